@@ -1,0 +1,306 @@
+//! A card: commands in, replies out. A state machine without I/O, fed with bytes and giving bytes.
+//!
+//! Whoever runs it ([`crate::serve`], or a simulator) calls [`Card::feed`] with what came, sends what
+//! [`Card::outgoing`] holds, and calls [`Card::work`] while [`Card::is_busy`]. No call takes longer than one stage of one
+//! pixel, none blocks, and nothing that is fed can make one panic.
+
+mod load;
+
+use heapless::Deque;
+use photoncard_shared::budget::{Budget, MICRO, REFERENCE, gather_candidates};
+use photoncard_shared::frame::{FrameReader, FrameWriter, MAX_FRAME};
+use photoncard_shared::image::LAYOUT_VERSION;
+use photoncard_shared::message::{
+    self, Command, Fault, FaultCode, FrameParameters, PIXEL_BYTES, PIXELS_PER_REPLY, PROTOCOL_VERSION, Reply,
+    Tile,
+};
+
+use self::load::{ImageState, Loader};
+use crate::chip::{Chip, sram_bytes};
+use crate::memory::{CardMemory, Dram};
+
+/// Tile commands that any budget may allow to wait.
+const TILE_QUEUE: usize = 4;
+
+/// A card of one chip: its memory, its chip and both directions of its link.
+pub struct Card<M, const TILE_PIXELS: usize, const CANDIDATES: usize> {
+    budget: Budget,
+    memory: M,
+    reader: FrameReader,
+    expected_sequence: u16,
+    session: Session<TILE_PIXELS, CANDIDATES>,
+    outgoing: Outgoing,
+}
+
+/// What commands act on.
+struct Session<const TILE_PIXELS: usize, const CANDIDATES: usize> {
+    chip: Chip<TILE_PIXELS, CANDIDATES>,
+    image: ImageState,
+    frame: Option<FrameParameters>,
+    tiles: Deque<Tile, TILE_QUEUE>,
+    at_work: Option<TileWork>,
+}
+
+/// The tile at work.
+#[derive(Clone, Copy)]
+enum TileWork {
+    Rendering(Tile),
+    /// Its pixels from this one on are still to be sent.
+    Sending(Tile, u32),
+}
+
+/// The frame on its way out.
+struct Outgoing {
+    writer: FrameWriter,
+    /// What of the writer's last frame is not yet sent.
+    bytes: heapless::Vec<u8, MAX_FRAME>,
+    sent: usize,
+}
+
+impl Outgoing {
+    fn rest(&self) -> &[u8] {
+        self.bytes.get(self.sent..).unwrap_or(&[])
+    }
+
+    fn send(&mut self, reply: &Reply) {
+        self.bytes.clear();
+        self.sent = 0;
+        if let Some(frame) = self.writer.write(|bytes| message::encode(reply, bytes)) {
+            // A frame is never longer than MAX_FRAME.
+            let _ = self.bytes.extend_from_slice(frame);
+        }
+    }
+}
+
+impl<M: CardMemory, const TILE_PIXELS: usize, const CANDIDATES: usize> Card<M, TILE_PIXELS, CANDIDATES> {
+    /// A card that has seen no host yet.
+    pub const fn new(budget: Budget, memory: M) -> Self {
+        Self {
+            budget,
+            memory,
+            reader: FrameReader::new(),
+            expected_sequence: 0,
+            session: Session {
+                chip: Chip::new(),
+                image: ImageState::None,
+                frame: None,
+                tiles: Deque::new(),
+                at_work: None,
+            },
+            outgoing: Outgoing { writer: FrameWriter::new(), bytes: heapless::Vec::new(), sent: 0 },
+        }
+    }
+
+    /// Whether there is something to do without a byte from the host.
+    pub fn is_busy(&self) -> bool {
+        self.session.at_work.is_some() || !self.session.tiles.is_empty()
+    }
+
+    /// What is to be sent now.
+    pub fn outgoing(&self) -> &[u8] {
+        self.outgoing.rest()
+    }
+
+    /// Tells that the first `bytes` of [`Self::outgoing`] are sent.
+    pub fn sent(&mut self, bytes: usize) {
+        self.outgoing.sent = self.outgoing.sent.saturating_add(bytes);
+    }
+
+    /// Takes bytes from the host; returns how many. While a reply waits to be sent it takes none.
+    pub fn feed(&mut self, bytes: &[u8]) -> usize {
+        let mut taken = 0;
+        while self.outgoing.rest().is_empty() {
+            let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) else { break };
+            let (count, frame) = self.reader.read(rest);
+            taken += count;
+            let Some(frame) = frame else { continue };
+            let result = match frame {
+                Err(_) => Err(Fault { code: FaultCode::Frame, detail: 0 }),
+                Ok(frame) => match message::decode::<Command>(frame.payload) {
+                    None => Err(Fault { code: FaultCode::Message, detail: frame.payload.len() as u32 }),
+                    Some(command) => check_sequence(&mut self.expected_sequence, frame.sequence, &command)
+                        .and_then(|()| self.session.execute(&self.budget, &mut self.memory, &command)),
+                },
+            };
+            match result {
+                Ok(Some(reply)) => self.outgoing.send(&reply),
+                Ok(None) => {}
+                Err(fault) => self.outgoing.send(&Reply::Fault(fault)),
+            }
+        }
+        taken
+    }
+
+    /// Does the next piece of work, unless a reply waits to be sent.
+    pub fn work(&mut self) {
+        if !self.outgoing.rest().is_empty() {
+            return;
+        }
+        if let Err(fault) = self.session.work(&mut self.memory, &mut self.outgoing) {
+            self.session.at_work = None;
+            self.outgoing.send(&Reply::Fault(fault));
+        }
+    }
+}
+
+/// Compares a frame's number with the one expected; a hello starts the count.
+fn check_sequence(expected: &mut u16, sequence: u16, command: &Command) -> Result<(), Fault> {
+    let fault = Fault { code: FaultCode::Sequence, detail: *expected as u32 };
+    let in_order = sequence == *expected || matches!(command, Command::Hello { .. });
+    // After a gap the count goes on from what came: one fault a gap.
+    *expected = sequence.wrapping_add(1);
+    if in_order { Ok(()) } else { Err(fault) }
+}
+
+const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
+
+impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Session<TILE_PIXELS, CANDIDATES> {
+    fn execute(
+        &mut self,
+        budget: &Budget,
+        memory: &mut impl CardMemory,
+        command: &Command,
+    ) -> Result<Option<Reply<'static>>, Fault> {
+        match *command {
+            Command::Hello { .. } => {
+                self.forget();
+                Ok(Some(hello(budget)))
+            }
+            Command::BeginImage { lines, checksum } => {
+                self.forget();
+                self.image = ImageState::Loading(Loader::new(memory, lines, checksum)?);
+                Ok(None)
+            }
+            Command::WriteLines { first, data } => {
+                self.image.loader()?.write(memory, first, data)?;
+                Ok(None)
+            }
+            Command::EndImage => {
+                let scene = core::mem::replace(&mut self.image, ImageState::None).loader()?.finish(memory)?;
+                self.image = ImageState::Ready(scene);
+                Ok(Some(Reply::ImageAccepted))
+            }
+            Command::BeginFrame(frame) => {
+                if self.image.scene().is_none() || self.at_work.is_some() || !self.tiles.is_empty() {
+                    return Err(OUT_OF_ORDER);
+                }
+                check_frame(budget, &frame)?;
+                self.frame = Some(frame);
+                self.chip.reset_counters();
+                Ok(Some(Reply::FrameAccepted))
+            }
+            Command::RenderTile(tile) => self.accept(budget, tile).map(|()| None),
+            Command::ReadCounters => Ok(Some(Reply::Counters(*self.chip.counters()))),
+        }
+    }
+
+    fn forget(&mut self) {
+        self.image = ImageState::None;
+        self.frame = None;
+        self.tiles.clear();
+        self.at_work = None;
+    }
+
+    fn accept(&mut self, budget: &Budget, tile: Tile) -> Result<(), Fault> {
+        let frame = self.frame.ok_or(OUT_OF_ORDER)?;
+        let fits =
+            |first: u32, count: u32, size: u32| first.checked_add(count).is_some_and(|end| end <= size);
+        let is_inside = fits(tile.x, tile.width, frame.width) && fits(tile.y, tile.height, frame.height);
+        if !is_inside || tile.pixels() == 0 || tile.pixels() > self.chip.tile_pixels() {
+            return Err(Fault { code: FaultCode::Tile, detail: tile.id });
+        }
+        let too_many = Fault { code: FaultCode::TooManyTiles, detail: tile.id };
+        let waiting = self.tiles.len() + usize::from(self.at_work.is_some());
+        if waiting >= budget.tiles as usize {
+            return Err(too_many);
+        }
+        self.tiles.push_back(tile).map_err(|_| too_many)
+    }
+
+    fn work(&mut self, memory: &mut impl CardMemory, outgoing: &mut Outgoing) -> Result<(), Fault> {
+        let (Some(scene), Some(frame)) = (self.image.scene(), self.frame.as_ref()) else { return Ok(()) };
+        match self.at_work {
+            None => {
+                if let Some(tile) = self.tiles.pop_front() {
+                    if !self.chip.begin(tile) {
+                        return Err(Fault { code: FaultCode::Tile, detail: tile.id });
+                    }
+                    self.at_work = Some(TileWork::Rendering(tile));
+                }
+            }
+            Some(TileWork::Rendering(tile)) => {
+                if self.chip.step(scene, memory, frame)? {
+                    self.at_work = Some(TileWork::Sending(tile, 0));
+                }
+            }
+            Some(TileWork::Sending(tile, first)) => {
+                let mut data = heapless::Vec::<u8, { PIXEL_BYTES * PIXELS_PER_REPLY }>::new();
+                let pixels = (first..first.saturating_add(PIXELS_PER_REPLY as u32))
+                    .map_while(|index| self.chip.pixel(index as usize, scene, frame));
+                for pixel in pixels {
+                    // There is room for PIXELS_PER_REPLY.
+                    let _ = data.extend_from_slice(&pixel.to_bytes());
+                }
+                if data.is_empty() {
+                    outgoing.send(&Reply::TileDone { tile: tile.id });
+                    self.at_work = None;
+                } else {
+                    outgoing.send(&Reply::Pixels { tile: tile.id, first, data: &data });
+                    self.at_work = Some(TileWork::Sending(tile, first + PIXELS_PER_REPLY as u32));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn hello(budget: &Budget) -> Reply<'static> {
+    Reply::Hello {
+        protocol: PROTOCOL_VERSION,
+        layout: LAYOUT_VERSION,
+        budget: *budget,
+        build: concat!("photoncard-firmware ", env!("CARGO_PKG_VERSION")),
+    }
+}
+
+/// Compares a frame's parameters with the budget; the fault's detail is the parameter's index.
+fn check_frame(budget: &Budget, frame: &FrameParameters) -> Result<(), Fault> {
+    let camera = &frame.camera;
+    let camera = [camera.origin, camera.forward, camera.right, camera.up];
+    let within = |value: u32, most: u32| (1..=most).contains(&value);
+    let checks = [
+        within(frame.width, MAX_PICTURE_SIDE),
+        within(frame.height, MAX_PICTURE_SIDE),
+        camera.as_flattened().iter().all(|component| component.is_finite()),
+        true,
+        within(frame.samples, budget.samples),
+        frame.gather_rays <= budget.gather_rays,
+        frame.shadow_rays <= budget.shadow_rays,
+        within(frame.neighbors, budget.neighbors),
+        frame.max_distance.is_finite() && frame.max_distance > 0.0,
+    ];
+    match checks.iter().position(|&holds| !holds) {
+        Some(index) => Err(Fault { code: FaultCode::Parameter, detail: index as u32 }),
+        None => Ok(()),
+    }
+}
+
+/// Pixels in a row or a column of a picture: `f32` tells them apart with room for the place in the pixel.
+pub const MAX_PICTURE_SIDE: u32 = 1 << 16;
+
+/// The card of the reference chip.
+pub type ReferenceCard<M> =
+    Card<M, { REFERENCE.tile_pixels as usize }, { gather_candidates(REFERENCE.neighbors) }>;
+
+/// The card of the micro chip.
+pub type MicroCard<M> = Card<M, { MICRO.tile_pixels as usize }, { gather_candidates(MICRO.neighbors) }>;
+
+/// On-chip memory of the reference card, bytes.
+pub const REFERENCE_SRAM_BYTES: usize = sram_bytes(&REFERENCE, size_of::<ReferenceCard<Dram<'static>>>());
+/// On-chip memory of the micro card, bytes.
+pub const MICRO_SRAM_BYTES: usize = sram_bytes(&MICRO, size_of::<MicroCard<Dram<'static>>>());
+
+const _: () = assert!(REFERENCE_SRAM_BYTES <= REFERENCE.sram_bytes as usize);
+const _: () = assert!(MICRO_SRAM_BYTES <= MICRO.sram_bytes as usize);
+const _: () = assert!(REFERENCE.tiles as usize <= TILE_QUEUE);
+const _: () = assert!(MICRO.tiles as usize <= TILE_QUEUE);

@@ -1,0 +1,103 @@
+//! Sums that come out the same in any order.
+//!
+//! A float sum depends on the order of its terms; an integer sum does not. Terms are rounded once to 2^-40 of a unit
+//! that the host chooses per scene (a power of two near the largest term), and added as integers.
+
+use fixed::types::I24F40;
+use glam::Vec3;
+use photoncard_shared::layout::Rgbe;
+
+/// 2^40: exact in `f32`, and so is the product with it.
+const SCALE: f32 = (1_u64 << 40) as f32;
+
+/// Rounds towards zero to 2^-40; what is not a number is zero, what is too large is the largest.
+#[inline(always)]
+fn from_f32(value: f32) -> I24F40 {
+    I24F40::from_bits((value * SCALE) as i64)
+}
+
+#[inline(always)]
+fn to_f32(value: I24F40) -> f32 {
+    value.to_bits() as f32 * (1.0 / SCALE)
+}
+
+/// The sum of many colours, exact but for the rounding of each term: its order does not matter.
+///
+/// A component holds less than 2^23 units and wraps above: `k` photons of a power unit each, reflected by a factor of
+/// at most a few thousand, stay far below.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ColourSum([I24F40; 3]);
+
+impl ColourSum {
+    /// No term yet.
+    pub const ZERO: Self = Self([I24F40::ZERO; 3]);
+
+    /// Adds a term, in units.
+    #[inline(always)]
+    pub fn add(&mut self, term: Vec3) {
+        for (sum, component) in self.0.iter_mut().zip(term.to_array()) {
+            *sum = sum.wrapping_add(from_f32(component));
+        }
+    }
+
+    /// Adds a shared-exponent colour: what [`Self::add`] does of the decoded one, in integers alone.
+    #[inline(always)]
+    pub fn add_rgbe(&mut self, Rgbe([r, g, b, exponent]): Rgbe) {
+        let shift = exponent as i32 - Rgbe::EXPONENT_BIAS + I24F40::FRAC_NBITS as i32;
+        for (sum, mantissa) in self.0.iter_mut().zip([r, g, b]) {
+            // A shift of 63 or more leaves nothing of a byte on either side.
+            let bits = if shift >= 0 {
+                (mantissa as i64) << shift.min(63)
+            } else {
+                mantissa as i64 >> (-shift).min(63)
+            };
+            *sum = sum.wrapping_add(I24F40::from_bits(bits));
+        }
+    }
+
+    /// The sum, in units.
+    #[inline(always)]
+    pub fn value(&self) -> Vec3 {
+        Vec3::from_array(self.0.map(to_f32))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sum_is_the_same_in_any_order() {
+        let terms: [Vec3; 100] = core::array::from_fn(|i| {
+            Vec3::new(1.0 / (i + 1) as f32, 1e-4 * (i as f32), if i == 50 { 7e4 } else { 1e-7 })
+        });
+        let mut forwards = ColourSum::ZERO;
+        terms.iter().for_each(|&term| forwards.add(term));
+        let mut backwards = ColourSum::ZERO;
+        terms.iter().rev().for_each(|&term| backwards.add(term));
+        assert_eq!(forwards, backwards);
+        assert!((forwards.value().x - 5.187_377_5).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_shared_exponent_colour_adds_what_its_decoded_form_adds() {
+        for exponent in 0..=144 {
+            for mantissas in [[255, 128, 1], [0, 77, 200]] {
+                let [r, g, b] = mantissas;
+                let colour = Rgbe([r, g, b, exponent]);
+                let mut direct = ColourSum::ZERO;
+                direct.add_rgbe(colour);
+                let mut decoded = ColourSum::ZERO;
+                decoded.add(Vec3::from_array(colour.decode()));
+                assert_eq!(direct, decoded, "{colour:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_number_adds_nothing() {
+        let mut sum = ColourSum::ZERO;
+        sum.add(Vec3::new(f32::NAN, 0.5, 0.0));
+        assert_eq!(sum.value(), Vec3::new(0.0, 0.5, 0.0));
+    }
+}

@@ -1,0 +1,36 @@
+//! Directly addressed memory: a slice of lines, nothing copied, nothing counted.
+
+use photoncard_shared::address::{Line, LineAddress, Structure};
+use photoncard_shared::message::Fault;
+
+use super::{CardMemory, MemoryPort, outside};
+
+/// DRAM that the processor can address.
+pub struct Dram<'a> {
+    lines: &'a mut [Line],
+}
+
+impl<'a> Dram<'a> {
+    /// The memory in `lines`; what is beyond 2^32 lines is not used.
+    pub fn new(lines: &'a mut [Line]) -> Self {
+        Self { lines }
+    }
+}
+
+impl MemoryPort for Dram<'_> {
+    #[inline(always)]
+    fn read(&mut self, _: Structure, address: LineAddress, _: u32) -> Result<&Line, Fault> {
+        self.lines.get(address.0 as usize).ok_or_else(|| outside(address))
+    }
+}
+
+impl CardMemory for Dram<'_> {
+    fn lines(&self) -> u32 {
+        u32::try_from(self.lines.len()).unwrap_or(u32::MAX)
+    }
+
+    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
+        let first = first.0 as usize;
+        self.lines.get_mut(first..first.checked_add(count as usize)?)
+    }
+}

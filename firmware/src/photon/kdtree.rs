@@ -1,0 +1,72 @@
+//! The photon map as Jensen's left-balanced kd-tree (*Realistic Image Synthesis Using Photon Mapping*, 2001, ch. 6):
+//! every node is a photon, the children of node i are 2 i + 1 and 2 i + 2, and no pointer is stored.
+
+use glam::Vec3;
+use heapless::Vec;
+use photoncard_shared::budget::KD_TREE_LEVELS;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{Photon, Record};
+use photoncard_shared::message::{Fault, FaultCode};
+
+use super::{Candidate, NearestPhotons};
+use crate::memory::MemoryPort;
+use crate::scene::SceneImage;
+
+const PHOTONS_PER_LINE: u32 = Photon::PER_LINE as u32;
+
+/// A subtree put off: its root, and the squared distance to the plane before it.
+struct Deferred {
+    node: u32,
+    distance_squared: f32,
+}
+
+/// Searches the photons nearest to `position` into `nearest`. Returns the number of photons tested.
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(always)]
+pub fn gather(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    position: Vec3,
+    nearest: &mut NearestPhotons,
+) -> Result<u32, Fault> {
+    let photons = scene.header.section(SectionKind::Photons).records;
+    let query = position.to_array();
+    let mut deferred: Vec<Deferred, KD_TREE_LEVELS> = Vec::new();
+    let mut node = 0;
+    let mut tested = 0;
+    while node < photons {
+        let record =
+            scene.record::<{ Photon::BYTES }, PHOTONS_PER_LINE>(memory, SectionKind::Photons, node)?;
+        tested += 1;
+        let place = Photon::position(record);
+        let [x, y, z] = [query[0] - place[0], query[1] - place[1], query[2] - place[2]];
+        let distance_squared = x * x + y * y + z * z;
+        let offset = match Photon::axis_of_flags(Photon::flags(record)) {
+            0 => x,
+            1 => y,
+            _ => z,
+        };
+        if distance_squared <= nearest.limit() {
+            nearest.insert(Candidate::new(distance_squared, node, record));
+        }
+        let left = 2 * node + 1;
+        let (near, far) = if offset < 0.0 { (left, left + 1) } else { (left + 1, left) };
+        let plane_squared = offset * offset;
+        if far < photons && plane_squared <= nearest.limit() {
+            let put_off = Deferred { node: far, distance_squared: plane_squared };
+            deferred.push(put_off).map_err(|_| Fault { code: FaultCode::Depth, detail: node })?;
+        }
+        node = near;
+        while node >= photons {
+            match deferred.pop() {
+                Some(next) if next.distance_squared <= nearest.limit() => node = next.node,
+                Some(_) => {}
+                None => break,
+            }
+        }
+    }
+    nearest.finish();
+    Ok(tested)
+}

@@ -1,0 +1,116 @@
+//! The radiance that the nearest photons reflect: Jensen's density estimate, corrected where it is known to be wrong.
+//!
+//! `L = 1 / (pi r^2 c) sum f(incoming) power`, over the photons within `r`. Three corrections, each principled:
+//!
+//! - The distance r to the k-th photon is a stopping rule: with all k photons in the sum the estimate is too bright by
+//!   `k / (k - 1)`. The k-th only says how far the search went; the k - 1 within r are summed. This is the unbiased
+//!   estimate of a Poisson density, also where fewer than k lie within the greatest distance and r is that distance.
+//! - Photons of another surface do not count: their surface normals differ. That leaves out photons on the other side
+//!   of a thin wall, and those on the other wall of a corner.
+//! - `c` is the part of the disc that is surface at all, without which every edge and corner darkens. The host measures
+//!   it around each photon, for that photon's own distance to its k-th neighbour; the nearest photon of the same
+//!   surface tells it here. At the distance of the nearest of k photons, about r / sqrt(k), c has hardly changed.
+//!
+//! What is left is the estimate's blur: the radiance is a mean over the disc.
+
+use core::f32::consts::PI;
+
+use glam::Vec3;
+use photoncard_shared::layout::{decode_direction, decode_normal};
+
+use super::{Candidate, NearestPhotons};
+use crate::fixed_point::ColourSum;
+use crate::scene::Surface;
+use crate::vector::{max, unit};
+
+/// Photons whose surface normal is at a lesser cosine to the query's belong to another surface.
+pub const MIN_NORMAL_COSINE: f32 = 0.75;
+
+/// The radius of a disc is at least this share of the greatest distance: photons in one point have no density.
+const MIN_RADIUS_SHARE: f32 = 1e-3;
+
+/// Radiance, in photon power units per (sr m^2), that `surface` reflects towards its outgoing direction.
+#[inline(always)]
+pub fn reflected_radiance(nearest: &NearestPhotons, surface: &Surface) -> Vec3 {
+    let candidates = nearest.candidates();
+    let Some(farthest) = candidates.iter().max_by_key(|candidate| candidate.key()) else { return Vec3::ZERO };
+    let (radius_squared, excluded) = if nearest.is_full() {
+        (farthest.distance_squared(), Some(farthest.key()))
+    } else {
+        (nearest.max_distance_squared(), None)
+    };
+    let mut same_surface = SameSurface::new(surface.normal);
+    let counted = candidates
+        .iter()
+        .filter(|candidate| Some(candidate.key()) != excluded && same_surface.holds(candidate.normal()));
+    let mut closest: Option<&Candidate> = None;
+    let mut sums = Sums::new(surface);
+    for candidate in counted {
+        if closest.is_none_or(|closest| candidate.key() < closest.key()) {
+            closest = Some(candidate);
+        }
+        sums.add(candidate);
+    }
+    let Some(closest) = closest else { return Vec3::ZERO };
+    let fraction = (closest.disc() as f32 + 1.0) * (1.0 / 64.0);
+    let least = MIN_RADIUS_SHARE * MIN_RADIUS_SHARE * nearest.max_distance_squared();
+    let area = PI * max(radius_squared, least) * fraction;
+    sums.reflected() * (1.0 / area)
+}
+
+/// The reflected power, photon by photon.
+struct Sums<'a> {
+    surface: &'a Surface,
+    mirror: Vec3,
+    power: ColourSum,
+    lobe: ColourSum,
+}
+
+impl<'a> Sums<'a> {
+    #[inline(always)]
+    fn new(surface: &'a Surface) -> Self {
+        let mirror = crate::scene::mirror(surface.outgoing, surface.normal);
+        Self { surface, mirror, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, photon: &Candidate) {
+        self.power.add_rgbe(photon.power());
+        if self.surface.reflection.has_lobe() {
+            let incoming = unit(decode_direction(photon.direction()).into());
+            let reflected = self.surface.reflection.lobe(self.mirror.dot(incoming));
+            self.lobe.add(reflected * Vec3::from_array(photon.power().decode()));
+        }
+    }
+
+    #[inline(always)]
+    fn reflected(&self) -> Vec3 {
+        self.surface.reflection.lambertian() * self.power.value() + self.lobe.value()
+    }
+}
+
+/// Tells the photons of one surface; neighbours mostly have the normal of the one before.
+struct SameSurface {
+    normal: Vec3,
+    last: Option<(u8, bool)>,
+}
+
+impl SameSurface {
+    #[inline(always)]
+    fn new(normal: Vec3) -> Self {
+        Self { normal, last: None }
+    }
+
+    #[inline(always)]
+    fn holds(&mut self, code: u8) -> bool {
+        match self.last {
+            Some((last, holds)) if last == code => holds,
+            _ => {
+                let other = unit(decode_normal(code).into());
+                let holds = other.dot(self.normal) >= MIN_NORMAL_COSINE;
+                self.last = Some((code, holds));
+                holds
+            }
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! The stages of a tile, each a function of one pixel or one ray.
+
+pub mod direct;
+pub mod eye;
+pub mod final_gather;
+
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::FrameParameters;
+
+use crate::scene::SceneImage;
+
+/// What every stage needs: the scene in its memory, the frame, and what is counted.
+pub struct Context<'a, M> {
+    /// Where the records lie.
+    pub scene: &'a SceneImage,
+    /// Card memory.
+    pub memory: &'a mut M,
+    /// The frame's parameters.
+    pub frame: &'a FrameParameters,
+    /// What is counted.
+    pub counters: &'a mut Counters,
+}
+
+/// One sample of one pixel: what random numbers depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelSample {
+    /// Column in the whole picture.
+    pub x: u32,
+    /// Row in the whole picture.
+    pub y: u32,
+    /// Number of the sample.
+    pub sample: u32,
+}

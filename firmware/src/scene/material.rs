@@ -1,0 +1,128 @@
+//! Reflection: Lambertian plus one Phong cosine lobe, `f = kd / pi + ks (n + 2) / (2 pi) max(0, cos alpha)^n`, alpha
+//! measured from the mirror direction.
+
+use core::f32::consts::{FRAC_1_PI, PI};
+
+use glam::Vec3;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{DOUBLE_SIDED, Material, Record};
+use photoncard_shared::message::Fault;
+
+use super::{Hit, Ray, SceneImage};
+use crate::memory::MemoryPort;
+use crate::vector::{max_component, unit};
+
+const MATERIALS_PER_LINE: u32 = Material::PER_LINE as u32;
+
+/// The point where a ray meets a surface, on the side that it comes from.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// The point, metres.
+    pub position: Vec3,
+    /// Unit geometric normal on the side of the ray's origin.
+    pub normal: Vec3,
+    /// Unit vector back along the ray.
+    pub outgoing: Vec3,
+    /// How this side reflects; black on the back of a one-sided surface.
+    pub reflection: Reflection,
+    /// Radiance that this side emits, W/(sr m^2).
+    pub emission: Vec3,
+    /// Distance along the ray, metres.
+    pub distance: f32,
+}
+
+/// A reflection function's parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reflection {
+    /// Lambertian albedo.
+    pub diffuse: Vec3,
+    /// Albedo of the Phong lobe.
+    pub specular: Vec3,
+    /// Exponent of the Phong lobe.
+    pub exponent: f32,
+}
+
+impl Reflection {
+    /// No reflection.
+    pub const BLACK: Self = Self { diffuse: Vec3::ZERO, specular: Vec3::ZERO, exponent: 0.0 };
+
+    /// Whether nothing is reflected.
+    #[inline(always)]
+    pub fn is_black(&self) -> bool {
+        max_component(self.diffuse) <= 0.0 && !self.has_lobe()
+    }
+
+    /// Whether there is a Phong lobe.
+    #[inline(always)]
+    pub fn has_lobe(&self) -> bool {
+        max_component(self.specular) > 0.0
+    }
+
+    /// The Lambertian part of `f`, 1/sr.
+    #[inline(always)]
+    pub fn lambertian(&self) -> Vec3 {
+        self.diffuse * FRAC_1_PI
+    }
+
+    /// The lobe's part of `f`, 1/sr, for an incoming direction at `cosine` to the mirror direction.
+    #[inline(always)]
+    pub fn lobe(&self, cosine: f32) -> Vec3 {
+        if cosine <= 0.0 {
+            return Vec3::ZERO;
+        }
+        self.specular * ((self.exponent + 2.0) / (2.0 * PI) * libm::powf(cosine, self.exponent))
+    }
+
+    /// `f`, 1/sr, for unit vectors away from the surface, both on the side of `normal`.
+    #[inline(always)]
+    pub fn evaluate(&self, normal: Vec3, outgoing: Vec3, incoming: Vec3) -> Vec3 {
+        if !self.has_lobe() {
+            return self.lambertian();
+        }
+        self.lambertian() + self.lobe(mirror(outgoing, normal).dot(incoming))
+    }
+}
+
+/// The mirror direction of a unit vector about a unit normal.
+#[inline(always)]
+pub(crate) fn mirror(direction: Vec3, normal: Vec3) -> Vec3 {
+    normal * (2.0 * normal.dot(direction)) - direction
+}
+
+/// Reads what a ray finds where it meets a triangle.
+///
+/// # Errors
+/// If the triangle's material is not in the image.
+#[inline(always)]
+pub fn read_surface(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    ray: &Ray,
+    hit: &Hit,
+) -> Result<Surface, Fault> {
+    let bytes = scene.record::<{ Material::BYTES }, MATERIALS_PER_LINE>(
+        memory,
+        SectionKind::Materials,
+        hit.triangle.material,
+    )?;
+    let material = Material::read(bytes);
+    let [a, b, c] = hit.triangle.vertices.map(Vec3::from_array);
+    let front_normal = unit((b - a).cross(c - a));
+    let is_front = front_normal.dot(ray.direction) < 0.0;
+    let visible = is_front || material.flags & DOUBLE_SIDED != 0;
+    let [u, v, w] = hit.intersection.barycentric;
+    let reflection = Reflection {
+        diffuse: material.diffuse.into(),
+        specular: material.specular.into(),
+        exponent: material.exponent,
+    };
+    Ok(Surface {
+        // From the corners and not along the ray: the rounding is then that of the corners.
+        position: a * u + b * v + c * w,
+        normal: if is_front { front_normal } else { -front_normal },
+        outgoing: -ray.direction,
+        reflection: if visible { reflection } else { Reflection::BLACK },
+        emission: if visible { material.emission.into() } else { Vec3::ZERO },
+        distance: hit.intersection.distance,
+    })
+}

@@ -1,0 +1,89 @@
+//! The scene in card memory: views that read its records line by line.
+
+mod bvh;
+mod emitter;
+mod material;
+mod triangle;
+
+pub use bvh::{Hit, closest_hit, is_occluded};
+pub use emitter::{EmitterSample, sample_emitter};
+pub(crate) use material::mirror;
+pub use material::{Reflection, Surface, read_surface};
+pub use triangle::{Intersection, RayFrame};
+
+use glam::Vec3;
+use photoncard_shared::address::{LineAddress, Structure};
+use photoncard_shared::image::{Header, SectionKind};
+use photoncard_shared::message::{Fault, FaultCode};
+
+use crate::memory::MemoryPort;
+
+/// A ray: the points `origin + t direction` with `t` in (0, `max_distance`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts, metres.
+    pub origin: Vec3,
+    /// Unit vector of its way.
+    pub direction: Vec3,
+    /// Where it ends, metres from the origin.
+    pub max_distance: f32,
+}
+
+impl Ray {
+    /// A ray without end.
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, direction, max_distance: f32::INFINITY }
+    }
+}
+
+/// A loaded card image: what is needed to find its records.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SceneImage {
+    /// The header, checked.
+    pub header: Header,
+}
+
+impl SceneImage {
+    /// Reads record `index` of a section, `N` bytes, `PER_LINE` to a line.
+    ///
+    /// # Errors
+    /// [`FaultCode::Record`] past the section's last record, [`FaultCode::LineRange`] outside the memory.
+    #[inline(always)]
+    pub fn record<'m, const N: usize, const PER_LINE: u32>(
+        &self,
+        memory: &'m mut impl MemoryPort,
+        kind: SectionKind,
+        index: u32,
+    ) -> Result<&'m [u8; N], Fault> {
+        let fault = Fault { code: FaultCode::Record, detail: index };
+        let (line, slot) = self.header.section(kind).locate::<PER_LINE>(index).ok_or(fault)?;
+        let structure = match kind {
+            SectionKind::Photons => Structure::PhotonMap,
+            _ => Structure::Scene,
+        };
+        read_slot(memory, structure, line, slot).ok_or(fault)?
+    }
+}
+
+#[inline(always)]
+fn read_slot<const N: usize>(
+    memory: &mut impl MemoryPort,
+    structure: Structure,
+    line: LineAddress,
+    slot: usize,
+) -> Option<Result<&[u8; N], Fault>> {
+    match memory.read(structure, line, N as u32) {
+        Ok(line) => line.record::<N>(slot).map(Ok),
+        Err(fault) => Some(Err(fault)),
+    }
+}
+
+/// A point just off a surface, on the side of `normal`, from which a ray does not meet the surface again.
+///
+/// The rounding of a point on a triangle is a few units in the last place of its greatest coordinate; the offset is
+/// 16 of them.
+#[inline(always)]
+pub fn offset_origin(position: Vec3, normal: Vec3) -> Vec3 {
+    let magnitude = crate::vector::max_component(position.abs()) + 1e-3;
+    position + normal * (magnitude * (16.0 * f32::EPSILON))
+}

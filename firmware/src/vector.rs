@@ -1,0 +1,47 @@
+//! Small geometry that glam does not have, the same on every processor.
+
+use glam::Vec3;
+
+/// The lesser of two numbers; `b` if either is NaN, as the SSE instruction does.
+#[inline(always)]
+pub(crate) fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers; `b` if either is NaN, as the SSE instruction does.
+#[inline(always)]
+pub(crate) fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Two unit vectors that form a right-handed frame with a unit normal (Duff et al. 2017, *Building an orthonormal
+/// basis, revisited*).
+#[inline(always)]
+pub(crate) fn tangents(normal: Vec3) -> (Vec3, Vec3) {
+    let sign = if normal.z < 0.0 { -1.0 } else { 1.0 };
+    let a = -1.0 / (sign + normal.z);
+    let b = normal.x * normal.y * a;
+    let tangent = Vec3::new(1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x);
+    let bitangent = Vec3::new(b, sign + normal.y * normal.y * a, -normal.y);
+    (tangent, bitangent)
+}
+
+/// The vector with these coordinates in the frame of `normal`, which is its third axis.
+#[inline(always)]
+pub(crate) fn from_frame(normal: Vec3, x: f32, y: f32, z: f32) -> Vec3 {
+    let (tangent, bitangent) = tangents(normal);
+    tangent * x + bitangent * y + normal * z
+}
+
+/// The unit vector along `vector`, or zero if it has no length.
+#[inline(always)]
+pub(crate) fn unit(vector: Vec3) -> Vec3 {
+    let length_squared = vector.length_squared();
+    if length_squared > 0.0 { vector * (1.0 / libm::sqrtf(length_squared)) } else { Vec3::ZERO }
+}
+
+/// The greatest component.
+#[inline(always)]
+pub(crate) fn max_component(v: Vec3) -> f32 {
+    max(max(v.x, v.y), v.z)
+}

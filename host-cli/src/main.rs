@@ -1,0 +1,2 @@
+//! The `photoncard` command.
+fn main() {}

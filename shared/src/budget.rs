@@ -1,0 +1,72 @@
+//! What a chip can hold. One room for every capacity: containers take theirs from here, and nowhere else.
+
+use serde::{Deserialize, Serialize};
+
+/// The fixed capacities of one kind of chip. A host reads them in the card's hello and keeps within them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Budget {
+    /// On-chip memory, bytes.
+    pub sram_bytes: u32,
+    /// Private DRAM, bytes.
+    pub dram_bytes: u32,
+    /// Share of the on-chip memory for the cache of the photon kd-tree, bytes.
+    pub photon_cache_bytes: u32,
+    /// Share of the on-chip memory for the ray caster's cache, bytes.
+    pub scene_cache_bytes: u32,
+    /// Share of the on-chip memory for the stack, bytes.
+    pub stack_bytes: u32,
+    /// Pixels of one tile.
+    pub tile_pixels: u32,
+    /// Photons that one gather can look for.
+    pub neighbors: u32,
+    /// Final gather rays of one sample.
+    pub gather_rays: u32,
+    /// Shadow rays of one sample.
+    pub shadow_rays: u32,
+    /// Samples of one pixel.
+    pub samples: u32,
+    /// Tile commands that may be waiting or at work on a chip: its credits.
+    pub tiles: u32,
+}
+
+/// The reference chip: the dissertation's, with 128 KB of photon cache (6.5), a 75 KB ray caster cache (7.3.2), tiles
+/// of 16x16 (up to 32x32 here) and up to 200 gather rays.
+pub const REFERENCE: Budget = Budget {
+    sram_bytes: 1 << 20,
+    dram_bytes: 512 << 20,
+    photon_cache_bytes: 128 << 10,
+    scene_cache_bytes: 75 << 10,
+    stack_bytes: 16 << 10,
+    tile_pixels: 1024,
+    neighbors: 256,
+    gather_rays: 256,
+    shadow_rays: 64,
+    samples: 4096,
+    tiles: 4,
+};
+
+/// The micro chip: everything within the 256 KB of SRAM that microcontrollers have.
+pub const MICRO: Budget = Budget {
+    sram_bytes: 256 << 10,
+    dram_bytes: 16 << 20,
+    photon_cache_bytes: 64 << 10,
+    scene_cache_bytes: 32 << 10,
+    stack_bytes: 16 << 10,
+    tile_pixels: 256,
+    neighbors: 128,
+    gather_rays: 256,
+    shadow_rays: 64,
+    samples: 4096,
+    tiles: 2,
+};
+
+/// Entries of the stack of a descent in the bounding volume hierarchy: a host refuses a hierarchy that needs more.
+pub const BVH_STACK: usize = 64;
+
+/// Levels of the photon kd-tree: enough for 2^27 photons.
+pub const KD_TREE_LEVELS: usize = 27;
+
+/// Candidates that a gather of `neighbors` photons may hold before it selects the nearest of them.
+pub const fn gather_candidates(neighbors: u32) -> usize {
+    2 * neighbors as usize
+}

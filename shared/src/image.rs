@@ -1,0 +1,210 @@
+//! The card image: one run of lines that holds all a chip needs of a scene.
+//!
+//! Line 0 is the header: magic, layout version, number of lines, units, and a table of sections. A section is a run
+//! of lines that holds records of one kind, packed as [`crate::layout`] says; the last line of each is padded with
+//! zero bytes.
+
+use crate::address::{LINE_BYTES, Line, LineAddress};
+use crate::layout::{BvhNode, Emitter, Material, Photon, Record, Triangle};
+
+/// The first eight bytes of an image.
+pub const MAGIC: [u8; 8] = *b"PHOTCARD";
+/// The version of everything in this module and in [`crate::layout`].
+pub const LAYOUT_VERSION: u16 = 1;
+/// Emitter thresholds in one line.
+pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
+
+/// The sections of an image, in the order of the table and of the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SectionKind {
+    /// [`BvhNode`]s, the root first.
+    Nodes = 0,
+    /// [`Triangle`]s, in the order of the leaves.
+    Triangles = 1,
+    /// [`Material`]s.
+    Materials = 2,
+    /// [`Emitter`]s.
+    Emitters = 3,
+    /// One `u32` an emitter: the upper end of its share of the probabilities, of 2^32; the last is 2^32 - 1.
+    EmitterThresholds = 4,
+    /// [`Photon`]s, a left-balanced kd-tree: the children of `i` are `2 i + 1` and `2 i + 2`.
+    Photons = 5,
+}
+
+/// Number of sections.
+pub const SECTIONS: usize = 6;
+
+impl SectionKind {
+    /// All sections, in order.
+    pub const ALL: [Self; SECTIONS] = [
+        Self::Nodes,
+        Self::Triangles,
+        Self::Materials,
+        Self::Emitters,
+        Self::EmitterThresholds,
+        Self::Photons,
+    ];
+
+    /// Records that one line holds.
+    pub const fn records_per_line(self) -> u32 {
+        match self {
+            Self::Nodes => BvhNode::PER_LINE as u32,
+            Self::Triangles => Triangle::PER_LINE as u32,
+            Self::Materials => Material::PER_LINE as u32,
+            Self::Emitters => Emitter::PER_LINE as u32,
+            Self::EmitterThresholds => THRESHOLDS_PER_LINE,
+            Self::Photons => Photon::PER_LINE as u32,
+        }
+    }
+}
+
+/// A run of records.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Section {
+    /// The line it starts at.
+    pub first_line: u32,
+    /// How many records it holds.
+    pub records: u32,
+}
+
+impl Section {
+    /// The line of record `index` and its slot in that line; `None` past the last record.
+    #[inline(always)]
+    pub fn locate<const PER_LINE: u32>(self, index: u32) -> Option<(LineAddress, usize)> {
+        (index < self.records).then(|| {
+            // No overflow: `Header::read` has checked the section's last line.
+            let line = self.first_line.wrapping_add(index / PER_LINE);
+            (LineAddress(line), (index % PER_LINE) as usize)
+        })
+    }
+}
+
+/// The first line of an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Header {
+    /// Lines of the whole image, the header's own among them.
+    pub lines: u32,
+    /// Watts that a photon power of 1 stands for.
+    pub photon_power_unit: f32,
+    /// Radiance that a fixed-point pixel sum of 1 stands for, W/(sr m^2): a power of two.
+    pub radiance_unit: f32,
+    /// Where the records lie, by [`SectionKind`].
+    pub sections: [Section; SECTIONS],
+}
+
+/// What is wrong with a header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeaderError {
+    /// It does not begin with [`MAGIC`].
+    Magic,
+    /// It was written for another layout version, the one given.
+    Version(u16),
+    /// A unit is not a positive finite number.
+    Unit,
+    /// The section of this index reaches past the image's last line.
+    Section(u8),
+}
+
+const SECTION_TABLE: usize = 32;
+
+impl Header {
+    /// The section of this kind.
+    pub fn section(&self, kind: SectionKind) -> Section {
+        self.sections[kind as usize]
+    }
+
+    /// The header's line.
+    pub fn to_line(&self) -> Line {
+        let mut line = Line::ZERO;
+        let mut put =
+            |offset: usize, bytes: &[u8]| line.0[offset..offset + bytes.len()].copy_from_slice(bytes);
+        put(0, &MAGIC);
+        put(8, &LAYOUT_VERSION.to_le_bytes());
+        put(12, &self.lines.to_le_bytes());
+        put(16, &self.photon_power_unit.to_le_bytes());
+        put(20, &self.radiance_unit.to_le_bytes());
+        for (index, section) in self.sections.iter().enumerate() {
+            put(SECTION_TABLE + 8 * index, &section.first_line.to_le_bytes());
+            put(SECTION_TABLE + 8 * index + 4, &section.records.to_le_bytes());
+        }
+        line
+    }
+
+    /// Reads and checks a header: whatever it returns, no section reaches past `lines`.
+    pub fn read(line: &Line) -> Result<Self, HeaderError> {
+        let word = |offset: usize| {
+            let at = |i: usize| line.0.get(offset + i).copied().unwrap_or(0);
+            u32::from_le_bytes([at(0), at(1), at(2), at(3)])
+        };
+        if !line.0.starts_with(&MAGIC) {
+            return Err(HeaderError::Magic);
+        }
+        let version = word(8) as u16;
+        if version != LAYOUT_VERSION {
+            return Err(HeaderError::Version(version));
+        }
+        let header = Self {
+            lines: word(12),
+            photon_power_unit: f32::from_bits(word(16)),
+            radiance_unit: f32::from_bits(word(20)),
+            sections: core::array::from_fn(|index| Section {
+                first_line: word(SECTION_TABLE + 8 * index),
+                records: word(SECTION_TABLE + 8 * index + 4),
+            }),
+        };
+        header.check()?;
+        Ok(header)
+    }
+
+    fn check(&self) -> Result<(), HeaderError> {
+        let is_unit = |x: f32| x.is_normal() && x > 0.0;
+        if !is_unit(self.photon_power_unit) || !is_unit(self.radiance_unit) {
+            return Err(HeaderError::Unit);
+        }
+        for kind in SectionKind::ALL {
+            let section = self.section(kind);
+            let lines = section.records.div_ceil(kind.records_per_line());
+            match section.first_line.checked_add(lines) {
+                Some(end) if end <= self.lines => {}
+                _ => return Err(HeaderError::Section(kind as u8)),
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header() -> Header {
+        let mut sections = [Section::default(); SECTIONS];
+        sections[SectionKind::Photons as usize] = Section { first_line: 10, records: 60 };
+        Header { lines: 20, photon_power_unit: 0.5, radiance_unit: 2.0, sections }
+    }
+
+    #[test]
+    fn a_header_survives_its_line() {
+        assert_eq!(Header::read(&header().to_line()), Ok(header()));
+    }
+
+    #[test]
+    fn a_section_past_the_end_is_refused() {
+        let mut long = header();
+        long.sections[SectionKind::Photons as usize].records = 61;
+        assert_eq!(Header::read(&long.to_line()), Err(HeaderError::Section(5)));
+        long.sections[SectionKind::Photons as usize] = Section { first_line: u32::MAX, records: u32::MAX };
+        assert_eq!(Header::read(&long.to_line()), Err(HeaderError::Section(5)));
+    }
+
+    #[test]
+    fn what_is_not_an_image_is_refused() {
+        assert_eq!(Header::read(&Line::ZERO), Err(HeaderError::Magic));
+        let mut other = header().to_line();
+        other.0[8] = 77;
+        assert_eq!(Header::read(&other), Err(HeaderError::Version(77)));
+        let unitless = Header { radiance_unit: f32::NAN, ..header() };
+        assert_eq!(Header::read(&unitless.to_line()), Err(HeaderError::Unit));
+    }
+}

@@ -1,0 +1,66 @@
+//! The records of card memory, little-endian, none of which straddles a line.
+//!
+//! | record | bytes | a line holds |
+//! |---|---|---|
+//! | [`Photon`] | 20 | 6 |
+//! | [`BvhNode`] | 128 | 1 |
+//! | [`Triangle`] | 40 | 3 |
+//! | [`Material`] | 64 | 2 |
+//! | [`Emitter`] | 64 | 2 |
+//! | emitter threshold | 4 | 32 |
+//!
+//! Colours and vectors are three `f32`; lengths are metres, powers watts per channel divided by the image's photon
+//! power unit, radiances W/(sr m^2).
+
+use crate::address::LINE_BYTES;
+
+mod direction;
+mod photon;
+mod scene;
+
+pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
+pub use photon::{FULL_DISC, Photon, Rgbe};
+pub use scene::{BvhNode, ChildReference, DOUBLE_SIDED, Emitter, MAX_LEAF_TRIANGLES, Material, Triangle};
+
+/// A record of fixed size in card memory.
+pub trait Record: Sized {
+    /// Bytes of the record.
+    const BYTES: usize;
+    /// Records in one line.
+    const PER_LINE: usize = LINE_BYTES / Self::BYTES;
+}
+
+/// Reads three consecutive `f32` from `bytes`, the first at `offset`; zero where the bytes end.
+#[inline(always)]
+fn read_vector<const N: usize>(bytes: &[u8; N], offset: usize) -> [f32; 3] {
+    [read_f32(bytes, offset), read_f32(bytes, offset + 4), read_f32(bytes, offset + 8)]
+}
+
+#[inline(always)]
+fn read_u32<const N: usize>(bytes: &[u8; N], offset: usize) -> u32 {
+    match bytes.get(offset..).and_then(<[u8]>::first_chunk) {
+        Some(word) => u32::from_le_bytes(*word),
+        None => 0,
+    }
+}
+
+#[inline(always)]
+fn read_f32<const N: usize>(bytes: &[u8; N], offset: usize) -> f32 {
+    f32::from_bits(read_u32(bytes, offset))
+}
+
+fn write_u32<const N: usize>(bytes: &mut [u8; N], offset: usize, value: u32) {
+    if let Some(word) = bytes.get_mut(offset..).and_then(<[u8]>::first_chunk_mut) {
+        *word = value.to_le_bytes();
+    }
+}
+
+fn write_f32<const N: usize>(bytes: &mut [u8; N], offset: usize, value: f32) {
+    write_u32(bytes, offset, value.to_bits());
+}
+
+fn write_vector<const N: usize>(bytes: &mut [u8; N], offset: usize, value: [f32; 3]) {
+    for (axis, component) in value.into_iter().enumerate() {
+        write_f32(bytes, offset + 4 * axis, component);
+    }
+}

@@ -1,0 +1,179 @@
+//! The photon of Jensen's book, 20 bytes: position, shared-exponent power, direction and flags.
+
+use super::{Record, read_vector, write_vector};
+
+/// One photon of the map, a node of the left-balanced kd-tree.
+///
+/// | bytes | what |
+/// |---|---|
+/// | 0..12 | position, metres |
+/// | 12..16 | power, [`Rgbe`], in units of the image's photon power unit |
+/// | 16..18 | direction towards where the photon came from, [`super::encode_direction`] |
+/// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-15 disc fraction |
+///
+/// The *disc fraction* is how much of the flat disc around the photon, of its gather's radius, is surface that the
+/// photon's own surface continues to: `(code + 1) / 64`. A gather divides by that part of the disc's area, which keeps
+/// the density estimate right at edges and in corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Photon {
+    /// Where the photon arrived, metres.
+    pub position: [f32; 3],
+    /// The power it carries, in photon power units.
+    pub power: Rgbe,
+    /// Octahedral code of the direction it came from.
+    pub direction: [u8; 2],
+    /// The axis the kd-tree is split on here: 0, 1 or 2.
+    pub axis: u8,
+    /// Octahedral code of the surface normal, on the side the photon arrived at.
+    pub normal: u8,
+    /// Code of the disc fraction, 0 to [`FULL_DISC`].
+    pub disc: u8,
+}
+
+/// The disc fraction's code of a whole disc.
+pub const FULL_DISC: u8 = 63;
+
+impl Record for Photon {
+    const BYTES: usize = 20;
+}
+
+impl Photon {
+    /// Reads a record.
+    #[inline(always)]
+    pub fn read(bytes: &[u8; Self::BYTES]) -> Self {
+        let flags = Self::flags(bytes);
+        Self {
+            position: Self::position(bytes),
+            power: Rgbe([bytes[12], bytes[13], bytes[14], bytes[15]]),
+            direction: [bytes[16], bytes[17]],
+            axis: Self::axis_of_flags(flags),
+            normal: Self::normal_of_flags(flags),
+            disc: Self::disc_of_flags(flags),
+        }
+    }
+
+    /// The position alone.
+    #[inline(always)]
+    pub fn position(bytes: &[u8; Self::BYTES]) -> [f32; 3] {
+        read_vector(bytes, 0)
+    }
+
+    /// The flags alone.
+    #[inline(always)]
+    pub fn flags(bytes: &[u8; Self::BYTES]) -> u16 {
+        u16::from_le_bytes([bytes[18], bytes[19]])
+    }
+
+    /// The splitting axis in the flags.
+    #[inline(always)]
+    pub fn axis_of_flags(flags: u16) -> u8 {
+        (flags & 3) as u8
+    }
+
+    /// The surface normal's code in the flags.
+    #[inline(always)]
+    pub fn normal_of_flags(flags: u16) -> u8 {
+        (flags >> 2) as u8
+    }
+
+    /// The disc fraction's code in the flags.
+    #[inline(always)]
+    pub fn disc_of_flags(flags: u16) -> u8 {
+        (flags >> 10) as u8
+    }
+
+    /// The record's bytes.
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        write_vector(&mut bytes, 0, self.position);
+        bytes[12..16].copy_from_slice(&self.power.0);
+        bytes[16..18].copy_from_slice(&self.direction);
+        let flags =
+            (self.axis & 3) as u16 | (self.normal as u16) << 2 | (self.disc.min(FULL_DISC) as u16) << 10;
+        bytes[18..20].copy_from_slice(&flags.to_le_bytes());
+        bytes
+    }
+}
+
+/// Three non-negative numbers with a shared exponent (Ward 1991): `mantissa * 2^(exponent - 136)`, rounded to nearest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rgbe(pub [u8; 4]);
+
+impl Rgbe {
+    /// What is added to a mantissa's binary exponent to make the fourth byte: 128, and 8 for the mantissa's bits.
+    pub const EXPONENT_BIAS: i32 = 136;
+
+    /// The nearest representable colour; negative and non-finite components count as zero.
+    pub fn encode(colour: [f32; 3]) -> Self {
+        let colour = colour.map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 });
+        let largest = colour.into_iter().fold(0.0_f32, |a, b| if b > a { b } else { a });
+        if largest < f32::MIN_POSITIVE {
+            return Self([0; 4]);
+        }
+        // largest = m 2^e with m in [1, 2); its mantissa byte is then in [128, 255], or 256 when it rounds up.
+        let mut exponent = (largest.to_bits() >> 23) as i32 - 127 + 1;
+        if (largest * power_of_two(8 - exponent) + 0.5) as u32 > 255 {
+            exponent += 1;
+        }
+        let code = exponent + Self::EXPONENT_BIAS - 8;
+        if code <= 0 {
+            return Self([0; 4]);
+        }
+        let [r, g, b] = colour.map(|c| (c * power_of_two(8 - exponent) + 0.5) as u8);
+        Self([r, g, b, code.min(255) as u8])
+    }
+
+    /// The colour.
+    #[inline(always)]
+    pub fn decode(self) -> [f32; 3] {
+        let [r, g, b, exponent] = self.0;
+        let scale = power_of_two(exponent as i32 - Self::EXPONENT_BIAS);
+        [r as f32 * scale, g as f32 * scale, b as f32 * scale]
+    }
+}
+
+/// `2^exponent`, clamped to the normal numbers.
+#[inline(always)]
+fn power_of_two(exponent: i32) -> f32 {
+    f32::from_bits(((exponent.clamp(-126, 127) + 127) as u32) << 23)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_photon_survives_its_record() {
+        let photon = Photon {
+            position: [1.5, -2.25, 1e-7],
+            power: Rgbe::encode([1.0, 0.25, 0.5]),
+            direction: [3, 200],
+            axis: 2,
+            normal: 0xa5,
+            disc: 41,
+        };
+        assert_eq!(Photon::read(&photon.to_bytes()), photon);
+    }
+
+    #[test]
+    fn rgbe_is_right_to_half_a_step_of_its_largest_component() {
+        for exponent in -40..40 {
+            for mantissa in 0..64 {
+                let largest = (1.0 + mantissa as f32 / 64.0) * power_of_two(exponent);
+                for colour in [[largest, largest * 0.3, 0.0], [0.01 * largest, largest, largest]] {
+                    let decoded = Rgbe::encode(colour).decode();
+                    for (a, b) in colour.into_iter().zip(decoded) {
+                        assert!((a - b).abs() <= largest / 255.0, "{colour:?} {decoded:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rgbe_takes_what_is_not_a_colour_as_black() {
+        for colour in [[0.0; 3], [-1.0, f32::NAN, f32::NEG_INFINITY], [1e-45, 0.0, 0.0]] {
+            assert_eq!(Rgbe::encode(colour).decode(), [0.0; 3]);
+        }
+    }
+}

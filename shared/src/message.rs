@@ -1,0 +1,249 @@
+//! Messages: what host and card say to each other. Each is the payload of one frame, in postcard's encoding.
+//!
+//! The host speaks first. A session is
+//!
+//! ```text
+//! Hello           -> Hello                       versions, budget, build
+//! BeginImage      -> (nothing)
+//! WriteLines ...  -> (nothing)                   any number, each up to sixteen lines
+//! EndImage        -> ImageAccepted               the checksum of all lines compared, the header read
+//! BeginFrame      -> FrameAccepted
+//! RenderTile ...  -> Pixels ..., TileDone        at most the budget's `tiles` unanswered
+//! ReadCounters    -> Counters
+//! ```
+//!
+//! Whatever a card cannot do it answers with [`Reply::Fault`]; it stays ready for the next command.
+
+use serde::{Deserialize, Serialize};
+
+use crate::budget::Budget;
+use crate::counters::Counters;
+
+/// The version of this module and of [`crate::frame`].
+pub const PROTOCOL_VERSION: u16 = 1;
+
+/// Lines that one [`Command::WriteLines`] may carry.
+pub const LINES_PER_WRITE: usize = 16;
+
+/// A pinhole camera. The ray through the picture's point `(u, v)`, both from 0 to 1, v downwards, has the direction
+/// `forward + (2 u - 1) right + (1 - 2 v) up`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Camera {
+    /// The pinhole, metres.
+    pub origin: [f32; 3],
+    /// Unit vector of the view.
+    pub forward: [f32; 3],
+    /// To the right edge of the picture, at distance 1.
+    pub right: [f32; 3],
+    /// To the upper edge of the picture, at distance 1.
+    pub up: [f32; 3],
+}
+
+/// All that a picture depends on besides the card image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrameParameters {
+    /// Pixels of the whole picture in a row.
+    pub width: u32,
+    /// Rows of the whole picture.
+    pub height: u32,
+    /// The view.
+    pub camera: Camera,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Final gather rays a sample.
+    pub gather_rays: u32,
+    /// Shadow rays a sample.
+    pub shadow_rays: u32,
+    /// Photons a gather looks for.
+    pub neighbors: u32,
+    /// How far from its place a gather looks, metres.
+    pub max_distance: f32,
+}
+
+/// A rectangle of the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tile {
+    /// The host's number for it.
+    pub id: u32,
+    /// First column.
+    pub x: u32,
+    /// First row, from the top.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Tile {
+    /// Number of pixels.
+    pub fn pixels(&self) -> u64 {
+        self.width as u64 * self.height as u64
+    }
+}
+
+/// From the host to a card.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Command<'a> {
+    /// Who are you? Any time; forgets image and frame.
+    Hello {
+        /// The host's [`PROTOCOL_VERSION`].
+        protocol: u16,
+        /// The host's [`crate::image::LAYOUT_VERSION`].
+        layout: u16,
+    },
+    /// An image of so many lines follows, with this checksum of all its bytes.
+    BeginImage {
+        /// Lines.
+        lines: u32,
+        /// CRC-32C.
+        checksum: u32,
+    },
+    /// The next lines of the image: those from line `first` on.
+    WriteLines {
+        /// Number of the first.
+        first: u32,
+        /// Whole lines, at most [`LINES_PER_WRITE`].
+        #[serde(borrow)]
+        data: &'a [u8],
+    },
+    /// The image is complete.
+    EndImage,
+    /// The parameters of the tiles to come; counters start again at zero.
+    BeginFrame(FrameParameters),
+    /// Render a tile.
+    RenderTile(Tile),
+    /// Tell the counters.
+    ReadCounters,
+}
+
+/// From a card to the host.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Reply<'a> {
+    /// Who I am.
+    Hello {
+        /// The card's [`PROTOCOL_VERSION`].
+        protocol: u16,
+        /// The card's [`crate::image::LAYOUT_VERSION`].
+        layout: u16,
+        /// What the chip can hold.
+        budget: Budget,
+        /// Name and version of the firmware.
+        #[serde(borrow)]
+        build: &'a str,
+    },
+    /// The image is in memory and its header is sound.
+    ImageAccepted,
+    /// Tiles may come.
+    FrameAccepted,
+    /// Some pixels of a tile, in rows, [`PIXEL_BYTES`] each.
+    Pixels {
+        /// The tile's number.
+        tile: u32,
+        /// The first of these pixels, counted in the tile's rows.
+        first: u32,
+        /// [`Pixel`] records.
+        #[serde(borrow)]
+        data: &'a [u8],
+    },
+    /// All pixels of this tile are sent.
+    TileDone {
+        /// The tile's number.
+        tile: u32,
+    },
+    /// The counters since the frame began.
+    Counters(Counters),
+    /// A command could not be done.
+    Fault(Fault),
+}
+
+/// Why a card could not do a command, and a number that says where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fault {
+    /// What is wrong.
+    pub code: FaultCode,
+    /// Where: a line, a record, a value; see the code.
+    pub detail: u32,
+}
+
+/// Numbered faults; the numbers are part of the protocol.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FaultCode {
+    /// A frame was damaged; detail: 0.
+    Frame,
+    /// A frame is missing; detail: the number expected.
+    Sequence,
+    /// A payload is not a command; detail: its bytes.
+    Message,
+    /// The command does not fit the state of the session; detail: 0.
+    Order,
+    /// The image does not fit in the card's memory; detail: the lines there are.
+    ImageTooLarge,
+    /// Lines are not the next of the image; detail: the line expected.
+    LineOrder,
+    /// The image's checksum differs; detail: the checksum found.
+    ImageChecksum,
+    /// The image's header is not sound; detail: the image's layout version for a wrong version, else 0.
+    ImageHeader,
+    /// A frame parameter is outside the budget or not a number; detail: its index in [`FrameParameters`].
+    Parameter,
+    /// A tile is empty, outside the picture or above the budget; detail: its number.
+    Tile,
+    /// More tiles than the budget's; detail: the tile's number.
+    TooManyTiles,
+    /// A line outside the card's memory was asked for; detail: the line.
+    LineRange,
+    /// A record outside its section was asked for; detail: its index.
+    Record,
+    /// A bounding volume hierarchy deeper than the stack; detail: the node.
+    Depth,
+}
+
+/// A pixel of a tile, as the wire carries it: ten `f32`, little-endian.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pixel {
+    /// Radiance towards the eye, W/(sr m^2).
+    pub radiance: [f32; 3],
+    /// Mean albedo of the surfaces seen, 0 to 1 a channel.
+    pub albedo: [f32; 3],
+    /// Mean of the unit normals seen, in world space, on the side of the eye.
+    pub normal: [f32; 3],
+    /// Mean distance along the view's axis of the surfaces seen, metres; infinite where none is.
+    pub depth: f32,
+}
+
+/// Bytes of one [`Pixel`].
+pub const PIXEL_BYTES: usize = 40;
+/// Pixels that one [`Reply::Pixels`] may carry.
+pub const PIXELS_PER_REPLY: usize = 48;
+
+impl Pixel {
+    /// Reads a record.
+    pub fn read(bytes: &[u8; PIXEL_BYTES]) -> Self {
+        let word = |index: usize| bytes.as_chunks().0.get(index).map_or(0.0, |w| f32::from_le_bytes(*w));
+        let vector = |first: usize| [word(first), word(first + 1), word(first + 2)];
+        Self { radiance: vector(0), albedo: vector(3), normal: vector(6), depth: word(9) }
+    }
+
+    /// The record's bytes.
+    pub fn to_bytes(&self) -> [u8; PIXEL_BYTES] {
+        let mut bytes = [0; PIXEL_BYTES];
+        let values = self.radiance.into_iter().chain(self.albedo).chain(self.normal).chain([self.depth]);
+        for (word, value) in bytes.as_chunks_mut().0.iter_mut().zip(values) {
+            *word = value.to_le_bytes();
+        }
+        bytes
+    }
+}
+
+/// Writes a message into `bytes`; its length, or `None` if there is no room.
+pub fn encode<T: Serialize>(message: &T, bytes: &mut [u8]) -> Option<usize> {
+    postcard::to_slice(message, bytes).ok().map(|written| written.len())
+}
+
+/// Reads a message that fills all of `bytes`; `None` if they are anything else.
+pub fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
+    postcard::take_from_bytes(bytes).ok().filter(|(_, rest)| rest.is_empty()).map(|(message, _)| message)
+}
