@@ -1,2 +1,33 @@
-//! The `photoncard` command.
-fn main() {}
+//! The `photoncard` command: arguments and printing, no rendering.
+//!
+//! Standard output is for data, standard error for people. Exit status: 0 done; 1 the work failed; 2 wrong arguments or
+//! unreadable input; 130 stopped by an interrupt.
+
+mod arguments;
+mod card;
+mod diff;
+mod failure;
+mod progress;
+mod render;
+mod scene;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::arguments::{Arguments, CardCommand, Command, SceneCommand};
+
+fn main() -> ExitCode {
+    // Wrong arguments end here, with status 2.
+    let arguments = Arguments::parse();
+    let result = match &arguments.command {
+        Command::Render(options) => render::run(options),
+        Command::Scene(SceneCommand::Info { scene }) => scene::info(scene),
+        Command::Card(CardCommand::Info { card }) => card::info(card),
+        Command::Diff(options) => diff::run(options),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}

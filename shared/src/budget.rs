@@ -61,7 +61,7 @@ pub const MICRO: Budget = Budget {
 };
 
 /// Entries of the stack of a descent in the bounding volume hierarchy: a host refuses a hierarchy that needs more.
-pub const BVH_STACK: usize = 64;
+pub const BVH_STACK: usize = 96;
 
 /// Levels of the photon kd-tree: enough for 2^27 photons.
 pub const KD_TREE_LEVELS: usize = 27;

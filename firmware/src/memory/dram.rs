@@ -24,6 +24,17 @@ impl MemoryPort for Dram<'_> {
     }
 }
 
+/// Lines that are only read: many readers may share them.
+#[derive(Clone, Copy)]
+pub struct Lines<'a>(pub &'a [Line]);
+
+impl MemoryPort for Lines<'_> {
+    #[inline(always)]
+    fn read(&mut self, _: Structure, address: LineAddress, _: u32) -> Result<&Line, Fault> {
+        self.0.get(address.0 as usize).ok_or_else(|| outside(address))
+    }
+}
+
 impl CardMemory for Dram<'_> {
     fn lines(&self) -> u32 {
         u32::try_from(self.lines.len()).unwrap_or(u32::MAX)

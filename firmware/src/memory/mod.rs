@@ -2,7 +2,7 @@
 
 mod dram;
 
-pub use dram::Dram;
+pub use dram::{Dram, Lines};
 use photoncard_shared::address::{Line, LineAddress, Structure};
 use photoncard_shared::message::{Fault, FaultCode};
 

@@ -1,0 +1,133 @@
+//! Emulated cards: the firmware on threads of this process, one chip a thread, each on a loopback link.
+
+use std::thread::JoinHandle;
+
+use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard, REFERENCE_SRAM_BYTES, ReferenceCard};
+use photoncard_firmware::chip::sram_bytes;
+use photoncard_firmware::memory::{CardMemory, MemoryPort};
+use photoncard_firmware::serve::serve;
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::budget::{MICRO, REFERENCE};
+use photoncard_shared::message::{Fault, FaultCode};
+
+use crate::link::{LoopbackPort, loopback};
+
+/// The kind of chip on an emulated card.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChipKind {
+    /// [`REFERENCE`].
+    Reference,
+    /// [`MICRO`].
+    Micro,
+}
+
+impl ChipKind {
+    /// On-chip memory that the firmware takes with its caches and stack, bytes.
+    pub fn sram_bytes(self) -> usize {
+        match self {
+            Self::Reference => REFERENCE_SRAM_BYTES,
+            Self::Micro => MICRO_SRAM_BYTES,
+        }
+    }
+
+    /// On-chip memory of the tile's and the link's buffers, bytes.
+    pub fn buffer_bytes(self) -> usize {
+        let budget = match self {
+            Self::Reference => REFERENCE,
+            Self::Micro => MICRO,
+        };
+        self.sram_bytes() - sram_bytes(&budget, 0)
+    }
+}
+
+/// Bytes that wait in each direction of a loopback link.
+const LINK_CAPACITY: usize = 64 << 10;
+/// Stack of a chip's thread: its buffers are built there before they move to the heap.
+const THREAD_STACK: usize = 8 << 20;
+
+/// A running emulated card. Its thread ends when the port is dropped.
+pub struct EmulatedCard {
+    thread: Option<JoinHandle<()>>,
+    port: Option<LoopbackPort>,
+}
+
+impl EmulatedCard {
+    /// Starts a card.
+    ///
+    /// # Errors
+    /// If the system has no thread for it.
+    pub fn start(kind: ChipKind) -> std::io::Result<Self> {
+        let (host, card) = loopback(LINK_CAPACITY);
+        let thread = std::thread::Builder::new()
+            .name("chip".into())
+            .stack_size(THREAD_STACK)
+            .spawn(move || run(kind, card))?;
+        Ok(Self { thread: Some(thread), port: Some(host) })
+    }
+
+    /// The host's end of the link.
+    ///
+    /// # Panics
+    /// Never: the port is there until the card is dropped.
+    pub fn port(&mut self) -> &mut LoopbackPort {
+        self.port.as_mut().expect("the port lives as long as the card")
+    }
+}
+
+impl Drop for EmulatedCard {
+    fn drop(&mut self) {
+        drop(self.port.take());
+        if let Some(thread) = self.thread.take() {
+            // A chip that panicked has already closed its link, which the session has told.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn run(kind: ChipKind, mut port: LoopbackPort) {
+    // Both end when the host drops its end of the link: that is no error.
+    let _ = match kind {
+        ChipKind::Reference => {
+            let memory = GrowingMemory::new(REFERENCE.dram_bytes);
+            serve(&mut *Box::new(ReferenceCard::new(REFERENCE, memory)), &mut port)
+        }
+        ChipKind::Micro => {
+            let memory = GrowingMemory::new(MICRO.dram_bytes);
+            serve(&mut *Box::new(MicroCard::new(MICRO, memory)), &mut port)
+        }
+    };
+}
+
+/// Card DRAM that takes host memory only for the lines that are written.
+struct GrowingMemory {
+    lines: Vec<Line>,
+    limit: u32,
+}
+
+impl GrowingMemory {
+    fn new(bytes: u32) -> Self {
+        Self { lines: Vec::new(), limit: bytes / LINE_BYTES as u32 }
+    }
+}
+
+impl MemoryPort for GrowingMemory {
+    #[inline(always)]
+    fn read(&mut self, _: Structure, address: LineAddress, _: u32) -> Result<&Line, Fault> {
+        let fault = Fault { code: FaultCode::LineRange, detail: address.0 };
+        self.lines.get(address.0 as usize).ok_or(fault)
+    }
+}
+
+impl CardMemory for GrowingMemory {
+    fn lines(&self) -> u32 {
+        self.limit
+    }
+
+    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
+        let end = first.0.checked_add(count).filter(|&end| end <= self.limit)?;
+        if self.lines.len() < end as usize {
+            self.lines.resize(end as usize, Line::ZERO);
+        }
+        self.lines.get_mut(first.0 as usize..end as usize)
+    }
+}

@@ -1,0 +1,287 @@
+//! Pictures as `OpenEXR` files: writing a film, and reading radiance back to compare it.
+//!
+//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; the first
+//! surface seen is in `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z`. The data window is the film's crop window,
+//! the display window the full picture. What the picture was made from is JSON in the one attribute `photoncard`:
+//! the `exr` crate keeps attributes in a hash map, so several would change the file's bytes from run to run.
+
+use std::io::{self, Cursor};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+use exr::meta::BlockDescription;
+use exr::meta::header::Header;
+use exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Compression, Encoding, FlatSamples, Image, ImageAttributes,
+    IntegerBounds, Layer, LayerAttributes, LineOrder, MetaData, ReadChannels, ReadLayers, SmallVec, Text,
+    Vec2, WritableImage, f16, read as reader,
+};
+use thiserror::Error;
+
+use crate::film::{Film, PixelValue};
+use crate::output::{self, OutputError};
+
+/// The attribute that says what the picture was made from.
+pub const PROVENANCE: &str = "photoncard";
+
+/// The most pixels a picture may have to be read.
+pub const MAX_READ_PIXELS: u64 = 1 << 28;
+
+/// How radiance, albedo and normals are stored. Depth is always single precision.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SampleFormat {
+    /// 16 bits: three digits, up to 65504; larger finite values are stored as 65504.
+    #[default]
+    Half,
+    /// 32 bits: exactly what was rendered.
+    Float,
+}
+
+/// Linear RGB radiance read from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RgbImage {
+    /// Columns of the data window.
+    pub width: usize,
+    /// Rows of the data window.
+    pub height: usize,
+    /// The data window's first column and row in the full picture.
+    pub data_window_origin: [i32; 2],
+    /// The pixels, row by row from the top.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+/// Why a picture cannot be written or read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ExrError {
+    /// The file's place cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The encoder refused the picture.
+    #[error("cannot encode {} as OpenEXR: {reason}", path.display())]
+    Encode {
+        /// The output file.
+        path: PathBuf,
+        /// What the encoder says.
+        reason: String,
+    },
+    /// The file cannot be read.
+    #[error("cannot read {}; check that the path names a file and that it may be read", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        #[source]
+        source: io::Error,
+    },
+    /// The file is not an `OpenEXR` picture, or a damaged one.
+    #[error("{} is not a readable OpenEXR picture: {reason}; render or copy it again", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The picture has no plain colour channels.
+    #[error("{} has no channels R, G and B, only {channels}; write the picture as plain RGB", path.display())]
+    NoColour {
+        /// The file.
+        path: PathBuf,
+        /// The channels there are.
+        channels: String,
+    },
+    /// The picture is too large to be read at once.
+    #[error("{} has {width} x {height} pixels, more than {MAX_READ_PIXELS}; compare crops of it", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its width.
+        width: usize,
+        /// Its height.
+        height: usize,
+    },
+}
+
+/// Writes the film to `path`, whole or not at all, the same bytes for the same film every time.
+///
+/// Pixels that were never written are zero. `provenance_json` is stored in the attribute `photoncard`; characters
+/// beyond ASCII are stored as JSON's `\u` escapes.
+///
+/// # Errors
+/// If the file cannot be written, or the provenance is empty.
+pub fn write(path: &Path, film: &Film, provenance_json: &str, format: SampleFormat) -> Result<(), ExrError> {
+    let fault = |reason: String| ExrError::Encode { path: path.to_owned(), reason };
+    if provenance_json.is_empty() {
+        return Err(fault("the provenance is empty".to_owned()));
+    }
+    let image = image_of(film, provenance_json, format)
+        .ok_or_else(|| fault("the provenance is not text".to_owned()))?;
+    let mut bytes = Cursor::new(Vec::new());
+    image.write().to_buffered(&mut bytes).map_err(|error| fault(error.to_string()))?;
+    Ok(output::write(path, bytes.get_ref())?)
+}
+
+fn image_of(
+    film: &Film,
+    provenance: &str,
+    format: SampleFormat,
+) -> Option<Image<Layer<AnyChannels<FlatSamples>>>> {
+    let window = film.window();
+    let provenance = Text::new_or_none(ascii(provenance))?;
+    let mut attributes =
+        ImageAttributes::new(IntegerBounds::from_dimensions((film.width() as usize, film.height() as usize)));
+    attributes.other.insert(Text::new_or_none(PROVENANCE)?, AttributeValue::Text(provenance));
+    let size = Vec2(window.width() as usize, window.height() as usize);
+    let position = Vec2(i32::try_from(window.x0).ok()?, i32::try_from(window.y0).ok()?);
+    let own = LayerAttributes::default().with_position(position);
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: exr::image::Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    Some(Image { attributes, layer_data: Layer::new(size, own, encoding, channels(film, format)) })
+}
+
+fn channels(film: &Film, format: SampleFormat) -> AnyChannels<FlatSamples> {
+    let stored = |name: &str, value: &dyn Fn(&PixelValue) -> f32| {
+        let samples = match format {
+            SampleFormat::Half => {
+                FlatSamples::F16(film.pixels().iter().map(|pixel| to_half(value(pixel))).collect())
+            }
+            SampleFormat::Float => FlatSamples::F32(film.pixels().iter().map(value).collect()),
+        };
+        AnyChannel::new(name, samples)
+    };
+    let mut list = SmallVec::new();
+    for (axis, name) in ["R", "G", "B"].into_iter().enumerate() {
+        list.push(stored(name, &|pixel| pixel.radiance[axis]));
+        list.push(stored(&format!("albedo.{name}"), &|pixel| pixel.albedo[axis]));
+    }
+    for (axis, name) in ["N.X", "N.Y", "N.Z"].into_iter().enumerate() {
+        list.push(stored(name, &|pixel| pixel.normal[axis]));
+    }
+    let depth = film.pixels().iter().map(|pixel| pixel.depth).collect();
+    list.push(AnyChannel::new("Z", FlatSamples::F32(depth)));
+    AnyChannels::sort(list)
+}
+
+/// The nearest half; a light brighter than halves reach stays finite.
+fn to_half(value: f32) -> f16 {
+    let half = f16::from_f32(value);
+    if half.is_infinite() && value.is_finite() { f16::MAX.copysign(half) } else { half }
+}
+
+/// JSON with every character beyond ASCII escaped: the attribute is ASCII, and only JSON's strings hold others.
+fn ascii(json: &str) -> String {
+    let mut text = String::with_capacity(json.len());
+    for character in json.chars() {
+        if character.is_ascii() {
+            text.push(character);
+        } else {
+            let units = character
+                .encode_utf16(&mut [0; 2])
+                .iter()
+                .map(|unit| format!("\\u{unit:04x}"))
+                .collect::<String>();
+            text.push_str(&units);
+        }
+    }
+    text
+}
+
+/// Reads the plain colour channels `R G B` (half, float or unsigned) of the first part that has them.
+///
+/// # Errors
+/// If the file cannot be read, is malformed, has no such channels, or is larger than [`MAX_READ_PIXELS`]. A file
+/// that states a size its length cannot hold is refused before anything is allocated.
+pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
+    let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
+    let found = std::fs::metadata(path).map_err(unreadable)?;
+    if !found.is_file() {
+        return Err(unreadable(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    // The `exr` crate trusts a file's numbers in places (sums of window sizes, offsets of blocks) and panics on a
+    // malformed one. Nothing is shared with the closure, so nothing can be left half changed.
+    catch_unwind(AssertUnwindSafe(|| decode(path, &bytes))).unwrap_or_else(|_| {
+        Err(ExrError::Malformed {
+            path: path.to_owned(),
+            reason: "its structure contradicts itself".to_owned(),
+        })
+    })
+}
+
+fn decode(path: &Path, bytes: &[u8]) -> Result<RgbImage, ExrError> {
+    let malformed =
+        |error: exr::error::Error| ExrError::Malformed { path: path.to_owned(), reason: error.to_string() };
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(malformed)?;
+    MetaData::validate(&meta.headers, false).map_err(malformed)?;
+    for header in &meta.headers {
+        check_size(path, header, bytes.len() as u64)?;
+    }
+    if !meta.headers.iter().any(has_colour) {
+        let names = meta.headers.iter().flat_map(|header| header.channels.list.iter());
+        let names: Vec<_> = names.take(20).map(|channel| channel.name.to_string()).collect();
+        return Err(ExrError::NoColour { path: path.to_owned(), channels: names.join(", ") });
+    }
+    let image = reader()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| (size.width(), vec![[0.0; 3]; size.area()]),
+            |(width, pixels): &mut (usize, Vec<[f32; 3]>), position, (red, green, blue): (f32, f32, f32)| {
+                pixels[position.y() * *width + position.x()] = [red, green, blue];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        // On a worker thread a panic would end the process.
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(malformed)?;
+    let layer = image.layer_data;
+    let Vec2(x, y) = layer.attributes.layer_position;
+    let (width, pixels) = layer.channel_data.pixels;
+    Ok(RgbImage { width, height: layer.size.height(), data_window_origin: [x, y], pixels })
+}
+
+fn has_colour(header: &Header) -> bool {
+    let has = |name: &str| header.channels.list.iter().any(|channel| channel.name.eq(name));
+    has("R") && has("G") && has("B")
+}
+
+/// Refuses sizes that are too large, or that a file of this length cannot hold however well it is compressed.
+fn check_size(path: &Path, header: &Header, length: u64) -> Result<(), ExrError> {
+    const CHUNK_OVERHEAD: u64 = 16;
+    let Vec2(width, height) = header.layer_size;
+    let pixels = (width as u64).checked_mul(height as u64).filter(|&pixels| pixels <= MAX_READ_PIXELS);
+    let pixels = pixels.ok_or_else(|| ExrError::TooLarge { path: path.to_owned(), width, height })?;
+    let contradiction = |reason: String| Err(ExrError::Malformed { path: path.to_owned(), reason });
+    if (header.chunk_count as u64).saturating_mul(CHUNK_OVERHEAD) > length {
+        return contradiction(format!("{} blocks do not fit into {length} bytes", header.chunk_count));
+    }
+    let held = length.saturating_mul(most_compressed(header.compression));
+    let stated = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
+    if stated > held {
+        return contradiction(format!("{width} x {height} pixels do not fit into {length} bytes"));
+    }
+    let BlockDescription::Tiles(tiles) = header.blocks else { return Ok(()) };
+    let tile = (tiles.tile_size.width() as u64).saturating_mul(tiles.tile_size.height() as u64);
+    if tile > MAX_READ_PIXELS {
+        return contradiction(format!("a tile of {tile} pixels is not possible"));
+    }
+    Ok(())
+}
+
+/// A bound on the bytes one byte of a file stands for.
+fn most_compressed(compression: Compression) -> u64 {
+    match compression {
+        Compression::Uncompressed => 1,
+        Compression::RLE => 64,
+        // Deflate reaches 1032 to 1; the others stay below.
+        Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 => 1100,
+        Compression::PIZ | Compression::B44 | Compression::B44A => 1100,
+        // Deflate over blocks of 64 samples of which one code may stand for all.
+        _ => 64 * 1100,
+    }
+}

@@ -1,0 +1,235 @@
+//! The picture while it is being rendered: what is known of each pixel of the crop window.
+
+pub use photoncard_shared::message::Pixel as PixelValue;
+use thiserror::Error;
+
+/// The most pixels a film may hold: 2^28, about 10 GiB.
+pub const MAX_PIXELS: u64 = 1 << 28;
+
+/// The largest width or height of a picture.
+pub const MAX_SIDE: u32 = 1 << 20;
+
+/// A rectangle of pixels, ends exclusive, in coordinates of the full picture: x to the right, y down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// First column.
+    pub x0: u32,
+    /// One past the last column.
+    pub x1: u32,
+    /// First row.
+    pub y0: u32,
+    /// One past the last row.
+    pub y1: u32,
+}
+
+impl Window {
+    /// The window that shows all of a picture.
+    pub const fn full(width: u32, height: u32) -> Self {
+        Self { x0: 0, x1: width, y0: 0, y1: height }
+    }
+
+    /// Columns, 0 if the window is turned around.
+    pub const fn width(&self) -> u32 {
+        self.x1.saturating_sub(self.x0)
+    }
+
+    /// Rows, 0 if the window is turned around.
+    pub const fn height(&self) -> u32 {
+        self.y1.saturating_sub(self.y0)
+    }
+
+    /// Whether the pixel lies inside.
+    pub const fn contains(&self, x: u32, y: u32) -> bool {
+        x >= self.x0 && x < self.x1 && y >= self.y0 && y < self.y1
+    }
+}
+
+/// Why a film cannot be made, or a pixel not be written.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FilmError {
+    /// A picture without pixels, or of absurd size.
+    #[error(
+        "a picture of {width} x {height} pixels is not possible: each side must be 1 to {MAX_SIDE}; choose another size"
+    )]
+    Size {
+        /// The width asked for.
+        width: u32,
+        /// The height asked for.
+        height: u32,
+    },
+    /// A crop window that is empty or not inside the picture.
+    #[error(
+        "the crop window {},{},{},{} is empty or not inside the picture of {width} x {height}; X0 < X1 <= width and \
+         Y0 < Y1 <= height must hold", window.x0, window.x1, window.y0, window.y1
+    )]
+    Window {
+        /// The crop window.
+        window: Window,
+        /// The picture's width.
+        width: u32,
+        /// The picture's height.
+        height: u32,
+    },
+    /// More pixels than are held at once, or than there is memory for.
+    #[error("a film of {width} x {height} pixels does not fit in memory; render it in several crops")]
+    Memory {
+        /// Columns of the crop window.
+        width: u32,
+        /// Rows of the crop window.
+        height: u32,
+    },
+    /// A pixel outside the crop window.
+    #[error("pixel ({x}, {y}) lies outside the crop window {},{},{},{}", window.x0, window.x1, window.y0, window.y1)]
+    Outside {
+        /// The pixel's column.
+        x: u32,
+        /// The pixel's row.
+        y: u32,
+        /// The crop window.
+        window: Window,
+    },
+}
+
+/// The pixels of a crop window of a picture.
+#[derive(Clone, Debug)]
+pub struct Film {
+    width: u32,
+    height: u32,
+    window: Window,
+    pixels: Vec<PixelValue>,
+    written: Vec<bool>,
+    missing: usize,
+}
+
+impl Film {
+    /// An empty film for the crop window `window` of a picture of `width` x `height` pixels.
+    ///
+    /// # Errors
+    /// If the picture or the window has no pixels or too many, or the window leaves the picture.
+    pub fn new(width: u32, height: u32, window: Window) -> Result<Self, FilmError> {
+        if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
+            return Err(FilmError::Size { width, height });
+        }
+        let (columns, rows) = (window.width(), window.height());
+        if columns == 0 || rows == 0 || window.x1 > width || window.y1 > height {
+            return Err(FilmError::Window { window, width, height });
+        }
+        let too_large = FilmError::Memory { width: columns, height: rows };
+        let count = u64::from(columns) * u64::from(rows);
+        let count = usize::try_from(count).ok().filter(|_| count <= MAX_PIXELS).ok_or(too_large)?;
+        let mut pixels = Vec::new();
+        let mut written = Vec::new();
+        pixels.try_reserve_exact(count).map_err(|_| too_large)?;
+        written.try_reserve_exact(count).map_err(|_| too_large)?;
+        pixels.resize(count, PixelValue::default());
+        written.resize(count, false);
+        Ok(Self { width, height, window, pixels, written, missing: count })
+    }
+
+    /// Width of the full picture.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height of the full picture.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The crop window: the part of the picture this film holds.
+    pub fn window(&self) -> Window {
+        self.window
+    }
+
+    /// The pixels of the crop window, row by row from the top.
+    pub fn pixels(&self) -> &[PixelValue] {
+        &self.pixels
+    }
+
+    /// The pixel at `(x, y)` of the full picture, or `None` outside the crop window.
+    pub fn pixel(&self, x: u32, y: u32) -> Option<&PixelValue> {
+        self.index(x, y).map(|index| &self.pixels[index])
+    }
+
+    /// Writes the pixel at `(x, y)` of the full picture; writing one again replaces it.
+    ///
+    /// # Errors
+    /// [`FilmError::Outside`] if the pixel is not in the crop window; the film stays as it was.
+    pub fn write(&mut self, x: u32, y: u32, value: PixelValue) -> Result<(), FilmError> {
+        let index = self.index(x, y).ok_or(FilmError::Outside { x, y, window: self.window })?;
+        self.pixels[index] = value;
+        if !std::mem::replace(&mut self.written[index], true) {
+            self.missing -= 1;
+        }
+        Ok(())
+    }
+
+    /// How many pixels of the crop window were never written.
+    pub fn missing(&self) -> usize {
+        self.missing
+    }
+
+    /// Whether every pixel of the crop window was written.
+    pub fn is_complete(&self) -> bool {
+        self.missing == 0
+    }
+
+    fn index(&self, x: u32, y: u32) -> Option<usize> {
+        let Window { x0, y0, .. } = self.window;
+        self.window
+            .contains(x, y)
+            .then(|| (y - y0) as usize * self.window.width() as usize + (x - x0) as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(radiance: f32) -> PixelValue {
+        PixelValue { radiance: [radiance; 3], ..PixelValue::default() }
+    }
+
+    #[test]
+    fn a_film_is_complete_once_each_pixel_of_the_window_was_written() {
+        let mut film = Film::new(8, 6, Window { x0: 2, x1: 5, y0: 1, y1: 3 }).unwrap();
+        for y in 1..3 {
+            for x in 2..5 {
+                assert!(!film.is_complete());
+                film.write(x, y, value(0.0)).unwrap();
+                film.write(x, y, value((10 * y + x) as f32)).unwrap();
+            }
+        }
+        assert!(film.is_complete());
+        assert_eq!(film.pixel(4, 2), Some(&value(24.0)));
+        assert_eq!(film.pixels()[0], value(12.0));
+    }
+
+    #[test]
+    fn pixels_outside_the_window_are_refused() {
+        let window = Window { x0: 2, x1: 5, y0: 1, y1: 3 };
+        let mut film = Film::new(8, 6, window).unwrap();
+        for (x, y) in [(1, 1), (5, 1), (2, 0), (2, 3), (u32::MAX, u32::MAX)] {
+            assert_eq!(film.write(x, y, value(1.0)), Err(FilmError::Outside { x, y, window }));
+            assert_eq!(film.pixel(x, y), None);
+        }
+        assert_eq!(film.missing(), 6);
+    }
+
+    #[test]
+    fn impossible_films_are_refused() {
+        assert!(matches!(Film::new(0, 4, Window::full(0, 4)), Err(FilmError::Size { .. })));
+        assert!(matches!(Film::new(u32::MAX, 4, Window::full(1, 1)), Err(FilmError::Size { .. })));
+        for window in [
+            Window { x0: 3, x1: 3, y0: 0, y1: 4 },
+            Window { x0: 3, x1: 2, y0: 0, y1: 4 },
+            Window { x0: 0, x1: 5, y0: 0, y1: 4 },
+            Window { x0: 0, x1: 4, y0: 0, y1: 5 },
+        ] {
+            assert!(matches!(Film::new(4, 4, window), Err(FilmError::Window { .. })), "{window:?}");
+        }
+        let side = MAX_SIDE;
+        assert!(matches!(Film::new(side, side, Window::full(side, side)), Err(FilmError::Memory { .. })));
+    }
+}

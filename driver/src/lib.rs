@@ -1,0 +1,18 @@
+//! The host half of photoncard.
+
+pub mod bvh;
+pub mod difference;
+pub mod emitter;
+pub mod emulator;
+pub mod error;
+pub mod exr;
+pub mod film;
+pub mod link;
+pub mod output;
+pub mod pack;
+pub mod photon;
+pub mod preview;
+pub mod render;
+pub mod scene;
+pub mod scheduler;
+pub mod session;

@@ -1,0 +1,174 @@
+//! Output files that appear whole or not at all: written beside their place, then renamed.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::{Builder, NamedTempFile};
+use thiserror::Error;
+
+/// Why an output file cannot be written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// The path ends in no file name.
+    #[error("'{}' names no file; add a file name", path.display())]
+    NoFileName {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The folder does not exist, or is none.
+    #[error("cannot write {}: the folder {} does not exist; create it or choose another", path.display(), folder.display())]
+    MissingFolder {
+        /// The output file.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// Something that is not a file is in the way.
+    #[error("cannot write {}: a {kind} has that name; choose another", path.display())]
+    NotAFile {
+        /// The output file.
+        path: PathBuf,
+        /// What is there.
+        kind: &'static str,
+    },
+    /// Writing failed.
+    #[error("cannot write {}; check the folder's permissions and the free space", path.display())]
+    Write {
+        /// The output file.
+        path: PathBuf,
+        /// What the operating system says.
+        #[source]
+        source: io::Error,
+    },
+}
+
+/// Checks, before long work starts, that `path` can be written when the work is done.
+///
+/// # Errors
+/// If the folder is missing or cannot be written to, or `path` is something other than a file.
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    create_beside(&resolve(path)?, path).map(drop)
+}
+
+/// Writes `bytes` to `path`, replacing a file of that name. On failure the old file, if any, is untouched.
+///
+/// # Errors
+/// As [`check_writable`], and if the disk is full or fails.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let target = resolve(path)?;
+    let failed = |source| OutputError::Write { path: path.to_owned(), source };
+    let mut file = create_beside(&target, path)?;
+    file.write_all(bytes).map_err(failed)?;
+    file.as_file().sync_all().map_err(failed)?;
+    file.persist(&target).map_err(|error| failed(error.error))?;
+    // The rename itself survives a power cut only once the folder is on disk too. Not every file system can do
+    // that for a folder, and the file is in place either way.
+    if let Ok(folder) = fs::File::open(folder_of(&target)) {
+        let _ = folder.sync_all();
+    }
+    Ok(())
+}
+
+/// The file that will be replaced: what `path` names, through symbolic links.
+fn resolve(path: &Path) -> Result<PathBuf, OutputError> {
+    if path.file_name().is_none() {
+        return Err(OutputError::NoFileName { path: path.to_owned() });
+    }
+    match fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err(OutputError::NotAFile { path: path.to_owned(), kind: "folder" }),
+        // Renaming over a device would replace the device.
+        Ok(found) if !found.is_file() => Err(OutputError::NotAFile { path: path.to_owned(), kind: "device" }),
+        Ok(_) => {
+            fs::canonicalize(path).map_err(|source| OutputError::Write { path: path.to_owned(), source })
+        }
+        Err(_) => Ok(path.to_owned()),
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+fn create_beside(target: &Path, path: &Path) -> Result<NamedTempFile, OutputError> {
+    let folder = folder_of(target);
+    if !folder.is_dir() {
+        return Err(OutputError::MissingFolder { path: path.to_owned(), folder: folder.to_owned() });
+    }
+    let mut builder = Builder::new();
+    builder.prefix(".photoncard-").suffix(".part");
+    // A temporary file is private by default; this one becomes an ordinary file, as the umask has it.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder).map_err(|source| OutputError::Write { path: path.to_owned(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_written_file_is_whole_and_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.exr");
+        check_writable(&path).unwrap();
+        assert!(names(folder.path()).is_empty());
+        write(&path, b"first").unwrap();
+        write(&path, b"second").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert_eq!(names(folder.path()), ["picture.exr"]);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("absent/picture.exr");
+        for result in [check_writable(&path), write(&path, b"x")] {
+            let error = result.unwrap_err();
+            assert!(matches!(error, OutputError::MissingFolder { .. }), "{error}");
+            assert!(error.to_string().contains("absent"), "{error}");
+        }
+        fs::write(folder.path().join("file"), b"").unwrap();
+        let below_a_file = check_writable(&folder.path().join("file/picture.exr"));
+        assert!(matches!(below_a_file, Err(OutputError::MissingFolder { .. })), "{below_a_file:?}");
+    }
+
+    #[test]
+    fn folders_and_nameless_paths_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        for result in [check_writable(folder.path()), write(folder.path(), b"x")] {
+            assert!(matches!(result, Err(OutputError::NotAFile { .. })), "{result:?}");
+        }
+        for path in ["", "/", ".."] {
+            let result = check_writable(Path::new(path));
+            assert!(matches!(result, Err(OutputError::NoFileName { .. })), "{path}: {result:?}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_a_device_stays_a_device() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        fs::write(&file, b"old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write(&link, b"new").unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        let device = write(Path::new("/dev/null"), b"x");
+        assert!(matches!(device, Err(OutputError::NotAFile { .. })), "{device:?}");
+    }
+}

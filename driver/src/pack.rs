@@ -1,0 +1,227 @@
+//! The card image: everything a chip needs of a scene, in lines.
+//!
+//! It grows in two steps. A [`PackedScene`] holds hierarchy, triangles, materials and emitters; the photon pass traces
+//! in it with the chip's own ray caster, so that photons land on exactly the surfaces that gather rays meet. With a
+//! photon map it becomes a [`CardImage`].
+
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::scene::SceneImage;
+use photoncard_shared::address::{LINE_BYTES, Line};
+use photoncard_shared::budget::Budget;
+use photoncard_shared::image::{Header, SECTIONS, Section, SectionKind};
+use photoncard_shared::layout::{self, Photon, Record};
+
+use crate::bvh::{self, HierarchyError};
+use crate::emitter::Emitters;
+use crate::scene::{Material, Scene, Triangle};
+
+/// Why a scene does not fit a card.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum PackError {
+    /// The hierarchy is not one for a chip.
+    #[error(transparent)]
+    #[diagnostic(help("simplify the scene's geometry"))]
+    Hierarchy(#[from] HierarchyError),
+    /// The image has more lines than an address can tell.
+    #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
+    #[diagnostic(help("lower --photons, or simplify the scene"))]
+    TooLarge {
+        /// Bytes of the image.
+        bytes: u64,
+    },
+    /// The image is larger than the card's memory.
+    #[error(
+        "the card image takes {needed} bytes ({photons} of them photons), the card's DRAM budget is {available} bytes"
+    )]
+    #[diagnostic(help("{remedy}"))]
+    Dram {
+        /// Bytes of the image.
+        needed: u64,
+        /// Bytes of the photon map alone.
+        photons: u64,
+        /// Bytes of the card's DRAM.
+        available: u64,
+        /// What to lower, and how far.
+        remedy: String,
+    },
+}
+
+/// The scene in lines, without photons.
+pub struct PackedScene {
+    lines: Vec<Line>,
+    sections: [Section; SECTIONS],
+    radiance_unit: f32,
+}
+
+/// A complete card image.
+pub struct CardImage {
+    lines: Vec<Line>,
+}
+
+impl PackedScene {
+    /// Packs geometry, materials and emitters.
+    ///
+    /// # Errors
+    /// If the geometry is too much for a chip.
+    pub fn new(scene: &Scene, emitters: &Emitters) -> Result<Self, PackError> {
+        let hierarchy = bvh::build(&scene.triangles)?;
+        let mut packed = Self {
+            // Line 0 is the header's.
+            lines: vec![Line::ZERO],
+            sections: [Section::default(); SECTIONS],
+            radiance_unit: radiance_unit(scene, emitters),
+        };
+        packed.append(SectionKind::Nodes, hierarchy.nodes.iter().map(layout::BvhNode::to_bytes))?;
+        let triangles =
+            hierarchy.order.iter().map(|&index| triangle_record(&scene.triangles[index as usize]));
+        packed.append(SectionKind::Triangles, triangles)?;
+        packed.append(SectionKind::Materials, scene.materials.iter().map(material_record))?;
+        packed.append(SectionKind::Emitters, emitters.records().iter().map(layout::Emitter::to_bytes))?;
+        packed
+            .append(SectionKind::EmitterThresholds, emitters.thresholds().iter().map(|t| t.to_le_bytes()))?;
+        Ok(packed)
+    }
+
+    fn append<const N: usize>(
+        &mut self,
+        kind: SectionKind,
+        records: impl ExactSizeIterator<Item = [u8; N]>,
+    ) -> Result<(), PackError> {
+        let bytes = (self.lines.len() + records.len()) as u64 * LINE_BYTES as u64;
+        let count = |n: usize| u32::try_from(n).map_err(|_| PackError::TooLarge { bytes });
+        self.sections[kind as usize] =
+            Section { first_line: count(self.lines.len())?, records: count(records.len())? };
+        self.lines.extend(pack_lines(records));
+        count(self.lines.len()).map(drop)
+    }
+
+    fn header(&self, photon_power_unit: f32) -> Header {
+        Header {
+            // `append` has checked that the number of lines fits.
+            lines: self.lines.len() as u32,
+            photon_power_unit,
+            radiance_unit: self.radiance_unit,
+            sections: self.sections,
+        }
+    }
+
+    /// The scene as a chip sees it, without photons.
+    pub fn view(&self) -> (SceneImage, Lines<'_>) {
+        (SceneImage { header: self.header(1.0) }, Lines(&self.lines))
+    }
+
+    /// Bytes of the scene's lines.
+    pub fn bytes(&self) -> u64 {
+        self.lines.len() as u64 * LINE_BYTES as u64
+    }
+
+    /// Checks that an image of this scene with so many photons fits a card's memory.
+    ///
+    /// # Errors
+    /// If not; the error says what to lower.
+    pub fn check_budget(&self, photons: usize, budget: &Budget) -> Result<(), PackError> {
+        let photon_lines = photons.div_ceil(Photon::PER_LINE) as u64;
+        let photon_bytes = photon_lines * LINE_BYTES as u64;
+        let needed = self.bytes() + photon_bytes;
+        let available = budget.dram_bytes as u64;
+        if needed <= available {
+            return Ok(());
+        }
+        let room = available.saturating_sub(self.bytes()) / LINE_BYTES as u64 * Photon::PER_LINE as u64;
+        let remedy = if room > 0 {
+            format!("lower --photons to {room} or less, or use a card with more memory")
+        } else {
+            format!(
+                "the scene alone takes {} bytes: simplify it, or use a card with more memory",
+                self.bytes()
+            )
+        };
+        Err(PackError::Dram { needed, photons: photon_bytes, available, remedy })
+    }
+
+    /// Adds the photon map: photons in the order of the tree.
+    ///
+    /// # Errors
+    /// If there are more than an address can tell.
+    pub fn with_photons(
+        mut self,
+        photons: impl ExactSizeIterator<Item = [u8; Photon::BYTES]>,
+        power_unit: f32,
+    ) -> Result<CardImage, PackError> {
+        self.append(SectionKind::Photons, photons)?;
+        self.lines[0] = self.header(power_unit).to_line();
+        Ok(CardImage { lines: self.lines })
+    }
+}
+
+impl CardImage {
+    /// All lines, the header first.
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// All lines, to be changed in place.
+    pub(crate) fn lines_mut(&mut self) -> &mut [Line] {
+        &mut self.lines
+    }
+
+    /// The image as a chip sees it.
+    pub fn view(&self) -> (SceneImage, Lines<'_>) {
+        // `with_photons` wrote this header.
+        let header =
+            Header::read(&self.lines[0]).unwrap_or_else(|error| unreachable!("own header: {error:?}"));
+        (SceneImage { header }, Lines(&self.lines))
+    }
+
+    /// Bytes of the image.
+    pub fn bytes(&self) -> u64 {
+        self.lines.len() as u64 * LINE_BYTES as u64
+    }
+}
+
+/// Packs records into lines, none of them across a border.
+fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl Iterator<Item = Line> {
+    let per_line = LINE_BYTES / N;
+    let mut records = records.peekable();
+    std::iter::from_fn(move || {
+        records.peek()?;
+        let mut line = Line::ZERO;
+        for (slot, record) in line.0.as_chunks_mut::<N>().0.iter_mut().zip(records.by_ref().take(per_line)) {
+            *slot = record;
+        }
+        Some(line)
+    })
+}
+
+fn triangle_record(triangle: &Triangle) -> [u8; layout::Triangle::BYTES] {
+    let vertices = triangle.vertices.map(|vertex| vertex.to_array());
+    layout::Triangle { vertices, material: triangle.material }.to_bytes()
+}
+
+fn material_record(material: &Material) -> [u8; layout::Material::BYTES] {
+    layout::Material {
+        diffuse: material.diffuse.to_array(),
+        specular: material.specular.to_array(),
+        exponent: material.exponent,
+        emission: material.emission.to_array(),
+        flags: if material.double_sided { layout::DOUBLE_SIDED } else { 0 },
+    }
+    .to_bytes()
+}
+
+/// Fixed-point sums of radiance hold 23 bits above the unit and 40 below.
+///
+/// The unit is the radiance that all surfaces would have if the emitted power were spread over them, once reflected by
+/// white: a typical one. A much brighter emitter raises it, so that its own radiance is within 2^20 units.
+fn radiance_unit(scene: &Scene, emitters: &Emitters) -> f32 {
+    let area: f64 = scene.triangles.iter().map(|triangle| triangle.area() as f64).sum();
+    let typical = emitters.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));
+    let brightest = scene.materials.iter().map(|m| m.emission.max_element()).fold(0.0, f32::max) as f64;
+    power_of_two_above(typical.max(brightest / (1 << 20) as f64))
+}
+
+/// The least power of two that is not below `value`, within the normal numbers of `f32`.
+pub(crate) fn power_of_two_above(value: f64) -> f32 {
+    let exponent = value.max(f64::MIN_POSITIVE).log2().ceil();
+    exponent.clamp(-126.0, 127.0).exp2() as f32
+}

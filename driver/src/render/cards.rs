@@ -1,0 +1,291 @@
+//! The cards of a render: each has a thread of the host that moves bytes between its port and its session.
+
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::budget::Budget;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::link::Port;
+
+use super::{Observer, Phase, RenderError};
+use crate::emulator::{ChipKind, EmulatedCard};
+use crate::film::{Film, Window};
+use crate::scheduler::Scheduler;
+use crate::session::{Job, LinkBytes, Picture, Session, SessionError};
+
+/// Where cards are: an argument of `--card`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CardAddress {
+    /// Chips in this process.
+    Emulated {
+        /// Their kind.
+        kind: ChipKind,
+        /// How many.
+        chips: usize,
+    },
+}
+
+impl Default for CardAddress {
+    /// One emulated reference chip.
+    fn default() -> Self {
+        Self::Emulated { kind: ChipKind::Reference, chips: 1 }
+    }
+}
+
+/// Chips that one process emulates.
+const MAX_CHIPS: usize = 1024;
+
+impl FromStr for CardAddress {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (kind, chips) = text.split_once(':').map_or((text, None), |(kind, chips)| (kind, Some(chips)));
+        let kind = match kind {
+            "emulated" => ChipKind::Reference,
+            "emulated-micro" => ChipKind::Micro,
+            "serial" | "tcp" | "unix" => {
+                return Err(format!("cards on {kind} links cannot be used yet; use emulated[:CHIPS]"));
+            }
+            _ => {
+                return Err(format!(
+                    "{kind:?} is no kind of card; use emulated[:CHIPS] or emulated-micro[:CHIPS]"
+                ));
+            }
+        };
+        let chips = match chips {
+            None => std::thread::available_parallelism().map_or(1, usize::from),
+            Some(chips) => chips
+                .parse()
+                .ok()
+                .filter(|count| (1..=MAX_CHIPS).contains(count))
+                .ok_or_else(|| format!("{chips:?} is no number of chips; use 1 to {MAX_CHIPS}"))?,
+        };
+        Ok(Self::Emulated { kind, chips })
+    }
+}
+
+/// Cards that have said hello.
+pub(super) struct Cards {
+    cards: Vec<Connected>,
+    start: Instant,
+}
+
+struct Connected {
+    card: EmulatedCard,
+    session: Session<'static>,
+    budget: Budget,
+}
+
+/// What a card says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CardInfo {
+    /// Name and version of its firmware.
+    pub build: String,
+    /// What it can hold.
+    pub budget: Budget,
+}
+
+/// Says hello to the first card at an address.
+///
+/// # Errors
+/// If it cannot be started, or does not answer as it should.
+pub fn card_info(address: CardAddress) -> Result<CardInfo, RenderError> {
+    let CardAddress::Emulated { kind, .. } = address;
+    let film = Film::new(1, 1, Window::full(1, 1))?;
+    let nothing = Mutex::new(Picture { scheduler: Scheduler::new(Vec::new()), film });
+    let cards = Cards::connect(&[CardAddress::Emulated { kind, chips: 1 }], &nothing)?;
+    let connected = &cards.cards[0];
+    Ok(CardInfo { build: connected.session.build().to_owned(), budget: connected.budget })
+}
+
+/// What came of a run.
+pub(super) struct Outcome {
+    pub(super) counters: Counters,
+    pub(super) bytes: LinkBytes,
+    pub(super) cards: usize,
+    pub(super) load_seconds: f64,
+    pub(super) render_seconds: f64,
+}
+
+/// What the threads of all cards share.
+struct Shared<'a> {
+    picture: &'a Mutex<Picture>,
+    failed: AtomicBool,
+    observer: &'a dyn Observer,
+    start: Instant,
+    image_bytes: u64,
+}
+
+/// What came of one card.
+#[derive(Default)]
+struct CardOutcome {
+    counters: Counters,
+    bytes: LinkBytes,
+    loaded: Duration,
+}
+
+/// How long a port may wait for a byte.
+const WAIT: Duration = Duration::from_millis(20);
+
+impl Cards {
+    /// Starts all cards and says hello to each.
+    pub(super) fn connect(addresses: &[CardAddress], picture: &Mutex<Picture>) -> Result<Self, RenderError> {
+        let start = Instant::now();
+        let kinds =
+            addresses.iter().flat_map(|&CardAddress::Emulated { kind, chips }| (0..chips).map(move |_| kind));
+        let cards: Result<Vec<Connected>, RenderError> = kinds
+            .enumerate()
+            .map(|(index, kind)| {
+                let card =
+                    EmulatedCard::start(kind).map_err(|source| RenderError::Start { card: index, source })?;
+                greet(card, picture, start).map_err(|source| RenderError::Card { card: index, source })
+            })
+            .collect();
+        Ok(Self { cards: cards?, start })
+    }
+
+    /// What each card can hold.
+    pub(super) fn budgets(&self) -> impl Iterator<Item = &Budget> {
+        self.cards.iter().map(|card| &card.budget)
+    }
+
+    /// Renders a picture on all cards.
+    pub(super) fn run(
+        self,
+        job: Job,
+        picture: &Mutex<Picture>,
+        observer: &dyn Observer,
+    ) -> Result<Outcome, RenderError> {
+        let begun = self.start.elapsed();
+        let shared = Shared {
+            picture,
+            failed: AtomicBool::new(false),
+            observer,
+            start: self.start,
+            image_bytes: (job.image.len() * LINE_BYTES) as u64,
+        };
+        let cards = self.cards.len();
+        let results: Vec<Result<CardOutcome, RenderError>> = std::thread::scope(|scope| {
+            let shared = &shared;
+            let threads: Vec<_> = (self.cards.into_iter().enumerate())
+                .map(|(index, card)| scope.spawn(move || render_on(index, card, job, shared)))
+                .collect();
+            // A panic of a host thread is a panic of the host.
+            threads
+                .into_iter()
+                .map(|thread| thread.join().unwrap_or_else(|p| std::panic::resume_unwind(p)))
+                .collect()
+        });
+        let ended = self.start.elapsed();
+        let mut sum = CardOutcome::default();
+        let mut stopped = false;
+        for result in results {
+            match result {
+                Ok(outcome) => sum.add(&outcome),
+                // The card that failed first made the others stop: its error is the one to tell.
+                Err(RenderError::Stopped) => stopped = true,
+                Err(error) => return Err(error),
+            }
+        }
+        if stopped {
+            return Err(RenderError::Stopped);
+        }
+        let loaded = sum.loaded.max(begun);
+        Ok(Outcome {
+            counters: sum.counters,
+            bytes: sum.bytes,
+            cards,
+            load_seconds: (loaded - begun).as_secs_f64(),
+            render_seconds: (ended - loaded).as_secs_f64(),
+        })
+    }
+}
+
+impl CardOutcome {
+    fn add(&mut self, other: &Self) {
+        self.counters.add(&other.counters);
+        self.bytes.payload += other.bytes.payload;
+        self.bytes.wire += other.bytes.wire;
+        self.loaded = self.loaded.max(other.loaded);
+    }
+}
+
+/// The picture; a thread that panicked holding it has left whole pixels.
+pub(super) fn lock(picture: &Mutex<Picture>) -> MutexGuard<'_, Picture> {
+    picture.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Moves bytes once in each direction, and waits a little if there are none.
+fn exchange(
+    session: &mut Session,
+    port: &mut impl Port,
+    picture: &Mutex<Picture>,
+    start: Instant,
+) -> Result<(), SessionError> {
+    session.prepare(&mut lock(picture));
+    let sent = if session.outgoing().is_empty() {
+        0
+    } else {
+        port.write(session.outgoing(), WAIT).map_err(SessionError::Port)?
+    };
+    session.sent(sent, start.elapsed());
+    let mut buffer = [0; 8192];
+    let wait = if session.has_more_to_send() { Duration::ZERO } else { WAIT };
+    let received = port.read(&mut buffer, wait).map_err(SessionError::Port)?;
+    if received > 0 {
+        session.receive(&buffer[..received], &mut lock(picture), start.elapsed())?;
+    }
+    session.check_silence(start.elapsed())
+}
+
+/// Says hello and waits for the answer.
+fn greet(
+    mut card: EmulatedCard,
+    picture: &Mutex<Picture>,
+    start: Instant,
+) -> Result<Connected, SessionError> {
+    let mut session = Session::new(start.elapsed());
+    loop {
+        if let Some(&budget) = session.budget() {
+            return Ok(Connected { card, session, budget });
+        }
+        exchange(&mut session, card.port(), picture, start)?;
+    }
+}
+
+/// Loads the image into a card and renders tiles on it until none is left.
+fn render_on(
+    index: usize,
+    connected: Connected,
+    job: Job,
+    shared: &Shared,
+) -> Result<CardOutcome, RenderError> {
+    let Connected { mut card, mut session, .. } = connected;
+    session.start(job, shared.start.elapsed());
+    let mut outcome = CardOutcome::default();
+    while !session.is_done() {
+        if shared.failed.load(Ordering::Relaxed) || shared.observer.is_stopped() {
+            return Err(RenderError::Stopped);
+        }
+        exchange(&mut session, card.port(), shared.picture, shared.start).map_err(|source| {
+            shared.failed.store(true, Ordering::Relaxed);
+            RenderError::Card { card: index, source }
+        })?;
+        if session.is_loaded() {
+            if outcome.loaded.is_zero() {
+                outcome.loaded = shared.start.elapsed();
+            }
+            let (done, total) = lock(shared.picture).scheduler.progress();
+            shared.observer.progress(Phase::Tiles, done as u64, total as u64);
+        } else {
+            let loaded = session.loaded_lines() as u64 * LINE_BYTES as u64;
+            shared.observer.progress(Phase::Load, loaded, shared.image_bytes);
+        }
+    }
+    outcome.counters = *session.counters();
+    outcome.bytes = session.link_bytes();
+    Ok(outcome)
+}

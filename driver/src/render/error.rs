@@ -1,0 +1,86 @@
+//! Why a render did not end in a picture.
+
+use photoncard_shared::message::Fault;
+
+use crate::error::SceneError;
+use crate::film::FilmError;
+use crate::pack::PackError;
+use crate::photon::TraceError;
+use crate::session::SessionError;
+
+/// Why a render did not end in a picture.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum RenderError {
+    /// A setting is not possible.
+    #[error("{option} {value} is not possible: {reason}")]
+    #[diagnostic(help("{remedy}"))]
+    Setting {
+        /// The option of the command line.
+        option: &'static str,
+        /// Its value.
+        value: String,
+        /// What is wrong with it.
+        reason: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// The camera is not in the scene.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Scene(#[from] SceneError),
+    /// The picture's size or crop is not possible.
+    #[error(transparent)]
+    #[diagnostic(help("set --size and --crop within these bounds"))]
+    Film(#[from] FilmError),
+    /// The scene does not fit the card.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Pack(#[from] PackError),
+    /// There are no photons.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Photons(#[from] TraceError),
+    /// The image that was just packed is not sound.
+    #[error("the packed image is not sound: fault {:?} ({})", .0.code, .0.detail)]
+    #[diagnostic(help("this is a fault of the program: please report it with the scene"))]
+    Image(Fault),
+    /// A card could not be started.
+    #[error("card {card} could not be started: {source}")]
+    #[diagnostic(help("use fewer cards"))]
+    Start {
+        /// Its number.
+        card: usize,
+        /// The system's error.
+        source: std::io::Error,
+    },
+    /// A card failed.
+    #[error("card {card}: {source}")]
+    Card {
+        /// Its number.
+        card: usize,
+        /// What happened.
+        #[source]
+        #[diagnostic_source]
+        source: SessionError,
+    },
+    /// The observer stopped the render.
+    #[error("stopped before the picture was complete")]
+    Stopped,
+}
+
+impl From<Fault> for RenderError {
+    fn from(fault: Fault) -> Self {
+        Self::Image(fault)
+    }
+}
+
+impl RenderError {
+    /// Whether the arguments or the scene are at fault, rather than the work.
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) => true,
+            Self::Photons(error) => matches!(error, TraceError::Lost { .. }),
+            Self::Image(_) | Self::Start { .. } | Self::Card { .. } | Self::Stopped => false,
+        }
+    }
+}

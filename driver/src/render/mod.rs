@@ -1,0 +1,184 @@
+//! A render, from a loaded scene to a complete film.
+
+mod cards;
+mod error;
+mod settings;
+mod statistics;
+
+pub use cards::{CardAddress, CardInfo, card_info};
+pub use error::RenderError;
+pub use settings::RenderSettings;
+pub use statistics::{LinkStatistics, Rays, Statistics, Times};
+
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use photoncard_shared::address::Line;
+use photoncard_shared::frame::Checksum;
+use photoncard_shared::message::FrameParameters;
+
+use self::cards::Cards;
+use crate::emitter::Emitters;
+use crate::film::Film;
+use crate::pack::{CardImage, PackedScene};
+use crate::photon::{PhotonMap, automatic_max_distance, measure_discs, trace};
+use crate::scene::Scene;
+use crate::scheduler::{Scheduler, tiles};
+use crate::session::{Job, Picture};
+
+/// What a render is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Tracing photons: progress in photons.
+    Photons,
+    /// Building the photon map and the card image: no progress.
+    Pack,
+    /// Loading the image into the cards: progress in bytes.
+    Load,
+    /// Rendering: progress in tiles.
+    Tiles,
+}
+
+/// Watches a render, and can stop it.
+pub trait Observer: Sync {
+    /// Tells how far a phase is.
+    fn progress(&self, phase: Phase, done: u64, total: u64);
+
+    /// Whether the render is to stop as soon as it can.
+    fn is_stopped(&self) -> bool;
+}
+
+/// Watches nothing and never stops.
+pub struct Unobserved;
+
+impl Observer for Unobserved {
+    fn progress(&self, _: Phase, _: u64, _: u64) {}
+
+    fn is_stopped(&self) -> bool {
+        false
+    }
+}
+
+/// A finished picture.
+pub struct Rendering {
+    /// Its pixels.
+    pub film: Film,
+    /// What it took.
+    pub statistics: Statistics,
+}
+
+/// A scene with its photon map, packed.
+struct PreparedScene {
+    image: CardImage,
+    checksum: u32,
+    max_distance: f32,
+    paths: u64,
+}
+
+/// Renders a scene.
+///
+/// # Errors
+/// If settings or scene do not fit the cards, a card fails, or the observer stops it.
+pub fn render(
+    scene: &Scene,
+    settings: &RenderSettings,
+    observer: &dyn Observer,
+) -> Result<Rendering, RenderError> {
+    let start = Instant::now();
+    let film = Film::new(settings.width, settings.height, settings.window())?;
+    let camera = scene.camera(settings.camera.as_deref())?;
+    let picture = Mutex::new(Picture { scheduler: Scheduler::new(Vec::new()), film });
+    let cards = Cards::connect(&settings.cards, &picture)?;
+    for budget in cards.budgets() {
+        settings.check(budget)?;
+    }
+    let mut times = Times::default();
+    let prepared = prepare(scene, settings, &cards, &mut times, observer)?;
+    let frame = settings.frame(camera, prepared.max_distance);
+    cards::lock(&picture).scheduler = Scheduler::new(tiles(settings.window(), settings.tile, settings.order));
+    let job = Job { image: prepared.image.lines(), checksum: prepared.checksum, frame: &frame };
+    let outcome = cards.run(job, &picture, observer)?;
+    times.load = outcome.load_seconds;
+    times.render = outcome.render_seconds;
+    times.total = start.elapsed().as_secs_f64();
+    let statistics = statistics(settings, &frame, &prepared, &outcome, times);
+    let film = picture.into_inner().unwrap_or_else(PoisonError::into_inner).film;
+    Ok(Rendering { film, statistics })
+}
+
+fn prepare(
+    scene: &Scene,
+    settings: &RenderSettings,
+    cards: &Cards,
+    times: &mut Times,
+    observer: &dyn Observer,
+) -> Result<PreparedScene, RenderError> {
+    let start = Instant::now();
+    let emitters = Emitters::new(scene);
+    let packed = PackedScene::new(scene, &emitters)?;
+    for budget in cards.budgets() {
+        packed.check_budget(settings.photons, budget)?;
+    }
+    times.pack = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let total = settings.photons as u64;
+    let progress = |stored: usize| {
+        observer.progress(Phase::Photons, stored as u64, total);
+        !observer.is_stopped()
+    };
+    let pass = trace(&packed, settings.seed, settings.photons, &progress)?;
+    times.photons = start.elapsed().as_secs_f64();
+    observer.progress(Phase::Pack, 0, 1);
+    let start = Instant::now();
+    let map = PhotonMap::new(&pass.arrivals);
+    let mut image = packed.with_photons(map.records(), map.power_unit())?;
+    let max_distance = match settings.max_distance {
+        Some(distance) => distance,
+        None => automatic_max_distance(&image, settings.neighbors)?,
+    };
+    measure_discs(&mut image, settings.neighbors, max_distance)?;
+    let checksum = checksum(image.lines());
+    times.pack += start.elapsed().as_secs_f64();
+    if observer.is_stopped() {
+        return Err(RenderError::Stopped);
+    }
+    Ok(PreparedScene { image, checksum, max_distance, paths: pass.paths })
+}
+
+/// CRC-32C of an image's bytes.
+fn checksum(lines: &[Line]) -> u32 {
+    let mut sum = Checksum::default();
+    lines.iter().for_each(|line| sum.update(&line.0));
+    sum.value()
+}
+
+fn statistics(
+    settings: &RenderSettings,
+    frame: &FrameParameters,
+    prepared: &PreparedScene,
+    outcome: &cards::Outcome,
+    time_s: Times,
+) -> Statistics {
+    let counters = &outcome.counters;
+    Statistics {
+        width: frame.width,
+        height: frame.height,
+        samples: frame.samples,
+        photons: settings.photons as u64,
+        photon_paths: prepared.paths,
+        max_distance: frame.max_distance,
+        cards: outcome.cards,
+        time_s,
+        rays: Rays { eye: counters.eye_rays, shadow: counters.shadow_rays, gather: counters.gather_rays },
+        gathers: counters.gathers,
+        photons_tested: counters.photons_tested,
+        photons_found: counters.photons_found,
+        image_bytes: prepared.image.bytes(),
+        link: LinkStatistics {
+            payload_bytes: outcome.bytes.payload,
+            wire_bytes: outcome.bytes.wire,
+            retransmitted_frames: 0,
+        },
+        peak_memory_bytes: statistics::peak_memory_bytes(),
+    }
+}

@@ -1,0 +1,138 @@
+//! What a render is asked to do.
+
+use glam::Vec3;
+use photoncard_firmware::card::MAX_PICTURE_SIDE;
+use photoncard_shared::budget::Budget;
+use photoncard_shared::message::{self, FrameParameters};
+
+use super::{CardAddress, RenderError};
+use crate::film::Window;
+use crate::scene::Camera;
+use crate::scheduler::TileOrder;
+
+/// The settings of a render; each field is an option of the command line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The part to render; `None` for the whole.
+    pub crop: Option<Window>,
+    /// Name of the camera; `None` for the first.
+    pub camera: Option<String>,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Photons in the map.
+    pub photons: usize,
+    /// Photons that a gather looks for.
+    pub neighbors: u32,
+    /// Greatest distance of a gather, metres; `None` for the one that the photons' density suggests.
+    pub max_distance: Option<f32>,
+    /// Final gather rays a sample.
+    pub gather_rays: u32,
+    /// Shadow rays a sample.
+    pub shadow_rays: u32,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Side of a tile, pixels.
+    pub tile: u32,
+    /// How the picture is cut into tiles.
+    pub order: TileOrder,
+    /// The cards to render on.
+    pub cards: Vec<CardAddress>,
+}
+
+impl Default for RenderSettings {
+    /// The dissertation's nominal values (Table 7.1) on one emulated reference chip.
+    fn default() -> Self {
+        Self {
+            width: 512,
+            height: 512,
+            crop: None,
+            camera: None,
+            seed: 0,
+            photons: 500_000,
+            neighbors: 100,
+            max_distance: None,
+            gather_rays: 100,
+            shadow_rays: 8,
+            samples: 1,
+            tile: 16,
+            order: TileOrder::Tiled,
+            cards: vec![CardAddress::default()],
+        }
+    }
+}
+
+/// Photons that can be asked for.
+const MAX_PHOTONS: usize = 1 << 27;
+
+impl RenderSettings {
+    /// The part to render.
+    pub fn window(&self) -> Window {
+        self.crop.unwrap_or(Window::full(self.width, self.height))
+    }
+
+    /// Checks the settings against what a card can hold.
+    ///
+    /// # Errors
+    /// The first setting that is not possible.
+    pub fn check(&self, budget: &Budget) -> Result<(), RenderError> {
+        let within = |option, value: u64, least: u64, most: u64| {
+            if (least..=most).contains(&value) {
+                return Ok(());
+            }
+            Err(RenderError::Setting {
+                option,
+                value: value.to_string(),
+                reason: format!("the card takes {least} to {most}"),
+                remedy: format!("choose a value from {least} to {most}"),
+            })
+        };
+        within("--size", self.width.max(self.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
+        within("--photons", self.photons as u64, 1, MAX_PHOTONS as u64)?;
+        within("--neighbors", self.neighbors as u64, 1, budget.neighbors as u64)?;
+        within("--gather-rays", self.gather_rays as u64, 0, budget.gather_rays as u64)?;
+        within("--shadow-rays", self.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
+        within("--spp", self.samples as u64, 1, budget.samples as u64)?;
+        within("--tile", self.tile as u64, 1, budget.tile_pixels.isqrt() as u64)?;
+        match self.max_distance {
+            Some(distance) if !(distance.is_finite() && distance > 0.0) => Err(RenderError::Setting {
+                option: "--max-distance",
+                value: distance.to_string(),
+                reason: "a distance is a positive number of metres".into(),
+                remedy: "give a positive number, or `auto`".into(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// The frame's parameters for a camera of the scene.
+    pub fn frame(&self, camera: &Camera, max_distance: f32) -> FrameParameters {
+        FrameParameters {
+            width: self.width,
+            height: self.height,
+            camera: self.pinhole(camera),
+            seed: self.seed,
+            samples: self.samples,
+            gather_rays: self.gather_rays,
+            shadow_rays: self.shadow_rays,
+            neighbors: self.neighbors,
+            max_distance,
+        }
+    }
+
+    /// The vertical field of view is the camera's, the horizontal one follows from the size.
+    fn pinhole(&self, camera: &Camera) -> message::Camera {
+        let half_height = libm::tanf(0.5 * camera.vertical_fov);
+        let half_width = half_height * self.width as f32 / self.height as f32;
+        let scaled = |axis: Vec3, length: f32| (axis * length).to_array();
+        message::Camera {
+            origin: camera.origin.to_array(),
+            forward: camera.forward.to_array(),
+            right: scaled(camera.right, half_width),
+            up: scaled(camera.up, half_height),
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! What a render took: the keys of `--stats`.
+
+use serde::Serialize;
+
+/// The contents of the statistics file. Keys are stable.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Pixels in a row of the whole picture.
+    pub width: u32,
+    /// Rows of the whole picture.
+    pub height: u32,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Photons in the map.
+    pub photons: u64,
+    /// Paths traced from the lights for them.
+    pub photon_paths: u64,
+    /// Greatest distance of a gather, metres.
+    pub max_distance: f32,
+    /// Cards, one chip each.
+    pub cards: usize,
+    /// Seconds of each phase.
+    pub time_s: Times,
+    /// Rays cast on the chips.
+    pub rays: Rays,
+    /// Searches of the photon map.
+    pub gathers: u64,
+    /// Photons whose distance was computed.
+    pub photons_tested: u64,
+    /// Photons that the searches returned.
+    pub photons_found: u64,
+    /// Bytes of the card image.
+    pub image_bytes: u64,
+    /// Bytes over all links.
+    pub link: LinkStatistics,
+    /// The most memory the process has held, bytes; absent where the system does not tell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_memory_bytes: Option<u64>,
+}
+
+/// Seconds of each phase.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Times {
+    /// Reading the scene file.
+    pub scene: f64,
+    /// Tracing photons.
+    pub photons: f64,
+    /// Building hierarchy, photon map and card image.
+    pub pack: f64,
+    /// Loading the slowest card.
+    pub load: f64,
+    /// Rendering, after the last card was loaded.
+    pub render: f64,
+    /// All of it.
+    pub total: f64,
+}
+
+/// Rays by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Rays {
+    /// From the eye.
+    pub eye: u64,
+    /// Towards emitters.
+    pub shadow: u64,
+    /// Final gather rays.
+    pub gather: u64,
+}
+
+/// Bytes over all links.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct LinkStatistics {
+    /// Image lines and pixels.
+    pub payload_bytes: u64,
+    /// All bytes in both directions.
+    pub wire_bytes: u64,
+    /// Frames sent more than once.
+    pub retransmitted_frames: u64,
+}
+
+/// The process's peak resident memory, where `/proc` tells.
+pub(super) fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kilobytes << 10)
+}

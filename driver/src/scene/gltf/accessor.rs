@@ -1,0 +1,238 @@
+//! The elements an accessor describes, read in place after every bound was checked.
+//!
+//! Nothing is allocated: an accessor's count need not be backed by bytes (glTF fills with zeros), so it says nothing
+//! about what a reader can afford.
+
+use gltf::json;
+use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::validation::Checked;
+
+use super::document::Document;
+use crate::error::SceneError;
+
+const REMEDY: &str = "export the scene again; the accessor, its buffer view and its buffer do not fit";
+
+/// The buffers of a document and their bytes.
+pub(super) struct Source<'a> {
+    pub(super) document: &'a Document,
+    pub(super) buffers: &'a [std::borrow::Cow<'a, [u8]>],
+}
+
+/// The elements of one accessor.
+pub(super) struct Elements<'a> {
+    pub(super) count: u64,
+    component: ComponentType,
+    base: Option<Strided<'a>>,
+    sparse: Option<Sparse<'a>>,
+}
+
+/// Equal elements at equal distances.
+struct Strided<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    size: usize,
+}
+
+impl<'a> Strided<'a> {
+    fn get(&self, index: usize) -> Option<&'a [u8]> {
+        let start = index.checked_mul(self.stride)?;
+        self.bytes.get(start..start.checked_add(self.size)?)
+    }
+}
+
+/// Elements that replace those of the base, in order of their indices.
+struct Sparse<'a> {
+    count: usize,
+    indices: Strided<'a>,
+    values: Strided<'a>,
+}
+
+impl<'a> Sparse<'a> {
+    fn index(&self, position: usize) -> Option<u64> {
+        self.indices.get(position).map(unsigned)
+    }
+
+    fn get(&self, index: u64) -> Option<&'a [u8]> {
+        let (mut low, mut high) = (0, self.count);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            match self.index(middle)?.cmp(&index) {
+                std::cmp::Ordering::Less => low = middle + 1,
+                std::cmp::Ordering::Greater => high = middle,
+                std::cmp::Ordering::Equal => return self.values.get(middle),
+            }
+        }
+        None
+    }
+}
+
+fn unsigned(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |value, &byte| value << 8 | u64::from(byte))
+}
+
+impl<'a> Elements<'a> {
+    /// The accessor `index`, which `item` refers to and which must be of one of `components` and of type `kind`.
+    pub(super) fn new(
+        source: &Source<'a>,
+        index: usize,
+        item: &str,
+        kind: Type,
+        components: &[ComponentType],
+    ) -> Result<Self, SceneError> {
+        let document = source.document;
+        let here = format!("accessors[{index}]");
+        let accessor = document
+            .root
+            .accessors
+            .get(index)
+            .ok_or_else(|| document.invalid(item, format!("accessor {index} does not exist"), REMEDY))?;
+        let component = match accessor.component_type {
+            Checked::Valid(component) if components.contains(&component.0) => component.0,
+            _ => {
+                let reason = format!("{here} is of a component type that is not allowed here");
+                return Err(document.invalid(
+                    item,
+                    reason,
+                    "export the mesh without compression or quantisation",
+                ));
+            }
+        };
+        if !matches!(accessor.type_, Checked::Valid(found) if found == kind) {
+            return Err(document.invalid(item, format!("{here} is not of type {kind:?}"), REMEDY));
+        }
+        let size = component.size() * kind.multiplicity();
+        let count = accessor.count.0;
+        let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
+        let base = accessor
+            .buffer_view
+            .map(|view| source.strided(view.value(), offset, count, size, &here))
+            .transpose()?;
+        let sparse = accessor
+            .sparse
+            .as_ref()
+            .map(|sparse| source.sparse(sparse, count, size, &format!("{here}.sparse")))
+            .transpose()?;
+        Ok(Self { count, component, base, sparse })
+    }
+
+    /// The bytes of an element, or `None` where glTF says zero.
+    fn bytes(&self, index: u64) -> Option<&'a [u8]> {
+        let replaced = self.sparse.as_ref().and_then(|sparse| sparse.get(index));
+        replaced.or_else(|| self.base.as_ref()?.get(usize::try_from(index).ok()?))
+    }
+
+    /// An element of three floats.
+    pub(super) fn vec3(&self, index: u64) -> [f32; 3] {
+        let mut vector = [0.0; 3];
+        if self.component == ComponentType::F32
+            && let Some(bytes) = self.bytes(index)
+        {
+            for (value, word) in vector.iter_mut().zip(bytes.as_chunks().0) {
+                *value = f32::from_le_bytes(*word);
+            }
+        }
+        vector
+    }
+
+    /// An element of one unsigned integer.
+    pub(super) fn unsigned(&self, index: u64) -> u64 {
+        self.bytes(index).map_or(0, unsigned)
+    }
+}
+
+impl<'a> Source<'a> {
+    /// `count` elements of `size` bytes that start `offset` bytes into a buffer view.
+    fn strided(
+        &self,
+        view: usize,
+        offset: u64,
+        count: u64,
+        size: usize,
+        item: &str,
+    ) -> Result<Strided<'a>, SceneError> {
+        let fault = |reason: String| self.document.invalid(item, reason, REMEDY);
+        let (Some(bytes), stride) = self.view(view)? else {
+            return Err(fault(format!("bufferViews[{view}] reaches beyond its buffer")));
+        };
+        let stride = stride.unwrap_or(size);
+        if stride < size {
+            return Err(fault(format!("elements of {size} bytes overlap at a stride of {stride}")));
+        }
+        let needed = match count.checked_sub(1) {
+            None => Some(0),
+            Some(last) => last.checked_mul(stride as u64).and_then(|start| start.checked_add(size as u64)),
+        };
+        let bytes = usize::try_from(offset).ok().and_then(|offset| bytes.get(offset..));
+        match (bytes, needed) {
+            (Some(bytes), Some(needed)) if needed <= bytes.len() as u64 => {
+                Ok(Strided { bytes, stride, size })
+            }
+            _ => {
+                let reason = format!(
+                    "{count} elements of {size} bytes at offset {offset} reach beyond bufferViews[{view}]"
+                );
+                Err(fault(reason))
+            }
+        }
+    }
+
+    /// A buffer view's bytes, `None` if they are not inside the buffer, and its stride.
+    fn view(&self, index: usize) -> Result<(Option<&'a [u8]>, Option<usize>), SceneError> {
+        let view = self.document.root.buffer_views.get(index).ok_or_else(|| {
+            self.document.invalid("bufferViews", format!("buffer view {index} does not exist"), REMEDY)
+        })?;
+        let offset = view.byte_offset.map_or(0, |offset| offset.0);
+        let bytes = self.buffers.get(view.buffer.value()).and_then(|buffer| {
+            let start = usize::try_from(offset).ok()?;
+            let end = usize::try_from(offset.checked_add(view.byte_length.0)?).ok()?;
+            buffer.get(start..end)
+        });
+        Ok((bytes, view.byte_stride.map(|stride| stride.0)))
+    }
+
+    fn sparse(
+        &self,
+        sparse: &json::accessor::sparse::Sparse,
+        base_count: u64,
+        size: usize,
+        item: &str,
+    ) -> Result<Sparse<'a>, SceneError> {
+        let fault =
+            |field: &str, reason: &str| self.document.invalid(format!("{item}{field}"), reason, REMEDY);
+        let Checked::Valid(component) = sparse.indices.component_type else {
+            return Err(fault(".indices.componentType", "it is not an unsigned integer type"));
+        };
+        let count = sparse.count.0;
+        let (indices, values) = (&sparse.indices, &sparse.values);
+        let indices = self.strided(
+            indices.buffer_view.value(),
+            indices.byte_offset.0,
+            count,
+            component.0.size(),
+            &format!("{item}.indices"),
+        )?;
+        let values = self.strided(
+            values.buffer_view.value(),
+            values.byte_offset.0,
+            count,
+            size,
+            &format!("{item}.values"),
+        )?;
+        // The bytes are there, so the count fits.
+        let count = usize::try_from(count).map_err(|_| fault(".count", "it is too large"))?;
+        let sparse = Sparse { count, indices, values };
+        let mut next = 0;
+        for position in 0..count {
+            match sparse.index(position) {
+                Some(index) if (next..base_count).contains(&index) => next = index + 1,
+                _ => {
+                    return Err(fault(
+                        ".indices",
+                        "the indices do not increase, or exceed the accessor's count",
+                    ));
+                }
+            }
+        }
+        Ok(sparse)
+    }
+}

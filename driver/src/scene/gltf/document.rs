@@ -1,0 +1,209 @@
+//! A glTF file as JSON and bytes: GLB's chunks, the JSON, and the rules of glTF that the JSON must keep.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use gltf::json;
+use gltf::json::mesh::Semantic;
+use gltf::json::validation::{Checked, Error as Fault, Validate};
+use miette::{NamedSource, SourceSpan};
+
+use crate::error::{Place, SceneError};
+
+/// Extensions whose meaning the loader knows.
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 2] =
+    ["KHR_materials_emissive_strength", "KHR_materials_specular"];
+
+const GLB_MAGIC: &[u8] = b"glTF";
+const GLB_HEADER: usize = 12;
+const CHUNK_HEADER: usize = 8;
+const CHUNK_JSON: u32 = u32::from_le_bytes(*b"JSON");
+const CHUNK_BIN: u32 = u32::from_le_bytes(*b"BIN\0");
+
+/// A parsed file whose indices all refer to something.
+pub(super) struct Document {
+    pub(super) path: PathBuf,
+    pub(super) root: json::Root,
+    /// The BIN chunk of a GLB.
+    pub(super) blob: Option<Vec<u8>>,
+}
+
+impl Document {
+    pub(super) fn read(path: &Path) -> Result<Self, SceneError> {
+        let bytes =
+            read_file(path).map_err(|source| SceneError::Unreadable { file: path.to_owned(), source })?;
+        let (text, blob) =
+            if bytes.starts_with(GLB_MAGIC) { split_glb(path, &bytes)? } else { (&bytes[..], None) };
+        let blob = blob.map(<[u8]>::to_vec);
+        let document = Self { path: path.to_owned(), root: parse(path, text)?, blob };
+        document.check()?;
+        Ok(document)
+    }
+
+    /// The place `item` of this file.
+    pub(super) fn place(&self, item: impl Into<String>) -> Place {
+        Place::new(&self.path, item)
+    }
+
+    pub(super) fn invalid(
+        &self,
+        item: impl Into<String>,
+        reason: impl Into<String>,
+        remedy: &'static str,
+    ) -> SceneError {
+        SceneError::Invalid { place: self.place(item), reason: reason.into(), remedy }
+    }
+
+    fn check(&self) -> Result<(), SceneError> {
+        self.check_version()?;
+        for (i, name) in self.root.extensions_required.iter().enumerate() {
+            if !SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
+                let place = self.place(format!("extensionsRequired[{i}]"));
+                return Err(SceneError::RequiredExtension { place, name: name.clone() });
+            }
+        }
+        self.check_positions()?;
+        self.check_rules()
+    }
+
+    fn check_version(&self) -> Result<(), SceneError> {
+        let asset = &self.root.asset;
+        let too_new = asset.min_version.as_deref().is_some_and(|version| version != "2.0");
+        if asset.version.starts_with("2.") && !too_new {
+            return Ok(());
+        }
+        let version = asset.min_version.as_deref().unwrap_or(&asset.version);
+        let reason = format!("the file is of glTF version {version:?}");
+        Err(self.invalid("asset.version", reason, "export the scene as glTF 2.0"))
+    }
+
+    /// The `gltf` crate's validation indexes the accessor list with a primitive's POSITION unchecked.
+    fn check_positions(&self) -> Result<(), SceneError> {
+        let accessors = self.root.accessors.len();
+        for (m, mesh) in self.root.meshes.iter().enumerate() {
+            for (p, primitive) in mesh.primitives.iter().enumerate() {
+                let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+                if let Some(index) = position.filter(|index| index.value() >= accessors) {
+                    let item = format!("meshes[{m}].primitives[{p}].attributes.POSITION");
+                    let reason = format!("accessor {index} does not exist, there are {accessors}");
+                    return Err(self.invalid(
+                        item,
+                        reason,
+                        "export the scene again; the file is inconsistent",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_rules(&self) -> Result<(), SceneError> {
+        let mut first = None;
+        self.root.validate(&self.root, json::Path::new, &mut |path, fault| {
+            let path = path();
+            // Bounds are not used, so that files without them load too.
+            let is_bound = path.as_str().ends_with(".min") || path.as_str().ends_with(".max");
+            if first.is_none() && !is_bound {
+                first = Some((path, fault));
+            }
+        });
+        let Some((path, fault)) = first else { return Ok(()) };
+        let reason = match fault {
+            Fault::IndexOutOfBounds => "the index refers to nothing",
+            Fault::Invalid => "the value is not one that glTF knows",
+            Fault::Missing => "it is missing",
+            Fault::Oversize => "the size is beyond this machine's limits",
+            Fault::Unsupported => "it is not supported",
+        };
+        Err(self.invalid(path.as_str(), reason, "export the scene again, or correct the file at this place"))
+    }
+}
+
+/// Reads a regular file; a pipe or a device could go on for ever.
+pub(super) fn read_file(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
+    }
+    fs::read(path)
+}
+
+fn u32_at(bytes: &[u8], offset: usize) -> Option<u32> {
+    let word = bytes.get(offset..)?.first_chunk()?;
+    Some(u32::from_le_bytes(*word))
+}
+
+/// Splits a GLB into its JSON and its BIN chunk. Chunks of other types are skipped, as the format demands.
+fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), SceneError> {
+    let truncated = |what, needed: u64, available: usize| SceneError::Truncated {
+        file: path.to_owned(),
+        what,
+        needed,
+        available: available as u64,
+    };
+    let not_gltf = |reason: &str| SceneError::NotGltf { file: path.to_owned(), reason: reason.to_owned() };
+    let header = (u32_at(bytes, 4), u32_at(bytes, 8));
+    let (Some(version), Some(length)) = header else {
+        return Err(truncated("the GLB header", GLB_HEADER as u64, bytes.len()));
+    };
+    if version != 2 {
+        return Err(not_gltf(&format!("it is a GLB of version {version}")));
+    }
+    let Some(contents) = bytes.get(..length as usize) else {
+        return Err(truncated("the GLB", length.into(), bytes.len()));
+    };
+    let mut chunks = contents.get(GLB_HEADER..).unwrap_or_default();
+    let (mut text, mut blob) = (None, None);
+    while !chunks.is_empty() {
+        let (Some(size), Some(kind)) = (u32_at(chunks, 0), u32_at(chunks, 4)) else {
+            return Err(truncated("a chunk header", CHUNK_HEADER as u64, chunks.len()));
+        };
+        let body = &chunks[CHUNK_HEADER..];
+        let Some(data) = body.get(..size as usize) else {
+            return Err(truncated("a chunk", size.into(), body.len()));
+        };
+        match kind {
+            CHUNK_JSON if text.is_none() => text = Some(data),
+            CHUNK_BIN if blob.is_none() => blob = Some(data),
+            _ if text.is_none() => return Err(not_gltf("the first chunk of the GLB is not JSON")),
+            _ => {}
+        }
+        chunks = &body[size as usize..];
+    }
+    text.map(|text| (text, blob)).ok_or_else(|| not_gltf("the GLB has no JSON chunk"))
+}
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<json::Root, SceneError> {
+    let not_gltf = |reason: &str| SceneError::NotGltf { file: path.to_owned(), reason: reason.to_owned() };
+    let text = str::from_utf8(bytes).map_err(|_| not_gltf("it is neither a GLB nor UTF-8 text"))?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    if text.trim().is_empty() {
+        return Err(not_gltf("it is empty"));
+    }
+    serde_json::from_str(text).map_err(|error| json_error(path, text, &error))
+}
+
+/// The error with an excerpt of the text: a line of glTF may be a whole buffer in base64.
+fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError {
+    const CONTEXT: usize = 100;
+    let line = text.lines().nth(error.line().saturating_sub(1)).unwrap_or_default();
+    let at = char_boundary(line, error.column().saturating_sub(1));
+    let start = char_boundary(line, at.saturating_sub(CONTEXT));
+    let end = char_boundary(line, at + CONTEXT);
+    let excerpt = line[start..end].to_owned();
+    let length = line[at..].chars().next().map_or(0, char::len_utf8);
+    let file = path.display().to_string();
+    SceneError::Json {
+        message: error.to_string(),
+        text: Arc::new(NamedSource::new(&file, excerpt)),
+        at: SourceSpan::new((at - start).into(), length),
+        file,
+    }
+}
+
+/// The last boundary between characters at or before `index`.
+fn char_boundary(text: &str, index: usize) -> usize {
+    let index = index.min(text.len());
+    (0..=index).rev().find(|&index| text.is_char_boundary(index)).unwrap_or(0)
+}

@@ -1,0 +1,177 @@
+//! What a file holds and the renderer does not use: one sentence for each thing, with the names of where it is.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use gltf::json;
+use gltf::json::material::AlphaMode;
+use gltf::json::mesh::Semantic;
+use gltf::json::validation::Checked;
+
+use super::document::{Document, SUPPORTED_EXTENSIONS};
+
+const PUNCTUAL_LIGHTS: &str = "KHR_lights_punctual";
+
+/// Names listed in one notice; the others are counted.
+const LISTED: usize = 8;
+
+/// What loading found; the rest is in the JSON.
+#[derive(Default)]
+pub(super) struct Notices {
+    /// Materials rendered as Lambertian although they reflect.
+    pub(super) metallic_roughness: Vec<String>,
+    /// Indices of meshes whose normals are not those of their triangles.
+    pub(super) smooth: BTreeSet<usize>,
+    /// Orthographic cameras.
+    pub(super) orthographic: Vec<String>,
+    /// Whether some primitive has no material.
+    pub(super) default_material: bool,
+    /// Whether the scene has no camera and was framed.
+    pub(super) framed: bool,
+}
+
+/// `kind 'a', 'b' and 3 more`.
+fn list(kind: &str, names: &[String]) -> String {
+    let mut seen = BTreeSet::new();
+    let unique: Vec<_> = names.iter().filter(|name| seen.insert(*name)).collect();
+    let listed: Vec<_> = unique.iter().take(LISTED).map(|name| format!("'{name}'")).collect();
+    let more = match unique.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        rest => format!(" and {rest} more"),
+    };
+    format!("{kind} {}{more}", listed.join(", "))
+}
+
+/// The names of those items that `holds` selects.
+fn names<'a, T: 'a>(
+    kind: &str,
+    items: &'a [T],
+    name: impl Fn(&'a T) -> Option<&'a String>,
+    holds: impl Fn(&'a T) -> bool,
+) -> Vec<String> {
+    let selected = items.iter().enumerate().filter(|(_, item)| holds(item));
+    selected.map(|(i, item)| name(item).cloned().unwrap_or_else(|| format!("{kind} {i}"))).collect()
+}
+
+fn materials(root: &json::Root, holds: impl Fn(&json::Material) -> bool) -> Vec<String> {
+    names("material", &root.materials, |material| material.name.as_ref(), holds)
+}
+
+fn meshes(root: &json::Root, holds: impl Fn(&json::mesh::Primitive) -> bool) -> Vec<String> {
+    names("mesh", &root.meshes, |mesh| mesh.name.as_ref(), |mesh| mesh.primitives.iter().any(&holds))
+}
+
+impl Notices {
+    /// All notices for a document, in a fixed order.
+    pub(super) fn finish(self, document: &Document) -> Vec<String> {
+        let root = &document.root;
+        let mut sentences = Vec::new();
+        let mut note = |sentence: &str, kind: &str, names: &[String]| {
+            if !names.is_empty() {
+                sentences.push(format!("{sentence}: {}", list(kind, names)));
+            }
+        };
+        note("metallic-roughness reflection is rendered as Lambertian", "material", &self.metallic_roughness);
+        note("textures are ignored, the factors alone count", "material", &materials(root, has_texture));
+        let blended = materials(root, |material| material.alpha_mode != Checked::Valid(AlphaMode::Opaque));
+        note("alpha is ignored, the surface is rendered opaque", "material", &blended);
+        let smooth = self.smooth.iter().map(|&mesh| mesh_name(root, mesh)).collect::<Vec<_>>();
+        note("smooth normals are rendered as flat", "mesh", &smooth);
+        let coloured = meshes(root, |primitive| {
+            primitive.attributes.keys().any(|key| matches!(key, Checked::Valid(Semantic::Colors(_))))
+        });
+        note("vertex colours are ignored", "mesh", &coloured);
+        let other_modes = meshes(root, |primitive| !is_triangles(primitive));
+        note(
+            "points, lines, strips and fans are ignored, only triangle lists are rendered",
+            "mesh",
+            &other_modes,
+        );
+        let morphed =
+            meshes(root, |primitive| primitive.targets.as_ref().is_some_and(|list| !list.is_empty()));
+        note("morph targets are ignored, the base shape is rendered", "mesh", &morphed);
+        let skinned = names("node", &root.nodes, |node| node.name.as_ref(), |node| node.skin.is_some());
+        note("skins are ignored, the mesh is rendered in its rest pose", "node", &skinned);
+        let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
+        note("animations are ignored, the scene is rendered as it stands", "animation", &moving);
+        note(
+            "punctual lights are ignored, only emissive surfaces give light",
+            "light",
+            &punctual_lights(root),
+        );
+        note("orthographic cameras are ignored", "camera", &self.orthographic);
+        for (extension, places) in other_extensions(root) {
+            let places = if places.is_empty() { String::new() } else { format!(": {}", places.join(", ")) };
+            sentences.push(format!("the extension {extension} is ignored{places}"));
+        }
+        if self.default_material {
+            sentences.push("primitives without a material are rendered white and one-sided".to_owned());
+        }
+        if self.framed {
+            sentences
+                .push("the scene has no perspective camera: it is framed from the front (+z)".to_owned());
+        }
+        sentences
+    }
+}
+
+/// The mesh's name, or `mesh N`.
+pub(super) fn mesh_name(root: &json::Root, mesh: usize) -> String {
+    root.meshes[mesh].name.clone().unwrap_or_else(|| format!("mesh {mesh}"))
+}
+
+pub(super) fn is_triangles(primitive: &json::mesh::Primitive) -> bool {
+    primitive.mode == Checked::Valid(json::mesh::Mode::Triangles)
+}
+
+fn has_texture(material: &json::Material) -> bool {
+    let pbr = &material.pbr_metallic_roughness;
+    let specular = material.extensions.as_ref().and_then(|extensions| extensions.specular.as_ref());
+    pbr.base_color_texture.is_some()
+        || pbr.metallic_roughness_texture.is_some()
+        || material.normal_texture.is_some()
+        || material.occlusion_texture.is_some()
+        || material.emissive_texture.is_some()
+        || specular.is_some_and(|s| s.specular_texture.is_some() || s.specular_color_texture.is_some())
+}
+
+fn punctual_lights(root: &json::Root) -> Vec<String> {
+    let lights = root.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
+    let lights = lights.map_or(&[][..], |extension| &extension.lights);
+    names("light", lights, |light| light.name.as_ref(), |_| true)
+}
+
+/// Every extension in use that means nothing to the loader, and the materials, meshes and nodes that use it.
+fn other_extensions(root: &json::Root) -> BTreeMap<String, Vec<String>> {
+    let mut users: BTreeMap<String, BTreeMap<&str, Vec<String>>> = BTreeMap::new();
+    let is_ignored = |name: &str| !SUPPORTED_EXTENSIONS.contains(&name) && name != PUNCTUAL_LIGHTS;
+    for name in root.extensions_used.iter().filter(|name| is_ignored(name)) {
+        users.entry(name.clone()).or_default();
+    }
+    let mut add = |kind: &'static str, index: usize, name: Option<&String>, extension: &String| {
+        if is_ignored(extension) {
+            let name = name.cloned().unwrap_or_else(|| format!("{kind} {index}"));
+            users.entry(extension.clone()).or_default().entry(kind).or_default().push(name);
+        }
+    };
+    for (i, material) in root.materials.iter().enumerate() {
+        for extension in material.extensions.iter().flat_map(|extensions| extensions.others.keys()) {
+            add("material", i, material.name.as_ref(), extension);
+        }
+    }
+    for (i, mesh) in root.meshes.iter().enumerate() {
+        let own = mesh.extensions.iter().flat_map(|extensions| extensions.others.keys());
+        let primitives = mesh.primitives.iter().filter_map(|primitive| primitive.extensions.as_ref());
+        for extension in own.chain(primitives.flat_map(|extensions| extensions.others.keys())) {
+            add("mesh", i, mesh.name.as_ref(), extension);
+        }
+    }
+    for (i, node) in root.nodes.iter().enumerate() {
+        for extension in node.extensions.iter().flat_map(|extensions| extensions.others.keys()) {
+            add("node", i, node.name.as_ref(), extension);
+        }
+    }
+    let places = |kinds: BTreeMap<&str, Vec<String>>| {
+        kinds.into_iter().map(|(kind, names)| list(kind, &names)).collect::<Vec<_>>()
+    };
+    users.into_iter().map(|(extension, kinds)| (extension, places(kinds))).collect()
+}

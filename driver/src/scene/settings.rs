@@ -1,0 +1,218 @@
+//! Settings from the command line that replace a value of a material: `floor.exponent=32`.
+
+use glam::Vec3;
+
+use super::material::Property;
+use super::{Material, Scene};
+use crate::error::SceneError;
+
+const FORM: &str = "write MATERIAL.PROPERTY=VALUE, for example floor.exponent=32 or lamp.emission=18,14,7; the \
+                    properties are diffuse, specular, emission and exponent";
+
+/// How many names an error proposes.
+const PROPOSED: usize = 5;
+
+impl Scene {
+    /// Applies `MATERIAL.PROPERTY=VALUE` to every material of that name.
+    ///
+    /// The property is `diffuse`, `specular` or `emission` with a value `r,g,b` or one number for all three, or
+    /// `exponent` with one number. The material's name may itself contain dots. Whether the scene still has a light
+    /// is for [`Scene::check_light`] to say once all settings are applied.
+    ///
+    /// # Errors
+    /// If the form is not kept, no material has that name, or the material would then be out of range; the scene
+    /// stays as it was.
+    pub fn apply(&mut self, assignment: &str) -> Result<(), SceneError> {
+        let fault = |reason: String, remedy| SceneError::Setting {
+            assignment: assignment.to_owned(),
+            reason,
+            remedy,
+        };
+        let form = |reason: &str| fault(reason.to_owned(), FORM);
+        let (left, value) = assignment.rsplit_once('=').ok_or_else(|| form("there is no ="))?;
+        let (name, property) =
+            left.rsplit_once('.').ok_or_else(|| form("there is no . between material and property"))?;
+        let property = Property::ALL
+            .into_iter()
+            .find_map(|(known, kind)| (known == property.trim()).then_some(kind))
+            .ok_or_else(|| fault(format!("there is no property '{}'", property.trim()), FORM))?;
+        let values =
+            parse(value).ok_or_else(|| fault(format!("'{value}' is neither a number nor r,g,b"), FORM))?;
+        if property == Property::Exponent && values.len() != 1 {
+            return Err(form("the exponent is one number"));
+        }
+        let selected: Vec<_> =
+            (0..self.materials.len()).filter(|&index| self.materials[index].name == name).collect();
+        if selected.is_empty() {
+            return Err(SceneError::UnknownMaterial {
+                assignment: assignment.to_owned(),
+                material: name.to_owned(),
+                nearest: nearest(name, &self.materials),
+            });
+        }
+        // All are checked before any is changed: two materials of one name may differ in what they allow.
+        let mut changed = Vec::with_capacity(selected.len());
+        for index in selected {
+            let mut material = self.materials[index].clone();
+            material.set(property, &values);
+            material.check().map_err(|out_of_range| fault(out_of_range.reason, out_of_range.remedy))?;
+            changed.push((index, material));
+        }
+        for (index, material) in changed {
+            self.materials[index] = material;
+        }
+        Ok(())
+    }
+}
+
+impl Material {
+    fn set(&mut self, property: Property, values: &[f32]) {
+        let vector = match *values {
+            [red, green, blue] => Vec3::new(red, green, blue),
+            [value, ..] => Vec3::splat(value),
+            [] => return,
+        };
+        match property {
+            Property::Diffuse => self.diffuse = vector,
+            Property::Specular => self.specular = vector,
+            Property::Emission => self.emission = vector,
+            Property::Exponent => self.exponent = vector.x,
+        }
+    }
+}
+
+/// One number or three.
+fn parse(text: &str) -> Option<Vec<f32>> {
+    let values: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    values.filter(|values| matches!(values.len(), 1 | 3))
+}
+
+/// The names nearest to a name that does not exist.
+fn nearest(name: &str, materials: &[Material]) -> String {
+    let mut names: Vec<_> = materials.iter().map(|material| material.name.as_str()).collect();
+    names.sort_by_cached_key(|candidate| edit_distance(name, candidate));
+    names.dedup();
+    let rest = names.len().saturating_sub(PROPOSED);
+    let listed: Vec<_> = names.iter().take(PROPOSED).map(|name| format!("'{name}'")).collect();
+    if rest == 0 { listed.join(", ") } else { format!("{} ({rest} more)", listed.join(", ")) }
+}
+
+/// Levenshtein's distance of the first characters, case aside.
+fn edit_distance(a: &str, b: &str) -> usize {
+    const COMPARED: usize = 64;
+    let letters = |text: &str| text.chars().take(COMPARED).flat_map(char::to_lowercase).collect::<Vec<_>>();
+    let (a, b) = (letters(a), letters(b));
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.iter().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, y) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene() -> Scene {
+        let material = |name: &str| Material {
+            name: name.to_owned(),
+            diffuse: Vec3::splat(0.5),
+            specular: Vec3::ZERO,
+            exponent: 0.0,
+            emission: Vec3::ZERO,
+            double_sided: false,
+        };
+        let materials = ["floor", "wall.left", "a=b", "floor"].map(material).to_vec();
+        Scene { materials, ..Scene::default() }
+    }
+
+    #[test]
+    fn each_property_is_set_on_every_material_of_the_name() {
+        let mut scene = scene();
+        for assignment in
+            ["floor.exponent=32", "floor.specular=0.1,0.2,0.3", "floor.diffuse=.25", "floor.emission= 5"]
+        {
+            scene.apply(assignment).unwrap();
+        }
+        for index in [0, 3] {
+            let floor = &scene.materials[index];
+            assert_eq!(floor.exponent, 32.0);
+            assert_eq!(floor.specular, Vec3::new(0.1, 0.2, 0.3));
+            assert_eq!((floor.diffuse, floor.emission), (Vec3::splat(0.25), Vec3::splat(5.0)));
+        }
+        assert_eq!(scene.materials[1].exponent, 0.0);
+    }
+
+    #[test]
+    fn names_may_hold_dots_and_equals_signs() {
+        let mut scene = scene();
+        scene.apply("wall.left.exponent=2").unwrap();
+        scene.apply("a=b.exponent=3").unwrap();
+        assert_eq!((scene.materials[1].exponent, scene.materials[2].exponent), (2.0, 3.0));
+    }
+
+    #[test]
+    fn an_unknown_material_is_answered_with_the_names_there_are() {
+        let error = scene().apply("flor.exponent=32").unwrap_err();
+        let help = miette::Diagnostic::help(&error).unwrap().to_string();
+        assert!(matches!(error, SceneError::UnknownMaterial { .. }));
+        assert!(help.starts_with("choose one of: 'floor', "), "{help}");
+    }
+
+    #[test]
+    fn bad_settings_change_nothing() {
+        let untouched = scene();
+        for assignment in [
+            "",
+            "floor",
+            "floor.exponent",
+            "floor=3",
+            "floor.gloss=3",
+            "floor.exponent=",
+            "floor.exponent=x",
+            "floor.exponent=1,2,3",
+            "floor.exponent=-1",
+            "floor.exponent=10001",
+            "floor.exponent=nan",
+            "floor.diffuse=1,2",
+            "floor.diffuse=1.5",
+            "floor.diffuse=inf",
+            "floor.specular=0.6",
+            "floor.specular=-0.1",
+            "floor.emission=-1",
+            "floor.emission=inf",
+            "floor.emission=1,,2",
+            ".exponent=1",
+            "=",
+        ] {
+            let mut scene = scene();
+            let error = scene.apply(assignment).unwrap_err();
+            assert!(miette::Diagnostic::help(&error).is_some(), "{assignment}");
+            assert!(error.to_string().contains(&format!("`{assignment}`")), "{error}");
+            assert_eq!(scene.materials, untouched.materials, "{assignment}");
+        }
+    }
+
+    /// Materials of one name are all changed or none is.
+    #[test]
+    fn materials_of_one_name_change_together() {
+        let mut scene = scene();
+        scene.materials[3].diffuse = Vec3::ONE;
+        let before = scene.materials.clone();
+        assert!(scene.apply("floor.specular=0.3").is_err());
+        assert_eq!(scene.materials, before);
+    }
+
+    #[test]
+    fn edit_distances_are_those_of_levenshtein() {
+        for (a, b, distance) in [("", "", 0), ("", "ab", 2), ("kitten", "sitting", 3), ("Floor", "floor", 0)]
+        {
+            assert_eq!((edit_distance(a, b), edit_distance(b, a)), (distance, distance), "{a} {b}");
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Which card renders which tile.
+//!
+//! Tiles wait in one queue. A card with a free credit takes the next one; no card waits for another, and results come in
+//! any order. A tile's pixels do not depend on who renders it, nor when.
+
+use std::collections::VecDeque;
+
+use photoncard_shared::message::Tile;
+
+use crate::film::Window;
+
+/// How a picture is cut into tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TileOrder {
+    /// Scanlines, from the top: runs of pixels within one row.
+    Naive,
+    /// Squares, row by row.
+    Tiled,
+}
+
+/// The tiles of a window, each at most `side * side` pixels, numbered from 0.
+pub fn tiles(window: Window, side: u32, order: TileOrder) -> Vec<Tile> {
+    let side = side.max(1);
+    let (tile_width, tile_height) = match order {
+        TileOrder::Naive => (side.saturating_mul(side), 1),
+        TileOrder::Tiled => (side, side),
+    };
+    let mut tiles = Vec::new();
+    for y in (window.y0..window.y1).step_by(tile_height as usize) {
+        for x in (window.x0..window.x1).step_by(tile_width as usize) {
+            tiles.push(Tile {
+                id: tiles.len() as u32,
+                x,
+                y,
+                width: tile_width.min(window.x1 - x),
+                height: tile_height.min(window.y1 - y),
+            });
+        }
+    }
+    tiles
+}
+
+/// The tiles of a picture, and how far they are.
+#[derive(Debug)]
+pub struct Scheduler {
+    waiting: VecDeque<Tile>,
+    done: usize,
+    total: usize,
+}
+
+impl Scheduler {
+    /// All tiles wait.
+    pub fn new(tiles: Vec<Tile>) -> Self {
+        Self { total: tiles.len(), waiting: tiles.into(), done: 0 }
+    }
+
+    /// The next tile for a card with a free credit.
+    pub fn take(&mut self) -> Option<Tile> {
+        self.waiting.pop_front()
+    }
+
+    /// A tile's pixels are all there.
+    pub fn complete(&mut self) {
+        self.done += 1;
+    }
+
+    /// Tiles that are done, and all of them.
+    pub fn progress(&self) -> (usize, usize) {
+        (self.done, self.total)
+    }
+
+    /// Whether no tile waits.
+    pub fn is_drained(&self) -> bool {
+        self.waiting.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        let window = Window { x0: 3, x1: 40, y0: 5, y1: 22 };
+        for order in [TileOrder::Naive, TileOrder::Tiled] {
+            for side in [1, 2, 8, 16, 100] {
+                let mut covered = vec![0; 40 * 22];
+                for tile in tiles(window, side, order) {
+                    assert!(tile.pixels() <= (side * side) as u64);
+                    for y in tile.y..tile.y + tile.height {
+                        for x in tile.x..tile.x + tile.width {
+                            covered[(y * 40 + x) as usize] += 1;
+                        }
+                    }
+                }
+                for y in 0..22 {
+                    for x in 0..40 {
+                        let inside = (3..40).contains(&x) && (5..22).contains(&y);
+                        assert_eq!(covered[y * 40 + x], usize::from(inside));
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! A film written as `OpenEXR` is read back as it was, and damaged files are refused.
+
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use exr::prelude::{ReadChannels, ReadLayers, Vec2};
+use photoncard_driver::exr::{ExrError, SampleFormat, read_rgb, write};
+use photoncard_driver::film::{Film, PixelValue, Window};
+use proptest::prelude::{ProptestConfig, any, proptest};
+
+const WINDOW: Window = Window { x0: 3, x1: 20, y0: 5, y1: 45 };
+
+fn value(x: u32, y: u32) -> PixelValue {
+    let (x, y) = (x as f32, y as f32);
+    PixelValue {
+        radiance: [x / 7.0, y / 3.0, 0.01 * x * y],
+        albedo: [0.1, 0.2, 0.3],
+        normal: [0.0, -1.0, 0.5],
+        depth: 1000.0 + x / 1024.0,
+    }
+}
+
+fn film() -> Film {
+    let mut film = Film::new(64, 48, WINDOW).unwrap();
+    for y in WINDOW.y0..WINDOW.y1 {
+        for x in WINDOW.x0..WINDOW.x1 {
+            film.write(x, y, value(x, y)).unwrap();
+        }
+    }
+    film
+}
+
+fn written(format: SampleFormat, provenance: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.exr");
+    write(&path, &film(), provenance, format).unwrap();
+    (folder, path)
+}
+
+#[test]
+fn radiance_is_read_back_to_the_format_s_precision() {
+    for (format, precision) in [(SampleFormat::Float, 0.0), (SampleFormat::Half, 1.0 / 2048.0)] {
+        let (_folder, path) = written(format, "{}");
+        let image = read_rgb(&path).unwrap();
+        assert_eq!((image.width, image.height, image.data_window_origin), (17, 40, [3, 5]));
+        for (index, pixel) in image.pixels.iter().enumerate() {
+            let expected = value(3 + index as u32 % 17, 5 + index as u32 / 17).radiance;
+            for (read, expected) in pixel.iter().zip(expected) {
+                assert!((read - expected).abs() <= precision * expected, "{format:?}: {read} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn windows_channels_and_provenance_are_as_documented() {
+    let (_folder, path) = written(SampleFormat::Half, r#"{"scene":"Küche 🍳"}"#);
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(&path)
+        .unwrap();
+    let display = image.attributes.display_window;
+    assert_eq!((display.position, display.size), (Vec2(0, 0), Vec2(64, 48)));
+    assert_eq!(image.layer_data.attributes.layer_position, Vec2(3, 5));
+    assert_eq!(image.layer_data.size, Vec2(17, 40));
+    assert_eq!(image.layer_data.attributes.layer_name, None);
+    let channels: Vec<_> =
+        image.layer_data.channel_data.list.iter().map(|channel| channel.name.to_string()).collect();
+    assert_eq!(channels, ["B", "G", "N.X", "N.Y", "N.Z", "R", "Z", "albedo.B", "albedo.G", "albedo.R"]);
+    let depth = &image.layer_data.channel_data.list[6].sample_data;
+    assert_eq!(depth.value_by_flat_index(16).to_f32(), value(19, 5).depth);
+    let custom: Vec<_> = image.attributes.other.iter().chain(&image.layer_data.attributes.other).collect();
+    let [(name, attribute)] = custom[..] else { panic!("{custom:?}") };
+    assert_eq!(name.to_string(), "photoncard");
+    let exr::prelude::AttributeValue::Text(json) = attribute else { panic!("{attribute:?}") };
+    let json: serde_json::Value = serde_json::from_str(&json.to_string()).unwrap();
+    assert_eq!(json["scene"], "Küche 🍳");
+}
+
+#[test]
+fn two_writes_give_the_same_bytes() {
+    let provenance = format!(r#"{{"scene":"{}"}}"#, "a".repeat(3000));
+    let (_first_folder, first) = written(SampleFormat::Half, &provenance);
+    for _ in 0..4 {
+        let (_folder, again) = written(SampleFormat::Half, &provenance);
+        assert_eq!(fs::read(&first).unwrap(), fs::read(&again).unwrap());
+    }
+}
+
+#[test]
+fn a_bright_light_stays_finite_in_halves() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bright.exr");
+    let mut film = Film::new(2, 1, Window::full(2, 1)).unwrap();
+    for (x, radiance) in [[1e6, 65504.0, 65530.0], [f32::INFINITY, -1e6, 1e-9]].into_iter().enumerate() {
+        film.write(x as u32, 0, PixelValue { radiance, ..PixelValue::default() }).unwrap();
+    }
+    write(&path, &film, "{}", SampleFormat::Half).unwrap();
+    let image = read_rgb(&path).unwrap();
+    assert_eq!(image.pixels, [[65504.0; 3], [f32::INFINITY, -65504.0, 0.0]]);
+}
+
+#[test]
+fn bad_files_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(matches!(read_rgb(&folder.path().join("absent.exr")), Err(ExrError::Unreadable { .. })));
+    assert!(matches!(read_rgb(folder.path()), Err(ExrError::Unreadable { .. })));
+    let path = folder.path().join("bad.exr");
+    for bytes in [&b""[..], b"text", b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"] {
+        fs::write(&path, bytes).unwrap();
+        assert!(matches!(read_rgb(&path), Err(ExrError::Malformed { .. })));
+    }
+    assert!(matches!(
+        write(Path::new("absent/x.exr"), &film(), "{}", SampleFormat::Half),
+        Err(ExrError::Output(_))
+    ));
+    assert!(matches!(write(&path, &film(), "", SampleFormat::Half), Err(ExrError::Encode { .. })));
+}
+
+#[test]
+fn a_grey_picture_has_no_colour() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grey.exr");
+    let grey = exr::image::AnyChannel::new("Y", exr::image::FlatSamples::F32(vec![1.0; 4]));
+    let mut list = exr::prelude::SmallVec::new();
+    list.push(grey);
+    let image = exr::image::Image::from_channels((2, 2), exr::image::AnyChannels::sort(list));
+    exr::prelude::WritableImage::write(&image).to_file(&path).unwrap();
+    let error = read_rgb(&path).unwrap_err();
+    assert!(matches!(error, ExrError::NoColour { .. }) && error.to_string().contains('Y'), "{error}");
+}
+
+/// A window whose pixels the file cannot hold is refused before they are allocated.
+#[test]
+fn absurd_windows_are_refused() {
+    let (_folder, path) = written(SampleFormat::Float, "{}");
+    let whole = fs::read(&path).unwrap();
+    let name = b"dataWindow\0box2i\0";
+    let at = whole.windows(name.len()).position(|window| window == name).unwrap() + name.len() + 4;
+    for (x1, y1) in
+        [(1 << 29, 44), (19, 1 << 29), (1 << 14, 1 << 14), (i32::MAX, i32::MAX), (-1, 5), (3000, 4000)]
+    {
+        let mut bytes = whole.clone();
+        bytes[at + 8..at + 12].copy_from_slice(&i32::to_le_bytes(x1));
+        bytes[at + 12..at + 16].copy_from_slice(&i32::to_le_bytes(y1));
+        fs::write(&path, &bytes).unwrap();
+        let start = Instant::now();
+        assert!(read_rgb(&path).is_err(), "{x1} {y1}");
+        assert!(start.elapsed() < Duration::from_secs(2), "{x1} {y1}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn damaged_files_are_read_or_refused_quickly(
+        flips in proptest::collection::vec((any::<usize>(), any::<u8>(), any::<bool>()), 1..6),
+        cut in any::<usize>(),
+        is_cut in any::<bool>(),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.exr");
+        let mut film = Film::new(12, 20, Window::full(12, 20)).unwrap();
+        film.write(1, 1, value(1, 1)).unwrap();
+        write(&path, &film, "{}", SampleFormat::Half).unwrap();
+        let mut bytes = fs::read(&path).unwrap();
+        for (at, value, in_header) in flips {
+            // Half of the damage goes where the sizes are.
+            let at = at % if in_header { bytes.len().min(700) } else { bytes.len() };
+            bytes[at] ^= value;
+        }
+        if is_cut {
+            bytes.truncate(cut % bytes.len());
+        }
+        fs::write(&path, &bytes).unwrap();
+        let start = Instant::now();
+        drop(read_rgb(&path));
+        assert!(start.elapsed() < Duration::from_secs(5));
+    }
+}

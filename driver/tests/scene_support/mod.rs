@@ -1,0 +1,98 @@
+//! Small glTF files made in the tests.
+
+use std::fs;
+
+use photoncard_driver::error::SceneError;
+use photoncard_driver::scene::{Scene, gltf};
+use serde_json::{Value, json};
+
+/// Three vertices, a triangle of 0.5 m^2 that faces +z, and three 16-bit indices.
+pub(crate) fn triangle_bytes() -> Vec<u8> {
+    let mut bytes: Vec<u8> =
+        [0f32, 0., 0., 1., 0., 0., 0., 1., 0.].iter().flat_map(|value| value.to_le_bytes()).collect();
+    bytes.extend([0, 0, 1, 0, 2, 0, 0, 0]);
+    bytes
+}
+
+/// One emissive triangle named `lamp`, seen by the camera `eye`; its bytes are in `data.bin`.
+pub(crate) fn triangle_json() -> Value {
+    json!({
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_materials_specular", "KHR_materials_emissive_strength"],
+        "scene": 0,
+        "scenes": [{"nodes": [0, 1]}],
+        "nodes": [
+            {"name": "shown", "mesh": 0},
+            {"name": "tripod", "camera": 0, "translation": [0.25, 0.25, 3.0]}
+        ],
+        "cameras": [
+            {"name": "eye", "type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 1.5, "znear": 0.1}}
+        ],
+        "meshes": [
+            {"name": "panel", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}
+        ],
+        "materials": [{
+            "name": "lamp",
+            "pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 1.0]},
+            "emissiveFactor": [1.0, 0.5, 0.25],
+            "extensions": {
+                "KHR_materials_specular": {"specularFactor": 0.0},
+                "KHR_materials_emissive_strength": {"emissiveStrength": 4.0}
+            }
+        }],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 36},
+            {"buffer": 0, "byteOffset": 36, "byteLength": 6}
+        ],
+        "buffers": [{"uri": "data.bin", "byteLength": 44}]
+    })
+}
+
+/// A GLB of `json`, whose first buffer becomes the BIN chunk.
+pub(crate) fn glb(mut json: Value, bin: &[u8]) -> Vec<u8> {
+    json["buffers"][0].as_object_mut().unwrap().remove("uri");
+    let mut text = serde_json::to_vec(&json).unwrap();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let length = 12 + 8 + text.len() + 8 + bin.len();
+    let mut bytes = b"glTF".to_vec();
+    for word in [2, length as u32, text.len() as u32] {
+        bytes.extend(word.to_le_bytes());
+    }
+    bytes.extend(b"JSON");
+    bytes.extend(&text);
+    bytes.extend((bin.len() as u32).to_le_bytes());
+    bytes.extend(b"BIN\0");
+    bytes.extend(bin);
+    bytes
+}
+
+/// Loads a file of these bytes.
+#[allow(dead_code, reason = "not every test file loads raw bytes")]
+pub(crate) fn load_bytes(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    gltf::load(&path)
+}
+
+/// Loads `json` with `bin` beside it as `data.bin`.
+#[allow(dead_code, reason = "not every test file loads JSON")]
+pub(crate) fn load_with(json: &Value, bin: &[u8]) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("data.bin"), bin).unwrap();
+    let path = folder.path().join("scene.gltf");
+    fs::write(&path, serde_json::to_vec(json).unwrap()).unwrap();
+    gltf::load(&path)
+}
+
+/// The triangle after `change`.
+#[allow(dead_code, reason = "not every test file changes the triangle")]
+pub(crate) fn load_changed(change: impl FnOnce(&mut Value)) -> Result<Scene, SceneError> {
+    let mut json = triangle_json();
+    change(&mut json);
+    load_with(&json, &triangle_bytes())
+}

@@ -1,0 +1,226 @@
+//! The arguments of every command, and what they mean.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use photoncard_driver::exr::SampleFormat;
+use photoncard_driver::film::Window;
+use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::scheduler::TileOrder;
+
+/// Global illumination by photon mapping on small rendering chips.
+#[derive(Parser)]
+#[command(version, about, max_term_width = 100)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Render a glTF scene to an EXR picture
+    Render(Box<RenderOptions>),
+    /// Look at a scene
+    #[command(subcommand)]
+    Scene(SceneCommand),
+    /// Look at a card
+    #[command(subcommand)]
+    Card(CardCommand),
+    /// Compare a picture with a reference
+    Diff(DiffOptions),
+}
+
+#[derive(Subcommand)]
+pub(crate) enum SceneCommand {
+    /// Tell what a scene holds, and what of it is ignored
+    Info {
+        /// A glTF 2.0 file, .gltf or .glb
+        scene: PathBuf,
+    },
+}
+
+#[derive(Subcommand)]
+pub(crate) enum CardCommand {
+    /// Tell what a card can hold
+    Info {
+        /// The card: emulated or emulated-micro
+        #[arg(long, default_value = "emulated:1")]
+        card: CardAddress,
+    },
+}
+
+#[derive(Args)]
+pub(crate) struct RenderOptions {
+    /// A glTF 2.0 file, .gltf or .glb
+    pub(crate) scene: PathBuf,
+    /// The picture: linear RGB radiance with albedo, N and Z layers, OpenEXR
+    #[arg(short, long, value_name = "OUT.exr")]
+    pub(crate) output: PathBuf,
+    /// Width and height of the picture, pixels
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = size)]
+    size: (u32, u32),
+    /// Render only the columns X0 up to X1 and the rows Y0 up to Y1
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop)]
+    crop: Option<Window>,
+    /// Name of the camera [default: the first of the file]
+    #[arg(long)]
+    camera: Option<String>,
+    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, emission or exponent; may be repeated
+    #[arg(long = "set", value_name = "ASSIGNMENT")]
+    pub(crate) assignments: Vec<String>,
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
+    /// Photons stored in the map
+    #[arg(long, default_value_t = 500_000)]
+    photons: usize,
+    /// Photons that a gather looks for
+    #[arg(long, default_value_t = 100)]
+    neighbors: u32,
+    /// Greatest distance of a gather in metres, or auto: from the photons' density
+    #[arg(long, default_value = "auto", value_parser = max_distance)]
+    max_distance: MaxDistance,
+    /// Final gather rays a sample
+    #[arg(long, default_value_t = 100)]
+    gather_rays: u32,
+    /// Shadow rays a sample
+    #[arg(long, default_value_t = 8)]
+    shadow_rays: u32,
+    /// Samples a pixel
+    #[arg(long, default_value_t = 1)]
+    spp: u32,
+    /// Side of a tile, pixels
+    #[arg(long, default_value_t = 16)]
+    tile: u32,
+    /// Order of the photon gathers; it never changes the picture
+    #[arg(long, default_value = "tiled")]
+    order: Order,
+    /// Where to render: emulated[:CHIPS] or emulated-micro[:CHIPS]; may be repeated [default: a chip a core]
+    #[arg(long = "card", value_name = "CARD")]
+    cards: Vec<CardAddress>,
+    /// Threads of the host's own work [default: a thread a core]
+    #[arg(long)]
+    pub(crate) threads: Option<usize>,
+    /// Type of the picture's samples; depth is always float
+    #[arg(long, default_value = "float")]
+    sample_type: SampleType,
+    /// Write a tone-mapped PNG as well
+    #[arg(long, value_name = "OUT.png")]
+    pub(crate) preview: Option<PathBuf>,
+    /// Write what the render took, as JSON
+    #[arg(long, value_name = "OUT.json")]
+    pub(crate) stats: Option<PathBuf>,
+    /// Show no progress
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Args)]
+pub(crate) struct DiffOptions {
+    /// The picture taken as right
+    pub(crate) reference: PathBuf,
+    /// The picture to compare
+    pub(crate) image: PathBuf,
+    /// Side of the blocks whose means are compared, pixels
+    #[arg(long, default_value_t = 16)]
+    pub(crate) block: usize,
+    /// Leave out blocks in which the reference exceeds this radiance: those that see an emitter
+    #[arg(long, value_name = "RADIANCE")]
+    pub(crate) exclude_above: Option<f32>,
+}
+
+/// Orders of the photon gathers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Order {
+    Naive,
+    Tiled,
+    Dirbin,
+    Hash,
+    Sort,
+    Hilbert,
+}
+
+impl Order {
+    /// The order, if it can be used.
+    pub(crate) fn tile_order(self) -> Result<TileOrder, String> {
+        match self {
+            Self::Naive => Ok(TileOrder::Naive),
+            Self::Tiled => Ok(TileOrder::Tiled),
+            Self::Dirbin | Self::Hash | Self::Sort | Self::Hilbert => {
+                let name = format!("{self:?}").to_lowercase();
+                Err(format!("--order {name} cannot be used yet; use naive or tiled, the picture is the same"))
+            }
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum SampleType {
+    Half,
+    Float,
+}
+
+#[derive(Clone, Copy)]
+enum MaxDistance {
+    Auto,
+    Metres(f32),
+}
+
+impl RenderOptions {
+    /// The settings that the options stand for; a text that says why not.
+    pub(crate) fn settings(&self) -> Result<RenderSettings, String> {
+        let emulated = || "emulated".parse();
+        Ok(RenderSettings {
+            width: self.size.0,
+            height: self.size.1,
+            crop: self.crop,
+            camera: self.camera.clone(),
+            seed: self.seed,
+            photons: self.photons,
+            neighbors: self.neighbors,
+            max_distance: match self.max_distance {
+                MaxDistance::Auto => None,
+                MaxDistance::Metres(distance) => Some(distance),
+            },
+            gather_rays: self.gather_rays,
+            shadow_rays: self.shadow_rays,
+            samples: self.spp,
+            tile: self.tile,
+            order: self.order.tile_order()?,
+            cards: if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() },
+        })
+    }
+
+    /// The type of the picture's samples.
+    pub(crate) fn sample_format(&self) -> SampleFormat {
+        match self.sample_type {
+            SampleType::Half => SampleFormat::Half,
+            SampleType::Float => SampleFormat::Float,
+        }
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let sides =
+        text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    match sides {
+        Some((width, height)) if width > 0 && height > 0 => Ok((width, height)),
+        _ => Err("a size is WIDTHxHEIGHT, both at least 1, such as 512x512".into()),
+    }
+}
+
+fn crop(text: &str) -> Result<Window, String> {
+    let ends: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
+    match ends.as_deref() {
+        Ok(&[x0, x1, y0, y1]) => Ok(Window { x0, x1, y0, y1 }),
+        _ => Err("a crop is X0,X1,Y0,Y1: four whole numbers, such as 0,64,0,64".into()),
+    }
+}
+
+fn max_distance(text: &str) -> Result<MaxDistance, String> {
+    match text.parse() {
+        _ if text == "auto" => Ok(MaxDistance::Auto),
+        Ok(distance) if f32::is_finite(distance) && distance > 0.0 => Ok(MaxDistance::Metres(distance)),
+        _ => Err("a greatest distance is a positive number of metres, or auto".into()),
+    }
+}

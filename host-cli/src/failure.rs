@@ -1,0 +1,66 @@
+//! How a command fails: what is said, and the exit status.
+
+use std::process::ExitCode;
+
+use miette::{Diagnostic, MietteDiagnostic, Report};
+use photoncard_driver::render::RenderError;
+
+/// Why a command did not do its work.
+pub(crate) enum Failure {
+    /// Wrong arguments or unreadable input: status 2.
+    Input(Report),
+    /// The work failed: status 1.
+    Work(Report),
+    /// An interrupt: status 130, as of a process ended by SIGINT.
+    Stopped,
+}
+
+impl Failure {
+    /// A failure of input that tells its own remedy.
+    pub(crate) fn input(error: impl Diagnostic + Send + Sync + 'static) -> Self {
+        Self::Input(Report::new(error))
+    }
+
+    /// A failure of input that is an error only, with its causes.
+    pub(crate) fn input_error(error: &(dyn std::error::Error + 'static)) -> Self {
+        Self::Input(Report::new(MietteDiagnostic::new(with_causes(error))))
+    }
+
+    /// A failure of the work that is an error only, with its causes.
+    pub(crate) fn work_error(error: &(dyn std::error::Error + 'static)) -> Self {
+        Self::Work(Report::new(MietteDiagnostic::new(with_causes(error))))
+    }
+
+    /// Says what happened, and gives the exit status.
+    pub(crate) fn report(self) -> ExitCode {
+        match self {
+            Self::Input(report) => {
+                eprintln!("{report:?}");
+                ExitCode::from(2)
+            }
+            Self::Work(report) => {
+                eprintln!("{report:?}");
+                ExitCode::from(1)
+            }
+            Self::Stopped => {
+                eprintln!("photoncard: stopped; no picture was written");
+                ExitCode::from(130)
+            }
+        }
+    }
+}
+
+impl From<RenderError> for Failure {
+    fn from(error: RenderError) -> Self {
+        match error {
+            RenderError::Stopped => Self::Stopped,
+            error if error.is_input() => Self::Input(Report::new(error)),
+            error => Self::Work(Report::new(error)),
+        }
+    }
+}
+
+fn with_causes(error: &(dyn std::error::Error + 'static)) -> String {
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
+}

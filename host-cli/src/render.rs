@@ -1,0 +1,100 @@
+//! `photoncard render`.
+
+use std::path::Path;
+use std::time::Instant;
+
+use miette::{MietteDiagnostic, Report};
+use photoncard_driver::render::{RenderSettings, Rendering, render};
+use photoncard_driver::scene::Scene;
+use photoncard_driver::scene::gltf::load;
+use photoncard_driver::{exr, output, preview};
+use serde_json::json;
+
+use crate::arguments::RenderOptions;
+use crate::failure::Failure;
+use crate::progress::Progress;
+
+/// Renders a scene and writes the picture and what else was asked for.
+pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
+    let settings =
+        options.settings().map_err(|text| Failure::Input(Report::new(MietteDiagnostic::new(text))))?;
+    for path in outputs(options) {
+        output::check_writable(path).map_err(|error| Failure::input_error(&error))?;
+    }
+    let start = Instant::now();
+    let scene = read_scene(options)?;
+    let scene_seconds = start.elapsed().as_secs_f64();
+    let progress = Progress::start(options.quiet).map_err(|error| Failure::work_error(&error))?;
+    let result = on_threads(options.threads, || render(&scene, &settings, &progress))?;
+    progress.finish();
+    let mut rendering = result?;
+    rendering.statistics.time_s.scene = scene_seconds;
+    rendering.statistics.time_s.total += scene_seconds;
+    write(options, &settings, &rendering)
+}
+
+fn outputs(options: &RenderOptions) -> impl Iterator<Item = &Path> {
+    [Some(&options.output), options.preview.as_ref(), options.stats.as_ref()]
+        .into_iter()
+        .flatten()
+        .map(AsRef::as_ref)
+}
+
+fn read_scene(options: &RenderOptions) -> Result<Scene, Failure> {
+    let mut scene = load(&options.scene).map_err(Failure::input)?;
+    for assignment in &options.assignments {
+        scene.apply(assignment).map_err(Failure::input)?;
+    }
+    if !options.quiet {
+        for notice in &scene.notices {
+            eprintln!("photoncard: {notice}");
+        }
+        if scene.skipped_triangles > 0 {
+            eprintln!("photoncard: {} triangles of zero area are left out", scene.skipped_triangles);
+        }
+    }
+    Ok(scene)
+}
+
+/// Does some work on a pool of so many threads.
+fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+    let Some(threads) = threads else { return Ok(work()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    Ok(pool.map_err(|error| Failure::work_error(&error))?.install(work))
+}
+
+fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Rendering) -> Result<(), Failure> {
+    let provenance = provenance(options, settings, rendering).to_string();
+    exr::write(&options.output, &rendering.film, &provenance, options.sample_format())
+        .map_err(|error| Failure::work_error(&error))?;
+    if let Some(path) = &options.preview {
+        preview::write_png(path, &rendering.film, None).map_err(|error| Failure::work_error(&error))?;
+    }
+    if let Some(path) = &options.stats {
+        let text = serde_json::to_string_pretty(&rendering.statistics)
+            .map_err(|error| Failure::work_error(&error))?;
+        output::write(path, (text + "\n").as_bytes()).map_err(|error| Failure::work_error(&error))?;
+    }
+    Ok(())
+}
+
+/// All that the pixels depend on, and nothing else: the file's bytes are the same on every card.
+fn provenance(
+    options: &RenderOptions,
+    settings: &RenderSettings,
+    rendering: &Rendering,
+) -> serde_json::Value {
+    json!({
+        "program": concat!("photoncard ", env!("CARGO_PKG_VERSION")),
+        "scene": options.scene.file_name().map(|name| name.to_string_lossy()),
+        "set": options.assignments,
+        "camera": settings.camera,
+        "seed": settings.seed,
+        "photons": settings.photons,
+        "neighbors": settings.neighbors,
+        "max_distance": rendering.statistics.max_distance,
+        "gather_rays": settings.gather_rays,
+        "shadow_rays": settings.shadow_rays,
+        "spp": settings.samples,
+    })
+}

@@ -1,0 +1,39 @@
+//! The sky over the court and the sun in it.
+//!
+//! Nothing lies beyond the scene but black, so the sky is a wedge that stands on the roof and closes the
+//! opening: low in the north, high in the south. What shape it has cannot be seen, for its radiance is
+//! the same all over; it is small because light that leaves one part of it for another is lost. The sun
+//! hangs in its high corner, so that light falls over the southern eaves slantwise on the northern side.
+
+use glam::Vec3;
+
+use crate::mesh::Mesh;
+
+/// Half the width of the sky; its foot, within the roof; its top.
+const SKY_X: f32 = 13.3;
+const SKY_Y: [f32; 2] = [9.2, 12.9];
+const SKY_Z: [f32; 2] = [-7.4, 5.6];
+
+const SUN: Vec3 = Vec3::new(-7.0, 12.0, -6.6);
+const SUN_TARGET: Vec3 = Vec3::new(3.0, 3.0, 4.5);
+const SUN_HALF_SIZE: f32 = 0.25;
+
+pub(super) fn sky() -> Mesh {
+    let ([foot, top], [south, north]) = (SKY_Y, SKY_Z);
+    let at = |x: f32, y: f32, z: f32| Vec3::new(x * SKY_X, y, z);
+    let mut mesh = Mesh::default();
+    mesh.quad([at(-1.0, foot, north), at(-1.0, top, south), at(1.0, top, south), at(1.0, foot, north)]);
+    mesh.quad([at(-1.0, foot, south), at(1.0, foot, south), at(1.0, top, south), at(-1.0, top, south)]);
+    mesh.lone_triangle([at(1.0, foot, north), at(1.0, top, south), at(1.0, foot, south)]);
+    mesh.lone_triangle([at(-1.0, foot, north), at(-1.0, foot, south), at(-1.0, top, south)]);
+    mesh
+}
+
+pub(super) fn sun() -> Mesh {
+    let towards = (SUN_TARGET - SUN).normalize();
+    let across = Vec3::Y.cross(towards).normalize() * SUN_HALF_SIZE;
+    let up = towards.cross(across);
+    let mut mesh = Mesh::default();
+    mesh.quad([SUN - across - up, SUN + across - up, SUN + across + up, SUN - across + up]);
+    mesh
+}

@@ -1,0 +1,213 @@
+//! Walls with arched openings, arch mouldings, vaults, and everything that runs around the court.
+
+use glam::{Vec2, Vec3};
+
+use super::dimensions::{EMBED, HALF};
+use crate::mesh::{Mesh, on_circle};
+
+/// A wall panel with one opening, round at its top, centred on x = 0.
+///
+/// The panel has no ends, top or underside: those lie within its neighbours.
+pub(super) struct ArchedPanel {
+    pub(super) width: f32,
+    pub(super) bottom: f32,
+    pub(super) springing: f32,
+    pub(super) top: f32,
+    pub(super) radius: f32,
+    /// Offsets of the two faces.
+    pub(super) faces: [f32; 2],
+    /// Segments of a quarter of the arch.
+    pub(super) segments: usize,
+    /// Strips between the opening and the outline.
+    pub(super) strips: usize,
+}
+
+impl ArchedPanel {
+    pub(super) fn mesh(&self) -> Mesh {
+        let outline = self.outline();
+        let [front, back] = self.faces;
+        let size = [outline.len(), self.strips + 1];
+        let at = |column: usize, strip: usize, offset: f32| {
+            let [inner, outer] = outline[column];
+            let point = inner + (outer - inner) * (strip as f32 / self.strips as f32);
+            // The outline itself must be exact: the next panel shares it.
+            let point = if strip == self.strips { outer } else { point };
+            point.extend(offset)
+        };
+        let mut mesh = Mesh::default();
+        mesh.grid(size, [false, false], |column, strip| at(column, strip, front));
+        let last = outline.len() - 1;
+        mesh.grid(size, [false, false], |column, strip| at(last - column, strip, back));
+        mesh.grid([outline.len(), 3], [false, false], |column, row| {
+            at(column, 0, back + (front - back) * (row as f32 / 2.0))
+        });
+        mesh
+    }
+
+    /// Points of the opening from right to left, each with its partner on the panel's outline.
+    fn outline(&self) -> Vec<[Vec2; 2]> {
+        let half = self.width / 2.0;
+        let mut right = Vec::new();
+        let jamb = self.springing - self.bottom;
+        let jamb_steps = (jamb / 0.7).ceil() as usize;
+        for step in 0..jamb_steps {
+            let y = self.bottom + jamb * (step as f32 / jamb_steps as f32);
+            right.push([Vec2::new(self.radius, y), Vec2::new(half, y)]);
+        }
+        let rise = self.top - self.springing;
+        let side = (self.segments as f32 * rise / (rise + half)).round() as usize;
+        let along_top = self.segments - side;
+        for step in 0..=self.segments {
+            let inner = on_circle(step, 4 * self.segments) * self.radius + Vec2::new(0.0, self.springing);
+            let outer = if step <= side {
+                Vec2::new(half, self.springing + rise * (step as f32 / side as f32))
+            } else {
+                Vec2::new(half * ((self.segments - step) as f32 / along_top as f32), self.top)
+            };
+            right.push([inner, outer]);
+        }
+        if let Some(crown) = right.last_mut() {
+            crown[0].x = 0.0;
+        }
+        // Mirrored rather than computed, so that neighbours meet bit for bit.
+        let left: Vec<_> =
+            right.iter().rev().skip(1).map(|pair| pair.map(|p| Vec2::new(-p.x, p.y))).collect();
+        right.into_iter().chain(left).collect()
+    }
+}
+
+/// A moulding over an arch: a rectangle, given by radii and offsets, with its two front edges bevelled.
+pub(super) fn arch_moulding(springing: f32, radii: [f32; 2], offsets: [f32; 2], segments: usize) -> Mesh {
+    let [inner, outer] = radii;
+    let [front, back] = offsets;
+    let bevel = 0.25 * (outer - inner);
+    let profile = [
+        [inner, front + bevel],
+        [inner + bevel, front],
+        [outer - bevel, front],
+        [outer, front + bevel],
+        [outer, back],
+        [inner, back],
+    ];
+    let mut mesh = Mesh::default();
+    // One more station at either end takes the feet down into what they stand on.
+    mesh.grid([segments + 3, profile.len()], [false, true], |station, row| {
+        let [radius, offset] = profile[row];
+        let drop = if station == 0 || station == segments + 2 { EMBED + 0.01 } else { 0.0 };
+        let p = on_circle(station.clamp(1, segments + 1) - 1, 2 * segments) * radius;
+        Vec3::new(p.x, springing + p.y - drop, offset)
+    });
+    mesh
+}
+
+/// A groin vault over a square bay centred on the y axis: two half cylinders that meet in the diagonals.
+///
+/// The vault reaches into the walls at either end of z and, with `all_round`, of x too.
+pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh {
+    const STEPS: usize = 10;
+    // Height and place of a cylinder's lines; equal angles keep its facets alike.
+    let line = |index: usize| on_circle(STEPS - index, 2 * STEPS) * radius;
+    let walled = |index: usize| match index {
+        0 => Vec2::new(-radius - EMBED, 0.0),
+        index if index == STEPS + 2 => Vec2::new(radius + EMBED, 0.0),
+        index => line(index - 1),
+    };
+    let across = |index: usize| if all_round { walled(index) } else { line(index) };
+    let columns = if all_round { STEPS + 3 } else { STEPS + 1 };
+    let mut mesh = Mesh::default();
+    mesh.grid_cut(
+        [columns, STEPS + 3],
+        [false, false],
+        |column, row| {
+            let (u, v) = (across(column), walled(row));
+            Vec3::new(u.x, springing + u.y.max(v.y).max(0.0), v.x)
+        },
+        // The cut follows the groin.
+        |column, row| (column < columns / 2) != (row < (STEPS + 2) / 2),
+    );
+    mesh
+}
+
+/// A profile carried around the court, with mitred corners.
+///
+/// `profile` is a closed polygon of offset and height, counterclockwise with offsets to the right.
+pub(super) fn ring(profile: &[[f32; 2]]) -> Mesh {
+    const STEPS: [usize; 2] = [16, 6];
+    // From corner to corner, along +x on the side of +z and on around.
+    let corners = [Vec2::new(-1.0, 1.0), Vec2::ONE, Vec2::new(1.0, -1.0), Vec2::NEG_ONE];
+    let stations: Vec<Vec2> = (0..4)
+        .flat_map(|side| {
+            let (from, to, steps) = (corners[side], corners[(side + 1) % 4], STEPS[side % 2]);
+            (0..steps).map(move |step| from + (to - from) * (step as f32 / steps as f32))
+        })
+        .collect();
+    let mut mesh = Mesh::default();
+    mesh.grid([stations.len(), profile.len()], [true, true], |station, row| {
+        let [offset, height] = profile[row];
+        let p = stations[station] * (HALF + offset);
+        Vec3::new(p.x, height, p.y)
+    });
+    mesh
+}
+
+/// Square slabs of `size` laid on y = 0 from `min` to `max`, those of which `chosen` approves.
+pub(super) fn paving(min: [i32; 2], max: [i32; 2], size: f32, chosen: impl Fn(i32, i32) -> bool) -> Mesh {
+    let mut mesh = Mesh::default();
+    for column in min[0]..max[0] {
+        for row in min[1]..max[1] {
+            if chosen(column, row) {
+                let at =
+                    |dx: i32, dz: i32| Vec3::new((column + dx) as f32 * size, 0.0, (row + dz) as f32 * size);
+                mesh.quad([at(0, 1), at(1, 1), at(1, 0), at(0, 0)]);
+            }
+        }
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_faces_outwards() {
+        let mesh = ring(&[[-0.5, 0.0], [0.5, 0.0], [0.5, 1.0], [-0.5, 1.0]]);
+        let volume = 25.0 * 10.0 - 23.0 * 8.0;
+        assert!((mesh.volume() - volume).abs() < 1e-2, "{}", mesh.volume());
+    }
+
+    #[test]
+    fn the_outline_of_a_panel_is_symmetric_and_its_area_right() {
+        let panel = ArchedPanel {
+            width: 3.0,
+            bottom: 0.0,
+            springing: 2.0,
+            top: 4.0,
+            radius: 1.0,
+            faces: [-0.5, 0.5],
+            segments: 32,
+            strips: 2,
+        };
+        let outline = panel.outline();
+        for (a, b) in outline.iter().zip(outline.iter().rev()) {
+            assert_eq!(a[1], Vec2::new(-b[1].x, b[1].y));
+        }
+        // Front and back alone, as pyramids over the origin: area x distance / 3, twice.
+        let mesh = panel.mesh();
+        let flat = |corners: &&[u32; 3]| {
+            let z = corners.map(|index| mesh.positions[index as usize].z);
+            z[0] == z[1] && z[1] == z[2]
+        };
+        let area: f32 = mesh
+            .triangles
+            .iter()
+            .filter(flat)
+            .map(|corners| {
+                let [a, b, c] = corners.map(|index| mesh.positions[index as usize]);
+                0.5 * (b - a).cross(c - a).z * a.z.signum()
+            })
+            .sum();
+        let expected = 2.0 * (3.0 * 4.0 - 2.0 * 2.0 - core::f32::consts::FRAC_PI_2);
+        assert!((area - expected).abs() < 1e-2, "{area} {expected}");
+    }
+}

@@ -1,0 +1,109 @@
+//! The Cornell box, scaled to two metres, and the same box with a glossy floor.
+
+use glam::Vec3;
+
+use crate::builder::{Camera, Material, SceneBuilder};
+use crate::document::Phong;
+use crate::mesh::Mesh;
+
+/// Four corners, counterclockwise from the front.
+type Quad = [[f32; 3]; 4];
+
+const LIGHT: Quad = [[-0.23, 0.99, -0.18], [0.23, 0.99, -0.18], [0.23, 0.99, 0.2], [-0.23, 0.99, 0.2]];
+const FLOOR: Quad = [[-1.0, -1.0, 1.0], [1.0, -1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, -1.0]];
+const CEILING: Quad = [[-1.0, 1.0, -1.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]];
+const BACK: Quad = [[-1.0, -1.0, -1.0], [1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [-1.0, 1.0, -1.0]];
+const GREEN_WALL: Quad = [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, -1.0]];
+const RED_WALL: Quad = [[-1.0, -1.0, 1.0], [-1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, 1.0, 1.0]];
+
+/// A box that stands on, or a little in, the floor: x and z of its four corners, then bottom and top.
+struct StandingBox {
+    footprint: [[f32; 2]; 4],
+    bottom: f32,
+    top: f32,
+}
+
+const SMALL_BOX: StandingBox = StandingBox {
+    footprint: [
+        [-0.03960294, 0.57917994],
+        [0.5341799, 0.7546029],
+        [0.70960295, 0.18082008],
+        [0.13582009, 0.005397062],
+    ],
+    bottom: -1.0,
+    top: -0.4,
+};
+
+const LARGE_BOX: StandingBox = StandingBox {
+    footprint: [
+        [-0.52096057, 0.09885888],
+        [0.04885888, -0.08903941],
+        [-0.1390394, -0.6588589],
+        [-0.7088589, -0.4709606],
+    ],
+    bottom: -1.01,
+    top: 0.21,
+};
+
+const WHITE: [f64; 3] = [0.885809, 0.698859, 0.666422];
+const GREEN: [f64; 3] = [0.105421, 0.37798, 0.076425];
+const RED: [f64; 3] = [0.570068, 0.0430135, 0.0443706];
+const LIGHT_RADIANCE: [f64; 3] = [18.387, 13.9873, 6.75357];
+
+/// The whole open side fills the picture.
+const FRONT: Camera =
+    Camera { eye: Vec3::new(0.0, 0.0, 3.9), target: Vec3::ZERO, yfov: 0.6860487863861751, aspect_ratio: 1.0 };
+
+/// Nearer, looking down, so that the floor fills the picture, from its open edge to the back wall.
+const TOWARDS_FLOOR: Camera = Camera {
+    eye: Vec3::new(-0.15, 0.5, 1.75),
+    target: Vec3::new(-0.15, -1.0, 0.2),
+    yfov: 0.64,
+    aspect_ratio: 1.0,
+};
+
+fn quad(corners: Quad) -> Mesh {
+    let mut mesh = Mesh::default();
+    mesh.quad(corners.map(Vec3::from_array));
+    mesh
+}
+
+fn standing_box(shape: &StandingBox) -> Mesh {
+    let mut mesh = Mesh::default();
+    mesh.prism(shape.footprint, shape.bottom, shape.top);
+    mesh
+}
+
+/// The box with the given material on its floor, or the white of the other walls.
+fn cornell_box(floor: Option<&Material>) -> SceneBuilder {
+    let mut scene = SceneBuilder::default();
+    let white = scene.material(&Material::diffuse("white", WHITE));
+    let green = scene.material(&Material::diffuse("green", GREEN));
+    let red = scene.material(&Material::diffuse("red", RED));
+    let light = scene.material(&Material::diffuse("light", WHITE).emitting(LIGHT_RADIANCE));
+    let floor = floor.map_or(white, |material| scene.material(material));
+    scene.object("light", &quad(LIGHT), light);
+    scene.object("floor", &quad(FLOOR), floor);
+    scene.object("ceiling", &quad(CEILING), white);
+    scene.object("back", &quad(BACK), white);
+    scene.object("green-wall", &quad(GREEN_WALL), green);
+    scene.object("red-wall", &quad(RED_WALL), red);
+    scene.object("small-box", &standing_box(&SMALL_BOX), white);
+    scene.object("large-box", &standing_box(&LARGE_BOX), white);
+    scene.camera("camera", &FRONT);
+    scene
+}
+
+/// All Lambertian, lit by the lamp in the ceiling.
+pub(crate) fn lambertian() -> Vec<u8> {
+    cornell_box(None).into_gltf()
+}
+
+/// The same with a floor that has a Phong lobe.
+pub(crate) fn glossy_floor() -> Vec<u8> {
+    let phong = Phong { specular: [0.35; 3], exponent: 32.0 };
+    let floor = Material::diffuse("floor", [0.45, 0.28, 0.14]).with_phong(phong);
+    let mut scene = cornell_box(Some(&floor));
+    scene.camera("floor", &TOWARDS_FLOOR);
+    scene.into_gltf()
+}

@@ -1,0 +1,29 @@
+//! A closed cube whose walls all emit and reflect alike.
+//!
+//! Radiance is then the same everywhere and in every direction: `L = 1 + 0.5 L`, so `L = 2`.
+
+use glam::Vec3;
+
+use crate::builder::{Camera, Material, SceneBuilder};
+use crate::mesh::Mesh;
+
+/// A box between two corners given in the wrong order shows its front to the inside.
+fn room() -> Mesh {
+    let mut mesh = Mesh::default();
+    mesh.cuboid(Vec3::ONE, Vec3::NEG_ONE);
+    mesh
+}
+
+pub(crate) fn furnace() -> Vec<u8> {
+    let mut scene = SceneBuilder::default();
+    let wall = scene.material(&Material::diffuse("wall", [0.5; 3]).emitting([1.0; 3]));
+    scene.object("room", &room(), wall);
+    let camera = Camera {
+        eye: Vec3::new(0.3, 0.2, 0.4),
+        target: Vec3::NEG_ONE,
+        yfov: core::f64::consts::FRAC_PI_3,
+        aspect_ratio: 1.0,
+    };
+    scene.camera("camera", &camera);
+    scene.into_gltf()
+}

@@ -1,0 +1,29 @@
+//! The scenes that ship with photoncard, made from numbers.
+//!
+//! Every run on every machine makes the same bytes; a test holds the files beside this crate to that.
+
+mod atrium;
+pub mod builder;
+mod cornell;
+pub mod document;
+mod furnace;
+pub mod mesh;
+
+/// A scene as it lies on disk.
+#[derive(Clone, Debug)]
+pub struct SceneFile {
+    /// The name of the file, without a folder.
+    pub name: &'static str,
+    /// All of the file.
+    pub bytes: Vec<u8>,
+}
+
+/// Makes every scene.
+pub fn scenes() -> Vec<SceneFile> {
+    vec![
+        SceneFile { name: "cornell.gltf", bytes: cornell::lambertian() },
+        SceneFile { name: "cornell-glossy.gltf", bytes: cornell::glossy_floor() },
+        SceneFile { name: "furnace.gltf", bytes: furnace::furnace() },
+        SceneFile { name: "atrium.glb", bytes: atrium::atrium() },
+    ]
+}

@@ -1,0 +1,179 @@
+//! Triangle meshes and the few ways in which the scenes' shapes are made.
+//!
+//! Front faces are counterclockwise. Shapes share vertices along their inner edges, so they have no
+//! cracks; sines and cosines come from `libm`, so every machine makes the same bits.
+
+use glam::{Vec2, Vec3};
+
+/// Indexed triangles.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Vertices, in metres.
+    pub positions: Vec<Vec3>,
+    /// Three vertices each, counterclockwise from the front.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    /// The corners of the smallest axis-aligned box around the mesh.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        self.positions.iter().fold(empty, |(min, max), &p| (min.min(p), max.max(p)))
+    }
+
+    fn vertex(&mut self, position: Vec3) -> u32 {
+        self.positions.push(position);
+        (self.positions.len() - 1) as u32
+    }
+
+    /// Adds a triangle unless two of its corners coincide, as they do at a pole.
+    fn triangle(&mut self, corners: [u32; 3]) {
+        let [a, b, c] = corners.map(|index| self.positions[index as usize]);
+        if a != b && b != c && c != a {
+            self.triangles.push(corners);
+        }
+    }
+
+    /// Adds the quadrilateral between four vertices, cut from the first to the third.
+    fn quad_between(&mut self, [a, b, c, d]: [u32; 4]) {
+        self.triangle([a, b, c]);
+        self.triangle([a, c, d]);
+    }
+
+    /// Adds a planar quadrilateral with vertices of its own.
+    pub fn quad(&mut self, corners: [Vec3; 4]) {
+        let corners = corners.map(|corner| self.vertex(corner));
+        self.quad_between(corners);
+    }
+
+    /// Adds a triangle with vertices of its own.
+    pub fn lone_triangle(&mut self, corners: [Vec3; 3]) {
+        let corners = corners.map(|corner| self.vertex(corner));
+        self.triangle(corners);
+    }
+
+    /// Adds an upright prism: sides, top and bottom. `footprint` holds x and z, counterclockwise as
+    /// seen from above.
+    pub fn prism(&mut self, footprint: [[f32; 2]; 4], bottom: f32, top: f32) {
+        let at = |corner: usize, y: f32| Vec3::new(footprint[corner][0], y, footprint[corner][1]);
+        for [from, to] in [[0, 1], [2, 3], [1, 2], [3, 0]] {
+            self.quad([at(from, bottom), at(to, bottom), at(to, top), at(from, top)]);
+        }
+        self.quad([0, 1, 2, 3].map(|corner| at(corner, top)));
+        self.quad([3, 2, 1, 0].map(|corner| at(corner, bottom)));
+    }
+
+    /// Adds an axis-aligned box.
+    pub fn cuboid(&mut self, min: Vec3, max: Vec3) {
+        let footprint = [[min.x, max.z], [max.x, max.z], [max.x, min.z], [min.x, min.z]];
+        self.prism(footprint, min.y, max.y);
+    }
+
+    /// Adds a box of half-width `half` in x and z about the y axis.
+    pub fn block(&mut self, half: f32, bottom: f32, top: f32) {
+        self.cuboid(Vec3::new(-half, bottom, -half), Vec3::new(half, top, half));
+    }
+
+    /// Adds a grid of `columns` by `rows` vertices; the front is on the side of (along a row) x (along a
+    /// column). `wrap` joins the last column to the first, the last row to the first, or both.
+    pub fn grid(&mut self, size: [usize; 2], wrap: [bool; 2], point: impl Fn(usize, usize) -> Vec3) {
+        self.grid_cut(size, wrap, point, |_, _| false);
+    }
+
+    /// The same; where `other_cut` says so a cell is cut along its other diagonal.
+    pub fn grid_cut(
+        &mut self,
+        [columns, rows]: [usize; 2],
+        wrap: [bool; 2],
+        point: impl Fn(usize, usize) -> Vec3,
+        other_cut: impl Fn(usize, usize) -> bool,
+    ) {
+        let first = self.positions.len();
+        for row in 0..rows {
+            self.positions.extend((0..columns).map(|column| point(column, row)));
+        }
+        let index = |column: usize, row: usize| (first + row % rows * columns + column % columns) as u32;
+        for row in 0..rows - usize::from(!wrap[1]) {
+            for column in 0..columns - usize::from(!wrap[0]) {
+                let mut cell = [
+                    index(column, row),
+                    index(column + 1, row),
+                    index(column + 1, row + 1),
+                    index(column, row + 1),
+                ];
+                if other_cut(column, row) {
+                    cell.rotate_left(1);
+                }
+                self.quad_between(cell);
+            }
+        }
+    }
+
+    /// Adds a surface of revolution about the y axis. `profile` holds radius and height, upwards on the
+    /// outside; where it begins and ends on the axis the solid is closed.
+    pub fn lathe(&mut self, segments: usize, profile: &[[f32; 2]]) {
+        self.fluted_lathe(segments, profile, |_, _| 1.0);
+    }
+
+    /// The same with the radius scaled by `flute(segment, row)`.
+    pub fn fluted_lathe(
+        &mut self,
+        segments: usize,
+        profile: &[[f32; 2]],
+        flute: impl Fn(usize, usize) -> f32,
+    ) {
+        self.grid([segments, profile.len()], [true, false], |segment, row| {
+            let [radius, height] = profile[row];
+            let direction = on_circle(segment, segments);
+            let radius = radius * flute(segment, row);
+            Vec3::new(radius * direction.x, height, -radius * direction.y)
+        });
+    }
+
+    /// Adds the whole of another mesh, moved by `offset`.
+    pub fn append(&mut self, other: &Self, offset: Vec3) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(other.positions.iter().map(|&p| p + offset));
+        self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|index| first + index)));
+    }
+
+    /// The mesh after a quarter turn about the y axis, from +z towards +x.
+    #[must_use]
+    pub fn quarter_turn(mut self) -> Self {
+        for p in &mut self.positions {
+            *p = Vec3::new(p.z, p.y, 0.0 - p.x);
+        }
+        self
+    }
+
+    /// The volume inside, if the mesh is closed; negative if its front faces inwards.
+    pub fn volume(&self) -> f32 {
+        let corner = |index: u32| self.positions[index as usize];
+        self.triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c)))).sum::<f32>() / 6.0
+    }
+}
+
+/// The point at `index / count` of the unit circle, from +x towards +y.
+pub fn on_circle(index: usize, count: usize) -> Vec2 {
+    let angle = core::f32::consts::TAU * index as f32 / count as f32;
+    Vec2::new(libm::cosf(angle), libm::sinf(angle))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn closed_shapes_face_outwards() {
+        let mut cube = Mesh::default();
+        cube.block(0.5, 0.0, 1.0);
+        assert_eq!(cube.volume(), 1.0);
+
+        let mut cylinder = Mesh::default();
+        cylinder.lathe(256, &[[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]]);
+        assert!((cylinder.volume() - core::f32::consts::TAU).abs() < 1e-2);
+        assert_eq!(cylinder.triangles.len(), 256 * 4);
+
+        assert!(cube.quarter_turn().volume() > 0.0);
+    }
+}

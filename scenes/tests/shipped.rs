@@ -1,0 +1,102 @@
+//! The scenes that lie beside this crate are what it makes, and are sound.
+
+use std::fs;
+use std::path::Path;
+
+use base64::Engine;
+use glam::{Mat4, Vec3};
+use gltf::buffer::Source;
+use gltf::{Gltf, Node};
+
+/// A scene's name, the triangles it may have, and its cameras.
+const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 4] = [
+    ("cornell.gltf", 36..=36, &["camera"]),
+    ("cornell-glossy.gltf", 36..=36, &["camera", "floor"]),
+    ("furnace.gltf", 12..=12, &["camera"]),
+    ("atrium.glb", 60_000..=150_000, &["court", "gallery"]),
+];
+
+fn shipped(name: &str) -> Vec<u8> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+    fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn binary(file: &Gltf) -> Vec<u8> {
+    let buffer = file.buffers().next().expect("a buffer");
+    match buffer.source() {
+        Source::Bin => file.blob.clone().expect("a binary chunk"),
+        Source::Uri(uri) => {
+            let (_, encoded) = uri.split_once("base64,").expect("a data URI");
+            base64::engine::general_purpose::STANDARD.decode(encoded).expect("base64")
+        }
+    }
+}
+
+/// Adds the triangles of a node and of those below it, in world space.
+fn collect(node: &Node<'_>, parent: Mat4, data: &[u8], triangles: &mut Vec<[Vec3; 3]>) {
+    let transform = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+    for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
+        let reader = primitive.reader(|_| Some(data));
+        let place = |position| transform.transform_point3(Vec3::from_array(position));
+        let positions: Vec<Vec3> = reader.read_positions().expect("positions").map(place).collect();
+        let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
+        let corners = indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]].map(|i| positions[i as usize]));
+        triangles.extend(corners);
+    }
+    for child in node.children() {
+        collect(&child, transform, data, triangles);
+    }
+}
+
+fn triangles(file: &Gltf) -> Vec<[Vec3; 3]> {
+    let data = binary(file);
+    let mut triangles = Vec::new();
+    for node in file.default_scene().expect("a scene").nodes() {
+        collect(&node, Mat4::IDENTITY, &data, &mut triangles);
+    }
+    triangles
+}
+
+#[test]
+fn shipped_files_are_what_the_generator_makes() {
+    let scenes = photoncard_scenes::scenes();
+    assert_eq!(scenes.len(), EXPECTED.len());
+    for scene in scenes {
+        let same = shipped(scene.name) == scene.bytes;
+        assert!(same, "{} differs: run `cargo run -p photoncard-scenes`", scene.name);
+    }
+}
+
+#[test]
+fn scenes_are_valid_and_of_the_expected_size() {
+    for (name, range, cameras) in EXPECTED {
+        let file = Gltf::from_slice(&shipped(name)).expect(name);
+        let count = triangles(&file).len();
+        assert!(range.contains(&count), "{name}: {count} triangles");
+        let names: Vec<_> = file.cameras().filter_map(|camera| camera.name()).collect();
+        assert_eq!(names, cameras, "{name}");
+    }
+}
+
+#[test]
+fn no_triangle_is_degenerate() {
+    for (name, ..) in EXPECTED {
+        let file = Gltf::from_slice(&shipped(name)).expect(name);
+        for [a, b, c] in triangles(&file) {
+            let doubled = (b - a).cross(c - a).length();
+            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+            let height = doubled / longest;
+            assert!(height > 1e-3, "{name}: {a} {b} {c} is {height} m high");
+            assert!(longest < 200.0 * height, "{name}: {a} {b} {c} is a sliver");
+        }
+    }
+}
+
+#[test]
+fn the_atrium_reflects_no_more_than_85_percent() {
+    let file = Gltf::from_slice(&shipped("atrium.glb")).expect("atrium.glb");
+    for material in file.materials() {
+        let [r, g, b, _] = material.pbr_metallic_roughness().base_color_factor();
+        assert!(r.max(g).max(b) <= 0.85, "{:?}", material.name());
+    }
+}
