@@ -56,6 +56,11 @@ impl Emitters {
         &self.thresholds
     }
 
+    /// Probability density, 1/m^2, of a point on one side of an emitter for each unit of its mean radiance.
+    pub fn density_per_radiance(&self) -> f32 {
+        if self.power > 0.0 { (std::f64::consts::PI / self.power) as f32 } else { 0.0 }
+    }
+
     /// Emitted power, watts, mean of the channels.
     pub fn power(&self) -> f64 {
         self.power

@@ -51,6 +51,7 @@ pub struct PackedScene {
     lines: Vec<Line>,
     sections: [Section; SECTIONS],
     radiance_unit: f32,
+    emitter_density: f32,
 }
 
 /// A complete card image.
@@ -70,6 +71,7 @@ impl PackedScene {
             lines: vec![Line::ZERO],
             sections: [Section::default(); SECTIONS],
             radiance_unit: radiance_unit(scene, emitters),
+            emitter_density: emitters.density_per_radiance(),
         };
         packed.append(SectionKind::Nodes, hierarchy.nodes.iter().map(layout::BvhNode::to_bytes))?;
         let triangles =
@@ -101,6 +103,7 @@ impl PackedScene {
             lines: self.lines.len() as u32,
             photon_power_unit,
             radiance_unit: self.radiance_unit,
+            emitter_density: self.emitter_density,
             sections: self.sections,
         }
     }

@@ -31,10 +31,10 @@ pub struct Chip<const TILE_PIXELS: usize, const CANDIDATES: usize> {
 /// What is known of a pixel so far: sums over its samples.
 #[derive(Clone, Copy, Debug)]
 struct PixelSum {
-    /// Emission and direct light, W/(sr m^2); samples come in their order.
+    /// Emission and what shadow rays bring, W/(sr m^2); samples come in their order.
     direct: Vec3,
-    /// Indirect light, in radiance units; gathers come in any order.
-    indirect: ColourSum,
+    /// What gather rays bring, in radiance units; they come in any order.
+    gathered: ColourSum,
     albedo: Vec3,
     normal: Vec3,
     depth: f32,
@@ -44,7 +44,7 @@ struct PixelSum {
 impl PixelSum {
     const ZERO: Self = Self {
         direct: Vec3::ZERO,
-        indirect: ColourSum::ZERO,
+        gathered: ColourSum::ZERO,
         albedo: Vec3::ZERO,
         normal: Vec3::ZERO,
         depth: 0.0,
@@ -144,7 +144,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Chip<TILE_PIXELS, CANDID
                 (Stage::FinalGather, Some(surface)) => {
                     for index in 0..frame.gather_rays {
                         if let Some(point) = final_gather::cast(&mut context, at, surface, index)? {
-                            sum.indirect.add(final_gather::radiance(
+                            sum.gathered.add(final_gather::radiance(
                                 &mut context,
                                 &point,
                                 &mut self.candidates,
@@ -181,10 +181,10 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Chip<TILE_PIXELS, CANDID
     pub fn pixel(&self, index: usize, scene: &SceneImage, frame: &FrameParameters) -> Option<Pixel> {
         let sum = self.sums.get(index)?;
         let per_sample = 1.0 / frame.samples.max(1) as f32;
-        let indirect = sum.indirect.value() * scene.header.radiance_unit;
+        let gathered = sum.gathered.value() * scene.header.radiance_unit;
         let per_surface = 1.0 / sum.surfaces as f32;
         Some(Pixel {
-            radiance: ((sum.direct + indirect) * per_sample).to_array(),
+            radiance: ((sum.direct + gathered) * per_sample).to_array(),
             albedo: (sum.albedo * per_sample).to_array(),
             normal: (sum.normal * per_sample).to_array(),
             depth: if sum.surfaces > 0 { sum.depth * per_surface } else { f32::INFINITY },

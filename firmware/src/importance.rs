@@ -19,6 +19,8 @@ pub struct GatherDirection {
     pub direction: Vec3,
     /// `f cos(theta) / p`, without unit: what the radiance from this direction is multiplied with.
     pub weight: Vec3,
+    /// Probability density of the direction, 1/sr.
+    pub density: f32,
 }
 
 /// The direction that belongs to a point of the unit square; `None` below the surface, where the weight is zero.
@@ -27,7 +29,8 @@ pub fn sample_reflection(surface: &Surface, [u, v]: [f32; 2]) -> Option<GatherDi
     let diffuse_share = diffuse_share(reflection);
     if diffuse_share >= 1.0 {
         let direction = cosine_direction(surface.normal, [u, v]);
-        return Some(GatherDirection { direction, weight: reflection.diffuse });
+        let density = surface.normal.dot(direction) * FRAC_1_PI;
+        return Some(GatherDirection { direction, weight: reflection.diffuse, density });
     }
     let mirror = mirror(surface.outgoing, surface.normal);
     let direction = if v < diffuse_share {
@@ -40,13 +43,35 @@ pub fn sample_reflection(surface: &Surface, [u, v]: [f32; 2]) -> Option<GatherDi
     if cosine <= 0.0 {
         return None;
     }
-    let alpha_cosine = max(mirror.dot(direction), 0.0);
-    let power = libm::powf(alpha_cosine, reflection.exponent);
-    let lobe_density = (reflection.exponent + 1.0) * 0.5 * FRAC_1_PI * power;
-    let density = diffuse_share * cosine * FRAC_1_PI + (1.0 - diffuse_share) * lobe_density;
+    let power = lobe_power(reflection, mirror, direction);
+    let density = mixture_density(reflection, diffuse_share, cosine, power);
     let lobe = reflection.specular * ((reflection.exponent + 2.0) * 0.5 * FRAC_1_PI * power);
     let weight = (reflection.lambertian() + lobe) * (cosine / density);
-    (density > 0.0).then_some(GatherDirection { direction, weight })
+    (density > 0.0).then_some(GatherDirection { direction, weight, density })
+}
+
+/// The probability density, 1/sr, with which [`sample_reflection`] chooses a direction on the side of the normal.
+pub fn reflection_density(surface: &Surface, direction: Vec3) -> f32 {
+    let reflection = &surface.reflection;
+    let cosine = surface.normal.dot(direction);
+    let diffuse_share = diffuse_share(reflection);
+    if diffuse_share >= 1.0 {
+        return cosine * FRAC_1_PI;
+    }
+    let mirror = mirror(surface.outgoing, surface.normal);
+    mixture_density(reflection, diffuse_share, cosine, lobe_power(reflection, mirror, direction))
+}
+
+/// `max(0, cos alpha)^n`.
+#[inline(always)]
+fn lobe_power(reflection: &Reflection, mirror: Vec3, direction: Vec3) -> f32 {
+    libm::powf(max(mirror.dot(direction), 0.0), reflection.exponent)
+}
+
+#[inline(always)]
+fn mixture_density(reflection: &Reflection, diffuse_share: f32, cosine: f32, lobe_power: f32) -> f32 {
+    let lobe_density = (reflection.exponent + 1.0) * 0.5 * FRAC_1_PI * lobe_power;
+    diffuse_share * cosine * FRAC_1_PI + (1.0 - diffuse_share) * lobe_density
 }
 
 /// The share of rays for the Lambertian part.
@@ -94,6 +119,7 @@ mod tests {
                 exponent,
             },
             emission: Vec3::ZERO,
+            double_sided: false,
             distance: 1.0,
         }
     }
@@ -147,6 +173,7 @@ mod tests {
             if let Some(direction) = sample_reflection(&surface, point) {
                 assert!(direction.weight.x <= 0.9 * 2.0, "{direction:?}");
                 assert!((direction.direction.length() - 1.0).abs() < 1e-4);
+                assert_eq!(direction.density, reflection_density(&surface, direction.direction));
             }
         }
     }

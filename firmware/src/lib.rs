@@ -20,8 +20,8 @@
 //! With E the eye, L a light, D and S a diffuse and a Phong reflection, at the point that the eye ray meets:
 //!
 //! - `LE`, light seen directly: the emission of the point itself.
-//! - `L(D|S)E`, direct light: shadow rays to points on emitters ([`render::direct`]). A final gather ray that meets an
-//!   emitter therefore does not count its emission.
+//! - `L(D|S)E`, direct light: shadow rays to points on emitters, and final gather rays that meet an emitter, each
+//!   weighted so that together they count it once ([`render::direct`]).
 //! - `L(D|S)+(D|S)E`, indirect light: final gather rays alone ([`render::final_gather`]). Where a ray ends, the photon
 //!   map gives all the light reflected there, first arrivals from lights included, as no shadow ray is cast from there.
 //!

@@ -36,7 +36,8 @@ impl Pattern {
         let cell = Cell::new(index, count);
         let sub_column = permute(cell.row, cell.rows, self.0 ^ 0x5163_3e2d);
         let sub_row = permute(cell.column, cell.columns, self.0 ^ 0x68bc_21eb);
-        let jitter = |salt: u32| unit_interval(hash(self.0.wrapping_add(salt) ^ index.wrapping_mul(0x9e37_79b9)));
+        let jitter =
+            |salt: u32| unit_interval(hash(self.0.wrapping_add(salt) ^ index.wrapping_mul(0x9e37_79b9)));
         let x_in_cell = (sub_column as f32 + jitter(0x967a_889b)) / cell.rows as f32;
         let x = (cell.column as f32 + x_in_cell) / cell.columns as f32;
         let y = ((cell.first + sub_row) as f32 + jitter(0x368c_c8b7)) / count as f32;

@@ -89,6 +89,9 @@ pub struct Header {
     pub photon_power_unit: f32,
     /// Radiance that a fixed-point pixel sum of 1 stands for, W/(sr m^2): a power of two.
     pub radiance_unit: f32,
+    /// Probability density, 1/m^2, of a shadow ray's end on one side of an emitter, for each unit of its mean radiance:
+    /// pi over the power of all emitters. Zero without emitters.
+    pub emitter_density: f32,
     /// Where the records lie, by [`SectionKind`].
     pub sections: [Section; SECTIONS],
 }
@@ -100,7 +103,7 @@ pub enum HeaderError {
     Magic,
     /// It was written for another layout version, the one given.
     Version(u16),
-    /// A unit is not a positive finite number.
+    /// A unit is not a positive finite number, or the emitters' density not a finite one.
     Unit,
     /// The section of this index reaches past the image's last line.
     Section(u8),
@@ -124,6 +127,7 @@ impl Header {
         put(12, &self.lines.to_le_bytes());
         put(16, &self.photon_power_unit.to_le_bytes());
         put(20, &self.radiance_unit.to_le_bytes());
+        put(24, &self.emitter_density.to_le_bytes());
         for (index, section) in self.sections.iter().enumerate() {
             put(SECTION_TABLE + 8 * index, &section.first_line.to_le_bytes());
             put(SECTION_TABLE + 8 * index + 4, &section.records.to_le_bytes());
@@ -148,6 +152,7 @@ impl Header {
             lines: word(12),
             photon_power_unit: f32::from_bits(word(16)),
             radiance_unit: f32::from_bits(word(20)),
+            emitter_density: f32::from_bits(word(24)),
             sections: core::array::from_fn(|index| Section {
                 first_line: word(SECTION_TABLE + 8 * index),
                 records: word(SECTION_TABLE + 8 * index + 4),
@@ -159,7 +164,8 @@ impl Header {
 
     fn check(&self) -> Result<(), HeaderError> {
         let is_unit = |x: f32| x.is_normal() && x > 0.0;
-        if !is_unit(self.photon_power_unit) || !is_unit(self.radiance_unit) {
+        let is_density = self.emitter_density.is_finite() && self.emitter_density >= 0.0;
+        if !is_unit(self.photon_power_unit) || !is_unit(self.radiance_unit) || !is_density {
             return Err(HeaderError::Unit);
         }
         for kind in SectionKind::ALL {
@@ -181,7 +187,7 @@ mod tests {
     fn header() -> Header {
         let mut sections = [Section::default(); SECTIONS];
         sections[SectionKind::Photons as usize] = Section { first_line: 10, records: 60 };
-        Header { lines: 20, photon_power_unit: 0.5, radiance_unit: 2.0, sections }
+        Header { lines: 20, photon_power_unit: 0.5, radiance_unit: 2.0, emitter_density: 0.25, sections }
     }
 
     #[test]
@@ -206,5 +212,7 @@ mod tests {
         assert_eq!(Header::read(&other), Err(HeaderError::Version(77)));
         let unitless = Header { radiance_unit: f32::NAN, ..header() };
         assert_eq!(Header::read(&unitless.to_line()), Err(HeaderError::Unit));
+        let endless = Header { emitter_density: f32::INFINITY, ..header() };
+        assert_eq!(Header::read(&endless.to_line()), Err(HeaderError::Unit));
     }
 }

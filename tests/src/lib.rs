@@ -1,1 +1,78 @@
-//! photoncard
+//! What the tests of the whole share: small scenes of known radiance, and renders of them.
+
+use glam::Vec3;
+use photoncard_driver::film::Film;
+use photoncard_driver::render::{RenderSettings, Rendering, Unobserved, render};
+use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
+
+/// A white Lambertian, one-sided material of some albedo that does not emit.
+pub fn lambertian(name: &str, albedo: f32) -> Material {
+    Material {
+        name: name.into(),
+        diffuse: Vec3::splat(albedo),
+        specular: Vec3::ZERO,
+        exponent: 0.0,
+        emission: Vec3::ZERO,
+        double_sided: false,
+    }
+}
+
+/// The two triangles of a quadrilateral with corners in counter-clockwise order, seen from its front.
+pub fn quad(corners: [Vec3; 4], material: u32) -> [Triangle; 2] {
+    let [a, b, c, d] = corners;
+    [Triangle { vertices: [a, b, c], material }, Triangle { vertices: [a, c, d], material }]
+}
+
+/// The six inner walls of the cube from -1 to 1, each of its own material: -x, +x, -y, +y, -z, +z.
+pub fn room(materials: [u32; 6]) -> Vec<Triangle> {
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+    let mut triangles = Vec::new();
+    for (axis, pair) in materials.as_chunks::<2>().0.iter().enumerate() {
+        for (side, &material) in [-1.0, 1.0].into_iter().zip(pair) {
+            let (n, u) = (axes[axis] * side, axes[(axis + 1) % 3]);
+            // The front faces inwards: u, v and -n form a right-handed frame.
+            let v = (-n).cross(u);
+            triangles.extend(quad([n - u - v, n + u - v, n + u + v, n - u + v], material));
+        }
+    }
+    triangles
+}
+
+/// A camera that looks along a direction with a field of view of 90 degrees.
+pub fn camera(origin: Vec3, forward: Vec3) -> Camera {
+    let forward = forward.normalize();
+    let right = forward.cross(Vec3::Y).normalize();
+    Camera {
+        name: "camera".into(),
+        origin,
+        right,
+        up: right.cross(forward),
+        forward,
+        vertical_fov: std::f32::consts::FRAC_PI_2,
+        aspect: None,
+    }
+}
+
+/// A scene of triangles, materials and one camera.
+pub fn scene(triangles: Vec<Triangle>, materials: Vec<Material>, camera: Camera) -> Scene {
+    Scene { triangles, materials, cameras: vec![camera], ..Scene::default() }
+}
+
+/// Renders, or panics with the reason.
+///
+/// # Panics
+/// If the render fails.
+pub fn render_or_panic(scene: &Scene, settings: &RenderSettings) -> Rendering {
+    render(scene, settings, &Unobserved).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Radiances of a film, row by row.
+pub fn radiances(film: &Film) -> Vec<[f32; 3]> {
+    film.pixels().iter().map(|pixel| pixel.radiance).collect()
+}
+
+/// Mean over pixels and channels.
+pub fn mean(radiances: &[[f32; 3]]) -> f64 {
+    let sum: f64 = radiances.as_flattened().iter().map(|&channel| channel as f64).sum();
+    sum / (3 * radiances.len()) as f64
+}

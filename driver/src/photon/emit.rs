@@ -82,6 +82,7 @@ pub(super) fn emit(
         outgoing: normal,
         reflection: Reflection { diffuse: Vec3::ONE, ..Reflection::BLACK },
         emission: sample.emission,
+        double_sided: false,
         distance: 0.0,
     };
     Ok(sample_reflection(&white, [c, d]).map(|sampled| Emission {

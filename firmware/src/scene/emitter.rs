@@ -25,6 +25,17 @@ pub struct EmitterSample {
     pub density: f32,
 }
 
+/// The probability density, 1/m^2, with which [`sample_emitter`] chooses a point of a surface of this emission: of
+/// either side, as a shadow ray meets the one that faces it.
+///
+/// It is the density in [`EmitterSample`] but for the rounding of its share; the weights of the two ways that direct
+/// light comes ([`crate::render::direct`]) both use this one, so that they sum to 1.
+#[inline(always)]
+pub fn emitter_density(scene: &SceneImage, emission: Vec3, double_sided: bool) -> f32 {
+    let sides = if double_sided { 2.0 } else { 1.0 };
+    scene.header.emitter_density * sides * (emission.element_sum() * (1.0 / 3.0))
+}
+
 /// The point on the scene's emitters that belongs to a point of the unit square; `None` without emitters.
 ///
 /// Neighbouring points of the square are on one emitter and near each other, so that a stratified pattern stratifies

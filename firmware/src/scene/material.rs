@@ -27,6 +27,8 @@ pub struct Surface {
     pub reflection: Reflection,
     /// Radiance that this side emits, W/(sr m^2).
     pub emission: Vec3,
+    /// Whether the other side does the same.
+    pub double_sided: bool,
     /// Distance along the ray, metres.
     pub distance: f32,
 }
@@ -109,7 +111,8 @@ pub fn read_surface(
     let [a, b, c] = hit.triangle.vertices.map(Vec3::from_array);
     let front_normal = unit((b - a).cross(c - a));
     let is_front = front_normal.dot(ray.direction) < 0.0;
-    let visible = is_front || material.flags & DOUBLE_SIDED != 0;
+    let double_sided = material.flags & DOUBLE_SIDED != 0;
+    let visible = is_front || double_sided;
     let [u, v, w] = hit.intersection.barycentric;
     let reflection = Reflection {
         diffuse: material.diffuse.into(),
@@ -123,6 +126,7 @@ pub fn read_surface(
         outgoing: -ray.direction,
         reflection: if visible { reflection } else { Reflection::BLACK },
         emission: if visible { material.emission.into() } else { Vec3::ZERO },
+        double_sided,
         distance: hit.intersection.distance,
     })
 }

@@ -6,7 +6,7 @@ mod material;
 mod triangle;
 
 pub use bvh::{Hit, closest_hit, is_occluded};
-pub use emitter::{EmitterSample, sample_emitter};
+pub use emitter::{EmitterSample, emitter_density, sample_emitter};
 pub(crate) use material::mirror;
 pub use material::{Reflection, Surface, read_surface};
 pub use triangle::{Intersection, RayFrame};

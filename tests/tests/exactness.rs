@@ -1,0 +1,108 @@
+//! Exactness: renders that differ only in ordering, tile size, chips or threads have identical pixels.
+
+use photoncard_driver::film::{Film, PixelValue, Window};
+use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::scene::{Scene, gltf};
+use photoncard_driver::scheduler::TileOrder;
+use photoncard_tests::render_or_panic;
+
+fn glossy() -> Scene {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf");
+    gltf::load(path.as_ref()).expect("a shipped scene loads")
+}
+
+fn settings() -> RenderSettings {
+    RenderSettings {
+        width: 37,
+        height: 29,
+        photons: 20_000,
+        neighbors: 50,
+        gather_rays: 12,
+        samples: 2,
+        cards: vec![card("emulated:1")],
+        ..RenderSettings::default()
+    }
+}
+
+fn card(text: &str) -> CardAddress {
+    text.parse().unwrap()
+}
+
+/// Bits of a film: floats compare as numbers, bits as what they are.
+fn bits(film: &Film) -> Vec<[u32; 10]> {
+    film.pixels().iter().map(pixel_bits).collect()
+}
+
+fn pixel_bits(pixel: &PixelValue) -> [u32; 10] {
+    let [[r, g, b], [p, q, s], [x, y, z]] = [pixel.radiance, pixel.albedo, pixel.normal];
+    [r, g, b, p, q, s, x, y, z, pixel.depth].map(f32::to_bits)
+}
+
+#[test]
+fn order_tiles_chips_and_kind_of_chip_do_not_change_a_bit() {
+    let scene = glossy();
+    let expected = bits(&render_or_panic(&scene, &settings()).film);
+    let variants = [
+        RenderSettings { order: TileOrder::Naive, ..settings() },
+        RenderSettings { tile: 8, ..settings() },
+        RenderSettings { tile: 5, order: TileOrder::Naive, ..settings() },
+        RenderSettings { tile: 32, ..settings() },
+        RenderSettings { cards: vec![card("emulated:2")], ..settings() },
+        RenderSettings { cards: vec![card("emulated:3")], order: TileOrder::Naive, ..settings() },
+        RenderSettings { cards: vec![card("emulated:7")], tile: 4, ..settings() },
+        RenderSettings { cards: vec![card("emulated-micro:2"), card("emulated:1")], ..settings() },
+    ];
+    for variant in variants {
+        let film = render_or_panic(&scene, &variant).film;
+        assert!(bits(&film) == expected, "{variant:?} changes the picture");
+    }
+}
+
+#[test]
+fn the_threads_of_the_host_do_not_change_a_bit() {
+    let scene = glossy();
+    let expected = bits(&render_or_panic(&scene, &settings()).film);
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let film = pool.install(|| render_or_panic(&scene, &settings())).film;
+        assert!(bits(&film) == expected, "{threads} threads change the picture");
+    }
+}
+
+#[test]
+fn a_crop_is_the_same_region_of_the_whole() {
+    let scene = glossy();
+    let whole = render_or_panic(&scene, &settings()).film;
+    for window in [
+        Window { x0: 3, x1: 20, y0: 7, y1: 29 },
+        Window { x0: 36, x1: 37, y0: 28, y1: 29 },
+        Window { x0: 0, x1: 37, y0: 10, y1: 11 },
+    ] {
+        let part = render_or_panic(&scene, &RenderSettings { crop: Some(window), ..settings() }).film;
+        for y in window.y0..window.y1 {
+            for x in window.x0..window.x1 {
+                let [a, b] = [&part, &whole].map(|film| film.pixel(x, y).map(pixel_bits));
+                assert!(a.is_some() && a == b, "pixel {x}, {y} of {window:?} differs");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_work_counted_does_not_depend_on_how_tiles_are_dealt() {
+    let scene = glossy();
+    let one = render_or_panic(&scene, &settings()).statistics;
+    let three = RenderSettings { cards: vec![card("emulated:3")], order: TileOrder::Naive, ..settings() };
+    let three = render_or_panic(&scene, &three).statistics;
+    assert_eq!(one.rays, three.rays);
+    assert_eq!((one.gathers, one.photons_tested), (three.gathers, three.photons_tested));
+    assert_eq!(one.rays.eye, 37 * 29 * 2);
+}
+
+#[test]
+fn another_seed_is_another_picture() {
+    let scene = glossy();
+    let first = bits(&render_or_panic(&scene, &settings()).film);
+    let second = bits(&render_or_panic(&scene, &RenderSettings { seed: 1, ..settings() }).film);
+    assert!(first != second);
+}

@@ -1,0 +1,114 @@
+//! The kd-tree's k nearest photons are those of brute force, whatever the photons.
+
+use glam::Vec3;
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::pack::{CardImage, PackedScene};
+use photoncard_driver::photon::{Arrival, PhotonMap};
+use photoncard_firmware::photon::{Candidate, NearestPhotons, gather};
+use photoncard_tests::{camera, lambertian, room, scene};
+use proptest::prelude::*;
+
+/// An image of an empty room with a photon at every place.
+fn image(places: &[[f32; 3]]) -> CardImage {
+    let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
+    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+    let arrivals: Vec<Arrival> = places
+        .iter()
+        .map(|&position| Arrival { position, power: [1.0; 3], direction: [0; 2], normal: 0 })
+        .collect();
+    let map = PhotonMap::new(&arrivals);
+    packed.with_photons(map.records(), map.power_unit()).unwrap()
+}
+
+/// Distances and indices of the chip's search, nearest first.
+fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<(u32, u32)> {
+    let (scene, mut memory) = image.view();
+    let mut buffer = heapless::Vec::<Candidate, 512>::new();
+    let mut nearest = NearestPhotons::new(&mut buffer, neighbors, max_distance);
+    gather(&scene, &mut memory, query, &mut nearest).unwrap();
+    let mut all: Vec<(u32, u32)> =
+        nearest.candidates().iter().map(|c| (c.distance_squared().to_bits(), c.index())).collect();
+    all.sort_unstable();
+    all
+}
+
+/// The same by looking at every photon.
+fn expected(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<(u32, u32)> {
+    let (scene, mut memory) = image.view();
+    let photons = scene.header.section(photoncard_shared::image::SectionKind::Photons).records;
+    let mut all: Vec<(u32, u32)> = (0..photons)
+        .map(|index| {
+            let kind = photoncard_shared::image::SectionKind::Photons;
+            let record = scene.record::<20, 6>(&mut memory, kind, index).unwrap();
+            let [x, y, z] = photoncard_shared::layout::Photon::position(record);
+            let [x, y, z] = [query.x - x, query.y - y, query.z - z];
+            (x * x + y * y + z * z, index)
+        })
+        .filter(|&(distance, _)| distance <= max_distance * max_distance)
+        .map(|(distance, index)| (distance.to_bits(), index))
+        .collect();
+    all.sort_unstable();
+    all.truncate(neighbors as usize);
+    all
+}
+
+fn check(places: &[[f32; 3]], queries: &[[f32; 3]], neighbors: u32, max_distance: f32) {
+    let image = image(places);
+    for &query in queries {
+        let query = Vec3::from(query);
+        assert_eq!(
+            found(&image, query, neighbors, max_distance),
+            expected(&image, query, neighbors, max_distance),
+            "query {query}, {neighbors} neighbours within {max_distance} of {} photons",
+            places.len()
+        );
+    }
+}
+
+fn place(range: f32) -> impl Strategy<Value = [f32; 3]> {
+    [-range..range, -range..range, -range..range]
+}
+
+/// Places of a kind: anywhere, in clusters, on a coarse grid (many coincide or lie at one distance), in a plane.
+fn places() -> impl Strategy<Value = Vec<[f32; 3]>> {
+    let random = proptest::collection::vec(place(1.0), 1..400);
+    let clustered =
+        (proptest::collection::vec(place(1.0), 1..5), proptest::collection::vec(place(0.01), 1..400))
+            .prop_map(|(centres, offsets)| {
+                let cluster = |(i, offset): (usize, &[f32; 3])| {
+                    let centre = centres[i % centres.len()];
+                    [centre[0] + offset[0], centre[1] + offset[1], centre[2] + offset[2]]
+                };
+                offsets.iter().enumerate().map(cluster).collect()
+            });
+    let coincident = proptest::collection::vec([-2_i8..3, -2_i8..3, -2_i8..3], 1..400)
+        .prop_map(|grid| grid.into_iter().map(|cell| cell.map(|c| f32::from(c) * 0.25)).collect());
+    let coplanar = proptest::collection::vec([-1.0_f32..1.0, -1.0_f32..1.0], 1..400)
+        .prop_map(|plane| plane.into_iter().map(|[x, y]| [x, 0.5, y]).collect());
+    prop_oneof![random, clustered, coincident, coplanar]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #[test]
+    fn the_tree_finds_what_brute_force_finds(
+        places in places(),
+        mut queries in proptest::collection::vec(place(1.2), 4),
+        neighbors in 1_u32..200,
+        max_distance in prop_oneof![0.02_f32..0.2, 0.2_f32..3.0],
+    ) {
+        // A query at a photon, as in a scene.
+        queries.push(places[0]);
+        check(&places, &queries, neighbors, max_distance);
+    }
+}
+
+#[test]
+fn photons_in_one_place_are_told_apart_by_their_index() {
+    check(&[[0.5; 3]; 300], &[[0.5; 3], [0.6, 0.5, 0.5]], 100, 1.0);
+}
+
+#[test]
+fn an_empty_map_has_no_neighbours() {
+    assert_eq!(found(&image(&[]), Vec3::ZERO, 10, 1.0), []);
+}
