@@ -197,7 +197,7 @@ pub enum FaultCode {
     LineRange,
     /// A record outside its section was asked for; detail: its index.
     Record,
-    /// A bounding volume hierarchy deeper than the stack; detail: the node.
+    /// A bounding volume hierarchy that is deeper than the stack, or no tree; detail: the node.
     Depth,
 }
 

@@ -163,7 +163,8 @@ fn measure_group(searcher: &mut Searcher, group: &[u32]) -> Result<Vec<(u32, u8)
     let mut measured = Vec::new();
     for (&index, photon) in group.iter().zip(&photons) {
         let radius = searcher.radius(photon.position.into())?;
-        let disc = Disc { centre: photon.position.into(), normal: normal_of(photon), radius };
+        let normal = exact_normal(&scene, &mut memory, photon, radius)?;
+        let disc = Disc { centre: photon.position.into(), normal, radius };
         let surface_points = disc.surface_points(&scene, &mut memory, POINTS)?;
         if surface_points < POINTS {
             // The photon is on a surface: there is never none.
@@ -179,8 +180,24 @@ fn read_photon(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> 
     scene.record::<{ Photon::BYTES }, PER_LINE>(memory, SectionKind::Photons, index).map(Photon::read)
 }
 
-fn normal_of(photon: &Photon) -> Vec3 {
+/// The normal that the photon's code stands for.
+fn coded_normal(photon: &Photon) -> Vec3 {
     Vec3::from(decode_normal(photon.normal)).normalize()
+}
+
+/// The normal of the surface that the photon lies on, which a short ray finds again; its code is rough.
+fn exact_normal(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    photon: &Photon,
+    radius: f32,
+) -> Result<Vec3, Fault> {
+    let coded = coded_normal(photon);
+    let above = offset_origin(photon.position.into(), coded) + coded * (1e-3 * radius);
+    let ray = Ray { origin: above, direction: -coded, max_distance: radius };
+    let Some(hit) = closest_hit(scene, memory, &ray)? else { return Ok(coded) };
+    let normal = read_surface(scene, memory, &ray, &hit)?.normal;
+    Ok(if normal.dot(coded) >= MIN_NORMAL_COSINE { normal } else { coded })
 }
 
 /// Whether the discs of a whole group lie inside one flat surface.
@@ -194,9 +211,13 @@ fn is_inside_surface(searcher: &Searcher, photons: &[Photon]) -> Result<bool, Fa
     let distance = |place: &Vec3| place.distance_squared(centre);
     let Some(nearest) = places().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return Ok(false) };
     let spread = places().map(|place| place.distance(nearest)).fold(0.0, f32::max);
-    let disc =
-        Disc { centre: nearest, normal: normal_of(&photons[0]), radius: spread + searcher.max_distance };
+    let radius = spread + searcher.max_distance;
     let mut memory = searcher.memory;
+    let Some(photon) = photons.iter().find(|photon| Vec3::from(photon.position) == nearest) else {
+        return Ok(false);
+    };
+    let normal = exact_normal(&searcher.scene, &mut memory, photon, radius)?;
+    let disc = Disc { centre: nearest, normal, radius };
     Ok(disc.surface_points(&searcher.scene, &mut memory, GROUP_POINTS)? == GROUP_POINTS)
 }
 

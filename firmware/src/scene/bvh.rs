@@ -90,6 +90,8 @@ fn descend(
     let mut stack: Vec<Entry, BVH_STACK> = Vec::new();
     let Some(root) = ChildReference::node(0) else { return Ok(()) };
     let mut next = Some(Entry { distance: 0.0, child: root });
+    // A tree's node is entered once: more visits than nodes tell of a cycle in an unsound image.
+    let mut visits_left = scene.header.section(SectionKind::Nodes).records;
     while let Some(entry) = next {
         if entry.distance > until {
             next = stack.pop();
@@ -97,6 +99,8 @@ fn descend(
         }
         let Some((first, count)) = entry.child.triangles() else {
             let index = entry.child.0;
+            visits_left =
+                visits_left.checked_sub(1).ok_or(Fault { code: FaultCode::Depth, detail: index })?;
             let bytes = scene.record::<LINE_BYTES, 1>(memory, SectionKind::Nodes, index)?;
             let entered = slabs.enter(&BvhNode::read(bytes), until);
             next = push(&mut stack, entered).map_err(|()| Fault { code: FaultCode::Depth, detail: index })?;

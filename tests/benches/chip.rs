@@ -1,0 +1,155 @@
+//! The chip's inner loops: photon gathers, rays, and one whole tile.
+//!
+//! `cargo bench -p photoncard-tests`; the item counts are gathers, rays and pixels.
+
+use std::sync::LazyLock;
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use glam::Vec3;
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::pack::{CardImage, PackedScene};
+use photoncard_driver::photon::{PhotonMap, automatic_max_distance, measure_discs, trace};
+use photoncard_driver::render::RenderSettings;
+use photoncard_driver::scene::{Scene, gltf};
+use photoncard_firmware::chip::ReferenceChip;
+use photoncard_firmware::importance::sample_reflection;
+use photoncard_firmware::photon::{Candidate, NearestPhotons, gather};
+use photoncard_firmware::sampler::hash;
+use photoncard_firmware::scene::{Ray, closest_hit, is_occluded, offset_origin, read_surface};
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::Photon;
+use photoncard_shared::message::Tile;
+
+fn main() {
+    divan::main();
+}
+
+const NEIGHBORS: u32 = 100;
+const PHOTONS: usize = 500_000;
+
+/// A scene with its image.
+struct Prepared {
+    scene: Scene,
+    image: CardImage,
+    max_distance: f32,
+}
+
+static CORNELL: LazyLock<Prepared> = LazyLock::new(|| prepare("cornell.gltf"));
+static ATRIUM: LazyLock<Prepared> = LazyLock::new(|| prepare("atrium.glb"));
+
+fn load(name: &str) -> Scene {
+    let path = format!("{}/../scenes/{name}", env!("CARGO_MANIFEST_DIR"));
+    gltf::load(path.as_ref()).expect("a shipped scene loads")
+}
+
+fn prepare(name: &str) -> Prepared {
+    let scene = load(name);
+    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+    let pass = trace(&packed, 0, PHOTONS, &|_| true).expect("traces");
+    let map = PhotonMap::new(&pass.arrivals);
+    let mut image = packed.with_photons(map.records(), map.power_unit()).expect("packs");
+    let max_distance = automatic_max_distance(&image, NEIGHBORS).expect("sound");
+    measure_discs(&mut image, NEIGHBORS, max_distance).expect("sound");
+    Prepared { scene, image, max_distance }
+}
+
+impl Prepared {
+    /// Places of photons, in the order of the tree's levels or in no order.
+    fn queries(&self, count: u32, shuffled: bool) -> Vec<Vec3> {
+        let (scene, mut memory) = self.image.view();
+        let photons = scene.header.section(SectionKind::Photons).records;
+        (0..count)
+            .map(|index| if shuffled { hash(index) % photons } else { photons / 2 + index })
+            .map(|index| {
+                let record = scene.record::<20, 6>(&mut memory, SectionKind::Photons, index).expect("sound");
+                Photon::position(record).into()
+            })
+            .collect()
+    }
+
+    /// Rays from where photons arrived, by the cosine: incoherent ones.
+    fn rays(&self, count: u32) -> Vec<Ray> {
+        let (scene, mut memory) = self.image.view();
+        let camera = self.scene.camera(None).expect("a camera");
+        let random = |i: u32, k: u32| (hash(hash(i).wrapping_add(k)) >> 8) as f32 / 16_777_216.0;
+        (0..)
+            .filter_map(|i| {
+                let [x, y] = [random(i, 1) - 0.5, random(i, 2) - 0.5];
+                let direction = (camera.forward + camera.right * x + camera.up * y).normalize();
+                let eye = Ray::new(camera.origin, direction);
+                let hit = closest_hit(&scene, &mut memory, &eye).expect("sound")?;
+                let surface = read_surface(&scene, &mut memory, &eye, &hit).expect("sound");
+                let sampled = sample_reflection(&surface, [random(i, 3), random(i, 4)])?;
+                Some(Ray::new(offset_origin(surface.position, surface.normal), sampled.direction))
+            })
+            .take(count as usize)
+            .collect()
+    }
+}
+
+#[divan::bench(args = [false, true])]
+fn gather_100_of_500000_photons(bencher: Bencher, shuffled: bool) {
+    let queries = CORNELL.queries(2000, shuffled);
+    let (scene, mut memory) = CORNELL.image.view();
+    let mut buffer = heapless::Vec::<Candidate, 512>::new();
+    bencher.counter(ItemsCount::new(queries.len())).bench_local(|| {
+        let mut found = 0;
+        for &query in &queries {
+            let mut nearest = NearestPhotons::new(&mut buffer, NEIGHBORS, CORNELL.max_distance);
+            gather(&scene, &mut memory, query, &mut nearest).expect("sound");
+            found += nearest.candidates().len();
+        }
+        found
+    });
+}
+
+fn cast(bencher: Bencher, prepared: &Prepared, any_hit: bool) {
+    let rays = prepared.rays(10_000);
+    let (scene, mut memory) = prepared.image.view();
+    bencher.counter(ItemsCount::new(rays.len())).bench_local(|| {
+        let is_hit = |ray: &&Ray| match any_hit {
+            true => is_occluded(&scene, &mut memory, ray).expect("sound"),
+            false => closest_hit(&scene, &mut memory, ray).expect("sound").is_some(),
+        };
+        rays.iter().filter(is_hit).count()
+    });
+}
+
+#[divan::bench(args = [false, true])]
+fn ray_in_cornell(bencher: Bencher, any_hit: bool) {
+    cast(bencher, &CORNELL, any_hit);
+}
+
+#[divan::bench(args = [false, true])]
+fn ray_in_atrium(bencher: Bencher, any_hit: bool) {
+    cast(bencher, &ATRIUM, any_hit);
+}
+
+#[divan::bench(sample_count = 10)]
+fn tile_of_cornell(bencher: Bencher) {
+    let settings = RenderSettings::default();
+    let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance);
+    let (scene, mut memory) = CORNELL.image.view();
+    let mut chip = Box::new(ReferenceChip::new());
+    let tile = Tile { id: 0, x: 256, y: 256, width: 16, height: 16 };
+    bencher.counter(ItemsCount::new(256_usize)).bench_local(|| {
+        assert!(chip.begin(tile));
+        while !chip.step(&scene, &mut memory, &frame).expect("sound") {}
+    });
+}
+
+/// Tracing and building a map of a million photons, on all cores.
+#[divan::bench(sample_count = 3)]
+fn map_of_a_million_photons(bencher: Bencher) {
+    let scene = load("cornell.gltf");
+    bencher.counter(ItemsCount::new(1_000_000_usize)).bench_local(|| {
+        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+        let pass = trace(&packed, 0, 1_000_000, &|_| true).expect("traces");
+        let map = PhotonMap::new(&pass.arrivals);
+        let mut image = packed.with_photons(map.records(), map.power_unit()).expect("packs");
+        let max_distance = automatic_max_distance(&image, NEIGHBORS).expect("sound");
+        measure_discs(&mut image, NEIGHBORS, max_distance).expect("sound");
+        image.bytes()
+    });
+}

@@ -1,0 +1,110 @@
+//! The density estimate is right where the plain one is not: at edges, in corners and on thin walls.
+
+use glam::Vec3;
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::pack::{CardImage, PackedScene};
+use photoncard_driver::photon::{PhotonMap, automatic_max_distance, measure_discs, trace};
+use photoncard_driver::scene::{Material, Scene};
+use photoncard_firmware::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
+use photoncard_firmware::scene::{Reflection, Surface};
+use photoncard_tests::{camera, lambertian, quad, room, scene};
+
+const NEIGHBORS: u32 = 100;
+const ALBEDO: f32 = 0.5;
+
+/// A photon map that can be asked for radiance.
+struct Map {
+    image: CardImage,
+    max_distance: f32,
+}
+
+impl Map {
+    fn new(scene: &Scene, photons: usize) -> Self {
+        let packed = PackedScene::new(scene, &Emitters::new(scene)).unwrap();
+        let pass = trace(&packed, 1, photons, &|_| true).unwrap();
+        let map = PhotonMap::new(&pass.arrivals);
+        let mut image = packed.with_photons(map.records(), map.power_unit()).unwrap();
+        let max_distance = automatic_max_distance(&image, NEIGHBORS).unwrap();
+        measure_discs(&mut image, NEIGHBORS, max_distance).unwrap();
+        Self { image, max_distance }
+    }
+
+    /// Radiance, W/(sr m^2), that a Lambertian surface reflects at a place.
+    fn radiance(&self, position: Vec3, normal: Vec3) -> f64 {
+        let (scene, mut memory) = self.image.view();
+        let mut buffer = heapless::Vec::<Candidate, 512>::new();
+        let mut nearest = NearestPhotons::new(&mut buffer, NEIGHBORS, self.max_distance);
+        gather(&scene, &mut memory, position, &mut nearest).unwrap();
+        let surface = Surface {
+            position,
+            normal,
+            outgoing: normal,
+            reflection: Reflection { diffuse: Vec3::splat(ALBEDO), ..Reflection::BLACK },
+            emission: Vec3::ZERO,
+            double_sided: false,
+            distance: 1.0,
+        };
+        (reflected_radiance(&nearest, &surface) * scene.header.photon_power_unit).x as f64
+    }
+
+    /// Mean radiance of a hundred places along a line.
+    fn mean_along(&self, from: Vec3, to: Vec3, normal: Vec3) -> f64 {
+        let places = (0..100).map(|i| from.lerp(to, (i as f32 + 0.5) / 100.0));
+        places.map(|place| self.radiance(place, normal)).sum::<f64>() / 100.0
+    }
+}
+
+/// In a furnace of walls that emit 1, every place reflects rho / (1 - rho): here 1.
+fn furnace() -> Scene {
+    let wall = Material { emission: Vec3::ONE, ..lambertian("wall", ALBEDO) };
+    scene(room([0; 6]), vec![wall], camera(Vec3::ZERO, Vec3::NEG_Z))
+}
+
+#[test]
+fn the_radiance_of_a_wall_is_the_same_up_to_its_edges() {
+    let map = Map::new(&furnace(), 300_000);
+    for distance in [0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 2.0] {
+        let x = 1.0 - distance * map.max_distance;
+        let mean = map.mean_along(Vec3::new(x, -1.0, -0.8), Vec3::new(x, -1.0, 0.8), Vec3::Y);
+        assert!((mean - 1.0).abs() < 0.05, "at {distance} radii from the edge it is {mean}");
+    }
+}
+
+#[test]
+fn the_mean_radiance_around_a_corner_is_that_of_the_wall() {
+    let map = Map::new(&furnace(), 300_000);
+    let mut sum = 0.0;
+    for corner in 0..4 {
+        let [x, z] = [0, 1].map(|axis| if corner >> axis & 1 == 0 { -1.0_f32 } else { 1.0 });
+        for step in 0..20 {
+            let along = |offset: f32| x * (1.0 - offset * map.max_distance);
+            let inward = z * (1.0 - (step as f32 + 0.5) / 20.0 * map.max_distance);
+            let [from, to] = [0.0, 1.0].map(|offset| Vec3::new(along(offset), -1.0, inward));
+            sum += map.mean_along(from, to, Vec3::Y);
+        }
+    }
+    let mean = sum / 80.0;
+    assert!((mean - 1.0).abs() < 0.04, "around the corners it is {mean}");
+}
+
+#[test]
+fn light_on_one_side_of_a_thin_wall_does_not_show_on_the_other() {
+    // A wall of a millimetre across the room: light is on its upper side alone.
+    let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
+    let mut triangles = room([0, 0, 0, 1, 0, 0]);
+    let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+    triangles.extend(quad(
+        [corner(-1., 0.001, 1.), corner(1., 0.001, 1.), corner(1., 0.001, -1.), corner(-1., 0.001, -1.)],
+        0,
+    ));
+    triangles.extend(quad(
+        [corner(-1., 0., -1.), corner(1., 0., -1.), corner(1., 0., 1.), corner(-1., 0., 1.)],
+        0,
+    ));
+    let scene = scene(triangles, vec![lambertian("wall", ALBEDO), lamp], camera(Vec3::ZERO, Vec3::NEG_Z));
+    let map = Map::new(&scene, 100_000);
+    let upper = map.mean_along(Vec3::new(-0.5, 0.001, 0.0), Vec3::new(0.5, 0.001, 0.0), Vec3::Y);
+    let lower = map.mean_along(Vec3::new(-0.5, 0.0, 0.0), Vec3::new(0.5, 0.0, 0.0), Vec3::NEG_Y);
+    assert!(upper > 0.2, "{upper}");
+    assert_eq!(lower, 0.0);
+}
