@@ -71,6 +71,19 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     Ok(())
 }
 
+/// Whether two paths name one file, or would if it were written. Names that a file system takes for one, such as those
+/// that differ in case alone, are told apart while there is no such file.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    let absolute = |path: &Path| {
+        let folder = || Some(fs::canonicalize(folder_of(path)).ok()?.join(path.file_name()?));
+        fs::canonicalize(path).ok().or_else(folder)
+    };
+    match (absolute(a), absolute(b)) {
+        (Some(a), Some(b)) => a == b,
+        _ => a == b,
+    }
+}
+
 /// The file that will be replaced: what `path` names, through symbolic links.
 fn resolve(path: &Path) -> Result<PathBuf, OutputError> {
     if path.file_name().is_none() {
@@ -156,6 +169,19 @@ mod tests {
             let result = check_writable(Path::new(path));
             assert!(matches!(result, Err(OutputError::NoFileName { .. })), "{path}: {result:?}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn one_file_is_recognised_by_any_of_its_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        assert!(is_same_file(&at("absent"), &at("./absent")));
+        assert!(!is_same_file(&at("absent"), &at("other")));
+        fs::write(at("file"), b"").unwrap();
+        std::os::unix::fs::symlink(at("file"), at("link")).unwrap();
+        assert!(is_same_file(&at("file"), &at("link")));
+        assert!(!is_same_file(&at("file"), &at("absent/file")));
     }
 
     #[cfg(unix)]

@@ -69,28 +69,28 @@ pub(crate) struct RenderOptions {
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
     /// Seed of all random numbers
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     seed: u32,
     /// Photons stored in the map
-    #[arg(long, default_value_t = 500_000)]
+    #[arg(long, default_value_t = 500_000, allow_negative_numbers = true)]
     photons: usize,
     /// Photons that a gather looks for
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 100, allow_negative_numbers = true)]
     neighbors: u32,
     /// Greatest distance of a gather in metres, or auto: from the photons' density
-    #[arg(long, default_value = "auto", value_parser = max_distance)]
+    #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true)]
     max_distance: MaxDistance,
     /// Final gather rays a sample
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 100, allow_negative_numbers = true)]
     gather_rays: u32,
     /// Shadow rays a sample
-    #[arg(long, default_value_t = 8)]
+    #[arg(long, default_value_t = 8, allow_negative_numbers = true)]
     shadow_rays: u32,
     /// Samples a pixel
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     spp: u32,
     /// Side of a tile, pixels
-    #[arg(long, default_value_t = 16)]
+    #[arg(long, default_value_t = 16, allow_negative_numbers = true)]
     tile: u32,
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = "tiled")]
@@ -99,7 +99,7 @@ pub(crate) struct RenderOptions {
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
     /// Threads of the host's own work [default: a thread a core]
-    #[arg(long)]
+    #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     /// Type of the picture's samples; depth is always float
     #[arg(long, default_value = "float")]
@@ -122,10 +122,10 @@ pub(crate) struct DiffOptions {
     /// The picture to compare
     pub(crate) image: PathBuf,
     /// Side of the blocks whose means are compared, pixels
-    #[arg(long, default_value_t = 16)]
+    #[arg(long, default_value_t = 16, allow_negative_numbers = true)]
     pub(crate) block: usize,
     /// Leave out blocks in which the reference exceeds this radiance: those that see an emitter
-    #[arg(long, value_name = "RADIANCE")]
+    #[arg(long, value_name = "RADIANCE", allow_negative_numbers = true)]
     pub(crate) exclude_above: Option<f32>,
 }
 
@@ -215,6 +215,15 @@ fn crop(text: &str) -> Result<Window, String> {
         Ok(&[x0, x1, y0, y1]) => Ok(Window { x0, x1, y0, y1 }),
         _ => Err("a crop is X0,X1,Y0,Y1: four whole numbers, such as 0,64,0,64".into()),
     }
+}
+
+/// Threads that can be asked for: a system that runs out of them half-way ends the process.
+const MAX_THREADS: usize = 1024;
+
+fn threads(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok().filter(|count| (1..=MAX_THREADS).contains(count));
+    count
+        .ok_or_else(|| format!("use 1 to {MAX_THREADS} threads, or leave the option out for a thread a core"))
 }
 
 fn max_distance(text: &str) -> Result<MaxDistance, String> {

@@ -3,7 +3,10 @@
 use std::process::ExitCode;
 
 use miette::{Diagnostic, MietteDiagnostic, Report};
+use photoncard_driver::photon::TraceError;
 use photoncard_driver::render::RenderError;
+
+use crate::console::say;
 
 /// Why a command did not do its work.
 pub(crate) enum Failure {
@@ -31,19 +34,26 @@ impl Failure {
         Self::Work(Report::new(MietteDiagnostic::new(with_causes(error))))
     }
 
+    /// Standard output that takes no data.
+    pub(crate) fn output(error: &std::io::Error) -> Self {
+        let text = format!("cannot write to standard output: {error}");
+        let help = "check the space of the file or the device that it is directed to";
+        Self::Work(Report::new(MietteDiagnostic::new(text).with_help(help)))
+    }
+
     /// Says what happened, and gives the exit status.
     pub(crate) fn report(self) -> ExitCode {
         match self {
             Self::Input(report) => {
-                eprintln!("{report:?}");
+                say(format_args!("{report:?}"));
                 ExitCode::from(2)
             }
             Self::Work(report) => {
-                eprintln!("{report:?}");
+                say(format_args!("{report:?}"));
                 ExitCode::from(1)
             }
             Self::Stopped => {
-                eprintln!("photoncard: stopped; no picture was written");
+                say(format_args!("photoncard: stopped; no picture was written"));
                 ExitCode::from(130)
             }
         }
@@ -53,7 +63,7 @@ impl Failure {
 impl From<RenderError> for Failure {
     fn from(error: RenderError) -> Self {
         match error {
-            RenderError::Stopped => Self::Stopped,
+            RenderError::Stopped | RenderError::Photons(TraceError::Stopped) => Self::Stopped,
             error if error.is_input() => Self::Input(Report::new(error)),
             error => Self::Work(Report::new(error)),
         }

@@ -5,6 +5,7 @@
 
 mod arguments;
 mod card;
+mod console;
 mod diff;
 mod failure;
 mod progress;
@@ -20,6 +21,7 @@ use crate::arguments::{Arguments, CardCommand, Command, SceneCommand};
 fn main() -> ExitCode {
     // Wrong arguments end here, with status 2.
     let arguments = Arguments::parse();
+    console::lay_out_errors();
     let result = match &arguments.command {
         Command::Render(options) => render::run(options),
         Command::Scene(SceneCommand::Info { scene }) => scene::info(scene),

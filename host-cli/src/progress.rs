@@ -8,6 +8,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use photoncard_driver::render::{Observer, Phase};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
+use crate::console::say;
+
 /// Shows progress, and is stopped by SIGINT and SIGTERM.
 pub(crate) struct Progress {
     stopped: Arc<AtomicBool>,
@@ -73,7 +75,7 @@ impl Display {
         if !self.on_terminal && tenths > self.told {
             self.told = tenths;
             let seconds = self.bar.elapsed().as_secs_f64();
-            eprintln!("photoncard: {} {done} of {total}, {seconds:.1} s", name(phase));
+            say(format_args!("photoncard: {} {done} of {total}, {seconds:.1} s", name(phase)));
         }
     }
 

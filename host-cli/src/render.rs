@@ -11,6 +11,7 @@ use photoncard_driver::{exr, output, preview};
 use serde_json::json;
 
 use crate::arguments::RenderOptions;
+use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
@@ -21,6 +22,7 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     for path in outputs(options) {
         output::check_writable(path).map_err(|error| Failure::input_error(&error))?;
     }
+    check_distinct(options)?;
     let start = Instant::now();
     let scene = read_scene(options)?;
     let scene_seconds = start.elapsed().as_secs_f64();
@@ -40,17 +42,34 @@ fn outputs(options: &RenderOptions) -> impl Iterator<Item = &Path> {
         .map(AsRef::as_ref)
 }
 
+/// Checks that no output replaces the scene or another output.
+fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
+    let mut taken = vec![(options.scene.as_path(), "the scene")];
+    for path in outputs(options) {
+        let same = taken.iter().find(|(other, _)| output::is_same_file(path, other));
+        if let Some((_, what)) = same {
+            let text = format!("cannot write {}: it is {what} as well", path.display());
+            let report = MietteDiagnostic::new(text).with_help("give every output a name of its own");
+            return Err(Failure::Input(Report::new(report)));
+        }
+        taken.push((path, "another output"));
+    }
+    Ok(())
+}
+
 fn read_scene(options: &RenderOptions) -> Result<Scene, Failure> {
     let mut scene = load(&options.scene).map_err(Failure::input)?;
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
     }
+    scene.check_light().map_err(Failure::input)?;
     if !options.quiet {
         for notice in &scene.notices {
-            eprintln!("photoncard: {notice}");
+            say(format_args!("photoncard: {notice}"));
         }
         if scene.skipped_triangles > 0 {
-            eprintln!("photoncard: {} triangles of zero area are left out", scene.skipped_triangles);
+            let count = scene.skipped_triangles;
+            say(format_args!("photoncard: triangles of zero area are left out: {count}"));
         }
     }
     Ok(scene)

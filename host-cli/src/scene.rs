@@ -4,21 +4,23 @@ use std::path::Path;
 
 use photoncard_driver::scene::gltf::load;
 
+use crate::console::print;
 use crate::failure::Failure;
 
 /// Prints what a scene holds.
 pub(crate) fn info(path: &Path) -> Result<(), Failure> {
     let scene = load(path).map_err(Failure::input)?;
     let (lower, upper) = scene.bounds();
-    println!("triangles  {}", scene.triangles.len());
-    println!("skipped    {} of zero area", scene.skipped_triangles);
-    println!("bounds     {lower} to {upper} m");
+    let mut lines = Vec::new();
+    lines.push(format!("triangles  {}", scene.triangles.len()));
+    lines.push(format!("skipped    {} of zero area", scene.skipped_triangles));
+    lines.push(format!("bounds     {lower} to {upper} m"));
     for camera in &scene.cameras {
         let degrees = camera.vertical_fov.to_degrees();
-        println!(
+        lines.push(format!(
             "camera     {} at {}, vertical field of view {degrees:.1} degrees",
             camera.name, camera.origin
-        );
+        ));
     }
     for material in &scene.materials {
         let mut parts = vec![format!("diffuse {}", material.diffuse)];
@@ -31,10 +33,10 @@ pub(crate) fn info(path: &Path) -> Result<(), Failure> {
         if material.double_sided {
             parts.push("double-sided".into());
         }
-        println!("material   {}: {}", material.name, parts.join(", "));
+        lines.push(format!("material   {}: {}", material.name, parts.join(", ")));
     }
     for notice in &scene.notices {
-        println!("ignored    {notice}");
+        lines.push(format!("ignored    {notice}"));
     }
-    Ok(())
+    print(&(lines.join("\n") + "\n"))
 }

@@ -201,7 +201,7 @@ fn exact_normal(
 }
 
 /// Whether the discs of a whole group lie inside one flat surface.
-fn is_inside_surface(searcher: &Searcher, photons: &[Photon]) -> Result<bool, Fault> {
+fn is_inside_surface(searcher: &mut Searcher, photons: &[Photon]) -> Result<bool, Fault> {
     if photons.iter().any(|photon| photon.normal != photons[0].normal) {
         return Ok(false);
     }
@@ -211,7 +211,8 @@ fn is_inside_surface(searcher: &Searcher, photons: &[Photon]) -> Result<bool, Fa
     let distance = |place: &Vec3| place.distance_squared(centre);
     let Some(nearest) = places().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return Ok(false) };
     let spread = places().map(|place| place.distance(nearest)).fold(0.0, f32::max);
-    let radius = spread + searcher.max_distance;
+    // From one photon to another the radius of a gather grows by their distance at the most.
+    let radius = spread + (searcher.radius(nearest)? + spread).min(searcher.max_distance);
     let mut memory = searcher.memory;
     let Some(photon) = photons.iter().find(|photon| Vec3::from(photon.position) == nearest) else {
         return Ok(false);

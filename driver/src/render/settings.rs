@@ -83,12 +83,13 @@ impl RenderSettings {
             if (least..=most).contains(&value) {
                 return Ok(());
             }
-            Err(RenderError::Setting {
-                option,
-                value: value.to_string(),
-                reason: format!("the card takes {least} to {most}"),
-                remedy: format!("choose a value from {least} to {most}"),
-            })
+            let remedy = if value < least {
+                format!("choose {least} or more")
+            } else {
+                format!("choose {most} or less; `photoncard card info` tells what a card can hold")
+            };
+            let reason = format!("it must be {least} to {most} on this card");
+            Err(RenderError::Setting { option, value: value.to_string(), reason, remedy })
         };
         within("--size", self.width.max(self.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
         within("--photons", self.photons as u64, 1, MAX_PHOTONS as u64)?;

@@ -1,0 +1,213 @@
+//! Wrong arguments and unreadable input: status 2, the place and the remedy, and no file touched.
+
+mod support;
+
+use std::fs;
+
+use serde_json::{Value, json};
+use support::{Outcome, Room, scene, scene_bytes, scene_of, shipped};
+
+/// Checks that a command is refused with these words in its message, and nothing on standard output.
+fn check_refused(outcome: &Outcome, words: &[&str], case: &str) {
+    let Outcome { status, stdout, stderr } = outcome;
+    assert_eq!(*status, Some(2), "{case}: {stderr}");
+    assert_eq!(stdout, "", "{case}");
+    for word in words {
+        assert!(stderr.contains(word), "{case}: {word:?} is not in: {stderr}");
+    }
+}
+
+/// Checks that a render is refused, that its old picture is untouched and that no other file appears.
+fn refused(room: &Room, scene: &str, options: &[&str], words: &[&str]) {
+    let case = format!("{scene} {options:?}");
+    room.write("out.exr", "old picture");
+    let before = room.names();
+    let mut all = vec!["--preview", "out.png", "--stats", "out.json"];
+    if !options.contains(&"-o") {
+        all.extend(["-o", "out.exr"]);
+    }
+    all.extend(options);
+    check_refused(&room.render(scene, &all), words, &case);
+    assert_eq!(room.names(), before, "{case}");
+    assert_eq!(room.read("out.exr"), b"old picture", "{case}");
+}
+
+/// Checks that a scene is refused.
+fn refused_scene(scene: &Value, words: &[&str]) {
+    let room = Room::new();
+    room.write_scene("scene.gltf", scene);
+    refused(&room, "scene.gltf", &[], &[&["scene.gltf", "help:"], words].concat());
+}
+
+#[test]
+fn files_that_are_no_scene() {
+    let room = Room::new();
+    let atrium = fs::read(shipped("atrium.glb")).unwrap();
+    room.write("cut.glb", &atrium[..atrium.len() / 2]);
+    room.write("empty.gltf", "");
+    room.write("list.gltf", "[]");
+    room.write("open.gltf", "{");
+    room.write("other.gltf", "{\"name\": \"no glTF\"}");
+    fs::create_dir(room.path("folder")).unwrap();
+    let unreadable = "check that the path names a file";
+    for (file, words) in [
+        ("absent.gltf", ["cannot read", unreadable]),
+        ("folder", ["cannot read", unreadable]),
+        ("cut.glb", ["truncated", "copy or export the file again"]),
+        ("empty.gltf", ["empty", "glTF 2.0"]),
+        ("list.gltf", ["glTF JSON", "correct the JSON"]),
+        ("open.gltf", ["glTF JSON", "correct the JSON"]),
+        ("other.gltf", ["glTF JSON", "asset"]),
+    ] {
+        refused(&room, file, &[], &[file, words[0], words[1]]);
+        check_refused(&room.run(&["scene", "info", file]), &[file, words[0], words[1]], file);
+    }
+    #[cfg(unix)]
+    refused(&room, "/dev/null", &[], &["/dev/null", "not a regular file"]);
+}
+
+#[test]
+fn scenes_that_break_a_rule() {
+    let changed = |change: &dyn Fn(&mut Value)| {
+        let mut scene = scene();
+        change(&mut scene);
+        scene
+    };
+    refused_scene(&changed(&|s| s["accessors"][0]["count"] = json!(400)), &["accessors[0]"]);
+    refused_scene(
+        &changed(&|s| s["extensionsRequired"] = json!(["KHR_draco_mesh_compression"])),
+        &["extensionsRequired[0]", "KHR_draco_mesh_compression", "export the scene without"],
+    );
+    let mut bytes = scene_bytes();
+    bytes[12..16].copy_from_slice(&f32::NAN.to_le_bytes());
+    refused_scene(&scene_of(&bytes), &["vertex 1", "'room'", "repair the mesh"]);
+    let mut bytes = scene_bytes();
+    bytes[84..86].copy_from_slice(&9u16.to_le_bytes());
+    refused_scene(&scene_of(&bytes), &["index 0 is 9", "4 vertices", "repair the mesh"]);
+}
+
+#[test]
+fn scenes_that_show_nothing() {
+    let changed = |change: &dyn Fn(&mut Value)| {
+        let mut scene = scene();
+        change(&mut scene);
+        scene
+    };
+    refused_scene(&changed(&|s| s["scenes"][0]["nodes"] = json!([1])), &["no triangles", "mesh"]);
+    refused_scene(&changed(&|s| s["nodes"][0]["scale"] = json!([1, 0, 0])), &["all 3", "zero area", "scale"]);
+    let dark = changed(&|s| s["materials"][1]["emissiveFactor"] = json!([0, 0, 0]));
+    refused_scene(&dark, &["no light", "emissiveFactor"]);
+    let room = Room::new();
+    // The lamp shines on a floor that keeps all light.
+    let black = json!([0.0, 0.0, 0.0, 1.0]);
+    room.write_scene(
+        "lost.gltf",
+        &changed(&|s| s["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = black.clone()),
+    );
+    refused(&room, "lost.gltf", &[], &["only 0 photons", "hardly any surface", "help:"]);
+    room.write_scene("scene.gltf", &scene());
+    refused(&room, "scene.gltf", &["--set", "lamp.emission=0"], &["no light", "emissiveFactor"]);
+}
+
+#[test]
+fn numbers_out_of_range() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for (option, value, words) in [
+        ("--photons", "0", ["1 to", "choose 1 or more"]),
+        ("--photons", "-5", ["-5", "invalid"]),
+        ("--photons", "99999999999", ["1 to", "or less"]),
+        ("--photons", "18446744073709551616", ["--photons", "too large"]),
+        ("--size", "0x0", ["WIDTHxHEIGHT", "at least 1"]),
+        ("--size", "8", ["WIDTHxHEIGHT", "512x512"]),
+        ("--size", "99999x99999", ["99999 x 99999", "crops"]),
+        ("--size", "70000x1", ["70000", "65536 or less"]),
+        ("--crop", "0,9,0,8", ["not inside", "X1 <= width"]),
+        ("--crop", "3,3,0,8", ["empty", "X0 < X1"]),
+        ("--crop", "0,9", ["four whole numbers", "0,64,0,64"]),
+        ("--crop", "0,9,a,b", ["four whole numbers", "0,64,0,64"]),
+        ("--tile", "0", ["1 to 32", "choose 1 or more"]),
+        ("--tile", "33", ["1 to 32", "32 or less"]),
+        ("--neighbors", "0", ["1 to 256", "choose 1 or more"]),
+        ("--neighbors", "257", ["1 to 256", "256 or less"]),
+        ("--spp", "0", ["1 to 4096", "choose 1 or more"]),
+        ("--spp", "4294967295", ["1 to 4096", "4096 or less"]),
+        ("--gather-rays", "4294967295", ["0 to", "or less"]),
+        ("--max-distance", "-1", ["positive number", "auto"]),
+        ("--max-distance", "nan", ["positive number", "auto"]),
+        ("--threads", "0", ["1 to 1024", "leave the option out"]),
+        ("--threads", "100000", ["1 to 1024", "leave the option out"]),
+        ("--seed", "-1", ["--seed", "invalid"]),
+    ] {
+        refused(&room, "scene.gltf", &[option, value], &[option, words[0], words[1]]);
+    }
+}
+
+#[test]
+fn names_that_do_not_exist() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for (option, value, words) in [
+        ("--camera", "absent", ["no camera 'absent'", "'eye'"]),
+        ("--set", "floor", ["`floor`", "MATERIAL.PROPERTY=VALUE"]),
+        ("--set", "flor.diffuse=0", ["'flor'", "'floor'"]),
+        ("--set", "floor.gloss=1", ["'gloss'", "the properties are"]),
+        ("--set", "floor.diffuse=2", ["albedo", "0 to 1"]),
+        ("--order", "dirbin", ["dirbin cannot be used yet", "use naive or tiled"]),
+        ("--order", "hash", ["hash cannot be used yet", "use naive or tiled"]),
+        ("--order", "sort", ["sort cannot be used yet", "use naive or tiled"]),
+        ("--order", "hilbert", ["hilbert cannot be used yet", "use naive or tiled"]),
+        ("--card", "serial:/dev/x", ["cannot be used yet", "use emulated[:CHIPS]"]),
+        ("--card", "abacus", ["no kind of card", "emulated[:CHIPS]"]),
+        ("--card", "emulated:0", ["no number of chips", "use 1 to"]),
+    ] {
+        refused(&room, "scene.gltf", &[option, value], &words);
+    }
+}
+
+#[test]
+fn an_image_larger_than_the_card() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let options = ["--card", "emulated-micro:1", "--photons", "5000000"];
+    let words = ["DRAM budget is 16777216 bytes", "lower --photons to"];
+    refused(&room, "scene.gltf", &options, &words);
+}
+
+#[test]
+fn outputs_that_cannot_be_written() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    fs::create_dir(room.path("folder")).unwrap();
+    let scene_before = room.read("scene.gltf");
+    let own_name = "a name of its own";
+    for (options, words) in [
+        (["-o", "absent/out.exr"], ["the folder absent does not exist", "create it"]),
+        (["-o", "folder"], ["a folder has that name", "choose another"]),
+        (["-o", "."], ["names no file", "add a file name"]),
+        (["-o", "folder/../scene.gltf"], ["it is the scene as well", own_name]),
+        (["-o", "./out.png"], ["it is another output as well", own_name]),
+        (["-o", "folder/../out.json"], ["it is another output as well", own_name]),
+    ] {
+        refused(&room, "scene.gltf", &options, &words);
+        assert_eq!(room.read("scene.gltf"), scene_before);
+    }
+}
+
+#[test]
+fn pictures_that_cannot_be_compared() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    room.rendered("scene.gltf", &["-o", "a.exr"]);
+    room.rendered("scene.gltf", &["-o", "b.exr", "--size", "4x8"]);
+    for (pictures, words) in [
+        (["a.exr", "b.exr"], ["8 x 8", "4 x 8"]),
+        (["a.exr", "scene.gltf"], ["scene.gltf", "not a readable OpenEXR picture"]),
+        (["absent.exr", "a.exr"], ["absent.exr", "check that the path"]),
+    ] {
+        check_refused(&room.run(&["diff", pictures[0], pictures[1]]), &words, pictures[1]);
+    }
+    for (option, value) in [("--block", "0"), ("--exclude-above", "NaN"), ("--exclude-above", "-1")] {
+        check_refused(&room.run(&["diff", "a.exr", "a.exr", option, value]), &[value], option);
+    }
+}

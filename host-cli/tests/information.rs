@@ -1,0 +1,93 @@
+//! What the other commands print, and what becomes of it where nobody reads.
+
+mod support;
+
+use std::process::Stdio;
+
+use support::{Room, scene, shipped, small_render};
+
+#[test]
+fn scene_info_tells_what_a_scene_holds() {
+    let outcome = Room::new().run(&["scene", "info", &shipped("cornell-glossy.gltf")]);
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    for word in
+        ["triangles  ", "skipped    0", "bounds     ", "camera     ", "material   floor: ", "exponent"]
+    {
+        assert!(outcome.stdout.contains(word), "{word}: {}", outcome.stdout);
+    }
+    assert!(outcome.stdout.ends_with('\n'));
+}
+
+#[test]
+fn card_info_tells_what_a_card_holds() {
+    for (card, dram) in [("emulated", 536_870_912), ("emulated-micro:2", 16_777_216)] {
+        let outcome = Room::new().run(&["card", "info", "--card", card]);
+        assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+        for word in ["build", "sram", "free", "neighbors", &format!("dram            {dram} bytes")] {
+            assert!(outcome.stdout.contains(word), "{word}: {}", outcome.stdout);
+        }
+    }
+}
+
+#[test]
+fn every_command_has_help() {
+    for command in
+        [&[][..], &["render"], &["scene"], &["scene", "info"], &["card"], &["card", "info"], &["diff"]]
+    {
+        let outcome = Room::new().run(&[command, &["--help"]].concat());
+        assert_eq!(outcome.status, Some(0), "{command:?}");
+        assert!(outcome.stdout.contains("Usage: photoncard"), "{command:?}");
+    }
+    for command in [&[][..], &["render"], &["paint"]] {
+        let outcome = Room::new().run(command);
+        assert_eq!(outcome.status, Some(2), "{command:?}");
+        assert!(outcome.stderr.contains("Usage: photoncard"), "{command:?}");
+    }
+}
+
+/// A pipe whose reader is gone.
+fn closed_pipe() -> Stdio {
+    let (_, writer) = std::io::pipe().unwrap();
+    writer.into()
+}
+
+#[test]
+fn a_reader_that_leaves_early_breaks_nothing() {
+    let room = Room::new();
+    let output = room.command().args(["card", "info"]).stdout(closed_pipe()).output().unwrap();
+    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &[][..]));
+    room.write_scene("scene.gltf", &scene());
+    let render = small_render("scene.gltf", &["-o", "a.exr"]);
+    let status = room.command().args(render).stderr(closed_pipe()).status().unwrap();
+    assert_eq!(status.code(), Some(0));
+    assert_eq!(room.names(), ["a.exr", "scene.gltf"]);
+    let status = room.command().args(["scene", "info", "absent"]).stderr(closed_pipe()).status().unwrap();
+    assert_eq!(status.code(), Some(2));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_device_is_told() {
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = Room::new().command().args(["card", "info"]).stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("cannot write to standard output") && message.contains("help:"), "{message}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn names_need_not_be_text() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+
+    let room = Room::new();
+    let names = [b"scene\xff.gltf".as_slice(), b"picture\xff.exr"].map(OsStr::from_bytes);
+    room.write_scene("scene.gltf", &scene());
+    std::fs::rename(room.path("scene.gltf"), room.path("").join(names[0])).unwrap();
+    let mut command = room.command();
+    command.args(small_render("", &["--quiet"]).into_iter().filter(|argument| !argument.is_empty()));
+    let output = command.arg(names[0]).arg("-o").arg(names[1]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(room.path("").join(names[1]).exists());
+}

@@ -1,0 +1,58 @@
+//! An interrupt ends a render soon, with status 130 and no file left.
+#![cfg(unix)]
+
+mod support;
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use support::{Room, shipped, small_render};
+
+/// How long a stopped render may go on; a loaded machine needs some of it to be heard at all.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Waits for the end, and ends a process that goes on for too long.
+fn wait(child: &mut Child) -> ExitStatus {
+    let start = Instant::now();
+    while start.elapsed() < PATIENCE {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    panic!("the render went on for {PATIENCE:?}");
+}
+
+/// Interrupts a render as soon as it has told of `phase`.
+fn interrupt(phase: &str, options: &[&str]) {
+    let room = Room::new();
+    room.write("out.exr", "old picture");
+    let cornell = shipped("cornell.gltf");
+    let options = [options, &["-o", "out.exr", "--preview", "out.png"]].concat();
+    let mut command = room.command();
+    let mut child = command.args(small_render(&cornell, &options)).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let told = lines.find(|line| line.starts_with(&format!("photoncard: {phase} ")));
+    assert!(told.is_some(), "the render ended before its phase {phase}");
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    assert_eq!(wait(&mut child).code(), Some(130));
+    let last = lines.last();
+    assert_eq!(last.as_deref(), Some("photoncard: stopped; no picture was written"));
+    assert_eq!(room.names(), ["out.exr"]);
+    assert_eq!(room.read("out.exr"), b"old picture");
+}
+
+#[test]
+fn while_photons_are_traced() {
+    interrupt("photons", &["--photons", "20000000"]);
+}
+
+#[test]
+fn while_a_picture_is_rendered() {
+    // The image is loaded, and one tile alone would take minutes.
+    interrupt("load", &["--size", "256x256", "--spp", "4096", "--gather-rays", "64", "--tile", "32"]);
+}

@@ -1,0 +1,134 @@
+//! What a render writes, and that nothing but the scene and its settings changes the picture.
+
+mod support;
+
+use photoncard_driver::exr::{RgbImage, read_rgb};
+use serde_json::{Value, json};
+use support::{Room, scene, scene_bytes, scene_of, shipped};
+
+fn picture(room: &Room, name: &str) -> RgbImage {
+    read_rgb(&room.path(name)).unwrap()
+}
+
+#[test]
+fn a_render_writes_picture_preview_and_statistics() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    let files = ["-o", "a.exr", "--preview", "a.png", "--stats", "a.json"];
+    let outcome = room.rendered(&cornell, &files);
+    assert_eq!(room.names(), ["a.exr", "a.json", "a.png"]);
+    assert!(room.read("a.png").starts_with(b"\x89PNG\r\n\x1a\n"));
+    assert!(outcome.stderr.lines().all(|line| line.starts_with("photoncard: ")), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("tiles"), "{}", outcome.stderr);
+    assert!(!outcome.stderr.contains(['\r', '\x1b']), "{:?}", outcome.stderr);
+
+    let statistics: Value = serde_json::from_slice(&room.read("a.json")).unwrap();
+    for key in ["scene", "photons", "pack", "load", "render", "total"] {
+        assert!(statistics["time_s"][key].as_f64().is_some_and(|seconds| seconds >= 0.0), "{key}");
+    }
+    assert_eq!(statistics["rays"]["eye"], 64);
+    for pointer in ["/rays/shadow", "/rays/gather", "/gathers", "/image_bytes"] {
+        assert!(statistics.pointer(pointer).and_then(Value::as_u64).is_some_and(|n| n > 0), "{pointer}");
+    }
+    let link = |key: &str| statistics["link"][key].as_u64().unwrap();
+    assert!(link("wire_bytes") > link("payload_bytes") && link("payload_bytes") > 0);
+    assert_eq!(link("retransmitted_frames"), 0);
+
+    let outcome = room.run(&["diff", "a.exr", "a.exr"]);
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    let difference: Value = serde_json::from_str(&outcome.stdout).unwrap();
+    for pointer in ["/pixels/mse", "/pixels/rmse", "/pixels/relmse", "/blocks/mse"] {
+        assert_eq!(difference.pointer(pointer), Some(&json!(0.0)), "{pointer}");
+    }
+}
+
+#[test]
+fn quiet_is_silent() {
+    let room = Room::new();
+    let outcome = room.rendered(&shipped("cornell-glossy.gltf"), &["-o", "a.exr", "--quiet"]);
+    assert_eq!(outcome.stderr, "");
+}
+
+#[test]
+fn the_same_bytes_however_they_are_rendered() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    room.rendered(&cornell, &["-o", "first.exr", "--size", "20x20"]);
+    for options in [
+        &[][..],
+        &["--order", "naive"],
+        &["--order", "tiled"],
+        &["--card", "emulated:1"],
+        &["--card", "emulated:2", "--threads", "1"],
+        &["--card", "emulated:3", "--threads", "2"],
+        &["--card", "emulated:1", "--card", "emulated-micro:2"],
+        &["--tile", "1"],
+        &["--tile", "7", "--order", "naive"],
+        &["--tile", "32"],
+    ] {
+        room.rendered(&cornell, &[&["-o", "other.exr", "--size", "20x20", "--quiet"], options].concat());
+        assert!(room.read("other.exr") == room.read("first.exr"), "{options:?}");
+    }
+    room.rendered(&cornell, &["-o", "other.exr", "--size", "20x20", "--seed", "1"]);
+    assert!(room.read("other.exr") != room.read("first.exr"));
+}
+
+#[test]
+fn a_crop_is_a_part_of_the_whole() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    room.rendered(&cornell, &["-o", "whole.exr", "--size", "20x16"]);
+    room.rendered(&cornell, &["-o", "part.exr", "--size", "20x16", "--crop", "3,17,5,16"]);
+    let (whole, part) = (picture(&room, "whole.exr"), picture(&room, "part.exr"));
+    assert_eq!((part.width, part.height, part.data_window_origin), (14, 11, [3, 5]));
+    for (row, pixels) in part.pixels.chunks(14).enumerate() {
+        let first = (row + 5) * whole.width + 3;
+        assert_eq!(pixels, &whole.pixels[first..first + 14], "row {row}");
+    }
+}
+
+#[test]
+fn a_setting_of_a_material_changes_the_picture() {
+    let room = Room::new();
+    let glossy = shipped("cornell-glossy.gltf");
+    // The glossy lobe reflects what final gather rays find: a few are not enough to see a difference.
+    let common = ["--size", "16x16", "--gather-rays", "16", "--quiet"];
+    room.rendered(&glossy, &[&common[..], &["-o", "a.exr"]].concat());
+    room.rendered(&glossy, &[&common[..], &["-o", "b.exr", "--set", "floor.exponent=2"]].concat());
+    assert_ne!(picture(&room, "a.exr").pixels, picture(&room, "b.exr").pixels);
+}
+
+#[test]
+fn triangles_of_no_area_are_counted_and_left_out() {
+    let room = Room::new();
+    let mut bytes = scene_bytes();
+    // The floor's second triangle becomes a line.
+    bytes[92..94].copy_from_slice(&0u16.to_le_bytes());
+    room.write_scene("scene.gltf", &scene_of(&bytes));
+    let outcome = room.rendered("scene.gltf", &["-o", "a.exr"]);
+    let told = outcome.stderr.lines().filter(|line| line.contains("zero area")).collect::<Vec<_>>();
+    assert_eq!(told, ["photoncard: triangles of zero area are left out: 1"]);
+    let information = room.run(&["scene", "info", "scene.gltf"]).stdout;
+    assert!(information.contains("triangles  2\nskipped    1 of zero area\n"), "{information}");
+}
+
+#[test]
+fn what_is_ignored_is_said_once() {
+    let room = Room::new();
+    let mut scene = scene();
+    scene["images"] = json!([{"uri": "absent.png"}]);
+    scene["textures"] = json!([{"source": 0}]);
+    scene["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+    scene["materials"][0]["alphaMode"] = json!("BLEND");
+    // The corners' places are as good as any normals that are not the triangles' own.
+    scene["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(0);
+    scene["extensionsUsed"] = json!(["KHR_materials_specular", "KHR_lights_punctual"]);
+    scene["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "point", "name": "bulb"}]}});
+    room.write_scene("scene.gltf", &scene);
+    let outcome = room.rendered("scene.gltf", &["-o", "a.exr"]);
+    let information = room.run(&["scene", "info", "scene.gltf"]).stdout;
+    for sentence in ["textures are ignored", "alpha is ignored", "smooth normals", "punctual lights"] {
+        assert_eq!(outcome.stderr.matches(sentence).count(), 1, "{sentence}: {}", outcome.stderr);
+        assert_eq!(information.matches(sentence).count(), 1, "{sentence}: {information}");
+    }
+}
