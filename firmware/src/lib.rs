@@ -31,6 +31,17 @@
 //! point ([`fixed_point`]), so their order does not matter. Nothing depends on the processor: `f32` operations, `libm`
 //! and integer arithmetic, never a fused multiply-add.
 #![no_std]
+// A chip never panics: what could is kept out, or its reason given.
+#![cfg_attr(
+    not(test),
+    warn(
+        clippy::indexing_slicing,
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::unreachable
+    )
+)]
 
 pub mod card;
 pub mod chip;

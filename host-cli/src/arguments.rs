@@ -53,14 +53,14 @@ pub(crate) enum CardCommand {
 pub(crate) struct RenderOptions {
     /// A glTF 2.0 file, .gltf or .glb
     pub(crate) scene: PathBuf,
-    /// The picture: linear RGB radiance with albedo, N and Z layers, OpenEXR
+    /// The picture, an EXR file: linear RGB radiance with albedo, N and Z layers
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: PathBuf,
     /// Width and height of the picture, pixels
-    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = size, allow_hyphen_values = true)]
     size: (u32, u32),
     /// Render only the columns X0 up to X1 and the rows Y0 up to Y1
-    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop)]
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, allow_hyphen_values = true)]
     crop: Option<Window>,
     /// Name of the camera [default: the first of the file]
     #[arg(long)]
@@ -95,7 +95,7 @@ pub(crate) struct RenderOptions {
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = "tiled")]
     order: Order,
-    /// Where to render: emulated[:CHIPS] or emulated-micro[:CHIPS]; may be repeated [default: a chip a core]
+    /// Where to render: emulated:CHIPS or emulated-micro:CHIPS; may be repeated [default: a chip a core]
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
     /// Threads of the host's own work [default: a thread a core]

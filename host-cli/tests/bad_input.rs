@@ -126,6 +126,8 @@ fn numbers_out_of_range() {
         ("--crop", "3,3,0,8", ["empty", "X0 < X1"]),
         ("--crop", "0,9", ["four whole numbers", "0,64,0,64"]),
         ("--crop", "0,9,a,b", ["four whole numbers", "0,64,0,64"]),
+        ("--crop", "-1,2,3,4", ["four whole numbers", "0,64,0,64"]),
+        ("--size", "-8x8", ["WIDTHxHEIGHT", "512x512"]),
         ("--tile", "0", ["1 to 32", "choose 1 or more"]),
         ("--tile", "33", ["1 to 32", "32 or less"]),
         ("--neighbors", "0", ["1 to 256", "choose 1 or more"]),

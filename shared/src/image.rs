@@ -113,11 +113,13 @@ const SECTION_TABLE: usize = 32;
 
 impl Header {
     /// The section of this kind.
+    #[expect(clippy::indexing_slicing, reason = "a kind is below SECTIONS")]
     pub fn section(&self, kind: SectionKind) -> Section {
         self.sections[kind as usize]
     }
 
     /// The header's line.
+    #[expect(clippy::indexing_slicing, reason = "constant places within the line")]
     pub fn to_line(&self) -> Line {
         let mut line = Line::ZERO;
         let mut put =

@@ -15,6 +15,17 @@
 //!
 //! Nothing here allocates, and nothing here panics on any input.
 #![no_std]
+// A chip never panics: what could is kept out, or its reason given.
+#![cfg_attr(
+    not(test),
+    warn(
+        clippy::indexing_slicing,
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::unreachable
+    )
+)]
 
 pub mod address;
 pub mod budget;

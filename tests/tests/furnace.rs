@@ -121,7 +121,7 @@ mod oracle {
         pub(super) exponent: f64,
     }
 
-    /// SplitMix64.
+    /// The generator of Steele, Lea and Flood 2014.
     struct Random(u64);
 
     impl Random {
@@ -138,7 +138,7 @@ mod oracle {
         /// Mean radiance that a camera of 90 degrees sees in a square picture.
         pub(super) fn mean_radiance(&self, camera: &Camera, paths: u32) -> f64 {
             let mut random = Random(7);
-            let [forward, right, up] = [camera.forward, camera.right, camera.up].map(|v| v.as_dvec3());
+            let [forward, right, up] = [camera.forward, camera.right, camera.up].map(glam::Vec3::as_dvec3);
             let mut sum = 0.0;
             for _ in 0..paths {
                 let (u, v) = (2.0 * random.next() - 1.0, 2.0 * random.next() - 1.0);

@@ -127,6 +127,7 @@ fn read_triangle(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -
 }
 
 /// Pushes the children that were entered, the nearest last, and takes that one off again.
+#[expect(clippy::indexing_slicing, reason = "a network of constant indices")]
 #[inline(always)]
 fn push(stack: &mut Vec<Entry, BVH_STACK>, mut entered: [Entry; 4]) -> Result<Option<Entry>, ()> {
     // A sorting network for four; a child that was not entered is infinitely far.
@@ -164,6 +165,7 @@ impl Slabs {
     }
 
     /// Where the ray enters each child's box: infinity if it does not, or beyond `until`.
+    #[expect(clippy::indexing_slicing, reason = "constant bounds")]
     #[inline(always)]
     fn enter(&self, node: &BvhNode, until: f32) -> [Entry; 4] {
         let origin = self.origin.to_array();

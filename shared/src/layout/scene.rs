@@ -44,6 +44,7 @@ impl BvhNode {
     }
 
     /// The record's bytes.
+    #[expect(clippy::indexing_slicing, reason = "constant bounds")]
     pub fn to_bytes(&self) -> [u8; LINE_BYTES] {
         let mut bytes = [0; LINE_BYTES];
         for child in 0..4 {

@@ -1,0 +1,56 @@
+//! Why a card could not be used.
+
+use std::time::Duration;
+
+use photoncard_shared::frame::FrameError;
+use photoncard_shared::link::PortError;
+use photoncard_shared::message::Fault;
+
+use crate::film::FilmError;
+
+/// Why a card could not be used.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum SessionError {
+    /// The card speaks another protocol.
+    #[error("the card speaks protocol {card}, this program {host}")]
+    #[diagnostic(help("install the firmware and the program of one release"))]
+    Protocol {
+        /// The card's version.
+        card: u16,
+        /// This program's version.
+        host: u16,
+    },
+    /// The card reads other images.
+    #[error("the card reads card images of layout {card}, this program writes {host}")]
+    #[diagnostic(help("install the firmware and the program of one release"))]
+    Layout {
+        /// The card's version.
+        card: u16,
+        /// This program's version.
+        host: u16,
+    },
+    /// The card could not do a command.
+    #[error("the card answered with fault {:?} ({})", .0.code, .0.detail)]
+    #[diagnostic(help(
+        "this is a fault of the program or of the card: please report it with the command used"
+    ))]
+    Fault(Fault),
+    /// A frame was damaged on its way.
+    #[error("a frame from the card was damaged on its way: {0:?}")]
+    #[diagnostic(help("check the link's cable and its speed"))]
+    Frame(FrameError),
+    /// A frame is missing, or is not what the session expects.
+    #[error("the card's answer is out of order: {0}")]
+    #[diagnostic(help("check the link's cable and its speed"))]
+    Unexpected(&'static str),
+    /// Nothing came for too long.
+    #[error("the card has not answered for {} s", .0.as_secs())]
+    #[diagnostic(help("check that the card is powered and its firmware runs"))]
+    Silent(Duration),
+    /// The link failed.
+    #[error("the link to the card is closed ({0:?})")]
+    Port(PortError),
+    /// A pixel does not belong to the picture.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+}
