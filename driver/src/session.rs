@@ -19,7 +19,7 @@ use photoncard_shared::message::{
     self, Command, FrameParameters, LINES_PER_WRITE, PIXEL_BYTES, PROTOCOL_VERSION, Pixel, Reply, Tile,
 };
 
-use crate::film::Film;
+use crate::film::{Film, FilmError, Window};
 use crate::scheduler::Scheduler;
 
 /// What sessions work on together.
@@ -28,6 +28,17 @@ pub struct Picture {
     pub scheduler: Scheduler,
     /// Where pixels go.
     pub film: Film,
+}
+
+impl Picture {
+    /// A picture of one pixel and no tile, for a session that has nothing to render yet.
+    ///
+    /// # Errors
+    /// If there is no memory for a pixel.
+    pub fn empty() -> Result<Self, FilmError> {
+        let film = Film::new(1, 1, Window::full(1, 1))?;
+        Ok(Self { scheduler: Scheduler::new(Vec::new()), film })
+    }
 }
 
 /// What a card is to do, the same for every card.

@@ -3,7 +3,6 @@
 use std::process::ExitCode;
 
 use miette::{Diagnostic, MietteDiagnostic, Report};
-use photoncard_driver::photon::TraceError;
 use photoncard_driver::render::RenderError;
 
 use crate::console::say;
@@ -63,7 +62,7 @@ impl Failure {
 impl From<RenderError> for Failure {
     fn from(error: RenderError) -> Self {
         match error {
-            RenderError::Stopped | RenderError::Photons(TraceError::Stopped) => Self::Stopped,
+            RenderError::Stopped => Self::Stopped,
             error if error.is_input() => Self::Input(Report::new(error)),
             error => Self::Work(Report::new(error)),
         }

@@ -9,7 +9,7 @@ use divan::counter::ItemsCount;
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{PhotonMap, automatic_max_distance, measure_discs, trace};
+use photoncard_driver::photon::{MappedImage, PhotonSettings, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_firmware::chip::ReferenceChip;
@@ -45,13 +45,14 @@ fn load(name: &str) -> Scene {
 
 fn prepare(name: &str) -> Prepared {
     let scene = load(name);
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
-    let pass = trace(&packed, 0, PHOTONS, &|_| true).expect("traces");
-    let map = PhotonMap::new(&pass.arrivals);
-    let mut image = packed.with_photons(map.records(), map.power_unit()).expect("packs");
-    let max_distance = automatic_max_distance(&image, NEIGHBORS).expect("sound");
-    measure_discs(&mut image, NEIGHBORS, max_distance).expect("sound");
+    let MappedImage { image, max_distance, .. } = map(&scene, PHOTONS);
     Prepared { scene, image, max_distance }
+}
+
+fn map(scene: &Scene, photons: usize) -> MappedImage {
+    let packed = PackedScene::new(scene, &Emitters::new(scene)).expect("packs");
+    let settings = PhotonSettings { seed: 0, photons, neighbors: NEIGHBORS, max_distance: None };
+    map_photons(packed, &settings, &|_| true).expect("maps")
 }
 
 impl Prepared {
@@ -143,13 +144,5 @@ fn tile_of_cornell(bencher: Bencher) {
 #[divan::bench(sample_count = 3)]
 fn map_of_a_million_photons(bencher: Bencher) {
     let scene = load("cornell.gltf");
-    bencher.counter(ItemsCount::new(1_000_000_usize)).bench_local(|| {
-        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
-        let pass = trace(&packed, 0, 1_000_000, &|_| true).expect("traces");
-        let map = PhotonMap::new(&pass.arrivals);
-        let mut image = packed.with_photons(map.records(), map.power_unit()).expect("packs");
-        let max_distance = automatic_max_distance(&image, NEIGHBORS).expect("sound");
-        measure_discs(&mut image, NEIGHBORS, max_distance).expect("sound");
-        image.bytes()
-    });
+    bencher.counter(ItemsCount::new(1_000_000_usize)).bench_local(|| map(&scene, 1_000_000).image.bytes());
 }

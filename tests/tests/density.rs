@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{PhotonMap, automatic_max_distance, measure_discs, trace};
+use photoncard_driver::photon::{MappedImage, PhotonSettings, map_photons};
 use photoncard_driver::scene::{Material, Scene};
 use photoncard_firmware::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
 use photoncard_firmware::scene::{Reflection, Surface};
@@ -21,11 +21,8 @@ struct Map {
 impl Map {
     fn new(scene: &Scene, photons: usize) -> Self {
         let packed = PackedScene::new(scene, &Emitters::new(scene)).unwrap();
-        let pass = trace(&packed, 1, photons, &|_| true).unwrap();
-        let map = PhotonMap::new(&pass.arrivals);
-        let mut image = packed.with_photons(map.records(), map.power_unit()).unwrap();
-        let max_distance = automatic_max_distance(&image, NEIGHBORS).unwrap();
-        measure_discs(&mut image, NEIGHBORS, max_distance).unwrap();
+        let settings = PhotonSettings { seed: 1, photons, neighbors: NEIGHBORS, max_distance: None };
+        let MappedImage { image, max_distance, .. } = map_photons(packed, &settings, &|_| true).unwrap();
         Self { image, max_distance }
     }
 

@@ -18,6 +18,7 @@ use photoncard_shared::layout::{FULL_DISC, Photon, Record, decode_normal};
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
+use super::PhotonError;
 use crate::pack::CardImage;
 
 /// Points tested on the disc of one photon.
@@ -65,7 +66,7 @@ impl<'a> Searcher<'a> {
 ///
 /// # Errors
 /// If the image is not sound.
-pub fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
+pub(super) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
     let (scene, memory) = image.view();
     let count = scene.header.section(SectionKind::Photons).records as usize;
     let step = count.div_ceil(SAMPLED_PHOTONS).max(1);
@@ -106,18 +107,28 @@ fn extent(image: &CardImage) -> f32 {
 }
 
 /// Measures the disc fraction of every photon for gathers of `neighbors` photons within `max_distance`, and writes it
-/// into the image.
+/// into the image. `go_on` is asked now and then.
 ///
 /// # Errors
-/// If the image is not sound.
-pub fn measure_discs(image: &mut CardImage, neighbors: u32, max_distance: f32) -> Result<(), Fault> {
+/// If the image is not sound, or `go_on` says no.
+pub(super) fn measure_discs(
+    image: &mut CardImage,
+    neighbors: u32,
+    max_distance: f32,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Result<(), PhotonError> {
     let (scene, _) = image.view();
     let count = scene.header.section(SectionKind::Photons).records;
-    let measured: Result<Vec<Vec<(u32, u8)>>, Fault> = groups(count)
+    let measured: Result<Vec<Vec<(u32, u8)>>, PhotonError> = groups(count)
         .into_par_iter()
         .map_init(
             || Searcher::new(image, neighbors, max_distance),
-            |searcher, group| measure_group(searcher, &group),
+            |searcher, group| {
+                if !go_on() {
+                    return Err(PhotonError::Stopped);
+                }
+                Ok(measure_group(searcher, &group)?)
+            },
         )
         .collect();
     let measured = measured?;

@@ -1,12 +1,68 @@
 //! The photon pass: light is traced from the emitters and stored where it arrives.
 //!
-//! It depends on the scene, the seed and the number of photons alone, never on threads, camera, tile or chip.
+//! It depends on the scene, the seed and the number of photons alone, never on threads, camera, tile or chip. What a
+//! gather needs to know beyond the photons, its greatest distance and the disc fractions, depends on the number of
+//! neighbours as well.
 
 mod disc;
 mod emit;
+mod error;
 mod map;
 mod trace;
 
-pub use disc::{automatic_max_distance, measure_discs};
+use std::time::{Duration, Instant};
+
+pub use error::PhotonError;
 pub use map::PhotonMap;
-pub use trace::{Arrival, PhotonPass, TraceError, trace};
+pub use trace::{Arrival, PhotonPass, trace};
+
+use self::disc::{automatic_max_distance, measure_discs};
+use crate::pack::{CardImage, PackedScene};
+
+/// What a photon map is asked to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhotonSettings {
+    /// Seed of the photon paths.
+    pub seed: u32,
+    /// Photons to store.
+    pub photons: usize,
+    /// Photons that a gather will look for.
+    pub neighbors: u32,
+    /// Greatest distance of a gather, metres; `None` for the one that the photons' density suggests.
+    pub max_distance: Option<f32>,
+}
+
+/// A card image with its photon map, ready for gathers.
+pub struct MappedImage {
+    /// The image.
+    pub image: CardImage,
+    /// Greatest distance of a gather, metres.
+    pub max_distance: f32,
+    /// Paths that were traced from the lights.
+    pub paths: u64,
+    /// How long the tracing took.
+    pub tracing: Duration,
+}
+
+/// Traces photons in a packed scene and completes its image with their map. `progress` is told how many photons are
+/// stored, and says whether to go on; it is asked again while the map is measured.
+///
+/// # Errors
+/// If hardly any path meets a surface, the image grows too large, or `progress` says to stop.
+pub fn map_photons(
+    packed: PackedScene,
+    settings: &PhotonSettings,
+    progress: &(dyn Fn(usize) -> bool + Sync),
+) -> Result<MappedImage, PhotonError> {
+    let start = Instant::now();
+    let pass = trace(&packed, settings.seed, settings.photons, progress)?;
+    let tracing = start.elapsed();
+    let map = PhotonMap::new(&pass.arrivals);
+    let mut image = packed.with_photons(map.records(), map.power_unit())?;
+    let max_distance = match settings.max_distance {
+        Some(distance) => distance,
+        None => automatic_max_distance(&image, settings.neighbors)?,
+    };
+    measure_discs(&mut image, settings.neighbors, max_distance, &|| progress(settings.photons))?;
+    Ok(MappedImage { image, max_distance, paths: pass.paths, tracing })
+}

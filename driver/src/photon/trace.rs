@@ -8,6 +8,7 @@ use photoncard_shared::layout::{encode_direction, encode_normal};
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
+use super::PhotonError;
 use super::emit::{PathRandom, emit};
 use crate::pack::PackedScene;
 
@@ -32,31 +33,8 @@ pub struct PhotonPass {
     pub paths: u64,
 }
 
-/// Why there is no photon map.
-#[derive(Debug, thiserror::Error, miette::Diagnostic)]
-pub enum TraceError {
-    /// Hardly any path meets a surface.
-    #[error(
-        "only {stored} photons were stored of {paths} traced from the lights: they meet hardly any surface"
-    )]
-    #[diagnostic(help(
-        "turn the emissive triangles so that their fronts face the scene (or make them double-sided), and check that \
-         surfaces reflect"
-    ))]
-    Lost {
-        /// Photons stored.
-        stored: usize,
-        /// Paths traced.
-        paths: u64,
-    },
-    /// The packed scene is not sound.
-    #[error("the packed scene is not sound: {0:?}")]
-    Unsound(Fault),
-    /// The caller asked to stop.
-    #[error("stopped")]
-    Stopped,
-}
-
+/// Paths that may be traced before each photon stored; beyond them there must be a photon to every thousand paths.
+const FRUITLESS_PATHS: u64 = 1_000_000;
 /// Paths that one task traces.
 const PATHS_PER_TASK: u64 = 2048;
 /// A path with more bounces than this has met surfaces that lose nothing; it ends.
@@ -71,13 +49,13 @@ pub fn trace(
     seed: u32,
     count: usize,
     progress: &(dyn Fn(usize) -> bool + Sync),
-) -> Result<PhotonPass, TraceError> {
+) -> Result<PhotonPass, PhotonError> {
     let (scene, _) = packed.view();
     let mut arrivals: Vec<Arrival> = Vec::with_capacity(count);
     let mut paths = 0_u64;
     while arrivals.len() < count {
-        if paths >= 1_000_000 + 1_000 * count as u64 {
-            return Err(TraceError::Lost { stored: arrivals.len(), paths });
+        if paths >= FRUITLESS_PATHS + 1_000 * arrivals.len() as u64 {
+            return Err(PhotonError::Lost { stored: arrivals.len(), paths });
         }
         let tasks = next_tasks(count - arrivals.len(), arrivals.len(), paths);
         let rounds: Result<Vec<Vec<Path>>, Fault> = (0..tasks)
@@ -88,14 +66,14 @@ pub fn trace(
                 (first..first + PATHS_PER_TASK).map(|path| follow(&scene, &mut memory, seed, path)).collect()
             })
             .collect();
-        for path in rounds.map_err(TraceError::Unsound)?.into_iter().flatten() {
+        for path in rounds.map_err(PhotonError::Unsound)?.into_iter().flatten() {
             if arrivals.len() < count {
                 paths += 1;
                 arrivals.extend(path);
             }
         }
         if !progress(arrivals.len().min(count)) {
-            return Err(TraceError::Stopped);
+            return Err(PhotonError::Stopped);
         }
     }
     arrivals.truncate(count);

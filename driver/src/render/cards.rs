@@ -12,8 +12,6 @@ use photoncard_shared::link::Port;
 
 use super::{Observer, Phase, RenderError};
 use crate::emulator::{ChipKind, EmulatedCard};
-use crate::film::{Film, Window};
-use crate::scheduler::Scheduler;
 use crate::session::{Job, LinkBytes, Picture, Session, SessionError};
 
 /// Where cards are: an argument of `--card`.
@@ -94,8 +92,7 @@ pub struct CardInfo {
 /// If it cannot be started, or does not answer as it should.
 pub fn card_info(address: CardAddress) -> Result<CardInfo, RenderError> {
     let CardAddress::Emulated { kind, .. } = address;
-    let film = Film::new(1, 1, Window::full(1, 1))?;
-    let nothing = Mutex::new(Picture { scheduler: Scheduler::new(Vec::new()), film });
+    let nothing = Mutex::new(Picture::empty()?);
     let cards = Cards::connect(&[CardAddress::Emulated { kind, chips: 1 }], &nothing)?;
     let connected = &cards.cards[0];
     Ok(CardInfo { build: connected.session.build().to_owned(), budget: connected.budget })

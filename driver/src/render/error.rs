@@ -5,7 +5,7 @@ use photoncard_shared::message::Fault;
 use crate::error::SceneError;
 use crate::film::FilmError;
 use crate::pack::PackError;
-use crate::photon::TraceError;
+use crate::photon::PhotonError;
 use crate::session::SessionError;
 
 /// Why a render did not end in a picture.
@@ -30,7 +30,6 @@ pub enum RenderError {
     Scene(#[from] SceneError),
     /// The picture's size or crop is not possible.
     #[error(transparent)]
-    #[diagnostic(help("set --size and --crop within these bounds"))]
     Film(#[from] FilmError),
     /// The scene does not fit the card.
     #[error(transparent)]
@@ -39,7 +38,7 @@ pub enum RenderError {
     /// There are no photons.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Photons(#[from] TraceError),
+    Photons(PhotonError),
     /// The image that was just packed is not sound.
     #[error("the packed image is not sound: fault {:?} ({})", .0.code, .0.detail)]
     #[diagnostic(help("this is a fault of the program: please report it with the scene"))]
@@ -68,9 +67,14 @@ pub enum RenderError {
     Stopped,
 }
 
-impl From<Fault> for RenderError {
-    fn from(fault: Fault) -> Self {
-        Self::Image(fault)
+impl From<PhotonError> for RenderError {
+    fn from(error: PhotonError) -> Self {
+        match error {
+            PhotonError::Stopped => Self::Stopped,
+            PhotonError::Unsound(fault) => Self::Image(fault),
+            PhotonError::Pack(error) => Self::Pack(error),
+            error @ PhotonError::Lost { .. } => Self::Photons(error),
+        }
     }
 }
 
@@ -78,8 +82,7 @@ impl RenderError {
     /// Whether the arguments or the scene are at fault, rather than the work.
     pub fn is_input(&self) -> bool {
         match self {
-            Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) => true,
-            Self::Photons(error) => matches!(error, TraceError::Lost { .. }),
+            Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,
             Self::Image(_) | Self::Start { .. } | Self::Card { .. } | Self::Stopped => false,
         }
     }

@@ -20,8 +20,8 @@ use photoncard_shared::message::FrameParameters;
 use self::cards::Cards;
 use crate::emitter::Emitters;
 use crate::film::Film;
-use crate::pack::{CardImage, PackedScene};
-use crate::photon::{PhotonMap, automatic_max_distance, measure_discs, trace};
+use crate::pack::PackedScene;
+use crate::photon::{MappedImage, map_photons};
 use crate::scene::Scene;
 use crate::scheduler::{Scheduler, tiles};
 use crate::session::{Job, Picture};
@@ -67,14 +67,6 @@ pub struct Rendering {
     pub statistics: Statistics,
 }
 
-/// A scene with its photon map, packed.
-struct PreparedScene {
-    image: CardImage,
-    checksum: u32,
-    max_distance: f32,
-    paths: u64,
-}
-
 /// Renders a scene.
 ///
 /// # Errors
@@ -85,18 +77,21 @@ pub fn render(
     observer: &dyn Observer,
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
-    let film = Film::new(settings.width, settings.height, settings.window())?;
     let camera = scene.camera(settings.camera.as_deref())?;
-    let picture = Mutex::new(Picture { scheduler: Scheduler::new(Vec::new()), film });
+    let picture = Mutex::new(Picture::empty()?);
     let cards = Cards::connect(&settings.cards, &picture)?;
     for budget in cards.budgets() {
         settings.check(budget)?;
     }
+    // Not before the settings are known to be possible: a film may be large.
+    let film = Film::new(settings.width, settings.height, settings.window())?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, &cards, &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance);
-    cards::lock(&picture).scheduler = Scheduler::new(tiles(settings.window(), settings.tile, settings.order));
-    let job = Job { image: prepared.image.lines(), checksum: prepared.checksum, frame: &frame };
+    let scheduler = Scheduler::new(tiles(settings.window(), settings.tile, settings.order));
+    *cards::lock(&picture) = Picture { scheduler, film };
+    let job =
+        Job { image: prepared.image.lines(), checksum: checksum(prepared.image.lines()), frame: &frame };
     let outcome = cards.run(job, &picture, observer)?;
     times.load = outcome.load_seconds;
     times.render = outcome.render_seconds;
@@ -112,37 +107,24 @@ fn prepare(
     cards: &Cards,
     times: &mut Times,
     observer: &dyn Observer,
-) -> Result<PreparedScene, RenderError> {
+) -> Result<MappedImage, RenderError> {
     let start = Instant::now();
-    let emitters = Emitters::new(scene);
-    let packed = PackedScene::new(scene, &emitters)?;
+    let packed = PackedScene::new(scene, &Emitters::new(scene))?;
     for budget in cards.budgets() {
         packed.check_budget(settings.photons, budget)?;
     }
-    times.pack = start.elapsed().as_secs_f64();
-    let start = Instant::now();
     let total = settings.photons as u64;
     let progress = |stored: usize| {
         observer.progress(Phase::Photons, stored as u64, total);
+        if stored as u64 == total {
+            observer.progress(Phase::Pack, 0, 1);
+        }
         !observer.is_stopped()
     };
-    let pass = trace(&packed, settings.seed, settings.photons, &progress)?;
-    times.photons = start.elapsed().as_secs_f64();
-    observer.progress(Phase::Pack, 0, 1);
-    let start = Instant::now();
-    let map = PhotonMap::new(&pass.arrivals);
-    let mut image = packed.with_photons(map.records(), map.power_unit())?;
-    let max_distance = match settings.max_distance {
-        Some(distance) => distance,
-        None => automatic_max_distance(&image, settings.neighbors)?,
-    };
-    measure_discs(&mut image, settings.neighbors, max_distance)?;
-    let checksum = checksum(image.lines());
-    times.pack += start.elapsed().as_secs_f64();
-    if observer.is_stopped() {
-        return Err(RenderError::Stopped);
-    }
-    Ok(PreparedScene { image, checksum, max_distance, paths: pass.paths })
+    let mapped = map_photons(packed, &settings.photon_settings(), &progress)?;
+    times.photons = mapped.tracing.as_secs_f64();
+    times.pack = start.elapsed().as_secs_f64() - times.photons;
+    Ok(mapped)
 }
 
 /// CRC-32C of an image's bytes.
@@ -155,7 +137,7 @@ fn checksum(lines: &[Line]) -> u32 {
 fn statistics(
     settings: &RenderSettings,
     frame: &FrameParameters,
-    prepared: &PreparedScene,
+    prepared: &MappedImage,
     outcome: &cards::Outcome,
     time_s: Times,
 ) -> Statistics {

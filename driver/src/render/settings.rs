@@ -7,6 +7,7 @@ use photoncard_shared::message::{self, FrameParameters};
 
 use super::{CardAddress, RenderError};
 use crate::film::Window;
+use crate::photon::PhotonSettings;
 use crate::scene::Camera;
 use crate::scheduler::TileOrder;
 
@@ -106,6 +107,16 @@ impl RenderSettings {
                 remedy: "give a positive number, or `auto`".into(),
             }),
             _ => Ok(()),
+        }
+    }
+
+    /// What the photon map is to be.
+    pub fn photon_settings(&self) -> PhotonSettings {
+        PhotonSettings {
+            seed: self.seed,
+            photons: self.photons,
+            neighbors: self.neighbors,
+            max_distance: self.max_distance,
         }
     }
 

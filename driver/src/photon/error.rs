@@ -1,0 +1,40 @@
+//! Why there is no photon map.
+
+use photoncard_shared::message::Fault;
+
+use crate::pack::PackError;
+
+/// Why there is no photon map.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum PhotonError {
+    /// Hardly any path meets a surface.
+    #[error(
+        "only {stored} photons were stored of {paths} traced from the lights: they meet hardly any surface"
+    )]
+    #[diagnostic(help(
+        "turn the emissive triangles so that their fronts face the scene (or make them double-sided), and check that \
+         surfaces reflect"
+    ))]
+    Lost {
+        /// Photons stored.
+        stored: usize,
+        /// Paths traced.
+        paths: u64,
+    },
+    /// The packed scene is not sound.
+    #[error("the packed scene is not sound: {0:?}")]
+    Unsound(Fault),
+    /// The image with the photons is too large.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Pack(#[from] PackError),
+    /// The caller asked to stop.
+    #[error("stopped")]
+    Stopped,
+}
+
+impl From<Fault> for PhotonError {
+    fn from(fault: Fault) -> Self {
+        Self::Unsound(fault)
+    }
+}
