@@ -30,6 +30,7 @@ pub enum RenderError {
     Scene(#[from] SceneError),
     /// The picture's size or crop is not possible.
     #[error(transparent)]
+    #[diagnostic(help("change --size or --crop"))]
     Film(#[from] FilmError),
     /// The scene does not fit the card.
     #[error(transparent)]
