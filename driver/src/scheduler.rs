@@ -5,25 +5,47 @@
 
 use std::collections::VecDeque;
 
-use photoncard_shared::message::Tile;
+use photoncard_shared::message::{Drain, Tile};
 
 use crate::film::Window;
 
-/// How a picture is cut into tiles.
+/// In which order photon gathers are done. The picture is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TileOrder {
-    /// Scanlines, from the top: runs of pixels within one row.
+pub enum GatherOrder {
+    /// Pixels along scanlines, the rays of each in the sampler's order.
     Naive,
-    /// Squares, row by row.
+    /// The same within square tiles.
     Tiled,
+    /// Within a tile, the rays of one direction bin for all pixels, then those of the next.
+    DirectionBins,
+    /// Rays by direction bins; gathers wait in the queue and are done by a spatial hash of their place.
+    Hash,
+    /// Rays by direction bins; gathers wait in the queue and are done along a Hilbert curve.
+    Sort,
+}
+
+impl GatherOrder {
+    /// When a chip does its gathers.
+    pub fn drain(self) -> Drain {
+        match self {
+            Self::Naive | Self::Tiled | Self::DirectionBins => Drain::Immediate,
+            Self::Hash => Drain::Hash,
+            Self::Sort => Drain::Sort,
+        }
+    }
+
+    /// Whether rays are cast by direction bins.
+    pub fn has_bins(self) -> bool {
+        !matches!(self, Self::Naive | Self::Tiled)
+    }
 }
 
 /// The tiles of a window, each at most `side * side` pixels, numbered from 0.
-pub fn tiles(window: Window, side: u32, order: TileOrder) -> Vec<Tile> {
+pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     let side = side.max(1);
     let (tile_width, tile_height) = match order {
-        TileOrder::Naive => (side.saturating_mul(side), 1),
-        TileOrder::Tiled => (side, side),
+        GatherOrder::Naive => (side.saturating_mul(side), 1),
+        _ => (side, side),
     };
     let mut tiles = Vec::new();
     for y in (window.y0..window.y1).step_by(tile_height as usize) {
@@ -82,7 +104,7 @@ mod tests {
     #[test]
     fn tiles_cover_every_pixel_once() {
         let window = Window { x0: 3, x1: 40, y0: 5, y1: 22 };
-        for order in [TileOrder::Naive, TileOrder::Tiled] {
+        for order in [GatherOrder::Naive, GatherOrder::Tiled] {
             for side in [1, 2, 8, 16, 100] {
                 let mut covered = vec![0; 40 * 22];
                 for tile in tiles(window, side, order) {

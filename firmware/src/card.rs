@@ -7,7 +7,7 @@
 mod load;
 
 use heapless::Deque;
-use photoncard_shared::budget::{Budget, MICRO, REFERENCE, gather_candidates};
+use photoncard_shared::budget::{Budget, MICRO, MOST_GATHER_RAYS, REFERENCE, gather_candidates};
 use photoncard_shared::frame::{FrameReader, FrameWriter, MAX_FRAME};
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
@@ -23,18 +23,18 @@ use crate::memory::{CardMemory, Dram};
 const TILE_QUEUE: usize = 4;
 
 /// A card of one chip: its memory, its chip and both directions of its link.
-pub struct Card<M, const TILE_PIXELS: usize, const CANDIDATES: usize> {
+pub struct Card<M, const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize> {
     budget: Budget,
     memory: M,
     reader: FrameReader,
     expected_sequence: u16,
-    session: Session<TILE_PIXELS, CANDIDATES>,
+    session: Session<TILE_PIXELS, CANDIDATES, QUEUE>,
     outgoing: Outgoing,
 }
 
 /// What commands act on.
-struct Session<const TILE_PIXELS: usize, const CANDIDATES: usize> {
-    chip: Chip<TILE_PIXELS, CANDIDATES>,
+struct Session<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize> {
+    chip: Chip<TILE_PIXELS, CANDIDATES, QUEUE>,
     image: ImageState,
     frame: Option<FrameParameters>,
     tiles: Deque<Tile, TILE_QUEUE>,
@@ -72,7 +72,9 @@ impl Outgoing {
     }
 }
 
-impl<M: CardMemory, const TILE_PIXELS: usize, const CANDIDATES: usize> Card<M, TILE_PIXELS, CANDIDATES> {
+impl<M: CardMemory, const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>
+    Card<M, TILE_PIXELS, CANDIDATES, QUEUE>
+{
     /// A card that has seen no host yet.
     pub const fn new(budget: Budget, memory: M) -> Self {
         Self {
@@ -154,7 +156,9 @@ fn check_sequence(expected: &mut u16, sequence: u16, command: &Command) -> Resul
 
 const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
-impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Session<TILE_PIXELS, CANDIDATES> {
+impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>
+    Session<TILE_PIXELS, CANDIDATES, QUEUE>
+{
     fn execute(
         &mut self,
         budget: &Budget,
@@ -181,12 +185,13 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Session<TILE_PIXELS, CAN
                 Ok(Some(Reply::ImageAccepted))
             }
             Command::BeginFrame(frame) => {
-                if self.image.scene().is_none() || self.at_work.is_some() || !self.tiles.is_empty() {
+                let Some(scene) = self.image.scene() else { return Err(OUT_OF_ORDER) };
+                if self.at_work.is_some() || !self.tiles.is_empty() {
                     return Err(OUT_OF_ORDER);
                 }
                 check_frame(budget, &frame)?;
+                self.chip.begin_frame(scene, memory, &frame)?;
                 self.frame = Some(frame);
-                self.chip.reset_counters();
                 Ok(Some(Reply::FrameAccepted))
             }
             Command::RenderTile(tile) => self.accept(budget, tile).map(|()| None),
@@ -278,6 +283,9 @@ fn check_frame(budget: &Budget, frame: &FrameParameters) -> Result<(), Fault> {
         frame.shadow_rays <= budget.shadow_rays,
         within(frame.neighbors, budget.neighbors),
         frame.max_distance.is_finite() && frame.max_distance > 0.0,
+        within(frame.bins, budget.gather_rays),
+        true,
+        frame.queue >= 1,
     ];
     match checks.iter().position(|&holds| !holds) {
         Some(index) => Err(Fault { code: FaultCode::Parameter, detail: index as u32 }),
@@ -289,11 +297,20 @@ fn check_frame(budget: &Budget, frame: &FrameParameters) -> Result<(), Fault> {
 pub const MAX_PICTURE_SIDE: u32 = 1 << 16;
 
 /// The card of the reference chip.
-pub type ReferenceCard<M> =
-    Card<M, { REFERENCE.tile_pixels as usize }, { gather_candidates(REFERENCE.neighbors) }>;
+pub type ReferenceCard<M> = Card<
+    M,
+    { REFERENCE.tile_pixels as usize },
+    { gather_candidates(REFERENCE.neighbors) },
+    { REFERENCE.gather_queue as usize },
+>;
 
 /// The card of the micro chip.
-pub type MicroCard<M> = Card<M, { MICRO.tile_pixels as usize }, { gather_candidates(MICRO.neighbors) }>;
+pub type MicroCard<M> = Card<
+    M,
+    { MICRO.tile_pixels as usize },
+    { gather_candidates(MICRO.neighbors) },
+    { MICRO.gather_queue as usize },
+>;
 
 /// On-chip memory of the reference card, bytes.
 pub const REFERENCE_SRAM_BYTES: usize = sram_bytes(&REFERENCE, size_of::<ReferenceCard<Dram<'static>>>());
@@ -302,5 +319,9 @@ pub const MICRO_SRAM_BYTES: usize = sram_bytes(&MICRO, size_of::<MicroCard<Dram<
 
 const _: () = assert!(REFERENCE_SRAM_BYTES <= REFERENCE.sram_bytes as usize);
 const _: () = assert!(MICRO_SRAM_BYTES <= MICRO.sram_bytes as usize);
+const _: () = assert!(REFERENCE.tile_pixels <= 1 << 16 && MICRO.tile_pixels <= 1 << 16);
+const _: () = assert!(
+    REFERENCE.gather_rays as usize <= MOST_GATHER_RAYS && MICRO.gather_rays as usize <= MOST_GATHER_RAYS
+);
 const _: () = assert!(REFERENCE.tiles as usize <= TILE_QUEUE);
 const _: () = assert!(MICRO.tiles as usize <= TILE_QUEUE);

@@ -2,31 +2,49 @@
 
 use glam::Vec3;
 use heapless::Vec;
+use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::{Budget, MICRO, REFERENCE, gather_candidates};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Fault, FrameParameters, Pixel, Tile};
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::BvhNode;
+use photoncard_shared::message::{Drain, Fault, FrameParameters, Pixel, Tile};
 
 use crate::fixed_point::ColourSum;
+use crate::gather::{DirectionBins, GatherQueue, GatherRequest, KeyScale};
 use crate::memory::MemoryPort;
 use crate::photon::Candidate;
 use crate::render::{Context, PixelSample, direct, eye, final_gather};
 use crate::scene::{SceneImage, Surface};
 
 /// The chip of [`REFERENCE`].
-pub type ReferenceChip = Chip<{ REFERENCE.tile_pixels as usize }, { gather_candidates(REFERENCE.neighbors) }>;
+pub type ReferenceChip = Chip<
+    { REFERENCE.tile_pixels as usize },
+    { gather_candidates(REFERENCE.neighbors) },
+    { REFERENCE.gather_queue as usize },
+>;
 /// The chip of [`MICRO`].
-pub type MicroChip = Chip<{ MICRO.tile_pixels as usize }, { gather_candidates(MICRO.neighbors) }>;
+pub type MicroChip = Chip<
+    { MICRO.tile_pixels as usize },
+    { gather_candidates(MICRO.neighbors) },
+    { MICRO.gather_queue as usize },
+>;
 
-/// A chip's tile buffers: `TILE_PIXELS` pixels, `CANDIDATES` photons of a gather.
-pub struct Chip<const TILE_PIXELS: usize, const CANDIDATES: usize> {
+/// A chip's tile buffers: `TILE_PIXELS` pixels, `CANDIDATES` photons of a gather, `QUEUE` gathers that wait.
+pub struct Chip<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize> {
     /// What each pixel of the tile sees, in the present sample.
     surfaces: Vec<Option<Surface>, TILE_PIXELS>,
     sums: Vec<PixelSum, TILE_PIXELS>,
     candidates: Vec<Candidate, CANDIDATES>,
+    queue: GatherQueue<QUEUE>,
+    bins: DirectionBins,
+    key_scale: Option<KeyScale>,
     tile: Tile,
     position: Position,
     counters: Counters,
 }
+
+/// Waiting gathers that one step does.
+const GATHERS_PER_STEP: usize = 64;
 
 /// What is known of a pixel so far: sums over its samples.
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +75,13 @@ impl PixelSum {
 struct Position {
     sample: u32,
     stage: Stage,
+    /// The direction bin, in the final gather.
+    bin: u32,
     pixel: u32,
+}
+
+impl Position {
+    const START: Self = Self { sample: 0, stage: Stage::Eye, bin: 0, pixel: 0 };
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,21 +91,28 @@ enum Stage {
     FinalGather,
 }
 
-impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Default for Chip<TILE_PIXELS, CANDIDATES> {
+impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize> Default
+    for Chip<TILE_PIXELS, CANDIDATES, QUEUE>
+{
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Chip<TILE_PIXELS, CANDIDATES> {
+impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>
+    Chip<TILE_PIXELS, CANDIDATES, QUEUE>
+{
     /// A chip without a tile.
     pub const fn new() -> Self {
         Self {
             surfaces: Vec::new(),
             sums: Vec::new(),
             candidates: Vec::new(),
+            queue: GatherQueue::new(),
+            bins: DirectionBins::new(),
+            key_scale: None,
             tile: Tile { id: 0, x: 0, y: 0, width: 0, height: 0 },
-            position: Position { sample: 0, stage: Stage::Eye, pixel: 0 },
+            position: Position::START,
             counters: Counters::ZERO,
         }
     }
@@ -91,30 +122,44 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Chip<TILE_PIXELS, CANDID
         TILE_PIXELS as u64
     }
 
-    /// What was counted since [`Self::reset_counters`].
+    /// What was counted since [`Self::begin_frame`].
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Counts from zero again.
-    pub fn reset_counters(&mut self) {
+    /// Begins a frame: counts from zero, groups the gather rays in bins, reads the scene's box.
+    ///
+    /// # Errors
+    /// If the image is not sound.
+    pub fn begin_frame(
+        &mut self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        frame: &FrameParameters,
+    ) -> Result<(), Fault> {
         self.counters = Counters::ZERO;
+        self.bins.set(frame.gather_rays, frame.bins);
+        let root = scene.record::<LINE_BYTES, 1>(memory, SectionKind::Nodes, 0)?;
+        self.key_scale = Some(KeyScale::new(&BvhNode::read(root)));
+        Ok(())
     }
 
     /// Begins a tile. Returns whether it has pixels and its buffers suffice.
     #[must_use]
     pub fn begin(&mut self, tile: Tile) -> bool {
         self.tile = tile;
-        self.position = Position { sample: 0, stage: Stage::Eye, pixel: 0 };
+        self.position = Position::START;
         self.surfaces.clear();
         self.sums.clear();
+        self.queue.clear();
         let Ok(pixels) = usize::try_from(tile.pixels()) else { return false };
         pixels > 0
             && self.surfaces.resize(pixels, None).is_ok()
             && self.sums.resize(pixels, PixelSum::ZERO).is_ok()
     }
 
-    /// Does the present stage of one pixel. Returns whether the tile is complete.
+    /// Does the next piece of the tile: one stage of one pixel, of the final gather the rays of one direction bin, or
+    /// some of the gathers that wait. Returns whether the tile is complete.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -124,42 +169,123 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Chip<TILE_PIXELS, CANDID
         memory: &mut impl MemoryPort,
         frame: &FrameParameters,
     ) -> Result<bool, Fault> {
-        let Position { sample, stage, pixel } = self.position;
-        if sample >= frame.samples {
-            return Ok(true);
+        let all_cast = self.position.sample >= frame.samples;
+        if self.queue.is_draining() || all_cast && !self.queue.is_empty() {
+            self.drain(scene, memory, frame)?;
+        } else if !all_cast {
+            self.cast(scene, memory, frame)?;
+            self.advance();
         }
-        let at = PixelSample {
-            x: self.tile.x + pixel % self.tile.width.max(1),
-            y: self.tile.y + pixel / self.tile.width.max(1),
-            sample,
-        };
-        let mut context = Context { scene, memory, frame, counters: &mut self.counters };
-        let (surfaces, sums) = (&mut self.surfaces, &mut self.sums);
-        if let (Some(seen), Some(sum)) = (surfaces.get_mut(pixel as usize), sums.get_mut(pixel as usize)) {
-            match (stage, &*seen) {
-                (Stage::Eye, _) => *seen = see(&mut context, at, sum)?,
-                (Stage::Direct, Some(surface)) => {
-                    sum.direct += direct::reflected(&mut context, at, surface)?;
-                }
-                (Stage::FinalGather, Some(surface)) => {
-                    for index in 0..frame.gather_rays {
-                        if let Some(point) = final_gather::cast(&mut context, at, surface, index)? {
-                            sum.gathered.add(final_gather::radiance(
-                                &mut context,
-                                &point,
-                                &mut self.candidates,
-                            )?);
-                        }
-                    }
-                }
-                (_, None) => {}
-            }
-        }
-        self.advance();
-        Ok(self.position.sample >= frame.samples)
+        Ok(self.position.sample >= frame.samples && self.queue.is_empty())
     }
 
-    /// Every pixel goes through a stage before the next stage begins, every stage before the next sample.
+    /// The present stage of the present pixel.
+    fn cast(
+        &mut self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        frame: &FrameParameters,
+    ) -> Result<(), Fault> {
+        let Position { sample, stage, pixel, .. } = self.position;
+        let width = self.tile.width.max(1);
+        let at = PixelSample { x: self.tile.x + pixel % width, y: self.tile.y + pixel / width, sample };
+        let mut context = Context { scene, memory, frame, counters: &mut self.counters };
+        let seen = self.surfaces.get_mut(pixel as usize);
+        let (Some(seen), Some(sum)) = (seen, self.sums.get_mut(pixel as usize)) else { return Ok(()) };
+        match (stage, *seen) {
+            (Stage::Eye, _) => *seen = see(&mut context, at, sum)?,
+            (Stage::Direct, Some(surface)) => sum.direct += direct::reflected(&mut context, at, &surface)?,
+            (Stage::FinalGather, Some(surface)) => self.final_gather(scene, memory, frame, at, &surface)?,
+            (_, None) => {}
+        }
+        Ok(())
+    }
+
+    /// The gather rays of the present bin, for one pixel.
+    fn final_gather(
+        &mut self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        frame: &FrameParameters,
+        at: PixelSample,
+        surface: &Surface,
+    ) -> Result<(), Fault> {
+        let Position { bin, pixel, .. } = self.position;
+        for place in 0..self.bins.rays(bin).len() {
+            let Some(&ray) = self.bins.rays(bin).get(place) else { break };
+            let mut context = Context { scene, memory: &mut *memory, frame, counters: &mut self.counters };
+            // A tile has at most TILE_PIXELS pixels, which 16 bits tell apart.
+            let end = final_gather::cast(&mut context, at, pixel as u16, surface, ray as u32)?;
+            let Some(end) = end else { continue };
+            if let Some(sum) = self.sums.get_mut(pixel as usize) {
+                sum.gathered.add(end.direct);
+            }
+            if let Some(request) = end.request {
+                self.gather_or_wait(scene, memory, frame, request)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Does a gather at once, or lets it wait. A queue that is full is drained first.
+    fn gather_or_wait(
+        &mut self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        frame: &FrameParameters,
+        request: GatherRequest,
+    ) -> Result<(), Fault> {
+        let Some(scale) = self.key_scale.filter(|_| frame.drain != Drain::Immediate) else {
+            return self.gather(scene, memory, frame, &request);
+        };
+        if self.queue.len() >= (frame.queue as usize).clamp(1, QUEUE) {
+            self.queue.begin_drain();
+            while self.queue.is_draining() {
+                self.drain(scene, memory, frame)?;
+            }
+        }
+        let key = scale.key(frame.drain, request.position.into(), self.queue.len() as u32);
+        match self.queue.push(key, request) {
+            Ok(()) => Ok(()),
+            Err(request) => self.gather(scene, memory, frame, &request),
+        }
+    }
+
+    /// Some of the gathers that wait.
+    fn drain(
+        &mut self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        frame: &FrameParameters,
+    ) -> Result<(), Fault> {
+        if !self.queue.is_draining() {
+            self.queue.begin_drain();
+        }
+        for _ in 0..GATHERS_PER_STEP {
+            let Some(request) = self.queue.take() else { break };
+            self.gather(scene, memory, frame, &request)?;
+        }
+        Ok(())
+    }
+
+    /// One gather, added to its pixel.
+    fn gather(
+        &mut self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        frame: &FrameParameters,
+        request: &GatherRequest,
+    ) -> Result<(), Fault> {
+        let mut context = Context { scene, memory, frame, counters: &mut self.counters };
+        let gathered = final_gather::gathered(&mut context, request, &mut self.candidates)?;
+        if let Some(sum) = self.sums.get_mut(request.pixel as usize) {
+            sum.gathered.add(gathered);
+        }
+        Ok(())
+    }
+
+    /// Every pixel goes through a stage before the next stage begins, through a bin before the next bin, and through
+    /// every stage before the next sample.
     fn advance(&mut self) {
         let position = &mut self.position;
         position.pixel += 1;
@@ -171,6 +297,11 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize> Chip<TILE_PIXELS, CANDID
             Stage::Eye => Stage::Direct,
             Stage::Direct => Stage::FinalGather,
             Stage::FinalGather => {
+                position.bin += 1;
+                if position.bin < self.bins.len() {
+                    return;
+                }
+                position.bin = 0;
                 position.sample += 1;
                 Stage::Eye
             }

@@ -9,6 +9,7 @@
 //! | [`scene`] | bounding volume hierarchy, triangles, materials, emitters, read from those lines |
 //! | [`photon`] | the k nearest photons and the radiance they reflect |
 //! | [`sampler`] | stratified random numbers from (pixel, sample, dimension) |
+//! | [`gather`] | photon gathers that wait, and in which order they are done |
 //! | [`importance`] | which way a final gather ray goes |
 //! | [`render`] | eye rays, direct light, final gather: the stages of a tile |
 //! | [`chip`] | owns the tile's state; one method a stage |
@@ -46,6 +47,7 @@
 pub mod card;
 pub mod chip;
 pub mod fixed_point;
+pub mod gather;
 pub mod importance;
 pub mod memory;
 pub mod photon;

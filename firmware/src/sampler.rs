@@ -47,20 +47,28 @@ impl Pattern {
 
 /// The cell of one point: a row of the square as high as its share of the points, cut into equal columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Cell {
+pub(crate) struct Cell {
     /// Rows of the whole square.
     rows: u32,
-    row: u32,
+    pub(crate) row: u32,
     /// Columns of this row.
-    columns: u32,
+    pub(crate) columns: u32,
     column: u32,
     /// Points in the rows before.
-    first: u32,
+    pub(crate) first: u32,
 }
 
 impl Cell {
+    /// The middle of the cell, of `count` in all.
+    pub(crate) fn centre(&self, count: u32) -> [f32; 2] {
+        let x = (self.column as f32 + 0.5) / self.columns as f32;
+        let y = (self.first as f32 + 0.5 * self.columns as f32) / count as f32;
+        [x, y]
+    }
+
+    /// The cell of point `index` of `count`.
     #[inline(always)]
-    fn new(index: u32, count: u32) -> Self {
+    pub(crate) fn new(index: u32, count: u32) -> Self {
         let count = count.max(1);
         let rows = (libm::sqrtf(count as f32) as u32).max(1);
         // Row r holds the points from floor(r count / rows) on.

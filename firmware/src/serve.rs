@@ -16,8 +16,8 @@ const IDLE_WAIT: Duration = Duration::from_millis(20);
 ///
 /// # Errors
 /// Why the port cannot go on; [`PortError::Closed`] is how a session ends in order.
-pub fn serve<M: CardMemory, const TILE_PIXELS: usize, const CANDIDATES: usize>(
-    card: &mut Card<M, TILE_PIXELS, CANDIDATES>,
+pub fn serve<M: CardMemory, const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>(
+    card: &mut Card<M, TILE_PIXELS, CANDIDATES, QUEUE>,
     port: &mut impl Port,
 ) -> Result<(), PortError> {
     let mut buffer = [0; 512];

@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
 use photoncard_driver::render::{CardAddress, RenderSettings};
-use photoncard_driver::scheduler::TileOrder;
+use photoncard_driver::scheduler::GatherOrder;
 
 /// Global illumination by photon mapping on small rendering chips.
 #[derive(Parser)]
@@ -93,8 +93,14 @@ pub(crate) struct RenderOptions {
     #[arg(long, default_value_t = 16, allow_negative_numbers = true)]
     tile: u32,
     /// Order of the photon gathers; it never changes the picture
-    #[arg(long, default_value = "tiled")]
+    #[arg(long, default_value = "sort")]
     order: Order,
+    /// Direction bins of the gather rays, for the orders that have any [default: a bin a ray]
+    #[arg(long)]
+    bins: Option<u32>,
+    /// Gathers that may wait on a chip, for the orders that let any [default: as many as it has room for]
+    #[arg(long)]
+    queue: Option<u32>,
     /// Where to render: emulated:CHIPS or emulated-micro:CHIPS; may be repeated [default: a chip a core]
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
@@ -132,23 +138,32 @@ pub(crate) struct DiffOptions {
 /// Orders of the photon gathers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Order {
+    /// Pixels along scanlines
     Naive,
+    /// Pixels along the scanlines of a tile
     Tiled,
+    /// Rays of one direction bin for all pixels of a tile, then those of the next
     Dirbin,
+    /// By direction bins; gathers wait and are done by a spatial hash of their place
     Hash,
+    /// By direction bins; gathers wait and are done along a Hilbert curve
     Sort,
+    /// All gathers of the frame along a Hilbert curve (not yet)
     Hilbert,
 }
 
 impl Order {
     /// The order, if it can be used.
-    pub(crate) fn tile_order(self) -> Result<TileOrder, String> {
+    pub(crate) fn gather_order(self) -> Result<GatherOrder, String> {
         match self {
-            Self::Naive => Ok(TileOrder::Naive),
-            Self::Tiled => Ok(TileOrder::Tiled),
-            Self::Dirbin | Self::Hash | Self::Sort | Self::Hilbert => {
-                let name = format!("{self:?}").to_lowercase();
-                Err(format!("--order {name} cannot be used yet; use naive or tiled, the picture is the same"))
+            Self::Naive => Ok(GatherOrder::Naive),
+            Self::Tiled => Ok(GatherOrder::Tiled),
+            Self::Dirbin => Ok(GatherOrder::DirectionBins),
+            Self::Hash => Ok(GatherOrder::Hash),
+            Self::Sort => Ok(GatherOrder::Sort),
+            Self::Hilbert => {
+                Err("--order hilbert cannot be used yet; use sort or any other, the picture is the same"
+                    .into())
             }
         }
     }
@@ -186,7 +201,9 @@ impl RenderOptions {
             shadow_rays: self.shadow_rays,
             samples: self.spp,
             tile: self.tile,
-            order: self.order.tile_order()?,
+            order: self.order.gather_order()?,
+            bins: self.bins,
+            queue: self.queue,
             cards: if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() },
         })
     }

@@ -23,6 +23,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("tile            {} pixels, {} tiles at once", budget.tile_pixels, budget.tiles),
         format!("neighbors       {}", budget.neighbors),
         format!("gather rays     {} a sample", budget.gather_rays),
+        format!("gather queue    {} gathers", budget.gather_queue),
         format!("shadow rays     {} a sample", budget.shadow_rays),
         format!("samples         {} a pixel", budget.samples),
     ];

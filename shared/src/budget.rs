@@ -21,6 +21,8 @@ pub struct Budget {
     pub neighbors: u32,
     /// Final gather rays of one sample.
     pub gather_rays: u32,
+    /// Photon gathers that can wait to be reordered.
+    pub gather_queue: u32,
     /// Shadow rays of one sample.
     pub shadow_rays: u32,
     /// Samples of one pixel.
@@ -39,7 +41,8 @@ pub const REFERENCE: Budget = Budget {
     stack_bytes: 16 << 10,
     tile_pixels: 1024,
     neighbors: 256,
-    gather_rays: 256,
+    gather_rays: MOST_GATHER_RAYS as u32,
+    gather_queue: 16_384,
     shadow_rays: 64,
     samples: 4096,
     tiles: 4,
@@ -54,11 +57,15 @@ pub const MICRO: Budget = Budget {
     stack_bytes: 16 << 10,
     tile_pixels: 256,
     neighbors: 128,
-    gather_rays: 256,
+    gather_rays: MOST_GATHER_RAYS as u32,
+    gather_queue: 1024,
     shadow_rays: 64,
     samples: 4096,
     tiles: 2,
 };
+
+/// Final gather rays of one sample that any budget may allow.
+pub const MOST_GATHER_RAYS: usize = 256;
 
 /// Entries of the stack of a descent in the bounding volume hierarchy: a host refuses a hierarchy that needs more.
 pub const BVH_STACK: usize = 96;

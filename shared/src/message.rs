@@ -60,6 +60,25 @@ pub struct FrameParameters {
     pub neighbors: u32,
     /// How far from its place a gather looks, metres.
     pub max_distance: f32,
+    /// Bins that the directions of gather rays are grouped in, at least 1: the rays of one bin are cast for all pixels
+    /// of a tile before those of the next. One bin casts all rays of a pixel before those of the next.
+    pub bins: u32,
+    /// When gathers are done.
+    pub drain: Drain,
+    /// Gathers that wait at most, at least 1; a chip takes what it has room for.
+    pub queue: u32,
+}
+
+/// When gathers are done, and in which order. The picture is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Drain {
+    /// At once.
+    #[default]
+    Immediate,
+    /// When the queue is full or the tile ends, by a spatial hash of their place.
+    Hash,
+    /// When the queue is full or the tile ends, along a Hilbert curve.
+    Sort,
 }
 
 /// A rectangle of the picture.

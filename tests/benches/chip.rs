@@ -12,6 +12,7 @@ use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, PhotonSettings, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::{Scene, gltf};
+use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::photon::{Candidate, NearestPhotons, gather};
@@ -127,12 +128,19 @@ fn ray_in_atrium(bencher: Bencher, any_hit: bool) {
     cast(bencher, &ATRIUM, any_hit);
 }
 
-#[divan::bench(sample_count = 10)]
-fn tile_of_cornell(bencher: Bencher) {
-    let settings = RenderSettings::default();
+#[divan::bench(sample_count = 10, args = ["tiled", "dirbin", "hash", "sort"])]
+fn tile_of_cornell(bencher: Bencher, order: &str) {
+    let order = match order {
+        "tiled" => GatherOrder::Tiled,
+        "dirbin" => GatherOrder::DirectionBins,
+        "hash" => GatherOrder::Hash,
+        _ => GatherOrder::Sort,
+    };
+    let settings = RenderSettings { order, ..RenderSettings::default() };
     let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance);
     let (scene, mut memory) = CORNELL.image.view();
     let mut chip = Box::new(ReferenceChip::new());
+    chip.begin_frame(&scene, &mut memory, &frame).expect("sound");
     let tile = Tile { id: 0, x: 256, y: 256, width: 16, height: 16 };
     bencher.counter(ItemsCount::new(256_usize)).bench_local(|| {
         assert!(chip.begin(tile));

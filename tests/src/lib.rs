@@ -76,3 +76,15 @@ pub fn mean(radiances: &[[f32; 3]]) -> f64 {
     let sum: f64 = radiances.as_flattened().iter().map(|&channel| channel as f64).sum();
     sum / (3 * radiances.len()) as f64
 }
+
+/// Does some work on a thread with room on its stack for a card's buffers, which are built there.
+///
+/// # Panics
+/// If the work does.
+pub fn with_room_for_a_card(work: impl FnOnce() + Send) {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, work);
+        let result = thread.expect("the system has a thread").join();
+        result.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    });
+}

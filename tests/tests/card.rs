@@ -13,7 +13,7 @@ use photoncard_shared::frame::{FrameReader, FrameWriter, checksum};
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{BvhNode, ChildReference};
 use photoncard_shared::message::{self, Command, Fault, FaultCode, FrameParameters, Reply, Tile};
-use photoncard_tests::{camera, lambertian, room, scene};
+use photoncard_tests::{camera, lambertian, room, scene, with_room_for_a_card};
 use proptest::prelude::*;
 
 const DRAM_LINES: usize = 4096;
@@ -127,51 +127,55 @@ fn renders_a_tile(wire: &mut Wire, image: &CardImage) {
 
 #[test]
 fn commands_out_of_order_are_faults_and_the_card_goes_on() {
-    let mut memory = vec![Line::ZERO; DRAM_LINES];
-    let mut wire = Wire::new(&mut memory);
-    let fault = |code| vec![Answer::Fault(code)];
-    wire.hello();
-    assert_eq!(wire.say(&Command::RenderTile(TILE)), fault(FaultCode::Order));
-    assert_eq!(wire.say(&Command::BeginFrame(frame())), fault(FaultCode::Order));
-    assert_eq!(wire.say(&Command::EndImage), fault(FaultCode::Order));
-    assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 128] }), fault(FaultCode::Order));
-    let too_large = Command::BeginImage { lines: DRAM_LINES as u32 + 1, checksum: 0 };
-    assert_eq!(wire.say(&too_large), fault(FaultCode::ImageTooLarge));
-    assert_eq!(wire.say(&Command::BeginImage { lines: 2, checksum: 0 }), []);
-    assert_eq!(wire.say(&Command::WriteLines { first: 1, data: &[0; 128] }), fault(FaultCode::LineOrder));
-    assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 100] }), fault(FaultCode::LineOrder));
-    assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 256] }), []);
-    assert_eq!(wire.say(&Command::EndImage), fault(FaultCode::ImageChecksum));
-    renders_a_tile(&mut wire, &image());
+    with_room_for_a_card(|| {
+        let mut memory = vec![Line::ZERO; DRAM_LINES];
+        let mut wire = Wire::new(&mut memory);
+        let fault = |code| vec![Answer::Fault(code)];
+        wire.hello();
+        assert_eq!(wire.say(&Command::RenderTile(TILE)), fault(FaultCode::Order));
+        assert_eq!(wire.say(&Command::BeginFrame(frame())), fault(FaultCode::Order));
+        assert_eq!(wire.say(&Command::EndImage), fault(FaultCode::Order));
+        assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 128] }), fault(FaultCode::Order));
+        let too_large = Command::BeginImage { lines: DRAM_LINES as u32 + 1, checksum: 0 };
+        assert_eq!(wire.say(&too_large), fault(FaultCode::ImageTooLarge));
+        assert_eq!(wire.say(&Command::BeginImage { lines: 2, checksum: 0 }), []);
+        assert_eq!(wire.say(&Command::WriteLines { first: 1, data: &[0; 128] }), fault(FaultCode::LineOrder));
+        assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 100] }), fault(FaultCode::LineOrder));
+        assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 256] }), []);
+        assert_eq!(wire.say(&Command::EndImage), fault(FaultCode::ImageChecksum));
+        renders_a_tile(&mut wire, &image());
+    });
 }
 
 #[test]
 fn frames_and_tiles_outside_the_budget_are_faults() {
-    let mut memory = vec![Line::ZERO; DRAM_LINES];
-    let mut wire = Wire::new(&mut memory);
-    wire.hello();
-    wire.load(image().lines());
-    let bad_frames = [
-        FrameParameters { width: 0, ..frame() },
-        FrameParameters { samples: 0, ..frame() },
-        FrameParameters { gather_rays: REFERENCE.gather_rays + 1, ..frame() },
-        FrameParameters { neighbors: REFERENCE.neighbors + 1, ..frame() },
-        FrameParameters { max_distance: f32::NAN, ..frame() },
-    ];
-    for bad in bad_frames {
-        assert_eq!(wire.say(&Command::BeginFrame(bad)), [Answer::Fault(FaultCode::Parameter)], "{bad:?}");
-    }
-    assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
-    let bad_tiles = [
-        Tile { width: 0, ..TILE },
-        Tile { width: 9, ..TILE },
-        Tile { x: u32::MAX, ..TILE },
-        Tile { y: 1, ..TILE },
-    ];
-    for bad in bad_tiles {
-        assert_eq!(wire.say(&Command::RenderTile(bad)), [Answer::Fault(FaultCode::Tile)], "{bad:?}");
-    }
-    renders_a_tile(&mut wire, &image());
+    with_room_for_a_card(|| {
+        let mut memory = vec![Line::ZERO; DRAM_LINES];
+        let mut wire = Wire::new(&mut memory);
+        wire.hello();
+        wire.load(image().lines());
+        let bad_frames = [
+            FrameParameters { width: 0, ..frame() },
+            FrameParameters { samples: 0, ..frame() },
+            FrameParameters { gather_rays: REFERENCE.gather_rays + 1, ..frame() },
+            FrameParameters { neighbors: REFERENCE.neighbors + 1, ..frame() },
+            FrameParameters { max_distance: f32::NAN, ..frame() },
+        ];
+        for bad in bad_frames {
+            assert_eq!(wire.say(&Command::BeginFrame(bad)), [Answer::Fault(FaultCode::Parameter)], "{bad:?}");
+        }
+        assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
+        let bad_tiles = [
+            Tile { width: 0, ..TILE },
+            Tile { width: 9, ..TILE },
+            Tile { x: u32::MAX, ..TILE },
+            Tile { y: 1, ..TILE },
+        ];
+        for bad in bad_tiles {
+            assert_eq!(wire.say(&Command::RenderTile(bad)), [Answer::Fault(FaultCode::Tile)], "{bad:?}");
+        }
+        renders_a_tile(&mut wire, &image());
+    });
 }
 
 /// A copy of the image with another root node.
@@ -186,50 +190,55 @@ fn with_root(image: &CardImage, change: impl FnOnce(&mut BvhNode)) -> Vec<Line> 
 
 #[test]
 fn unsound_images_end_in_faults_and_not_in_a_hang() {
-    let image = image();
-    let everywhere = |node: &mut BvhNode, child: ChildReference| {
-        node.lower = [[-9.0; 4]; 3];
-        node.upper = [[9.0; 4]; 3];
-        node.children = [child; 4];
-    };
-    let unsound = [
-        (with_root(&image, |node| everywhere(node, ChildReference(0))), FaultCode::Depth),
-        (
-            with_root(&image, |node| {
-                everywhere(node, ChildReference::EMPTY);
-                node.children[0] = ChildReference(0);
-            }),
-            FaultCode::Depth,
-        ),
-        (with_root(&image, |node| everywhere(node, ChildReference(1_000_000))), FaultCode::Record),
-        (
-            with_root(&image, |node| everywhere(node, ChildReference::leaf(5_000, 3).unwrap())),
-            FaultCode::Record,
-        ),
-    ];
-    let mut memory = vec![Line::ZERO; DRAM_LINES];
-    let mut wire = Wire::new(&mut memory);
-    for (lines, code) in unsound {
-        wire.hello();
-        assert_eq!(wire.load(&lines), [Answer::ImageAccepted]);
-        assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
-        assert_eq!(wire.say(&Command::RenderTile(TILE)), [Answer::Fault(code)]);
-    }
-    renders_a_tile(&mut wire, &image);
+    with_room_for_a_card(|| {
+        let image = image();
+        let everywhere = |node: &mut BvhNode, child: ChildReference| {
+            node.lower = [[-9.0; 4]; 3];
+            node.upper = [[9.0; 4]; 3];
+            node.children = [child; 4];
+        };
+        let unsound = [
+            (with_root(&image, |node| everywhere(node, ChildReference(0))), FaultCode::Depth),
+            (
+                with_root(&image, |node| {
+                    everywhere(node, ChildReference::EMPTY);
+                    node.children[0] = ChildReference(0);
+                }),
+                FaultCode::Depth,
+            ),
+            (with_root(&image, |node| everywhere(node, ChildReference(1_000_000))), FaultCode::Record),
+            (
+                with_root(&image, |node| everywhere(node, ChildReference::leaf(5_000, 3).unwrap())),
+                FaultCode::Record,
+            ),
+        ];
+        let mut memory = vec![Line::ZERO; DRAM_LINES];
+        let mut wire = Wire::new(&mut memory);
+        for (lines, code) in unsound {
+            wire.hello();
+            assert_eq!(wire.load(&lines), [Answer::ImageAccepted]);
+            assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
+            assert_eq!(wire.say(&Command::RenderTile(TILE)), [Answer::Fault(code)]);
+        }
+        renders_a_tile(&mut wire, &image);
+    });
 }
 
 #[test]
 fn a_damaged_and_a_missing_frame_are_told() {
-    let mut memory = vec![Line::ZERO; DRAM_LINES];
-    let mut wire = Wire::new(&mut memory);
-    wire.hello();
-    let frame = wire.writer.write(|bytes| message::encode(&Command::ReadCounters, bytes)).unwrap().to_vec();
-    let mut damaged = frame.clone();
-    damaged[3] ^= 0x10;
-    assert_eq!(wire.send(&damaged), [Answer::Fault(FaultCode::Frame)]);
-    // That frame's number is missing now.
-    assert_eq!(wire.say(&Command::ReadCounters), [Answer::Fault(FaultCode::Sequence)]);
-    assert_eq!(wire.say(&Command::ReadCounters), [Answer::Counters]);
+    with_room_for_a_card(|| {
+        let mut memory = vec![Line::ZERO; DRAM_LINES];
+        let mut wire = Wire::new(&mut memory);
+        wire.hello();
+        let frame =
+            wire.writer.write(|bytes| message::encode(&Command::ReadCounters, bytes)).unwrap().to_vec();
+        let mut damaged = frame.clone();
+        damaged[3] ^= 0x10;
+        assert_eq!(wire.send(&damaged), [Answer::Fault(FaultCode::Frame)]);
+        // That frame's number is missing now.
+        assert_eq!(wire.say(&Command::ReadCounters), [Answer::Fault(FaultCode::Sequence)]);
+        assert_eq!(wire.say(&Command::ReadCounters), [Answer::Counters]);
+    });
 }
 
 proptest! {
@@ -237,12 +246,13 @@ proptest! {
 
     #[test]
     fn no_bytes_stop_a_card(garbage in proptest::collection::vec(any::<u8>(), 0..5000)) {
-        let mut memory = vec![Line::ZERO; DRAM_LINES];
-        let mut wire = Wire::new(&mut memory);
-        let mut garbage = garbage;
-        garbage.push(0);
-        wire.send(&garbage);
-        wire.hello();
+        with_room_for_a_card(|| {
+            let mut memory = vec![Line::ZERO; DRAM_LINES];
+            let mut wire = Wire::new(&mut memory);
+            wire.send(&garbage);
+            wire.send(&[0]);
+            wire.hello();
+        });
     }
 
     /// An image with any line damaged renders, or ends in a fault: never in a panic or a hang.
@@ -258,14 +268,16 @@ proptest! {
         for (target, byte) in damaged[place..].iter_mut().zip(bytes) {
             *target = byte;
         }
-        let mut memory = vec![Line::ZERO; DRAM_LINES];
-        let mut wire = Wire::new(&mut memory);
-        wire.hello();
-        if wire.load(&lines) == [Answer::ImageAccepted] {
-            wire.say(&Command::BeginFrame(frame()));
-            let answers = wire.say(&Command::RenderTile(TILE));
-            prop_assert!(matches!(answers.last(), Some(Answer::TileDone(7) | Answer::Fault(_))), "{:?}", answers);
-        }
-        wire.hello();
+        with_room_for_a_card(|| {
+            let mut memory = vec![Line::ZERO; DRAM_LINES];
+            let mut wire = Wire::new(&mut memory);
+            wire.hello();
+            if wire.load(&lines) == [Answer::ImageAccepted] {
+                wire.say(&Command::BeginFrame(frame()));
+                let answers = wire.say(&Command::RenderTile(TILE));
+                assert!(matches!(answers.last(), Some(Answer::TileDone(7) | Answer::Fault(_))), "{answers:?}");
+            }
+            wire.hello();
+        });
     }
 }

@@ -5,6 +5,7 @@ use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, PhotonSettings, map_photons};
 use photoncard_driver::scene::{Material, Scene};
+use photoncard_firmware::gather::PartialReflection;
 use photoncard_firmware::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
 use photoncard_firmware::scene::{Reflection, Surface};
 use photoncard_tests::{camera, lambertian, quad, room, scene};
@@ -41,7 +42,8 @@ impl Map {
             double_sided: false,
             distance: 1.0,
         };
-        (reflected_radiance(&nearest, &surface) * scene.header.photon_power_unit).x as f64
+        let reflection = PartialReflection::new(&surface, Vec3::splat(scene.header.photon_power_unit));
+        reflected_radiance(&nearest, &reflection).x as f64
     }
 
     /// Mean radiance of a hundred places along a line.

@@ -3,7 +3,7 @@
 use photoncard_driver::film::{Film, PixelValue, Window};
 use photoncard_driver::render::{CardAddress, RenderSettings};
 use photoncard_driver::scene::{Scene, gltf};
-use photoncard_driver::scheduler::TileOrder;
+use photoncard_driver::scheduler::GatherOrder;
 use photoncard_tests::render_or_panic;
 
 fn glossy() -> Scene {
@@ -19,6 +19,7 @@ fn settings() -> RenderSettings {
         neighbors: 50,
         gather_rays: 12,
         samples: 2,
+        order: GatherOrder::Tiled,
         cards: vec![card("emulated:1")],
         ..RenderSettings::default()
     }
@@ -43,12 +44,30 @@ fn order_tiles_chips_and_kind_of_chip_do_not_change_a_bit() {
     let scene = glossy();
     let expected = bits(&render_or_panic(&scene, &settings()).film);
     let variants = [
-        RenderSettings { order: TileOrder::Naive, ..settings() },
+        RenderSettings { order: GatherOrder::Naive, ..settings() },
         RenderSettings { tile: 8, ..settings() },
-        RenderSettings { tile: 5, order: TileOrder::Naive, ..settings() },
+        RenderSettings { tile: 5, order: GatherOrder::Naive, ..settings() },
         RenderSettings { tile: 32, ..settings() },
         RenderSettings { cards: vec![card("emulated:2")], ..settings() },
-        RenderSettings { cards: vec![card("emulated:3")], order: TileOrder::Naive, ..settings() },
+        RenderSettings { order: GatherOrder::DirectionBins, ..settings() },
+        RenderSettings { order: GatherOrder::DirectionBins, bins: Some(5), tile: 11, ..settings() },
+        RenderSettings { order: GatherOrder::Hash, ..settings() },
+        RenderSettings {
+            order: GatherOrder::Hash,
+            queue: Some(37),
+            cards: vec![card("emulated:3")],
+            ..settings()
+        },
+        RenderSettings { order: GatherOrder::Sort, queue: Some(1), tile: 9, ..settings() },
+        RenderSettings { order: GatherOrder::Sort, queue: Some(2), bins: Some(3), ..settings() },
+        RenderSettings {
+            order: GatherOrder::Sort,
+            queue: Some(1000),
+            cards: vec![card("emulated-micro:2")],
+            ..settings()
+        },
+        RenderSettings { order: GatherOrder::Sort, cards: vec![card("emulated:7")], tile: 16, ..settings() },
+        RenderSettings { cards: vec![card("emulated:3")], order: GatherOrder::Naive, ..settings() },
         RenderSettings { cards: vec![card("emulated:7")], tile: 4, ..settings() },
         RenderSettings { cards: vec![card("emulated-micro:2"), card("emulated:1")], ..settings() },
     ];
@@ -92,7 +111,7 @@ fn a_crop_is_the_same_region_of_the_whole() {
 fn the_work_counted_does_not_depend_on_how_tiles_are_dealt() {
     let scene = glossy();
     let one = render_or_panic(&scene, &settings()).statistics;
-    let three = RenderSettings { cards: vec![card("emulated:3")], order: TileOrder::Naive, ..settings() };
+    let three = RenderSettings { cards: vec![card("emulated:3")], order: GatherOrder::Naive, ..settings() };
     let three = render_or_panic(&scene, &three).statistics;
     assert_eq!(one.rays, three.rays);
     assert_eq!((one.gathers, one.photons_tested), (three.gathers, three.photons_tested));

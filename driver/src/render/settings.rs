@@ -9,7 +9,7 @@ use super::{CardAddress, RenderError};
 use crate::film::Window;
 use crate::photon::PhotonSettings;
 use crate::scene::Camera;
-use crate::scheduler::TileOrder;
+use crate::scheduler::GatherOrder;
 
 /// The settings of a render; each field is an option of the command line.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,8 +38,12 @@ pub struct RenderSettings {
     pub samples: u32,
     /// Side of a tile, pixels.
     pub tile: u32,
-    /// How the picture is cut into tiles.
-    pub order: TileOrder,
+    /// Order of the photon gathers.
+    pub order: GatherOrder,
+    /// Direction bins of the gather rays, where the order has any; `None` for a bin a ray.
+    pub bins: Option<u32>,
+    /// Gathers that may wait on a chip, where the order lets any; `None` for as many as it has room for.
+    pub queue: Option<u32>,
     /// The cards to render on.
     pub cards: Vec<CardAddress>,
 }
@@ -60,7 +64,9 @@ impl Default for RenderSettings {
             shadow_rays: 8,
             samples: 1,
             tile: 16,
-            order: TileOrder::Tiled,
+            order: GatherOrder::Sort,
+            bins: None,
+            queue: None,
             cards: vec![CardAddress::default()],
         }
     }
@@ -98,6 +104,8 @@ impl RenderSettings {
         within("--gather-rays", self.gather_rays as u64, 0, budget.gather_rays as u64)?;
         within("--shadow-rays", self.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
         within("--spp", self.samples as u64, 1, budget.samples as u64)?;
+        within("--bins", self.bins.unwrap_or(1) as u64, 1, budget.gather_rays as u64)?;
+        within("--queue", self.queue.unwrap_or(1) as u64, 1, budget.gather_queue as u64)?;
         within("--tile", self.tile as u64, 1, budget.tile_pixels.isqrt() as u64)?;
         match self.max_distance {
             Some(distance) if !(distance.is_finite() && distance > 0.0) => Err(RenderError::Setting {
@@ -132,6 +140,9 @@ impl RenderSettings {
             shadow_rays: self.shadow_rays,
             neighbors: self.neighbors,
             max_distance,
+            bins: if self.order.has_bins() { self.bins.unwrap_or(self.gather_rays).max(1) } else { 1 },
+            drain: self.order.drain(),
+            queue: self.queue.unwrap_or(u32::MAX),
         }
     }
 

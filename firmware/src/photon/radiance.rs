@@ -16,11 +16,11 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_shared::layout::{decode_direction, decode_normal};
+use photoncard_shared::layout::decode_normal;
 
 use super::{Candidate, NearestPhotons};
 use crate::fixed_point::ColourSum;
-use crate::scene::Surface;
+use crate::gather::PartialReflection;
 use crate::vector::{max, unit};
 
 /// Photons whose surface normal is at a lesser cosine to the query's belong to another surface.
@@ -29,9 +29,10 @@ pub const MIN_NORMAL_COSINE: f32 = 0.75;
 /// The radius of a disc is at least this share of the greatest distance: photons in one point have no density.
 const MIN_RADIUS_SHARE: f32 = 1e-3;
 
-/// Radiance, in photon power units per (sr m^2), that `surface` reflects towards its outgoing direction.
+/// What a gather adds to its pixel, in the units of the reflection: the photons' power over the area of their disc,
+/// reflected.
 #[inline(always)]
-pub fn reflected_radiance(nearest: &NearestPhotons, surface: &Surface) -> Vec3 {
+pub fn reflected_radiance(nearest: &NearestPhotons, reflection: &PartialReflection) -> Vec3 {
     let candidates = nearest.candidates();
     let Some(farthest) = candidates.iter().max_by_key(|candidate| candidate.key()) else { return Vec3::ZERO };
     let (radius_squared, excluded) = if nearest.is_full() {
@@ -39,12 +40,12 @@ pub fn reflected_radiance(nearest: &NearestPhotons, surface: &Surface) -> Vec3 {
     } else {
         (nearest.max_distance_squared(), None)
     };
-    let mut same_surface = SameSurface::new(surface.normal);
+    let mut same_surface = SameSurface::new(reflection.normal());
     let counted = candidates
         .iter()
         .filter(|candidate| Some(candidate.key()) != excluded && same_surface.holds(candidate.normal()));
     let mut closest: Option<&Candidate> = None;
-    let mut sums = Sums::new(surface);
+    let mut sums = Sums::new(reflection);
     for candidate in counted {
         if closest.is_none_or(|closest| candidate.key() < closest.key()) {
             closest = Some(candidate);
@@ -58,9 +59,9 @@ pub fn reflected_radiance(nearest: &NearestPhotons, surface: &Surface) -> Vec3 {
     sums.reflected() * (1.0 / area)
 }
 
-/// The reflected power, photon by photon.
+/// The photons' power, and the lobe's share of it.
 struct Sums<'a> {
-    surface: &'a Surface,
+    reflection: &'a PartialReflection,
     mirror: Vec3,
     power: ColourSum,
     lobe: ColourSum,
@@ -68,49 +69,44 @@ struct Sums<'a> {
 
 impl<'a> Sums<'a> {
     #[inline(always)]
-    fn new(surface: &'a Surface) -> Self {
-        let mirror = crate::scene::mirror(surface.outgoing, surface.normal);
-        Self { surface, mirror, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
+    fn new(reflection: &'a PartialReflection) -> Self {
+        let mirror = if reflection.has_lobe() { reflection.mirror() } else { Vec3::ZERO };
+        Self { reflection, mirror, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
     }
 
     #[inline(always)]
     fn add(&mut self, photon: &Candidate) {
         self.power.add_rgbe(photon.power());
-        if self.surface.reflection.has_lobe() {
-            let incoming = unit(decode_direction(photon.direction()).into());
-            let reflected = self.surface.reflection.lobe(self.mirror.dot(incoming));
-            self.lobe.add(reflected * Vec3::from_array(photon.power().decode()));
+        if self.reflection.has_lobe() {
+            let share = self.reflection.lobe_share(self.mirror, photon.direction());
+            self.lobe.add(Vec3::from_array(photon.power().decode()) * share);
         }
     }
 
     #[inline(always)]
     fn reflected(&self) -> Vec3 {
-        self.surface.reflection.lambertian() * self.power.value() + self.lobe.value()
+        self.reflection.diffuse() * self.power.value() + self.reflection.lobe() * self.lobe.value()
     }
 }
 
 /// Tells the photons of one surface; neighbours mostly have the normal of the one before.
 struct SameSurface {
     normal: Vec3,
-    last: Option<(u8, bool)>,
+    last: (u8, bool),
 }
 
 impl SameSurface {
     #[inline(always)]
-    fn new(normal: Vec3) -> Self {
-        Self { normal, last: None }
+    fn new(code: u8) -> Self {
+        Self { normal: unit(decode_normal(code).into()), last: (code, true) }
     }
 
     #[inline(always)]
     fn holds(&mut self, code: u8) -> bool {
-        match self.last {
-            Some((last, holds)) if last == code => holds,
-            _ => {
-                let other = unit(decode_normal(code).into());
-                let holds = other.dot(self.normal) >= MIN_NORMAL_COSINE;
-                self.last = Some((code, holds));
-                holds
-            }
+        if self.last.0 != code {
+            let other = unit(decode_normal(code).into());
+            self.last = (code, other.dot(self.normal) >= MIN_NORMAL_COSINE);
         }
+        self.last.1
     }
 }

@@ -8,33 +8,34 @@ use heapless::VecView;
 use photoncard_shared::message::Fault;
 
 use super::{Context, PixelSample, direct};
+use crate::gather::{GatherRequest, PartialReflection};
 use crate::importance::sample_reflection;
 use crate::memory::MemoryPort;
 use crate::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Ray, Surface, closest_hit, offset_origin, read_surface};
 
-/// Where a final gather ray ended, and what the radiance from there counts at the eye's surface.
+/// What the end of a final gather ray brings.
 #[derive(Clone, Copy, Debug)]
-pub struct GatherPoint {
-    /// The surface that the ray met.
-    pub surface: Surface,
-    /// Weight of its radiance, for one ray of the sample's `gather_rays`.
-    pub weight: Vec3,
-    /// Direct light that the ray found, weighted, in the image's radiance units.
+pub struct GatherRayEnd {
+    /// Direct light of the emitter it met, weighted, in the image's radiance units.
     pub direct: Vec3,
+    /// The gather of what is reflected there, if anything is.
+    pub request: Option<GatherRequest>,
 }
 
-/// Casts gather ray `index` of a sample from the surface that the eye sees; `None` if it meets nothing.
+/// Casts gather ray `index` of a sample from the surface that the eye sees; `None` if it meets nothing. `pixel_index` is
+/// the pixel's in its tile.
 ///
 /// # Errors
 /// If the image is not sound.
 pub fn cast<M: MemoryPort>(
     context: &mut Context<M>,
     pixel: PixelSample,
+    pixel_index: u16,
     surface: &Surface,
     index: u32,
-) -> Result<Option<GatherPoint>, Fault> {
+) -> Result<Option<GatherRayEnd>, Fault> {
     let frame = context.frame;
     let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, pixel.sample, Dimension::Gather);
     let point = pattern.point(index, frame.gather_rays);
@@ -42,32 +43,32 @@ pub fn cast<M: MemoryPort>(
     let ray = Ray::new(offset_origin(surface.position, surface.normal), sampled.direction);
     context.counters.gather_rays += 1;
     let Some(hit) = closest_hit(context.scene, context.memory, &ray)? else { return Ok(None) };
-    let surface = read_surface(context.scene, context.memory, &ray, &hit)?;
+    let met = read_surface(context.scene, context.memory, &ray, &hit)?;
+    let header = &context.scene.header;
     let weight = sampled.weight / frame.gather_rays as f32;
-    let emitted = direct::seen_by_gather_ray(context, &ray, &surface, sampled.density);
-    let direct = emitted * weight * (1.0 / context.scene.header.radiance_unit);
-    Ok(Some(GatherPoint { surface, weight, direct }))
+    let emitted = direct::seen_by_gather_ray(context, &ray, &met, sampled.density);
+    let request = (!met.reflection.is_black()).then(|| GatherRequest {
+        position: met.position.to_array(),
+        reflection: PartialReflection::new(&met, weight * (header.photon_power_unit / header.radiance_unit)),
+        pixel: pixel_index,
+    });
+    Ok(Some(GatherRayEnd { direct: emitted * weight * (1.0 / header.radiance_unit), request }))
 }
 
-/// The weighted radiance of a gather point, reflected and direct, in the image's radiance units.
+/// Does a gather: what it adds to its pixel, in the image's radiance units.
 ///
 /// # Errors
 /// If the image is not sound.
-pub fn radiance<M: MemoryPort>(
+pub fn gathered<M: MemoryPort>(
     context: &mut Context<M>,
-    point: &GatherPoint,
+    request: &GatherRequest,
     candidates: &mut VecView<Candidate>,
 ) -> Result<Vec3, Fault> {
-    if point.surface.reflection.is_black() {
-        return Ok(point.direct);
-    }
     let frame = context.frame;
     let mut nearest = NearestPhotons::new(candidates, frame.neighbors, frame.max_distance);
-    let tested = gather(context.scene, context.memory, point.surface.position, &mut nearest)?;
+    let tested = gather(context.scene, context.memory, request.position.into(), &mut nearest)?;
     context.counters.gathers += 1;
     context.counters.photons_tested += tested as u64;
     context.counters.photons_found += nearest.candidates().len() as u64;
-    let header = &context.scene.header;
-    let unit = header.photon_power_unit / header.radiance_unit;
-    Ok(reflected_radiance(&nearest, &point.surface) * unit * point.weight + point.direct)
+    Ok(reflected_radiance(&nearest, &request.reflection))
 }

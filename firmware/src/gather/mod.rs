@@ -1,0 +1,21 @@
+//! Photon gathers that wait, and the order in which they are done.
+//!
+//! The end of a gather ray becomes a [`GatherRequest`] of 28 bytes: a place, a partially evaluated reflection and a
+//! pixel. Requests may be done in any order, as the sum of a pixel does not depend on it. In an order that keeps
+//! neighbours together, the photons of one gather are still in the cache for the next (Steinhurst, Coombe, Lastra 2005,
+//! *Reordering for cache conscious photon mapping*):
+//!
+//! - *generative* reordering ([`DirectionBins`]) casts the rays of one bundle of directions for all pixels of a tile
+//!   before those of the next;
+//! - *deferred* reordering ([`GatherQueue`]) lets requests wait, and does them by a hash of their place or along a
+//!   Hilbert curve.
+
+mod direction_bins;
+mod order;
+mod queue;
+mod request;
+
+pub use direction_bins::DirectionBins;
+pub use order::{KeyScale, hilbert_index};
+pub use queue::GatherQueue;
+pub use request::{GatherRequest, PartialReflection};

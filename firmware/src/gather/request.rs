@@ -1,0 +1,94 @@
+//! A gather that waits: its place, what of its reflection is known before any photon is, and its pixel.
+
+use core::f32::consts::FRAC_1_PI;
+
+use glam::Vec3;
+use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode_normal};
+
+use crate::scene::{Surface, mirror};
+use crate::vector::{max, unit};
+
+/// A reflection function with all evaluated that does not depend on a photon: 13 bytes, the dissertation's `S_B`
+/// (section 7.4).
+///
+/// Stage one, [`Self::new`], is done once a query: albedos, weight, units and the lobe's factor become two colours.
+/// Stage two is done once a photon: [`Self::lobe_share`]. Colours are rounded to a shared exponent, directions to two
+/// bytes, the exponent to eight bits of mantissa: in every order alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PartialReflection {
+    diffuse: Rgbe,
+    lobe: Rgbe,
+    mirror: [u8; 2],
+    exponent: [u8; 2],
+    normal: u8,
+}
+
+impl PartialReflection {
+    /// The reflection of a surface towards its outgoing direction, times `weight`.
+    #[inline(always)]
+    pub fn new(surface: &Surface, weight: Vec3) -> Self {
+        let reflection = &surface.reflection;
+        let lobe = reflection.specular * weight * ((reflection.exponent + 2.0) * 0.5 * FRAC_1_PI);
+        let mirror = mirror(surface.outgoing, surface.normal);
+        let [exponent @ .., _, _] = (reflection.exponent.to_bits().saturating_add(0x8000)).to_be_bytes();
+        Self {
+            diffuse: Rgbe::encode((reflection.lambertian() * weight).to_array()),
+            lobe: Rgbe::encode(lobe.to_array()),
+            mirror: encode_direction(mirror.to_array()),
+            exponent,
+            normal: encode_normal(surface.normal.to_array()),
+        }
+    }
+
+    /// What the photons' power is multiplied with, whatever their directions.
+    #[inline(always)]
+    pub fn diffuse(&self) -> Vec3 {
+        self.diffuse.decode().into()
+    }
+
+    /// What the lobe's share of the photons' power is multiplied with.
+    #[inline(always)]
+    pub fn lobe(&self) -> Vec3 {
+        self.lobe.decode().into()
+    }
+
+    /// Whether there is a lobe.
+    #[inline(always)]
+    pub fn has_lobe(&self) -> bool {
+        self.lobe != Rgbe::default()
+    }
+
+    /// The unit mirror direction.
+    #[inline(always)]
+    pub fn mirror(&self) -> Vec3 {
+        unit(decode_direction(self.mirror).into())
+    }
+
+    /// `max(0, cos alpha)^n` for a photon that came from the direction of this code.
+    #[inline(always)]
+    pub fn lobe_share(&self, mirror: Vec3, direction: [u8; 2]) -> f32 {
+        let [high, low] = self.exponent;
+        let exponent = f32::from_bits(u32::from_be_bytes([high, low, 0, 0]));
+        libm::powf(max(mirror.dot(unit(decode_direction(direction).into())), 0.0), exponent)
+    }
+
+    /// Code of the surface normal.
+    #[inline(always)]
+    pub fn normal(&self) -> u8 {
+        self.normal
+    }
+}
+
+/// A gather: where, how the photons found there are reflected, and whose sum the result goes to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GatherRequest {
+    /// The place, metres.
+    pub position: [f32; 3],
+    /// The reflection, times the gather ray's weight, from photon power units to radiance units.
+    pub reflection: PartialReflection,
+    /// Index of the pixel in its tile.
+    pub pixel: u16,
+}
+
+const _: () = assert!(size_of::<PartialReflection>() == 13);
+const _: () = assert!(size_of::<GatherRequest>() == 28);
