@@ -225,6 +225,24 @@ fn radiance_unit(scene: &Scene, emitters: &Emitters) -> f32 {
 
 /// The least power of two that is not below `value`, within the normal numbers of `f32`.
 pub(crate) fn power_of_two_above(value: f64) -> f32 {
-    let exponent = value.max(f64::MIN_POSITIVE).log2().ceil();
-    exponent.clamp(-126.0, 127.0).exp2() as f32
+    // By the bits, and not by a logarithm, whose last digit differs between systems.
+    let bits = value.max(f64::MIN_POSITIVE).to_bits();
+    let is_power = bits & ((1 << 52) - 1) == 0;
+    let exponent = (bits >> 52) as i32 - 1023 + i32::from(!is_power);
+    f32::from_bits(((exponent.clamp(-126, 127) + 127) as u32) << 23)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_the_next_power_of_two() {
+        for (value, unit) in [(1.0, 1.0), (1.1, 2.0), (0.3, 0.5), (0.25, 0.25), (1e6, 1_048_576.0)] {
+            assert_eq!(power_of_two_above(value), unit);
+        }
+        for extreme in [0.0, 1e-300, 1e300, f64::INFINITY] {
+            assert!(power_of_two_above(extreme).is_normal());
+        }
+    }
 }
