@@ -24,7 +24,7 @@ impl Emitters {
             let material = &scene.materials[triangle.material as usize];
             let area = triangle.area() as f64;
             let sides = if material.double_sided { 2.0 } else { 1.0 };
-            let mean = material.emission.element_sum() as f64 / 3.0;
+            let mean = material.emission.to_array().iter().map(|&c| c as f64).sum::<f64>() / 3.0;
             let power = mean * area * std::f64::consts::PI * sides;
             if power > 0.0 {
                 records.push(Emitter {

@@ -106,8 +106,10 @@ pub struct Session<'a> {
 
 /// How long a card may be silent while an answer is due.
 const SILENCE: Duration = Duration::from_secs(10);
-/// How long a card may be silent while it renders.
+/// How long a card may be silent while it renders, besides the time of its tiles.
 const RENDERING_SILENCE: Duration = Duration::from_secs(600);
+/// Time that a slow card may take for one ray and its gather.
+const SLOW_RAY: Duration = Duration::from_millis(1);
 
 impl<'a> Session<'a> {
     /// A session that says hello first.
@@ -245,10 +247,17 @@ impl<'a> Session<'a> {
         let limit = match self.state {
             State::Ready | State::Done => return Ok(()),
             State::Rendering if self.tiles.is_empty() => return Ok(()),
-            State::Rendering => RENDERING_SILENCE,
+            State::Rendering => self.rendering_silence(),
             _ => SILENCE,
         };
         if now.saturating_sub(self.heard) > limit { Err(SessionError::Silent(limit)) } else { Ok(()) }
+    }
+
+    /// A tile tells nothing of itself until it is complete: a card may be silent for as long as a slow one would be.
+    fn rendering_silence(&self) -> Duration {
+        let pixels: u64 = self.tiles.values().map(|in_flight| in_flight.tile.pixels()).sum();
+        let rays = self.job.map_or(1, |job| job.frame.samples as u64 * (job.frame.gather_rays as u64 + 1));
+        RENDERING_SILENCE + SLOW_RAY.saturating_mul(u32::try_from(pixels * rays).unwrap_or(u32::MAX))
     }
 
     fn check_sequence(&mut self, sequence: u16) -> Result<(), SessionError> {

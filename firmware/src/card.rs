@@ -2,7 +2,7 @@
 //!
 //! Whoever runs it ([`crate::serve`], or a simulator) calls [`Card::feed`] with what came, sends what
 //! [`Card::outgoing`] holds, and calls [`Card::work`] while [`Card::is_busy`]. No call takes longer than one stage of one
-//! pixel, none blocks, and nothing that is fed can make one panic.
+//! pixel, or the drain of a gather queue that fills within it; none blocks, and nothing that is fed can make one panic.
 
 mod load;
 
@@ -180,8 +180,9 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>
                 Ok(None)
             }
             Command::EndImage => {
-                let scene = core::mem::replace(&mut self.image, ImageState::None).loader()?.finish(memory)?;
-                self.image = ImageState::Ready(scene);
+                let finished = self.image.loader()?.finish(memory);
+                self.image = finished.map_or(ImageState::None, ImageState::Ready);
+                finished?;
                 Ok(Some(Reply::ImageAccepted))
             }
             Command::BeginFrame(frame) => {
@@ -281,7 +282,7 @@ fn check_frame(budget: &Budget, frame: &FrameParameters) -> Result<(), Fault> {
         within(frame.samples, budget.samples),
         frame.gather_rays <= budget.gather_rays,
         frame.shadow_rays <= budget.shadow_rays,
-        within(frame.neighbors, budget.neighbors),
+        frame.neighbors >= 2 && within(frame.neighbors, budget.neighbors),
         frame.max_distance.is_finite() && frame.max_distance > 0.0,
         within(frame.bins, budget.gather_rays),
         true,

@@ -51,7 +51,7 @@ const GATHERS_PER_STEP: usize = 64;
 struct PixelSum {
     /// Emission and what shadow rays bring, W/(sr m^2); samples come in their order.
     direct: Vec3,
-    /// What gather rays bring, in radiance units; they come in any order.
+    /// The mean of what gather rays bring, in radiance units; they come in any order.
     gathered: ColourSum,
     albedo: Vec3,
     normal: Vec3,
@@ -315,7 +315,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>
         let gathered = sum.gathered.value() * scene.header.radiance_unit;
         let per_surface = 1.0 / sum.surfaces as f32;
         Some(Pixel {
-            radiance: ((sum.direct + gathered) * per_sample).to_array(),
+            radiance: (sum.direct * per_sample + gathered).to_array(),
             albedo: (sum.albedo * per_sample).to_array(),
             normal: (sum.normal * per_sample).to_array(),
             depth: if sum.surfaces > 0 { sum.depth * per_surface } else { f32::INFINITY },

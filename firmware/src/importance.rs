@@ -65,7 +65,7 @@ pub fn reflection_density(surface: &Surface, direction: Vec3) -> f32 {
 /// `max(0, cos alpha)^n`.
 #[inline(always)]
 fn lobe_power(reflection: &Reflection, mirror: Vec3, direction: Vec3) -> f32 {
-    libm::powf(max(mirror.dot(direction), 0.0), reflection.exponent)
+    crate::scene::lobe_power(mirror.dot(direction), reflection.exponent)
 }
 
 #[inline(always)]
@@ -121,6 +121,7 @@ mod tests {
             emission: Vec3::ZERO,
             double_sided: false,
             distance: 1.0,
+            magnitude: 0.0,
         }
     }
 

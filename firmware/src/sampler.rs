@@ -30,6 +30,12 @@ impl Pattern {
         Self(hash(hash(hash(pixel).wrapping_add(sample)).wrapping_add(dimension as u32)))
     }
 
+    /// Random bits that belong to a point, independent of its place.
+    #[inline(always)]
+    pub fn dither(self, index: u32) -> u32 {
+        hash(self.0.wrapping_add(0x2545_f491) ^ index.wrapping_mul(0x9e37_79b9))
+    }
+
     /// Point `index` of `count`, in [0, 1) x [0, 1); `index` below `count`, `count` below 2^16.
     #[inline(always)]
     pub fn point(self, index: u32, count: u32) -> [f32; 2] {

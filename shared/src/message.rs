@@ -56,7 +56,7 @@ pub struct FrameParameters {
     pub gather_rays: u32,
     /// Shadow rays a sample.
     pub shadow_rays: u32,
-    /// Photons a gather looks for.
+    /// Photons a gather looks for, at least 2: the last only tells how far it looked.
     pub neighbors: u32,
     /// How far from its place a gather looks, metres.
     pub max_distance: f32,

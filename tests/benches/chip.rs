@@ -17,7 +17,7 @@ use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::photon::{Candidate, NearestPhotons, gather};
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, closest_hit, is_occluded, offset_origin, read_surface};
+use photoncard_firmware::scene::{Ray, closest_hit, is_occluded, read_surface};
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::Photon;
 use photoncard_shared::message::Tile;
@@ -83,7 +83,7 @@ impl Prepared {
                 let hit = closest_hit(&scene, &mut memory, &eye).expect("sound")?;
                 let surface = read_surface(&scene, &mut memory, &eye, &hit).expect("sound");
                 let sampled = sample_reflection(&surface, [random(i, 3), random(i, 4)])?;
-                Some(Ray::new(offset_origin(surface.position, surface.normal), sampled.direction))
+                Some(Ray::new(surface.offset_origin(), sampled.direction))
             })
             .take(count as usize)
             .collect()

@@ -165,6 +165,9 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
             assert_eq!(wire.say(&Command::BeginFrame(bad)), [Answer::Fault(FaultCode::Parameter)], "{bad:?}");
         }
         assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
+        // An image that is in use is not disturbed by the end of none.
+        assert_eq!(wire.say(&Command::EndImage), [Answer::Fault(FaultCode::Order)]);
+        assert_eq!(wire.say(&Command::RenderTile(TILE)).last(), Some(&Answer::TileDone(7)));
         let bad_tiles = [
             Tile { width: 0, ..TILE },
             Tile { width: 9, ..TILE },

@@ -11,7 +11,7 @@
 use glam::Vec3;
 use photoncard_firmware::memory::{Lines, MemoryPort};
 use photoncard_firmware::photon::{Candidate, MIN_NORMAL_COSINE, NearestPhotons, gather};
-use photoncard_firmware::scene::{Ray, SceneImage, closest_hit, offset_origin, read_surface};
+use photoncard_firmware::scene::{Ray, SceneImage, closest_hit, magnitude, offset_origin, read_surface};
 use photoncard_shared::budget::{REFERENCE, gather_candidates};
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{FULL_DISC, Photon, Record, decode_normal};
@@ -92,7 +92,7 @@ pub(super) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Resul
 }
 
 /// The diagonal of the root's box, metres.
-fn extent(image: &CardImage) -> f32 {
+pub(super) fn extent(image: &CardImage) -> f32 {
     let (scene, mut memory) = image.view();
     let root = scene.record::<128, 1>(&mut memory, SectionKind::Nodes, 0);
     root.map_or(1.0, |bytes| {
@@ -204,7 +204,8 @@ fn exact_normal(
     radius: f32,
 ) -> Result<Vec3, Fault> {
     let coded = coded_normal(photon);
-    let above = offset_origin(photon.position.into(), coded) + coded * (1e-3 * radius);
+    let above = offset_origin(photon.position.into(), coded, magnitude(&[photon.position.into()]))
+        + coded * (1e-3 * radius);
     let ray = Ray { origin: above, direction: -coded, max_distance: radius };
     let Some(hit) = closest_hit(scene, memory, &ray)? else { return Ok(coded) };
     let normal = read_surface(scene, memory, &ray, &hit)?.normal;
@@ -250,7 +251,8 @@ impl Disc {
         points: u32,
     ) -> Result<u32, Fault> {
         let (tangent, bitangent) = self.normal.any_orthonormal_pair();
-        let surface = offset_origin(self.centre, self.normal);
+        let surface = offset_origin(self.centre, self.normal, magnitude(&[self.centre]))
+            + self.normal * (1e-3 * self.radius);
         let above = surface + self.normal * self.clear_height(scene, memory, surface)?;
         let mut found = 0;
         for index in 0..points {

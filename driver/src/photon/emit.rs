@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, SceneImage, Surface, offset_origin, sample_emitter};
+use photoncard_firmware::scene::{Ray, SceneImage, Surface, sample_emitter};
 use photoncard_firmware::{importance::sample_reflection, scene::Reflection};
 use photoncard_shared::message::Fault;
 
@@ -84,9 +84,10 @@ pub(super) fn emit(
         emission: sample.emission,
         double_sided: false,
         distance: 0.0,
+        magnitude: sample.magnitude,
     };
     Ok(sample_reflection(&white, [c, d]).map(|sampled| Emission {
-        ray: Ray::new(offset_origin(sample.position, normal), sampled.direction),
+        ray: Ray::new(white.offset_origin(), sampled.direction),
         power: sample.emission * (PI * sides / sample.density),
     }))
 }

@@ -1,5 +1,6 @@
 //! The left-balanced kd-tree (Jensen 2001, ch. 6): the tree of its photons without gaps, in the order of a heap.
 
+use photoncard_firmware::sampler::hash;
 use photoncard_shared::layout::{FULL_DISC, Photon, Record, Rgbe};
 use rayon::prelude::*;
 
@@ -65,7 +66,7 @@ fn record(node: &Node, arrivals: &[Arrival], power_unit: f32) -> Photon {
     let arrival = &arrivals[node.arrival as usize];
     Photon {
         position: arrival.position,
-        power: Rgbe::encode(arrival.power.map(|p| p / power_unit)),
+        power: Rgbe::encode(arrival.power.map(|p| p / power_unit), hash(node.arrival)),
         direction: arrival.direction,
         axis: node.axis,
         normal: arrival.normal,

@@ -16,7 +16,7 @@ pub use error::PhotonError;
 pub use map::PhotonMap;
 pub use trace::{Arrival, PhotonPass, trace};
 
-use self::disc::{automatic_max_distance, measure_discs};
+use self::disc::{automatic_max_distance, extent, measure_discs};
 use crate::pack::{CardImage, PackedScene};
 
 /// What a photon map is asked to be.
@@ -60,7 +60,8 @@ pub fn map_photons(
     let map = PhotonMap::new(&pass.arrivals);
     let mut image = packed.with_photons(map.records(), map.power_unit())?;
     let max_distance = match settings.max_distance {
-        Some(distance) => distance,
+        // Farther than the scene is wide is as good as that wide.
+        Some(distance) => distance.min(extent(&image)),
         None => automatic_max_distance(&image, settings.neighbors)?,
     };
     measure_discs(&mut image, settings.neighbors, max_distance, &|| progress(settings.photons))?;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::MemoryPort;
-use photoncard_firmware::scene::{Ray, SceneImage, closest_hit, offset_origin, read_surface};
+use photoncard_firmware::scene::{Ray, SceneImage, closest_hit, read_surface};
 use photoncard_shared::layout::{encode_direction, encode_normal};
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
@@ -117,7 +117,7 @@ fn follow(scene: &SceneImage, memory: &mut impl MemoryPort, seed: u32, path: u64
             Some(reflected) => power = reflected,
             None => break,
         }
-        ray = Ray::new(offset_origin(surface.position, surface.normal), sampled.direction);
+        ray = Ray::new(surface.offset_origin(), sampled.direction);
     }
     Ok(arrivals)
 }

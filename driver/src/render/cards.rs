@@ -133,6 +133,15 @@ impl Cards {
         let start = Instant::now();
         let kinds =
             addresses.iter().flat_map(|&CardAddress::Emulated { kind, chips }| (0..chips).map(move |_| kind));
+        let chips = kinds.clone().count();
+        if chips > MAX_CHIPS {
+            return Err(RenderError::Setting {
+                option: "--card",
+                value: format!("with {chips} chips in all"),
+                reason: format!("one process emulates at most {MAX_CHIPS}"),
+                remedy: "use fewer chips".into(),
+            });
+        }
         let cards: Result<Vec<Connected>, RenderError> = kinds
             .enumerate()
             .map(|(index, kind)| {

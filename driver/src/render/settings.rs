@@ -100,7 +100,7 @@ impl RenderSettings {
         };
         within("--size", self.width.max(self.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
         within("--photons", self.photons as u64, 1, MAX_PHOTONS as u64)?;
-        within("--neighbors", self.neighbors as u64, 1, budget.neighbors as u64)?;
+        within("--neighbors", self.neighbors as u64, 2, budget.neighbors as u64)?;
         within("--gather-rays", self.gather_rays as u64, 0, budget.gather_rays as u64)?;
         within("--shadow-rays", self.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
         within("--spp", self.samples as u64, 1, budget.samples as u64)?;

@@ -43,6 +43,9 @@ fn every(vector: Vec3, holds: impl Fn(f32) -> bool) -> bool {
     vector.to_array().into_iter().all(holds)
 }
 
+/// Radiances that an emitter may have, W/(sr m^2): their products and squares stay within single precision.
+const EMISSION: std::ops::RangeInclusive<f32> = 1e-20..=1e20;
+
 impl Material {
     /// Checks that no value is negative, infinite or not a number, and that no more light leaves than arrives.
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
@@ -72,12 +75,12 @@ impl Material {
             let reason = format!("the Phong exponent is {exponent}");
             return fault(Property::Exponent, reason, "the exponent is 0 to 10000");
         }
-        if !every(*emission, |value| value.is_finite() && value >= 0.0) {
+        if !every(*emission, |value| value == 0.0 || EMISSION.contains(&value)) {
             let reason = format!("the emission is {emission}");
             return fault(
                 Property::Emission,
                 reason,
-                "emission is a finite radiance of at least 0 in each channel",
+                "emission is a radiance of 0, or of 1e-20 to 1e20, in each channel",
             );
         }
         Ok(())

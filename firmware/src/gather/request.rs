@@ -5,8 +5,8 @@ use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode_normal};
 
-use crate::scene::{Surface, mirror};
-use crate::vector::{max, unit};
+use crate::scene::{Surface, lobe_power, mirror};
+use crate::vector::unit;
 
 /// A reflection function with all evaluated that does not depend on a photon: 13 bytes, the dissertation's `S_B`
 /// (section 7.4).
@@ -24,16 +24,17 @@ pub struct PartialReflection {
 }
 
 impl PartialReflection {
-    /// The reflection of a surface towards its outgoing direction, times `weight`.
+    /// The reflection of a surface towards its outgoing direction, times `weight`. Random bits in `dither` make the
+    /// rounding right on average.
     #[inline(always)]
-    pub fn new(surface: &Surface, weight: Vec3) -> Self {
+    pub fn new(surface: &Surface, weight: Vec3, dither: u32) -> Self {
         let reflection = &surface.reflection;
-        let lobe = reflection.specular * weight * ((reflection.exponent + 2.0) * 0.5 * FRAC_1_PI);
         let mirror = mirror(surface.outgoing, surface.normal);
         let [exponent @ .., _, _] = (reflection.exponent.to_bits().saturating_add(0x8000)).to_be_bytes();
+        let factor = (decode_exponent(exponent) + 2.0) * 0.5 * FRAC_1_PI;
         Self {
-            diffuse: Rgbe::encode((reflection.lambertian() * weight).to_array()),
-            lobe: Rgbe::encode(lobe.to_array()),
+            diffuse: Rgbe::encode((reflection.lambertian() * weight).to_array(), dither),
+            lobe: Rgbe::encode((reflection.specular * weight * factor).to_array(), dither),
             mirror: encode_direction(mirror.to_array()),
             exponent,
             normal: encode_normal(surface.normal.to_array()),
@@ -67,9 +68,7 @@ impl PartialReflection {
     /// `max(0, cos alpha)^n` for a photon that came from the direction of this code.
     #[inline(always)]
     pub fn lobe_share(&self, mirror: Vec3, direction: [u8; 2]) -> f32 {
-        let [high, low] = self.exponent;
-        let exponent = f32::from_bits(u32::from_be_bytes([high, low, 0, 0]));
-        libm::powf(max(mirror.dot(unit(decode_direction(direction).into())), 0.0), exponent)
+        lobe_power(mirror.dot(unit(decode_direction(direction).into())), decode_exponent(self.exponent))
     }
 
     /// Code of the surface normal.
@@ -77,6 +76,12 @@ impl PartialReflection {
     pub fn normal(&self) -> u8 {
         self.normal
     }
+}
+
+/// The upper half of a float's bits as the float.
+#[inline(always)]
+fn decode_exponent([high, low]: [u8; 2]) -> f32 {
+    f32::from_bits(u32::from_be_bytes([high, low, 0, 0]))
 }
 
 /// A gather: where, how the photons found there are reflected, and whose sum the result goes to.

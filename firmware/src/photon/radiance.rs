@@ -20,19 +20,21 @@ use photoncard_shared::layout::decode_normal;
 
 use super::{Candidate, NearestPhotons};
 use crate::fixed_point::ColourSum;
-use crate::gather::PartialReflection;
+use crate::gather::{GatherRequest, PartialReflection};
 use crate::vector::{max, unit};
 
 /// Photons whose surface normal is at a lesser cosine to the query's belong to another surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
 
-/// The radius of a disc is at least this share of the greatest distance: photons in one point have no density.
-const MIN_RADIUS_SHARE: f32 = 1e-3;
+/// The radius of a disc is at least this share of the place's greatest coordinate, about its rounding: photons in one
+/// point have no density.
+const MIN_RADIUS_SHARE: f32 = 1e-6;
 
 /// What a gather adds to its pixel, in the units of the reflection: the photons' power over the area of their disc,
 /// reflected.
 #[inline(always)]
-pub fn reflected_radiance(nearest: &NearestPhotons, reflection: &PartialReflection) -> Vec3 {
+pub fn reflected_radiance(nearest: &NearestPhotons, request: &GatherRequest) -> Vec3 {
+    let reflection = &request.reflection;
     let candidates = nearest.candidates();
     let Some(farthest) = candidates.iter().max_by_key(|candidate| candidate.key()) else { return Vec3::ZERO };
     let (radius_squared, excluded) = if nearest.is_full() {
@@ -54,8 +56,8 @@ pub fn reflected_radiance(nearest: &NearestPhotons, reflection: &PartialReflecti
     }
     let Some(closest) = closest else { return Vec3::ZERO };
     let fraction = (closest.disc() as f32 + 1.0) * (1.0 / 64.0);
-    let least = MIN_RADIUS_SHARE * MIN_RADIUS_SHARE * nearest.max_distance_squared();
-    let area = PI * max(radius_squared, least) * fraction;
+    let least = MIN_RADIUS_SHARE * crate::scene::magnitude(&[request.position.into()]);
+    let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
     sums.reflected() * (1.0 / area)
 }
 

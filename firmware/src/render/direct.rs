@@ -29,7 +29,7 @@ pub fn reflected<M: MemoryPort>(
     pixel: PixelSample,
     surface: &Surface,
 ) -> Result<Vec3, Fault> {
-    if surface.reflection.is_black() {
+    if surface.reflection.is_black() || context.frame.shadow_rays == 0 {
         return Ok(Vec3::ZERO);
     }
     let frame = context.frame;
@@ -51,14 +51,14 @@ fn from_emitter<M: MemoryPort>(
     surface: &Surface,
     target: &EmitterSample,
 ) -> Result<Vec3, Fault> {
-    let origin = offset_origin(surface.position, surface.normal);
+    let origin = surface.offset_origin();
     let away = origin - target.position;
     let is_front = target.normal.dot(away) > 0.0;
     if !is_front && !target.double_sided {
         return Ok(Vec3::ZERO);
     }
     let emitting_normal = if is_front { target.normal } else { -target.normal };
-    let way = offset_origin(target.position, emitting_normal) - origin;
+    let way = offset_origin(target.position, emitting_normal, target.magnitude) - origin;
     let distance_squared = way.length_squared();
     let distance = libm::sqrtf(distance_squared);
     let direction = way / distance;
@@ -100,6 +100,9 @@ pub fn seen_by_gather_ray<M>(context: &Context<M>, ray: &Ray, met: &Surface, gat
 /// The weight of the first of two ways to find a path, each with its number of rays and its density.
 #[inline(always)]
 fn balance((rays, density): (u32, f32), (other_rays, other_density): (u32, f32)) -> f32 {
+    if other_rays == 0 {
+        return 1.0;
+    }
     // Divided first: a density may be infinite at a grazing angle, and the weight is then 1 or 0.
     let ratio = (other_rays as f32 * other_density) / (rays as f32 * density);
     1.0 / (1.0 + ratio)

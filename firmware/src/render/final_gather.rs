@@ -13,7 +13,7 @@ use crate::importance::sample_reflection;
 use crate::memory::MemoryPort;
 use crate::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
 use crate::sampler::{Dimension, Pattern};
-use crate::scene::{Ray, Surface, closest_hit, offset_origin, read_surface};
+use crate::scene::{Ray, Surface, closest_hit, read_surface};
 
 /// What the end of a final gather ray brings.
 #[derive(Clone, Copy, Debug)]
@@ -40,16 +40,21 @@ pub fn cast<M: MemoryPort>(
     let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, pixel.sample, Dimension::Gather);
     let point = pattern.point(index, frame.gather_rays);
     let Some(sampled) = sample_reflection(surface, point) else { return Ok(None) };
-    let ray = Ray::new(offset_origin(surface.position, surface.normal), sampled.direction);
+    let ray = Ray::new(surface.offset_origin(), sampled.direction);
     context.counters.gather_rays += 1;
     let Some(hit) = closest_hit(context.scene, context.memory, &ray)? else { return Ok(None) };
     let met = read_surface(context.scene, context.memory, &ray, &hit)?;
     let header = &context.scene.header;
-    let weight = sampled.weight / frame.gather_rays as f32;
+    // The mean over rays and samples is taken here, so that the pixel's sum stays small.
+    let weight = sampled.weight / (frame.gather_rays as f32 * frame.samples as f32);
     let emitted = direct::seen_by_gather_ray(context, &ray, &met, sampled.density);
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
         position: met.position.to_array(),
-        reflection: PartialReflection::new(&met, weight * (header.photon_power_unit / header.radiance_unit)),
+        reflection: PartialReflection::new(
+            &met,
+            weight * (header.photon_power_unit / header.radiance_unit),
+            pattern.dither(index),
+        ),
         pixel: pixel_index,
     });
     Ok(Some(GatherRayEnd { direct: emitted * weight * (1.0 / header.radiance_unit), request }))
@@ -70,5 +75,5 @@ pub fn gathered<M: MemoryPort>(
     context.counters.gathers += 1;
     context.counters.photons_tested += tested as u64;
     context.counters.photons_found += nearest.candidates().len() as u64;
-    Ok(reflected_radiance(&nearest, &request.reflection))
+    Ok(reflected_radiance(&nearest, request))
 }

@@ -23,6 +23,8 @@ pub struct EmitterSample {
     pub double_sided: bool,
     /// Probability density of the point, 1/m^2.
     pub density: f32,
+    /// The greatest coordinate of the emitter, metres.
+    pub magnitude: f32,
 }
 
 /// The probability density, 1/m^2, with which [`sample_emitter`] chooses a point of a surface of this emission: of
@@ -68,6 +70,7 @@ pub fn sample_emitter(
         emission: emitter.emission.into(),
         double_sided: emitter.flags & DOUBLE_SIDED != 0,
         density: emitter.density,
+        magnitude: super::magnitude(&[a, b, c]),
     }))
 }
 

@@ -8,7 +8,7 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{DOUBLE_SIDED, Material, Record};
 use photoncard_shared::message::Fault;
 
-use super::{Hit, Ray, SceneImage};
+use super::{Hit, Ray, SceneImage, magnitude, offset_origin};
 use crate::memory::MemoryPort;
 use crate::vector::{max_component, unit};
 
@@ -31,6 +31,16 @@ pub struct Surface {
     pub double_sided: bool,
     /// Distance along the ray, metres.
     pub distance: f32,
+    /// The greatest coordinate that the point was computed from, metres: its rounding is in proportion.
+    pub magnitude: f32,
+}
+
+impl Surface {
+    /// A point just off the surface, from which a ray does not meet it again.
+    #[inline(always)]
+    pub fn offset_origin(&self) -> Vec3 {
+        offset_origin(self.position, self.normal, self.magnitude)
+    }
 }
 
 /// A reflection function's parameters.
@@ -69,10 +79,7 @@ impl Reflection {
     /// The lobe's part of `f`, 1/sr, for an incoming direction at `cosine` to the mirror direction.
     #[inline(always)]
     pub fn lobe(&self, cosine: f32) -> Vec3 {
-        if cosine <= 0.0 {
-            return Vec3::ZERO;
-        }
-        self.specular * ((self.exponent + 2.0) / (2.0 * PI) * libm::powf(cosine, self.exponent))
+        self.specular * ((self.exponent + 2.0) / (2.0 * PI) * lobe_power(cosine, self.exponent))
     }
 
     /// `f`, 1/sr, for unit vectors away from the surface, both on the side of `normal`.
@@ -83,6 +90,12 @@ impl Reflection {
         }
         self.lambertian() + self.lobe(mirror(outgoing, normal).dot(incoming))
     }
+}
+
+/// `max(0, cosine)^exponent`; zero at and below the lobe's horizon for every exponent, 0 among them.
+#[inline(always)]
+pub(crate) fn lobe_power(cosine: f32, exponent: f32) -> f32 {
+    if cosine > 0.0 { libm::powf(cosine, exponent) } else { 0.0 }
 }
 
 /// The mirror direction of a unit vector about a unit normal.
@@ -128,5 +141,6 @@ pub fn read_surface(
         emission: if visible { material.emission.into() } else { Vec3::ZERO },
         double_sided,
         distance: hit.intersection.distance,
+        magnitude: magnitude(&[a, b, c, ray.origin]),
     })
 }

@@ -7,8 +7,8 @@ mod triangle;
 
 pub use bvh::{Hit, closest_hit, is_occluded};
 pub use emitter::{EmitterSample, emitter_density, sample_emitter};
-pub(crate) use material::mirror;
 pub use material::{Reflection, Surface, read_surface};
+pub(crate) use material::{lobe_power, mirror};
 pub use triangle::{Intersection, RayFrame};
 
 use glam::Vec3;
@@ -80,10 +80,17 @@ fn read_slot<const N: usize>(
 
 /// A point just off a surface, on the side of `normal`, from which a ray does not meet the surface again.
 ///
-/// The rounding of a point on a triangle is a few units in the last place of its greatest coordinate; the offset is
-/// 16 of them.
+/// A point on a triangle is off its plane by a few units in the last place of the greatest coordinate that it was
+/// computed from, `magnitude`: a corner's or the ray's origin. The offset is 32 of them.
 #[inline(always)]
-pub fn offset_origin(position: Vec3, normal: Vec3) -> Vec3 {
-    let magnitude = crate::vector::max_component(position.abs()) + 1e-3;
-    position + normal * (magnitude * (16.0 * f32::EPSILON))
+pub fn offset_origin(position: Vec3, normal: Vec3, magnitude: f32) -> Vec3 {
+    position + normal * (magnitude * (32.0 * f32::EPSILON) + f32::MIN_POSITIVE)
+}
+
+/// The greatest coordinate of some points, whatever its sign.
+#[inline(always)]
+pub fn magnitude(points: &[Vec3]) -> f32 {
+    points
+        .iter()
+        .fold(0.0, |greatest, point| crate::vector::max(crate::vector::max_component(point.abs()), greatest))
 }

@@ -95,7 +95,7 @@ impl Photon {
     }
 }
 
-/// Three non-negative numbers with a shared exponent (Ward 1991): `mantissa * 2^(exponent - 136)`, rounded to nearest.
+/// Three non-negative numbers with a shared exponent (Ward 1991): `mantissa * 2^(exponent - 136)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rgbe(pub [u8; 4]);
 
@@ -103,24 +103,30 @@ impl Rgbe {
     /// What is added to a mantissa's binary exponent to make the fourth byte: 128, and 8 for the mantissa's bits.
     pub const EXPONENT_BIAS: i32 = 136;
 
-    /// The nearest representable colour; negative and non-finite components count as zero.
-    pub fn encode(colour: [f32; 3]) -> Self {
+    /// A representable colour next to this one; negative and non-finite components count as zero.
+    ///
+    /// The random bits of `dither` choose between the two neighbours of each component, so that the mean over many
+    /// encodings is the colour: rounding to the nearest would err the same way for all photons of one lamp.
+    pub fn encode(colour: [f32; 3], dither: u32) -> Self {
         let colour = colour.map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 });
         let largest = colour.into_iter().fold(0.0_f32, |a, b| if b > a { b } else { a });
         if largest < f32::MIN_POSITIVE {
             return Self([0; 4]);
         }
-        // largest = m 2^e with m in [1, 2); its mantissa byte is then in [128, 255], or 256 when it rounds up.
+        // largest = m 2^e with m in [1, 2); its mantissa byte is then in [128, 255], and must not round up to 256.
         let mut exponent = (largest.to_bits() >> 23) as i32 - 127 + 1;
-        if (largest * power_of_two(8 - exponent) + 0.5) as u32 > 255 {
+        if largest * power_of_two(8 - exponent) > 255.0 {
             exponent += 1;
         }
         let code = exponent + Self::EXPONENT_BIAS - 8;
         if code <= 0 {
             return Self([0; 4]);
         }
-        let [r, g, b] = colour.map(|c| (c * power_of_two(8 - exponent) + 0.5) as u8);
-        Self([r, g, b, code.min(255) as u8])
+        let scale = power_of_two(8 - exponent);
+        let threshold = |shift: u32| (dither.rotate_left(shift) >> 8) as f32 * (1.0 / 16_777_216.0);
+        let [r, g, b] = colour;
+        let round = |c: f32, shift: u32| (c * scale + threshold(shift)) as u8;
+        Self([round(r, 0), round(g, 11), round(b, 22), code.min(255) as u8])
     }
 
     /// The colour.
@@ -146,7 +152,7 @@ mod tests {
     fn a_photon_survives_its_record() {
         let photon = Photon {
             position: [1.5, -2.25, 1e-7],
-            power: Rgbe::encode([1.0, 0.25, 0.5]),
+            power: Rgbe::encode([1.0, 0.25, 0.5], 7),
             direction: [3, 200],
             axis: 2,
             normal: 0xa5,
@@ -156,14 +162,14 @@ mod tests {
     }
 
     #[test]
-    fn rgbe_is_right_to_half_a_step_of_its_largest_component() {
+    fn rgbe_is_right_to_a_step_of_its_largest_component() {
         for exponent in -40..40 {
             for mantissa in 0..64 {
                 let largest = (1.0 + mantissa as f32 / 64.0) * power_of_two(exponent);
                 for colour in [[largest, largest * 0.3, 0.0], [0.01 * largest, largest, largest]] {
-                    let decoded = Rgbe::encode(colour).decode();
+                    let decoded = Rgbe::encode(colour, 0x9e37_79b9).decode();
                     for (a, b) in colour.into_iter().zip(decoded) {
-                        assert!((a - b).abs() <= largest / 255.0, "{colour:?} {decoded:?}");
+                        assert!((a - b).abs() <= largest / 63.0, "{colour:?} {decoded:?}");
                     }
                 }
             }
@@ -171,9 +177,24 @@ mod tests {
     }
 
     #[test]
+    fn the_mean_of_dithered_encodings_is_the_colour() {
+        for colour in [[1.0, 0.01, 0.003], [0.9, 0.7, 0.37], [0.998, 0.001, 0.5]] {
+            let mut mean = [0.0_f64; 3];
+            let count = 100_000_u32;
+            for i in 0..count {
+                let decoded = Rgbe::encode(colour, i.wrapping_mul(0x9e37_79b9)).decode();
+                (0..3).for_each(|c| mean[c] += decoded[c] as f64 / count as f64);
+            }
+            for (a, b) in colour.into_iter().zip(mean) {
+                assert!((b / a as f64 - 1.0).abs() < 0.01, "{colour:?} {mean:?}");
+            }
+        }
+    }
+
+    #[test]
     fn rgbe_takes_what_is_not_a_colour_as_black() {
         for colour in [[0.0; 3], [-1.0, f32::NAN, f32::NEG_INFINITY], [1e-45, 0.0, 0.0]] {
-            assert_eq!(Rgbe::encode(colour).decode(), [0.0; 3]);
+            assert_eq!(Rgbe::encode(colour, 0x9e37_79b9).decode(), [0.0; 3]);
         }
     }
 }

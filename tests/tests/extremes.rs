@@ -1,0 +1,118 @@
+//! Scenes and settings at the ends of their ranges: large, tilted, dazzling, strongly coloured, with rays of one kind alone.
+
+use glam::Vec3;
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::photon::{PhotonMap, trace};
+use photoncard_driver::render::RenderSettings;
+use photoncard_driver::scene::{Material, Scene, Triangle};
+use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
+
+fn settings() -> RenderSettings {
+    RenderSettings {
+        width: 16,
+        height: 16,
+        photons: 20_000,
+        gather_rays: 16,
+        cards: vec!["emulated:2".parse().unwrap()],
+        ..RenderSettings::default()
+    }
+}
+
+fn emitting(name: &str, albedo: f32, radiance: Vec3) -> Material {
+    Material { emission: radiance, ..lambertian(name, albedo) }
+}
+
+/// A floor tilted about two axes under a parallel lamp, all of it scaled and seen from near.
+fn tilted_floor(half_side: f32) -> Scene {
+    let (u, v) = (Vec3::new(0.8, 0.3, 0.2).normalize(), Vec3::new(-0.2, 0.5, -0.9));
+    let v = (v - u * u.dot(v)).normalize();
+    let n = u.cross(v);
+    let square = |centre: Vec3, half: f32, sign: f32, material: u32| -> [Triangle; 2] {
+        let (u, v) = (u * half, v * half * sign);
+        quad([centre - u - v, centre + u - v, centre + u + v, centre - u + v], material)
+    };
+    let mut triangles = square(Vec3::new(0.1, 0.2, 0.3), half_side, 1.0, 0).to_vec();
+    triangles.extend(square(n * 2.0, 0.5, -1.0, 1));
+    let eye = Vec3::new(0.1, 0.2, 0.3) + n * 1.5 + u * 0.7;
+    let mut view = camera(eye, -n + u * -0.4);
+    view.vertical_fov = 0.5;
+    scene(triangles, vec![lambertian("floor", 0.5), emitting("lamp", 0.0, Vec3::ONE)], view)
+}
+
+#[test]
+fn the_size_of_a_tilted_floor_does_not_darken_what_is_seen_of_it() {
+    let settings = RenderSettings { gather_rays: 0, shadow_rays: 16, ..settings() };
+    let expected = mean(&radiances(&render_or_panic(&tilted_floor(4.0), &settings).film));
+    for half_side in [12.0, 50.0, 300.0, 1000.0] {
+        let found = mean(&radiances(&render_or_panic(&tilted_floor(half_side), &settings).film));
+        assert!((found / expected - 1.0).abs() < 0.01, "at {half_side} m: {found} and not {expected}");
+    }
+}
+
+#[test]
+fn many_samples_next_to_a_dazzling_lamp_do_not_overflow() {
+    let side = 500.0;
+    let mut triangles: Vec<Triangle> = quad(
+        [
+            Vec3::new(-side, 0., side),
+            Vec3::new(side, 0., side),
+            Vec3::new(side, 0., -side),
+            Vec3::new(-side, 0., -side),
+        ],
+        0,
+    )
+    .to_vec();
+    let lamp = |x: f32, z: f32| Vec3::new(0.5 * x, 0.3, 0.5 * z);
+    triangles.extend(quad([lamp(-1., -1.), lamp(1., -1.), lamp(1., 1.), lamp(-1., 1.)], 1));
+    let materials = vec![lambertian("floor", 0.5), emitting("lamp", 0.0, Vec3::splat(1000.0))];
+    let scene = scene(triangles, materials, camera(Vec3::new(0.0, 0.15, 1.5), Vec3::new(0.0, -0.15, -1.5)));
+    let picture = |samples: u32| {
+        let settings = RenderSettings { width: 8, height: 8, samples, ..settings() };
+        radiances(&render_or_panic(&scene, &settings).film)
+    };
+    let [few, many] = [picture(32), picture(512)];
+    assert!(many.as_flattened().iter().all(|&radiance| radiance >= 0.0));
+    assert!((mean(&many) / mean(&few) - 1.0).abs() < 0.05, "{} and {}", mean(&many), mean(&few));
+}
+
+#[test]
+fn direct_light_is_the_same_by_shadow_rays_by_gather_rays_and_by_both() {
+    // Black but for the floor: all light there is direct.
+    let materials =
+        vec![lambertian("black", 0.0), lambertian("floor", 0.6), emitting("lamp", 0.0, Vec3::ONE)];
+    let scene = scene(room([0, 0, 1, 2, 0, 0]), materials, camera(Vec3::ZERO, Vec3::new(0.01, -1.0, 0.02)));
+    let picture = |shadow_rays: u32, gather_rays: u32| {
+        let settings = RenderSettings { shadow_rays, gather_rays, samples: 16, ..settings() };
+        radiances(&render_or_panic(&scene, &settings).film)
+    };
+    let expected = mean(&picture(64, 0));
+    for (shadow_rays, gather_rays) in [(0, 64), (8, 16), (1, 64)] {
+        let found = picture(shadow_rays, gather_rays);
+        assert!(found.as_flattened().iter().all(|radiance| radiance.is_finite()));
+        let error = mean(&found) / expected - 1.0;
+        assert!(error.abs() < 0.01, "{shadow_rays} shadow and {gather_rays} gather rays are off by {error}");
+    }
+    assert_eq!(mean(&picture(0, 0)), 0.0);
+}
+
+#[test]
+fn the_stored_power_of_coloured_light_is_right_in_every_channel() {
+    let emission = Vec3::new(1.0, 0.01, 0.003);
+    let scene = scene(
+        room([0, 0, 0, 1, 0, 0]),
+        vec![lambertian("wall", 0.5), emitting("lamp", 0.5, emission)],
+        camera(Vec3::ZERO, Vec3::NEG_Z),
+    );
+    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+    for photons in [50_000, 70_000] {
+        let pass = trace(&packed, 0, photons, &|_| true).unwrap();
+        let map = PhotonMap::new(&pass.arrivals);
+        for channel in 0..3 {
+            let stored: f64 = map.photons().iter().map(|photon| photon.power.decode()[channel] as f64).sum();
+            let emitted = std::f64::consts::PI * 4.0 * emission[channel] as f64;
+            let error = stored * map.power_unit() as f64 / (emitted / 0.5) - 1.0;
+            assert!(error.abs() < 0.015, "{photons} photons, channel {channel}: off by {error}");
+        }
+    }
+}
