@@ -22,6 +22,8 @@ pub enum GatherOrder {
     Hash,
     /// Rays by direction bins; gathers wait in the queue and are done along a Hilbert curve.
     Sort,
+    /// All gathers of the frame along one Hilbert curve: on emulated cards alone, which leave them to the host.
+    Hilbert,
 }
 
 impl GatherOrder {
@@ -30,7 +32,7 @@ impl GatherOrder {
         match self {
             Self::Naive | Self::Tiled | Self::DirectionBins => Drain::Immediate,
             Self::Hash => Drain::Hash,
-            Self::Sort => Drain::Sort,
+            Self::Sort | Self::Hilbert => Drain::Sort,
         }
     }
 

@@ -108,6 +108,8 @@ pub struct Session<'a> {
 const SILENCE: Duration = Duration::from_secs(10);
 /// How long a card may be silent while it renders, besides the time of its tiles.
 const RENDERING_SILENCE: Duration = Duration::from_secs(600);
+/// Irradiance records that a card gathers for one pixel at the most.
+const MOST_RECORDS_OF_A_PIXEL: u64 = 19;
 /// Time that a slow card may take for one ray and its gather.
 const SLOW_RAY: Duration = Duration::from_millis(1);
 
@@ -256,7 +258,11 @@ impl<'a> Session<'a> {
     /// A tile tells nothing of itself until it is complete: a card may be silent for as long as a slow one would be.
     fn rendering_silence(&self) -> Duration {
         let pixels: u64 = self.tiles.values().map(|in_flight| in_flight.tile.pixels()).sum();
-        let rays = self.job.map_or(1, |job| job.frame.samples as u64 * (job.frame.gather_rays as u64 + 1));
+        let rays = self.job.map_or(1, |Job { frame, .. }| {
+            let samples =
+                frame.samples as u64 + frame.irradiance_error.map_or(0, |_| MOST_RECORDS_OF_A_PIXEL);
+            samples * (frame.gather_rays as u64 + 1)
+        });
         RENDERING_SILENCE + SLOW_RAY.saturating_mul(u32::try_from(pixels * rays).unwrap_or(u32::MAX))
     }
 
@@ -308,7 +314,8 @@ impl<'a> Session<'a> {
 
     fn take(&mut self, reply: &Reply, picture: &mut Picture) -> Result<(), SessionError> {
         match (self.state, *reply) {
-            (State::Greeting, Reply::Hello { protocol, layout, budget, .. }) => {
+            (State::Greeting, Reply::Hello { protocol, layout, budget, build }) => {
+                build.clone_into(&mut self.build);
                 self.greet(protocol, layout, budget)
             }
             (State::Greeting, _) => {

@@ -7,7 +7,10 @@
 mod load;
 
 use heapless::Deque;
-use photoncard_shared::budget::{Budget, MICRO, MOST_GATHER_RAYS, REFERENCE, gather_candidates};
+use photoncard_shared::budget::{
+    Budget, MICRO, MOST_BINS, MOST_GATHER_RAYS, REFERENCE, TechniqueMemory, gather_candidates,
+};
+use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::{FrameReader, FrameWriter, MAX_FRAME};
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
@@ -16,27 +19,35 @@ use photoncard_shared::message::{
 };
 
 use self::load::{ImageState, Loader};
-use crate::chip::{Chip, sram_bytes};
+use crate::chip::{Chip, MicroChip, Progress, ReferenceChip, sram_bytes};
 use crate::memory::{CardMemory, Dram};
+use crate::render::Context;
 
 /// Tile commands that any budget may allow to wait.
 const TILE_QUEUE: usize = 4;
 
 /// A card of one chip: its memory, its chip and both directions of its link.
-pub struct Card<M, const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize> {
+pub struct Card<
+    M,
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+> {
     budget: Budget,
     memory: M,
     reader: FrameReader,
     expected_sequence: u16,
-    session: Session<TILE_PIXELS, CANDIDATES, QUEUE>,
+    session: Session<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>,
     outgoing: Outgoing,
 }
 
 /// What commands act on.
-struct Session<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize> {
-    chip: Chip<TILE_PIXELS, CANDIDATES, QUEUE>,
+struct Session<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize> {
+    chip: Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>,
     image: ImageState,
     frame: Option<FrameParameters>,
+    counters: Counters,
     tiles: Deque<Tile, TILE_QUEUE>,
     at_work: Option<TileWork>,
 }
@@ -72,8 +83,13 @@ impl Outgoing {
     }
 }
 
-impl<M: CardMemory, const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>
-    Card<M, TILE_PIXELS, CANDIDATES, QUEUE>
+impl<
+    M: CardMemory,
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+> Card<M, TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
 {
     /// A card that has seen no host yet.
     pub const fn new(budget: Budget, memory: M) -> Self {
@@ -86,6 +102,7 @@ impl<M: CardMemory, const TILE_PIXELS: usize, const CANDIDATES: usize, const QUE
                 chip: Chip::new(),
                 image: ImageState::None,
                 frame: None,
+                counters: Counters::ZERO,
                 tiles: Deque::new(),
                 at_work: None,
             },
@@ -156,8 +173,8 @@ fn check_sequence(expected: &mut u16, sequence: u16, command: &Command) -> Resul
 
 const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
-impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>
-    Session<TILE_PIXELS, CANDIDATES, QUEUE>
+impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
+    Session<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
 {
     fn execute(
         &mut self,
@@ -191,12 +208,20 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>
                     return Err(OUT_OF_ORDER);
                 }
                 check_frame(budget, &frame)?;
-                self.chip.begin_frame(scene, memory, &frame)?;
+                self.counters = Counters::ZERO;
+                let counters = &mut self.counters;
+                self.chip.begin_frame(&mut Context {
+                    scene,
+                    memory,
+                    frame: &frame,
+                    counters,
+                    outlet: None,
+                })?;
                 self.frame = Some(frame);
                 Ok(Some(Reply::FrameAccepted))
             }
             Command::RenderTile(tile) => self.accept(budget, tile).map(|()| None),
-            Command::ReadCounters => Ok(Some(Reply::Counters(*self.chip.counters()))),
+            Command::ReadCounters => Ok(Some(Reply::Counters(self.counters))),
         }
     }
 
@@ -235,14 +260,18 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>
                 }
             }
             Some(TileWork::Rendering(tile)) => {
-                if self.chip.step(scene, memory, frame)? {
+                let counters = &mut self.counters;
+                let progress =
+                    self.chip.step(&mut Context { scene, memory, frame, counters, outlet: None })?;
+                if progress == Progress::Complete {
                     self.at_work = Some(TileWork::Sending(tile, 0));
                 }
             }
             Some(TileWork::Sending(tile, first)) => {
                 let mut data = heapless::Vec::<u8, { PIXEL_BYTES * PIXELS_PER_REPLY }>::new();
                 let pixels = (first..first.saturating_add(PIXELS_PER_REPLY as u32))
-                    .map_while(|index| self.chip.pixel(index as usize, scene, frame));
+                    .map_while(|index| self.chip.sum(index as usize))
+                    .map(|sum| sum.pixel(scene, frame));
                 for pixel in pixels {
                     // There is room for PIXELS_PER_REPLY.
                     let _ = data.extend_from_slice(&pixel.to_bytes());
@@ -284,7 +313,9 @@ fn check_frame(budget: &Budget, frame: &FrameParameters) -> Result<(), Fault> {
         frame.shadow_rays <= budget.shadow_rays,
         frame.neighbors >= 2 && within(frame.neighbors, budget.neighbors),
         frame.max_distance.is_finite() && frame.max_distance > 0.0,
-        within(frame.bins, budget.gather_rays),
+        true,
+        frame.irradiance_error.is_none_or(|error| error.is_finite() && error >= LEAST_IRRADIANCE_ERROR),
+        within(frame.bins, MOST_BINS),
         true,
         frame.queue >= 1,
     ];
@@ -293,6 +324,9 @@ fn check_frame(budget: &Budget, frame: &FrameParameters) -> Result<(), Fault> {
         None => Ok(()),
     }
 }
+
+/// The least error that interpolated irradiance may be allowed: what is below asks for more than rounding gives.
+pub const LEAST_IRRADIANCE_ERROR: f32 = 1e-6;
 
 /// Pixels in a row or a column of a picture: `f32` tells them apart with room for the place in the pixel.
 pub const MAX_PICTURE_SIDE: u32 = 1 << 16;
@@ -303,6 +337,7 @@ pub type ReferenceCard<M> = Card<
     { REFERENCE.tile_pixels as usize },
     { gather_candidates(REFERENCE.neighbors) },
     { REFERENCE.gather_queue as usize },
+    { REFERENCE.irradiance_records as usize },
 >;
 
 /// The card of the micro chip.
@@ -311,6 +346,7 @@ pub type MicroCard<M> = Card<
     { MICRO.tile_pixels as usize },
     { gather_candidates(MICRO.neighbors) },
     { MICRO.gather_queue as usize },
+    { MICRO.irradiance_records as usize },
 >;
 
 /// On-chip memory of the reference card, bytes.
@@ -320,9 +356,9 @@ pub const MICRO_SRAM_BYTES: usize = sram_bytes(&MICRO, size_of::<MicroCard<Dram<
 
 const _: () = assert!(REFERENCE_SRAM_BYTES <= REFERENCE.sram_bytes as usize);
 const _: () = assert!(MICRO_SRAM_BYTES <= MICRO.sram_bytes as usize);
+const _: () = assert!(ReferenceChip::TECHNIQUES.is_within(&TechniqueMemory::REFERENCE));
+const _: () = assert!(MicroChip::TECHNIQUES.is_within(&TechniqueMemory::MICRO));
 const _: () = assert!(REFERENCE.tile_pixels <= 1 << 16 && MICRO.tile_pixels <= 1 << 16);
-const _: () = assert!(
-    REFERENCE.gather_rays as usize <= MOST_GATHER_RAYS && MICRO.gather_rays as usize <= MOST_GATHER_RAYS
-);
+const _: () = assert!(REFERENCE.gather_rays <= MOST_GATHER_RAYS && MICRO.gather_rays <= MOST_GATHER_RAYS);
 const _: () = assert!(REFERENCE.tiles as usize <= TILE_QUEUE);
 const _: () = assert!(MICRO.tiles as usize <= TILE_QUEUE);

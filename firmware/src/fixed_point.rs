@@ -10,33 +10,51 @@ use photoncard_shared::layout::Rgbe;
 /// 2^40: exact in `f32`, and so is the product with it.
 const SCALE: f32 = (1_u64 << 40) as f32;
 
-/// Rounds towards zero to 2^-40; what is not a number is zero, what is too large is the largest.
-#[inline(always)]
-fn from_f32(value: f32) -> I24F40 {
-    I24F40::from_bits((value * SCALE) as i64)
-}
+/// The sum of many numbers, exact but for the rounding of each term: its order does not matter.
+///
+/// It holds less than 2^23 units and wraps above.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sum(I24F40);
 
-#[inline(always)]
-fn to_f32(value: I24F40) -> f32 {
-    value.to_bits() as f32 * (1.0 / SCALE)
+impl Sum {
+    /// No term yet.
+    pub const ZERO: Self = Self(I24F40::ZERO);
+
+    /// Adds a term, in units, rounded towards zero to 2^-40; what is not a number is zero, what is too large is the
+    /// largest.
+    #[inline(always)]
+    pub fn add(&mut self, term: f32) {
+        self.add_bits((term * SCALE) as i64);
+    }
+
+    #[inline(always)]
+    fn add_bits(&mut self, bits: i64) {
+        self.0 = self.0.wrapping_add(I24F40::from_bits(bits));
+    }
+
+    /// The sum, in units.
+    #[inline(always)]
+    pub fn value(self) -> f32 {
+        self.0.to_bits() as f32 * (1.0 / SCALE)
+    }
 }
 
 /// The sum of many colours, exact but for the rounding of each term: its order does not matter.
 ///
-/// A component holds less than 2^23 units and wraps above: `k` photons of a power unit each, reflected by a factor of
-/// at most a few thousand, stay far below.
+/// A component is a [`Sum`]: `k` photons of a power unit each, reflected by a factor of at most a few thousand, stay far
+/// below its limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ColourSum([I24F40; 3]);
+pub struct ColourSum([Sum; 3]);
 
 impl ColourSum {
     /// No term yet.
-    pub const ZERO: Self = Self([I24F40::ZERO; 3]);
+    pub const ZERO: Self = Self([Sum::ZERO; 3]);
 
     /// Adds a term, in units.
     #[inline(always)]
     pub fn add(&mut self, term: Vec3) {
         for (sum, component) in self.0.iter_mut().zip(term.to_array()) {
-            *sum = sum.wrapping_add(from_f32(component));
+            sum.add(component);
         }
     }
 
@@ -51,14 +69,14 @@ impl ColourSum {
             } else {
                 mantissa as i64 >> (-shift).min(63)
             };
-            *sum = sum.wrapping_add(I24F40::from_bits(bits));
+            sum.add_bits(bits);
         }
     }
 
     /// The sum, in units.
     #[inline(always)]
     pub fn value(&self) -> Vec3 {
-        Vec3::from_array(self.0.map(to_f32))
+        Vec3::from_array(self.0.map(Sum::value))
     }
 }
 

@@ -11,6 +11,7 @@
 //! | [`sampler`] | stratified random numbers from (pixel, sample, dimension) |
 //! | [`gather`] | photon gathers that wait, and in which order they are done |
 //! | [`importance`] | which way a final gather ray goes |
+//! | [`irradiance_cache`] | indirect irradiance, gathered at few places and interpolated between them |
 //! | [`render`] | eye rays, direct light, final gather: the stages of a tile |
 //! | [`chip`] | owns the tile's state; one method a stage |
 //! | [`card`] | commands in, replies out |
@@ -44,11 +45,15 @@
     )
 )]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod card;
 pub mod chip;
 pub mod fixed_point;
 pub mod gather;
 pub mod importance;
+pub mod irradiance_cache;
 pub mod memory;
 pub mod photon;
 pub mod render;

@@ -1,10 +1,13 @@
 //! Random numbers from (seed, pixel, sample, dimension): never from a chip, a thread or what came before.
 //!
-//! Points are correlated multi-jittered (Kensler 2013, *Correlated multi-jittered sampling*): `count` points of the
-//! square in as many cells of equal area, in about sqrt(count) rows, and stratified within rows and columns. Kensler's
-//! grid is rectangular; here the rows of a count that is not a product hold one cell more or less, which keeps every
-//! cell's area, and so the expectation, exact. Point `i` lies in the same cell for every pixel: rays of one index go in
-//! one bundle of directions, the direction bins of the dissertation.
+//! Points in a pixel and on emitters are correlated multi-jittered (Kensler 2013, *Correlated multi-jittered sampling*):
+//! `count` points of the square in as many cells of equal area, in about sqrt(count) rows, and stratified within rows
+//! and columns. Kensler's grid is rectangular; here the rows of a count that is not a product hold one cell more or
+//! less, which keeps every cell's area, and so the expectation, exact.
+//!
+//! Final gather rays take points along a line ([`Pattern::jitter`]), which their table divides
+//! ([`crate::importance::DirectionTable`]), and across it a radical inverse: any run of neighbours, as fall in one cell
+//! of the table, is stratified both ways.
 
 /// What a random number is for. Each purpose has a pattern of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,8 +17,12 @@ pub enum Dimension {
     Pixel = 1,
     /// The point on an emitter.
     Emitter = 2,
-    /// The direction of a final gather ray.
+    /// The directions of final gather rays.
     Gather = 3,
+    /// The directions of the gather rays of an irradiance record.
+    Irradiance = 4,
+    /// The directions of the rays that survey an irradiance record's surroundings.
+    Survey = 5,
 }
 
 /// A pattern of points for one pixel, sample and dimension.
@@ -33,7 +40,25 @@ impl Pattern {
     /// Random bits that belong to a point, independent of its place.
     #[inline(always)]
     pub fn dither(self, index: u32) -> u32 {
-        hash(self.0.wrapping_add(0x2545_f491) ^ index.wrapping_mul(0x9e37_79b9))
+        self.bits(index, 0x2545_f491)
+    }
+
+    /// Random bits for the place of a point in its stratum of a line.
+    #[inline(always)]
+    pub fn jitter(self, index: u32) -> u32 {
+        self.bits(index, 0x967a_889b)
+    }
+
+    /// The radical inverse of `index`, in [0, 1), its digits flipped at random: over the indices it is uniform, and any
+    /// 2^m neighbouring ones from a multiple of 2^m on lie in different 2^m-ths.
+    #[inline(always)]
+    pub fn radical_inverse(self, index: u32) -> f32 {
+        unit_interval(index.reverse_bits() ^ hash(self.0.wrapping_add(0x368c_c8b7)))
+    }
+
+    #[inline(always)]
+    fn bits(self, index: u32, salt: u32) -> u32 {
+        hash(self.0.wrapping_add(salt) ^ index.wrapping_mul(0x9e37_79b9))
     }
 
     /// Point `index` of `count`, in [0, 1) x [0, 1); `index` below `count`, `count` below 2^16.
@@ -42,8 +67,7 @@ impl Pattern {
         let cell = Cell::new(index, count);
         let sub_column = permute(cell.row, cell.rows, self.0 ^ 0x5163_3e2d);
         let sub_row = permute(cell.column, cell.columns, self.0 ^ 0x68bc_21eb);
-        let jitter =
-            |salt: u32| unit_interval(hash(self.0.wrapping_add(salt) ^ index.wrapping_mul(0x9e37_79b9)));
+        let jitter = |salt: u32| unit_interval(self.bits(index, salt));
         let x_in_cell = (sub_column as f32 + jitter(0x967a_889b)) / cell.rows as f32;
         let x = (cell.column as f32 + x_in_cell) / cell.columns as f32;
         let y = ((cell.first + sub_row) as f32 + jitter(0x368c_c8b7)) / count as f32;
@@ -53,28 +77,21 @@ impl Pattern {
 
 /// The cell of one point: a row of the square as high as its share of the points, cut into equal columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Cell {
+struct Cell {
     /// Rows of the whole square.
     rows: u32,
-    pub(crate) row: u32,
+    row: u32,
     /// Columns of this row.
-    pub(crate) columns: u32,
+    columns: u32,
     column: u32,
     /// Points in the rows before.
-    pub(crate) first: u32,
+    first: u32,
 }
 
 impl Cell {
-    /// The middle of the cell, of `count` in all.
-    pub(crate) fn centre(&self, count: u32) -> [f32; 2] {
-        let x = (self.column as f32 + 0.5) / self.columns as f32;
-        let y = (self.first as f32 + 0.5 * self.columns as f32) / count as f32;
-        [x, y]
-    }
-
     /// The cell of point `index` of `count`.
     #[inline(always)]
-    pub(crate) fn new(index: u32, count: u32) -> Self {
+    fn new(index: u32, count: u32) -> Self {
         let count = count.max(1);
         let rows = (libm::sqrtf(count as f32) as u32).max(1);
         // Row r holds the points from floor(r count / rows) on.
@@ -115,9 +132,15 @@ pub fn hash(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
+/// The radical inverse of `index` in base two, in [0, 1) (van der Corput 1935).
+#[inline(always)]
+pub fn radical_inverse(index: u32) -> f32 {
+    unit_interval(index.reverse_bits())
+}
+
 /// The 24 upper bits as a number in [0, 1).
 #[inline(always)]
-fn unit_interval(bits: u32) -> f32 {
+pub(crate) fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 

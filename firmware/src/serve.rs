@@ -16,8 +16,14 @@ const IDLE_WAIT: Duration = Duration::from_millis(20);
 ///
 /// # Errors
 /// Why the port cannot go on; [`PortError::Closed`] is how a session ends in order.
-pub fn serve<M: CardMemory, const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize>(
-    card: &mut Card<M, TILE_PIXELS, CANDIDATES, QUEUE>,
+pub fn serve<
+    M: CardMemory,
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+>(
+    card: &mut Card<M, TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>,
     port: &mut impl Port,
 ) -> Result<(), PortError> {
     let mut buffer = [0; 512];

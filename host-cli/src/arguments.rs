@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
-use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::render::{CardAddress, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
 /// Global illumination by photon mapping on small rendering chips.
@@ -92,10 +92,19 @@ pub(crate) struct RenderOptions {
     /// Side of a tile, pixels
     #[arg(long, default_value_t = 16, allow_negative_numbers = true)]
     tile: u32,
+    /// What the directions of gather rays are chosen by; it never changes what the picture converges to
+    #[arg(long, default_value = "brdf")]
+    sampling: SamplingOption,
+    /// Gather the indirect light of Lambertian surfaces at some places and interpolate between them
+    #[arg(long, default_value = "off")]
+    irradiance_cache: Switch,
+    /// Relative error that interpolated irradiance may have
+    #[arg(long, value_name = "ERROR", default_value = "0.025", value_parser = ic_error, allow_negative_numbers = true)]
+    ic_error: f32,
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = "sort")]
     order: Order,
-    /// Direction bins of the gather rays, for the orders that have any [default: a bin a ray]
+    /// Direction bins of the gather rays, for the orders that have any [default: 99]
     #[arg(long)]
     bins: Option<u32>,
     /// Gathers that may wait on a chip, for the orders that let any [default: as many as it has room for]
@@ -148,25 +157,51 @@ pub(crate) enum Order {
     Hash,
     /// By direction bins; gathers wait and are done along a Hilbert curve
     Sort,
-    /// All gathers of the frame along a Hilbert curve (not yet)
+    /// All gathers of the frame along a Hilbert curve, on emulated cards alone: the bound to compare with
     Hilbert,
 }
 
 impl Order {
-    /// The order, if it can be used.
-    pub(crate) fn gather_order(self) -> Result<GatherOrder, String> {
+    fn gather_order(self) -> GatherOrder {
         match self {
-            Self::Naive => Ok(GatherOrder::Naive),
-            Self::Tiled => Ok(GatherOrder::Tiled),
-            Self::Dirbin => Ok(GatherOrder::DirectionBins),
-            Self::Hash => Ok(GatherOrder::Hash),
-            Self::Sort => Ok(GatherOrder::Sort),
-            Self::Hilbert => {
-                Err("--order hilbert cannot be used yet; use sort or any other, the picture is the same"
-                    .into())
-            }
+            Self::Naive => GatherOrder::Naive,
+            Self::Tiled => GatherOrder::Tiled,
+            Self::Dirbin => GatherOrder::DirectionBins,
+            Self::Hash => GatherOrder::Hash,
+            Self::Sort => GatherOrder::Sort,
+            Self::Hilbert => GatherOrder::Hilbert,
         }
     }
+}
+
+/// What the directions of gather rays are chosen by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SamplingOption {
+    /// The reflection function
+    Brdf,
+    /// The photons that arrive at the point
+    Photon,
+    /// The product of both
+    Combined,
+    /// The mean of both
+    Mixture,
+}
+
+impl SamplingOption {
+    fn sampling(self) -> Sampling {
+        match self {
+            Self::Brdf => Sampling::Reflection,
+            Self::Photon => Sampling::Photon,
+            Self::Combined => Sampling::Product,
+            Self::Mixture => Sampling::Mixture,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Switch {
+    On,
+    Off,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -201,11 +236,18 @@ impl RenderOptions {
             shadow_rays: self.shadow_rays,
             samples: self.spp,
             tile: self.tile,
-            order: self.order.gather_order()?,
+            sampling: self.sampling.sampling(),
+            irradiance_error: (self.irradiance_cache == Switch::On).then_some(self.ic_error),
+            order: self.order.gather_order(),
             bins: self.bins,
             queue: self.queue,
             cards: if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() },
         })
+    }
+
+    /// The name of the sampling.
+    pub(crate) fn sampling_name(&self) -> Option<String> {
+        self.sampling.to_possible_value().map(|value| value.get_name().to_owned())
     }
 
     /// The type of the picture's samples.
@@ -241,6 +283,13 @@ fn threads(text: &str) -> Result<usize, String> {
     let count = text.parse().ok().filter(|count| (1..=MAX_THREADS).contains(count));
     count
         .ok_or_else(|| format!("use 1 to {MAX_THREADS} threads, or leave the option out for a thread a core"))
+}
+
+fn ic_error(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(error) if f32::is_finite(error) && error > 0.0 => Ok(error),
+        _ => Err("an error is a share of the irradiance, a number above 0 such as 0.025".into()),
+    }
 }
 
 fn max_distance(text: &str) -> Result<MaxDistance, String> {

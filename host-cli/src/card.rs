@@ -11,6 +11,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     let info = card_info(*address)?;
     let CardAddress::Emulated { kind, .. } = *address;
     let budget = info.budget;
+    let techniques = kind.techniques();
     let lines = [
         format!("build           {}", info.build),
         format!("sram            {} bytes", budget.sram_bytes),
@@ -18,12 +19,16 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("  scene cache   {} bytes", budget.scene_cache_bytes),
         format!("  stack         {} bytes", budget.stack_bytes),
         format!("  buffers       {} bytes", ChipKind::buffer_bytes(kind)),
+        format!("    reordering  {} bytes: gathers that wait", techniques.reordering),
+        format!("    cache       {} bytes: irradiance records", techniques.irradiance_cache),
+        format!("    sampling    {} bytes: tables of directions", techniques.importance_sampling),
         format!("  free          {} bytes", budget.sram_bytes as usize - ChipKind::sram_bytes(kind)),
         format!("dram            {} bytes", budget.dram_bytes),
         format!("tile            {} pixels, {} tiles at once", budget.tile_pixels, budget.tiles),
         format!("neighbors       {}", budget.neighbors),
         format!("gather rays     {} a sample", budget.gather_rays),
         format!("gather queue    {} gathers", budget.gather_queue),
+        format!("records         {} of irradiance", budget.irradiance_records),
         format!("shadow rays     {} a sample", budget.shadow_rays),
         format!("samples         {} a pixel", budget.samples),
     ];

@@ -115,5 +115,7 @@ fn provenance(
         "gather_rays": settings.gather_rays,
         "shadow_rays": settings.shadow_rays,
         "spp": settings.samples,
+        "sampling": options.sampling_name(),
+        "ic_error": settings.irradiance_error,
     })
 }

@@ -155,7 +155,7 @@ fn names_that_do_not_exist() {
         ("--set", "flor.diffuse=0", ["'flor'", "'floor'"]),
         ("--set", "floor.gloss=1", ["'gloss'", "the properties are"]),
         ("--set", "floor.diffuse=2", ["albedo", "0 to 1"]),
-        ("--order", "hilbert", ["hilbert cannot be used yet", "use sort"]),
+        ("--ic-error", "nan", ["--ic-error", "0.025"]),
         ("--card", "serial:/dev/x", ["cannot be used yet", "use emulated[:CHIPS]"]),
         ("--card", "abacus", ["no kind of card", "emulated[:CHIPS]"]),
         ("--card", "emulated:0", ["no number of chips", "use 1 to"]),

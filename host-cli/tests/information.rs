@@ -23,7 +23,16 @@ fn card_info_tells_what_a_card_holds() {
     for (card, dram) in [("emulated", 536_870_912), ("emulated-micro:2", 16_777_216)] {
         let outcome = Room::new().run(&["card", "info", "--card", card]);
         assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
-        for word in ["build", "sram", "free", "neighbors", &format!("dram            {dram} bytes")] {
+        for word in [
+            "photoncard-firmware",
+            "sram",
+            "reordering",
+            "cache ",
+            "sampling",
+            "free",
+            "neighbors",
+            &format!("dram            {dram} bytes"),
+        ] {
             assert!(outcome.stdout.contains(word), "{word}: {}", outcome.stdout);
         }
     }

@@ -1,4 +1,4 @@
-//! The Cornell box, scaled to two metres, and the same box with a glossy floor.
+//! The Cornell box, scaled to two metres, the same box with a glossy floor, and lit by a lamp that faces the ceiling.
 
 use glam::Vec3;
 
@@ -50,6 +50,13 @@ const GREEN: [f64; 3] = [0.105421, 0.37798, 0.076425];
 const RED: [f64; 3] = [0.570068, 0.0430135, 0.0443706];
 const LIGHT_RADIANCE: [f64; 3] = [18.387, 13.9873, 6.75357];
 
+/// A lamp that faces upwards, and the cup around it: its half side, its bottom and its rim.
+const UPLIGHT: Quad = [[-0.12, 0.72, 0.12], [0.12, 0.72, 0.12], [0.12, 0.72, -0.12], [-0.12, 0.72, -0.12]];
+const CUP: (f32, f32, f32) = (0.14, 0.7, 0.86);
+const CUP_ALBEDO: [f64; 3] = [0.1; 3];
+/// As much power as the ceiling's lamp has in a third of the area.
+const UPLIGHT_RADIANCE: [f64; 3] = [56.0, 42.6, 20.6];
+
 /// The whole open side fills the picture.
 const FRONT: Camera =
     Camera { eye: Vec3::new(0.0, 0.0, 3.9), target: Vec3::ZERO, yfov: 0.6860487863861751, aspect_ratio: 1.0 };
@@ -74,15 +81,14 @@ fn standing_box(shape: &StandingBox) -> Mesh {
     mesh
 }
 
-/// The box with the given material on its floor, or the white of the other walls.
-fn cornell_box(floor: Option<&Material>) -> SceneBuilder {
+/// The box with the given material on its floor, or the white of the other walls, and a lamp.
+fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> SceneBuilder {
     let mut scene = SceneBuilder::default();
     let white = scene.material(&Material::diffuse("white", WHITE));
     let green = scene.material(&Material::diffuse("green", GREEN));
     let red = scene.material(&Material::diffuse("red", RED));
-    let light = scene.material(&Material::diffuse("light", WHITE).emitting(LIGHT_RADIANCE));
+    add_lamp(&mut scene);
     let floor = floor.map_or(white, |material| scene.material(material));
-    scene.object("light", &quad(LIGHT), light);
     scene.object("floor", &quad(FLOOR), floor);
     scene.object("ceiling", &quad(CEILING), white);
     scene.object("back", &quad(BACK), white);
@@ -94,16 +100,48 @@ fn cornell_box(floor: Option<&Material>) -> SceneBuilder {
     scene
 }
 
+fn add_ceiling_lamp(scene: &mut SceneBuilder) {
+    let light = scene.material(&Material::diffuse("light", WHITE).emitting(LIGHT_RADIANCE));
+    scene.object("light", &quad(LIGHT), light);
+}
+
+fn add_uplight(scene: &mut SceneBuilder) {
+    let lamp = scene.material(&Material::diffuse("lamp", WHITE).emitting(UPLIGHT_RADIANCE));
+    let cup = scene.material(&Material::diffuse("cup", CUP_ALBEDO).double_sided());
+    scene.object("lamp", &quad(UPLIGHT), lamp);
+    scene.object("cup", &cup_walls(), cup);
+}
+
 /// All Lambertian, lit by the lamp in the ceiling.
 pub(crate) fn lambertian() -> Vec<u8> {
-    cornell_box(None).into_gltf()
+    cornell_box(None, add_ceiling_lamp).into_gltf()
 }
 
 /// The same with a floor that has a Phong lobe.
 pub(crate) fn glossy_floor() -> Vec<u8> {
     let phong = Phong { specular: [0.35; 3], exponent: 32.0 };
     let floor = Material::diffuse("floor", [0.45, 0.28, 0.14]).with_phong(phong);
-    let mut scene = cornell_box(Some(&floor));
+    let mut scene = cornell_box(Some(&floor), add_ceiling_lamp);
     scene.camera("floor", &TOWARDS_FLOOR);
     scene.into_gltf()
+}
+
+/// All Lambertian, lit by a lamp in a cup that only a spot of the ceiling sees: nearly all light is indirect, and comes
+/// from there.
+pub(crate) fn uplight() -> Vec<u8> {
+    cornell_box(None, add_uplight).into_gltf()
+}
+
+/// The bottom and the four sides of the cup.
+fn cup_walls() -> Mesh {
+    let (side, bottom, rim) = CUP;
+    let corners = [[-side, -side], [side, -side], [side, side], [-side, side]];
+    let mut mesh = Mesh::default();
+    mesh.quad(corners.map(|[x, z]| Vec3::new(x, bottom, z)));
+    for (index, [x, z]) in corners.into_iter().enumerate() {
+        let [next_x, next_z] = corners[(index + 1) % 4];
+        let wall = [[x, bottom, z], [next_x, bottom, next_z], [next_x, rim, next_z], [x, rim, z]];
+        mesh.quad(wall.map(Vec3::from_array));
+    }
+    mesh
 }

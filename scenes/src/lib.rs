@@ -23,6 +23,7 @@ pub fn scenes() -> Vec<SceneFile> {
     vec![
         SceneFile { name: "cornell.gltf", bytes: cornell::lambertian() },
         SceneFile { name: "cornell-glossy.gltf", bytes: cornell::glossy_floor() },
+        SceneFile { name: "cornell-uplight.gltf", bytes: cornell::uplight() },
         SceneFile { name: "furnace.gltf", bytes: furnace::furnace() },
         SceneFile { name: "atrium.glb", bytes: atrium::atrium() },
     ]

@@ -9,9 +9,10 @@ use gltf::buffer::Source;
 use gltf::{Gltf, Node};
 
 /// A scene's name, the triangles it may have, and its cameras.
-const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 4] = [
+const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 5] = [
     ("cornell.gltf", 36..=36, &["camera"]),
     ("cornell-glossy.gltf", 36..=36, &["camera", "floor"]),
+    ("cornell-uplight.gltf", 46..=46, &["camera"]),
     ("furnace.gltf", 12..=12, &["camera"]),
     ("atrium.glb", 60_000..=150_000, &["court", "gallery"]),
 ];

@@ -23,6 +23,8 @@ pub struct Budget {
     pub gather_rays: u32,
     /// Photon gathers that can wait to be reordered.
     pub gather_queue: u32,
+    /// Irradiance records of one block of a tile; a power of two.
+    pub irradiance_records: u32,
     /// Shadow rays of one sample.
     pub shadow_rays: u32,
     /// Samples of one pixel.
@@ -32,7 +34,7 @@ pub struct Budget {
 }
 
 /// The reference chip: the dissertation's, with 128 KB of photon cache (6.5), a 75 KB ray caster cache (7.3.2), tiles
-/// of 16x16 (up to 32x32 here) and up to 200 gather rays.
+/// of 16x16 (up to 32x32 here).
 pub const REFERENCE: Budget = Budget {
     sram_bytes: 1 << 20,
     dram_bytes: 512 << 20,
@@ -41,8 +43,9 @@ pub const REFERENCE: Budget = Budget {
     stack_bytes: 16 << 10,
     tile_pixels: 1024,
     neighbors: 256,
-    gather_rays: MOST_GATHER_RAYS as u32,
+    gather_rays: MOST_GATHER_RAYS,
     gather_queue: 16_384,
+    irradiance_records: 256,
     shadow_rays: 64,
     samples: 4096,
     tiles: 4,
@@ -57,15 +60,46 @@ pub const MICRO: Budget = Budget {
     stack_bytes: 16 << 10,
     tile_pixels: 256,
     neighbors: 128,
-    gather_rays: MOST_GATHER_RAYS as u32,
+    gather_rays: MOST_GATHER_RAYS,
     gather_queue: 1024,
+    irradiance_records: 128,
     shadow_rays: 64,
     samples: 4096,
     tiles: 2,
 };
 
+/// On-chip memory that each technique may add to a chip that does without, bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TechniqueMemory {
+    /// Reordering: the queue of gathers that wait.
+    pub reordering: usize,
+    /// The irradiance cache: records, and the sums of those being gathered.
+    pub irradiance_cache: usize,
+    /// Combined importance sampling: a table of directions for every pixel of a tile.
+    pub importance_sampling: usize,
+}
+
+impl TechniqueMemory {
+    /// What the techniques may add to [`REFERENCE`].
+    pub const REFERENCE: Self =
+        Self { reordering: (512 << 10) + 64, irradiance_cache: 48 << 10, importance_sampling: 34 << 10 };
+    /// What the techniques may add to [`MICRO`].
+    pub const MICRO: Self =
+        Self { reordering: (32 << 10) + 64, irradiance_cache: 32 << 10, importance_sampling: 8704 };
+
+    /// Whether every technique adds no more than `limit` allows.
+    pub const fn is_within(&self, limit: &Self) -> bool {
+        self.reordering <= limit.reordering
+            && self.irradiance_cache <= limit.irradiance_cache
+            && self.importance_sampling <= limit.importance_sampling
+    }
+}
+
 /// Final gather rays of one sample that any budget may allow.
-pub const MOST_GATHER_RAYS: usize = 256;
+pub const MOST_GATHER_RAYS: u32 = 1 << 14;
+
+/// Direction bins that gather rays may be grouped in.
+pub const MOST_BINS: u32 = 256;
 
 /// Entries of the stack of a descent in the bounding volume hierarchy: a host refuses a hierarchy that needs more.
 pub const BVH_STACK: usize = 96;

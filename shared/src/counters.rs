@@ -11,8 +11,18 @@ pub struct Counters {
     pub shadow_rays: u64,
     /// Final gather rays.
     pub gather_rays: u64,
+    /// Rays that survey the surroundings of irradiance records.
+    pub survey_rays: u64,
     /// Searches for the nearest photons.
     pub gathers: u64,
+    /// Those of them that made a table of directions.
+    pub tables: u64,
+    /// Irradiance records that were gathered.
+    pub records: u64,
+    /// Samples that see a surface with a Lambertian part, and are not left to shadow rays alone.
+    pub lambertian_samples: u64,
+    /// Those of them whose indirect irradiance was interpolated.
+    pub interpolated_samples: u64,
     /// Photons whose distance was computed.
     pub photons_tested: u64,
     /// Photons that the searches returned.
@@ -21,15 +31,31 @@ pub struct Counters {
 
 impl Counters {
     /// All zero.
-    pub const ZERO: Self =
-        Self { eye_rays: 0, shadow_rays: 0, gather_rays: 0, gathers: 0, photons_tested: 0, photons_found: 0 };
+    pub const ZERO: Self = Self {
+        eye_rays: 0,
+        shadow_rays: 0,
+        gather_rays: 0,
+        survey_rays: 0,
+        gathers: 0,
+        tables: 0,
+        records: 0,
+        lambertian_samples: 0,
+        interpolated_samples: 0,
+        photons_tested: 0,
+        photons_found: 0,
+    };
 
     /// Adds another chip's counts.
     pub fn add(&mut self, other: &Self) {
         self.eye_rays += other.eye_rays;
         self.shadow_rays += other.shadow_rays;
         self.gather_rays += other.gather_rays;
+        self.survey_rays += other.survey_rays;
         self.gathers += other.gathers;
+        self.tables += other.tables;
+        self.records += other.records;
+        self.lambertian_samples += other.lambertian_samples;
+        self.interpolated_samples += other.interpolated_samples;
         self.photons_tested += other.photons_tested;
         self.photons_found += other.photons_found;
     }

@@ -10,7 +10,7 @@ use crate::layout::{BvhNode, Emitter, Material, Photon, Record, Triangle};
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// The version of everything in this module and in [`crate::layout`].
-pub const LAYOUT_VERSION: u16 = 1;
+pub const LAYOUT_VERSION: u16 = 2;
 /// Emitter thresholds in one line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 

@@ -60,6 +60,10 @@ pub struct FrameParameters {
     pub neighbors: u32,
     /// How far from its place a gather looks, metres.
     pub max_distance: f32,
+    /// Which way gather rays go.
+    pub sampling: Sampling,
+    /// The relative error that interpolated irradiance may have, above 0; without one no irradiance is interpolated.
+    pub irradiance_error: Option<f32>,
     /// Bins that the directions of gather rays are grouped in, at least 1: the rays of one bin are cast for all pixels
     /// of a tile before those of the next. One bin casts all rays of a pixel before those of the next.
     pub bins: u32,
@@ -67,6 +71,20 @@ pub struct FrameParameters {
     pub drain: Drain,
     /// Gathers that wait at most, at least 1; a chip takes what it has room for.
     pub queue: u32,
+}
+
+/// What the directions of final gather rays are chosen by. The expectation of the picture is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Sampling {
+    /// The reflection function and the cosine.
+    #[default]
+    Reflection,
+    /// The photons that arrive at the point.
+    Photon,
+    /// The product of both.
+    Product,
+    /// The mean of both.
+    Mixture,
 }
 
 /// When gathers are done, and in which order. The picture is the same.

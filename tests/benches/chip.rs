@@ -13,11 +13,13 @@ use photoncard_driver::photon::{MappedImage, PhotonSettings, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
-use photoncard_firmware::chip::ReferenceChip;
+use photoncard_firmware::chip::{Progress, ReferenceChip};
 use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::photon::{Candidate, NearestPhotons, gather};
+use photoncard_firmware::render::Context;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{Ray, closest_hit, is_occluded, read_surface};
+use photoncard_shared::counters::Counters;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::Photon;
 use photoncard_shared::message::Tile;
@@ -139,12 +141,15 @@ fn tile_of_cornell(bencher: Bencher, order: &str) {
     let settings = RenderSettings { order, ..RenderSettings::default() };
     let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance);
     let (scene, mut memory) = CORNELL.image.view();
+    let mut counters = Counters::ZERO;
+    let mut context =
+        Context { scene: &scene, memory: &mut memory, frame: &frame, counters: &mut counters, outlet: None };
     let mut chip = Box::new(ReferenceChip::new());
-    chip.begin_frame(&scene, &mut memory, &frame).expect("sound");
+    chip.begin_frame(&mut context).expect("sound");
     let tile = Tile { id: 0, x: 256, y: 256, width: 16, height: 16 };
     bencher.counter(ItemsCount::new(256_usize)).bench_local(|| {
         assert!(chip.begin(tile));
-        while !chip.step(&scene, &mut memory, &frame).expect("sound") {}
+        while chip.step(&mut context).expect("sound") == Progress::Busy {}
     });
 }
 

@@ -1,5 +1,7 @@
 //! What the tests of the whole share: small scenes of known radiance, and renders of them.
 
+pub mod mapped;
+
 use glam::Vec3;
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{RenderSettings, Rendering, Unobserved, render};

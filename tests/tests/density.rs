@@ -45,7 +45,7 @@ impl Map {
         };
         let reflection =
             PartialReflection::new(&surface, Vec3::splat(scene.header.photon_power_unit), 1 << 31);
-        let request = GatherRequest { position: position.to_array(), reflection, pixel: 0 };
+        let request = GatherRequest { position: position.to_array(), reflection, target: 0, cell: 0 };
         reflected_radiance(&nearest, &request).x as f64
     }
 

@@ -1,7 +1,7 @@
 //! Exactness: renders that differ only in ordering, tile size, chips or threads have identical pixels.
 
 use photoncard_driver::film::{Film, PixelValue, Window};
-use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::render::{CardAddress, RenderSettings, Sampling, Unobserved, render};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_tests::render_or_panic;
@@ -39,11 +39,9 @@ fn pixel_bits(pixel: &PixelValue) -> [u32; 10] {
     [r, g, b, p, q, s, x, y, z, pixel.depth].map(f32::to_bits)
 }
 
-#[test]
-fn order_tiles_chips_and_kind_of_chip_do_not_change_a_bit() {
-    let scene = glossy();
-    let expected = bits(&render_or_panic(&scene, &settings()).film);
-    let variants = [
+/// Settings that must not change a bit of the picture.
+fn variants() -> Vec<RenderSettings> {
+    vec![
         RenderSettings { order: GatherOrder::Naive, ..settings() },
         RenderSettings { tile: 8, ..settings() },
         RenderSettings { tile: 5, order: GatherOrder::Naive, ..settings() },
@@ -51,6 +49,7 @@ fn order_tiles_chips_and_kind_of_chip_do_not_change_a_bit() {
         RenderSettings { cards: vec![card("emulated:2")], ..settings() },
         RenderSettings { order: GatherOrder::DirectionBins, ..settings() },
         RenderSettings { order: GatherOrder::DirectionBins, bins: Some(5), tile: 11, ..settings() },
+        RenderSettings { order: GatherOrder::DirectionBins, bins: Some(256), ..settings() },
         RenderSettings { order: GatherOrder::Hash, ..settings() },
         RenderSettings {
             order: GatherOrder::Hash,
@@ -70,11 +69,73 @@ fn order_tiles_chips_and_kind_of_chip_do_not_change_a_bit() {
         RenderSettings { cards: vec![card("emulated:3")], order: GatherOrder::Naive, ..settings() },
         RenderSettings { cards: vec![card("emulated:7")], tile: 4, ..settings() },
         RenderSettings { cards: vec![card("emulated-micro:2"), card("emulated:1")], ..settings() },
-    ];
-    for variant in variants {
+        RenderSettings { order: GatherOrder::Hilbert, ..settings() },
+        RenderSettings {
+            order: GatherOrder::Hilbert,
+            tile: 7,
+            cards: vec![card("emulated:3")],
+            ..settings()
+        },
+    ]
+}
+
+fn check_variants(sampling: Sampling, irradiance_error: Option<f32>, samples: u32) {
+    let scene = glossy();
+    let with = |settings| RenderSettings { sampling, irradiance_error, samples, ..settings };
+    let expected = bits(&render_or_panic(&scene, &with(settings())).film);
+    for variant in variants() {
+        let variant = with(variant);
         let film = render_or_panic(&scene, &variant).film;
         assert!(bits(&film) == expected, "{variant:?} changes the picture");
     }
+}
+
+#[test]
+fn order_tiles_chips_and_kind_of_chip_do_not_change_a_bit() {
+    check_variants(Sampling::Reflection, None, 2);
+}
+
+#[test]
+fn nor_do_they_with_rays_by_photons_and_records_of_irradiance() {
+    check_variants(Sampling::Photon, Some(0.025), 1);
+}
+
+#[test]
+fn nor_do_they_with_rays_by_the_product_and_records_of_irradiance() {
+    check_variants(Sampling::Product, Some(0.025), 2);
+}
+
+#[test]
+fn nor_do_they_with_rays_by_the_mixture() {
+    check_variants(Sampling::Mixture, None, 1);
+}
+
+#[test]
+fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
+    // So small an error divides every cell: an aligned tile of 32x32 needs 289 records, one that is not needs more.
+    let scene = glossy();
+    let settings = |tile, cards| RenderSettings {
+        irradiance_error: Some(1e-5),
+        gather_rays: 2,
+        samples: 1,
+        width: 70,
+        tile,
+        cards: vec![card(cards)],
+        ..settings()
+    };
+    let expected = bits(&render_or_panic(&scene, &settings(4, "emulated:1")).film);
+    for (tile, cards) in [(32, "emulated:1"), (27, "emulated:1"), (16, "emulated-micro:1")] {
+        let film = render_or_panic(&scene, &settings(tile, cards)).film;
+        assert!(bits(&film) == expected, "tiles of {tile} on {cards} change the picture");
+    }
+}
+
+#[test]
+fn a_frame_along_one_curve_is_for_emulated_reference_chips_alone() {
+    let settings =
+        RenderSettings { order: GatherOrder::Hilbert, cards: vec![card("emulated-micro:1")], ..settings() };
+    let error = render(&glossy(), &settings, &Unobserved).err().expect("is refused");
+    assert!(error.is_input() && error.to_string().contains("--order hilbert"), "{error}");
 }
 
 #[test]

@@ -14,7 +14,7 @@ fn image(places: &[[f32; 3]]) -> CardImage {
     let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
     let arrivals: Vec<Arrival> = places
         .iter()
-        .map(|&position| Arrival { position, power: [1.0; 3], direction: [0; 2], normal: 0 })
+        .map(|&position| Arrival { position, power: [1.0; 3], direction: [0; 2], normal: 0, direct: false })
         .collect();
     let map = PhotonMap::new(&arrivals);
     packed.with_photons(map.records(), map.power_unit()).unwrap()

@@ -71,6 +71,7 @@ fn record(node: &Node, arrivals: &[Arrival], power_unit: f32) -> Photon {
         axis: node.axis,
         normal: arrival.normal,
         disc: FULL_DISC,
+        direct: arrival.direct,
     }
 }
 
@@ -150,6 +151,7 @@ mod tests {
                 power: [1.0, 0.5, 0.25],
                 direction: [0, 0],
                 normal: 0,
+                direct: false,
             })
             .collect()
     }

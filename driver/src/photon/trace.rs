@@ -23,6 +23,8 @@ pub struct Arrival {
     pub direction: [u8; 2],
     /// Code of the surface normal on its side.
     pub normal: u8,
+    /// Whether it came straight from an emitter.
+    pub direct: bool,
 }
 
 /// The result of the photon pass.
@@ -110,6 +112,7 @@ fn follow(scene: &SceneImage, memory: &mut impl MemoryPort, seed: u32, path: u64
             power: power.to_array(),
             direction: encode_direction(surface.outgoing.to_array()),
             normal: encode_normal(surface.normal.to_array()),
+            direct: bounce == 0,
         });
         let (point, roulette) = random.bounce(bounce);
         let Some(sampled) = sample_reflection(&surface, point) else { break };

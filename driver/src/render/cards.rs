@@ -65,6 +65,24 @@ impl FromStr for CardAddress {
     }
 }
 
+/// The number of emulated reference chips at some addresses.
+///
+/// # Errors
+/// If there is any other card among them.
+pub(super) fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
+    let counts = addresses.iter().map(|address| match *address {
+        CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),
+        CardAddress::Emulated { kind: ChipKind::Micro, .. } => None,
+    });
+    let chips = counts.sum::<Option<usize>>().filter(|chips| (1..=MAX_CHIPS).contains(chips));
+    chips.ok_or_else(|| RenderError::Setting {
+        option: "--order",
+        value: "hilbert".into(),
+        reason: "it leaves all gathers of the frame to the host, as no chip has room for them".into(),
+        remedy: format!("use --card emulated:CHIPS with 1 to {MAX_CHIPS} chips, or --order sort"),
+    })
+}
+
 /// Cards that have said hello.
 pub(super) struct Cards {
     cards: Vec<Connected>,
@@ -99,6 +117,7 @@ pub fn card_info(address: CardAddress) -> Result<CardInfo, RenderError> {
 }
 
 /// What came of a run.
+#[derive(Default)]
 pub(super) struct Outcome {
     pub(super) counters: Counters,
     pub(super) bytes: LinkBytes,
@@ -154,8 +173,8 @@ impl Cards {
     }
 
     /// What each card can hold.
-    pub(super) fn budgets(&self) -> impl Iterator<Item = &Budget> {
-        self.cards.iter().map(|card| &card.budget)
+    pub(super) fn budgets(&self) -> impl Iterator<Item = Budget> {
+        self.cards.iter().map(|card| card.budget)
     }
 
     /// Renders a picture on all cards.

@@ -2,6 +2,7 @@
 
 use photoncard_shared::message::Fault;
 
+use crate::emulator::whole_frame::FrameError;
 use crate::error::SceneError;
 use crate::film::FilmError;
 use crate::pack::PackError;
@@ -66,6 +67,23 @@ pub enum RenderError {
     /// The observer stopped the render.
     #[error("stopped before the picture was complete")]
     Stopped,
+}
+
+impl From<FrameError> for RenderError {
+    fn from(error: FrameError) -> Self {
+        match error {
+            FrameError::Stopped => Self::Stopped,
+            FrameError::Image(fault) => Self::Image(fault),
+            FrameError::Film(error) => Self::Film(error),
+            FrameError::Start(source) => Self::Start { card: 0, source: std::io::Error::other(source) },
+            FrameError::TooManyGathers { .. } => Self::Setting {
+                option: "--order",
+                value: "hilbert".into(),
+                reason: error.to_string(),
+                remedy: "render a part with --crop, fewer --spp or --gather-rays, or use --order sort".into(),
+            },
+        }
+    }
 }
 
 impl From<PhotonError> for RenderError {

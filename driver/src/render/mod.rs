@@ -7,6 +7,7 @@ mod statistics;
 
 pub use cards::{CardAddress, CardInfo, card_info};
 pub use error::RenderError;
+pub use photoncard_shared::message::Sampling;
 pub use settings::RenderSettings;
 pub use statistics::{LinkStatistics, Rays, Statistics, Times};
 
@@ -14,16 +15,18 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use photoncard_shared::address::Line;
+use photoncard_shared::budget::{Budget, REFERENCE};
 use photoncard_shared::frame::Checksum;
 use photoncard_shared::message::FrameParameters;
 
-use self::cards::Cards;
+use self::cards::{Cards, Outcome};
 use crate::emitter::Emitters;
+use crate::emulator::whole_frame::render_along_curve;
 use crate::film::Film;
 use crate::pack::PackedScene;
 use crate::photon::{MappedImage, map_photons};
-use crate::scene::Scene;
-use crate::scheduler::{Scheduler, tiles};
+use crate::scene::{Camera, Scene};
+use crate::scheduler::{GatherOrder, Scheduler, tiles};
 use crate::session::{Job, Picture};
 
 /// What a render is doing.
@@ -78,15 +81,18 @@ pub fn render(
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
     let camera = scene.camera(settings.camera.as_deref())?;
+    if settings.order == GatherOrder::Hilbert {
+        return render_whole_frame(scene, settings, camera, observer);
+    }
     let picture = Mutex::new(Picture::empty()?);
     let cards = Cards::connect(&settings.cards, &picture)?;
     for budget in cards.budgets() {
-        settings.check(budget)?;
+        settings.check(&budget)?;
     }
     // Not before the settings are known to be possible: a film may be large.
     let film = Film::new(settings.width, settings.height, settings.window())?;
     let mut times = Times::default();
-    let prepared = prepare(scene, settings, &cards, &mut times, observer)?;
+    let prepared = prepare(scene, settings, cards.budgets(), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance);
     let scheduler = Scheduler::new(tiles(settings.window(), settings.tile, settings.order));
     *cards::lock(&picture) = Picture { scheduler, film };
@@ -101,17 +107,45 @@ pub fn render(
     Ok(Rendering { film, statistics })
 }
 
+/// Renders with all gathers of the frame along one curve: the chips are emulated, and leave the gathers to the host.
+fn render_whole_frame(
+    scene: &Scene,
+    settings: &RenderSettings,
+    camera: &Camera,
+    observer: &dyn Observer,
+) -> Result<Rendering, RenderError> {
+    let start = Instant::now();
+    let chips = cards::reference_chips(&settings.cards)?;
+    settings.check(&REFERENCE)?;
+    let mut film = Film::new(settings.width, settings.height, settings.window())?;
+    let mut times = Times::default();
+    let prepared = prepare(scene, settings, std::iter::once(REFERENCE), &mut times, observer)?;
+    let frame = settings.frame(camera, prepared.max_distance);
+    let tiles = tiles(settings.window(), settings.tile, settings.order);
+    let progress = |done: u64, total: u64| {
+        observer.progress(Phase::Tiles, done, total);
+        !observer.is_stopped()
+    };
+    let begun = Instant::now();
+    let counters = render_along_curve(&prepared.image, &frame, &tiles, chips, &mut film, &progress)?;
+    times.render = begun.elapsed().as_secs_f64();
+    times.total = start.elapsed().as_secs_f64();
+    let outcome = Outcome { counters, cards: chips, render_seconds: times.render, ..Outcome::default() };
+    let statistics = statistics(settings, &frame, &prepared, &outcome, times);
+    Ok(Rendering { film, statistics })
+}
+
 fn prepare(
     scene: &Scene,
     settings: &RenderSettings,
-    cards: &Cards,
+    budgets: impl Iterator<Item = Budget>,
     times: &mut Times,
     observer: &dyn Observer,
 ) -> Result<MappedImage, RenderError> {
     let start = Instant::now();
     let packed = PackedScene::new(scene, &Emitters::new(scene))?;
-    for budget in cards.budgets() {
-        packed.check_budget(settings.photons, budget)?;
+    for budget in budgets {
+        packed.check_budget(settings.photons, &budget)?;
     }
     let total = settings.photons as u64;
     let progress = |stored: usize| {
@@ -151,8 +185,16 @@ fn statistics(
         max_distance: frame.max_distance,
         cards: outcome.cards,
         time_s,
-        rays: Rays { eye: counters.eye_rays, shadow: counters.shadow_rays, gather: counters.gather_rays },
+        rays: Rays {
+            eye: counters.eye_rays,
+            shadow: counters.shadow_rays,
+            gather: counters.gather_rays,
+            survey: counters.survey_rays,
+        },
         gathers: counters.gathers,
+        tables: counters.tables,
+        records: counters.records,
+        interpolated_share: counters.interpolated_samples as f64 / counters.lambertian_samples.max(1) as f64,
         photons_tested: counters.photons_tested,
         photons_found: counters.photons_found,
         image_bytes: prepared.image.bytes(),

@@ -1,9 +1,10 @@
 //! What a render is asked to do.
 
 use glam::Vec3;
-use photoncard_firmware::card::MAX_PICTURE_SIDE;
-use photoncard_shared::budget::Budget;
-use photoncard_shared::message::{self, FrameParameters};
+use photoncard_firmware::card::{LEAST_IRRADIANCE_ERROR, MAX_PICTURE_SIDE};
+use photoncard_firmware::importance::ENTRIES;
+use photoncard_shared::budget::{Budget, MOST_BINS};
+use photoncard_shared::message::{self, FrameParameters, Sampling};
 
 use super::{CardAddress, RenderError};
 use crate::film::Window;
@@ -38,9 +39,13 @@ pub struct RenderSettings {
     pub samples: u32,
     /// Side of a tile, pixels.
     pub tile: u32,
+    /// What the directions of gather rays are chosen by.
+    pub sampling: Sampling,
+    /// The relative error that interpolated irradiance may have; `None` to interpolate none.
+    pub irradiance_error: Option<f32>,
     /// Order of the photon gathers.
     pub order: GatherOrder,
-    /// Direction bins of the gather rays, where the order has any; `None` for a bin a ray.
+    /// Direction bins of the gather rays, where the order has any; `None` for the default.
     pub bins: Option<u32>,
     /// Gathers that may wait on a chip, where the order lets any; `None` for as many as it has room for.
     pub queue: Option<u32>,
@@ -64,6 +69,8 @@ impl Default for RenderSettings {
             shadow_rays: 8,
             samples: 1,
             tile: 16,
+            sampling: Sampling::Reflection,
+            irradiance_error: None,
             order: GatherOrder::Sort,
             bins: None,
             queue: None,
@@ -71,6 +78,9 @@ impl Default for RenderSettings {
         }
     }
 }
+
+/// Direction bins: three to an entry of the table that directions are sampled by.
+const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 
 /// Photons that can be asked for.
 const MAX_PHOTONS: usize = 1 << 27;
@@ -104,9 +114,19 @@ impl RenderSettings {
         within("--gather-rays", self.gather_rays as u64, 0, budget.gather_rays as u64)?;
         within("--shadow-rays", self.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
         within("--spp", self.samples as u64, 1, budget.samples as u64)?;
-        within("--bins", self.bins.unwrap_or(1) as u64, 1, budget.gather_rays as u64)?;
+        within("--bins", self.bins.unwrap_or(1) as u64, 1, MOST_BINS as u64)?;
         within("--queue", self.queue.unwrap_or(1) as u64, 1, budget.gather_queue as u64)?;
         within("--tile", self.tile as u64, 1, budget.tile_pixels.isqrt() as u64)?;
+        if let Some(error) = self.irradiance_error
+            && !(error.is_finite() && error >= LEAST_IRRADIANCE_ERROR)
+        {
+            return Err(RenderError::Setting {
+                option: "--ic-error",
+                value: error.to_string(),
+                reason: format!("an error is a share of the irradiance, {LEAST_IRRADIANCE_ERROR} or more"),
+                remedy: "give a number such as 0.025".into(),
+            });
+        }
         match self.max_distance {
             Some(distance) if !(distance.is_finite() && distance > 0.0) => Err(RenderError::Setting {
                 option: "--max-distance",
@@ -140,7 +160,9 @@ impl RenderSettings {
             shadow_rays: self.shadow_rays,
             neighbors: self.neighbors,
             max_distance,
-            bins: if self.order.has_bins() { self.bins.unwrap_or(self.gather_rays).max(1) } else { 1 },
+            sampling: self.sampling,
+            irradiance_error: self.irradiance_error,
+            bins: if self.order.has_bins() { self.bins.unwrap_or(DEFAULT_BINS) } else { 1 },
             drain: self.order.drain(),
             queue: self.queue.unwrap_or(u32::MAX),
         }

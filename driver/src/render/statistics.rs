@@ -25,6 +25,12 @@ pub struct Statistics {
     pub rays: Rays,
     /// Searches of the photon map.
     pub gathers: u64,
+    /// Those of them that made a table of directions.
+    pub tables: u64,
+    /// Irradiance records gathered; one that two tiles use counts twice.
+    pub records: u64,
+    /// Of the samples that see a surface with a Lambertian part, the share whose irradiance was interpolated.
+    pub interpolated_share: f64,
     /// Photons whose distance was computed.
     pub photons_tested: u64,
     /// Photons that the searches returned.
@@ -64,6 +70,8 @@ pub struct Rays {
     pub shadow: u64,
     /// Final gather rays.
     pub gather: u64,
+    /// Around irradiance records.
+    pub survey: u64,
 }
 
 /// Bytes over all links.

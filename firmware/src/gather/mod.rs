@@ -5,17 +5,15 @@
 //! neighbours together, the photons of one gather are still in the cache for the next (Steinhurst, Coombe, Lastra 2005,
 //! *Reordering for cache conscious photon mapping*):
 //!
-//! - *generative* reordering ([`DirectionBins`]) casts the rays of one bundle of directions for all pixels of a tile
-//!   before those of the next;
+//! - *generative* reordering casts the rays of one bin of directions ([`crate::importance::DirectionTable::rays`]) for
+//!   all pixels of a tile before those of the next;
 //! - *deferred* reordering ([`GatherQueue`]) lets requests wait, and does them by a hash of their place or along a
 //!   Hilbert curve.
 
-mod direction_bins;
 mod order;
 mod queue;
 mod request;
 
-pub use direction_bins::DirectionBins;
 pub use order::{KeyScale, hilbert_index};
 pub use queue::GatherQueue;
 pub use request::{GatherRequest, PartialReflection};

@@ -24,6 +24,9 @@ pub struct KeyScale {
 }
 
 impl KeyScale {
+    /// A scale of which every place is in the first cell.
+    pub const POINT: Self = Self { lower: Vec3::ZERO, inverse_size: Vec3::ZERO };
+
     /// Of the box of all children of the root.
     pub fn new(root: &BvhNode) -> Self {
         let lower = root.lower.map(|corners| corners.into_iter().fold(f32::INFINITY, min));

@@ -91,8 +91,10 @@ pub struct GatherRequest {
     pub position: [f32; 3],
     /// The reflection, times the gather ray's weight, from photon power units to radiance units.
     pub reflection: PartialReflection,
-    /// Index of the pixel in its tile.
-    pub pixel: u16,
+    /// Whose sum it is: the number of a gather point on the chip.
+    pub target: u16,
+    /// The cell of the hemisphere above the gather point that the ray went through.
+    pub cell: u8,
 }
 
 const _: () = assert!(size_of::<PartialReflection>() == 13);

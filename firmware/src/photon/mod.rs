@@ -6,4 +6,4 @@ mod radiance;
 
 pub use kdtree::gather;
 pub use nearest::{Candidate, NearestPhotons};
-pub use radiance::{MIN_NORMAL_COSINE, reflected_radiance};
+pub use radiance::{MIN_NORMAL_COSINE, SameSurface, reflected_radiance};

@@ -73,6 +73,12 @@ impl Candidate {
     pub fn disc(&self) -> u8 {
         Photon::disc_of_flags(self.flags())
     }
+
+    /// Whether the photon came straight from an emitter.
+    #[inline(always)]
+    pub fn is_direct(&self) -> bool {
+        Photon::direct_of_flags(self.flags())
+    }
 }
 
 /// The nearest photons found so far, in a buffer that someone else owns.

@@ -16,7 +16,7 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_shared::layout::decode_normal;
+use photoncard_shared::layout::{FULL_DISC, decode_normal};
 
 use super::{Candidate, NearestPhotons};
 use crate::fixed_point::ColourSum;
@@ -55,7 +55,7 @@ pub fn reflected_radiance(nearest: &NearestPhotons, request: &GatherRequest) -> 
         sums.add(candidate);
     }
     let Some(closest) = closest else { return Vec3::ZERO };
-    let fraction = (closest.disc() as f32 + 1.0) * (1.0 / 64.0);
+    let fraction = (closest.disc() as f32 + 1.0) * (1.0 / (FULL_DISC as f32 + 1.0));
     let least = MIN_RADIUS_SHARE * crate::scene::magnitude(&[request.position.into()]);
     let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
     sums.reflected() * (1.0 / area)
@@ -92,19 +92,21 @@ impl<'a> Sums<'a> {
 }
 
 /// Tells the photons of one surface; neighbours mostly have the normal of the one before.
-struct SameSurface {
+pub struct SameSurface {
     normal: Vec3,
     last: (u8, bool),
 }
 
 impl SameSurface {
     #[inline(always)]
-    fn new(code: u8) -> Self {
+    /// Photons whose surface normal is near the one that this code stands for.
+    pub fn new(code: u8) -> Self {
         Self { normal: unit(decode_normal(code).into()), last: (code, true) }
     }
 
     #[inline(always)]
-    fn holds(&mut self, code: u8) -> bool {
+    /// Whether a photon of this normal's code is one.
+    pub fn holds(&mut self, code: u8) -> bool {
         if self.last.0 != code {
             let other = unit(decode_normal(code).into());
             self.last = (code, other.dot(self.normal) >= MIN_NORMAL_COSINE);

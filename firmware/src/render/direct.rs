@@ -4,12 +4,18 @@
 //! distance; gather rays alone where it is small. Both are there in any case, and the balance heuristic (Veach, Guibas
 //! 1995) takes from each what it does best: a path found with `n` rays of density `p` one way and `m` of density `q`
 //! the other counts `n p / (n p + m q)`. The two weights of a path sum to 1, so that direct light is counted once.
+//!
+//! An irradiance record shares its rays' part with samples around it, whose shadow rays bring the rest. The weights
+//! between the two are made for that: with the cosine's density in place of the record's own, which a sample could not
+//! know, with the shadow rays of all samples of a pixel, and by the power heuristic, as the noise of a record shows as
+//! a blotch: light of small emitters is left to shadow rays, that of a sky to records.
+
+use core::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
 
-use super::{Context, PixelSample};
-use crate::importance::reflection_density;
+use super::{Context, GatherPoint, PixelSample, Purpose};
 use crate::memory::MemoryPort;
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{
@@ -20,27 +26,27 @@ use crate::vector::max_component;
 /// A shadow ray ends this share short of its target, for the rounding of its length.
 const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
 
-/// Radiance, W/(sr m^2), that `surface` reflects of the light that emitters send it directly: the shadow rays' share.
+/// Radiance, W/(sr m^2), that a point reflects of the light that emitters send it directly: the shadow rays' share.
 ///
 /// # Errors
 /// If the image is not sound.
 pub fn reflected<M: MemoryPort>(
     context: &mut Context<M>,
     pixel: PixelSample,
-    surface: &Surface,
+    point: &GatherPoint,
 ) -> Result<Vec3, Fault> {
-    if surface.reflection.is_black() || context.frame.shadow_rays == 0 {
+    if point.surface.reflection.is_black() || context.frame.shadow_rays == 0 {
         return Ok(Vec3::ZERO);
     }
     let frame = context.frame;
     let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, pixel.sample, Dimension::Emitter);
     let mut sum = Vec3::ZERO;
     for index in 0..frame.shadow_rays {
-        let point = pattern.point(index, frame.shadow_rays);
-        let Some(target) = sample_emitter(context.scene, context.memory, point)? else {
+        let place = pattern.point(index, frame.shadow_rays);
+        let Some(target) = sample_emitter(context.scene, context.memory, place)? else {
             return Ok(Vec3::ZERO);
         };
-        sum += from_emitter(context, surface, &target)?;
+        sum += from_emitter(context, point, &target)?;
     }
     Ok(sum / frame.shadow_rays as f32)
 }
@@ -48,9 +54,10 @@ pub fn reflected<M: MemoryPort>(
 /// What one point on an emitter adds, over its probability density.
 fn from_emitter<M: MemoryPort>(
     context: &mut Context<M>,
-    surface: &Surface,
+    point: &GatherPoint,
     target: &EmitterSample,
 ) -> Result<Vec3, Fault> {
+    let surface = &point.surface;
     let origin = surface.offset_origin();
     let away = origin - target.position;
     let is_front = target.normal.dot(away) > 0.0;
@@ -73,37 +80,80 @@ fn from_emitter<M: MemoryPort>(
     if is_occluded(context.scene, context.memory, &ray)? {
         return Ok(Vec3::ZERO);
     }
-    let reflection = surface.reflection.evaluate(surface.normal, surface.outgoing, direction);
     let geometry = cosine * emitter_cosine / (distance_squared * target.density);
     let area_density = emitter_density(context.scene, target.emission, target.double_sided);
     let density = area_density * distance_squared / emitter_cosine;
+    let reflector = point.reflector();
     let weight = balance(
         (context.frame.shadow_rays, density),
-        (context.frame.gather_rays, reflection_density(surface, direction)),
+        (point.rays, point.directions.density(&reflector, direction)),
     );
-    Ok(reflection * target.emission * (geometry * weight))
+    let shared = reflector.reflection.evaluate(surface.normal, surface.outgoing, direction);
+    let mut reflected = shared * weight;
+    if point.purpose == Purpose::Lobe {
+        let by_records = power(shadow_rays_for_records(context, density), rays_of_record(context, cosine));
+        reflected += surface.reflection.lambertian() * by_records;
+    }
+    Ok(reflected * target.emission * geometry)
 }
 
-/// The radiance that a gather ray brings straight from an emitter that it has met, with its weight against the shadow
-/// rays. `gather_density` is the ray's own probability density, 1/sr.
+/// The radiance that a gather ray of a point brings straight from an emitter that it has met, with its weight against
+/// the shadow rays. `gather_density` is the ray's own probability density, 1/sr.
 #[inline(always)]
-pub fn seen_by_gather_ray<M>(context: &Context<M>, ray: &Ray, met: &Surface, gather_density: f32) -> Vec3 {
+pub fn seen_by_gather_ray<M>(
+    context: &Context<M>,
+    point: &GatherPoint,
+    ray: &Ray,
+    met: &Surface,
+    gather_density: f32,
+) -> Vec3 {
     if max_component(met.emission) <= 0.0 {
         return Vec3::ZERO;
     }
     let emitter_cosine = -met.normal.dot(ray.direction);
     let area_density = emitter_density(context.scene, met.emission, met.double_sided);
     let density = area_density * (met.distance * met.distance) / emitter_cosine;
-    met.emission * balance((context.frame.gather_rays, gather_density), (context.frame.shadow_rays, density))
+    let weight = if point.purpose == Purpose::Record {
+        let cosine = point.surface.normal.dot(ray.direction);
+        power(rays_of_record(context, cosine), shadow_rays_for_records(context, density))
+    } else {
+        balance((point.rays, gather_density), (context.frame.shadow_rays, density))
+    };
+    met.emission * weight
 }
 
-/// The weight of the first of two ways to find a path, each with its number of rays and its density.
+/// The rays of a record, and the density of one as its samples see it, 1/sr.
 #[inline(always)]
-fn balance((rays, density): (u32, f32), (other_rays, other_density): (u32, f32)) -> f32 {
-    if other_rays == 0 {
-        return 1.0;
+fn rays_of_record<M>(context: &Context<M>, cosine: f32) -> (u32, f32) {
+    (context.frame.gather_rays, cosine * FRAC_1_PI)
+}
+
+/// The shadow rays that share direct light with the rays of records, and the density of one, 1/sr.
+#[inline(always)]
+fn shadow_rays_for_records<M>(context: &Context<M>, density: f32) -> (u32, f32) {
+    (context.frame.shadow_rays * context.frame.samples, density)
+}
+
+/// The weight of the first of two ways to find a path, each with its number of rays and its density: the balance
+/// heuristic.
+#[inline(always)]
+fn balance(way: (u32, f32), other: (u32, f32)) -> f32 {
+    1.0 / (1.0 + ratio(other, way))
+}
+
+/// The same by the power heuristic with the exponent 2.
+#[inline(always)]
+fn power(way: (u32, f32), other: (u32, f32)) -> f32 {
+    let ratio = ratio(other, way);
+    1.0 / (1.0 + ratio * ratio)
+}
+
+/// How many times more of a path's samples are found one way than the other; a way without rays finds none.
+#[inline(always)]
+fn ratio((rays, density): (u32, f32), (other_rays, other_density): (u32, f32)) -> f32 {
+    if rays == 0 {
+        return 0.0;
     }
-    // Divided first: a density may be infinite at a grazing angle, and the weight is then 1 or 0.
-    let ratio = (other_rays as f32 * other_density) / (rays as f32 * density);
-    1.0 / (1.0 + ratio)
+    // Divided first: a density may be infinite at a grazing angle, and the ratio is then as well, or 0.
+    (rays as f32 * density) / (other_rays as f32 * other_density)
 }

@@ -9,12 +9,21 @@ use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Ray, Surface, closest_hit, read_surface};
 use crate::vector::unit;
 
-/// The surface that a sample sees. The samples of a pixel are stratified over its square (a box filter).
+/// The place of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over
+/// its square (a box filter).
+pub fn place<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
+    let PixelSample { x, y, sample } = pixel;
+    let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Pixel);
+    let [jitter_x, jitter_y] = pattern.point(sample, context.frame.samples);
+    [x as f32 + jitter_x, y as f32 + jitter_y]
+}
+
+/// The surface that is seen at a place of the picture.
 ///
 /// # Errors
 /// If the image is not sound.
-pub fn see<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Option<Surface>, Fault> {
-    let ray = eye_ray(context, pixel);
+pub fn see<M: MemoryPort>(context: &mut Context<M>, place: [f32; 2]) -> Result<Option<Surface>, Fault> {
+    let ray = eye_ray(context, place);
     context.counters.eye_rays += 1;
     match closest_hit(context.scene, context.memory, &ray)? {
         Some(hit) => read_surface(context.scene, context.memory, &ray, &hit).map(Some),
@@ -22,16 +31,20 @@ pub fn see<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resul
     }
 }
 
-fn eye_ray<M>(context: &Context<M>, PixelSample { x, y, sample }: PixelSample) -> Ray {
+fn eye_ray<M>(context: &Context<M>, [x, y]: [f32; 2]) -> Ray {
     let frame = context.frame;
-    let [jitter_x, jitter_y] =
-        Pattern::new(frame.seed, x, y, 0, Dimension::Pixel).point(sample, frame.samples);
-    let u = (x as f32 + jitter_x) / frame.width as f32;
-    let v = (y as f32 + jitter_y) / frame.height as f32;
+    let [u, v] = [x / frame.width as f32, y / frame.height as f32];
     let camera = &frame.camera;
     let [forward, right, up] = [camera.forward, camera.right, camera.up].map(Vec3::from_array);
     let direction = forward + right * (2.0 * u - 1.0) + up * (1.0 - 2.0 * v);
     Ray::new(camera.origin.into(), unit(direction))
+}
+
+/// The side of a pixel at the depth of a surface, metres.
+pub fn pixel_side<M>(context: &Context<M>, surface: &Surface) -> f32 {
+    let frame = context.frame;
+    let up = libm::sqrtf(Vec3::from_array(frame.camera.up).length_squared());
+    depth(context, surface) * up * 2.0 / frame.height as f32
 }
 
 /// Distance of a surface along the view's axis, metres.

@@ -3,10 +3,14 @@
 pub mod direct;
 pub mod eye;
 pub mod final_gather;
+mod point;
+
+pub use point::{GatherPoint, Purpose};
 
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::FrameParameters;
 
+use crate::gather::GatherRequest;
 use crate::scene::SceneImage;
 
 /// What every stage needs: the scene in its memory, the frame, and what is counted.
@@ -19,6 +23,14 @@ pub struct Context<'a, M> {
     pub frame: &'a FrameParameters,
     /// What is counted.
     pub counters: &'a mut Counters,
+    /// Who does the gathers of pixels, if it is not the chip.
+    pub outlet: Option<&'a mut dyn GatherOutlet>,
+}
+
+/// Takes the gathers of pixels from a chip: a host that has room for those of a whole frame.
+pub trait GatherOutlet {
+    /// Takes a gather with the key of its order; its target is the pixel's number in the tile.
+    fn take(&mut self, key: u32, request: GatherRequest);
 }
 
 /// One sample of one pixel: what random numbers depend on.

@@ -9,11 +9,14 @@ use super::{Record, read_vector, write_vector};
 /// | 0..12 | position, metres |
 /// | 12..16 | power, [`Rgbe`], in units of the image's photon power unit |
 /// | 16..18 | direction towards where the photon came from, [`super::encode_direction`] |
-/// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-15 disc fraction |
+/// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-14 disc fraction, 15 direct |
 ///
 /// The *disc fraction* is how much of the flat disc around the photon, of its gather's radius, is surface that the
-/// photon's own surface continues to: `(code + 1) / 64`. A gather divides by that part of the disc's area, which keeps
+/// photon's own surface continues to: `(code + 1) / 32`. A gather divides by that part of the disc's area, which keeps
 /// the density estimate right at edges and in corners.
+///
+/// A *direct* photon came straight from an emitter: it counts like any other where a final gather ray ends, but says
+/// nothing of where indirect light comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
     /// Where the photon arrived, metres.
@@ -28,10 +31,12 @@ pub struct Photon {
     pub normal: u8,
     /// Code of the disc fraction, 0 to [`FULL_DISC`].
     pub disc: u8,
+    /// Whether it came straight from an emitter.
+    pub direct: bool,
 }
 
 /// The disc fraction's code of a whole disc.
-pub const FULL_DISC: u8 = 63;
+pub const FULL_DISC: u8 = 31;
 
 impl Record for Photon {
     const BYTES: usize = 20;
@@ -49,6 +54,7 @@ impl Photon {
             axis: Self::axis_of_flags(flags),
             normal: Self::normal_of_flags(flags),
             disc: Self::disc_of_flags(flags),
+            direct: Self::direct_of_flags(flags),
         }
     }
 
@@ -79,7 +85,13 @@ impl Photon {
     /// The disc fraction's code in the flags.
     #[inline(always)]
     pub fn disc_of_flags(flags: u16) -> u8 {
-        (flags >> 10) as u8
+        (flags >> 10 & FULL_DISC as u16) as u8
+    }
+
+    /// Whether the photon came straight from an emitter.
+    #[inline(always)]
+    pub fn direct_of_flags(flags: u16) -> bool {
+        flags >> 15 != 0
     }
 
     /// The record's bytes.
@@ -88,8 +100,10 @@ impl Photon {
         write_vector(&mut bytes, 0, self.position);
         bytes[12..16].copy_from_slice(&self.power.0);
         bytes[16..18].copy_from_slice(&self.direction);
-        let flags =
-            (self.axis & 3) as u16 | (self.normal as u16) << 2 | (self.disc.min(FULL_DISC) as u16) << 10;
+        let flags = (self.axis & 3) as u16
+            | (self.normal as u16) << 2
+            | (self.disc.min(FULL_DISC) as u16) << 10
+            | (self.direct as u16) << 15;
         bytes[18..20].copy_from_slice(&flags.to_le_bytes());
         bytes
     }
@@ -156,7 +170,8 @@ mod tests {
             direction: [3, 200],
             axis: 2,
             normal: 0xa5,
-            disc: 41,
+            disc: 21,
+            direct: true,
         };
         assert_eq!(Photon::read(&photon.to_bytes()), photon);
     }

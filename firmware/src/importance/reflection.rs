@@ -1,4 +1,4 @@
-//! Which way a final gather ray goes: importance sampling of the reflection function.
+//! The reflection function's own sampling, for the paths of photons.
 //!
 //! A point of the unit square becomes a direction. The map keeps neighbours together, so that a stratified pattern
 //! stays stratified on the hemisphere. A surface with a Phong lobe is sampled by a mixture of both parts, and the
@@ -12,25 +12,22 @@ use glam::Vec3;
 use crate::scene::{Reflection, Surface, mirror};
 use crate::vector::{from_frame, max, max_component};
 
-/// A direction and what the radiance from there counts.
+/// A direction that is reflected to, and how much is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GatherDirection {
+pub struct ReflectedDirection {
     /// Unit vector away from the surface.
     pub direction: Vec3,
-    /// `f cos(theta) / p`, without unit: what the radiance from this direction is multiplied with.
+    /// `f cos(theta) / p`, without unit: what arrived is multiplied with it.
     pub weight: Vec3,
-    /// Probability density of the direction, 1/sr.
-    pub density: f32,
 }
 
 /// The direction that belongs to a point of the unit square; `None` below the surface, where the weight is zero.
-pub fn sample_reflection(surface: &Surface, [u, v]: [f32; 2]) -> Option<GatherDirection> {
+pub fn sample_reflection(surface: &Surface, [u, v]: [f32; 2]) -> Option<ReflectedDirection> {
     let reflection = &surface.reflection;
     let diffuse_share = diffuse_share(reflection);
     if diffuse_share >= 1.0 {
         let direction = cosine_direction(surface.normal, [u, v]);
-        let density = surface.normal.dot(direction) * FRAC_1_PI;
-        return Some(GatherDirection { direction, weight: reflection.diffuse, density });
+        return Some(ReflectedDirection { direction, weight: reflection.diffuse });
     }
     let mirror = mirror(surface.outgoing, surface.normal);
     let direction = if v < diffuse_share {
@@ -47,19 +44,7 @@ pub fn sample_reflection(surface: &Surface, [u, v]: [f32; 2]) -> Option<GatherDi
     let density = mixture_density(reflection, diffuse_share, cosine, power);
     let lobe = reflection.specular * ((reflection.exponent + 2.0) * 0.5 * FRAC_1_PI * power);
     let weight = (reflection.lambertian() + lobe) * (cosine / density);
-    (density > 0.0).then_some(GatherDirection { direction, weight, density })
-}
-
-/// The probability density, 1/sr, with which [`sample_reflection`] chooses a direction on the side of the normal.
-pub fn reflection_density(surface: &Surface, direction: Vec3) -> f32 {
-    let reflection = &surface.reflection;
-    let cosine = surface.normal.dot(direction);
-    let diffuse_share = diffuse_share(reflection);
-    if diffuse_share >= 1.0 {
-        return cosine * FRAC_1_PI;
-    }
-    let mirror = mirror(surface.outgoing, surface.normal);
-    mixture_density(reflection, diffuse_share, cosine, lobe_power(reflection, mirror, direction))
+    (density > 0.0).then_some(ReflectedDirection { direction, weight })
 }
 
 /// `max(0, cos alpha)^n`.
@@ -97,7 +82,7 @@ fn cosine_direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
 
 /// A direction of density `(n + 1) / (2 pi) cos(alpha)^n` about an axis.
 #[inline(always)]
-fn lobe_direction(axis: Vec3, exponent: f32, [u, v]: [f32; 2]) -> Vec3 {
+pub(super) fn lobe_direction(axis: Vec3, exponent: f32, [u, v]: [f32; 2]) -> Vec3 {
     let cosine = libm::powf(1.0 - v, 1.0 / (exponent + 1.0));
     let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
     let angle = 2.0 * PI * u;
@@ -174,7 +159,6 @@ mod tests {
             if let Some(direction) = sample_reflection(&surface, point) {
                 assert!(direction.weight.x <= 0.9 * 2.0, "{direction:?}");
                 assert!((direction.direction.length() - 1.0).abs() < 1e-4);
-                assert_eq!(direction.density, reflection_density(&surface, direction.direction));
             }
         }
     }

@@ -1,13 +1,15 @@
 //! Emulated cards: the firmware on threads of this process, one chip a thread, each on a loopback link.
 
+pub mod whole_frame;
+
 use std::thread::JoinHandle;
 
 use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard, REFERENCE_SRAM_BYTES, ReferenceCard};
-use photoncard_firmware::chip::sram_bytes;
+use photoncard_firmware::chip::{MicroChip, ReferenceChip, sram_bytes};
 use photoncard_firmware::memory::{CardMemory, MemoryPort};
 use photoncard_firmware::serve::serve;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::budget::{MICRO, REFERENCE};
+use photoncard_shared::budget::{MICRO, REFERENCE, TechniqueMemory};
 use photoncard_shared::message::{Fault, FaultCode};
 
 use crate::link::{LoopbackPort, loopback};
@@ -27,6 +29,14 @@ impl ChipKind {
         match self {
             Self::Reference => REFERENCE_SRAM_BYTES,
             Self::Micro => MICRO_SRAM_BYTES,
+        }
+    }
+
+    /// On-chip memory that each technique adds, bytes.
+    pub fn techniques(self) -> TechniqueMemory {
+        match self {
+            Self::Reference => ReferenceChip::TECHNIQUES,
+            Self::Micro => MicroChip::TECHNIQUES,
         }
     }
 

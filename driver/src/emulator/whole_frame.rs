@@ -1,0 +1,222 @@
+//! All gathers of a frame along one Hilbert curve: the bound that the orders of a chip are compared with.
+//!
+//! No chip can do it: the gathers of a frame are gigabytes. The emulated chips hand theirs to the host, which sorts them
+//! and has them done when all rays are cast (Steinhurst, Coombe, Lastra 2005). Irradiance records are needed before the
+//! pixels and stay on the chips.
+
+use glam::Vec3;
+use photoncard_firmware::chip::{PixelSum, Progress, ReferenceChip};
+use photoncard_firmware::gather::GatherRequest;
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::photon::Candidate;
+use photoncard_firmware::render::final_gather::gathered;
+use photoncard_firmware::render::{Context, GatherOutlet};
+use photoncard_firmware::scene::SceneImage;
+use photoncard_shared::budget::{REFERENCE, gather_candidates};
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{Fault, FrameParameters, Tile};
+use rayon::prelude::*;
+
+use crate::film::{Film, FilmError};
+use crate::pack::CardImage;
+
+/// The most gathers that are kept at once, 36 bytes each.
+const MOST_GATHERS: u64 = 1 << 28;
+/// Tiles of which rays are cast before the host looks around.
+const TILES_PER_ROUND: usize = 64;
+/// Gathers that one task does.
+const GATHERS_PER_TASK: usize = 4096;
+/// Gathers that are done before the host looks around.
+const GATHERS_PER_ROUND: usize = 256 * GATHERS_PER_TASK;
+/// Stack of a chip's thread: its buffers are built there before they move to the heap.
+const THREAD_STACK: usize = 8 << 20;
+
+/// Why a frame was not rendered.
+#[derive(Debug, thiserror::Error)]
+pub enum FrameError {
+    /// It might have more gathers than can be kept.
+    #[error("the frame may have {gathers} gathers, and at most {MOST_GATHERS} are kept at once")]
+    TooManyGathers {
+        /// Rays over pixels and samples.
+        gathers: u64,
+    },
+    /// The image is not sound.
+    #[error("the image is not sound: fault {:?} ({})", .0.code, .0.detail)]
+    Image(Fault),
+    /// The system has no threads.
+    #[error("the chips could not be started: {0}")]
+    Start(#[from] rayon::ThreadPoolBuildError),
+    /// A tile is not in the film.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    /// It was stopped.
+    #[error("stopped before the picture was complete")]
+    Stopped,
+}
+
+impl From<Fault> for FrameError {
+    fn from(fault: Fault) -> Self {
+        Self::Image(fault)
+    }
+}
+
+/// A gather on its way along the curve.
+#[derive(Clone, Copy)]
+struct Waiting {
+    key: u32,
+    /// Index in the frame's sums.
+    sum: u32,
+    request: GatherRequest,
+}
+
+/// The sums of a frame's pixels, tile after tile, and the gathers that are still to be added.
+#[derive(Default)]
+struct Frame {
+    sums: Vec<PixelSum>,
+    waiting: Vec<Waiting>,
+    counters: Counters,
+}
+
+/// What one tile leaves to the host.
+struct CastTile {
+    sums: Vec<PixelSum>,
+    waiting: Vec<(u32, GatherRequest)>,
+    counters: Counters,
+}
+
+/// Takes the gathers of a chip.
+struct Outlet(Vec<(u32, GatherRequest)>);
+
+impl GatherOutlet for Outlet {
+    fn take(&mut self, key: u32, request: GatherRequest) {
+        self.0.push((key, request));
+    }
+}
+
+/// Renders tiles into a film on so many emulated reference chips. `progress` is told how much of the work is done, of
+/// how much, and says whether to go on.
+///
+/// # Errors
+/// If the frame has too many gathers, the image is not sound, or `progress` says no.
+pub fn render_along_curve(
+    image: &CardImage,
+    frame: &FrameParameters,
+    tiles: &[Tile],
+    chips: usize,
+    film: &mut Film,
+    progress: &(dyn Fn(u64, u64) -> bool + Sync),
+) -> Result<Counters, FrameError> {
+    let pixels: u64 = tiles.iter().map(Tile::pixels).sum();
+    let gathers = pixels * frame.samples as u64 * frame.gather_rays as u64;
+    if gathers > MOST_GATHERS || pixels > u32::MAX as u64 {
+        return Err(FrameError::TooManyGathers { gathers });
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(chips).stack_size(THREAD_STACK).build()?;
+    let mut all = Frame::default();
+    // Casting is counted as one part, gathering as nine.
+    let steps = tiles.len() as u64 * 10;
+    for (round, tiles) in tiles.chunks(TILES_PER_ROUND).enumerate() {
+        all.add(pool.install(|| cast_tiles(image, frame, tiles))?);
+        if !progress((round * TILES_PER_ROUND) as u64, steps) {
+            return Err(FrameError::Stopped);
+        }
+    }
+    pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.key));
+    let mut done = 0;
+    for waiting in all.waiting.chunks(GATHERS_PER_ROUND) {
+        let (brought, counters) = pool.install(|| do_gathers(image, frame, waiting))?;
+        all.counters.add(&counters);
+        for (sum, brought) in brought {
+            all.sums[sum as usize].add_gathered(brought);
+        }
+        done += waiting.len() as u64;
+        let gathered = tiles.len() as u64 * 9 * done / all.waiting.len() as u64;
+        if !progress(tiles.len() as u64 + gathered, steps) {
+            return Err(FrameError::Stopped);
+        }
+    }
+    let (scene, _) = image.view();
+    let places = tiles.iter().flat_map(|tile| {
+        (0..tile.height).flat_map(move |y| (0..tile.width).map(move |x| (tile.x + x, tile.y + y)))
+    });
+    for (sum, (x, y)) in all.sums.iter().zip(places) {
+        film.write(x, y, sum.pixel(&scene, frame))?;
+    }
+    Ok(all.counters)
+}
+
+impl Frame {
+    fn add(&mut self, tiles: Vec<CastTile>) {
+        for tile in tiles {
+            let first = self.sums.len() as u32;
+            self.sums.extend(tile.sums);
+            self.counters.add(&tile.counters);
+            let waiting = tile.waiting.into_iter();
+            self.waiting.extend(waiting.map(|(key, request)| Waiting {
+                key,
+                sum: first + request.target as u32,
+                request,
+            }));
+        }
+    }
+}
+
+fn cast_tiles(image: &CardImage, frame: &FrameParameters, tiles: &[Tile]) -> Result<Vec<CastTile>, Fault> {
+    let new_chip = || Box::new(ReferenceChip::new());
+    tiles.par_iter().map_init(new_chip, |chip, &tile| cast(chip, image.view(), frame, tile)).collect()
+}
+
+/// Casts all rays of a tile.
+fn cast(
+    chip: &mut ReferenceChip,
+    (scene, mut memory): (SceneImage, Lines),
+    frame: &FrameParameters,
+    tile: Tile,
+) -> Result<CastTile, Fault> {
+    let mut counters = Counters::ZERO;
+    let mut outlet = Outlet(Vec::new());
+    let mut context = Context {
+        scene: &scene,
+        memory: &mut memory,
+        frame,
+        counters: &mut counters,
+        outlet: Some(&mut outlet),
+    };
+    chip.begin_frame(&mut context)?;
+    let tile_fault = Fault { code: photoncard_shared::message::FaultCode::Tile, detail: tile.id };
+    if !chip.begin(tile) {
+        return Err(tile_fault);
+    }
+    while chip.step(&mut context)? == Progress::Busy {}
+    let sums = (0..tile.pixels() as usize).map_while(|index| chip.sum(index).copied()).collect();
+    Ok(CastTile { sums, waiting: outlet.0, counters })
+}
+
+/// What came of some gathers: index of the sum, and what is added there.
+type Brought = Vec<(u32, Vec3)>;
+
+fn do_gathers(
+    image: &CardImage,
+    frame: &FrameParameters,
+    waiting: &[Waiting],
+) -> Result<(Brought, Counters), Fault> {
+    let task = |waiting: &[Waiting]| -> Result<(Brought, Counters), Fault> {
+        let (scene, mut memory) = image.view();
+        let mut counters = Counters::ZERO;
+        let mut context =
+            Context { scene: &scene, memory: &mut memory, frame, counters: &mut counters, outlet: None };
+        let mut candidates = heapless::Vec::<Candidate, { gather_candidates(REFERENCE.neighbors) }>::new();
+        let mut brought = Vec::with_capacity(waiting.len());
+        for Waiting { sum, request, .. } in waiting {
+            brought.push((*sum, gathered(&mut context, request, &mut candidates)?));
+        }
+        Ok((brought, counters))
+    };
+    let parts: Result<Vec<_>, Fault> = waiting.par_chunks(GATHERS_PER_TASK).map(task).collect();
+    let mut all = (Brought::with_capacity(waiting.len()), Counters::ZERO);
+    for (brought, counters) in parts? {
+        all.0.extend(brought);
+        all.1.add(&counters);
+    }
+    Ok(all)
+}

@@ -1,0 +1,102 @@
+//! The gathers of a chip: done at once, or waiting in the queue.
+
+use heapless::Vec;
+use photoncard_shared::message::{Drain, Fault, FrameParameters};
+
+use crate::gather::{GatherQueue, GatherRequest, KeyScale};
+use crate::memory::MemoryPort;
+use crate::photon::Candidate;
+use crate::render::Context;
+use crate::render::final_gather::gathered;
+
+/// The candidates of a gather, and the gathers that wait.
+pub(super) struct Gathers<const CANDIDATES: usize, const QUEUE: usize> {
+    pub(super) candidates: Vec<Candidate, CANDIDATES>,
+    queue: GatherQueue<QUEUE>,
+    key_scale: KeyScale,
+}
+
+/// Waiting gathers that one step does.
+const GATHERS_PER_STEP: usize = 64;
+
+impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
+    pub(super) const fn new() -> Self {
+        Self { candidates: Vec::new(), queue: GatherQueue::new(), key_scale: KeyScale::POINT }
+    }
+
+    pub(super) fn set_scale(&mut self, key_scale: KeyScale) {
+        self.key_scale = key_scale;
+    }
+
+    /// Drops what waits.
+    pub(super) fn clear(&mut self) {
+        self.queue.clear();
+    }
+
+    /// Whether none waits.
+    pub(super) fn is_empty(&self) -> bool {
+        self.queue.is_empty()
+    }
+
+    /// Whether waiting gathers are being done.
+    pub(super) fn is_draining(&self) -> bool {
+        self.queue.is_draining()
+    }
+
+    /// The place of a gather in the frame's order, if it comes now.
+    pub(super) fn key(&self, frame: &FrameParameters, request: &GatherRequest) -> u32 {
+        self.key_scale.key(frame.drain, request.position.into(), self.queue.len() as u32)
+    }
+
+    /// Does a gather at once, or lets it wait; a queue that is full is drained first. Every gather that was done goes
+    /// to `add`.
+    pub(super) fn submit<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+        request: GatherRequest,
+        add: &mut impl FnMut(&GatherRequest, glam::Vec3),
+    ) -> Result<(), Fault> {
+        let frame = context.frame;
+        if frame.drain == Drain::Immediate {
+            return self.gather(context, &request, add);
+        }
+        if self.queue.len() >= (frame.queue as usize).clamp(1, QUEUE) {
+            self.queue.begin_drain();
+            while self.queue.is_draining() {
+                self.drain(context, add)?;
+            }
+        }
+        let key = self.key(frame, &request);
+        match self.queue.push(key, request) {
+            Ok(()) => Ok(()),
+            Err(request) => self.gather(context, &request, add),
+        }
+    }
+
+    /// Does some of the gathers that wait.
+    pub(super) fn drain<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+        add: &mut impl FnMut(&GatherRequest, glam::Vec3),
+    ) -> Result<(), Fault> {
+        if !self.queue.is_draining() {
+            self.queue.begin_drain();
+        }
+        for _ in 0..GATHERS_PER_STEP {
+            let Some(request) = self.queue.take() else { break };
+            self.gather(context, &request, add)?;
+        }
+        Ok(())
+    }
+
+    fn gather<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+        request: &GatherRequest,
+        add: &mut impl FnMut(&GatherRequest, glam::Vec3),
+    ) -> Result<(), Fault> {
+        let brought = gathered(context, request, &mut self.candidates)?;
+        add(request, brought);
+        Ok(())
+    }
+}

@@ -1,0 +1,146 @@
+//! One chip: the state of a tile, and its stages.
+//!
+//! A tile is rendered in blocks, with the irradiance cache off in one. A block goes through the stages of `position`;
+//! every stage is done for all pixels before the next begins, so that gathers of neighbouring pixels come together. Each
+//! call of [`Chip::step`] is one small piece of it.
+
+mod gathers;
+mod pixels;
+mod position;
+mod records;
+
+use heapless::Vec;
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::budget::{Budget, MICRO, REFERENCE, TechniqueMemory, gather_candidates};
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::BvhNode;
+use photoncard_shared::message::{Fault, Tile};
+
+use self::gathers::Gathers;
+pub use self::pixels::PixelSum;
+use self::position::{Block, Position};
+use crate::gather::{GatherQueue, KeyScale};
+use crate::importance::DirectionTable;
+use crate::irradiance_cache::IrradianceCache;
+use crate::memory::MemoryPort;
+use crate::render::{Context, GatherPoint};
+
+/// The chip of [`REFERENCE`].
+pub type ReferenceChip = Chip<
+    { REFERENCE.tile_pixels as usize },
+    { gather_candidates(REFERENCE.neighbors) },
+    { REFERENCE.gather_queue as usize },
+    { REFERENCE.irradiance_records as usize },
+>;
+/// The chip of [`MICRO`].
+pub type MicroChip = Chip<
+    { MICRO.tile_pixels as usize },
+    { gather_candidates(MICRO.neighbors) },
+    { MICRO.gather_queue as usize },
+    { MICRO.irradiance_records as usize },
+>;
+
+/// A chip's buffers: `TILE_PIXELS` pixels, `CANDIDATES` photons of a gather, `QUEUE` gathers that wait, `RECORDS`
+/// irradiance records.
+pub struct Chip<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize> {
+    /// Where gather rays start, in the present sample: what each pixel of the tile sees, or records.
+    points: Vec<Option<GatherPoint>, TILE_PIXELS>,
+    /// What is known of each pixel of the tile so far.
+    sums: Vec<PixelSum, TILE_PIXELS>,
+    gathers: Gathers<CANDIDATES, QUEUE>,
+    cache: IrradianceCache<RECORDS>,
+    tile: Tile,
+    /// What of the tile is not begun.
+    blocks: Vec<Block, MOST_BLOCKS>,
+    block: Block,
+    position: Position,
+}
+
+/// Blocks that wait: a tile is halved at most so often.
+const MOST_BLOCKS: usize = 32;
+
+/// What a step has led to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// There is more to do.
+    Busy,
+    /// The tile's pixels are complete.
+    Complete,
+}
+
+impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize> Default
+    for Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
+    Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
+{
+    /// What each technique adds to the chip's memory.
+    pub const TECHNIQUES: TechniqueMemory = TechniqueMemory {
+        reordering: size_of::<GatherQueue<QUEUE>>(),
+        irradiance_cache: size_of::<IrradianceCache<RECORDS>>(),
+        importance_sampling: TILE_PIXELS * size_of::<DirectionTable>(),
+    };
+
+    /// A chip without a tile.
+    pub const fn new() -> Self {
+        Self {
+            points: Vec::new(),
+            sums: Vec::new(),
+            gathers: Gathers::new(),
+            cache: IrradianceCache::new(),
+            tile: Tile { id: 0, x: 0, y: 0, width: 0, height: 0 },
+            blocks: Vec::new(),
+            block: Block::EMPTY,
+            position: Position::DONE,
+        }
+    }
+
+    /// Pixels that a tile may have.
+    pub const fn tile_pixels(&self) -> u64 {
+        TILE_PIXELS as u64
+    }
+
+    /// Begins a frame: reads the scene's box.
+    ///
+    /// # Errors
+    /// If the image is not sound.
+    pub fn begin_frame<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+        let root = context.scene.record::<LINE_BYTES, 1>(context.memory, SectionKind::Nodes, 0)?;
+        self.gathers.set_scale(KeyScale::new(&BvhNode::read(root)));
+        Ok(())
+    }
+
+    /// Begins a tile. Returns whether it has pixels and its buffers suffice.
+    #[must_use]
+    pub fn begin(&mut self, tile: Tile) -> bool {
+        self.tile = tile;
+        self.position = Position::DONE;
+        self.points.clear();
+        self.sums.clear();
+        self.gathers.clear();
+        self.blocks.clear();
+        let Ok(pixels) = usize::try_from(tile.pixels()) else { return false };
+        pixels > 0
+            && self.points.resize(pixels, None).is_ok()
+            && self.sums.resize(pixels, PixelSum::ZERO).is_ok()
+            && self.blocks.push(Block::whole(tile.width, tile.height)).is_ok()
+    }
+
+    /// The sum of pixel `index` of the complete tile, counted in rows.
+    pub fn sum(&self, index: usize) -> Option<&PixelSum> {
+        self.sums.get(index)
+    }
+}
+
+/// On-chip memory that a card of `card_bytes` takes under a budget: its statics, caches and stack.
+pub const fn sram_bytes(budget: &Budget, card_bytes: usize) -> usize {
+    card_bytes
+        + budget.photon_cache_bytes as usize
+        + budget.scene_cache_bytes as usize
+        + budget.stack_bytes as usize
+}

@@ -1,0 +1,115 @@
+//! The stages of a block's irradiance records.
+
+use photoncard_shared::message::Fault;
+
+use super::Chip;
+use super::pixels::allowed_error;
+use super::position::{Position, Stage};
+use crate::irradiance_cache::{Full, Window};
+use crate::memory::MemoryPort;
+use crate::render::{Context, eye, final_gather};
+use crate::vector::max_component;
+
+impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
+    Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
+{
+    fn window(&self) -> Window {
+        let [x0, y0] = [self.tile.x + self.block.x, self.tile.y + self.block.y];
+        Window { x0, x1: x0 + self.block.width, y0, y1: y0 + self.block.height }
+    }
+
+    /// Begins the records of the block.
+    pub(super) fn begin_records(&mut self) {
+        self.position = Position::at(Stage::Survey);
+        if self.cache.begin(&self.window()).is_err() {
+            self.divide_block();
+        }
+    }
+
+    /// Puts the block off in two halves: its records do not fit. A block of one pixel always fits.
+    fn divide_block(&mut self) {
+        if let Some([first, second]) = self.block.halves() {
+            // There is room: a tile's sides can be halved sixteen times each.
+            let _ = self.blocks.push(second);
+            let _ = self.blocks.push(first);
+        }
+        self.position = Position::DONE;
+    }
+
+    /// One cell of the lattice.
+    pub(super) fn survey<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+        let Some(allowed) = allowed_error(context.frame) else { return Ok(()) };
+        match self.cache.look_at_next_cell(context, &self.window(), allowed)? {
+            Ok(true) => self.position = Position::at(Stage::Mark),
+            Ok(false) => {}
+            Err(Full) => self.divide_block(),
+        }
+        Ok(())
+    }
+
+    /// The records that one sample of one pixel uses.
+    pub(super) fn mark<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+        let Some(allowed) = allowed_error(context.frame) else { return Ok(()) };
+        let (_, at) = self.present();
+        let place = eye::place(context, at);
+        let surface = eye::see(context, place)?;
+        if let Some(surface) = surface.filter(|surface| max_component(surface.reflection.diffuse) > 0.0) {
+            self.cache.want(place, &surface, allowed);
+        }
+        if self.position.next_index(self.block.pixels()) && self.position.next_sample(context.frame.samples) {
+            self.begin_gather(context);
+        }
+        Ok(())
+    }
+
+    /// Begins the gather of the next records, or goes on to the pixels if all are done.
+    fn begin_gather<M: MemoryPort>(&mut self, context: &Context<M>) {
+        let count = self.cache.begin_gather(context, self.points.as_mut_slice());
+        self.position = Position::at(if count > 0 { Stage::RecordPoints } else { Stage::Eye });
+    }
+
+    /// The directions of one record's rays.
+    pub(super) fn choose_record_point<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+    ) -> Result<(), Fault> {
+        let index = self.position.index;
+        if let Some(Some(point)) = self.points.get_mut(index as usize) {
+            point.choose_directions(context, &mut self.gathers.candidates)?;
+            self.cache.set_point(index, point);
+        }
+        if self.position.next_index(self.cache.being_gathered()) {
+            self.position = Position::at(Stage::RecordRays);
+        }
+        Ok(())
+    }
+
+    /// The gather rays of the present bin, for one record.
+    pub(super) fn cast_for_record<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+        let Self { points, cache, gathers, position, .. } = self;
+        let index = position.index;
+        if let Some(Some(point)) = points.get(index as usize) {
+            for ray in point.directions.rays(point.pattern, point.rays, position.bin, context.frame.bins) {
+                // There are at most as many as the cache gathers at once.
+                let end = final_gather::cast(context, point, index as u16, 1.0, ray)?;
+                let Some(end) = end else { continue };
+                cache.add(index as u16, end.cell, end.direct);
+                if let Some(request) = end.request {
+                    gathers.submit(context, request, &mut |request, brought| {
+                        cache.add(request.target, request.cell, brought);
+                    })?;
+                }
+            }
+        }
+        if position.next_index(cache.being_gathered()) && position.next_bin(context.frame.bins) {
+            self.position = Position::at(Stage::RecordSums);
+        }
+        Ok(())
+    }
+
+    /// What has come of the records; the next ones begin.
+    pub(super) fn end_records<M: MemoryPort>(&mut self, context: &mut Context<M>) {
+        self.cache.end_gather(context);
+        self.begin_gather(context);
+    }
+}

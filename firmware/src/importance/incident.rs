@@ -1,0 +1,209 @@
+//! Where the indirect light at a point comes from, as the photons nearest to it tell, and the tables made of it.
+//!
+//! The flux of the photons that came through each cell is summed, those straight from an emitter left out: their light is
+//! there already, by shadow rays. With k = 100 photons a cell holds a few, and its flux is uncertain by half of itself.
+//! A table of raw sums would cost more variance than it saves wherever light comes from all around. So the sums are
+//! drawn towards their mean by as much of their spread as the photons' number explains (James, Stein 1961): where
+//! nothing is known but noise the table is the cosine's, where few cells hold the light it is theirs.
+
+use glam::Vec3;
+use photoncard_shared::layout::decode_direction;
+use photoncard_shared::message::Sampling;
+
+use super::cell_of;
+use super::hemisphere::CELLS;
+use super::reflection::lobe_direction;
+use super::table::{DirectionTable, Reflector};
+use crate::fixed_point::Sum;
+use crate::photon::{NearestPhotons, SameSurface};
+use crate::sampler::radical_inverse;
+use crate::scene::{Reflection, mirror};
+use crate::vector::{max, max_component, unit};
+
+/// Of a product's cells this share is divided evenly, however sure the photons are: light varies within a cell as well,
+/// which only many rays in all cells tell. It bounds the weight of a ray by twice the albedo, where the photons missed
+/// where light comes from. Measured: `docs/techniques.md`.
+const EVEN_SHARE: f32 = 0.55;
+/// Jensen's small energy of an empty cell, over the mean.
+const EMPTY_CELL: f32 = 0.1;
+/// Points of the lobe whose cells are looked up.
+const LOBE_POINTS: u32 = 32;
+/// Exponent of a lobe of which a cell holds one half: its solid angle is about that of two cells.
+const HALF_HELD_EXPONENT: f32 = 16.0;
+/// At the least this part of the lobe's albedo's share goes to the lobe's entry.
+const LOBE_PART: f32 = 0.25;
+
+/// Flux through the cells of the hemisphere: the photons' power weighted by a colour, in photon power units.
+pub struct IncidentFlux {
+    cells: [Sum; CELLS],
+    /// Of the squares of the photons' powers.
+    squares: Sum,
+}
+
+impl IncidentFlux {
+    /// Of the photons nearest to a point, of its surface, that did not come straight from an emitter; each channel of
+    /// their power is weighted by that of `colour`, which is at most about 1. `normal_code` is the code of `normal`.
+    pub fn new(nearest: &NearestPhotons, normal: Vec3, normal_code: u8, colour: Vec3) -> Self {
+        let mut flux = Self { cells: [Sum::ZERO; CELLS], squares: Sum::ZERO };
+        let mut same_surface = SameSurface::new(normal_code);
+        for photon in nearest.candidates() {
+            if photon.is_direct() || !same_surface.holds(photon.normal()) {
+                continue;
+            }
+            let direction = unit(decode_direction(photon.direction()).into());
+            let Some(cell) = cell_of(normal, direction) else { continue };
+            let power = Vec3::from_array(photon.power().decode()).dot(colour);
+            if let Some(sum) = flux.cells.get_mut(cell as usize) {
+                sum.add(power);
+                flux.squares.add(power * power);
+            }
+        }
+        flux
+    }
+
+    /// The flux of each cell; all 1 if there is none.
+    fn raw(&self) -> [f32; CELLS] {
+        let cells = self.cells.map(Sum::value);
+        if cells.iter().any(|&cell| cell > 0.0) { cells } else { [1.0; CELLS] }
+    }
+
+    /// The flux of each cell drawn towards the mean.
+    fn shrunk(&self) -> [f32; CELLS] {
+        let cells = self.raw();
+        let mean = mean(&cells);
+        let spread: f32 = cells.iter().map(|cell| (cell - mean) * (cell - mean)).sum();
+        let noise = self.squares.value() * (1.0 - 1.0 / CELLS as f32);
+        let known = if spread > 0.0 { max(1.0 - noise / spread, 0.0) } else { 0.0 };
+        cells.map(|cell| mean + known * (cell - mean))
+    }
+
+    /// The table of a sampling for a point where the reflection is not black.
+    pub fn table(&self, sampling: Sampling, reflector: &Reflector) -> DirectionTable {
+        match sampling {
+            Sampling::Reflection => DirectionTable::of_reflection(&reflector.reflection),
+            Sampling::Photon => {
+                let cells = self.raw();
+                let least = EMPTY_CELL * mean(&cells);
+                DirectionTable::new(&cells.map(|cell| max(cell, least)), 0.0)
+            }
+            Sampling::Product => product(&self.shrunk(), reflector),
+            Sampling::Mixture => mixture(&self.shrunk(), &reflector.reflection),
+        }
+    }
+}
+
+impl DirectionTable {
+    /// The table of the reflection alone.
+    pub fn of_reflection(reflection: &Reflection) -> Self {
+        let [diffuse, specular] = albedos(reflection);
+        Self::new(&[diffuse * (1.0 / CELLS as f32); CELLS], specular)
+    }
+}
+
+fn mean(cells: &[f32; CELLS]) -> f32 {
+    cells.iter().sum::<f32>() * (1.0 / CELLS as f32)
+}
+
+/// The greatest channels of both albedos.
+fn albedos(reflection: &Reflection) -> [f32; 2] {
+    [max_component(reflection.diffuse), max_component(reflection.specular)]
+}
+
+/// The flux of each cell, reflected: by the Lambertian part, and by what of the lobe cells can hold.
+fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
+    let [diffuse, specular] = albedos(&reflector.reflection);
+    let even = EVEN_SHARE * mean(flux);
+    let flux = flux.map(|flux| even + (1.0 - EVEN_SHARE) * flux);
+    let mut cells = flux.map(|flux| flux * diffuse);
+    if specular <= 0.0 {
+        return DirectionTable::new(&cells, 0.0);
+    }
+    let exponent = reflector.reflection.exponent;
+    let held = HALF_HELD_EXPONENT / (HALF_HELD_EXPONENT + exponent);
+    let mut lobe = 0.0;
+    let scale = specular * (CELLS as f32 / LOBE_POINTS as f32);
+    for (cell, cosine) in lobe_points(reflector) {
+        let (Some(reflected), Some(flux)) = (cells.get_mut(cell as usize), flux.get(cell as usize)) else {
+            continue;
+        };
+        // The radiance of the cell, over the lobe's point of it; the factor of a projected solid angle of 1 is 1.
+        let brought = scale * flux * cosine * ((exponent + 2.0) / (exponent + 1.0));
+        *reflected += held * brought;
+        lobe += (1.0 - held) * brought;
+    }
+    let all: f32 = cells.iter().sum::<f32>() + lobe;
+    let least = LOBE_PART * specular / (diffuse + specular) * all;
+    DirectionTable::new(&cells, max(lobe, least))
+}
+
+/// Points of the lobe, each with the cell it lies in and its cosine to the normal; those below the surface are left out.
+fn lobe_points(reflector: &Reflector) -> impl Iterator<Item = (u8, f32)> {
+    let Reflector { normal, outgoing, reflection } = *reflector;
+    let mirror = mirror(outgoing, normal);
+    (0..LOBE_POINTS).filter_map(move |index| {
+        let point = [radical_inverse(index), (index as f32 + 0.5) / LOBE_POINTS as f32];
+        let direction = lobe_direction(mirror, reflection.exponent, point);
+        cell_of(normal, direction).map(|cell| (cell, normal.dot(direction)))
+    })
+}
+
+/// Half of the rays by the reflection, half by the flux.
+fn mixture(flux: &[f32; CELLS], reflection: &Reflection) -> DirectionTable {
+    let [diffuse, specular] = albedos(reflection);
+    let all: f32 = flux.iter().sum();
+    let diffuse_share = diffuse / (diffuse + specular);
+    let even = diffuse_share * (1.0 / CELLS as f32);
+    DirectionTable::new(&flux.map(|flux| 0.5 * (even + flux / all)), 0.5 * (1.0 - diffuse_share))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flux_of(cells: [f32; CELLS], photons: u32) -> IncidentFlux {
+        let all: f32 = cells.iter().sum();
+        let mut flux = IncidentFlux { cells: [Sum::ZERO; CELLS], squares: Sum::ZERO };
+        flux.cells.iter_mut().zip(cells).for_each(|(sum, cell)| sum.add(cell));
+        flux.squares.add(all * all / photons as f32);
+        flux
+    }
+
+    #[test]
+    fn a_spread_that_noise_explains_is_drawn_to_the_mean() {
+        let mut cells = [1.0; CELLS];
+        cells[3] = 1.5;
+        cells[20] = 0.5;
+        let shrunk = flux_of(cells, 100).shrunk();
+        assert!(shrunk.iter().all(|cell| (cell - 1.0).abs() < 1e-6), "{shrunk:?}");
+    }
+
+    #[test]
+    fn light_from_one_cell_keeps_its_cell() {
+        let mut cells = [0.0; CELLS];
+        cells[7] = 1.0;
+        let shrunk = flux_of(cells, 100).shrunk();
+        assert!(shrunk[7] > 0.98 && shrunk[8] > 0.0, "{shrunk:?}");
+    }
+
+    #[test]
+    fn a_lobe_in_the_dark_gets_few_rays_and_a_lobe_in_the_light_many() {
+        let reflector = |exponent| Reflector {
+            normal: Vec3::Y,
+            outgoing: Vec3::Y,
+            reflection: Reflection { diffuse: Vec3::splat(0.3), specular: Vec3::splat(0.3), exponent },
+        };
+        // The first row is around the normal, where the lobe points.
+        let mut bright = [0.1; CELLS];
+        bright[..8].fill(1.0);
+        let mut dark = [1.0; CELLS];
+        dark[..8].fill(0.01);
+        for exponent in [50.0, 1000.0] {
+            let share = |flux: &[f32; CELLS]| {
+                let table = product(flux, &reflector(exponent));
+                let density = table.density(&reflector(exponent), Vec3::Y);
+                density / DirectionTable::COSINE.density(&reflector(exponent), Vec3::Y)
+            };
+            assert!(share(&bright) > 1.5 * share(&dark), "{} {}", share(&bright), share(&dark));
+        }
+    }
+}

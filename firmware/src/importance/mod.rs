@@ -1,0 +1,41 @@
+//! Which way a final gather ray goes: importance sampling of the reflection function, of the photons, or of both.
+//!
+//! Every surface point that gather rays start from has a [`DirectionTable`]: 4x8 cells of the hemisphere and the Phong
+//! lobe as one more entry, each with a share of the rays. A stratified pattern is sent through the table's inverse
+//! cumulative distribution, and the density of the whole mixture weights each ray, so that no choice of shares biases
+//! the picture. What differs between the samplings is only where the shares come from:
+//!
+//! | sampling | share of a cell | share of the lobe |
+//! |---|---|---|
+//! | reflection | the Lambertian albedo's, all cells alike | the lobe's albedo's |
+//! | photon (Jensen 1995, *Importance driven path tracing using the photon map*) | the flux of the photons that came through it | none |
+//! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | that flux, reflected | what of the lobe a cell cannot hold |
+//! | mixture | the mean of reflection and photon | half the lobe's albedo's |
+//!
+//! Table entries are the direction bins of generative reordering as well: see [`DirectionTable::rays`].
+
+mod hemisphere;
+mod incident;
+mod reflection;
+mod table;
+
+pub use hemisphere::{CELLS, COLUMNS, ROWS, cell_of};
+pub(crate) use hemisphere::{cell_at, cell_centre, direction_in};
+pub use incident::IncidentFlux;
+pub use reflection::{ReflectedDirection, sample_reflection};
+pub use table::{DirectionTable, ENTRIES, Reflector};
+
+use glam::Vec3;
+
+/// A direction and what the radiance from there counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GatherDirection {
+    /// Unit vector away from the surface.
+    pub direction: Vec3,
+    /// `f cos(theta) / p`, without unit: what the radiance from this direction is multiplied with.
+    pub weight: Vec3,
+    /// Probability density of the direction, 1/sr.
+    pub density: f32,
+    /// The cell of the hemisphere that the direction lies in.
+    pub cell: u8,
+}

@@ -1,0 +1,337 @@
+//! The table of one surface point: how many of its gather rays go which way.
+
+use core::f32::consts::{FRAC_1_PI, PI};
+use core::ops::Range;
+
+use glam::Vec3;
+
+use super::hemisphere::{CELLS, direction_in};
+use super::reflection::lobe_direction;
+use super::{GatherDirection, cell_of};
+use crate::sampler::Pattern;
+use crate::scene::{Reflection, lobe_power, mirror};
+use crate::vector::max;
+
+/// Entries of a table: the cells of the hemisphere along their walk, then the lobe.
+pub const ENTRIES: usize = CELLS + 1;
+
+/// The number of the lobe's entry.
+const LOBE: usize = CELLS;
+
+/// Shares of the gather rays: whole numbers, so that densities are exact. 34 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DirectionTable {
+    cells: [u8; CELLS],
+    lobe: u16,
+}
+
+/// The reflection at a point, as seen from where the rays that it sends go.
+#[derive(Clone, Copy, Debug)]
+pub struct Reflector {
+    /// Unit normal on the side of the rays.
+    pub normal: Vec3,
+    /// Unit vector towards the eye.
+    pub outgoing: Vec3,
+    /// What is reflected.
+    pub reflection: Reflection,
+}
+
+impl Default for DirectionTable {
+    fn default() -> Self {
+        Self::COSINE
+    }
+}
+
+impl DirectionTable {
+    /// All cells alike: the cosine's density.
+    pub const COSINE: Self = Self { cells: [1; CELLS], lobe: 0 };
+
+    /// A table in proportion to `cells` and `lobe`, which are finite and not negative; no cell is left empty unless all
+    /// are.
+    pub(super) fn new(cells: &[f32; CELLS], lobe: f32) -> Self {
+        let greatest = cells.iter().fold(0.0, |greatest, &cell| max(cell, greatest));
+        if greatest <= 0.0 {
+            return if lobe > 0.0 { Self { cells: [0; CELLS], lobe: 1 } } else { Self::COSINE };
+        }
+        let scale = u8::MAX as f32 / greatest;
+        let cells = cells.map(|cell| ((cell * scale + 0.5) as u8).max(1));
+        // The conversion takes what is above the greatest number as that.
+        let lobe = if lobe > 0.0 { ((lobe * scale + 0.5) as u16).max(1) } else { 0 };
+        Self { cells, lobe }
+    }
+
+    #[inline(always)]
+    fn total(&self) -> u32 {
+        self.cells.iter().map(|&share| share as u32).sum::<u32>() + self.lobe as u32
+    }
+
+    /// The part of all rays that goes to a cell by itself, not counting what of the lobe's goes there.
+    pub(crate) fn cell_share(&self, cell: usize) -> f32 {
+        self.cells.get(cell).map_or(0.0, |&share| share as f32) / self.total() as f32
+    }
+
+    #[inline(always)]
+    fn share(&self, entry: usize) -> u32 {
+        self.cells.get(entry).map_or(self.lobe as u32, |&share| share as u32)
+    }
+
+    /// The sum of the shares before an entry.
+    #[inline(always)]
+    fn before(&self, entry: usize) -> u32 {
+        let cells: u32 = self.cells.iter().take(entry).map(|&share| share as u32).sum();
+        cells + if entry > LOBE { self.lobe as u32 } else { 0 }
+    }
+
+    /// The rays, of `count` in all, that belong to direction bin `bin` of `bins`: bins divide the walk through the
+    /// entries evenly. One bin holds all rays; the ranges of all bins follow each other.
+    ///
+    /// `count` is at most [`MOST_GATHER_RAYS`](photoncard_shared::budget::MOST_GATHER_RAYS), `bins` at most
+    /// [`MOST_BINS`](photoncard_shared::budget::MOST_BINS).
+    #[inline]
+    pub fn rays(&self, pattern: Pattern, count: u32, bin: u32, bins: u32) -> Range<u32> {
+        if bins <= 1 {
+            return 0..count;
+        }
+        self.first_ray(pattern, count, bin, bins)..self.first_ray(pattern, count, bin + 1, bins)
+    }
+
+    /// The first ray that is not before the beginning of a bin.
+    fn first_ray(&self, pattern: Pattern, count: u32, bin: u32, bins: u32) -> u32 {
+        let [entry, part] = [bin * ENTRIES as u32 / bins, bin * ENTRIES as u32 % bins];
+        // In units of 1 / bins of a share, so that all is whole.
+        let beginning = (self.before(entry as usize) * bins + self.share(entry as usize) * part) as u64;
+        let total = (self.total() * bins) as u64;
+        let ray = (beginning * count as u64 / total) as u32;
+        let is_before = ray < count && stratum_point(pattern, ray) * total < beginning * whole(count);
+        ray + u32::from(is_before)
+    }
+
+    /// Ray `index` of `count`: its entry, and its place in the entry along the walk and across it.
+    #[inline(always)]
+    fn entry(&self, pattern: Pattern, index: u32, count: u32) -> (usize, [f32; 2]) {
+        let target = stratum_point(pattern, index) * self.total() as u64;
+        let mut before = 0_u64;
+        for (entry, &share) in self.cells.iter().enumerate() {
+            let end = before + share as u64 * whole(count);
+            if target < end {
+                return (entry, [part(target - before, end - before), pattern.radical_inverse(index)]);
+            }
+            before = end;
+        }
+        let size = self.lobe as u64 * whole(count);
+        (LOBE, [part(target - before, size), pattern.radical_inverse(index)])
+    }
+
+    /// Rays of `count` in each cell, not counting those of the lobe.
+    pub fn rays_in_cells(&self, pattern: Pattern, count: u32) -> [u16; CELLS] {
+        let mut rays = [0; CELLS];
+        for index in 0..count {
+            let (entry, _) = self.entry(pattern, index, count);
+            if let Some(rays) = rays.get_mut(entry) {
+                *rays += 1;
+            }
+        }
+        rays
+    }
+
+    /// The direction of ray `index` of `count`; `None` below the surface, where nothing is reflected.
+    #[inline(always)]
+    pub fn sample(
+        &self,
+        reflector: &Reflector,
+        pattern: Pattern,
+        index: u32,
+        count: u32,
+    ) -> Option<GatherDirection> {
+        let (entry, point) = self.entry(pattern, index, count);
+        let Reflector { normal, outgoing, reflection } = reflector;
+        let direction = if entry == LOBE {
+            let [along, across] = point;
+            lobe_direction(mirror(*outgoing, *normal), reflection.exponent, [across, along])
+        } else {
+            direction_in(*normal, entry as u8, point)
+        };
+        let cosine = normal.dot(direction);
+        // A ray of a cell keeps its cell, whatever the rounding of its direction.
+        let cell = if entry == LOBE { cell_of(*normal, direction)? } else { entry as u8 };
+        if cosine <= 0.0 {
+            return None;
+        }
+        let power = self.lobe_power(reflector, direction);
+        let lobe = reflection.specular * ((reflection.exponent + 2.0) * 0.5 * FRAC_1_PI * power);
+        let density = self.mixture_density(reflection, cell, cosine, power);
+        let weight = (reflection.lambertian() + lobe) * (cosine / density);
+        (density > 0.0).then_some(GatherDirection { direction, weight, density, cell })
+    }
+
+    /// The probability density, 1/sr, of a direction on the side of the normal.
+    #[inline(always)]
+    pub fn density(&self, reflector: &Reflector, direction: Vec3) -> f32 {
+        let Some(cell) = cell_of(reflector.normal, direction) else { return 0.0 };
+        let power = self.lobe_power(reflector, direction);
+        self.mixture_density(&reflector.reflection, cell, reflector.normal.dot(direction), power)
+    }
+
+    #[inline(always)]
+    fn lobe_power(&self, reflector: &Reflector, direction: Vec3) -> f32 {
+        if !reflector.reflection.has_lobe() {
+            return 0.0;
+        }
+        let mirror = mirror(reflector.outgoing, reflector.normal);
+        lobe_power(mirror.dot(direction), reflector.reflection.exponent)
+    }
+
+    #[inline(always)]
+    fn mixture_density(&self, reflection: &Reflection, cell: u8, cosine: f32, lobe_power: f32) -> f32 {
+        let per_share = 1.0 / self.total() as f32;
+        let cell_share = self.share(cell as usize) as f32 * per_share;
+        let lobe_share = self.lobe as f32 * per_share;
+        let lobe_density = (reflection.exponent + 1.0) / (2.0 * PI) * lobe_power;
+        cell_share * CELLS as f32 * FRAC_1_PI * cosine + lobe_share * lobe_density
+    }
+}
+
+/// Bits of a point's place in its stratum.
+const JITTER_BITS: u32 = 24;
+
+/// The length of all strata.
+#[inline(always)]
+fn whole(count: u32) -> u64 {
+    (count as u64) << JITTER_BITS
+}
+
+/// The point of a ray along all strata, each of the length `2^JITTER_BITS`.
+#[inline(always)]
+fn stratum_point(pattern: Pattern, index: u32) -> u64 {
+    (index as u64) << JITTER_BITS | (pattern.jitter(index) >> (u32::BITS - JITTER_BITS)) as u64
+}
+
+#[inline(always)]
+fn part(of: u64, size: u64) -> f32 {
+    of as f32 / size.max(1) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampler::Dimension;
+
+    fn pattern(seed: u32) -> Pattern {
+        Pattern::new(seed, 3, 4, 0, Dimension::Gather)
+    }
+
+    fn reflector(diffuse: f32, specular: f32, exponent: f32, outgoing: Vec3) -> Reflector {
+        let reflection =
+            Reflection { diffuse: Vec3::splat(diffuse), specular: Vec3::splat(specular), exponent };
+        Reflector { normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
+    }
+
+    /// Some table with cells between 1 and 255 and a lobe.
+    fn uneven(seed: u32, lobe: f32) -> DirectionTable {
+        let mut cells = [0.0; CELLS];
+        for (cell, share) in cells.iter_mut().enumerate() {
+            *share = (crate::sampler::hash(seed * 64 + cell as u32) % 1000) as f32;
+        }
+        DirectionTable::new(&cells, lobe)
+    }
+
+    #[test]
+    fn bins_hold_every_ray_once_and_only_rays_of_their_entries() {
+        for seed in 0..20 {
+            let table = uneven(seed, 2000.0 * (seed % 3) as f32);
+            for (count, bins) in [(100, 33), (7, 33), (200, 66), (1, 256), (256, 11), (5000, 100)] {
+                let mut next = 0;
+                for bin in 0..bins {
+                    let rays = table.rays(pattern(seed), count, bin, bins);
+                    assert_eq!(rays.start, next);
+                    next = rays.end;
+                    for ray in rays {
+                        let (entry, [along, _]) = table.entry(pattern(seed), ray, count);
+                        let place = (entry as f32 + along) * bins as f32 / ENTRIES as f32;
+                        assert!(place > bin as f32 - 1e-3 && place < bin as f32 + 1.001, "{place} {bin}");
+                    }
+                }
+                assert_eq!(next, count);
+            }
+        }
+    }
+
+    #[test]
+    fn an_entry_gets_its_share_of_the_rays() {
+        let table = uneven(5, 1500.0);
+        let rays = table.rays_in_cells(pattern(1), 10_000);
+        for (cell, &rays) in rays.iter().enumerate() {
+            let expected = 10_000.0 * table.share(cell) as f32 / table.total() as f32;
+            assert!((rays as f32 - expected).abs() < 2.0, "{cell}: {rays} of {expected}");
+        }
+    }
+
+    /// The mean weight over many patterns.
+    fn mean_weight(table: &DirectionTable, reflector: &Reflector) -> f32 {
+        let [patterns, count] = [50, 2000];
+        let rays = (0..patterns).flat_map(|seed| (0..count).map(move |index| (seed, index)));
+        let weights = rays.filter_map(|(seed, index)| table.sample(reflector, pattern(seed), index, count));
+        (weights.map(|sampled| sampled.weight.x as f64).sum::<f64>() / (patterns * count) as f64) as f32
+    }
+
+    #[test]
+    fn the_mean_weight_is_the_albedo_whatever_the_shares() {
+        let lambertian = reflector(0.7, 0.0, 0.0, Vec3::new(1.0, 1.0, 0.0));
+        assert!((mean_weight(&DirectionTable::COSINE, &lambertian) - 0.7).abs() < 1e-5);
+        for seed in 0..5 {
+            let mean = mean_weight(&uneven(seed, 0.0), &lambertian);
+            assert!((mean - 0.7).abs() < 2e-3, "{mean}");
+        }
+        // The integral of (n + 2) / (2 pi) cos^n cos is 1 where the lobe's axis is the normal.
+        for exponent in [1.0, 8.0, 128.0, 1000.0] {
+            for lobe in [3000.0, 30_000.0] {
+                let mean = mean_weight(&uneven(3, lobe), &reflector(0.4, 0.35, exponent, Vec3::Y));
+                assert!((mean - 0.75).abs() < 5e-3, "{exponent}: {mean}");
+            }
+        }
+        let without_lobe = mean_weight(&uneven(4, 0.0), &reflector(0.4, 0.35, 8.0, Vec3::Y));
+        assert!((without_lobe - 0.75).abs() < 5e-3, "{without_lobe}");
+    }
+
+    #[test]
+    fn the_density_of_a_sampled_direction_is_the_one_it_was_sampled_with() {
+        let reflector = reflector(0.3, 0.5, 20.0, Vec3::new(2.0, 1.0, 0.5));
+        let table = uneven(9, 4000.0);
+        let mut others = 0;
+        for index in 0..1000 {
+            let Some(sampled) = table.sample(&reflector, pattern(1), index, 1000) else { continue };
+            let density = table.density(&reflector, sampled.direction);
+            // On the border of two cells the rounding of the direction may choose the other.
+            others += u32::from((density / sampled.density - 1.0).abs() > 1e-4);
+        }
+        assert!(others <= 2, "{others}");
+    }
+
+    #[test]
+    fn the_density_integrates_to_one() {
+        let reflector = reflector(0.3, 0.5, 20.0, Vec3::new(0.2, 1.0, 0.1));
+        let table = uneven(2, 4000.0);
+        let side = 1000;
+        let mut integral = 0.0_f64;
+        for i in 0..side {
+            for j in 0..2 * side {
+                let [cosine, azimuth] = [(i as f32 + 0.5) / side as f32, (j as f32 + 0.5) * PI / side as f32];
+                let sine = libm::sqrtf(1.0 - cosine * cosine);
+                let direction = Vec3::new(sine * libm::cosf(azimuth), cosine, sine * libm::sinf(azimuth));
+                let solid_angle = PI / (side * side) as f32;
+                integral += (table.density(&reflector, direction) * solid_angle) as f64;
+            }
+        }
+        // What of the lobe lies below the surface is lost: hardly anything here.
+        assert!((integral - 1.0).abs() < 5e-3, "{integral}");
+    }
+
+    #[test]
+    fn no_cell_is_empty_unless_all_are() {
+        let mut cells = [0.0; CELLS];
+        cells[3] = 1e6;
+        assert!(DirectionTable::new(&cells, 0.0).cells.iter().all(|&share| share >= 1));
+        assert_eq!(DirectionTable::new(&[0.0; CELLS], 0.0), DirectionTable::COSINE);
+        assert_eq!(DirectionTable::new(&[0.0; CELLS], 1.0).share(LOBE), 1);
+    }
+}

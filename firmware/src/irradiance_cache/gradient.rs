@@ -1,0 +1,261 @@
+//! Irradiance gradients (Ward, Heckbert 1992, *Irradiance gradients*) from rays in cells of the hemisphere.
+//!
+//! The translational gradient is a sum over the borders of neighbouring cells: how fast a border sweeps over the
+//! hemisphere as the point moves, which goes with the inverse distance of the nearer cell, times the difference of the
+//! cells' radiance. So it is linear in the radiances, with coefficients that only distances decide. Those are known from a
+//! survey before any photon is gathered, and each gather adds its part in whatever order it is done.
+
+use core::f32::consts::{FRAC_1_PI, PI};
+
+use photoncard_shared::message::Fault;
+
+use crate::importance::{CELLS, COLUMNS, ROWS, cell_at, cell_centre, direction_in};
+use crate::memory::MemoryPort;
+use crate::render::{Context, GatherPoint};
+use crate::sampler::{Pattern, unit_interval};
+use crate::scene::{Ray, Surface, closest_hit};
+use crate::vector::max;
+
+/// The harmonic mean of the distances where there is nothing around, metres: its square is finite.
+const FARTHEST: f32 = 1e18;
+/// Rays of a survey in each cell.
+const RAYS_PER_CELL: u32 = 2;
+
+/// The distance of what is around a point in each cell, over their harmonic mean; in eight bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Distances([u8; CELLS]);
+
+/// Steps of a factor of two in a distance's code.
+const STEPS_PER_OCTAVE: u32 = 16;
+/// The code of the mean distance.
+const MEAN_CODE: u32 = 128;
+
+impl Distances {
+    fn new(inverse_distances: &[f32; CELLS], radius: f32) -> Self {
+        Self(inverse_distances.map(|inverse| encode(1.0 / (inverse * radius))))
+    }
+
+    /// The distance in a cell, over their harmonic mean.
+    fn get(&self, cell: usize) -> f32 {
+        decode(self.0.get(cell).copied().unwrap_or(u8::MAX))
+    }
+}
+
+/// Bits of a float below those of the code's step.
+const SHIFT: u32 = 23 - STEPS_PER_OCTAVE.ilog2();
+/// The upper bits of 1.0.
+const ONE: u32 = 1.0_f32.to_bits() >> SHIFT;
+
+/// Sixteen steps an octave from 2^-8 to 2^8; what is more or no number is the most.
+fn encode(ratio: f32) -> u8 {
+    ((ratio.to_bits() >> SHIFT) + MEAN_CODE).saturating_sub(ONE).min(u8::MAX as u32) as u8
+}
+
+fn decode(code: u8) -> f32 {
+    f32::from_bits(((code as u32 + ONE - MEAN_CODE) << SHIFT) | 1 << (SHIFT - 1))
+}
+
+/// What a point's surroundings are like.
+pub(super) struct Survey {
+    /// The harmonic mean of the distances, metres.
+    pub(super) radius: f32,
+    pub(super) distances: Distances,
+}
+
+/// Casts rays in all cells above a surface.
+///
+/// # Errors
+/// If the image is not sound.
+pub(super) fn survey<M: MemoryPort>(
+    context: &mut Context<M>,
+    surface: &Surface,
+    pattern: Pattern,
+) -> Result<Survey, Fault> {
+    let origin = surface.offset_origin();
+    let mut inverse_distances = [0.0; CELLS];
+    for (cell, inverse) in (0..).zip(inverse_distances.iter_mut()) {
+        for ray in 0..RAYS_PER_CELL {
+            let index = cell as u32 * RAYS_PER_CELL + ray;
+            let along = (ray as f32 + unit_interval(pattern.jitter(index))) / RAYS_PER_CELL as f32;
+            let direction = direction_in(surface.normal, cell, [along, pattern.radical_inverse(index)]);
+            context.counters.survey_rays += 1;
+            if let Some(hit) = closest_hit(context.scene, context.memory, &Ray::new(origin, direction))? {
+                *inverse += 1.0 / max(hit.intersection.distance, f32::MIN_POSITIVE) / RAYS_PER_CELL as f32;
+            }
+        }
+    }
+    let mean = inverse_distances.iter().sum::<f32>() * (1.0 / CELLS as f32);
+    let radius = 1.0 / max(mean, 1.0 / FARTHEST);
+    Ok(Survey { radius, distances: Distances::new(&inverse_distances, radius) })
+}
+
+/// How much of what a gather ray of each cell brings goes into the translational gradient, along the tangent and the
+/// bitangent, 1/m.
+pub(super) type Coefficients = [[f32; 2]; CELLS];
+
+/// The coefficients of the cells for the rays of a gather point whose reflection is white and Lambertian.
+pub(super) fn coefficients(point: &GatherPoint, distances: &Distances, radius: f32) -> Coefficients {
+    let rays = point.directions.rays_in_cells(point.pattern, point.rays);
+    let mut coefficients = [[0.0; 2]; CELLS];
+    let mut border = |[less, more]: [usize; 2], length: f32, azimuth: f32| {
+        let known = |cell: usize| rays.get(cell).is_some_and(|&rays| rays > 0);
+        if !known(less) || !known(more) {
+            return;
+        }
+        let nearer = crate::vector::min(distances.get(less), distances.get(more));
+        let speed = length / (nearer * radius);
+        let way = [speed * libm::cosf(azimuth), speed * libm::sinf(azimuth)];
+        for (cell, sign) in [(less, -1.0), (more, 1.0)] {
+            if let Some(sum) = coefficients.get_mut(cell) {
+                sum[0] += sign * way[0];
+                sum[1] += sign * way[1];
+            }
+        }
+    };
+    let column_angle = 2.0 * PI / COLUMNS as f32;
+    for column in 0..COLUMNS {
+        let azimuth = (column as f32 + 0.5) * column_angle;
+        for row in 1..ROWS {
+            // A border between rows: sin cos^2 times the angle of the column, over pi.
+            let sine_squared = row as f32 / ROWS as f32;
+            let length = 2.0 / COLUMNS as f32 * libm::sqrtf(sine_squared) * (1.0 - sine_squared);
+            border([cell_at(row - 1, column), cell_at(row, column)], length, azimuth);
+        }
+        let before = (column + COLUMNS - 1) % COLUMNS;
+        let across = column as f32 * column_angle + 0.5 * PI;
+        for row in 0..ROWS {
+            // A border between columns: the difference of the sines of its ends, over pi.
+            let sine = |row: usize| libm::sqrtf(row as f32 / ROWS as f32);
+            let length = (sine(row + 1) - sine(row)) * FRAC_1_PI;
+            border([cell_at(row, before), cell_at(row, column)], length, across);
+        }
+    }
+    for (cell, sum) in coefficients.iter_mut().enumerate() {
+        // From what a ray brings, its share of the mean, to the mean radiance of the cell.
+        let rays = rays.get(cell).copied().unwrap_or(0).max(1) as f32;
+        let expected_rays = point.directions.cell_share(cell) * point.rays as f32;
+        let factor = CELLS as f32 * expected_rays / rays;
+        *sum = sum.map(|component| component * factor);
+    }
+    coefficients
+}
+
+/// How much of what a ray of a cell brings goes into the rotational gradient, along the tangent and the bitangent.
+pub(super) fn rotation(cell: u8) -> [f32; 2] {
+    let [azimuth, sine_squared] = cell_centre(cell);
+    let tangent = libm::sqrtf(sine_squared / (1.0 - sine_squared));
+    // Along the axis about which the normal turns towards the cell: a right angle from its azimuth.
+    [-tangent * libm::sinf(azimuth), tangent * libm::cosf(azimuth)]
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::irradiance_cache::record::{Irradiance, Record};
+    use crate::sampler::Dimension;
+    use crate::scene::{Reflection, magnitude};
+
+    fn white(position: Vec3, normal: Vec3) -> Surface {
+        Surface {
+            position,
+            normal,
+            outgoing: normal,
+            reflection: Reflection { diffuse: Vec3::ONE, ..Reflection::BLACK },
+            emission: Vec3::ZERO,
+            double_sided: false,
+            distance: 1.0,
+            magnitude: magnitude(&[position]),
+        }
+    }
+
+    /// What a ray from `origin` meets at height 1: its distance, and a radiance that grows along x.
+    fn ceiling(origin: Vec3, direction: Vec3) -> (f32, f32) {
+        let distance = (1.0 - origin.y) / max(direction.y, 1e-3);
+        let x = (origin + direction * distance).x;
+        (distance, 1.0 + 1.0 / (1.0 + libm::expf(-2.0 * x)))
+    }
+
+    /// Irradiance over pi of the ceiling, with gradients, from `rays` rays.
+    fn gathered(position: Vec3, normal: Vec3, rays: u32) -> Irradiance {
+        let pattern = Pattern::new(1, 2, 3, 0, Dimension::Irradiance);
+        let point = GatherPoint::record(white(position, normal), pattern, rays);
+        let mut inverse = [0.0; CELLS];
+        let mut counts = [0.0; CELLS];
+        let samples: std::vec::Vec<_> =
+            (0..rays).filter_map(|i| point.directions.sample(&point.reflector(), pattern, i, rays)).collect();
+        for sampled in &samples {
+            let cell = sampled.cell as usize;
+            inverse[cell] += 1.0 / ceiling(position, sampled.direction).0;
+            counts[cell] += 1.0;
+        }
+        let inverse: [f32; CELLS] = core::array::from_fn(|cell| inverse[cell] / counts[cell]);
+        let radius = CELLS as f32 / inverse.iter().sum::<f32>();
+        let coefficients = coefficients(&point, &Distances::new(&inverse, radius), radius);
+        let mut irradiance = Irradiance::default();
+        for sampled in samples {
+            let brought = sampled.weight * (ceiling(position, sampled.direction).1 / rays as f32);
+            irradiance.mean += brought;
+            let coefficients = coefficients[sampled.cell as usize];
+            let terms = irradiance.translation.iter_mut().zip(coefficients);
+            terms.for_each(|(sum, coefficient)| *sum += brought * coefficient);
+            let terms = irradiance.rotation.iter_mut().zip(rotation(sampled.cell));
+            terms.for_each(|(sum, coefficient)| *sum += brought * coefficient);
+        }
+        irradiance
+    }
+
+    #[test]
+    fn distances_survive_their_code() {
+        for ratio in [0.01, 0.5, 0.99, 1.0, 1.5, 100.0] {
+            assert!((decode(encode(ratio)) / ratio - 1.0).abs() < 0.04, "{ratio}");
+        }
+        assert!(decode(encode(f32::INFINITY)) > 200.0 && decode(encode(0.0)) < 0.01);
+    }
+
+    #[test]
+    fn even_light_has_no_translational_gradient() {
+        let pattern = Pattern::new(7, 0, 0, 0, Dimension::Irradiance);
+        let mut inverse = [0.0; CELLS];
+        inverse.iter_mut().enumerate().for_each(|(cell, inverse)| *inverse = 0.2 + (cell * 7 % 13) as f32);
+        let point = GatherPoint::record(white(Vec3::ZERO, Vec3::Y), pattern, 100);
+        let coefficients = coefficients(&point, &Distances::new(&inverse, 0.1), 0.1);
+        let rays = point.directions.rays_in_cells(pattern, 100);
+        for axis in 0..2 {
+            let terms = coefficients.iter().zip(rays).map(|(c, rays)| c[axis] * rays as f32);
+            let [sum, greatest] = [terms.clone().sum::<f32>(), terms.fold(0.0, max)];
+            assert!(sum.abs() < 1e-4 * greatest, "{sum} {greatest}");
+        }
+    }
+
+    #[test]
+    fn a_record_tells_the_irradiance_around_it() {
+        let normal = Vec3::new(0.1, 1.0, -0.2).normalize();
+        let origin = Vec3::new(0.2, 0.0, 0.1);
+        let here = gathered(origin, normal, 10_000);
+        let tangent = Vec3::X - normal * normal.x;
+        for step in [-0.2, 0.2] {
+            let place = origin + tangent * step;
+            let expected = gathered(place, normal, 10_000).mean.x - here.mean.x;
+            let found = here.at(origin, normal, place, normal).x - here.mean.x;
+            assert!((found / expected - 1.0).abs() < 0.35, "moved: {found} of {expected}");
+        }
+        for turned in [Vec3::X, Vec3::Z, Vec3::NEG_X] {
+            let turned = (normal + turned * 0.15).normalize();
+            let expected = gathered(origin, turned, 10_000).mean.x - here.mean.x;
+            let found = here.at(origin, normal, origin, turned).x - here.mean.x;
+            assert!((found - expected).abs() < 0.3 * expected.abs() + 2e-3, "turned: {found} of {expected}");
+        }
+    }
+
+    #[test]
+    fn the_error_of_a_record_grows_with_distance_and_turn_and_is_infinite_off_its_plane() {
+        let record = Record::new(&white(Vec3::ZERO, Vec3::Y), 1.0, Distances([128; CELLS]));
+        let error = |position, normal: Vec3| record.error(1.0, 0.04, position, normal.normalize());
+        assert_eq!(error(Vec3::ZERO, Vec3::Y), 0.0);
+        assert!((error(Vec3::X * 0.1, Vec3::Y) - 0.01).abs() < 1e-6);
+        assert!(error(Vec3::X * 0.1, Vec3::new(0.1, 1.0, 0.0)) > 0.01);
+        assert!(error(Vec3::Y * 0.03, Vec3::Y).is_infinite() && error(Vec3::ZERO, Vec3::NEG_Y).is_infinite());
+    }
+}

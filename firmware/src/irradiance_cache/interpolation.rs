@@ -1,0 +1,103 @@
+//! Interpolation between the records at the corners of a cell.
+
+use glam::Vec3;
+
+use super::lattice::Cell;
+use super::record::{Content, Record};
+use super::{IrradianceCache, LatticePoint};
+use crate::scene::Surface;
+use crate::vector::min;
+
+/// The weights of a sample's records sum to this at the least.
+const LEAST_WEIGHT: f32 = 0.05;
+
+/// The records at the corners of a cell.
+pub(super) struct Corners<'a>([Option<&'a Record>; 4]);
+
+impl<'a> Corners<'a> {
+    pub(super) fn records(&self) -> impl Iterator<Item = &'a Record> {
+        self.0.into_iter().flatten()
+    }
+
+    /// The error of each record at a place. A record reaches no farther than the others let it: what is near one
+    /// cannot be farther from its neighbour than their distance more (neighbour clamping).
+    pub(super) fn errors(&self, allowed: f32, position: Vec3, normal: Vec3) -> impl Iterator<Item = f32> {
+        self.0
+            .map(|record| {
+                let Some(record) = record else { return f32::INFINITY };
+                let radius = self.records().fold(record.radius, |radius, other| {
+                    let distance = libm::sqrtf((other.position - record.position).length_squared());
+                    min(other.radius + distance, radius)
+                });
+                record.error(radius, allowed, position, normal)
+            })
+            .into_iter()
+    }
+}
+
+/// The weights of the four corners of a sample's cell.
+struct Weights {
+    cell: Cell,
+    weights: [f32; 4],
+}
+
+impl<const RECORDS: usize> IrradianceCache<RECORDS> {
+    pub(super) fn corners(&self, cell: &Cell) -> Corners<'_> {
+        Corners(cell.corners().map(|corner| self.records.get(&corner).and_then(Option::as_ref)))
+    }
+
+    /// The undivided cell at a place of the picture.
+    fn undivided_cell(&self, [x, y]: [f32; 2]) -> Option<Cell> {
+        let [x, y] = [x as u32, y as u32];
+        let mut cell = Cell::coarsest(x, y);
+        let (_, divided) = self.roots.iter().find(|(corner, _)| *corner == cell.corner)?;
+        while !cell.is_finest() && divided >> cell.tree_number() & 1 != 0 {
+            cell = cell.child_at(x, y);
+        }
+        Some(cell)
+    }
+
+    /// Which records a sample uses and how much; `None` if it cannot be interpolated.
+    fn weights(&self, place: [f32; 2], surface: &Surface, allowed: f32) -> Option<Weights> {
+        let cell = self.undivided_cell(place)?;
+        let part = |at: f32, from: u32| (at - from as f32) / cell.side() as f32;
+        let [x, y] = [part(place[0], cell.corner.x), part(place[1], cell.corner.y)];
+        let bilinear = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
+        let corners = self.corners(&cell);
+        let errors = corners.errors(allowed, surface.position, surface.normal);
+        let mut weights = bilinear;
+        for (weight, error) in weights.iter_mut().zip(errors) {
+            // Falls to zero where the record's validity ends.
+            *weight *= if error < allowed { 1.0 - error / allowed } else { 0.0 };
+        }
+        (weights.iter().sum::<f32>() >= LEAST_WEIGHT).then_some(Weights { cell, weights })
+    }
+
+    /// Wants the records that a sample uses.
+    pub fn want(&mut self, place: [f32; 2], surface: &Surface, allowed: f32) {
+        let Some(Weights { cell, weights }) = self.weights(place, surface, allowed) else { return };
+        for (corner, weight) in cell.corners().iter().zip(weights) {
+            if weight <= 0.0 {
+                continue;
+            }
+            if let Some(Some(record)) = self.records.get_mut(corner)
+                && let Content::Surveyed(distances) = record.content
+            {
+                record.content = Content::Wanted(distances);
+            }
+        }
+    }
+
+    /// The indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample has to gather its own.
+    pub fn interpolate(&self, place: [f32; 2], surface: &Surface, allowed: f32) -> Option<Vec3> {
+        let Weights { cell, weights } = self.weights(place, surface, allowed)?;
+        let mut sum = Vec3::ZERO;
+        for (LatticePoint { x, y }, weight) in cell.corners().into_iter().zip(weights) {
+            let record = self.records.get(&LatticePoint { x, y }).and_then(Option::as_ref);
+            if let Some(Record { content: Content::Gathered(irradiance), position, normal, .. }) = record {
+                sum += irradiance.at(*position, *normal, surface.position, surface.normal) * weight;
+            }
+        }
+        Some(sum * (1.0 / weights.iter().sum::<f32>()))
+    }
+}

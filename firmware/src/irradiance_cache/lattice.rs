@@ -1,0 +1,138 @@
+//! The lattice of picture positions where irradiance records may be: squares of 16 pixels, halved up to three times.
+//!
+//! The lattice belongs to the picture and not to a tile: whoever needs the record at a position computes the same one.
+
+/// Side of a coarsest cell, pixels.
+pub(super) const COARSEST_SIDE: u32 = 16;
+/// Levels: sides of 16, 8, 4 and 2 pixels.
+pub(super) const LEVELS: u32 = 4;
+
+/// A corner of pixels, counted from the picture's upper left corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct LatticePoint {
+    /// To the right.
+    pub x: u32,
+    /// Downwards.
+    pub y: u32,
+}
+
+/// A square of the lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Cell {
+    pub(super) corner: LatticePoint,
+    /// 0 is the coarsest.
+    pub(super) level: u32,
+}
+
+impl Cell {
+    /// The coarsest cell that holds a pixel.
+    pub(super) fn coarsest(x: u32, y: u32) -> Self {
+        let floor = |v: u32| v - v % COARSEST_SIDE;
+        Self { corner: LatticePoint { x: floor(x), y: floor(y) }, level: 0 }
+    }
+
+    /// Its side, pixels.
+    pub(super) fn side(&self) -> u32 {
+        COARSEST_SIDE >> self.level
+    }
+
+    /// Whether it cannot be halved.
+    pub(super) fn is_finest(&self) -> bool {
+        self.level + 1 >= LEVELS
+    }
+
+    /// Its corners: the upper two, then the lower two, each from the left.
+    pub(super) fn corners(&self) -> [LatticePoint; 4] {
+        let LatticePoint { x, y } = self.corner;
+        let side = self.side();
+        [(0, 0), (side, 0), (0, side), (side, side)].map(|(dx, dy)| LatticePoint { x: x + dx, y: y + dy })
+    }
+
+    /// The points that its children add.
+    pub(super) fn middles(&self) -> [LatticePoint; 5] {
+        let LatticePoint { x, y } = self.corner;
+        let [half, side] = [self.side() / 2, self.side()];
+        [(half, half), (half, 0), (0, half), (side, half), (half, side)]
+            .map(|(dx, dy)| LatticePoint { x: x + dx, y: y + dy })
+    }
+
+    /// Its four quarters.
+    pub(super) fn children(&self) -> [Self; 4] {
+        let level = self.level + 1;
+        let LatticePoint { x, y } = self.corner;
+        let half = self.side() / 2;
+        [(0, 0), (half, 0), (0, half), (half, half)]
+            .map(|(dx, dy)| Self { corner: LatticePoint { x: x + dx, y: y + dy }, level })
+    }
+
+    /// Its number in the tree of its coarsest cell, the root 0; below 21 for a cell that can be halved.
+    pub(super) fn tree_number(&self) -> u32 {
+        let root = Self::coarsest(self.corner.x, self.corner.y);
+        let first = ((1 << (2 * self.level)) - 1) / 3;
+        let side = self.side();
+        let [x, y] = [(self.corner.x - root.corner.x) / side, (self.corner.y - root.corner.y) / side];
+        first + (y << self.level) + x
+    }
+
+    /// The child that holds a pixel of this cell.
+    pub(super) fn child_at(&self, x: u32, y: u32) -> Self {
+        let half = (self.side() / 2).max(1);
+        let step = |v: u32, from: u32| from + v.saturating_sub(from) / half * half;
+        let corner = LatticePoint { x: step(x, self.corner.x), y: step(y, self.corner.y) };
+        Self { corner, level: self.level + 1 }
+    }
+
+    /// Whether it has a pixel in common with a window.
+    pub(super) fn overlaps(&self, window: &Window) -> bool {
+        let LatticePoint { x, y } = self.corner;
+        let side = self.side();
+        x < window.x1 && x + side > window.x0 && y < window.y1 && y + side > window.y0
+    }
+}
+
+/// A rectangle of the picture: columns `x0` up to `x1`, rows `y0` up to `y1`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// First column.
+    pub x0: u32,
+    /// Past the last column.
+    pub x1: u32,
+    /// First row.
+    pub y0: u32,
+    /// Past the last row.
+    pub y1: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pixel_has_one_cell_of_each_level_and_cells_have_numbers_of_their_own() {
+        let mut numbers = std::collections::BTreeSet::new();
+        for (x, y) in (32..48).flat_map(|x| (16..32).map(move |y| (x, y))) {
+            let mut cell = Cell::coarsest(x, y);
+            assert_eq!((cell.corner, cell.tree_number()), (LatticePoint { x: 32, y: 16 }, 0));
+            while !cell.is_finest() {
+                numbers.insert((cell.tree_number(), cell.level, cell.corner.x, cell.corner.y));
+                let child = cell.child_at(x, y);
+                assert!(cell.children().contains(&child));
+                assert!(child.overlaps(&Window { x0: x, x1: x + 1, y0: y, y1: y + 1 }));
+                cell = child;
+            }
+            assert_eq!(cell.side(), 2);
+        }
+        assert_eq!(numbers.len(), 21);
+        assert!(numbers.iter().map(|cell| cell.0).eq(0..21));
+    }
+
+    #[test]
+    fn children_and_middles_have_the_same_points() {
+        let cell = Cell::coarsest(20, 20);
+        for child in cell.children() {
+            for corner in child.corners() {
+                assert!(cell.middles().contains(&corner) || cell.corners().contains(&corner));
+            }
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! The parallel irradiance cache: indirect irradiance is gathered at few places of the picture, with its gradients, and
+//! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992; neighbour clamping: Krivanek 2006).
+//!
+//! The published caches are filled as pixels need it, so that each pixel depends on those before it. The dissertation
+//! makes the cache parallel by removing that dependence; how is not told, and this is a reconstruction. Which records
+//! exist is decided by a rule that looks at the geometry of one cell of a lattice over the picture and at nothing else:
+//!
+//! - Records are at the corners of the cells, 16 pixels apart. A record is the surface seen there, and the harmonic mean
+//!   distance of what a few rays find around it: nothing is gathered yet.
+//! - A cell is divided in four, down to a side of 2 pixels, unless its corners cover it: every corner, and every point
+//!   that a division would add, is within the allowed error of all four corner records.
+//! - A sample interpolates the up to four corner records of its undivided cell that are valid at the surface it sees,
+//!   with weights that are continuous across cells of one size. Where none is, it casts gather rays of its own.
+//! - The records that some sample uses are gathered, and no others: their gradients' coefficients are known from the
+//!   survey, so their gathers may be reordered like any.
+//!
+//! A tile therefore computes what another tile would, and no seam shows. The records of a tile that do not fit in the
+//! cache make the chip render it in smaller blocks: more records are computed twice, and no pixel changes.
+//!
+//! Light straight from an emitter is weighted between shadow rays and gather rays as everywhere ([`crate::render::direct`]):
+//! the gather rays' part, which is that of large emitters, is in the records.
+
+mod gradient;
+mod interpolation;
+mod lattice;
+mod record;
+
+pub use lattice::{LatticePoint, Window};
+
+use glam::Vec3;
+use heapless::Vec;
+use heapless::index_map::FnvIndexMap;
+use photoncard_shared::message::Fault;
+
+use self::gradient::{Coefficients, coefficients, rotation, survey};
+use self::lattice::Cell;
+use self::record::{Content, Irradiance, Record};
+use crate::fixed_point::ColourSum;
+use crate::memory::MemoryPort;
+use crate::render::{Context, GatherPoint, eye};
+use crate::sampler::{Dimension, Pattern};
+use crate::vector::{max, max_component};
+
+/// Coarsest cells that a block may overlap.
+const MOST_ROOTS: usize = 16;
+/// Cells that wait to be looked at: the coarsest, and three of every level below.
+const MOST_WAITING: usize = MOST_ROOTS + 3 * (lattice::LEVELS as usize - 1);
+/// Records that are gathered at once.
+const MOST_GATHERED: usize = 32;
+/// A record reaches at least so many pixels.
+const LEAST_REACH: f32 = 3.0;
+/// Records of one coarsest cell of which one pixel is needed: 4 corners, and 5 for each division.
+const LEAST_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
+
+/// The records of a block.
+pub struct IrradianceCache<const RECORDS: usize> {
+    /// By lattice point; none where no surface with a Lambertian part is seen.
+    records: FnvIndexMap<LatticePoint, Option<Record>, RECORDS>,
+    /// The coarsest cells, with a bit for each divided cell of their tree.
+    roots: Vec<(LatticePoint, u32), MOST_ROOTS>,
+    waiting: Vec<Cell, MOST_WAITING>,
+    gathered: Vec<GatheredRecord, MOST_GATHERED>,
+    /// Records before this one are not wanted or already gathered.
+    next: usize,
+}
+
+/// A record on its way.
+struct GatheredRecord {
+    /// Its index.
+    record: usize,
+    coefficients: Coefficients,
+    mean: ColourSum,
+    translation: [ColourSum; 2],
+    rotation: [ColourSum; 2],
+}
+
+/// The buffers do not suffice for the block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Full;
+
+impl<const RECORDS: usize> Default for IrradianceCache<RECORDS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const RECORDS: usize> IrradianceCache<RECORDS> {
+    const SUFFICES: () = assert!(RECORDS >= LEAST_RECORDS, "a block of one pixel must fit");
+
+    /// A cache without records.
+    pub const fn new() -> Self {
+        let () = Self::SUFFICES;
+        Self {
+            records: FnvIndexMap::new(),
+            roots: Vec::new(),
+            waiting: Vec::new(),
+            gathered: Vec::new(),
+            next: 0,
+        }
+    }
+
+    /// Forgets all records and begins with the cells of a window of the picture.
+    ///
+    /// # Errors
+    /// If there are too many.
+    pub fn begin(&mut self, window: &Window) -> Result<(), Full> {
+        self.records.clear();
+        self.roots.clear();
+        self.waiting.clear();
+        self.gathered.clear();
+        self.next = 0;
+        let steps = |from: u32, to: u32| {
+            let first = from - from % lattice::COARSEST_SIDE;
+            (first..to).step_by(lattice::COARSEST_SIDE as usize)
+        };
+        for y in steps(window.y0, window.y1) {
+            for x in steps(window.x0, window.x1) {
+                let cell = Cell::coarsest(x, y);
+                self.roots.push((cell.corner, 0)).map_err(|_| Full)?;
+                self.waiting.push(cell).map_err(|_| Full)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Looks at the next cell: surveys its corners and divides it if they do not cover it. Returns whether it was the
+    /// last.
+    ///
+    /// # Errors
+    /// If the image is not sound. `Ok(Err(Full))` if there is no room for the records.
+    pub fn look_at_next_cell<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+        window: &Window,
+        allowed: f32,
+    ) -> Result<Result<bool, Full>, Fault> {
+        let Some(cell) = self.waiting.pop() else { return Ok(Ok(true)) };
+        for corner in cell.corners() {
+            if self.records.contains_key(&corner) {
+                continue;
+            }
+            let record = survey_point(context, corner, allowed)?;
+            if self.records.insert(corner, record).is_err() {
+                return Ok(Err(Full));
+            }
+        }
+        if !cell.is_finest() && !self.is_covered(context, &cell, allowed)? {
+            self.divide(&cell);
+            let children = cell.children().into_iter().filter(|child| child.overlaps(window));
+            for child in children {
+                if self.waiting.push(child).is_err() {
+                    return Ok(Err(Full));
+                }
+            }
+        }
+        Ok(Ok(self.waiting.is_empty()))
+    }
+
+    /// Whether every corner and every point that a division would add is within the error of all corner records.
+    fn is_covered<M: MemoryPort>(
+        &self,
+        context: &mut Context<M>,
+        cell: &Cell,
+        allowed: f32,
+    ) -> Result<bool, Fault> {
+        let corners = self.corners(cell);
+        let mut surfaces = corners.records().map(|record| (record.position, record.normal));
+        let covers = |position: Vec3, normal: Vec3| {
+            corners.errors(allowed, position, normal).all(|error| error < allowed)
+        };
+        if corners.records().count() < 4 || !surfaces.all(|(position, normal)| covers(position, normal)) {
+            return Ok(false);
+        }
+        for LatticePoint { x, y } in cell.middles() {
+            let seen = eye::see(context, [x as f32, y as f32])?;
+            if !seen.is_some_and(|surface| covers(surface.position, surface.normal)) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn divide(&mut self, cell: &Cell) {
+        let root = Cell::coarsest(cell.corner.x, cell.corner.y).corner;
+        let divided = self.roots.iter_mut().find(|(corner, _)| *corner == root);
+        if let Some((_, divided)) = divided {
+            *divided |= 1 << cell.tree_number();
+        }
+    }
+
+    /// Fills the first gather points for records that are wanted and not yet gathered. Returns
+    /// how many.
+    pub fn begin_gather<M: MemoryPort>(
+        &mut self,
+        context: &Context<M>,
+        points: &mut [Option<GatherPoint>],
+    ) -> u32 {
+        self.gathered.clear();
+        let frame = context.frame;
+        for slot in points.iter_mut().take(MOST_GATHERED) {
+            let wanted = loop {
+                let Some((point, record)) = self.records.get_index(self.next) else { break None };
+                self.next += 1;
+                if let Some(record @ Record { content: Content::Wanted(_), .. }) = record {
+                    break Some((self.next - 1, *point, *record));
+                }
+            };
+            let Some((index, LatticePoint { x, y }, record)) = wanted else { break };
+            let pattern = Pattern::new(frame.seed, x, y, 0, Dimension::Irradiance);
+            *slot = Some(GatherPoint::record(record.surface(), pattern, frame.gather_rays));
+            let gathered = GatheredRecord {
+                record: index,
+                coefficients: [[0.0; 2]; crate::importance::CELLS],
+                mean: ColourSum::ZERO,
+                translation: [ColourSum::ZERO; 2],
+                rotation: [ColourSum::ZERO; 2],
+            };
+            // There is room for as many as there are slots.
+            let _ = self.gathered.push(gathered);
+        }
+        self.gathered.len() as u32
+    }
+
+    /// Records that are being gathered.
+    pub fn being_gathered(&self) -> u32 {
+        self.gathered.len() as u32
+    }
+
+    /// Tells the directions of the rays of record `index` of those that [`Self::begin_gather`] chose.
+    pub fn set_point(&mut self, index: u32, point: &GatherPoint) {
+        let Some(gathered) = self.gathered.get_mut(index as usize) else { return };
+        let record = self.records.get_index(gathered.record).and_then(|(_, record)| record.as_ref());
+        if let Some(Record { content: Content::Wanted(distances), radius, .. }) = record {
+            gathered.coefficients = coefficients(point, distances, *radius);
+        }
+    }
+
+    /// Adds what a gather ray through a cell of the hemisphere brought to record `index` of those being gathered.
+    #[inline]
+    pub fn add(&mut self, index: u16, cell: u8, brought: Vec3) {
+        let Some(gathered) = self.gathered.get_mut(index as usize) else { return };
+        gathered.mean.add(brought);
+        if let Some(coefficients) = gathered.coefficients.get(cell as usize) {
+            for (sum, coefficient) in gathered.translation.iter_mut().zip(coefficients) {
+                sum.add(brought * *coefficient);
+            }
+        }
+        for (sum, coefficient) in gathered.rotation.iter_mut().zip(rotation(cell)) {
+            sum.add(brought * coefficient);
+        }
+    }
+
+    /// Ends the gather of the chosen records: their irradiance is known, in W/(sr m^2) over pi.
+    pub fn end_gather<M: MemoryPort>(&mut self, context: &mut Context<M>) {
+        let unit = context.scene.header.radiance_unit;
+        for gathered in &self.gathered {
+            context.counters.records += 1;
+            let record = self.records.get_index_mut(gathered.record);
+            let Some((_, Some(record))) = record else { continue };
+            let irradiance = Irradiance {
+                mean: gathered.mean.value() * unit,
+                translation: gathered.translation.map(|sum| sum.value() * unit),
+                rotation: gathered.rotation.map(|sum| sum.value() * unit),
+            };
+            record.content = Content::Gathered(irradiance.limited(record.radius));
+        }
+        self.gathered.clear();
+    }
+}
+
+/// What is seen at a point of the lattice, and what is around that.
+fn survey_point<M: MemoryPort>(
+    context: &mut Context<M>,
+    LatticePoint { x, y }: LatticePoint,
+    allowed: f32,
+) -> Result<Option<Record>, Fault> {
+    let Some(surface) = eye::see(context, [x as f32, y as f32])? else { return Ok(None) };
+    if max_component(surface.reflection.diffuse) <= 0.0 {
+        return Ok(None);
+    }
+    let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Survey);
+    let found = survey(context, &surface, pattern)?;
+    let least = LEAST_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
+    Ok(Some(Record::new(&surface, max(found.radius, least), found.distances)))
+}

@@ -1,0 +1,105 @@
+//! One irradiance record: where it is, how far it reaches, and the irradiance with its gradients.
+
+use glam::Vec3;
+
+use super::gradient::Distances;
+use crate::scene::{Reflection, Surface};
+use crate::vector::tangents;
+
+/// What a record knows of the light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Content {
+    /// Nothing yet but the distances of what is around.
+    Surveyed(Distances),
+    /// The same, and some sample of the block needs more.
+    Wanted(Distances),
+    /// What was gathered.
+    Gathered(Irradiance),
+}
+
+/// Indirect light at a record. Gradients are in the surface's tangent plane: along the tangent and the bitangent.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Irradiance {
+    /// The irradiance over pi, W/(sr m^2): the radiance that a white Lambertian surface would reflect.
+    pub(super) mean: Vec3,
+    /// Its change with the place, 1/m.
+    pub(super) translation: [Vec3; 2],
+    /// Its change with the normal's rotation about an axis, 1/rad.
+    pub(super) rotation: [Vec3; 2],
+}
+
+/// A record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Record {
+    pub(super) position: Vec3,
+    /// Unit normal on the side of the eye.
+    pub(super) normal: Vec3,
+    /// The greatest coordinate that the position was computed from, metres.
+    magnitude: f32,
+    /// Harmonic mean of the distances of what is around, metres; not below some pixels.
+    pub(super) radius: f32,
+    pub(super) content: Content,
+}
+
+/// Of a record's radius, how far a place may be from its tangent plane, over the square root of the error.
+const PLANE_SHARE: f32 = 0.1;
+
+impl Record {
+    pub(super) fn new(surface: &Surface, radius: f32, distances: Distances) -> Self {
+        let Surface { position, normal, magnitude, .. } = *surface;
+        Self { position, normal, magnitude, radius, content: Content::Surveyed(distances) }
+    }
+
+    /// A white Lambertian surface where the record is.
+    pub(super) fn surface(&self) -> Surface {
+        Surface {
+            position: self.position,
+            normal: self.normal,
+            outgoing: self.normal,
+            reflection: Reflection { diffuse: Vec3::ONE, ..Reflection::BLACK },
+            emission: Vec3::ZERO,
+            double_sided: false,
+            distance: 0.0,
+            magnitude: self.magnitude,
+        }
+    }
+
+    /// The error of the record at a place, for a radius of `radius`: the square of the distance over it, and how far
+    /// the normal has turned (Ward, Rubinstein, Clear 1988, whose error is of first order; with gradients it is of
+    /// second). Infinite out of its plane.
+    pub(super) fn error(&self, radius: f32, allowed: f32, position: Vec3, normal: Vec3) -> f32 {
+        let way = position - self.position;
+        let cosine = self.normal.dot(normal);
+        let height = way.dot(self.normal + normal) * 0.5;
+        let height_allowed = PLANE_SHARE * libm::sqrtf(allowed) * radius;
+        if cosine <= 0.0 || height > height_allowed || height < -height_allowed {
+            return f32::INFINITY;
+        }
+        way.length_squared() / (radius * radius) + (1.0 - cosine)
+    }
+}
+
+impl Irradiance {
+    /// The irradiance over pi at a place near the record at `origin` with normal `origin_normal` (Ward, Heckbert 1992).
+    pub(super) fn at(&self, origin: Vec3, origin_normal: Vec3, position: Vec3, normal: Vec3) -> Vec3 {
+        let (tangent, bitangent) = tangents(origin_normal);
+        let along = |gradient: &[Vec3; 2], way: Vec3| {
+            gradient[0] * tangent.dot(way) + gradient[1] * bitangent.dot(way)
+        };
+        let changed = self.mean
+            + along(&self.translation, position - origin)
+            + along(&self.rotation, origin_normal.cross(normal));
+        changed.max(Vec3::ZERO)
+    }
+
+    /// No gradient that changes the irradiance by more than itself within `radius`: such a one is noise.
+    pub(super) fn limited(mut self, radius: f32) -> Self {
+        let greatest = self.mean.element_sum() * (1.0 / 3.0) / radius;
+        let [x, y] = self.translation.map(|component| component.element_sum() * (1.0 / 3.0));
+        let length = libm::sqrtf(x * x + y * y);
+        if length > greatest {
+            self.translation = self.translation.map(|component| component * (greatest / length));
+        }
+        self
+    }
+}

@@ -1,0 +1,172 @@
+//! Scenes with a photon map that stays as it is while frames change: what differs between two frames is then the gather
+//! alone.
+
+use glam::Vec3;
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::film::Window;
+use photoncard_driver::pack::{CardImage, PackedScene};
+use photoncard_driver::photon::{MappedImage, PhotonSettings, map_photons};
+use photoncard_driver::render::RenderSettings;
+use photoncard_driver::scene::Scene;
+use photoncard_driver::scheduler::tiles;
+use photoncard_firmware::chip::{Progress, ReferenceChip};
+use photoncard_firmware::photon::Candidate;
+use photoncard_firmware::render::eye::see;
+use photoncard_firmware::render::final_gather::{cast, gathered};
+use photoncard_firmware::render::{Context, GatherPoint};
+use photoncard_firmware::sampler::{Dimension, Pattern};
+use photoncard_firmware::scene::Surface;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{FrameParameters, Sampling, Tile};
+use rayon::prelude::*;
+
+/// A scene with its card image.
+pub struct MappedScene {
+    scene: Scene,
+    image: CardImage,
+    max_distance: f32,
+}
+
+/// The pixels of a frame's window, row by row, and what they took.
+pub struct Frame {
+    /// W/(sr m^2).
+    pub radiance: Vec<Vec3>,
+    /// What was counted.
+    pub counters: Counters,
+}
+
+impl MappedScene {
+    /// Traces photons and packs the image, as a render of these settings would.
+    ///
+    /// # Panics
+    /// If the scene cannot be packed.
+    pub fn new(scene: Scene, settings: &RenderSettings) -> Self {
+        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+        let photons = PhotonSettings {
+            seed: settings.seed,
+            photons: settings.photons,
+            neighbors: settings.neighbors,
+            max_distance: settings.max_distance,
+        };
+        let MappedImage { image, max_distance, .. } = map_photons(packed, &photons, &|_| true).expect("maps");
+        Self { scene, image, max_distance }
+    }
+
+    /// The window of a frame on reference chips of this process, one a thread.
+    ///
+    /// # Panics
+    /// If the image is not sound.
+    pub fn frame(&self, settings: &RenderSettings) -> Frame {
+        let window = settings.window();
+        let frame = settings
+            .frame(self.scene.camera(settings.camera.as_deref()).expect("a camera"), self.max_distance);
+        let tiles = tiles(window, settings.tile, settings.order);
+        let pool = rayon::ThreadPoolBuilder::new().stack_size(16 << 20).build().expect("threads");
+        let parts: Vec<(Tile, Vec<Vec3>, Counters)> = pool.install(|| {
+            let new_chip = || Box::new(ReferenceChip::new());
+            tiles.into_par_iter().map_init(new_chip, |chip, tile| self.tile(chip, &frame, tile)).collect()
+        });
+        collect(window, &parts)
+    }
+
+    fn tile(
+        &self,
+        chip: &mut ReferenceChip,
+        frame: &FrameParameters,
+        tile: Tile,
+    ) -> (Tile, Vec<Vec3>, Counters) {
+        let (scene, mut memory) = self.image.view();
+        let mut counters = Counters::ZERO;
+        let mut context =
+            Context { scene: &scene, memory: &mut memory, frame, counters: &mut counters, outlet: None };
+        chip.begin_frame(&mut context).expect("sound");
+        assert!(chip.begin(tile));
+        while chip.step(&mut context).expect("sound") == Progress::Busy {}
+        let sums = (0..tile.pixels() as usize).map_while(|index| chip.sum(index));
+        let radiance = sums.map(|sum| sum.pixel(&scene, frame).radiance.into()).collect();
+        (tile, radiance, counters)
+    }
+}
+
+/// The indirect light of some surface points, gathered without a picture around them.
+pub struct IndirectLight<'a> {
+    mapped: &'a MappedScene,
+    frame: FrameParameters,
+    /// The points, spread evenly over the picture; those whose reflection is black are left out.
+    pub points: Vec<Surface>,
+}
+
+impl<'a> IndirectLight<'a> {
+    /// What a camera sees at the middles of `side * side` squares of the picture.
+    ///
+    /// # Panics
+    /// If the image is not sound.
+    pub fn new(mapped: &'a MappedScene, settings: &RenderSettings, side: u32) -> Self {
+        let camera = mapped.scene.camera(settings.camera.as_deref()).expect("a camera");
+        let frame = settings.frame(camera, mapped.max_distance);
+        let (scene, mut memory) = mapped.image.view();
+        let mut counters = Counters::ZERO;
+        let mut context = Context {
+            scene: &scene,
+            memory: &mut memory,
+            frame: &frame,
+            counters: &mut counters,
+            outlet: None,
+        };
+        let middle = |i: u32, size: u32| (i as f32 + 0.5) / side as f32 * size as f32;
+        let places =
+            (0..side * side).map(|i| [middle(i % side, frame.width), middle(i / side, frame.height)]);
+        let points = places
+            .filter_map(|place| see(&mut context, place).expect("sound"))
+            .filter(|surface| !surface.reflection.is_black())
+            .collect();
+        Self { mapped, frame, points }
+    }
+
+    /// The radiance that each point reflects towards the eye of the light that reaches it from other surfaces, with so
+    /// many rays of a sampling.
+    ///
+    /// # Panics
+    /// If the image is not sound.
+    pub fn radiance(&self, sampling: Sampling, rays: u32, seed: u32) -> Vec<Vec3> {
+        let frame = FrameParameters { sampling, ..self.frame };
+        let gather = |(index, surface): (usize, &Surface)| {
+            let (scene, mut memory) = self.mapped.image.view();
+            let mut counters = Counters::ZERO;
+            let mut context = Context {
+                scene: &scene,
+                memory: &mut memory,
+                frame: &frame,
+                counters: &mut counters,
+                outlet: None,
+            };
+            let mut candidates = heapless::Vec::<Candidate, 512>::new();
+            let pattern = Pattern::new(seed, index as u32, 0, 0, Dimension::Gather);
+            let mut point = GatherPoint::sample(*surface, pattern, rays);
+            point.choose_directions(&mut context, &mut candidates).expect("sound");
+            let mut sum = Vec3::ZERO;
+            for ray in 0..rays {
+                let end = cast(&mut context, &point, 0, 1.0, ray).expect("sound");
+                if let Some(request) = end.and_then(|end| end.request) {
+                    sum += gathered(&mut context, &request, &mut candidates).expect("sound");
+                }
+            }
+            sum * scene.header.radiance_unit
+        };
+        self.points.par_iter().enumerate().map(|(index, surface)| gather((index, surface))).collect()
+    }
+}
+
+fn collect(window: Window, parts: &[(Tile, Vec<Vec3>, Counters)]) -> Frame {
+    let width = (window.x1 - window.x0) as usize;
+    let mut radiance = vec![Vec3::ZERO; width * (window.y1 - window.y0) as usize];
+    let mut counters = Counters::ZERO;
+    for (tile, pixels, counted) in parts {
+        counters.add(counted);
+        for (row, pixels) in pixels.chunks(tile.width as usize).enumerate() {
+            let start = ((tile.y - window.y0) as usize + row) * width + (tile.x - window.x0) as usize;
+            radiance[start..start + pixels.len()].copy_from_slice(pixels);
+        }
+    }
+    Frame { radiance, counters }
+}

@@ -1,0 +1,72 @@
+//! Every sampling of the gather rays converges to the same picture.
+
+use glam::{DVec3, Vec3};
+use photoncard_driver::render::{RenderSettings, Sampling};
+use photoncard_driver::scene::gltf;
+use photoncard_tests::mapped::{IndirectLight, MappedScene};
+
+/// Checks the mean of many seeds against a gather of 10,000 rays, within the standard error of both.
+fn check(scene: &str, camera: Option<&str>, assignments: &[&str]) {
+    let path = format!("{}/../scenes/{scene}", env!("CARGO_MANIFEST_DIR"));
+    let mut scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
+    assignments.iter().for_each(|assignment| scene.apply(assignment).expect("a material of the scene"));
+    let settings = RenderSettings {
+        photons: 50_000,
+        neighbors: 50,
+        camera: camera.map(Into::into),
+        ..RenderSettings::default()
+    };
+    let mapped = MappedScene::new(scene, &settings);
+    let light = IndirectLight::new(&mapped, &settings, 4);
+    let reference: Vec<DVec3> =
+        light.radiance(Sampling::Reflection, 10_000, 1).into_iter().map(Vec3::as_dvec3).collect();
+    for sampling in [Sampling::Reflection, Sampling::Photon, Sampling::Product, Sampling::Mixture] {
+        check_sampling(&light, sampling, &reference);
+    }
+}
+
+fn check_sampling(light: &IndirectLight, sampling: Sampling, reference: &[DVec3]) {
+    // The photons' sampling has rare rays of a great weight: few seeds do not tell its variance.
+    const SEEDS: u32 = 120;
+    const RAYS: u32 = 32;
+    let runs: Vec<Vec<Vec3>> = (100..100 + SEEDS).map(|seed| light.radiance(sampling, RAYS, seed)).collect();
+    let count = SEEDS as f64;
+    let [mut worst, mut sum, mut sum_variance] = [0.0_f64; 3];
+    for (point, expected) in reference.iter().enumerate() {
+        let values = || runs.iter().map(|run| run[point].as_dvec3().element_sum());
+        let mean = values().sum::<f64>() / count;
+        let variance = values().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0) / count;
+        // The reference's own rays are as good as so many more seeds, at the least.
+        let variance =
+            variance * (1.0 + count * RAYS as f64 / 10_000.0) + (1e-4 * expected.element_sum()).powi(2);
+        let deviation = mean - expected.element_sum();
+        worst = worst.max(deviation.abs() / variance.sqrt());
+        sum += deviation;
+        sum_variance += variance;
+    }
+    let overall = sum / sum_variance.sqrt();
+    assert!(overall.abs() < 3.0, "{sampling:?}: the mean of all points is off by {overall} standard errors");
+    assert!(worst < 5.0, "{sampling:?}: a point is off by {worst} standard errors");
+}
+
+#[test]
+fn the_cornell_box_has_the_same_indirect_light_by_every_sampling() {
+    check("cornell.gltf", None, &[]);
+}
+
+#[test]
+fn so_has_one_that_is_lit_from_a_spot() {
+    check("cornell-uplight.gltf", None, &[]);
+}
+
+#[test]
+fn so_have_glossy_floors() {
+    for exponent in ["1", "8", "32", "128"] {
+        check("cornell-glossy.gltf", Some("floor"), &[&format!("floor.exponent={exponent}")]);
+    }
+}
+
+#[test]
+fn so_has_the_atrium() {
+    check("atrium.glb", None, &[]);
+}
