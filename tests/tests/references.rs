@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use photoncard_driver::exr::{RgbImage, read_rgb};
 use photoncard_driver::film::Film;
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{RenderSettings, Sampling};
 use photoncard_driver::scene::gltf;
 use photoncard_tests::render_or_panic;
 
@@ -52,14 +52,22 @@ fn compare(film: &Film, reference: &RgbImage) {
     assert!(high < 0.05, "the 95th percentile of the blocks is off by {high}");
 }
 
+/// Checks a scene as it is rendered by default, and with all that saves gathers.
 fn check(scene: &str, reference: &str) {
+    check_with(scene, reference, Sampling::Reflection, None);
+    check_with(scene, reference, Sampling::Product, Some(0.025));
+}
+
+fn check_with(scene: &str, reference: &str, sampling: Sampling, irradiance_error: Option<f32>) {
     let scene = gltf::load(&path("../scenes").join(scene)).expect("a shipped scene loads");
     let settings = RenderSettings {
         width: 64,
         height: 64,
         photons: 300_000,
-        gather_rays: 32,
+        gather_rays: if irradiance_error.is_some() { 256 } else { 32 },
         samples: 16,
+        sampling,
+        irradiance_error,
         cards: vec!["emulated:2".parse().unwrap()],
         ..RenderSettings::default()
     };

@@ -16,6 +16,18 @@ pub struct LatticePoint {
     pub y: u32,
 }
 
+/// How far from its lattice point a record is seen, pixels: in a symmetric view of a room, edges of walls run exactly
+/// through lattice points, and a record in an edge sees nothing of what is right beside it.
+const PLACE_OFFSET: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
+
+impl LatticePoint {
+    /// The place of the picture where the point's record is seen.
+    pub(super) fn place(&self) -> [f32; 2] {
+        let [right, down] = PLACE_OFFSET;
+        [self.x as f32 + right, self.y as f32 + down]
+    }
+}
+
 /// A square of the lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {

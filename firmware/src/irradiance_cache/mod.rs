@@ -171,8 +171,8 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
         if corners.records().count() < 4 || !surfaces.all(|(position, normal)| covers(position, normal)) {
             return Ok(false);
         }
-        for LatticePoint { x, y } in cell.middles() {
-            let seen = eye::see(context, [x as f32, y as f32])?;
+        for point in cell.middles() {
+            let seen = eye::see(context, point.place())?;
             if !seen.is_some_and(|surface| covers(surface.position, surface.normal)) {
                 return Ok(false);
             }
@@ -271,14 +271,14 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
 /// What is seen at a point of the lattice, and what is around that.
 fn survey_point<M: MemoryPort>(
     context: &mut Context<M>,
-    LatticePoint { x, y }: LatticePoint,
+    point: LatticePoint,
     allowed: f32,
 ) -> Result<Option<Record>, Fault> {
-    let Some(surface) = eye::see(context, [x as f32, y as f32])? else { return Ok(None) };
+    let Some(surface) = eye::see(context, point.place())? else { return Ok(None) };
     if max_component(surface.reflection.diffuse) <= 0.0 {
         return Ok(None);
     }
-    let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Survey);
+    let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
     let found = survey(context, &surface, pattern)?;
     let least = LEAST_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
     Ok(Some(Record::new(&surface, max(found.radius, least), found.distances)))
