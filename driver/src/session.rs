@@ -108,7 +108,7 @@ pub struct Session<'a> {
 const SILENCE: Duration = Duration::from_secs(10);
 /// How long a card may be silent while it renders, besides the time of its tiles.
 const RENDERING_SILENCE: Duration = Duration::from_secs(600);
-/// Irradiance records that a card gathers for one pixel at the most.
+/// Irradiance records that a card surveys for one pixel at the most, and more than it gathers.
 const MOST_RECORDS_OF_A_PIXEL: u64 = 19;
 /// Time that a slow card may take for one ray and its gather.
 const SLOW_RAY: Duration = Duration::from_millis(1);

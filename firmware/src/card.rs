@@ -314,7 +314,7 @@ fn check_frame(budget: &Budget, frame: &FrameParameters) -> Result<(), Fault> {
         frame.neighbors >= 2 && within(frame.neighbors, budget.neighbors),
         frame.max_distance.is_finite() && frame.max_distance > 0.0,
         true,
-        frame.irradiance_error.is_none_or(|error| error.is_finite() && error >= LEAST_IRRADIANCE_ERROR),
+        frame.irradiance_error.is_none_or(|error| (LEAST_IRRADIANCE_ERROR..=1.0).contains(&error)),
         within(frame.bins, MOST_BINS),
         true,
         frame.queue >= 1,

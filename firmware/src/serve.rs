@@ -12,7 +12,7 @@ const IDLE_WAIT: Duration = Duration::from_millis(20);
 
 /// Serves a card on a port until the port fails: bytes in, work, bytes out.
 ///
-/// Between two looks at the port lies at most one stage of one pixel, or the drain of a gather queue that fills in it.
+/// Between two looks at the port lies at most one stage of one pixel or irradiance record, or the drain of a gather queue that fills in it.
 ///
 /// # Errors
 /// Why the port cannot go on; [`PortError::Closed`] is how a session ends in order.

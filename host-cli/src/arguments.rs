@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
-use photoncard_driver::render::{CardAddress, RenderSettings, Sampling};
+use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
 /// Global illumination by photon mapping on small rendering chips.
@@ -93,7 +93,7 @@ pub(crate) struct RenderOptions {
     #[arg(long, default_value_t = 16, allow_negative_numbers = true)]
     tile: u32,
     /// What the directions of gather rays are chosen by; it never changes what the picture converges to
-    #[arg(long, default_value = "brdf")]
+    #[arg(long, default_value = "combined")]
     sampling: SamplingOption,
     /// Gather the indirect light of Lambertian surfaces at some places and interpolate between them
     #[arg(long, default_value = "off")]
@@ -237,7 +237,8 @@ impl RenderOptions {
             samples: self.spp,
             tile: self.tile,
             sampling: self.sampling.sampling(),
-            irradiance_error: (self.irradiance_cache == Switch::On).then_some(self.ic_error),
+            irradiance_error: (self.irradiance_cache == Switch::On && self.gather_rays > 0)
+                .then_some(self.ic_error),
             order: self.order.gather_order(),
             bins: self.bins,
             queue: self.queue,
@@ -287,8 +288,10 @@ fn threads(text: &str) -> Result<usize, String> {
 
 fn ic_error(text: &str) -> Result<f32, String> {
     match text.parse() {
-        Ok(error) if f32::is_finite(error) && error > 0.0 => Ok(error),
-        _ => Err("an error is a share of the irradiance, a number above 0 such as 0.025".into()),
+        Ok(error) if (LEAST_IRRADIANCE_ERROR..=1.0).contains(&error) => Ok(error),
+        _ => Err(format!(
+            "an error is a share of the irradiance, {LEAST_IRRADIANCE_ERROR} to 1, such as 0.025"
+        )),
     }
 }
 

@@ -1,7 +1,7 @@
 //! `photoncard card info`.
 
 use photoncard_driver::emulator::ChipKind;
-use photoncard_driver::render::{CardAddress, card_info};
+use photoncard_driver::render::{CardAddress, MOST_BINS, card_info};
 
 use crate::console::print;
 use crate::failure::Failure;
@@ -27,6 +27,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("tile            {} pixels, {} tiles at once", budget.tile_pixels, budget.tiles),
         format!("neighbors       {}", budget.neighbors),
         format!("gather rays     {} a sample", budget.gather_rays),
+        format!("bins            {MOST_BINS} of directions"),
         format!("gather queue    {} gathers", budget.gather_queue),
         format!("records         {} of irradiance", budget.irradiance_records),
         format!("shadow rays     {} a sample", budget.shadow_rays),

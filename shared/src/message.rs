@@ -20,7 +20,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// The version of this module and of [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 
 /// Lines that one [`Command::WriteLines`] may carry.
 pub const LINES_PER_WRITE: usize = 16;
@@ -62,7 +62,7 @@ pub struct FrameParameters {
     pub max_distance: f32,
     /// Which way gather rays go.
     pub sampling: Sampling,
-    /// The relative error that interpolated irradiance may have, above 0; without one no irradiance is interpolated.
+    /// The relative error that interpolated irradiance may have, above 0 and at most 1; without one no irradiance is interpolated.
     pub irradiance_error: Option<f32>,
     /// Bins that the directions of gather rays are grouped in, at least 1: the rays of one bin are cast for all pixels
     /// of a tile before those of the next. One bin casts all rays of a pixel before those of the next.
@@ -93,9 +93,9 @@ pub enum Drain {
     /// At once.
     #[default]
     Immediate,
-    /// When the queue is full or the tile ends, by a spatial hash of their place.
+    /// When the queue is full or their results are needed, by a spatial hash of their place.
     Hash,
-    /// When the queue is full or the tile ends, along a Hilbert curve.
+    /// When the queue is full or their results are needed, along a Hilbert curve.
     Sort,
 }
 

@@ -130,6 +130,25 @@ fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
     }
 }
 
+/// Far to the right a place in the picture has few bits below the pixel: it may be rounded to the next pixel's border.
+#[test]
+fn nor_do_they_where_samples_are_rounded_to_the_next_pixel() {
+    let scene = glossy();
+    let settings = |tile| RenderSettings {
+        width: 65_536,
+        height: 4096,
+        crop: Some(Window { x0: 33_000, x1: 33_072, y0: 2000, y1: 2032 }),
+        irradiance_error: Some(0.1),
+        gather_rays: 1,
+        tile,
+        ..settings()
+    };
+    let expected = bits(&render_or_panic(&scene, &settings(16)).film);
+    for tile in [32, 5] {
+        assert!(bits(&render_or_panic(&scene, &settings(tile)).film) == expected, "tiles of {tile}");
+    }
+}
+
 #[test]
 fn a_frame_along_one_curve_is_for_emulated_reference_chips_alone() {
     let settings =

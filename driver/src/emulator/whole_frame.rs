@@ -4,6 +4,8 @@
 //! and has them done when all rays are cast (Steinhurst, Coombe, Lastra 2005). Irradiance records are needed before the
 //! pixels and stay on the chips.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use glam::Vec3;
 use photoncard_firmware::chip::{PixelSum, Progress, ReferenceChip};
 use photoncard_firmware::gather::GatherRequest;
@@ -14,16 +16,16 @@ use photoncard_firmware::render::{Context, GatherOutlet};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::budget::{REFERENCE, gather_candidates};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Fault, FrameParameters, Tile};
+use photoncard_shared::message::{Fault, FaultCode, FrameParameters, Tile};
 use rayon::prelude::*;
 
 use crate::film::{Film, FilmError};
 use crate::pack::CardImage;
 
-/// The most gathers that are kept at once, 36 bytes each.
-const MOST_GATHERS: u64 = 1 << 28;
-/// Tiles of which rays are cast before the host looks around.
-const TILES_PER_ROUND: usize = 64;
+/// The most gathers that are kept at once, 36 bytes each: 4.8 GB.
+const MOST_GATHERS: u64 = 1 << 27;
+/// Gathers of the tiles that are cast before the host takes them over, about.
+const GATHERS_PER_CAST: u64 = 1 << 21;
 /// Gathers that one task does.
 const GATHERS_PER_TASK: usize = 4096;
 /// Gathers that are done before the host looks around.
@@ -35,7 +37,9 @@ const THREAD_STACK: usize = 8 << 20;
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
     /// It might have more gathers than can be kept.
-    #[error("the frame may have {gathers} gathers, and at most {MOST_GATHERS} are kept at once")]
+    #[error(
+        "the frame may have {gathers} gathers, and at most {MOST_GATHERS} are kept at once, as memory allows"
+    )]
     TooManyGathers {
         /// Rays over pixels and samples.
         gathers: u64,
@@ -93,8 +97,8 @@ impl GatherOutlet for Outlet {
     }
 }
 
-/// Renders tiles into a film on so many emulated reference chips. `progress` is told how much of the work is done, of
-/// how much, and says whether to go on.
+/// Renders tiles into a film on so many emulated reference chips. `progress` is told how many tiles' worth of the work is
+/// done, of how many, and says whether to go on.
 ///
 /// # Errors
 /// If the frame has too many gathers, the image is not sound, or `progress` says no.
@@ -106,20 +110,16 @@ pub fn render_along_curve(
     film: &mut Film,
     progress: &(dyn Fn(u64, u64) -> bool + Sync),
 ) -> Result<Counters, FrameError> {
-    let pixels: u64 = tiles.iter().map(Tile::pixels).sum();
-    let gathers = pixels * frame.samples as u64 * frame.gather_rays as u64;
-    if gathers > MOST_GATHERS || pixels > u32::MAX as u64 {
-        return Err(FrameError::TooManyGathers { gathers });
-    }
+    let mut all = Frame::with_room_for(frame, tiles)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(chips).stack_size(THREAD_STACK).build()?;
-    let mut all = Frame::default();
-    // Casting is counted as one part, gathering as nine.
-    let steps = tiles.len() as u64 * 10;
-    for (round, tiles) in tiles.chunks(TILES_PER_ROUND).enumerate() {
-        all.add(pool.install(|| cast_tiles(image, frame, tiles))?);
-        if !progress((round * TILES_PER_ROUND) as u64, steps) {
-            return Err(FrameError::Stopped);
-        }
+    // Casting a tile counts as a tenth of it, doing its gathers as the rest.
+    let total = tiles.len() as u64;
+    let cast = AtomicU64::new(0);
+    let go_on = || progress(cast.fetch_add(1, Ordering::Relaxed) / 10, total);
+    let gathers_of_tile = rays_of_pixel(frame) * tiles.iter().map(Tile::pixels).max().unwrap_or(1);
+    let tiles_per_round = (GATHERS_PER_CAST / gathers_of_tile.max(1)).max(2 * chips as u64) as usize;
+    for tiles in tiles.chunks(tiles_per_round) {
+        all.add(pool.install(|| cast_tiles(image, frame, tiles, &go_on))?)?;
     }
     pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.key));
     let mut done = 0;
@@ -130,8 +130,7 @@ pub fn render_along_curve(
             all.sums[sum as usize].add_gathered(brought);
         }
         done += waiting.len() as u64;
-        let gathered = tiles.len() as u64 * 9 * done / all.waiting.len() as u64;
-        if !progress(tiles.len() as u64 + gathered, steps) {
+        if !progress(total / 10 + (total - total / 10) * done / all.waiting.len() as u64, total) {
             return Err(FrameError::Stopped);
         }
     }
@@ -145,9 +144,38 @@ pub fn render_along_curve(
     Ok(all.counters)
 }
 
+/// The gather rays of one pixel; with the irradiance cache about.
+fn rays_of_pixel(frame: &FrameParameters) -> u64 {
+    let samples = frame.samples as u64;
+    match frame.irradiance_error {
+        None => samples * frame.gather_rays as u64,
+        Some(_) => samples * (frame.gather_rays as u64).div_ceil(samples.max(1)),
+    }
+}
+
 impl Frame {
-    fn add(&mut self, tiles: Vec<CastTile>) {
+    fn with_room_for(frame: &FrameParameters, tiles: &[Tile]) -> Result<Self, FrameError> {
+        let pixels: u64 = tiles.iter().map(Tile::pixels).sum();
+        let gathers = pixels * rays_of_pixel(frame);
+        let too_many = || FrameError::TooManyGathers { gathers };
+        if gathers > MOST_GATHERS || pixels > u32::MAX as u64 {
+            return Err(too_many());
+        }
+        let mut all = Self::default();
+        all.sums.try_reserve_exact(pixels as usize).map_err(|_| too_many())?;
+        all.waiting.try_reserve_exact(gathers as usize).map_err(|_| too_many())?;
+        Ok(all)
+    }
+
+    /// Takes over what tiles leave. Only lobes beside an irradiance cache can be more than there was room made for.
+    fn add(&mut self, tiles: Vec<CastTile>) -> Result<(), FrameError> {
         for tile in tiles {
+            let gathers = (self.waiting.len() + tile.waiting.len()) as u64;
+            let too_many = || FrameError::TooManyGathers { gathers };
+            if gathers > MOST_GATHERS {
+                return Err(too_many());
+            }
+            self.waiting.try_reserve(tile.waiting.len()).map_err(|_| too_many())?;
             let first = self.sums.len() as u32;
             self.sums.extend(tile.sums);
             self.counters.add(&tile.counters);
@@ -158,12 +186,24 @@ impl Frame {
                 request,
             }));
         }
+        Ok(())
     }
 }
 
-fn cast_tiles(image: &CardImage, frame: &FrameParameters, tiles: &[Tile]) -> Result<Vec<CastTile>, Fault> {
+fn cast_tiles(
+    image: &CardImage,
+    frame: &FrameParameters,
+    tiles: &[Tile],
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<CastTile>, FrameError> {
     let new_chip = || Box::new(ReferenceChip::new());
-    tiles.par_iter().map_init(new_chip, |chip, &tile| cast(chip, image.view(), frame, tile)).collect()
+    let cast_one = |chip: &mut Box<ReferenceChip>, &tile: &Tile| {
+        if !go_on() {
+            return Err(FrameError::Stopped);
+        }
+        Ok(cast(chip, image.view(), frame, tile)?)
+    };
+    tiles.par_iter().map_init(new_chip, cast_one).collect()
 }
 
 /// Casts all rays of a tile.
@@ -183,9 +223,8 @@ fn cast(
         outlet: Some(&mut outlet),
     };
     chip.begin_frame(&mut context)?;
-    let tile_fault = Fault { code: photoncard_shared::message::FaultCode::Tile, detail: tile.id };
     if !chip.begin(tile) {
-        return Err(tile_fault);
+        return Err(Fault { code: FaultCode::Tile, detail: tile.id });
     }
     while chip.step(&mut context)? == Progress::Busy {}
     let sums = (0..tile.pixels() as usize).map_while(|index| chip.sum(index).copied()).collect();

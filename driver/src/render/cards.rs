@@ -74,12 +74,26 @@ pub(super) fn reference_chips(addresses: &[CardAddress]) -> Result<usize, Render
         CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),
         CardAddress::Emulated { kind: ChipKind::Micro, .. } => None,
     });
-    let chips = counts.sum::<Option<usize>>().filter(|chips| (1..=MAX_CHIPS).contains(chips));
-    chips.ok_or_else(|| RenderError::Setting {
+    let chips = counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
         option: "--order",
         value: "hilbert".into(),
         reason: "it leaves all gathers of the frame to the host, as no chip has room for them".into(),
-        remedy: format!("use --card emulated:CHIPS with 1 to {MAX_CHIPS} chips, or --order sort"),
+        remedy: "use --card emulated:CHIPS, or --order sort".into(),
+    })?;
+    check_chips(chips)?;
+    Ok(chips)
+}
+
+/// Checks the number of chips of one process.
+fn check_chips(chips: usize) -> Result<(), RenderError> {
+    if chips <= MAX_CHIPS {
+        return Ok(());
+    }
+    Err(RenderError::Setting {
+        option: "--card",
+        value: format!("with {chips} chips in all"),
+        reason: format!("one process emulates at most {MAX_CHIPS}"),
+        remedy: "use fewer chips".into(),
     })
 }
 
@@ -152,15 +166,7 @@ impl Cards {
         let start = Instant::now();
         let kinds =
             addresses.iter().flat_map(|&CardAddress::Emulated { kind, chips }| (0..chips).map(move |_| kind));
-        let chips = kinds.clone().count();
-        if chips > MAX_CHIPS {
-            return Err(RenderError::Setting {
-                option: "--card",
-                value: format!("with {chips} chips in all"),
-                reason: format!("one process emulates at most {MAX_CHIPS}"),
-                remedy: "use fewer chips".into(),
-            });
-        }
+        check_chips(kinds.clone().count())?;
         let cards: Result<Vec<Connected>, RenderError> = kinds
             .enumerate()
             .map(|(index, kind)| {

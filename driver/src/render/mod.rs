@@ -7,8 +7,9 @@ mod statistics;
 
 pub use cards::{CardAddress, CardInfo, card_info};
 pub use error::RenderError;
+pub use photoncard_shared::budget::MOST_BINS;
 pub use photoncard_shared::message::Sampling;
-pub use settings::RenderSettings;
+pub use settings::{LEAST_IRRADIANCE_ERROR, RenderSettings};
 pub use statistics::{LinkStatistics, Rays, Statistics, Times};
 
 use std::sync::{Mutex, PoisonError};

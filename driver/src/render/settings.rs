@@ -1,7 +1,8 @@
 //! What a render is asked to do.
 
 use glam::Vec3;
-use photoncard_firmware::card::{LEAST_IRRADIANCE_ERROR, MAX_PICTURE_SIDE};
+pub use photoncard_firmware::card::LEAST_IRRADIANCE_ERROR;
+use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::{Budget, MOST_BINS};
 use photoncard_shared::message::{self, FrameParameters, Sampling};
@@ -69,7 +70,7 @@ impl Default for RenderSettings {
             shadow_rays: 8,
             samples: 1,
             tile: 16,
-            sampling: Sampling::Reflection,
+            sampling: Sampling::Product,
             irradiance_error: None,
             order: GatherOrder::Sort,
             bins: None,
@@ -118,12 +119,12 @@ impl RenderSettings {
         within("--queue", self.queue.unwrap_or(1) as u64, 1, budget.gather_queue as u64)?;
         within("--tile", self.tile as u64, 1, budget.tile_pixels.isqrt() as u64)?;
         if let Some(error) = self.irradiance_error
-            && !(error.is_finite() && error >= LEAST_IRRADIANCE_ERROR)
+            && !(LEAST_IRRADIANCE_ERROR..=1.0).contains(&error)
         {
             return Err(RenderError::Setting {
                 option: "--ic-error",
                 value: error.to_string(),
-                reason: format!("an error is a share of the irradiance, {LEAST_IRRADIANCE_ERROR} or more"),
+                reason: format!("an error is a share of the irradiance, {LEAST_IRRADIANCE_ERROR} to 1"),
                 remedy: "give a number such as 0.025".into(),
             });
         }

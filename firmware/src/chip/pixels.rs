@@ -6,6 +6,7 @@ use photoncard_shared::message::{Fault, FrameParameters, Pixel};
 use super::position::{Position, Stage};
 use super::{Chip, Progress};
 use crate::fixed_point::ColourSum;
+use crate::irradiance_cache::SeenSample;
 use crate::memory::MemoryPort;
 use crate::render::{Context, GatherPoint, PixelSample, direct, eye, final_gather};
 use crate::sampler::{Dimension, Pattern};
@@ -119,14 +120,14 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
             let pattern = Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather);
             let allowed = allowed_error(frame);
             let is_lambertian = frame.gather_rays > 0 && max_component(surface.reflection.diffuse) > 0.0;
-            let interpolated = match allowed {
-                Some(allowed) if is_lambertian => self.cache.interpolate(place, &surface, allowed),
-                _ => None,
-            };
+            let sample = SeenSample { pixel: [at.x, at.y], place, surface: &surface };
             // With the cache the rays are those of a record, and of a pixel; without it those of a sample.
-            let rays = match allowed {
-                Some(_) => frame.gather_rays.div_ceil(frame.samples.max(1)),
-                None => frame.gather_rays,
+            let (interpolated, rays) = match allowed {
+                Some(allowed) if is_lambertian => (
+                    self.cache.interpolate(&sample, allowed),
+                    frame.gather_rays.div_ceil(frame.samples.max(1)),
+                ),
+                _ => (None, frame.gather_rays),
             };
             context.counters.lambertian_samples += u64::from(is_lambertian);
             context.counters.interpolated_samples += u64::from(interpolated.is_some());

@@ -2,10 +2,10 @@
 
 use photoncard_shared::message::Fault;
 
-use super::Chip;
 use super::pixels::allowed_error;
 use super::position::{Position, Stage};
-use crate::irradiance_cache::{Full, Window};
+use super::{Chip, MOST_BLOCKS};
+use crate::irradiance_cache::{Full, SeenSample, Window};
 use crate::memory::MemoryPort;
 use crate::render::{Context, eye, final_gather};
 use crate::vector::max_component;
@@ -28,17 +28,28 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
 
     /// Puts the block off in two halves: its records do not fit. A block of one pixel always fits.
     fn divide_block(&mut self) {
-        if let Some([first, second]) = self.block.halves() {
-            // There is room: a tile's sides can be halved sixteen times each.
-            let _ = self.blocks.push(second);
-            let _ = self.blocks.push(first);
+        let Some([first, second]) = self.block.halves().filter(|_| self.blocks.len() + 2 <= MOST_BLOCKS)
+        else {
+            // Never: there is room for one pixel, and for the halves of a tile down to it. Each sample gathers its own.
+            return self.do_without_records();
+        };
+        for half in [second, first] {
+            let _ = self.blocks.push(half);
         }
         self.position = Position::DONE;
     }
 
+    fn do_without_records(&mut self) {
+        self.cache.forget();
+        self.position = Position::at(Stage::Eye);
+    }
+
     /// One cell of the lattice.
     pub(super) fn survey<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let Some(allowed) = allowed_error(context.frame) else { return Ok(()) };
+        let Some(allowed) = allowed_error(context.frame) else {
+            self.do_without_records();
+            return Ok(());
+        };
         match self.cache.look_at_next_cell(context, &self.window(), allowed)? {
             Ok(true) => self.position = Position::at(Stage::Mark),
             Ok(false) => {}
@@ -49,12 +60,15 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
 
     /// The records that one sample of one pixel uses.
     pub(super) fn mark<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let Some(allowed) = allowed_error(context.frame) else { return Ok(()) };
+        let Some(allowed) = allowed_error(context.frame) else {
+            self.do_without_records();
+            return Ok(());
+        };
         let (_, at) = self.present();
         let place = eye::place(context, at);
         let surface = eye::see(context, place)?;
         if let Some(surface) = surface.filter(|surface| max_component(surface.reflection.diffuse) > 0.0) {
-            self.cache.want(place, &surface, allowed);
+            self.cache.want(&SeenSample { pixel: [at.x, at.y], place, surface: &surface }, allowed);
         }
         if self.position.next_index(self.block.pixels()) && self.position.next_sample(context.frame.samples) {
             self.begin_gather(context);
@@ -109,7 +123,9 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
 
     /// What has come of the records; the next ones begin.
     pub(super) fn end_records<M: MemoryPort>(&mut self, context: &mut Context<M>) {
-        self.cache.end_gather(context);
+        if let Some(allowed) = allowed_error(context.frame) {
+            self.cache.end_gather(context, allowed);
+        }
         self.begin_gather(context);
     }
 }

@@ -1,4 +1,4 @@
-//! The gather queue: requests wait here until it is full or the tile ends, and are then done in the order of their
+//! The gather queue: requests wait here until it is full or their results are needed, and are then done in the order of their
 //! keys. Full is back-pressure: the queue is drained, and nothing is lost.
 
 use heapless::Vec;

@@ -31,8 +31,8 @@ const STEPS_PER_OCTAVE: u32 = 16;
 const MEAN_CODE: u32 = 128;
 
 impl Distances {
-    fn new(inverse_distances: &[f32; CELLS], radius: f32) -> Self {
-        Self(inverse_distances.map(|inverse| encode(1.0 / (inverse * radius))))
+    fn new(inverse_distances: &[f32; CELLS], mean: f32) -> Self {
+        Self(inverse_distances.map(|inverse| encode(1.0 / (inverse * mean))))
     }
 
     /// The distance in a cell, over their harmonic mean.
@@ -56,9 +56,10 @@ fn decode(code: u8) -> f32 {
 }
 
 /// What a point's surroundings are like.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Survey {
     /// The harmonic mean of the distances, metres.
-    pub(super) radius: f32,
+    pub(super) distance: f32,
     pub(super) distances: Distances,
 }
 
@@ -85,16 +86,16 @@ pub(super) fn survey<M: MemoryPort>(
         }
     }
     let mean = inverse_distances.iter().sum::<f32>() * (1.0 / CELLS as f32);
-    let radius = 1.0 / max(mean, 1.0 / FARTHEST);
-    Ok(Survey { radius, distances: Distances::new(&inverse_distances, radius) })
+    let distance = 1.0 / max(mean, 1.0 / FARTHEST);
+    Ok(Survey { distance, distances: Distances::new(&inverse_distances, distance) })
 }
 
 /// How much of what a gather ray of each cell brings goes into the translational gradient, along the tangent and the
-/// bitangent, 1/m.
+/// bitangent, over the harmonic mean distance: without unit, so that sums are of one size in scenes of any.
 pub(super) type Coefficients = [[f32; 2]; CELLS];
 
 /// The coefficients of the cells for the rays of a gather point whose reflection is white and Lambertian.
-pub(super) fn coefficients(point: &GatherPoint, distances: &Distances, radius: f32) -> Coefficients {
+pub(super) fn coefficients(point: &GatherPoint, distances: &Distances) -> Coefficients {
     let rays = point.directions.rays_in_cells(point.pattern, point.rays);
     let mut coefficients = [[0.0; 2]; CELLS];
     let mut border = |[less, more]: [usize; 2], length: f32, azimuth: f32| {
@@ -103,7 +104,7 @@ pub(super) fn coefficients(point: &GatherPoint, distances: &Distances, radius: f
             return;
         }
         let nearer = crate::vector::min(distances.get(less), distances.get(more));
-        let speed = length / (nearer * radius);
+        let speed = length / nearer;
         let way = [speed * libm::cosf(azimuth), speed * libm::sinf(azimuth)];
         for (cell, sign) in [(less, -1.0), (more, 1.0)] {
             if let Some(sum) = coefficients.get_mut(cell) {
@@ -192,14 +193,14 @@ mod tests {
         }
         let inverse: [f32; CELLS] = core::array::from_fn(|cell| inverse[cell] / counts[cell]);
         let radius = CELLS as f32 / inverse.iter().sum::<f32>();
-        let coefficients = coefficients(&point, &Distances::new(&inverse, radius), radius);
+        let coefficients = coefficients(&point, &Distances::new(&inverse, radius));
         let mut irradiance = Irradiance::default();
         for sampled in samples {
             let brought = sampled.weight * (ceiling(position, sampled.direction).1 / rays as f32);
             irradiance.mean += brought;
             let coefficients = coefficients[sampled.cell as usize];
             let terms = irradiance.translation.iter_mut().zip(coefficients);
-            terms.for_each(|(sum, coefficient)| *sum += brought * coefficient);
+            terms.for_each(|(sum, coefficient)| *sum += brought * (coefficient / radius));
             let terms = irradiance.rotation.iter_mut().zip(rotation(sampled.cell));
             terms.for_each(|(sum, coefficient)| *sum += brought * coefficient);
         }
@@ -220,7 +221,7 @@ mod tests {
         let mut inverse = [0.0; CELLS];
         inverse.iter_mut().enumerate().for_each(|(cell, inverse)| *inverse = 0.2 + (cell * 7 % 13) as f32);
         let point = GatherPoint::record(white(Vec3::ZERO, Vec3::Y), pattern, 100);
-        let coefficients = coefficients(&point, &Distances::new(&inverse, 0.1), 0.1);
+        let coefficients = coefficients(&point, &Distances::new(&inverse, 0.1));
         let rays = point.directions.rays_in_cells(pattern, 100);
         for axis in 0..2 {
             let terms = coefficients.iter().zip(rays).map(|(c, rays)| c[axis] * rays as f32);
@@ -251,7 +252,8 @@ mod tests {
 
     #[test]
     fn the_error_of_a_record_grows_with_distance_and_turn_and_is_infinite_off_its_plane() {
-        let record = Record::new(&white(Vec3::ZERO, Vec3::Y), 1.0, Distances([128; CELLS]));
+        let survey = Survey { distance: 1.0, distances: Distances([128; CELLS]) };
+        let record = Record::new(&white(Vec3::ZERO, Vec3::Y), survey, 0.1);
         let error = |position, normal: Vec3| record.error(1.0, 0.04, position, normal.normalize());
         assert_eq!(error(Vec3::ZERO, Vec3::Y), 0.0);
         assert!((error(Vec3::X * 0.1, Vec3::Y) - 0.01).abs() < 1e-6);

@@ -35,6 +35,17 @@ impl<'a> Corners<'a> {
     }
 }
 
+/// What a sample sees, and where in the picture.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenSample<'a> {
+    /// Column and row of its pixel.
+    pub pixel: [u32; 2],
+    /// Its place in the picture, pixels.
+    pub place: [f32; 2],
+    /// The surface.
+    pub surface: &'a Surface,
+}
+
 /// The weights of the four corners of a sample's cell.
 struct Weights {
     cell: Cell,
@@ -46,9 +57,8 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
         Corners(cell.corners().map(|corner| self.records.get(&corner).and_then(Option::as_ref)))
     }
 
-    /// The undivided cell at a place of the picture.
-    fn undivided_cell(&self, [x, y]: [f32; 2]) -> Option<Cell> {
-        let [x, y] = [x as u32, y as u32];
+    /// The undivided cell that holds a pixel.
+    fn undivided_cell(&self, [x, y]: [u32; 2]) -> Option<Cell> {
         let mut cell = Cell::coarsest(x, y);
         let (_, divided) = self.roots.iter().find(|(corner, _)| *corner == cell.corner)?;
         while !cell.is_finest() && divided >> cell.tree_number() & 1 != 0 {
@@ -58,8 +68,10 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
     }
 
     /// Which records a sample uses and how much; `None` if it cannot be interpolated.
-    fn weights(&self, place: [f32; 2], surface: &Surface, allowed: f32) -> Option<Weights> {
-        let cell = self.undivided_cell(place)?;
+    fn weights(&self, sample: &SeenSample, allowed: f32) -> Option<Weights> {
+        let SeenSample { pixel, place, surface } = *sample;
+        // Of the pixel, and not of the place, which rounding may put on the next pixel's border.
+        let cell = self.undivided_cell(pixel)?;
         let part = |at: f32, from: u32| (at - from as f32) / cell.side() as f32;
         let [x, y] = [part(place[0], cell.corner.x), part(place[1], cell.corner.y)];
         let bilinear = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
@@ -74,8 +86,8 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
     }
 
     /// Wants the records that a sample uses.
-    pub fn want(&mut self, place: [f32; 2], surface: &Surface, allowed: f32) {
-        let Some(Weights { cell, weights }) = self.weights(place, surface, allowed) else { return };
+    pub fn want(&mut self, sample: &SeenSample, allowed: f32) {
+        let Some(Weights { cell, weights }) = self.weights(sample, allowed) else { return };
         for (corner, weight) in cell.corners().iter().zip(weights) {
             if weight <= 0.0 {
                 continue;
@@ -89,8 +101,9 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
     }
 
     /// The indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample has to gather its own.
-    pub fn interpolate(&self, place: [f32; 2], surface: &Surface, allowed: f32) -> Option<Vec3> {
-        let Weights { cell, weights } = self.weights(place, surface, allowed)?;
+    pub fn interpolate(&self, sample: &SeenSample, allowed: f32) -> Option<Vec3> {
+        let Weights { cell, weights } = self.weights(sample, allowed)?;
+        let surface = sample.surface;
         let mut sum = Vec3::ZERO;
         for (LatticePoint { x, y }, weight) in cell.corners().into_iter().zip(weights) {
             let record = self.records.get(&LatticePoint { x, y }).and_then(Option::as_ref);

@@ -1,5 +1,6 @@
 //! The parallel irradiance cache: indirect irradiance is gathered at few places of the picture, with its gradients, and
-//! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992; neighbour clamping: Krivanek 2006).
+//! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992; neighbour clamping after Krivanek 2006,
+//! among the corners of a cell).
 //!
 //! The published caches are filled as pixels need it, so that each pixel depends on those before it. The dissertation
 //! makes the cache parallel by removing that dependence; how is not told, and this is a reconstruction. Which records
@@ -25,6 +26,7 @@ mod interpolation;
 mod lattice;
 mod record;
 
+pub use interpolation::SeenSample;
 pub use lattice::{LatticePoint, Window};
 
 use glam::Vec3;
@@ -49,7 +51,7 @@ const MOST_WAITING: usize = MOST_ROOTS + 3 * (lattice::LEVELS as usize - 1);
 const MOST_GATHERED: usize = 32;
 /// A record reaches at least so many pixels.
 const LEAST_REACH: f32 = 3.0;
-/// Records of one coarsest cell of which one pixel is needed: 4 corners, and 5 for each division.
+/// Records of a block of one pixel at the most: 4 corners, and 5 for each division.
 const LEAST_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
 /// The records of a block.
@@ -104,11 +106,7 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
     /// # Errors
     /// If there are too many.
     pub fn begin(&mut self, window: &Window) -> Result<(), Full> {
-        self.records.clear();
-        self.roots.clear();
-        self.waiting.clear();
-        self.gathered.clear();
-        self.next = 0;
+        self.forget();
         let steps = |from: u32, to: u32| {
             let first = from - from % lattice::COARSEST_SIDE;
             (first..to).step_by(lattice::COARSEST_SIDE as usize)
@@ -121,6 +119,15 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
             }
         }
         Ok(())
+    }
+
+    /// Forgets all records: nothing is interpolated.
+    pub fn forget(&mut self) {
+        self.records.clear();
+        self.roots.clear();
+        self.waiting.clear();
+        self.gathered.clear();
+        self.next = 0;
     }
 
     /// Looks at the next cell: surveys its corners and divides it if they do not cover it. Returns whether it was the
@@ -230,8 +237,8 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
     pub fn set_point(&mut self, index: u32, point: &GatherPoint) {
         let Some(gathered) = self.gathered.get_mut(index as usize) else { return };
         let record = self.records.get_index(gathered.record).and_then(|(_, record)| record.as_ref());
-        if let Some(Record { content: Content::Wanted(distances), radius, .. }) = record {
-            gathered.coefficients = coefficients(point, distances, *radius);
+        if let Some(Record { content: Content::Wanted(distances), .. }) = record {
+            gathered.coefficients = coefficients(point, distances);
         }
     }
 
@@ -251,7 +258,7 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
     }
 
     /// Ends the gather of the chosen records: their irradiance is known, in W/(sr m^2) over pi.
-    pub fn end_gather<M: MemoryPort>(&mut self, context: &mut Context<M>) {
+    pub fn end_gather<M: MemoryPort>(&mut self, context: &mut Context<M>, allowed: f32) {
         let unit = context.scene.header.radiance_unit;
         for gathered in &self.gathered {
             context.counters.records += 1;
@@ -259,10 +266,11 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
             let Some((_, Some(record))) = record else { continue };
             let irradiance = Irradiance {
                 mean: gathered.mean.value() * unit,
-                translation: gathered.translation.map(|sum| sum.value() * unit),
+                translation: gathered.translation.map(|sum| sum.value() * (unit / record.distance)),
                 rotation: gathered.rotation.map(|sum| sum.value() * unit),
             };
-            record.content = Content::Gathered(irradiance.limited(record.radius));
+            let reach = libm::sqrtf(allowed) * record.radius;
+            record.content = Content::Gathered(irradiance.limited(max(reach, record.distance)));
         }
         self.gathered.clear();
     }
@@ -281,5 +289,5 @@ fn survey_point<M: MemoryPort>(
     let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
     let found = survey(context, &surface, pattern)?;
     let least = LEAST_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
-    Ok(Some(Record::new(&surface, max(found.radius, least), found.distances)))
+    Ok(Some(Record::new(&surface, found, least)))
 }

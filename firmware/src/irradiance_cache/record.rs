@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::gradient::Distances;
+use super::gradient::{Distances, Survey};
 use crate::scene::{Reflection, Surface};
-use crate::vector::tangents;
+use crate::vector::{max, tangents};
 
 /// What a record knows of the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +36,9 @@ pub(super) struct Record {
     pub(super) normal: Vec3,
     /// The greatest coordinate that the position was computed from, metres.
     magnitude: f32,
-    /// Harmonic mean of the distances of what is around, metres; not below some pixels.
+    /// Harmonic mean of the distances of what is around, metres.
+    pub(super) distance: f32,
+    /// The same, not below what makes the record reach some pixels.
     pub(super) radius: f32,
     pub(super) content: Content,
 }
@@ -45,9 +47,12 @@ pub(super) struct Record {
 const PLANE_SHARE: f32 = 0.1;
 
 impl Record {
-    pub(super) fn new(surface: &Surface, radius: f32, distances: Distances) -> Self {
+    /// The record of a surface that was surveyed, with a radius of at least `least` metres.
+    pub(super) fn new(surface: &Surface, survey: Survey, least: f32) -> Self {
         let Surface { position, normal, magnitude, .. } = *surface;
-        Self { position, normal, magnitude, radius, content: Content::Surveyed(distances) }
+        let Survey { distance, distances } = survey;
+        let radius = max(distance, least);
+        Self { position, normal, magnitude, distance, radius, content: Content::Surveyed(distances) }
     }
 
     /// A white Lambertian surface where the record is.
@@ -92,9 +97,9 @@ impl Irradiance {
         changed.max(Vec3::ZERO)
     }
 
-    /// No gradient that changes the irradiance by more than itself within `radius`: such a one is noise.
-    pub(super) fn limited(mut self, radius: f32) -> Self {
-        let greatest = self.mean.element_sum() * (1.0 / 3.0) / radius;
+    /// No gradient that changes the irradiance by more than itself within `distance`: such a one is noise.
+    pub(super) fn limited(mut self, distance: f32) -> Self {
+        let greatest = self.mean.element_sum() * (1.0 / 3.0) / distance;
         let [x, y] = self.translation.map(|component| component.element_sum() * (1.0 / 3.0));
         let length = libm::sqrtf(x * x + y * y);
         if length > greatest {
