@@ -138,7 +138,7 @@ fn nor_do_they_where_samples_are_rounded_to_the_next_pixel() {
         width: 65_536,
         height: 4096,
         crop: Some(Window { x0: 33_008, x1: 33_072, y0: 2000, y1: 2032 }),
-        irradiance_error: Some(0.1),
+        irradiance_error: Some(1e-6),
         gather_rays: 1,
         samples: 8,
         tile,
