@@ -88,33 +88,27 @@ impl Position {
 
     /// Goes on to the next of `count` indices; at the end of them to the first again. Returns whether it was the last.
     pub(super) fn next_index(&mut self, count: u32) -> bool {
-        self.index += 1;
-        if self.index < count {
-            return false;
-        }
-        self.index = 0;
-        true
+        next(&mut self.index, count)
     }
 
     /// Goes on to the next of `count` bins and says whether it was the last, as [`Self::next_index`].
     pub(super) fn next_bin(&mut self, count: u32) -> bool {
-        self.bin += 1;
-        if self.bin < count {
-            return false;
-        }
-        self.bin = 0;
-        true
+        next(&mut self.bin, count)
     }
 
     /// Goes on to the next of `count` samples and says whether it was the last, as [`Self::next_index`].
     pub(super) fn next_sample(&mut self, count: u32) -> bool {
-        self.sample += 1;
-        if self.sample < count {
-            return false;
-        }
-        self.sample = 0;
-        true
+        next(&mut self.sample, count)
     }
+}
+
+fn next(number: &mut u32, count: u32) -> bool {
+    *number += 1;
+    let was_last = *number >= count;
+    if was_last {
+        *number = 0;
+    }
+    was_last
 }
 
 #[cfg(test)]
