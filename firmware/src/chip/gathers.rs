@@ -1,5 +1,6 @@
 //! The gathers of a chip: done at once, or waiting in the queue.
 
+use glam::Vec3;
 use heapless::Vec;
 use photoncard_shared::message::{Drain, Fault, FrameParameters};
 
@@ -54,7 +55,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         &mut self,
         context: &mut Context<M>,
         request: GatherRequest,
-        add: &mut impl FnMut(&GatherRequest, glam::Vec3),
+        add: &mut impl FnMut(&GatherRequest, Vec3),
     ) -> Result<(), Fault> {
         let frame = context.frame;
         if frame.drain == Drain::Immediate {
@@ -77,7 +78,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
     pub(super) fn drain<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
-        add: &mut impl FnMut(&GatherRequest, glam::Vec3),
+        add: &mut impl FnMut(&GatherRequest, Vec3),
     ) -> Result<(), Fault> {
         if !self.queue.is_draining() {
             self.queue.begin_drain();
@@ -93,7 +94,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         &mut self,
         context: &mut Context<M>,
         request: &GatherRequest,
-        add: &mut impl FnMut(&GatherRequest, glam::Vec3),
+        add: &mut impl FnMut(&GatherRequest, Vec3),
     ) -> Result<(), Fault> {
         let brought = gathered(context, request, &mut self.candidates)?;
         add(request, brought);

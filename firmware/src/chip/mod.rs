@@ -14,16 +14,17 @@ use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::{Budget, MICRO, REFERENCE, TechniqueMemory, gather_candidates};
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::BvhNode;
-use photoncard_shared::message::{Fault, Tile};
+use photoncard_shared::message::{Fault, FrameParameters, Tile};
 
 use self::gathers::Gathers;
 pub use self::pixels::PixelSum;
-use self::position::{Block, Position};
+use self::pixels::add_gathered;
+use self::position::{Block, Position, Stage};
 use crate::gather::{GatherQueue, KeyScale};
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
 use crate::memory::MemoryPort;
-use crate::render::{Context, GatherPoint};
+use crate::render::{Context, GatherPoint, PixelSample};
 
 /// The chip of [`REFERENCE`].
 pub type ReferenceChip = Chip<
@@ -131,10 +132,72 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
             && self.blocks.push(Block::whole(tile.width, tile.height)).is_ok()
     }
 
+    /// Does the next piece of the tile: one stage of one pixel or record, in the stages of gather rays one direction
+    /// bin of it, or some of the gathers that wait.
+    ///
+    /// # Errors
+    /// If the image is not sound.
+    pub fn step<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<Progress, Fault> {
+        let stage = self.position.stage;
+        let must_be_empty = matches!(stage, Stage::Done | Stage::RecordSums);
+        if self.gathers.is_draining() || must_be_empty && !self.gathers.is_empty() {
+            self.drain(context)?;
+            return Ok(Progress::Busy);
+        }
+        match stage {
+            Stage::Survey => self.survey(context)?,
+            Stage::Mark => self.mark(context)?,
+            Stage::RecordPoints => self.choose_record_point(context)?,
+            Stage::RecordRays => self.cast_for_record(context)?,
+            Stage::RecordSums => self.end_records(context),
+            Stage::Eye => self.look(context)?,
+            Stage::Direct => self.light_directly(context)?,
+            Stage::Rays => self.cast_for_pixel(context)?,
+            Stage::Done => return Ok(self.next_block(context)),
+        }
+        Ok(Progress::Busy)
+    }
+
+    /// Begins the next block; without one the tile is complete.
+    fn next_block<M>(&mut self, context: &Context<M>) -> Progress {
+        let Some(block) = self.blocks.pop() else { return Progress::Complete };
+        self.block = block;
+        match allowed_error(context.frame) {
+            None => self.position = Position::at(Stage::Eye),
+            Some(_) => self.begin_records(),
+        }
+        Progress::Busy
+    }
+
+    /// The present pixel's number in the tile, and its present sample.
+    fn present(&self) -> (usize, PixelSample) {
+        let [column, row] = self.block.pixel(self.position.index);
+        let at = PixelSample { x: self.tile.x + column, y: self.tile.y + row, sample: self.position.sample };
+        ((row * self.tile.width + column) as usize, at)
+    }
+
+    /// Some of the gathers that wait.
+    fn drain<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+        let Self { sums, gathers, cache, position, .. } = self;
+        if position.stage == Stage::RecordSums {
+            return gathers.drain(context, &mut |request, brought| {
+                cache.add(request.target, request.cell, brought);
+            });
+        }
+        gathers.drain(context, &mut |request, brought| {
+            add_gathered(sums, request.target, brought);
+        })
+    }
+
     /// The sum of pixel `index` of the complete tile, counted in rows.
     pub fn sum(&self, index: usize) -> Option<&PixelSum> {
         self.sums.get(index)
     }
+}
+
+/// The error that interpolated irradiance may have; `None` if none is interpolated.
+fn allowed_error(frame: &FrameParameters) -> Option<f32> {
+    frame.irradiance_error.filter(|_| frame.gather_rays > 0)
 }
 
 /// On-chip memory that a card of `card_bytes` takes under a budget: its statics, caches and stack.

@@ -3,15 +3,14 @@
 use glam::Vec3;
 use photoncard_shared::message::{Fault, FrameParameters, Pixel};
 
-use super::position::{Position, Stage};
-use super::{Chip, Progress};
+use super::position::Stage;
+use super::{Chip, allowed_error};
 use crate::fixed_point::ColourSum;
 use crate::irradiance_cache::SeenSample;
 use crate::memory::MemoryPort;
-use crate::render::{Context, GatherPoint, PixelSample, direct, eye, final_gather};
+use crate::render::{Context, GatherPoint, direct, eye, final_gather};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::SceneImage;
-use crate::vector::max_component;
 
 /// What is known of a pixel so far: sums over its samples.
 #[derive(Clone, Copy, Debug)]
@@ -56,55 +55,19 @@ impl PixelSum {
     }
 }
 
+/// Adds what a gather brought to the pixel that it is for.
+#[inline]
+pub(super) fn add_gathered(sums: &mut [PixelSum], target: u16, brought: Vec3) {
+    if let Some(sum) = sums.get_mut(target as usize) {
+        sum.add_gathered(brought);
+    }
+}
+
 impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
     Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
 {
-    /// Does the next piece of the tile: one stage of one pixel or record, in the stages of gather rays one direction
-    /// bin of it, or some of the gathers that wait.
-    ///
-    /// # Errors
-    /// If the image is not sound.
-    pub fn step<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<Progress, Fault> {
-        let stage = self.position.stage;
-        let must_be_empty = matches!(stage, Stage::Done | Stage::RecordSums);
-        if self.gathers.is_draining() || must_be_empty && !self.gathers.is_empty() {
-            self.drain(context)?;
-            return Ok(Progress::Busy);
-        }
-        match stage {
-            Stage::Survey => self.survey(context)?,
-            Stage::Mark => self.mark(context)?,
-            Stage::RecordPoints => self.choose_record_point(context)?,
-            Stage::RecordRays => self.cast_for_record(context)?,
-            Stage::RecordSums => self.end_records(context),
-            Stage::Eye => self.look(context)?,
-            Stage::Direct => self.light_directly(context)?,
-            Stage::Rays => self.cast_for_pixel(context)?,
-            Stage::Done => return Ok(self.next_block(context)),
-        }
-        Ok(Progress::Busy)
-    }
-
-    /// Begins the next block; without one the tile is complete.
-    fn next_block<M>(&mut self, context: &Context<M>) -> Progress {
-        let Some(block) = self.blocks.pop() else { return Progress::Complete };
-        self.block = block;
-        match allowed_error(context.frame) {
-            None => self.position = Position::at(Stage::Eye),
-            Some(_) => self.begin_records(),
-        }
-        Progress::Busy
-    }
-
-    /// The present pixel's number in the tile, and its present sample.
-    pub(super) fn present(&self) -> (usize, PixelSample) {
-        let [column, row] = self.block.pixel(self.position.index);
-        let at = PixelSample { x: self.tile.x + column, y: self.tile.y + row, sample: self.position.sample };
-        ((row * self.tile.width + column) as usize, at)
-    }
-
     /// What the present pixel sees in the present sample, and what of that goes straight into the picture.
-    fn look<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+    pub(super) fn look<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
         let place = eye::place(context, at);
         let surface = eye::see(context, place)?;
@@ -119,7 +82,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
             let frame = context.frame;
             let pattern = Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather);
             let allowed = allowed_error(frame);
-            let is_lambertian = frame.gather_rays > 0 && max_component(surface.reflection.diffuse) > 0.0;
+            let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
             let sample = SeenSample { pixel: [at.x, at.y], place, surface: &surface };
             // With the cache the rays are those of a record, and of a pixel; without it those of a sample.
             let (interpolated, rays) = match allowed {
@@ -151,7 +114,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
     }
 
     /// What shadow rays bring the present pixel.
-    fn light_directly<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+    pub(super) fn light_directly<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
         if let (Some(Some(point)), Some(sum)) = (self.points.get(index), self.sums.get_mut(index)) {
             sum.radiance += direct::reflected(context, at, point)?;
@@ -163,14 +126,9 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
     }
 
     /// The gather rays of the present bin and pixel.
-    fn cast_for_pixel<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+    pub(super) fn cast_for_pixel<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, _) = self.present();
         let Self { points, sums, gathers, position, .. } = self;
-        let mut add = |target: u16, brought: Vec3| {
-            if let Some(sum) = sums.get_mut(target as usize) {
-                sum.add_gathered(brought);
-            }
-        };
         if let Some(Some(point)) = points.get(index) {
             let frame = context.frame;
             let share = 1.0 / frame.samples as f32;
@@ -178,15 +136,16 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
                 // A tile has at most TILE_PIXELS pixels, which 16 bits tell apart.
                 let end = final_gather::cast(context, point, index as u16, share, ray)?;
                 let Some(end) = end else { continue };
-                add(index as u16, end.direct);
+                add_gathered(sums, index as u16, end.direct);
                 match (end.request, &mut context.outlet) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => {
                         outlet.take(gathers.key(context.frame, &request), request);
                     }
                     (Some(request), None) => {
-                        gathers
-                            .submit(context, request, &mut |request, brought| add(request.target, brought))?;
+                        gathers.submit(context, request, &mut |request, brought| {
+                            add_gathered(sums, request.target, brought);
+                        })?;
                     }
                 }
             }
@@ -198,24 +157,4 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
         }
         Ok(())
     }
-
-    /// Some of the gathers that wait.
-    fn drain<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let Self { sums, gathers, cache, position, .. } = self;
-        if position.stage == Stage::RecordSums {
-            return gathers.drain(context, &mut |request, brought| {
-                cache.add(request.target, request.cell, brought);
-            });
-        }
-        gathers.drain(context, &mut |request, brought| {
-            if let Some(sum) = sums.get_mut(request.target as usize) {
-                sum.add_gathered(brought);
-            }
-        })
-    }
-}
-
-/// The error that interpolated irradiance may have; `None` if none is interpolated.
-pub(super) fn allowed_error(frame: &FrameParameters) -> Option<f32> {
-    frame.irradiance_error.filter(|_| frame.gather_rays > 0)
 }

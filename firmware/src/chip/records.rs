@@ -2,13 +2,11 @@
 
 use photoncard_shared::message::Fault;
 
-use super::pixels::allowed_error;
 use super::position::{Position, Stage};
-use super::{Chip, MOST_BLOCKS};
+use super::{Chip, MOST_BLOCKS, allowed_error};
 use crate::irradiance_cache::{Full, SeenSample, Window};
 use crate::memory::MemoryPort;
 use crate::render::{Context, eye, final_gather};
-use crate::vector::max_component;
 
 impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
     Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
@@ -67,7 +65,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
         let (_, at) = self.present();
         let place = eye::place(context, at);
         let surface = eye::see(context, place)?;
-        if let Some(surface) = surface.filter(|surface| max_component(surface.reflection.diffuse) > 0.0) {
+        if let Some(surface) = surface.filter(|surface| surface.reflection.has_lambertian()) {
             self.cache.want(&SeenSample { pixel: [at.x, at.y], place, surface: &surface }, allowed);
         }
         if self.position.next_index(self.block.pixels()) && self.position.next_sample(context.frame.samples) {

@@ -41,7 +41,7 @@ use crate::fixed_point::ColourSum;
 use crate::memory::MemoryPort;
 use crate::render::{Context, GatherPoint, eye};
 use crate::sampler::{Dimension, Pattern};
-use crate::vector::{max, max_component};
+use crate::vector::max;
 
 /// Coarsest cells that a block may overlap.
 const MOST_ROOTS: usize = 16;
@@ -195,8 +195,7 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
         }
     }
 
-    /// Fills the first gather points for records that are wanted and not yet gathered. Returns
-    /// how many.
+    /// Fills the first gather points for records that are wanted and not yet gathered. Returns how many.
     pub fn begin_gather<M: MemoryPort>(
         &mut self,
         context: &Context<M>,
@@ -283,7 +282,7 @@ fn survey_point<M: MemoryPort>(
     allowed: f32,
 ) -> Result<Option<Record>, Fault> {
     let Some(surface) = eye::see(context, point.place())? else { return Ok(None) };
-    if max_component(surface.reflection.diffuse) <= 0.0 {
+    if !surface.reflection.has_lambertian() {
         return Ok(None);
     }
     let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);

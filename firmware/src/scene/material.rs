@@ -61,7 +61,13 @@ impl Reflection {
     /// Whether nothing is reflected.
     #[inline(always)]
     pub fn is_black(&self) -> bool {
-        max_component(self.diffuse) <= 0.0 && !self.has_lobe()
+        !self.has_lambertian() && !self.has_lobe()
+    }
+
+    /// Whether there is a Lambertian part.
+    #[inline(always)]
+    pub fn has_lambertian(&self) -> bool {
+        max_component(self.diffuse) > 0.0
     }
 
     /// Whether there is a Phong lobe.
