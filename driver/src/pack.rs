@@ -9,10 +9,12 @@ use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::budget::Budget;
 use photoncard_shared::image::{Header, SECTIONS, Section, SectionKind};
-use photoncard_shared::layout::{self, Photon, Record};
+use photoncard_shared::layout::{self, Photon, PhotonGrid, Record, power_of_two_above};
 
 use crate::bvh::{self, HierarchyError};
 use crate::emitter::Emitters;
+use crate::photon::PhotonMap;
+use crate::photon::leaves::{PhotonLines, Placed};
 use crate::scene::{Material, Scene, Triangle};
 
 /// Why a scene does not fit a card.
@@ -97,20 +99,21 @@ impl PackedScene {
         count(self.lines.len()).map(drop)
     }
 
-    fn header(&self, photon_power_unit: f32) -> Header {
+    fn header(&self, photon_power_unit: f32, photon_grid: PhotonGrid) -> Header {
         Header {
             // `append` has checked that the number of lines fits.
             lines: self.lines.len() as u32,
             photon_power_unit,
             radiance_unit: self.radiance_unit,
             emitter_density: self.emitter_density,
+            photon_grid,
             sections: self.sections,
         }
     }
 
     /// The scene as a chip sees it, without photons.
     pub fn view(&self) -> (SceneImage, Lines<'_>) {
-        (SceneImage { header: self.header(1.0) }, Lines(&self.lines))
+        (SceneImage { header: self.header(1.0, PhotonGrid::UNIT) }, Lines(&self.lines))
     }
 
     /// Bytes of the scene's lines.
@@ -142,17 +145,13 @@ impl PackedScene {
         Err(PackError::Dram { needed, photons: photon_bytes, available, remedy })
     }
 
-    /// Adds the photon map: photons in the order of the tree.
+    /// Adds the photon map: a left-balanced tree.
     ///
     /// # Errors
-    /// If there are more than an address can tell.
-    pub fn with_photons(
-        mut self,
-        photons: impl ExactSizeIterator<Item = [u8; Photon::BYTES]>,
-        power_unit: f32,
-    ) -> Result<CardImage, PackError> {
-        self.append(SectionKind::Photons, photons)?;
-        self.lines[0] = self.header(power_unit).to_line();
+    /// If there are more photons than an address can tell.
+    pub fn with_photons(mut self, map: &PhotonMap) -> Result<CardImage, PackError> {
+        self.append(SectionKind::Photons, map.records())?;
+        self.lines[0] = self.header(map.power_unit(), map.grid()).to_line();
         Ok(CardImage { lines: self.lines })
     }
 }
@@ -174,6 +173,60 @@ impl CardImage {
         let header =
             Header::read(&self.lines[0]).unwrap_or_else(|error| unreachable!("own header: {error:?}"));
         (SceneImage { header }, Lines(&self.lines))
+    }
+
+    /// The same image with its photons in leaves, for searches of about `radius` metres. It finds the same photons.
+    ///
+    /// # Errors
+    /// If there are more lines than an address can tell.
+    pub fn with_photons_in_leaves(self, radius: f32) -> Result<Self, PackError> {
+        let (SceneImage { header }, _) = self.view();
+        let section = header.section(SectionKind::Photons);
+        let records = self.lines[section.first_line as usize..]
+            .iter()
+            .flat_map(|line| line.0.as_chunks::<{ Photon::BYTES }>().0)
+            .take(section.records as usize);
+        let grid = header.photon_grid;
+        let mut photons: Vec<Placed> = records
+            .map(|record| {
+                let photon = Photon { axis: 0, ..Photon::read(record) };
+                (grid.nearest(photon.position), Photon::content(&photon.to_bytes()))
+            })
+            .collect();
+        let map = PhotonLines::new(&mut photons, f64::from(radius) / f64::from(grid.cell));
+        let mut lines = self.lines;
+        // The photons are the last section.
+        lines.truncate(section.first_line as usize);
+        let mut scene = PackedScene {
+            lines,
+            sections: header.sections,
+            radiance_unit: header.radiance_unit,
+            emitter_density: header.emitter_density,
+        };
+        scene.sections[SectionKind::Photons as usize] = Section::default();
+        scene.append(SectionKind::PhotonTreelets, map.treelets.into_iter())?;
+        scene.append(SectionKind::PhotonLeaves, map.leaves.into_iter())?;
+        scene.lines[0] = scene.header(header.photon_power_unit, grid).to_line();
+        Ok(Self { lines: scene.lines })
+    }
+
+    /// Checks that the image fits a card's memory.
+    ///
+    /// # Errors
+    /// If not.
+    pub fn check_budget(&self, budget: &Budget) -> Result<(), PackError> {
+        let (needed, available) = (self.bytes(), budget.dram_bytes as u64);
+        if needed <= available {
+            return Ok(());
+        }
+        let (SceneImage { header }, _) = self.view();
+        let lines = |kind| header.section(kind).records as u64 * LINE_BYTES as u64;
+        Err(PackError::Dram {
+            needed,
+            photons: lines(SectionKind::PhotonTreelets) + lines(SectionKind::PhotonLeaves),
+            available,
+            remedy: "lower --photons, or use a card with more memory".into(),
+        })
     }
 
     /// Bytes of the image.
@@ -221,28 +274,4 @@ fn radiance_unit(scene: &Scene, emitters: &Emitters) -> f32 {
     let typical = emitters.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));
     let brightest = scene.materials.iter().map(|m| m.emission.max_element()).fold(0.0, f32::max) as f64;
     power_of_two_above(typical.max(brightest / (1 << 20) as f64))
-}
-
-/// The least power of two that is not below `value`, within the normal numbers of `f32`.
-pub(crate) fn power_of_two_above(value: f64) -> f32 {
-    // By the bits, and not by a logarithm, whose last digit differs between systems.
-    let bits = value.max(f64::MIN_POSITIVE).to_bits();
-    let is_power = bits & ((1 << 52) - 1) == 0;
-    let exponent = (bits >> 52) as i32 - 1023 + i32::from(!is_power);
-    f32::from_bits(((exponent.clamp(-126, 127) + 127) as u32) << 23)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn units_are_the_next_power_of_two() {
-        for (value, unit) in [(1.0, 1.0), (1.1, 2.0), (0.3, 0.5), (0.25, 0.25), (1e6, 1_048_576.0)] {
-            assert_eq!(power_of_two_above(value), unit);
-        }
-        for extreme in [0.0, 1e-300, 1e300, f64::INFINITY] {
-            assert!(power_of_two_above(extreme).is_normal());
-        }
-    }
 }

@@ -253,7 +253,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
         match self.at_work {
             None => {
                 if let Some(tile) = self.tiles.pop_front() {
-                    if !self.chip.begin(tile) {
+                    if !self.chip.begin(memory, tile) {
                         return Err(Fault { code: FaultCode::Tile, detail: tile.id });
                     }
                     self.at_work = Some(TileWork::Rendering(tile));

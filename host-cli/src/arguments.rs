@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
+use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
@@ -74,6 +75,9 @@ pub(crate) struct RenderOptions {
     /// Photons stored in the map
     #[arg(long, default_value_t = 500_000, allow_negative_numbers = true)]
     photons: usize,
+    /// Layout of the photon map in card memory; it never changes the picture
+    #[arg(long, default_value = "jensen")]
+    photon_map: PhotonMapOption,
     /// Photons that a gather looks for
     #[arg(long, default_value_t = 100, allow_negative_numbers = true)]
     neighbors: u32,
@@ -198,6 +202,24 @@ impl SamplingOption {
     }
 }
 
+/// Layouts of the photon map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum PhotonMapOption {
+    /// A left-balanced kd-tree of 20-byte photons
+    Jensen,
+    /// Leaves that fill a line of memory each
+    Lines,
+}
+
+impl PhotonMapOption {
+    fn layout(self) -> PhotonLayout {
+        match self {
+            Self::Jensen => PhotonLayout::Jensen,
+            Self::Lines => PhotonLayout::Lines,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Switch {
     On,
@@ -227,6 +249,7 @@ impl RenderOptions {
             camera: self.camera.clone(),
             seed: self.seed,
             photons: self.photons,
+            photon_layout: self.photon_map.layout(),
             neighbors: self.neighbors,
             max_distance: match self.max_distance {
                 MaxDistance::Auto => None,

@@ -28,11 +28,44 @@ impl Line {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LineAddress(pub u32);
 
-/// Who asks for a line: memory traffic is counted, and cached, by structure.
+/// What a line holds: memory traffic is counted, and cached, by structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Structure {
-    /// The photon kd-tree.
-    PhotonMap,
-    /// Bounding volume hierarchy, triangles, materials and emitters.
-    Scene,
+    /// The image's header.
+    Header = 0,
+    /// Bounding volume hierarchy.
+    Nodes = 1,
+    /// Triangles.
+    Triangles = 2,
+    /// Materials.
+    Materials = 3,
+    /// Emitters, and the thresholds that choose one.
+    Emitters = 4,
+    /// Inner nodes of a photon map that has its photons in leaves.
+    PhotonNodes = 5,
+    /// Photons.
+    Photons = 6,
+}
+
+/// Number of structures.
+pub const STRUCTURES: usize = 7;
+
+impl Structure {
+    /// All structures, in order.
+    pub const ALL: [Self; STRUCTURES] = [
+        Self::Header,
+        Self::Nodes,
+        Self::Triangles,
+        Self::Materials,
+        Self::Emitters,
+        Self::PhotonNodes,
+        Self::Photons,
+    ];
+
+    /// Whether it belongs to the photon map, and not to the scene.
+    #[inline(always)]
+    pub const fn is_photon_map(self) -> bool {
+        matches!(self, Self::PhotonNodes | Self::Photons)
+    }
 }

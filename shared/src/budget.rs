@@ -107,6 +107,9 @@ pub const BVH_STACK: usize = 96;
 /// Levels of the photon kd-tree: enough for 2^27 photons.
 pub const KD_TREE_LEVELS: usize = 27;
 
+/// Entries of the stack of a search in a photon map of leaves: a host makes no deeper tree.
+pub const PHOTON_STACK: usize = 48;
+
 /// Candidates that a gather of `neighbors` photons may hold before it selects the nearest of them.
 pub const fn gather_candidates(neighbors: u32) -> usize {
     2 * neighbors as usize

@@ -25,8 +25,16 @@ pub struct Counters {
     pub interpolated_samples: u64,
     /// Photons whose distance was computed.
     pub photons_tested: u64,
+    /// Photons that were near enough to become candidates of a search.
+    pub photons_taken: u64,
+    /// Candidates that selections of the nearest went through.
+    pub photons_selected: u64,
     /// Photons that the searches returned.
     pub photons_found: u64,
+    /// Times that waiting gathers were taken out of the queue.
+    pub drains: u64,
+    /// The most gathers that waited at once, on any chip.
+    pub most_waiting: u64,
 }
 
 impl Counters {
@@ -42,7 +50,11 @@ impl Counters {
         lambertian_samples: 0,
         interpolated_samples: 0,
         photons_tested: 0,
+        photons_taken: 0,
+        photons_selected: 0,
         photons_found: 0,
+        drains: 0,
+        most_waiting: 0,
     };
 
     /// Adds another chip's counts.
@@ -57,6 +69,10 @@ impl Counters {
         self.lambertian_samples += other.lambertian_samples;
         self.interpolated_samples += other.interpolated_samples;
         self.photons_tested += other.photons_tested;
+        self.photons_taken += other.photons_taken;
+        self.photons_selected += other.photons_selected;
         self.photons_found += other.photons_found;
+        self.drains += other.drains;
+        self.most_waiting = self.most_waiting.max(other.most_waiting);
     }
 }

@@ -3,14 +3,17 @@
 //! Line 0 is the header: magic, layout version, number of lines, units, and a table of sections. A section is a run
 //! of lines that holds records of one kind, packed as [`crate::layout`] says; the last line of each is padded with
 //! zero bytes.
+//!
+//! The photon map has one of two layouts, and the sections of the other are empty: [`SectionKind::Photons`], or
+//! [`SectionKind::PhotonTreelets`] and [`SectionKind::PhotonLeaves`].
 
-use crate::address::{LINE_BYTES, Line, LineAddress};
-use crate::layout::{BvhNode, Emitter, Material, Photon, Record, Triangle};
+use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
+use crate::layout::{BvhNode, Emitter, Material, Photon, PhotonGrid, Record, Triangle};
 
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// The version of everything in this module and in [`crate::layout`].
-pub const LAYOUT_VERSION: u16 = 2;
+pub const LAYOUT_VERSION: u16 = 3;
 /// Emitter thresholds in one line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
@@ -30,10 +33,14 @@ pub enum SectionKind {
     EmitterThresholds = 4,
     /// [`Photon`]s, a left-balanced kd-tree: the children of `i` are `2 i + 1` and `2 i + 2`.
     Photons = 5,
+    /// [`crate::layout::PhotonTreelet`]s, the root first.
+    PhotonTreelets = 6,
+    /// [`crate::layout::PhotonLeaf`]s.
+    PhotonLeaves = 7,
 }
 
 /// Number of sections.
-pub const SECTIONS: usize = 6;
+pub const SECTIONS: usize = 8;
 
 impl SectionKind {
     /// All sections, in order.
@@ -44,6 +51,8 @@ impl SectionKind {
         Self::Emitters,
         Self::EmitterThresholds,
         Self::Photons,
+        Self::PhotonTreelets,
+        Self::PhotonLeaves,
     ];
 
     /// Records that one line holds.
@@ -55,6 +64,20 @@ impl SectionKind {
             Self::Emitters => Emitter::PER_LINE as u32,
             Self::EmitterThresholds => THRESHOLDS_PER_LINE,
             Self::Photons => Photon::PER_LINE as u32,
+            Self::PhotonTreelets | Self::PhotonLeaves => 1,
+        }
+    }
+
+    /// What its lines are counted and cached as.
+    #[inline(always)]
+    pub const fn structure(self) -> Structure {
+        match self {
+            Self::Nodes => Structure::Nodes,
+            Self::Triangles => Structure::Triangles,
+            Self::Materials => Structure::Materials,
+            Self::Emitters | Self::EmitterThresholds => Structure::Emitters,
+            Self::PhotonTreelets => Structure::PhotonNodes,
+            Self::Photons | Self::PhotonLeaves => Structure::Photons,
         }
     }
 }
@@ -92,6 +115,8 @@ pub struct Header {
     /// Probability density, 1/m^2, of a shadow ray's end on one side of an emitter, for each unit of its mean radiance:
     /// pi over the power of all emitters. Zero without emitters.
     pub emitter_density: f32,
+    /// The grid that photons' positions are on.
+    pub photon_grid: PhotonGrid,
     /// Where the records lie, by [`SectionKind`].
     pub sections: [Section; SECTIONS],
 }
@@ -110,6 +135,8 @@ pub enum HeaderError {
 }
 
 const SECTION_TABLE: usize = 32;
+const PHOTON_GRID: usize = SECTION_TABLE + 8 * SECTIONS;
+const _: () = assert!(PHOTON_GRID + 16 <= LINE_BYTES);
 
 impl Header {
     /// The section of this kind.
@@ -134,6 +161,10 @@ impl Header {
             put(SECTION_TABLE + 8 * index, &section.first_line.to_le_bytes());
             put(SECTION_TABLE + 8 * index + 4, &section.records.to_le_bytes());
         }
+        for (axis, origin) in self.photon_grid.origin.iter().enumerate() {
+            put(PHOTON_GRID + 4 * axis, &origin.to_le_bytes());
+        }
+        put(PHOTON_GRID + 12, &self.photon_grid.cell.to_le_bytes());
         line
     }
 
@@ -155,6 +186,10 @@ impl Header {
             photon_power_unit: f32::from_bits(word(16)),
             radiance_unit: f32::from_bits(word(20)),
             emitter_density: f32::from_bits(word(24)),
+            photon_grid: PhotonGrid {
+                origin: core::array::from_fn(|axis| word(PHOTON_GRID + 4 * axis) as i32),
+                cell: f32::from_bits(word(PHOTON_GRID + 12)),
+            },
             sections: core::array::from_fn(|index| Section {
                 first_line: word(SECTION_TABLE + 8 * index),
                 records: word(SECTION_TABLE + 8 * index + 4),
@@ -167,7 +202,8 @@ impl Header {
     fn check(&self) -> Result<(), HeaderError> {
         let is_unit = |x: f32| x.is_normal() && x > 0.0;
         let is_density = self.emitter_density.is_finite() && self.emitter_density >= 0.0;
-        if !is_unit(self.photon_power_unit) || !is_unit(self.radiance_unit) || !is_density {
+        let units = [self.photon_power_unit, self.radiance_unit, self.photon_grid.cell];
+        if !units.into_iter().all(is_unit) || !is_density {
             return Err(HeaderError::Unit);
         }
         for kind in SectionKind::ALL {
@@ -189,7 +225,15 @@ mod tests {
     fn header() -> Header {
         let mut sections = [Section::default(); SECTIONS];
         sections[SectionKind::Photons as usize] = Section { first_line: 10, records: 60 };
-        Header { lines: 20, photon_power_unit: 0.5, radiance_unit: 2.0, emitter_density: 0.25, sections }
+        let photon_grid = PhotonGrid { origin: [-7, 0, 1 << 23], cell: 0.125 };
+        Header {
+            lines: 20,
+            photon_power_unit: 0.5,
+            radiance_unit: 2.0,
+            emitter_density: 0.25,
+            photon_grid,
+            sections,
+        }
     }
 
     #[test]

@@ -3,6 +3,8 @@
 //! | record | bytes | a line holds |
 //! |---|---|---|
 //! | [`Photon`] | 20 | 6 |
+//! | [`PhotonTreelet`] | 128 | 1 |
+//! | [`PhotonLeaf`] | 128 | 1 |
 //! | [`BvhNode`] | 128 | 1 |
 //! | [`Triangle`] | 40 | 3 |
 //! | [`Material`] | 64 | 2 |
@@ -16,10 +18,15 @@ use crate::address::LINE_BYTES;
 
 mod direction;
 mod photon;
+mod photon_lines;
 mod scene;
 
 pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
 pub use photon::{FULL_DISC, Photon, Rgbe};
+pub use photon_lines::{
+    GRID_BITS, LEAF_PHOTONS, PHOTON_CONTENT_BYTES, PhotonChild, PhotonGrid, PhotonLeaf, PhotonNode,
+    PhotonTreelet, TREELET_NODES, power_of_two_above,
+};
 pub use scene::{BvhNode, ChildReference, DOUBLE_SIDED, Emitter, MAX_LEAF_TRIANGLES, Material, Triangle};
 
 /// A record of fixed size in card memory.

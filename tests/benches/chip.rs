@@ -9,7 +9,7 @@ use divan::counter::ItemsCount;
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{MappedImage, PhotonSettings, map_photons};
+use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
@@ -39,6 +39,10 @@ struct Prepared {
 }
 
 static CORNELL: LazyLock<Prepared> = LazyLock::new(|| prepare("cornell.gltf"));
+static CORNELL_IN_LEAVES: LazyLock<CardImage> = LazyLock::new(|| {
+    let image = prepare("cornell.gltf").image;
+    image.with_photons_in_leaves(CORNELL.max_distance).expect("packs")
+});
 static ATRIUM: LazyLock<Prepared> = LazyLock::new(|| prepare("atrium.glb"));
 
 fn load(name: &str) -> Scene {
@@ -54,7 +58,13 @@ fn prepare(name: &str) -> Prepared {
 
 fn map(scene: &Scene, photons: usize) -> MappedImage {
     let packed = PackedScene::new(scene, &Emitters::new(scene)).expect("packs");
-    let settings = PhotonSettings { seed: 0, photons, neighbors: NEIGHBORS, max_distance: None };
+    let settings = PhotonSettings {
+        seed: 0,
+        photons,
+        neighbors: NEIGHBORS,
+        max_distance: None,
+        layout: PhotonLayout::Jensen,
+    };
     map_photons(packed, &settings, &|_| true).expect("maps")
 }
 
@@ -92,10 +102,9 @@ impl Prepared {
     }
 }
 
-#[divan::bench(args = [false, true])]
-fn gather_100_of_500000_photons(bencher: Bencher, shuffled: bool) {
+fn gather_all(bencher: Bencher, image: &CardImage, shuffled: bool) {
     let queries = CORNELL.queries(2000, shuffled);
-    let (scene, mut memory) = CORNELL.image.view();
+    let (scene, mut memory) = image.view();
     let mut buffer = heapless::Vec::<Candidate, 512>::new();
     bencher.counter(ItemsCount::new(queries.len())).bench_local(|| {
         let mut found = 0;
@@ -106,6 +115,16 @@ fn gather_100_of_500000_photons(bencher: Bencher, shuffled: bool) {
         }
         found
     });
+}
+
+#[divan::bench(args = [false, true])]
+fn gather_100_of_500000_photons(bencher: Bencher, shuffled: bool) {
+    gather_all(bencher, &CORNELL.image, shuffled);
+}
+
+#[divan::bench(args = [false, true])]
+fn gather_100_of_500000_photons_in_leaves(bencher: Bencher, shuffled: bool) {
+    gather_all(bencher, &CORNELL_IN_LEAVES, shuffled);
 }
 
 fn cast(bencher: Bencher, prepared: &Prepared, any_hit: bool) {
@@ -148,7 +167,7 @@ fn tile_of_cornell(bencher: Bencher, order: &str) {
     chip.begin_frame(&mut context).expect("sound");
     let tile = Tile { id: 0, x: 256, y: 256, width: 16, height: 16 };
     bencher.counter(ItemsCount::new(256_usize)).bench_local(|| {
-        assert!(chip.begin(tile));
+        assert!(chip.begin(context.memory, tile));
         while chip.step(&mut context).expect("sound") == Progress::Busy {}
     });
 }

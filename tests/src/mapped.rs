@@ -5,7 +5,7 @@ use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::film::Window;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{MappedImage, PhotonSettings, map_photons};
+use photoncard_driver::photon::{MappedImage, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::tiles;
@@ -42,13 +42,8 @@ impl MappedScene {
     /// If the scene cannot be packed.
     pub fn new(scene: Scene, settings: &RenderSettings) -> Self {
         let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
-        let photons = PhotonSettings {
-            seed: settings.seed,
-            photons: settings.photons,
-            neighbors: settings.neighbors,
-            max_distance: settings.max_distance,
-        };
-        let MappedImage { image, max_distance, .. } = map_photons(packed, &photons, &|_| true).expect("maps");
+        let MappedImage { image, max_distance, .. } =
+            map_photons(packed, &settings.photon_settings(), &|_| true).expect("maps");
         Self { scene, image, max_distance }
     }
 
@@ -80,7 +75,7 @@ impl MappedScene {
         let mut context =
             Context { scene: &scene, memory: &mut memory, frame, counters: &mut counters, outlet: None };
         chip.begin_frame(&mut context).expect("sound");
-        assert!(chip.begin(tile));
+        assert!(chip.begin(context.memory, tile));
         while chip.step(&mut context).expect("sound") == Progress::Busy {}
         let sums = (0..tile.pixels() as usize).map_while(|index| chip.sum(index));
         let radiance = sums.map(|sum| sum.pixel(&scene, frame).radiance.into()).collect();

@@ -105,7 +105,7 @@ fn image() -> CardImage {
         scene(room([0, 0, 0, 1, 0, 0]), vec![lambertian("wall", 0.5), lamp], camera(Vec3::ZERO, Vec3::NEG_Z));
     let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
     let map = PhotonMap::new(&trace(&packed, 0, 500, &|_| true).unwrap().arrivals);
-    packed.with_photons(map.records(), map.power_unit()).unwrap()
+    packed.with_photons(&map).unwrap()
 }
 
 fn frame() -> FrameParameters {

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{MappedImage, PhotonSettings, map_photons};
+use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::scene::{Material, Scene};
 use photoncard_firmware::gather::{GatherRequest, PartialReflection};
 use photoncard_firmware::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
@@ -22,7 +22,13 @@ struct Map {
 impl Map {
     fn new(scene: &Scene, photons: usize) -> Self {
         let packed = PackedScene::new(scene, &Emitters::new(scene)).unwrap();
-        let settings = PhotonSettings { seed: 1, photons, neighbors: NEIGHBORS, max_distance: None };
+        let settings = PhotonSettings {
+            seed: 1,
+            photons,
+            neighbors: NEIGHBORS,
+            max_distance: None,
+            layout: PhotonLayout::Jensen,
+        };
         let MappedImage { image, max_distance, .. } = map_photons(packed, &settings, &|_| true).unwrap();
         Self { image, max_distance }
     }

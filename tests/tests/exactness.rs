@@ -1,6 +1,7 @@
 //! Exactness: renders that differ only in ordering, tile size, chips or threads have identical pixels.
 
 use photoncard_driver::film::{Film, PixelValue, Window};
+use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, RenderSettings, Sampling, Unobserved, render};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
@@ -69,6 +70,13 @@ fn variants() -> Vec<RenderSettings> {
         RenderSettings { cards: vec![card("emulated:3")], order: GatherOrder::Naive, ..settings() },
         RenderSettings { cards: vec![card("emulated:7")], tile: 4, ..settings() },
         RenderSettings { cards: vec![card("emulated-micro:2"), card("emulated:1")], ..settings() },
+        RenderSettings { photon_layout: PhotonLayout::Lines, ..settings() },
+        RenderSettings {
+            photon_layout: PhotonLayout::Lines,
+            order: GatherOrder::Sort,
+            cards: vec![card("emulated-micro:2")],
+            ..settings()
+        },
         RenderSettings { order: GatherOrder::Hilbert, ..settings() },
         RenderSettings {
             order: GatherOrder::Hilbert,

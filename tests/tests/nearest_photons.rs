@@ -1,67 +1,81 @@
-//! The kd-tree's k nearest photons are those of brute force, whatever the photons.
+//! The k nearest photons of either layout are those of brute force, whatever the photons.
 
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{Arrival, PhotonMap};
 use photoncard_firmware::photon::{Candidate, NearestPhotons, gather};
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::Photon;
 use photoncard_tests::{camera, lambertian, room, scene};
 use proptest::prelude::*;
 
-/// An image of an empty room with a photon at every place.
-fn image(places: &[[f32; 3]]) -> CardImage {
+/// An image of an empty room with a photon at every place, in either layout. Photons of one place differ in what they carry.
+fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
-    let arrivals: Vec<Arrival> = places
-        .iter()
-        .map(|&position| Arrival { position, power: [1.0; 3], direction: [0; 2], normal: 0, direct: false })
+    let arrivals: Vec<Arrival> = (0_u16..)
+        .zip(places)
+        .map(|(index, &position)| Arrival {
+            position,
+            power: [1.0; 3],
+            direction: (index / 3).to_le_bytes(),
+            normal: 0,
+            direct: false,
+        })
         .collect();
     let map = PhotonMap::new(&arrivals);
-    packed.with_photons(map.records(), map.power_unit()).unwrap()
+    let image = || {
+        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+        packed.with_photons(&map).unwrap()
+    };
+    [image(), image().with_photons_in_leaves(0.1).unwrap()]
 }
 
-/// Distances and indices of the chip's search, nearest first.
-fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<(u32, u32)> {
+/// What tells a photon from another, as far as it matters.
+type Found = (u32, [u8; 2]);
+
+/// Distances and directions of the chip's search, nearest first.
+fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<Found> {
     let (scene, mut memory) = image.view();
     let mut buffer = heapless::Vec::<Candidate, 512>::new();
     let mut nearest = NearestPhotons::new(&mut buffer, neighbors, max_distance);
     gather(&scene, &mut memory, query, &mut nearest).unwrap();
-    let mut all: Vec<(u32, u32)> =
-        nearest.candidates().iter().map(|c| (c.distance_squared().to_bits(), c.index())).collect();
-    all.sort_unstable();
-    all
+    let mut all: Vec<Candidate> = nearest.candidates().to_vec();
+    all.sort_unstable_by_key(Candidate::order);
+    all.into_iter().map(|c| (c.distance_squared().to_bits(), c.direction())).collect()
 }
 
 /// The same by looking at every photon.
-fn expected(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<(u32, u32)> {
+fn expected(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<Found> {
     let (scene, mut memory) = image.view();
-    let photons = scene.header.section(photoncard_shared::image::SectionKind::Photons).records;
-    let mut all: Vec<(u32, u32)> = (0..photons)
+    let photons = scene.header.section(SectionKind::Photons).records;
+    let mut all: Vec<Candidate> = (0..photons)
         .map(|index| {
-            let kind = photoncard_shared::image::SectionKind::Photons;
-            let record = scene.record::<20, 6>(&mut memory, kind, index).unwrap();
-            let [x, y, z] = photoncard_shared::layout::Photon::position(record);
+            let record = scene.record::<20, 6>(&mut memory, SectionKind::Photons, index).unwrap();
+            let [x, y, z] = Photon::position(record);
             let [x, y, z] = [query.x - x, query.y - y, query.z - z];
-            (x * x + y * y + z * z, index)
+            Candidate::new(x * x + y * y + z * z, Photon::content(record))
         })
-        .filter(|&(distance, _)| distance <= max_distance * max_distance)
-        .map(|(distance, index)| (distance.to_bits(), index))
+        .filter(|candidate| candidate.distance_squared() <= max_distance * max_distance)
         .collect();
-    all.sort_unstable();
+    all.sort_unstable_by_key(Candidate::order);
     all.truncate(neighbors as usize);
-    all
+    all.into_iter().map(|c| (c.distance_squared().to_bits(), c.direction())).collect()
 }
 
 fn check(places: &[[f32; 3]], queries: &[[f32; 3]], neighbors: u32, max_distance: f32) {
-    let image = image(places);
+    let [jensen, lines] = images(places);
     for &query in queries {
         let query = Vec3::from(query);
-        assert_eq!(
-            found(&image, query, neighbors, max_distance),
-            expected(&image, query, neighbors, max_distance),
-            "query {query}, {neighbors} neighbours within {max_distance} of {} photons",
-            places.len()
-        );
+        let expected = expected(&jensen, query, neighbors, max_distance);
+        for (layout, image) in [("jensen", &jensen), ("lines", &lines)] {
+            assert_eq!(
+                found(image, query, neighbors, max_distance),
+                expected,
+                "query {query}, {neighbors} neighbours within {max_distance} of {} photons in {layout}",
+                places.len()
+            );
+        }
     }
 }
 
@@ -91,7 +105,7 @@ fn places() -> impl Strategy<Value = Vec<[f32; 3]>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
     #[test]
-    fn the_tree_finds_what_brute_force_finds(
+    fn both_layouts_find_what_brute_force_finds(
         places in places(),
         mut queries in proptest::collection::vec(place(1.2), 4),
         neighbors in 1_u32..200,
@@ -104,11 +118,13 @@ proptest! {
 }
 
 #[test]
-fn photons_in_one_place_are_told_apart_by_their_index() {
+fn photons_in_one_place_are_told_apart_by_what_they_carry() {
     check(&[[0.5; 3]; 300], &[[0.5; 3], [0.6, 0.5, 0.5]], 100, 1.0);
 }
 
 #[test]
 fn an_empty_map_has_no_neighbours() {
-    assert_eq!(found(&image(&[]), Vec3::ZERO, 10, 1.0), []);
+    for image in images(&[]) {
+        assert_eq!(found(&image, Vec3::ZERO, 10, 1.0), []);
+    }
 }

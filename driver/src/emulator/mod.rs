@@ -2,6 +2,7 @@
 
 pub mod whole_frame;
 
+use std::ops::Range;
 use std::thread::JoinHandle;
 
 use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard, REFERENCE_SRAM_BYTES, ReferenceCard};
@@ -122,7 +123,7 @@ impl GrowingMemory {
 
 impl MemoryPort for GrowingMemory {
     #[inline(always)]
-    fn read(&mut self, _: Structure, address: LineAddress, _: u32) -> Result<&Line, Fault> {
+    fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         let fault = Fault { code: FaultCode::LineRange, detail: address.0 };
         self.lines.get(address.0 as usize).ok_or(fault)
     }

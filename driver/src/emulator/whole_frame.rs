@@ -223,7 +223,7 @@ fn cast(
         outlet: Some(&mut outlet),
     };
     chip.begin_frame(&mut context)?;
-    if !chip.begin(tile) {
+    if !chip.begin(context.memory, tile) {
         return Err(Fault { code: FaultCode::Tile, detail: tile.id });
     }
     while chip.step(&mut context)? == Progress::Busy {}

@@ -1,11 +1,10 @@
 //! The left-balanced kd-tree (Jensen 2001, ch. 6): the tree of its photons without gaps, in the order of a heap.
 
 use photoncard_firmware::sampler::hash;
-use photoncard_shared::layout::{FULL_DISC, Photon, Record, Rgbe};
+use photoncard_shared::layout::{FULL_DISC, Photon, PhotonGrid, Record, Rgbe, power_of_two_above};
 use rayon::prelude::*;
 
 use super::Arrival;
-use crate::pack::power_of_two_above;
 
 /// Below this number of photons a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
@@ -13,7 +12,7 @@ const SEQUENTIAL: usize = 4096;
 /// A photon map in the order of its tree.
 pub struct PhotonMap {
     photons: Vec<Photon>,
-
+    grid: PhotonGrid,
     power_unit: f32,
 }
 
@@ -27,15 +26,18 @@ struct Node {
 }
 
 impl PhotonMap {
-    /// Builds the tree: the same for the same arrivals, whatever the threads.
+    /// Builds the tree: the same for the same arrivals, whatever the threads. Positions are put on a grid, a millionth of
+    /// the map's longest side wide, so that every layout of the map can tell them exactly.
     ///
     /// # Panics
     /// If there are 2^32 arrivals or more; `--photons` does not allow so many.
     pub fn new(arrivals: &[Arrival]) -> Self {
         assert!(u32::try_from(arrivals.len()).is_ok(), "more photons than 32 bits tell apart");
+        let grid = grid_of(arrivals);
+        let on_grid = |place| grid.position(grid.nearest(place));
         let mut nodes: Vec<Node> = (0_u32..)
             .zip(arrivals)
-            .map(|(arrival, a)| Node { position: a.position, arrival, axis: 0 })
+            .map(|(arrival, a)| Node { position: on_grid(a.position), arrival, axis: 0 })
             .collect();
         balance(&mut nodes);
         let strongest = arrivals.iter().flat_map(|arrival| arrival.power).fold(0.0, f32::max);
@@ -43,7 +45,12 @@ impl PhotonMap {
         let order = heap_order(nodes.len());
         let photons =
             order.par_iter().map(|&place| record(&nodes[place as usize], arrivals, power_unit)).collect();
-        Self { photons, power_unit }
+        Self { photons, grid, power_unit }
+    }
+
+    /// The grid that positions are on.
+    pub fn grid(&self) -> PhotonGrid {
+        self.grid
     }
 
     /// Watts that a photon power of 1 stands for.
@@ -62,10 +69,21 @@ impl PhotonMap {
     }
 }
 
+/// The finest grid that holds all arrivals.
+fn grid_of(arrivals: &[Arrival]) -> PhotonGrid {
+    let corners = arrivals.iter().fold(None, |corners: Option<[[f32; 3]; 2]>, arrival| {
+        let place = arrival.position;
+        let [lower, upper] = corners.unwrap_or([place; 2]);
+        let axes = [0, 1, 2];
+        Some([axes.map(|a| lower[a].min(place[a])), axes.map(|a| upper[a].max(place[a]))])
+    });
+    corners.map_or(PhotonGrid::UNIT, |[lower, upper]| PhotonGrid::around(lower, upper))
+}
+
 fn record(node: &Node, arrivals: &[Arrival], power_unit: f32) -> Photon {
     let arrival = &arrivals[node.arrival as usize];
     Photon {
-        position: arrival.position,
+        position: node.position,
         power: Rgbe::encode(arrival.power.map(|p| p / power_unit), hash(node.arrival)),
         direction: arrival.direction,
         axis: node.axis,

@@ -145,8 +145,9 @@ fn prepare(
 ) -> Result<MappedImage, RenderError> {
     let start = Instant::now();
     let packed = PackedScene::new(scene, &Emitters::new(scene))?;
-    for budget in budgets {
-        packed.check_budget(settings.photons, &budget)?;
+    let budgets: Vec<Budget> = budgets.collect();
+    for budget in &budgets {
+        packed.check_budget(settings.photons, budget)?;
     }
     let total = settings.photons as u64;
     let progress = |stored: usize| {
@@ -157,6 +158,9 @@ fn prepare(
         !observer.is_stopped()
     };
     let mapped = map_photons(packed, &settings.photon_settings(), &progress)?;
+    for budget in &budgets {
+        mapped.image.check_budget(budget)?;
+    }
     times.photons = mapped.tracing.as_secs_f64();
     times.pack = start.elapsed().as_secs_f64() - times.photons;
     Ok(mapped)

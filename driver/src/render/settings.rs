@@ -9,7 +9,7 @@ use photoncard_shared::message::{self, FrameParameters, Sampling};
 
 use super::{CardAddress, RenderError};
 use crate::film::Window;
-use crate::photon::PhotonSettings;
+use crate::photon::{PhotonLayout, PhotonSettings};
 use crate::scene::Camera;
 use crate::scheduler::GatherOrder;
 
@@ -28,6 +28,8 @@ pub struct RenderSettings {
     pub seed: u32,
     /// Photons in the map.
     pub photons: usize,
+    /// How the photon map is laid out in card memory.
+    pub photon_layout: PhotonLayout,
     /// Photons that a gather looks for.
     pub neighbors: u32,
     /// Greatest distance of a gather, metres; `None` for the one that the photons' density suggests.
@@ -64,6 +66,7 @@ impl Default for RenderSettings {
             camera: None,
             seed: 0,
             photons: 500_000,
+            photon_layout: PhotonLayout::default(),
             neighbors: 100,
             max_distance: None,
             gather_rays: 100,
@@ -146,6 +149,7 @@ impl RenderSettings {
             photons: self.photons,
             neighbors: self.neighbors,
             max_distance: self.max_distance,
+            layout: self.photon_layout,
         }
     }
 

@@ -83,7 +83,7 @@ impl Loader {
         if found != self.expected {
             return Err(Fault { code: FaultCode::ImageChecksum, detail: found });
         }
-        let line = memory.read(Structure::Scene, LineAddress(0), LINE_BYTES as u32)?;
+        let line = memory.read(Structure::Header, LineAddress(0), 0..LINE_BYTES as u32)?;
         let unsound = |detail: u32| Fault { code: FaultCode::ImageHeader, detail };
         let header = Header::read(line).map_err(|error| match error {
             HeaderError::Version(version) => unsound(version as u32),

@@ -62,7 +62,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
             return self.gather(context, &request, add);
         }
         if self.queue.len() >= (frame.queue as usize).clamp(1, QUEUE) {
-            self.queue.begin_drain();
+            self.begin_drain(context);
             while self.queue.is_draining() {
                 self.drain(context, add)?;
             }
@@ -74,6 +74,13 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         }
     }
 
+    fn begin_drain<M>(&mut self, context: &mut Context<M>) {
+        let counters = &mut *context.counters;
+        counters.drains += 1;
+        counters.most_waiting = counters.most_waiting.max(self.queue.len() as u64);
+        self.queue.begin_drain();
+    }
+
     /// Does some of the gathers that wait.
     pub(super) fn drain<M: MemoryPort>(
         &mut self,
@@ -81,7 +88,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         add: &mut impl FnMut(&GatherRequest, Vec3),
     ) -> Result<(), Fault> {
         if !self.queue.is_draining() {
-            self.queue.begin_drain();
+            self.begin_drain(context);
         }
         for _ in 0..GATHERS_PER_STEP {
             let Some(request) = self.queue.take() else { break };

@@ -118,7 +118,8 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
 
     /// Begins a tile. Returns whether it has pixels and its buffers suffice.
     #[must_use]
-    pub fn begin(&mut self, tile: Tile) -> bool {
+    pub fn begin(&mut self, memory: &mut impl MemoryPort, tile: Tile) -> bool {
+        memory.begin_tile();
         self.tile = tile;
         self.position = Position::DONE;
         self.points.clear();

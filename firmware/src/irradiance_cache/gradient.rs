@@ -10,7 +10,7 @@ use core::f32::consts::{FRAC_1_PI, PI};
 use photoncard_shared::message::Fault;
 
 use crate::importance::{CELLS, COLUMNS, ROWS, cell_at, cell_centre, direction_in};
-use crate::memory::MemoryPort;
+use crate::memory::{MemoryPort, Stage};
 use crate::render::{Context, GatherPoint};
 use crate::sampler::{Pattern, unit_interval};
 use crate::scene::{Ray, Surface, closest_hit};
@@ -72,6 +72,7 @@ pub(super) fn survey<M: MemoryPort>(
     surface: &Surface,
     pattern: Pattern,
 ) -> Result<Survey, Fault> {
+    context.memory.enter(Stage::Survey);
     let origin = surface.offset_origin();
     let mut inverse_distances = [0.0; CELLS];
     for (cell, inverse) in (0..).zip(inverse_distances.iter_mut()) {

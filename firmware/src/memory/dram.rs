@@ -1,5 +1,7 @@
 //! Directly addressed memory: a slice of lines, nothing copied, nothing counted.
 
+use core::ops::Range;
+
 use photoncard_shared::address::{Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
@@ -19,7 +21,7 @@ impl<'a> Dram<'a> {
 
 impl MemoryPort for Dram<'_> {
     #[inline(always)]
-    fn read(&mut self, _: Structure, address: LineAddress, _: u32) -> Result<&Line, Fault> {
+    fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         self.lines.get(address.0 as usize).ok_or_else(|| outside(address))
     }
 }
@@ -30,7 +32,7 @@ pub struct Lines<'a>(pub &'a [Line]);
 
 impl MemoryPort for Lines<'_> {
     #[inline(always)]
-    fn read(&mut self, _: Structure, address: LineAddress, _: u32) -> Result<&Line, Fault> {
+    fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         self.0.get(address.0 as usize).ok_or_else(|| outside(address))
     }
 }

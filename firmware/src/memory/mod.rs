@@ -1,18 +1,37 @@
 //! Card memory, as the chip sees it: lines, by number.
+//!
+//! What stands between a chip and its DRAM is a [`MemoryPort`] over a [`MemoryPort`]: [`LineCaches`] hold lines,
+//! [`Counted`] counts them. The plain [`Dram`] costs nothing: borrowed slices, no copy, no count.
 
+mod counted;
 mod dram;
+mod line_cache;
+mod traffic;
 
+use core::ops::Range;
+
+pub use counted::Counted;
 pub use dram::{Dram, Lines};
+pub use line_cache::{CacheEntry, CacheShape, LineCache, LineCaches, SetIndex, ShapeError};
 use photoncard_shared::address::{Line, LineAddress, Structure};
 use photoncard_shared::message::{Fault, FaultCode};
+pub use traffic::{Reads, STAGES, Stage, Traffic};
 
 /// Where a chip reads lines. A cache or a counter is a `MemoryPort` over a `MemoryPort`.
 pub trait MemoryPort {
-    /// Reads a line for `structure`, which will use `bytes` of it.
+    /// Reads a line of a structure, of which the bytes in `used` are asked for.
     ///
     /// # Errors
     /// [`FaultCode::LineRange`] outside the memory.
-    fn read(&mut self, structure: Structure, address: LineAddress, bytes: u32) -> Result<&Line, Fault>;
+    fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault>;
+
+    /// Tells what the reads to come are for.
+    #[inline(always)]
+    fn enter(&mut self, _: Stage) {}
+
+    /// Tells that a tile begins: its reads depend on no tile before it.
+    #[inline(always)]
+    fn begin_tile(&mut self) {}
 }
 
 /// Memory that a card image is loaded into.

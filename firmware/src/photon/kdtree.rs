@@ -20,12 +20,12 @@ struct Deferred {
     distance_squared: f32,
 }
 
-/// Searches the photons nearest to `position` into `nearest`. Returns the number of photons tested.
+/// Searches the photons nearest to `position` into `nearest`. Returns the number of photons tested, all nodes visited.
 ///
 /// # Errors
 /// If the image is not sound.
 #[inline(always)]
-pub fn gather(
+pub(super) fn gather(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     position: Vec3,
@@ -49,7 +49,7 @@ pub fn gather(
             _ => z,
         };
         if distance_squared <= nearest.limit() {
-            nearest.insert(Candidate::new(distance_squared, node, record));
+            nearest.insert(Candidate::new(distance_squared, Photon::content(record)));
         }
         let left = 2 * node + 1;
         let (near, far) = if offset < 0.0 { (left, left + 1) } else { (left + 1, left) };
@@ -67,6 +67,5 @@ pub fn gather(
             }
         }
     }
-    nearest.finish();
     Ok(tested)
 }

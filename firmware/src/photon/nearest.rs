@@ -2,64 +2,67 @@
 //!
 //! Instead of a heap, which reorders itself for every candidate, candidates collect in a buffer of twice k; when it is
 //! full, the k nearest are selected in linear time and the search radius shrinks to the k-th. The result is a set,
-//! independent of the order of the stream: equal distances are told apart by the photon's index.
+//! independent of the order of the stream: equal distances are told apart by what the photons carry.
 
 use heapless::VecView;
-use photoncard_shared::layout::{Photon, Rgbe};
+use photoncard_shared::layout::{PHOTON_CONTENT_BYTES, Photon, Rgbe};
 
 /// A photon near a query, with all that its reflection needs.
+///
+/// Candidates are in the order of their distance, then of what they carry. So it does not matter in which layout or place
+/// of the map a photon lies: two that are equal add the same to any sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
-    /// The squared distance's bits above the photon's index: the order of candidates.
-    key: u64,
-    /// The record's bytes from the power on.
-    content: [u8; 8],
+    /// The squared distance's bits.
+    distance: u32,
+    /// The power's bytes.
+    power: u32,
+    /// The direction's code, and the flags without the axis.
+    rest: u32,
 }
 
 impl Candidate {
-    /// The photon of this index and record at a squared distance, m^2, that is not negative.
+    /// A photon that carries `content` at a squared distance, m^2, that is not negative.
     #[inline(always)]
-    pub fn new(distance_squared: f32, index: u32, record: &[u8; 20]) -> Self {
-        // The bits of non-negative floats are in the order of their values.
-        let key = (distance_squared.to_bits() as u64) << 32 | index as u64;
-        let [.., a, b, c, d, e, f, g, h] = *record;
-        Self { key, content: [a, b, c, d, e, f, g, h] }
+    pub fn new(distance_squared: f32, content: [u8; PHOTON_CONTENT_BYTES]) -> Self {
+        let [r, g, b, exponent, direction @ .., low, high] = content;
+        let flags = Photon::flags_without_axis(u16::from_le_bytes([low, high]));
+        Self {
+            // The bits of non-negative floats are in the order of their values.
+            distance: distance_squared.to_bits(),
+            power: u32::from_le_bytes([r, g, b, exponent]),
+            rest: u32::from(flags) << 16 | u32::from(u16::from_le_bytes(direction)),
+        }
     }
 
-    /// The order of candidates: by distance, then by index.
+    /// The order of candidates.
     #[inline(always)]
-    pub fn key(&self) -> u64 {
-        self.key
+    pub fn order(&self) -> (u64, u32) {
+        ((self.distance as u64) << 32 | self.power as u64, self.rest)
     }
 
     /// Squared distance from the query, m^2.
     #[inline(always)]
     pub fn distance_squared(&self) -> f32 {
-        f32::from_bits((self.key >> 32) as u32)
-    }
-
-    /// Index of the photon.
-    #[inline(always)]
-    pub fn index(&self) -> u32 {
-        self.key as u32
+        f32::from_bits(self.distance)
     }
 
     /// The photon's power, in photon power units.
     #[inline(always)]
     pub fn power(&self) -> Rgbe {
-        let [r, g, b, e, ..] = self.content;
-        Rgbe([r, g, b, e])
+        Rgbe(self.power.to_le_bytes())
     }
 
     /// Code of the direction the photon came from.
     #[inline(always)]
     pub fn direction(&self) -> [u8; 2] {
-        [self.content[4], self.content[5]]
+        let [a, b, ..] = self.rest.to_le_bytes();
+        [a, b]
     }
 
     #[inline(always)]
     fn flags(&self) -> u16 {
-        u16::from_le_bytes([self.content[6], self.content[7]])
+        (self.rest >> 16) as u16
     }
 
     /// Code of the surface normal at the photon.
@@ -89,6 +92,9 @@ pub struct NearestPhotons<'a> {
     full: usize,
     limit: f32,
     max_distance_squared: f32,
+    /// Candidates that selections went through, and that they dropped.
+    selected: u32,
+    dropped: u32,
 }
 
 impl<'a> NearestPhotons<'a> {
@@ -100,7 +106,7 @@ impl<'a> NearestPhotons<'a> {
         let neighbors = (neighbors as usize).clamp(1, capacity.saturating_sub(1).max(1));
         let full = (2 * neighbors).min(capacity);
         let limit = max_distance * max_distance;
-        Self { candidates, neighbors, full, limit, max_distance_squared: limit }
+        Self { candidates, neighbors, full, limit, max_distance_squared: limit, selected: 0, dropped: 0 }
     }
 
     /// The squared distance beyond which a photon cannot be among the nearest, m^2.
@@ -126,7 +132,9 @@ impl<'a> NearestPhotons<'a> {
         if candidates.len() <= self.neighbors {
             return;
         }
-        let (_, last, _) = candidates.select_nth_unstable_by_key(self.neighbors - 1, Candidate::key);
+        self.selected += candidates.len() as u32;
+        self.dropped += (candidates.len() - self.neighbors) as u32;
+        let (_, last, _) = candidates.select_nth_unstable_by_key(self.neighbors - 1, Candidate::order);
         self.limit = last.distance_squared();
         self.candidates.truncate(self.neighbors);
     }
@@ -140,6 +148,16 @@ impl<'a> NearestPhotons<'a> {
     #[inline(always)]
     pub fn candidates(&self) -> &[Candidate] {
         self.candidates.as_slice()
+    }
+
+    /// Candidates that were taken so far.
+    pub fn taken(&self) -> u32 {
+        self.dropped + self.candidates.len() as u32
+    }
+
+    /// Candidates that selections went through so far.
+    pub fn selected(&self) -> u32 {
+        self.selected
     }
 
     /// Whether there are as many as were asked for.

@@ -14,6 +14,7 @@
 //! What is left is the estimate's blur: the radiance is a mean over the disc.
 
 use core::f32::consts::PI;
+use core::ptr;
 
 use glam::Vec3;
 use photoncard_shared::layout::{FULL_DISC, decode_normal};
@@ -36,20 +37,23 @@ const MIN_RADIUS_SHARE: f32 = 1e-6;
 pub fn reflected_radiance(nearest: &NearestPhotons, request: &GatherRequest) -> Vec3 {
     let reflection = &request.reflection;
     let candidates = nearest.candidates();
-    let Some(farthest) = candidates.iter().max_by_key(|candidate| candidate.key()) else { return Vec3::ZERO };
+    let farthest = candidates.iter().max_by_key(|candidate| candidate.order());
+    let Some(farthest) = farthest else { return Vec3::ZERO };
     let (radius_squared, excluded) = if nearest.is_full() {
-        (farthest.distance_squared(), Some(farthest.key()))
+        (farthest.distance_squared(), Some(farthest))
     } else {
         (nearest.max_distance_squared(), None)
     };
     let mut same_surface = SameSurface::new(reflection.normal());
+    // Of several that are equal to the farthest one is left out.
+    let is_excluded = |candidate| excluded.is_some_and(|excluded| ptr::eq(excluded, candidate));
     let counted = candidates
         .iter()
-        .filter(|candidate| Some(candidate.key()) != excluded && same_surface.holds(candidate.normal()));
+        .filter(|&candidate| !is_excluded(candidate) && same_surface.holds(candidate.normal()));
     let mut closest: Option<&Candidate> = None;
     let mut sums = Sums::new(reflection);
     for candidate in counted {
-        if closest.is_none_or(|closest| candidate.key() < closest.key()) {
+        if closest.is_none_or(|closest| candidate.order() < closest.order()) {
             closest = Some(candidate);
         }
         sums.add(candidate);

@@ -16,7 +16,7 @@ use glam::Vec3;
 use photoncard_shared::message::Fault;
 
 use super::{Context, GatherPoint, PixelSample, Purpose};
-use crate::memory::MemoryPort;
+use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{
     EmitterSample, Ray, Surface, emitter_density, is_occluded, offset_origin, sample_emitter,
@@ -38,6 +38,7 @@ pub fn reflected<M: MemoryPort>(
     if point.surface.reflection.is_black() || context.frame.shadow_rays == 0 {
         return Ok(Vec3::ZERO);
     }
+    context.memory.enter(Stage::Shadow);
     let frame = context.frame;
     let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, pixel.sample, Dimension::Emitter);
     let mut sum = Vec3::ZERO;

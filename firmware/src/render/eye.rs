@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_shared::message::Fault;
 
 use super::{Context, PixelSample};
-use crate::memory::MemoryPort;
+use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Ray, Surface, closest_hit, read_surface};
 use crate::vector::unit;
@@ -23,6 +23,7 @@ pub fn place<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
 /// # Errors
 /// If the image is not sound.
 pub fn see<M: MemoryPort>(context: &mut Context<M>, place: [f32; 2]) -> Result<Option<Surface>, Fault> {
+    context.memory.enter(Stage::Eye);
     let ray = eye_ray(context, place);
     context.counters.eye_rays += 1;
     match closest_hit(context.scene, context.memory, &ray)? {

@@ -9,7 +9,7 @@ use photoncard_shared::message::Fault;
 
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, PartialReflection};
-use crate::memory::MemoryPort;
+use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
 use crate::scene::{Ray, closest_hit, read_surface};
 
@@ -36,6 +36,7 @@ pub fn cast<M: MemoryPort>(
     share: f32,
     index: u32,
 ) -> Result<Option<GatherRayEnd>, Fault> {
+    context.memory.enter(Stage::GatherRay);
     let sampled = point.directions.sample(&point.reflector(), point.pattern, index, point.rays);
     let Some(sampled) = sampled else { return Ok(None) };
     let ray = Ray::new(point.surface.offset_origin(), sampled.direction);
@@ -72,6 +73,7 @@ pub fn gathered<M: MemoryPort>(
     request: &GatherRequest,
     candidates: &mut VecView<Candidate>,
 ) -> Result<Vec3, Fault> {
+    context.memory.enter(Stage::Gather);
     let nearest = nearest_photons(context, request.position.into(), candidates)?;
     Ok(reflected_radiance(&nearest, request))
 }
@@ -88,6 +90,8 @@ pub(super) fn nearest_photons<'a, M: MemoryPort>(
     let tested = gather(context.scene, context.memory, position, &mut nearest)?;
     context.counters.gathers += 1;
     context.counters.photons_tested += tested as u64;
+    context.counters.photons_taken += nearest.taken() as u64;
+    context.counters.photons_selected += nearest.selected() as u64;
     context.counters.photons_found += nearest.candidates().len() as u64;
     Ok(nearest)
 }

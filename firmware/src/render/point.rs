@@ -8,7 +8,7 @@ use photoncard_shared::message::{Fault, Sampling};
 use super::Context;
 use super::final_gather::nearest_photons;
 use crate::importance::{DirectionTable, IncidentFlux, Reflector};
-use crate::memory::MemoryPort;
+use crate::memory::{MemoryPort, Stage};
 use crate::photon::Candidate;
 use crate::sampler::Pattern;
 use crate::scene::{Reflection, Surface};
@@ -90,6 +90,7 @@ impl GatherPoint {
             DirectionTable::of_reflection(&reflector.reflection)
         } else {
             context.counters.tables += 1;
+            context.memory.enter(Stage::Table);
             let Surface { position, normal, .. } = self.surface;
             let nearest = nearest_photons(context, position, candidates)?;
             let colour = reflector.reflection.diffuse + reflector.reflection.specular;

@@ -11,8 +11,10 @@ pub use material::{Reflection, Surface, read_surface};
 pub(crate) use material::{lobe_power, mirror};
 pub use triangle::{Intersection, RayFrame};
 
+use core::ops::Range;
+
 use glam::Vec3;
-use photoncard_shared::address::{LineAddress, Structure};
+use photoncard_shared::address::{LINE_BYTES, LineAddress, Structure};
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::message::{Fault, FaultCode};
 
@@ -57,11 +59,25 @@ impl SceneImage {
     ) -> Result<&'m [u8; N], Fault> {
         let fault = Fault { code: FaultCode::Record, detail: index };
         let (line, slot) = self.header.section(kind).locate::<PER_LINE>(index).ok_or(fault)?;
-        let structure = match kind {
-            SectionKind::Photons => Structure::PhotonMap,
-            _ => Structure::Scene,
-        };
-        read_slot(memory, structure, line, slot).ok_or(fault)?
+        let first = slot as u32 * N as u32;
+        read_slot(memory, kind.structure(), line, slot, first..first + N as u32).ok_or(fault)?
+    }
+
+    /// Reads line `index` of a section whose records are whole lines, of which the bytes in `used` are asked for.
+    ///
+    /// # Errors
+    /// As [`Self::record`].
+    #[inline(always)]
+    pub fn line<'m>(
+        &self,
+        memory: &'m mut impl MemoryPort,
+        kind: SectionKind,
+        index: u32,
+        used: Range<u32>,
+    ) -> Result<&'m [u8; LINE_BYTES], Fault> {
+        let fault = Fault { code: FaultCode::Record, detail: index };
+        let (line, slot) = self.header.section(kind).locate::<1>(index).ok_or(fault)?;
+        read_slot(memory, kind.structure(), line, slot, used).ok_or(fault)?
     }
 }
 
@@ -71,8 +87,9 @@ fn read_slot<const N: usize>(
     structure: Structure,
     line: LineAddress,
     slot: usize,
+    used: Range<u32>,
 ) -> Option<Result<&[u8; N], Fault>> {
-    match memory.read(structure, line, N as u32) {
+    match memory.read(structure, line, used) {
         Ok(line) => line.record::<N>(slot).map(Ok),
         Err(fault) => Some(Err(fault)),
     }

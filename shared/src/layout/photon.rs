@@ -1,6 +1,6 @@
 //! The photon of Jensen's book, 20 bytes: position, shared-exponent power, direction and flags.
 
-use super::{Record, read_vector, write_vector};
+use super::{PHOTON_CONTENT_BYTES, Record, read_vector, write_vector};
 
 /// One photon of the map, a node of the left-balanced kd-tree.
 ///
@@ -74,6 +74,19 @@ impl Photon {
     #[inline(always)]
     pub fn axis_of_flags(flags: u16) -> u8 {
         (flags & 3) as u8
+    }
+
+    /// The flags of a photon that is no node of a tree.
+    #[inline(always)]
+    pub fn flags_without_axis(flags: u16) -> u16 {
+        flags & !3
+    }
+
+    /// What the photon carries besides its position: the record's bytes from the power on.
+    #[inline(always)]
+    pub fn content(bytes: &[u8; Self::BYTES]) -> [u8; PHOTON_CONTENT_BYTES] {
+        let [.., a, b, c, d, e, f, g, h] = *bytes;
+        [a, b, c, d, e, f, g, h]
     }
 
     /// The surface normal's code in the flags.

@@ -1,0 +1,95 @@
+//! What memory is read for, and how much.
+
+use photoncard_shared::address::{STRUCTURES, Structure};
+
+/// What a chip reads memory for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Stage {
+    /// Loading an image and beginning a frame.
+    Begin = 0,
+    /// Rays from the eye.
+    Eye = 1,
+    /// Rays around irradiance records.
+    Survey = 2,
+    /// Gathers that tables of directions are made of.
+    Table = 3,
+    /// Shadow rays.
+    Shadow = 4,
+    /// Final gather rays.
+    GatherRay = 5,
+    /// Photon gathers at the ends of final gather rays.
+    Gather = 6,
+}
+
+/// Number of stages.
+pub const STAGES: usize = 7;
+
+impl Stage {
+    /// All stages, in order.
+    pub const ALL: [Self; STAGES] =
+        [Self::Begin, Self::Eye, Self::Survey, Self::Table, Self::Shadow, Self::GatherRay, Self::Gather];
+}
+
+/// Reads of one structure in one stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reads {
+    /// How many.
+    pub requests: u64,
+    /// Bytes that were asked for.
+    pub bytes: u64,
+}
+
+impl Reads {
+    const ZERO: Self = Self { requests: 0, bytes: 0 };
+
+    fn add(&mut self, other: &Self) {
+        self.requests += other.requests;
+        self.bytes += other.bytes;
+    }
+}
+
+/// Reads by stage and structure, and writes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Traffic {
+    reads: [[Reads; STRUCTURES]; STAGES],
+    /// Bytes written.
+    pub written_bytes: u64,
+}
+
+impl Traffic {
+    /// Nothing was read or written.
+    pub const ZERO: Self = Self { reads: [[Reads::ZERO; STRUCTURES]; STAGES], written_bytes: 0 };
+
+    /// Adds another memory's traffic.
+    pub fn add(&mut self, other: &Self) {
+        let pairs = self.reads.as_flattened_mut().iter_mut().zip(other.reads.as_flattened());
+        pairs.for_each(|(reads, other)| reads.add(other));
+        self.written_bytes += other.written_bytes;
+    }
+
+    /// Counts a read.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "stages and structures number the rows and columns")]
+    pub(super) fn count(&mut self, stage: Stage, structure: Structure, bytes: u32) {
+        let reads = &mut self.reads[stage as usize][structure as usize];
+        reads.requests += 1;
+        reads.bytes += bytes as u64;
+    }
+
+    /// The reads of a structure in a stage.
+    #[expect(clippy::indexing_slicing, reason = "stages and structures number the rows and columns")]
+    pub fn reads(&self, stage: Stage, structure: Structure) -> Reads {
+        self.reads[stage as usize][structure as usize]
+    }
+
+    /// The reads of some structures in all stages.
+    pub fn of(&self, chosen: impl Fn(Structure) -> bool) -> Reads {
+        let mut sum = Reads::ZERO;
+        for row in &self.reads {
+            let pairs = Structure::ALL.into_iter().zip(row);
+            pairs.filter(|&(structure, _)| chosen(structure)).for_each(|(_, reads)| sum.add(reads));
+        }
+        sum
+    }
+}
