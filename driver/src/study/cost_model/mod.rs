@@ -1,0 +1,173 @@
+//! The cost model of chapter 7: what a frame takes of a chip's arithmetic and memory, and so how many chips it takes.
+//!
+//! [`Symbols`] are Table 7.1, a [`Workload`] is what one frame takes, a [`Cost`] is that in FLOPs and bytes of each unit
+//! of the chip, and a [`Prediction`] is what a [`Machine`] makes of it. Formulas: `docs/scaling.md`.
+
+mod prediction;
+mod symbols;
+mod workload;
+
+pub use prediction::{ChipsNeeded, Machine, Prediction, Resource};
+pub use symbols::{Origin, Symbol, SymbolError, Symbols};
+pub use workload::Workload;
+
+/// Colour channels: a reflection function is evaluated for each.
+const CHANNELS: f64 = 3.0;
+
+/// What one frame takes of one unit, on all chips together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UnitCost {
+    /// Floating-point operations.
+    pub flops: f64,
+    /// Bytes from DRAM.
+    pub dram_bytes: f64,
+}
+
+/// What one frame takes of each unit of the chip, on all chips together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cost {
+    /// The ray caster: all rays.
+    pub ray_caster: UnitCost,
+    /// The controller: importance tables and the irradiance cache. Both are on chip and take no DRAM.
+    pub controller: UnitCost,
+    /// The photon gather unit: searches of the photon map, those for tables included, and all reflection.
+    pub gather_unit: UnitCost,
+}
+
+impl Cost {
+    /// With the reflection evaluated in two stages: the first once where a gather ray ends, the second for each photon.
+    pub fn new(workload: &Workload, symbols: &Symbols) -> Self {
+        let [stage_1, stage_2] = [symbols.reflection_stage_1, symbols.reflection_stage_2];
+        let of_gather = stage_1 + workload.photons_per_gather * stage_2;
+        let reflection = workload.ray_gathers * of_gather + reflected_rays(workload) * (stage_1 + stage_2);
+        Self {
+            controller: UnitCost { flops: controller_flops(workload, symbols), dram_bytes: 0.0 },
+            ..Self::of_units(workload, symbols, reflection)
+        }
+    }
+
+    /// With the whole reflection function evaluated for every photon, and nothing cached or sampled by importance.
+    ///
+    /// For [`Workload::naive`] this is
+    /// `T P [(1 + N_FG + N_S) C_RayCast + N_FG C_G + (N_FG k + N_FG + N_S) 3 (C_B1 + C_B2)]` a frame, which makes the
+    /// dissertation's 7.4 TFLOPS at 30 frames/s. Its own formula is not in the public excerpts: this one is a
+    /// hypothesis that meets the figure.
+    pub fn naive(workload: &Workload, symbols: &Symbols) -> Self {
+        let evaluations = workload.ray_gathers * workload.photons_per_gather + reflected_rays(workload);
+        let reflection = evaluations * (symbols.reflection_stage_1 + symbols.reflection_stage_2);
+        Self::of_units(workload, symbols, reflection)
+    }
+
+    /// `reflection`: FLOPs of all reflection functions, of one channel.
+    fn of_units(workload: &Workload, symbols: &Symbols, reflection: f64) -> Self {
+        Self {
+            ray_caster: UnitCost {
+                flops: workload.rays() * symbols.ray_cast,
+                dram_bytes: workload.scene_bytes,
+            },
+            controller: UnitCost::default(),
+            gather_unit: UnitCost {
+                flops: workload.gathers() * symbols.gather + CHANNELS * reflection,
+                dram_bytes: workload.photon_map_bytes,
+            },
+        }
+    }
+
+    /// All units together.
+    pub fn total(&self) -> UnitCost {
+        let units = [self.ray_caster, self.controller, self.gather_unit];
+        UnitCost {
+            flops: units.iter().map(|unit| unit.flops).sum(),
+            dram_bytes: units.iter().map(|unit| unit.dram_bytes).sum(),
+        }
+    }
+}
+
+/// Rays whose light is reflected at the point that the eye sees.
+fn reflected_rays(workload: &Workload) -> f64 {
+    workload.gather_rays + workload.shadow_rays
+}
+
+/// The dissertation's formula for these is not in the public excerpts: the terms and their FLOPs are ours.
+fn controller_flops(workload: &Workload, symbols: &Symbols) -> f64 {
+    let table = workload.photons_per_gather * symbols.table_photon + symbols.table_cells * symbols.table_cell;
+    let interpolation = symbols.records_per_pixel * symbols.interpolation;
+    let record = symbols.gather_rays * symbols.record_ray;
+    workload.table_gathers * table + workload.interpolated_samples * interpolation + workload.records * record
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_naive_hypothesis_makes_7_4_tflops() {
+        let symbols = Symbols::NOMINAL;
+        let cost = Cost::naive(&Workload::naive(&symbols), &symbols).total();
+        let tflops = symbols.frames_per_second * cost.flops / 1e12;
+        assert!((tflops - 7.408).abs() < 0.0005, "{tflops}");
+    }
+
+    #[test]
+    fn every_symbol_of_a_cost_only_ever_adds() {
+        let nominal = Symbols::NOMINAL;
+        let total = |symbols: &Symbols| Cost::new(&Workload::nominal(symbols), symbols).total();
+        let before = total(&nominal);
+        let of_flops = [
+            "P",
+            "T",
+            "N_FG",
+            "k",
+            "N_S",
+            "C_J",
+            "R_FG",
+            "L_IC",
+            "C_B1",
+            "C_B2",
+            "C_RayCast",
+            "C_G",
+            "C_IC",
+            "C_IR",
+            "C_T1",
+            "C_T2",
+        ];
+        let of_bytes = ["P", "T", "N_FG", "N_S", "R_FG", "B_G", "B_R"];
+        for (symbol, value) in nominal.rows() {
+            let mut symbols = nominal;
+            symbols.set(&format!("{}={}", symbol.notation, 1.5 * value)).unwrap();
+            let after = total(&symbols);
+            // An interpolated pixel takes less than one that gathers.
+            let falls = symbol.notation == "R_IC";
+            assert_eq!(after.flops > before.flops, of_flops.contains(&symbol.notation), "{symbol:?}");
+            assert_eq!(
+                after.dram_bytes > before.dram_bytes,
+                of_bytes.contains(&symbol.notation),
+                "{symbol:?}"
+            );
+            assert_eq!(
+                after.flops < before.flops || after.dram_bytes < before.dram_bytes,
+                falls,
+                "{symbol:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn two_stages_save_the_first_for_all_photons_but_one() {
+        let symbols = Symbols::NOMINAL;
+        let workload = Workload::naive(&symbols);
+        let saved =
+            Cost::naive(&workload, &symbols).total().flops - Cost::new(&workload, &symbols).total().flops;
+        let expected = 3.0 * 12.0 * 99.0 * workload.ray_gathers;
+        assert!((saved / expected - 1.0).abs() < 1e-9, "{saved} {expected}");
+    }
+
+    #[test]
+    fn a_measured_frame_costs_what_it_counts() {
+        let symbols = Symbols::NOMINAL;
+        let workload = Workload { eye_rays: 2.0, survey_rays: 3.0, scene_bytes: 70.0, ..Workload::default() };
+        let cost = Cost::new(&workload, &symbols);
+        assert_eq!(cost.ray_caster, UnitCost { flops: 5.0 * 330.0, dram_bytes: 70.0 });
+        assert_eq!(cost.total(), cost.ray_caster);
+    }
+}

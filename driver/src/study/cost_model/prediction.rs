@@ -1,0 +1,226 @@
+//! What a machine makes of a frame's cost: tiles a second, frames a second, chips.
+
+use super::{Cost, Workload};
+
+/// What one chip can do, and the host's link that all chips share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Machine {
+    /// Usable memory bandwidth of a chip, bytes/s.
+    pub bandwidth: f64,
+    /// Floating-point operations of a chip a second.
+    pub flops: f64,
+    /// The host's link, bytes/s each way.
+    pub link: f64,
+}
+
+impl Machine {
+    /// The chip that section 7.1 expects of 2010: 90 GB/s and 500 GFLOPS. The link is our choice: the 4 GB/s each way
+    /// of the sixteen lanes of PCI Express 1.x that a workstation of 2007 had.
+    pub const NOMINAL: Self = Self { bandwidth: 90e9, flops: 500e9, link: 4e9 };
+}
+
+/// What keeps a machine from rendering faster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resource {
+    /// The chips' memory.
+    Bandwidth,
+    /// The chips' arithmetic.
+    Computation,
+    /// The host's link: more chips do not help.
+    HostLink,
+}
+
+/// Chips that a frame rate takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChipsNeeded {
+    /// For their memory bandwidth alone.
+    pub bandwidth: u64,
+    /// For their arithmetic alone.
+    pub computation: u64,
+    /// For the whole; `None` if the host's link cannot carry the frames of any number of chips.
+    pub overall: Option<u64>,
+}
+
+/// How fast a machine renders a frame of some cost.
+///
+/// Memory, arithmetic and link work at the same time, as in a pipeline that never waits, and tiles are dealt without
+/// loss: an upper bound, of which [`crate::study::load_balance`] tells how near the dealing of tiles comes to it. What
+/// costs nothing has an infinite rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prediction {
+    /// Tiles a second that one chip's memory bandwidth allows.
+    pub bandwidth_tiles_per_second: f64,
+    /// Tiles a second that one chip's arithmetic allows.
+    pub computation_tiles_per_second: f64,
+    /// Frames a second that the host's link allows, whatever the number of chips.
+    pub link_frames_per_second: f64,
+    /// Tiles of a frame.
+    pub tiles: f64,
+}
+
+/// Relative error of a ratio of rates that is taken for rounding.
+const ROUNDING: f64 = 1e-9;
+
+impl Prediction {
+    /// Of a frame on a machine.
+    pub fn new(workload: &Workload, cost: &Cost, machine: &Machine) -> Self {
+        let total = cost.total();
+        // The link's directions do not disturb each other: the busier one limits.
+        let link_bytes = workload.bytes_to_host.max(workload.bytes_from_host);
+        let rate = |capacity: f64, of_frame: f64| {
+            if of_frame > 0.0 { capacity / of_frame } else { f64::INFINITY }
+        };
+        Self {
+            bandwidth_tiles_per_second: workload.tiles * rate(machine.bandwidth, total.dram_bytes),
+            computation_tiles_per_second: workload.tiles * rate(machine.flops, total.flops),
+            link_frames_per_second: rate(machine.link, link_bytes),
+            tiles: workload.tiles,
+        }
+    }
+
+    /// Tiles a second of one chip.
+    pub fn tiles_per_second(&self) -> f64 {
+        self.bandwidth_tiles_per_second.min(self.computation_tiles_per_second)
+    }
+
+    /// Frames a second of some chips, the host's link included.
+    pub fn frames_per_second(&self, chips: u64) -> f64 {
+        self.chips_frames_per_second(chips).min(self.link_frames_per_second)
+    }
+
+    /// What limits some chips; of two that limit alike, the one that more chips help.
+    pub fn binding(&self, chips: u64) -> Resource {
+        if self.link_frames_per_second < self.chips_frames_per_second(chips) {
+            Resource::HostLink
+        } else if self.computation_tiles_per_second < self.bandwidth_tiles_per_second {
+            Resource::Computation
+        } else {
+            Resource::Bandwidth
+        }
+    }
+
+    /// The fewest chips for a frame rate, at least one. A rate that a number of chips meets up to rounding is met.
+    pub fn chips_needed(&self, frames_per_second: f64) -> ChipsNeeded {
+        let chips = |tiles_per_second: f64| {
+            let ratio = frames_per_second * self.tiles / tiles_per_second;
+            ((ratio * (1.0 - ROUNDING)).ceil() as u64).max(1)
+        };
+        let bandwidth = chips(self.bandwidth_tiles_per_second);
+        let computation = chips(self.computation_tiles_per_second);
+        let is_carried = self.link_load(frames_per_second) <= 1.0 + ROUNDING;
+        ChipsNeeded { bandwidth, computation, overall: is_carried.then(|| bandwidth.max(computation)) }
+    }
+
+    /// The share of the host's link that a frame rate takes; above 1 it cannot be carried.
+    pub fn link_load(&self, frames_per_second: f64) -> f64 {
+        frames_per_second / self.link_frames_per_second
+    }
+
+    fn chips_frames_per_second(&self, chips: u64) -> f64 {
+        chips as f64 * self.tiles_per_second() / self.tiles
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::{Symbols, UnitCost};
+    use super::*;
+
+    fn nominal() -> Prediction {
+        let symbols = Symbols::NOMINAL;
+        let workload = Workload::nominal(&symbols);
+        Prediction::new(&workload, &Cost::new(&workload, &symbols), &Machine::NOMINAL)
+    }
+
+    fn naive() -> Prediction {
+        let symbols = Symbols::NOMINAL;
+        let workload = Workload::naive(&symbols);
+        Prediction::new(&workload, &Cost::naive(&workload, &symbols), &Machine::NOMINAL)
+    }
+
+    #[test]
+    fn the_naive_frame_takes_under_sixteen_chips_of_arithmetic_and_over_a_hundred_of_memory() {
+        let chips = naive().chips_needed(30.0);
+        // (11 TB/s + 8.57 GB/s of the scene) / 90 GB/s.
+        assert_eq!(chips, ChipsNeeded { bandwidth: 123, computation: 15, overall: Some(123) });
+        assert_eq!(naive().binding(123), Resource::Bandwidth);
+    }
+
+    #[test]
+    fn the_techniques_bring_the_nominal_frame_to_a_few_chips() {
+        let chips = nominal().chips_needed(30.0);
+        assert!(chips.overall.unwrap() < 16, "{chips:?}");
+        assert!(nominal().link_load(30.0) < 0.1);
+    }
+
+    #[test]
+    fn the_binding_resource_is_the_scarcest() {
+        let workload = Workload { tiles: 10.0, bytes_to_host: 100.0, ..Workload::default() };
+        let cost = Cost { gather_unit: UnitCost { flops: 1000.0, dram_bytes: 50.0 }, ..Cost::default() };
+        let on =
+            |bandwidth, flops, link| Prediction::new(&workload, &cost, &Machine { bandwidth, flops, link });
+        let prediction = on(50.0, 2000.0, 450.0);
+        assert_eq!(
+            [prediction.bandwidth_tiles_per_second, prediction.computation_tiles_per_second],
+            [10.0, 20.0]
+        );
+        assert_eq!(prediction.binding(1), Resource::Bandwidth);
+        assert_eq!(on(100.1, 2000.0, 450.0).binding(1), Resource::Computation);
+        // The link carries 4.5 frames a second.
+        assert_eq!([prediction.binding(4), prediction.binding(5)], [Resource::Bandwidth, Resource::HostLink]);
+        assert_eq!([prediction.frames_per_second(4), prediction.frames_per_second(1000)], [4.0, 4.5]);
+        assert_eq!(prediction.chips_needed(4.5).overall, Some(5));
+        assert_eq!(prediction.chips_needed(4.6).overall, None);
+        assert_eq!(prediction.link_load(9.0), 2.0);
+    }
+
+    #[test]
+    fn a_frame_that_costs_nothing_takes_one_chip() {
+        let workload = Workload { tiles: 4.0, ..Workload::default() };
+        let prediction = Prediction::new(&workload, &Cost::default(), &Machine::NOMINAL);
+        assert_eq!(prediction.chips_needed(30.0).overall, Some(1));
+        assert_eq!(prediction.frames_per_second(1), f64::INFINITY);
+    }
+
+    proptest! {
+        #[test]
+        fn the_chips_needed_are_enough_and_no_more(
+            bytes in 1.0..1e13_f64, flops in 1.0..1e13_f64, target in 0.1..1000.0_f64,
+        ) {
+            let workload = Workload { tiles: 1024.0, ..Workload::default() };
+            let cost =
+                Cost { gather_unit: UnitCost { flops, dram_bytes: bytes }, ..Cost::default() };
+            let prediction = Prediction::new(&workload, &cost, &Machine::NOMINAL);
+            let chips = prediction.chips_needed(target).overall.unwrap();
+            prop_assert!(prediction.frames_per_second(chips) >= target * (1.0 - 2.0 * ROUNDING));
+            prop_assert!(chips == 1 || prediction.frames_per_second(chips - 1) < target);
+        }
+
+        #[test]
+        fn an_exact_multiple_is_not_rounded_up(flops in 1.0..1e13_f64, chips in 1..2000_u64) {
+            let workload = Workload { tiles: 1024.0, ..Workload::default() };
+            let cost = Cost { ray_caster: UnitCost { flops, dram_bytes: 0.0 }, ..Cost::default() };
+            let prediction = Prediction::new(&workload, &cost, &Machine::NOMINAL);
+            let needed = prediction.chips_needed(prediction.frames_per_second(chips));
+            prop_assert_eq!(needed.computation, chips);
+        }
+
+        #[test]
+        fn more_of_anything_is_never_slower(chips in 1..200_u64, factor in 1.0..4.0_f64) {
+            let symbols = Symbols::NOMINAL;
+            let workload = Workload::nominal(&symbols);
+            let rate = |machine: &Machine, chips| {
+                Prediction::new(&workload, &Cost::new(&workload, &symbols), machine).frames_per_second(chips)
+            };
+            let before = rate(&Machine::NOMINAL, chips);
+            let mut machines = [Machine::NOMINAL; 3];
+            machines[0].bandwidth *= factor;
+            machines[1].flops *= factor;
+            machines[2].link *= factor;
+            prop_assert!(rate(&Machine::NOMINAL, chips + 1) >= before);
+            prop_assert!(machines.iter().all(|machine| rate(machine, chips) >= before));
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! What one frame takes, by the symbols or as a run counted it.
+
+use super::Symbols;
+
+/// What one frame takes, on all chips together. A run fills it with what it counted, Table 7.1 with what it expects.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Workload {
+    /// Rays from the eye. Nominal: `T P`.
+    pub eye_rays: f64,
+    /// Rays towards emitters. Nominal: `T P N_S`.
+    pub shadow_rays: f64,
+    /// Final gather rays, those of irradiance records included. Nominal: `T P R_FG N_FG`.
+    pub gather_rays: f64,
+    /// Rays that survey the surroundings of irradiance records. Nominal: none, the table knows of no survey.
+    pub survey_rays: f64,
+    /// Searches of the photon map where a gather ray ends. Nominal: one a gather ray.
+    pub ray_gathers: f64,
+    /// Searches of the photon map that fill an importance table. Nominal: `T P R_FG`, one a pixel that gathers.
+    pub table_gathers: f64,
+    /// Photons that a gather returns and that are then reflected, or counted in a table. Nominal: `k`.
+    pub photons_per_gather: f64,
+    /// Samples whose irradiance is interpolated. Nominal: `T P R_IC`.
+    pub interpolated_samples: f64,
+    /// Irradiance records that are made. Nominal: `T P R_FG`: every pixel that gathers leaves one.
+    pub records: f64,
+    /// Bytes from DRAM for the photon map. Nominal: `B_G` a gather of either kind.
+    pub photon_map_bytes: f64,
+    /// Bytes from DRAM for the scene. Nominal: `B_R` a ray.
+    pub scene_bytes: f64,
+    /// Tiles of the picture. Nominal: `T`.
+    pub tiles: f64,
+    /// Bytes over the host's link to the host: pixels. Nominal: `T P B_P`.
+    pub bytes_to_host: f64,
+    /// Bytes over the host's link from the host: tile commands. Nominal: `T B_T`. The image is loaded before the frame.
+    pub bytes_from_host: f64,
+}
+
+impl Workload {
+    /// What Table 7.1 expects of a frame with all three techniques: `T P (1 + R_FG N_FG + N_S)` rays.
+    pub fn nominal(symbols: &Symbols) -> Self {
+        let pixels = symbols.pixels();
+        let gathering_pixels = pixels * symbols.gathering_share();
+        let mut workload = Self {
+            gather_rays: gathering_pixels * symbols.gather_rays,
+            ray_gathers: gathering_pixels * symbols.gather_rays,
+            table_gathers: gathering_pixels,
+            interpolated_samples: pixels * symbols.interpolated_share,
+            records: gathering_pixels,
+            ..Self::of_pixels(symbols)
+        };
+        workload.photon_map_bytes = workload.gathers() * symbols.gather_dram;
+        workload.scene_bytes = workload.rays() * symbols.ray_dram;
+        workload
+    }
+
+    /// What Table 7.1 expects of a frame with none of the techniques: every pixel gathers with all its rays, and each
+    /// gather takes `B_N` bytes.
+    pub fn naive(symbols: &Symbols) -> Self {
+        let rays = symbols.pixels() * symbols.gather_rays;
+        let mut workload = Self { gather_rays: rays, ray_gathers: rays, ..Self::of_pixels(symbols) };
+        workload.photon_map_bytes = workload.gathers() * symbols.naive_gather_dram;
+        workload.scene_bytes = workload.rays() * symbols.ray_dram;
+        workload
+    }
+
+    /// What every pixel takes, gather or not.
+    fn of_pixels(symbols: &Symbols) -> Self {
+        let pixels = symbols.pixels();
+        Self {
+            eye_rays: pixels,
+            shadow_rays: pixels * symbols.shadow_rays,
+            photons_per_gather: symbols.neighbors,
+            tiles: symbols.tiles,
+            bytes_to_host: pixels * symbols.pixel_bytes,
+            bytes_from_host: symbols.tiles * symbols.command_bytes,
+            ..Self::default()
+        }
+    }
+
+    /// Rays of all kinds.
+    pub fn rays(&self) -> f64 {
+        self.eye_rays + self.shadow_rays + self.gather_rays + self.survey_rays
+    }
+
+    /// Searches of the photon map of both kinds.
+    pub fn gathers(&self) -> f64 {
+        self.ray_gathers + self.table_gathers
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_nominal_second_casts_385_million_rays() {
+        let symbols = Symbols::NOMINAL;
+        let rays = symbols.frames_per_second * Workload::nominal(&symbols).rays();
+        assert!((rays - 385.35e6).abs() < 0.01e6, "{rays}");
+    }
+
+    #[test]
+    fn a_naive_second_reads_11_terabytes_of_photons() {
+        let symbols = Symbols::NOMINAL;
+        let bytes = symbols.frames_per_second * Workload::naive(&symbols).photon_map_bytes;
+        assert!((bytes / 11e12 - 1.0).abs() < 1e-12, "{bytes}");
+    }
+
+    #[test]
+    fn a_frame_without_the_cache_casts_the_naive_frames_rays() {
+        let symbols = Symbols { interpolated_share: 0.0, ..Symbols::NOMINAL };
+        assert_eq!(Workload::nominal(&symbols).rays(), Workload::naive(&symbols).rays());
+        assert_eq!(Workload::nominal(&symbols).interpolated_samples, 0.0);
+    }
+}

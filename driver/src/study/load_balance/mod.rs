@@ -1,0 +1,224 @@
+//! How evenly tiles load many chips: a simulation of the scheduler over the costs of a picture's tiles.
+//!
+//! Tiles are dealt by [`Scheduler`] itself, under the policy of [`crate::session`]: one queue; when the host turns to a
+//! card, it sends it as many tiles as the card has free credits; a chip works its tiles in the order they came; a tile
+//! frees its credit when its result is at the host. A chip is done with a tile once it has rendered it: what it takes to
+//! send the result is the link's.
+//!
+//! Time is kept in whole nanoseconds, and what happens at the same time happens in the order of the chips, so a
+//! simulation gives the same result wherever it runs.
+
+mod order;
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use photoncard_shared::message::Tile;
+
+pub use self::order::TileOrder;
+use crate::scheduler::Scheduler;
+
+/// The links of all chips, which one host serves, one message at a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LinkModel {
+    /// Seconds of the host for one tile command.
+    pub command_seconds: f64,
+    /// Seconds of the host for one tile's result: its pixels and the message that ends them.
+    pub result_seconds: f64,
+    /// Seconds that any message is on its way.
+    pub latency_seconds: f64,
+}
+
+/// The chips that render, and how they are reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setup {
+    /// Number of chips.
+    pub chips: usize,
+    /// Tile commands that may be unanswered on a chip; [`Budget::tiles`](photoncard_shared::budget::Budget::tiles).
+    pub credits: usize,
+    /// The links.
+    pub link: LinkModel,
+}
+
+/// Why nothing was simulated.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LoadBalanceError {
+    /// No tile.
+    #[error("there are no tiles to deal; give the cost of one at least")]
+    NoTiles,
+    /// No chip, or none that may have a tile.
+    #[error("{chips} chips of {credits} credits render nothing; give one of each at least")]
+    NoChips {
+        /// Number of chips.
+        chips: usize,
+        /// Tile commands that may be unanswered on a chip.
+        credits: usize,
+    },
+    /// A time that is none.
+    #[error("{0} is no time; give seconds from 0 to {MOST_SECONDS}")]
+    Time(f64),
+}
+
+/// The longest time of a tile or of a message, seconds: their sums stay whole.
+pub const MOST_SECONDS: f64 = 1e9;
+
+/// How a picture's tiles were dealt, and how long that took. Times are seconds from when the host begins to deal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Balance {
+    /// When the host has the last result.
+    pub makespan_seconds: f64,
+    /// All tiles on one chip, without links.
+    pub work_seconds: f64,
+    /// When each chip is done with its last tile; 0 for a chip that got none.
+    pub chip_seconds: Vec<f64>,
+    /// Seconds that the host was at work on messages.
+    pub host_seconds: f64,
+    /// The most tiles that were unanswered at one time, on all chips.
+    pub most_in_flight: usize,
+    /// The chip that rendered each tile, in the picture's order.
+    pub chip_of_tile: Vec<usize>,
+}
+
+impl Balance {
+    /// How many times faster than one chip without links.
+    pub fn speedup(&self) -> f64 {
+        if self.makespan_seconds > 0.0 { self.work_seconds / self.makespan_seconds } else { 1.0 }
+    }
+
+    /// The share of all chips' time until the makespan in which they render.
+    pub fn efficiency(&self) -> f64 {
+        self.speedup() / self.chip_seconds.len() as f64
+    }
+
+    /// The rest of that time: chips wait for tiles, or for the last of the others.
+    pub fn idle_share(&self) -> f64 {
+        1.0 - self.efficiency()
+    }
+
+    /// When the slowest chip is done, seconds.
+    pub fn slowest_chip_seconds(&self) -> f64 {
+        self.chip_seconds.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// When a chip is done on average, seconds.
+    pub fn mean_chip_seconds(&self) -> f64 {
+        self.chip_seconds.iter().sum::<f64>() / self.chip_seconds.len() as f64
+    }
+}
+
+/// Deals a picture's tiles to chips.
+///
+/// `costs` are the seconds that a chip takes for each tile, in the picture's order.
+///
+/// # Errors
+/// If there are no tiles, no chips or no credits, or a time is negative, above [`MOST_SECONDS`] or no number.
+pub fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balance, LoadBalanceError> {
+    let &Setup { chips, credits, link } = setup;
+    if costs.is_empty() {
+        return Err(LoadBalanceError::NoTiles);
+    }
+    if chips == 0 || credits == 0 {
+        return Err(LoadBalanceError::NoChips { chips, credits });
+    }
+    let costs: Vec<u128> = costs.iter().map(|&cost| nanoseconds(cost)).collect::<Result<_, _>>()?;
+    let mut simulation = Simulation {
+        scheduler: Scheduler::new(order.tiles(&costs)),
+        credits,
+        command: nanoseconds(link.command_seconds)?,
+        result: nanoseconds(link.result_seconds)?,
+        latency: nanoseconds(link.latency_seconds)?,
+        chips: vec![Chip::default(); chips],
+        chip_of_tile: vec![0; costs.len()],
+        costs,
+        results: BinaryHeap::new(),
+        now: 0,
+        busy: 0,
+        most_in_flight: 0,
+    };
+    simulation.run();
+    Ok(simulation.balance())
+}
+
+#[derive(Clone, Copy, Default)]
+struct Chip {
+    /// Tiles that are unanswered.
+    tiles: usize,
+    /// When it is done with what it has.
+    done: u128,
+}
+
+/// Times are nanoseconds.
+struct Simulation {
+    scheduler: Scheduler,
+    credits: usize,
+    command: u128,
+    result: u128,
+    latency: u128,
+    costs: Vec<u128>,
+    chips: Vec<Chip>,
+    chip_of_tile: Vec<usize>,
+    /// Results on their way: when they are at the host, of which chip, in order.
+    results: BinaryHeap<Reverse<(u128, usize)>>,
+    /// Up to when the host has worked or waited.
+    now: u128,
+    /// How much of that it has worked.
+    busy: u128,
+    most_in_flight: usize,
+}
+
+impl Simulation {
+    fn run(&mut self) {
+        for chip in 0..self.chips.len() {
+            self.deal(chip);
+        }
+        // A result that is still to be made comes after the one that frees its credit: the heap's first is the next.
+        while let Some(Reverse((arrival, chip))) = self.results.pop() {
+            self.now = self.now.max(arrival) + self.result;
+            self.busy += self.result;
+            self.chips[chip].tiles -= 1;
+            self.scheduler.complete();
+            self.deal(chip);
+        }
+    }
+
+    /// Sends tiles to a chip until it has no free credit, as a session does.
+    fn deal(&mut self, chip: usize) {
+        while self.chips[chip].tiles < self.credits {
+            let Some(Tile { id, .. }) = self.scheduler.take() else { break };
+            self.now += self.command;
+            self.busy += self.command;
+            let at = &mut self.chips[chip];
+            at.tiles += 1;
+            at.done = at.done.max(self.now + self.latency) + self.costs[id as usize];
+            self.results.push(Reverse((at.done + self.latency, chip)));
+            self.chip_of_tile[id as usize] = chip;
+        }
+        // All that is dealt and not done has a result on its way.
+        self.most_in_flight = self.most_in_flight.max(self.results.len());
+    }
+
+    fn balance(self) -> Balance {
+        Balance {
+            makespan_seconds: seconds(self.now),
+            work_seconds: seconds(self.costs.iter().sum()),
+            chip_seconds: self.chips.iter().map(|chip| seconds(chip.done)).collect(),
+            host_seconds: seconds(self.busy),
+            most_in_flight: self.most_in_flight,
+            chip_of_tile: self.chip_of_tile,
+        }
+    }
+}
+
+fn nanoseconds(seconds: f64) -> Result<u128, LoadBalanceError> {
+    if !(0.0..=MOST_SECONDS).contains(&seconds) {
+        return Err(LoadBalanceError::Time(seconds));
+    }
+    Ok((seconds * 1e9).round() as u128)
+}
+
+fn seconds(nanoseconds: u128) -> f64 {
+    nanoseconds as f64 / 1e9
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,186 @@
+use proptest::prelude::*;
+
+use super::*;
+
+const NO_LINK: LinkModel = LinkModel { command_seconds: 0.0, result_seconds: 0.0, latency_seconds: 0.0 };
+
+fn balance(costs: &[f64], order: TileOrder, chips: usize, credits: usize, link: LinkModel) -> Balance {
+    simulate(costs, order, &Setup { chips, credits, link }).unwrap()
+}
+
+/// Whole milliseconds, so that sums are exact in nanoseconds.
+fn costs() -> impl Strategy<Value = Vec<f64>> {
+    proptest::collection::vec((0..1000_u32).prop_map(|cost| cost as f64 / 1000.0), 1..200)
+}
+
+fn orders() -> impl Strategy<Value = TileOrder> {
+    prop_oneof![
+        Just(TileOrder::Picture),
+        any::<u32>().prop_map(TileOrder::Random),
+        Just(TileOrder::LongestFirst)
+    ]
+}
+
+fn longest(costs: &[f64]) -> f64 {
+    costs.iter().copied().fold(0.0, f64::max)
+}
+
+/// The least makespan of all ways to give tiles to chips.
+fn best_makespan(costs: &[f64], chips: usize) -> f64 {
+    let ways = chips.pow(costs.len() as u32);
+    let makespan = |mut way: usize| {
+        let mut work = vec![0.0; chips];
+        for cost in costs {
+            work[way % chips] += cost;
+            way /= chips;
+        }
+        longest(&work)
+    };
+    (0..ways).map(makespan).fold(f64::INFINITY, f64::min)
+}
+
+/// A tenth of a nanosecond: what conversions to and from seconds leave.
+const ROUNDING: f64 = 1e-10;
+
+#[test]
+fn a_chip_waits_for_its_command_and_the_host_for_its_result() {
+    let link = LinkModel { command_seconds: 0.01, result_seconds: 0.02, latency_seconds: 0.1 };
+    let one = balance(&[1.0, 1.0], TileOrder::Picture, 1, 1, link);
+    // Twice: command, way, tile, way, result.
+    assert!((one.makespan_seconds - 2.0 * (0.01 + 0.1 + 1.0 + 0.1 + 0.02)).abs() < ROUNDING);
+    let two = balance(&[1.0, 1.0], TileOrder::Picture, 2, 1, link);
+    // The second chip's command waits for the first's 0.01, and its result then for 0.01 of the first's.
+    assert!((two.makespan_seconds - (0.02 + 0.1 + 1.0 + 0.1 + 0.01 + 0.02)).abs() < ROUNDING, "{two:?}");
+    assert!((two.host_seconds - 0.06).abs() < ROUNDING);
+    assert_eq!([one.most_in_flight, two.most_in_flight], [1, 2]);
+}
+
+#[test]
+fn a_second_credit_hides_the_latency_of_the_link() {
+    let costs = [0.01; 400];
+    let link = LinkModel { latency_seconds: 0.005, ..NO_LINK };
+    let [one, two, four] = [1, 2, 4].map(|credits| balance(&costs, TileOrder::Picture, 4, credits, link));
+    // A tile is as long as the way to the host and back: with one credit half of the time is waiting.
+    assert!((one.idle_share() - 0.5).abs() < 0.01, "{}", one.idle_share());
+    assert!(two.idle_share() < 0.02, "{}", two.idle_share());
+    assert!(four.idle_share() <= two.idle_share() + ROUNDING);
+}
+
+#[test]
+fn tiles_behind_a_long_one_wait_for_it() {
+    let mut costs = [1.0; 8];
+    costs[0] = 10.0;
+    let makespan = |credits| balance(&costs, TileOrder::Picture, 2, credits, NO_LINK).makespan_seconds;
+    assert_eq!([makespan(1), makespan(4), makespan(8)], [10.0, 13.0, 17.0]);
+}
+
+#[test]
+fn a_busy_host_bounds_the_speed_of_many_chips() {
+    let costs = [1.0; 2000];
+    let link = LinkModel { command_seconds: 0.001, result_seconds: 0.009, latency_seconds: 0.0 };
+    let many = balance(&costs, TileOrder::Picture, 1000, 2, link);
+    assert!(many.makespan_seconds >= 20.0 && many.speedup() <= 100.0, "{}", many.speedup());
+    assert!(many.host_seconds <= many.makespan_seconds);
+}
+
+#[test]
+fn the_longest_first_keeps_the_end_short() {
+    let mut costs = [1.0; 9];
+    costs[8] = 3.0;
+    let makespan = |order| balance(&costs, order, 3, 1, NO_LINK).makespan_seconds;
+    assert_eq!(makespan(TileOrder::Picture), 5.0);
+    assert_eq!(makespan(TileOrder::LongestFirst), 4.0);
+}
+
+#[test]
+fn equal_tiles_on_a_divisor_of_chips_leave_none_idle() {
+    for chips in [1, 2, 8, 64, 1024] {
+        let even = balance(&[0.25; 1024], TileOrder::Picture, chips, 1, NO_LINK);
+        assert_eq!([even.speedup(), even.efficiency(), even.idle_share()], [chips as f64, 1.0, 0.0]);
+        assert_eq!(even.slowest_chip_seconds(), even.mean_chip_seconds());
+    }
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused() {
+    let simulate = |costs: &[f64], chips, credits, link| {
+        simulate(costs, TileOrder::Picture, &Setup { chips, credits, link })
+    };
+    assert_eq!(simulate(&[], 1, 1, NO_LINK), Err(LoadBalanceError::NoTiles));
+    for (chips, credits) in [(0, 1), (1, 0)] {
+        assert_eq!(
+            simulate(&[1.0], chips, credits, NO_LINK),
+            Err(LoadBalanceError::NoChips { chips, credits })
+        );
+    }
+    for time in [-1.0, f64::NAN, f64::INFINITY, 2.0 * MOST_SECONDS] {
+        assert!(matches!(simulate(&[time], 1, 1, NO_LINK), Err(LoadBalanceError::Time(_))));
+        let link = LinkModel { latency_seconds: time, ..NO_LINK };
+        assert!(matches!(simulate(&[1.0], 1, 1, link), Err(LoadBalanceError::Time(_))));
+    }
+    assert!(simulate(&[MOST_SECONDS; 1000], 1, 1, NO_LINK).is_ok());
+}
+
+proptest! {
+    #[test]
+    fn one_chip_without_links_takes_the_sum_of_the_costs(
+        costs in costs(), order in orders(), credits in 1..8_usize,
+    ) {
+        let one = balance(&costs, order, 1, credits, NO_LINK);
+        prop_assert!((one.makespan_seconds - costs.iter().sum::<f64>()).abs() < ROUNDING);
+        prop_assert_eq!(one.speedup(), 1.0);
+    }
+
+    /// No schedule of any links beats the longest tile, nor an even share of the work.
+    #[test]
+    fn no_dealing_beats_the_work(
+        costs in costs(), order in orders(), chips in 1..40_usize, credits in 1..8_usize, latency in 0.0..0.5_f64,
+    ) {
+        let link = LinkModel { command_seconds: 0.001, result_seconds: 0.002, latency_seconds: latency };
+        let dealt = balance(&costs, order, chips, credits, link);
+        let share = dealt.work_seconds / chips as f64;
+        prop_assert!(dealt.makespan_seconds >= longest(&costs).max(share) - ROUNDING);
+        prop_assert!(dealt.slowest_chip_seconds() <= dealt.makespan_seconds);
+        prop_assert!((0.0..=1.0).contains(&dealt.idle_share()));
+        prop_assert!(dealt.most_in_flight <= (chips * credits).min(costs.len()));
+    }
+
+    /// Graham 1966: no chip idles while a tile waits, so the last tile to end began when all chips had worked, for at
+    /// most the rest's even share. That takes free links, and one credit: a tile that waits on a chip is no other's.
+    #[test]
+    fn one_credit_without_links_keeps_grahams_bound(
+        costs in costs(), order in orders(), chips in 1..40_usize,
+    ) {
+        let dealt = balance(&costs, order, chips, 1, NO_LINK);
+        let chips = chips as f64;
+        let bound = dealt.work_seconds / chips + (1.0 - 1.0 / chips) * longest(&costs);
+        prop_assert!(dealt.makespan_seconds <= bound + ROUNDING);
+    }
+
+    /// Graham 1969: the longest first takes at most 4/3 - 1/(3 chips) of the best time.
+    #[test]
+    fn the_longest_first_is_within_a_third_of_the_best(
+        costs in proptest::collection::vec((0..1000_u32).prop_map(|cost| cost as f64 / 1000.0), 1..8),
+        chips in 1..4_usize,
+    ) {
+        let dealt = balance(&costs, TileOrder::LongestFirst, chips, 1, NO_LINK);
+        let bound = (4.0 / 3.0 - 1.0 / (3 * chips) as f64) * best_makespan(&costs, chips);
+        prop_assert!(dealt.makespan_seconds <= bound + ROUNDING);
+    }
+
+    #[test]
+    fn every_tile_is_rendered_once_and_the_same_way_each_time(
+        costs in costs(), order in orders(), chips in 1..40_usize, credits in 1..8_usize, latency in 0.0..0.5_f64,
+    ) {
+        let link = LinkModel { command_seconds: 0.001, result_seconds: 0.002, latency_seconds: latency };
+        let dealt = balance(&costs, order, chips, credits, link);
+        prop_assert_eq!(dealt.chip_of_tile.len(), costs.len());
+        let mut work = vec![0.0; chips];
+        for (cost, &chip) in costs.iter().zip(&dealt.chip_of_tile) {
+            work[chip] += cost;
+        }
+        prop_assert!(work.iter().zip(&dealt.chip_seconds).all(|(work, done)| *work <= done + ROUNDING));
+        prop_assert!((dealt.host_seconds - 0.003 * costs.len() as f64).abs() < ROUNDING);
+        prop_assert_eq!(&dealt, &balance(&costs, order, chips, credits, link));
+    }
+}
