@@ -16,3 +16,4 @@ pub mod render;
 pub mod scene;
 pub mod scheduler;
 pub mod session;
+pub mod study;
