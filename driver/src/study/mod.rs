@@ -1,4 +1,7 @@
-//! Studies: what the architecture would do at sizes and speeds that no run here has.
+//! Studies: renders of the same scenes with one thing changed, kept and reported, and what they say of chips that no run
+//! here has.
 
 pub mod cost_model;
 pub mod load_balance;
+pub mod report;
+pub mod store;

@@ -1,0 +1,169 @@
+//! Reports: one page that tells what was studied, what came out, and how to get it again.
+
+use std::fmt::Write;
+
+use super::markup::escape;
+use super::plot::Plot;
+use super::table::{Column, Table};
+
+const STYLE: &str = include_str!("style.css");
+
+/// A report on a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// What was studied.
+    pub title: String,
+    /// Paragraphs before the first section.
+    pub introduction: Vec<String>,
+    /// In the order of reading.
+    pub sections: Vec<Section>,
+    /// Where the numbers come from.
+    pub provenance: Provenance,
+}
+
+/// A part of a report under one heading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Section {
+    /// The heading.
+    pub heading: String,
+    /// In the order of reading.
+    pub blocks: Vec<Block>,
+}
+
+/// A part of a section.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Block {
+    /// Plain text.
+    Paragraph(String),
+    /// A table, which is also the file `<name>.csv` beside the page.
+    Table {
+        /// The file's name without its extension.
+        name: String,
+        /// The table.
+        table: Table,
+    },
+    /// A plot, which is also the file `<name>.svg` beside the page.
+    Plot {
+        /// The file's name without its extension.
+        name: String,
+        /// The plot.
+        plot: Plot,
+    },
+}
+
+/// Where a report's numbers come from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Provenance {
+    /// The program and its version.
+    pub version: String,
+    /// When the study was made.
+    pub date: String,
+    /// The processor and the operating system.
+    pub host: String,
+    /// What was typed.
+    pub command_line: String,
+    /// Every setting and its value.
+    pub settings: Vec<(String, String)>,
+}
+
+impl Report {
+    /// The report as one HTML page that needs nothing else, but links to the tables and plots beside it. It is also
+    /// well-formed XML.
+    pub fn to_html(&self) -> String {
+        let title = escape(&self.title);
+        let mut html = format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>{title}</title>\n\
+             <style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n"
+        );
+        for text in &self.introduction {
+            html += &paragraph(text);
+        }
+        for section in &self.sections {
+            let _ = write!(html, "<section>\n<h2>{}</h2>\n", escape(&section.heading));
+            for block in &section.blocks {
+                html += &block.to_html();
+            }
+            html += "</section>\n";
+        }
+        html += &self.provenance.to_html();
+        html + "</main>\n</body>\n</html>\n"
+    }
+}
+
+impl Block {
+    /// The name of the file beside the page and what is in it, if there is one.
+    pub(super) fn file(&self) -> Option<(String, String)> {
+        match self {
+            Self::Paragraph(_) => None,
+            Self::Table { name, table } => Some((format!("{name}.csv"), table.to_csv())),
+            Self::Plot { name, plot } => Some((format!("{name}.svg"), plot.to_svg())),
+        }
+    }
+
+    fn to_html(&self) -> String {
+        match self {
+            Self::Paragraph(text) => paragraph(text),
+            Self::Table { name, table } => {
+                let caption = format!("<strong>{}</strong> {}", escape(table.title()), link(name, "csv"));
+                format!(
+                    "<figure>\n<figcaption>{caption}</figcaption>\n{}</figure>\n",
+                    scrolling("table", table.title(), &table.to_html())
+                )
+            }
+            Self::Plot { name, plot } => {
+                let caption = format!("{} {}", escape(&plot.caption), link(name, "svg"));
+                format!(
+                    "<figure>\n{}<figcaption>{caption}</figcaption>\n</figure>\n",
+                    scrolling("plot", &plot.title, &sized(plot))
+                )
+            }
+        }
+    }
+}
+
+impl Provenance {
+    fn to_html(&self) -> String {
+        let mut html = "<section>\n<h2>Provenance</h2>\n<dl>\n".to_owned();
+        for (term, text) in [("Program", &self.version), ("Date", &self.date), ("Host", &self.host)] {
+            let _ = writeln!(html, "<dt>{term}</dt><dd>{}</dd>", escape(text));
+        }
+        let command = format!("<pre><code>{}</code></pre>\n", escape(&self.command_line));
+        let _ = writeln!(
+            html,
+            "<dt>Command line</dt><dd>{}</dd>\n</dl>",
+            scrolling("", "Command line", &command)
+        );
+        if !self.settings.is_empty() {
+            let mut settings =
+                Table::new("Settings", vec![Column::new("setting", ""), Column::new("value", "")]);
+            for (name, value) in &self.settings {
+                settings.push(vec![name.as_str().into(), value.as_str().into()]);
+            }
+            html += &scrolling("table", settings.title(), &settings.to_html());
+        }
+        html + "</section>\n"
+    }
+}
+
+fn paragraph(text: &str) -> String {
+    format!("<p>{}</p>\n", escape(text))
+}
+
+fn link(name: &str, extension: &str) -> String {
+    let file = escape(&format!("{name}.{extension}"));
+    format!("<a href=\"{file}\" download=\"{file}\">{file}</a>")
+}
+
+/// A plot that shrinks with the page, though never so far that its text becomes too small to read.
+fn sized(plot: &Plot) -> String {
+    format!("<div style=\"--panels: {}\">\n{}</div>\n", plot.panels.len().max(1), plot.to_svg())
+}
+
+/// Content in a box of its own, which scrolls where the content is wider than the page.
+fn scrolling(class: &str, label: &str, content: &str) -> String {
+    format!(
+        "<div class=\"scroll {class}\" role=\"region\" aria-label=\"{}\" tabindex=\"0\">\n{content}</div>\n",
+        escape(label)
+    )
+}

@@ -1,0 +1,29 @@
+//! Names of files that the caller chooses.
+
+/// Longest name in bytes; an extension and a hash still fit into what file systems take.
+const LONGEST: usize = 100;
+
+/// Whether `name` is a file's name on every system: letters, digits, `-` and `.`, not starting or ending with a dot.
+pub(in crate::study) fn is_portable(name: &str) -> bool {
+    let is_allowed = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'.';
+    (1..=LONGEST).contains(&name.len())
+        && name.bytes().all(is_allowed)
+        && !name.starts_with('.')
+        && !name.ends_with('.')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_plain_names_are_portable() {
+        for name in ["figure-6.17", "a", "Table-7.1"] {
+            assert!(is_portable(name), "{name}");
+        }
+        let long = "a".repeat(LONGEST + 1);
+        for name in ["", ".", "..", ".hidden", "a.", "a/b", "a\\b", "a b", "ä", "a:b", long.as_str()] {
+            assert!(!is_portable(name), "{name}");
+        }
+    }
+}

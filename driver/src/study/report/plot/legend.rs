@@ -1,0 +1,75 @@
+//! The legend, below the panels: it never covers data.
+
+use super::style::Style;
+use super::svg::{self, Anchor};
+use super::text;
+
+/// Width of the sample of a line, and of the gap between it and the name, in pixels.
+const SAMPLE: f64 = 46.0;
+const GAP: f64 = 8.0;
+/// The space between columns, and above and below the legend, in pixels.
+const COLUMN_GAP: f64 = 22.0;
+const PADDING: f64 = 8.0;
+/// The least distance of rows, in pixels.
+const ROW: f64 = 20.0;
+
+/// Samples and names in columns of one width.
+pub(super) struct Legend {
+    /// Index and wrapped name of each series with a name.
+    entries: Vec<(usize, Vec<String>)>,
+    columns: usize,
+    column_width: f64,
+}
+
+impl Legend {
+    /// Lays the named among the series out within `room` pixels.
+    pub(super) fn new(names: &[&str], room: f64) -> Self {
+        let name_room = room - SAMPLE - GAP;
+        let entries: Vec<_> = names
+            .iter()
+            .enumerate()
+            .map(|(index, name)| (index, text::wrap(name, text::LABEL, name_room)))
+            .filter(|(_, lines)| !lines.is_empty())
+            .collect();
+        let lines = entries.iter().flat_map(|(_, lines)| lines);
+        let widest = lines.map(|line| text::width(line, text::LABEL)).fold(0.0, f64::max);
+        let column_width = SAMPLE + GAP + widest;
+        let columns = ((room + COLUMN_GAP) / (column_width + COLUMN_GAP)).floor().max(1.0) as usize;
+        Self { entries, columns, column_width }
+    }
+
+    /// In pixels.
+    pub(super) fn height(&self) -> f64 {
+        let padding = if self.entries.is_empty() { 0.0 } else { 2.0 * PADDING };
+        self.rows().map(row_height).sum::<f64>() + padding
+    }
+
+    /// The legend with its upper left corner there.
+    pub(super) fn draw(&self, [left, top]: [f64; 2]) -> String {
+        let mut drawn = String::new();
+        let mut row_top = top + PADDING;
+        for row in self.rows() {
+            for (column, (index, lines)) in row.iter().enumerate() {
+                let x = left + column as f64 * (self.column_width + COLUMN_GAP);
+                let style = Style::of(*index);
+                let y = row_top + 0.62 * text::LABEL;
+                drawn += "<g class=\"legend\">\n";
+                drawn += &style.line(&[[x, y], [x + SAMPLE, y]], 1.75);
+                drawn += &style.marker(x + 0.5 * SAMPLE, y);
+                drawn += &svg::lines("name", lines, [x + SAMPLE + GAP, row_top], text::LABEL, Anchor::Start);
+                drawn += "</g>\n";
+            }
+            row_top += row_height(row);
+        }
+        drawn
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &[(usize, Vec<String>)]> {
+        self.entries.chunks(self.columns)
+    }
+}
+
+fn row_height(row: &[(usize, Vec<String>)]) -> f64 {
+    let lines = row.iter().map(|(_, lines)| lines.len()).max().unwrap_or(0);
+    (text::height(lines, text::LABEL) + 3.0).max(ROW)
+}

@@ -1,0 +1,320 @@
+//! Tables, written for programs as CSV and for people as HTML.
+
+use std::fmt::Write;
+
+use super::markup::escape;
+use super::number;
+
+/// Significant digits of a measured value, and of its half-width, for people.
+const DIGITS: usize = 4;
+const HALF_WIDTH_DIGITS: usize = 2;
+
+/// A titled table with one unit a column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    title: String,
+    columns: Vec<Column>,
+    rows: Vec<Vec<Cell>>,
+}
+
+/// The head of a column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// What the column holds.
+    pub name: String,
+    /// Its unit; empty where there is none.
+    pub unit: String,
+}
+
+/// One entry of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// Nothing was measured.
+    Empty,
+    /// Words.
+    Text(String),
+    /// A count or a setting, shown with all its digits.
+    Integer(i128),
+    /// A measured value, shown with four significant digits.
+    Real {
+        /// The value in the column's unit.
+        value: f64,
+        /// Half the width of its confidence interval, in the column's unit.
+        half_width: Option<f64>,
+    },
+}
+
+impl Column {
+    /// A column of that name and unit.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { name: name.into(), unit: unit.into() }
+    }
+}
+
+impl Cell {
+    /// A measured value and half the width of its confidence interval, both in the column's unit.
+    pub fn interval(value: f64, half_width: f64) -> Self {
+        Self::Real { value, half_width: Some(half_width) }
+    }
+
+    fn half_width(&self) -> Option<f64> {
+        match self {
+            Self::Real { half_width, .. } => *half_width,
+            _ => None,
+        }
+    }
+
+    fn is_text(&self) -> bool {
+        matches!(self, Self::Text(_))
+    }
+
+    fn csv(&self) -> String {
+        match self {
+            Self::Empty => String::new(),
+            Self::Text(text) => text.clone(),
+            Self::Integer(value) => value.to_string(),
+            Self::Real { value, .. } => number::full(*value),
+        }
+    }
+
+    fn html(&self) -> String {
+        match self {
+            Self::Empty => String::new(),
+            Self::Text(text) => escape(text),
+            Self::Integer(value) => number::grouped(&value.to_string()),
+            Self::Real { value, half_width: None } => number::human(*value, DIGITS),
+            Self::Real { value, half_width: Some(half_width) } => {
+                let half_width = number::human(*half_width, HALF_WIDTH_DIGITS);
+                format!("{} ± {half_width}", number::human(*value, DIGITS))
+            }
+        }
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<f64> for Cell {
+    fn from(value: f64) -> Self {
+        Self::Real { value, half_width: None }
+    }
+}
+
+macro_rules! from_integer {
+    ($($integer:ty),*) => {$(
+        impl From<$integer> for Cell {
+            fn from(value: $integer) -> Self {
+                Self::Integer(value as i128)
+            }
+        }
+    )*};
+}
+
+from_integer!(u8, u16, u32, u64, usize, i32, i64);
+
+impl<T: Into<Cell>> From<Option<T>> for Cell {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::Empty, Into::into)
+    }
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new(title: impl Into<String>, columns: Vec<Column>) -> Self {
+        Self { title: title.into(), columns, rows: Vec::new() }
+    }
+
+    /// Adds a row below the others.
+    ///
+    /// # Panics
+    /// If it has not one cell for every column.
+    pub fn push(&mut self, row: Vec<Cell>) {
+        assert_eq!(row.len(), self.columns.len(), "a row of the table '{}'", self.title);
+        self.rows.push(row);
+    }
+
+    /// The title.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// The columns' heads, from left to right.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// The rows, from top to bottom; each has as many cells as there are columns.
+    pub fn rows(&self) -> &[Vec<Cell>] {
+        &self.rows
+    }
+
+    /// The table as RFC 4180 has it, with a header `name (unit)` and numbers in full precision.
+    ///
+    /// A column with half-widths is followed by one of its half-widths. Values that are not finite are written `NaN`,
+    /// `inf` and `-inf`.
+    pub fn to_csv(&self) -> String {
+        let with_half_width: Vec<bool> =
+            (0..self.columns.len()).map(|column| self.has_half_width(column)).collect();
+        let mut header = Vec::new();
+        for (column, with_half_width) in self.columns.iter().zip(&with_half_width) {
+            let unit = if column.unit.is_empty() { String::new() } else { format!(" ({})", column.unit) };
+            header.push(format!("{}{unit}", column.name));
+            if *with_half_width {
+                header.push(format!("{} half-width{unit}", column.name));
+            }
+        }
+        let mut csv = csv_record(&header);
+        for row in &self.rows {
+            let mut record = Vec::new();
+            for (cell, with_half_width) in row.iter().zip(&with_half_width) {
+                record.push(cell.csv());
+                if *with_half_width {
+                    record.push(cell.half_width().map_or_else(String::new, number::full));
+                }
+            }
+            csv.push_str(&csv_record(&record));
+        }
+        csv
+    }
+
+    /// The table as an HTML element `table`, without its title: integers whole, other numbers with four significant
+    /// digits.
+    pub fn to_html(&self) -> String {
+        let mut html = "<table>\n<thead><tr>".to_owned();
+        for (index, column) in self.columns.iter().enumerate() {
+            let unit = match column.unit.as_str() {
+                "" => String::new(),
+                unit => format!(" <span class=\"unit\">({})</span>", escape(unit)),
+            };
+            let class = class(self.is_numeric(index));
+            let _ = write!(html, "<th scope=\"col\"{class}>{}{unit}</th>", escape(&column.name));
+        }
+        html.push_str("</tr></thead>\n<tbody>\n");
+        for row in &self.rows {
+            html.push_str("<tr>");
+            for cell in row {
+                let _ = write!(html, "<td{}>{}</td>", class(!cell.is_text()), cell.html());
+            }
+            html.push_str("</tr>\n");
+        }
+        html.push_str("</tbody>\n</table>\n");
+        html
+    }
+
+    fn has_half_width(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| row[column].half_width().is_some())
+    }
+
+    fn is_numeric(&self, column: usize) -> bool {
+        !self.rows.is_empty() && self.rows.iter().all(|row| !row[column].is_text())
+    }
+}
+
+fn class(is_number: bool) -> &'static str {
+    if is_number { " class=\"number\"" } else { "" }
+}
+
+fn csv_record(fields: &[String]) -> String {
+    let quote = |field: &String| {
+        let is_plain = !field.contains(['"', ',', '\r', '\n']) && field.trim() == field;
+        if is_plain { field.clone() } else { format!("\"{}\"", field.replace('"', "\"\"")) }
+    };
+    // A record of one empty field would be an empty line, which readers skip.
+    if let [field] = fields
+        && field.is_empty()
+    {
+        return "\"\"\r\n".to_owned();
+    }
+    fields.iter().map(quote).collect::<Vec<_>>().join(",") + "\r\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::markup::reader;
+    use super::*;
+
+    /// Reads RFC 4180.
+    fn parse(csv: &str) -> Vec<Vec<String>> {
+        let (mut records, mut record, mut field) = (Vec::new(), Vec::new(), String::new());
+        let mut characters = csv.chars().peekable();
+        let mut is_quoted = false;
+        while let Some(character) = characters.next() {
+            match character {
+                '"' if is_quoted && characters.peek() == Some(&'"') => field.extend(characters.next()),
+                '"' => is_quoted = !is_quoted,
+                ',' if !is_quoted => record.push(std::mem::take(&mut field)),
+                '\r' if !is_quoted => {
+                    assert_eq!(characters.next(), Some('\n'));
+                    record.push(std::mem::take(&mut field));
+                    records.push(std::mem::take(&mut record));
+                }
+                _ => field.push(character),
+            }
+        }
+        assert!(!is_quoted && record.is_empty() && field.is_empty());
+        records
+    }
+
+    fn nasty() -> Table {
+        let mut table = Table::new(
+            "Nasty",
+            vec![Column::new("name, \"quoted\"", ""), Column::new("traffic", "GB/s"), Column::new("n", "")],
+        );
+        table.push(vec![
+            "a\r\nb \"c\", <d> & 'e'".into(),
+            Cell::interval(1.0 / 3.0, 0.0125),
+            12_345_678_u64.into(),
+        ]);
+        table.push(vec![" padded ".into(), f64::NAN.into(), (-7_i64).into()]);
+        table.push(vec![Cell::Empty, 1234.5678.into(), Cell::Empty]);
+        table
+    }
+
+    #[test]
+    fn csv_reads_back_what_was_written() {
+        let records = parse(&nasty().to_csv());
+        assert_eq!(records[0], ["name, \"quoted\"", "traffic (GB/s)", "traffic half-width (GB/s)", "n"]);
+        assert_eq!(records[1][0], "a\r\nb \"c\", <d> & 'e'");
+        assert_eq!(records[1][1].parse::<f64>().unwrap(), 1.0 / 3.0);
+        assert_eq!(records[1][2..], ["0.0125", "12345678"]);
+        assert_eq!(records[2], [" padded ", "NaN", "", "-7"]);
+        assert_eq!(records[3], ["", "1234.5678", "", ""]);
+        assert_eq!(records.len(), 4);
+    }
+
+    #[test]
+    fn a_single_empty_cell_is_still_a_record() {
+        let mut table = Table::new("", vec![Column::new("only", "")]);
+        table.push(vec![Cell::Empty]);
+        assert_eq!(parse(&table.to_csv()), [["only"], [""]]);
+    }
+
+    #[test]
+    fn html_shows_rounded_numbers_with_units_and_escapes_words() {
+        let html = nasty().to_html();
+        let elements = reader::elements(&html);
+        let cells: Vec<_> = elements.iter().filter(|element| element.tag == "td").collect();
+        assert_eq!(cells[0].text, "a\r\nb \"c\", <d> & 'e'");
+        assert_eq!((cells[1].text.as_str(), cells[1].get("class")), ("0.3333 ± 0.013", Some("number")));
+        assert_eq!(cells[2].text, "12,345,678");
+        assert_eq!(cells[4].text, "n/a");
+        assert_eq!(cells[5].text, "−7");
+        assert_eq!(cells[7].text, "1,235");
+        assert!(html.contains("traffic <span class=\"unit\">(GB/s)</span>"));
+    }
+
+    #[test]
+    #[should_panic(expected = "a row of the table 'Nasty'")]
+    fn a_row_has_a_cell_for_every_column() {
+        nasty().push(vec![Cell::Empty]);
+    }
+}
