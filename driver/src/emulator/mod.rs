@@ -1,5 +1,7 @@
 //! Emulated cards: the firmware on threads of this process, one chip a thread, each on a loopback link.
 
+pub mod direct;
+pub mod memory_model;
 pub mod whole_frame;
 
 use std::ops::Range;

@@ -7,18 +7,19 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
-use photoncard_firmware::chip::{PixelSum, Progress, ReferenceChip};
+use photoncard_firmware::chip::{PixelSum, ReferenceChip};
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::Candidate;
 use photoncard_firmware::render::final_gather::gathered;
 use photoncard_firmware::render::{Context, GatherOutlet};
-use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::budget::{REFERENCE, gather_candidates};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Fault, FaultCode, FrameParameters, Tile};
+use photoncard_shared::message::{Fault, FrameParameters, Tile};
 use rayon::prelude::*;
 
+use super::direct::{RenderedTile, render_tile};
+use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::film::{Film, FilmError};
 use crate::pack::CardImage;
 
@@ -28,6 +29,8 @@ const MOST_GATHERS: u64 = 1 << 27;
 const GATHERS_PER_CAST: u64 = 1 << 21;
 /// Gathers that one task does.
 const GATHERS_PER_TASK: usize = 4096;
+/// The same where memory is modelled: empty caches at the beginning of each hardly count.
+const GATHERS_PER_COUNTED_TASK: usize = 1 << 22;
 /// Gathers that are done before the host looks around.
 const GATHERS_PER_ROUND: usize = 256 * GATHERS_PER_TASK;
 /// Stack of a chip's thread: its buffers are built there before they move to the heap.
@@ -74,18 +77,17 @@ struct Waiting {
 }
 
 /// The sums of a frame's pixels, tile after tile, and the gathers that are still to be added.
-#[derive(Default)]
 struct Frame {
     sums: Vec<PixelSum>,
     waiting: Vec<Waiting>,
     counters: Counters,
+    traffic: MemoryTraffic,
 }
 
 /// What one tile leaves to the host.
 struct CastTile {
-    sums: Vec<PixelSum>,
+    tile: RenderedTile,
     waiting: Vec<(u32, GatherRequest)>,
-    counters: Counters,
 }
 
 /// Takes the gathers of a chip.
@@ -97,19 +99,54 @@ impl GatherOutlet for Outlet {
     }
 }
 
-/// Renders tiles into a film on so many emulated reference chips. `progress` is told how many tiles' worth of the work is
-/// done, of how many, and says whether to go on.
+/// A frame along the curve: what to render, and on what.
+#[derive(Clone, Copy)]
+pub struct CurveJob<'a> {
+    /// The card image.
+    pub image: &'a CardImage,
+    /// The frame's parameters.
+    pub frame: &'a FrameParameters,
+    /// The tiles whose rays are cast, one after the other.
+    pub tiles: &'a [Tile],
+    /// Emulated reference chips.
+    pub chips: usize,
+}
+
+/// What a frame took.
+pub struct CurveOutcome {
+    /// What was counted.
+    pub counters: Counters,
+    /// What was read, if the memory is modelled: caches are empty when a tile begins, and at every 2^22-th gather.
+    pub traffic: MemoryTraffic,
+}
+
+/// Renders tiles into a film. `progress` is told how many tiles' worth of the work is done, of how many, and says whether
+/// to go on. With `caches` memory is modelled.
 ///
 /// # Errors
 /// If the frame has too many gathers, the image is not sound, or `progress` says no.
 pub fn render_along_curve(
-    image: &CardImage,
-    frame: &FrameParameters,
-    tiles: &[Tile],
-    chips: usize,
+    job: CurveJob,
+    caches: Option<&CacheSettings>,
     film: &mut Film,
     progress: &(dyn Fn(u64, u64) -> bool + Sync),
-) -> Result<Counters, FrameError> {
+) -> Result<CurveOutcome, FrameError> {
+    match caches {
+        None => render_with(job, GATHERS_PER_TASK, &|memory| memory, film, progress),
+        Some(caches) => {
+            render_with(job, GATHERS_PER_COUNTED_TASK, &|memory| caches.over(memory), film, progress)
+        }
+    }
+}
+
+fn render_with<'a, M: MeasuredMemory>(
+    job: CurveJob<'a>,
+    gathers_per_task: usize,
+    model: &(impl Fn(Lines<'a>) -> M + Sync),
+    film: &mut Film,
+    progress: &(dyn Fn(u64, u64) -> bool + Sync),
+) -> Result<CurveOutcome, FrameError> {
+    let CurveJob { image, frame, tiles, chips } = job;
     let mut all = Frame::with_room_for(frame, tiles)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(chips).stack_size(THREAD_STACK).build()?;
     // Casting a tile counts as a tenth of it, doing its gathers as the rest.
@@ -119,15 +156,21 @@ pub fn render_along_curve(
     let gathers_of_tile = rays_of_pixel(frame) * tiles.iter().map(Tile::pixels).max().unwrap_or(1);
     let tiles_per_round = (GATHERS_PER_CAST / gathers_of_tile.max(1)).max(2 * chips as u64) as usize;
     for tiles in tiles.chunks(tiles_per_round) {
-        all.add(pool.install(|| cast_tiles(image, frame, tiles, &go_on))?)?;
+        all.add(pool.install(|| cast_tiles(job, model, tiles, &go_on))?)?;
     }
     pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.key));
     let mut done = 0;
-    for waiting in all.waiting.chunks(GATHERS_PER_ROUND) {
-        let (brought, counters) = pool.install(|| do_gathers(image, frame, waiting))?;
-        all.counters.add(&counters);
-        for (sum, brought) in brought {
-            all.sums[sum as usize].add_gathered(brought);
+    for waiting in all.waiting.chunks(GATHERS_PER_ROUND.max(chips * gathers_per_task)) {
+        let parts: Result<Vec<_>, Fault> = pool.install(|| {
+            let task = |waiting: &[Waiting]| do_gathers(job, model, waiting);
+            waiting.par_chunks(gathers_per_task).map(task).collect()
+        });
+        for Gathered { brought, counters, traffic } in parts? {
+            all.counters.add(&counters);
+            all.traffic.add(&traffic);
+            for (sum, brought) in brought {
+                all.sums[sum as usize].add_gathered(brought);
+            }
         }
         done += waiting.len() as u64;
         if !progress(total / 10 + (total - total / 10) * done / all.waiting.len() as u64, total) {
@@ -141,7 +184,7 @@ pub fn render_along_curve(
     for (sum, (x, y)) in all.sums.iter().zip(places) {
         film.write(x, y, sum.pixel(&scene, frame))?;
     }
-    Ok(all.counters)
+    Ok(CurveOutcome { counters: all.counters, traffic: all.traffic })
 }
 
 /// The gather rays of one pixel; with the irradiance cache about.
@@ -161,7 +204,12 @@ impl Frame {
         if gathers > MOST_GATHERS || pixels > u32::MAX as u64 {
             return Err(too_many());
         }
-        let mut all = Self::default();
+        let mut all = Self {
+            sums: Vec::new(),
+            waiting: Vec::new(),
+            counters: Counters::ZERO,
+            traffic: MemoryTraffic::ZERO,
+        };
         all.sums.try_reserve_exact(pixels as usize).map_err(|_| too_many())?;
         all.waiting.try_reserve_exact(gathers as usize).map_err(|_| too_many())?;
         Ok(all)
@@ -169,18 +217,18 @@ impl Frame {
 
     /// Takes over what tiles leave. Only lobes beside an irradiance cache can be more than there was room made for.
     fn add(&mut self, tiles: Vec<CastTile>) -> Result<(), FrameError> {
-        for tile in tiles {
-            let gathers = (self.waiting.len() + tile.waiting.len()) as u64;
+        for CastTile { tile, waiting } in tiles {
+            let gathers = (self.waiting.len() + waiting.len()) as u64;
             let too_many = || FrameError::TooManyGathers { gathers };
             if gathers > MOST_GATHERS {
                 return Err(too_many());
             }
-            self.waiting.try_reserve(tile.waiting.len()).map_err(|_| too_many())?;
+            self.waiting.try_reserve(waiting.len()).map_err(|_| too_many())?;
             let first = self.sums.len() as u32;
             self.sums.extend(tile.sums);
             self.counters.add(&tile.counters);
-            let waiting = tile.waiting.into_iter();
-            self.waiting.extend(waiting.map(|(key, request)| Waiting {
+            self.traffic.add(&tile.traffic);
+            self.waiting.extend(waiting.into_iter().map(|(key, request)| Waiting {
                 key,
                 sum: first + request.target as u32,
                 request,
@@ -190,9 +238,9 @@ impl Frame {
     }
 }
 
-fn cast_tiles(
-    image: &CardImage,
-    frame: &FrameParameters,
+fn cast_tiles<'a, M: MeasuredMemory>(
+    job: CurveJob<'a>,
+    model: &(impl Fn(Lines<'a>) -> M + Sync),
     tiles: &[Tile],
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<CastTile>, FrameError> {
@@ -201,61 +249,41 @@ fn cast_tiles(
         if !go_on() {
             return Err(FrameError::Stopped);
         }
-        Ok(cast(chip, image.view(), frame, tile)?)
+        let mut outlet = Outlet(Vec::new());
+        let (scene, memory) = job.image.view();
+        let tile = render_tile(chip, &scene, model(memory), job.frame, tile, Some(&mut outlet))?;
+        Ok(CastTile { tile, waiting: outlet.0 })
     };
     tiles.par_iter().map_init(new_chip, cast_one).collect()
 }
 
-/// Casts all rays of a tile.
-fn cast(
-    chip: &mut ReferenceChip,
-    (scene, mut memory): (SceneImage, Lines),
-    frame: &FrameParameters,
-    tile: Tile,
-) -> Result<CastTile, Fault> {
+/// What came of some gathers.
+struct Gathered {
+    /// Index of the sum, and what is added there.
+    brought: Vec<(u32, Vec3)>,
+    counters: Counters,
+    traffic: MemoryTraffic,
+}
+
+fn do_gathers<'a, M: MeasuredMemory>(
+    job: CurveJob<'a>,
+    model: &impl Fn(Lines<'a>) -> M,
+    waiting: &[Waiting],
+) -> Result<Gathered, Fault> {
+    let (scene, memory) = job.image.view();
+    let mut memory = model(memory);
     let mut counters = Counters::ZERO;
-    let mut outlet = Outlet(Vec::new());
     let mut context = Context {
         scene: &scene,
         memory: &mut memory,
-        frame,
+        frame: job.frame,
         counters: &mut counters,
-        outlet: Some(&mut outlet),
+        outlet: None,
     };
-    chip.begin_frame(&mut context)?;
-    if !chip.begin(context.memory, tile) {
-        return Err(Fault { code: FaultCode::Tile, detail: tile.id });
+    let mut candidates = heapless::Vec::<Candidate, { gather_candidates(REFERENCE.neighbors) }>::new();
+    let mut brought = Vec::with_capacity(waiting.len());
+    for Waiting { sum, request, .. } in waiting {
+        brought.push((*sum, gathered(&mut context, request, &mut candidates)?));
     }
-    while chip.step(&mut context)? == Progress::Busy {}
-    let sums = (0..tile.pixels() as usize).map_while(|index| chip.sum(index).copied()).collect();
-    Ok(CastTile { sums, waiting: outlet.0, counters })
-}
-
-/// What came of some gathers: index of the sum, and what is added there.
-type Brought = Vec<(u32, Vec3)>;
-
-fn do_gathers(
-    image: &CardImage,
-    frame: &FrameParameters,
-    waiting: &[Waiting],
-) -> Result<(Brought, Counters), Fault> {
-    let task = |waiting: &[Waiting]| -> Result<(Brought, Counters), Fault> {
-        let (scene, mut memory) = image.view();
-        let mut counters = Counters::ZERO;
-        let mut context =
-            Context { scene: &scene, memory: &mut memory, frame, counters: &mut counters, outlet: None };
-        let mut candidates = heapless::Vec::<Candidate, { gather_candidates(REFERENCE.neighbors) }>::new();
-        let mut brought = Vec::with_capacity(waiting.len());
-        for Waiting { sum, request, .. } in waiting {
-            brought.push((*sum, gathered(&mut context, request, &mut candidates)?));
-        }
-        Ok((brought, counters))
-    };
-    let parts: Result<Vec<_>, Fault> = waiting.par_chunks(GATHERS_PER_TASK).map(task).collect();
-    let mut all = (Brought::with_capacity(waiting.len()), Counters::ZERO);
-    for (brought, counters) in parts? {
-        all.0.extend(brought);
-        all.1.add(&counters);
-    }
-    Ok(all)
+    Ok(Gathered { brought, counters, traffic: memory.traffic() })
 }

@@ -22,7 +22,7 @@ use photoncard_shared::message::FrameParameters;
 
 use self::cards::{Cards, Outcome};
 use crate::emitter::Emitters;
-use crate::emulator::whole_frame::render_along_curve;
+use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 use crate::film::Film;
 use crate::pack::PackedScene;
 use crate::photon::{MappedImage, map_photons};
@@ -128,7 +128,8 @@ fn render_whole_frame(
         !observer.is_stopped()
     };
     let begun = Instant::now();
-    let counters = render_along_curve(&prepared.image, &frame, &tiles, chips, &mut film, &progress)?;
+    let job = CurveJob { image: &prepared.image, frame: &frame, tiles: &tiles, chips };
+    let CurveOutcome { counters, .. } = render_along_curve(job, None, &mut film, &progress)?;
     times.render = begun.elapsed().as_secs_f64();
     times.total = start.elapsed().as_secs_f64();
     let outcome = Outcome { counters, cards: chips, render_seconds: times.render, ..Outcome::default() };

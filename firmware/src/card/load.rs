@@ -6,7 +6,7 @@ use photoncard_shared::image::{Header, HeaderError};
 use photoncard_shared::message::{Fault, FaultCode};
 
 use super::OUT_OF_ORDER;
-use crate::memory::{CardMemory, MemoryPort};
+use crate::memory::{CardMemory, MemoryPort, Stage};
 use crate::scene::SceneImage;
 
 /// The image in memory.
@@ -83,6 +83,7 @@ impl Loader {
         if found != self.expected {
             return Err(Fault { code: FaultCode::ImageChecksum, detail: found });
         }
+        memory.enter(Stage::Begin);
         let line = memory.read(Structure::Header, LineAddress(0), 0..LINE_BYTES as u32)?;
         let unsound = |detail: u32| Fault { code: FaultCode::ImageHeader, detail };
         let header = Header::read(line).map_err(|error| match error {

@@ -23,7 +23,7 @@ use self::position::{Block, Position, Stage};
 use crate::gather::{GatherQueue, KeyScale};
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
-use crate::memory::MemoryPort;
+use crate::memory::{MemoryPort, Stage as MemoryStage};
 use crate::render::{Context, GatherPoint, PixelSample};
 
 /// The chip of [`REFERENCE`].
@@ -111,6 +111,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
     /// # Errors
     /// If the image is not sound.
     pub fn begin_frame<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+        context.memory.enter(MemoryStage::Begin);
         let root = context.scene.record::<LINE_BYTES, 1>(context.memory, SectionKind::Nodes, 0)?;
         self.gathers.set_scale(KeyScale::new(&BvhNode::read(root)));
         Ok(())

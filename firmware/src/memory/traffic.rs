@@ -83,12 +83,14 @@ impl Traffic {
         self.reads[stage as usize][structure as usize]
     }
 
-    /// The reads of some structures in all stages.
-    pub fn of(&self, chosen: impl Fn(Structure) -> bool) -> Reads {
+    /// The reads of some structures in all stages of tiles: in all but [`Stage::Begin`], which every chip goes through and
+    /// not every tile.
+    pub fn of_tiles(&self, chosen: impl Fn(Structure) -> bool) -> Reads {
         let mut sum = Reads::ZERO;
-        for row in &self.reads {
-            let pairs = Structure::ALL.into_iter().zip(row);
-            pairs.filter(|&(structure, _)| chosen(structure)).for_each(|(_, reads)| sum.add(reads));
+        let stages = Stage::ALL.into_iter().filter(|&stage| stage != Stage::Begin);
+        for stage in stages {
+            let structures = Structure::ALL.into_iter().filter(|&structure| chosen(structure));
+            structures.for_each(|structure| sum.add(&self.reads(stage, structure)));
         }
         sum
     }

@@ -1,0 +1,287 @@
+//! A model of a chip's memory: its caches, and what is counted above and below them.
+
+use std::fmt;
+use std::str::FromStr;
+
+use photoncard_firmware::memory::{
+    CacheEntry, CacheShape, Counted, LineCache, LineCaches, Lines, MemoryPort, Reads, SetIndex, ShapeError,
+    Traffic,
+};
+use photoncard_shared::address::{LINE_BYTES, Line, Structure};
+
+/// The caches between a chip and its DRAM: an argument of `--cache`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CacheSettings {
+    /// One for the photon map and one for the scene.
+    Split {
+        /// Of the photon map.
+        photon: CacheSpec,
+        /// Of the scene.
+        scene: CacheSpec,
+    },
+    /// One for both.
+    Unified(CacheSpec),
+}
+
+/// The shape of a cache, as it is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CacheSpec {
+    /// Bytes it holds.
+    pub bytes: u32,
+    /// Bytes of one of its lines.
+    pub line_bytes: u32,
+    /// Lines of a set.
+    pub ways: u32,
+    /// How a line finds its set.
+    pub index: SetIndex,
+}
+
+impl CacheSpec {
+    /// The dissertation's cache of the photon map: 128 KB in lines of 128 bytes (section 6.5); 4 ways are our choice.
+    pub const PHOTON: Self = Self { bytes: 128 << 10, line_bytes: 128, ways: 4, index: SetIndex::Modulo };
+    /// Its ray caster's: 75 KB (section 7.3.2).
+    pub const SCENE: Self = Self { bytes: 75 << 10, ..Self::PHOTON };
+
+    fn shape(&self) -> Result<CacheShape, ShapeError> {
+        CacheShape::new(self.bytes, self.line_bytes, self.ways, self.index)
+    }
+
+    fn cache(&self) -> LineCache<Vec<CacheEntry>, Vec<Line>> {
+        // `FromStr` and the constants make no other.
+        let shape = self.shape().unwrap_or_else(|error| unreachable!("{self}: {error:?}"));
+        let entries = vec![CacheEntry::EMPTY; shape.entries()];
+        let lines = vec![Line::ZERO; shape.lines()];
+        LineCache::new(shape, entries, lines).unwrap_or_else(|| unreachable!("buffers of the shape's size"))
+    }
+}
+
+impl Default for CacheSettings {
+    fn default() -> Self {
+        Self::Split { photon: CacheSpec::PHOTON, scene: CacheSpec::SCENE }
+    }
+}
+
+impl fmt::Display for CacheSpec {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.bytes.is_multiple_of(1 << 10) {
+            write!(f, "{}K", self.bytes >> 10)?;
+        } else {
+            write!(f, "{}", self.bytes)?;
+        }
+        write!(f, "/{}/{}", self.line_bytes, self.ways)
+    }
+}
+
+impl fmt::Display for CacheSettings {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let index = match self {
+            Self::Split { photon, scene } => {
+                write!(f, "photon={photon},scene={scene}")?;
+                photon.index
+            }
+            Self::Unified(cache) => {
+                write!(f, "unified={cache}")?;
+                cache.index
+            }
+        };
+        if index == SetIndex::Hashed { f.write_str(",index=hash") } else { Ok(()) }
+    }
+}
+
+impl FromStr for CacheSettings {
+    type Err = String;
+
+    /// `photon=128K/128/4,scene=75K/128/4,index=hash`, parts left out as they are by default, or `unified=256K/128/8`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut photon = None;
+        let mut scene = None;
+        let mut unified = None;
+        let mut index = None;
+        for part in text.split(',') {
+            let (name, value) = part.split_once('=').ok_or_else(|| usage(part))?;
+            let taken = match name {
+                "photon" => photon.replace(cache(value)?).is_some(),
+                "scene" => scene.replace(cache(value)?).is_some(),
+                "unified" => unified.replace(cache(value)?).is_some(),
+                "index" => index.replace(set_index(value)?).is_some(),
+                _ => return Err(usage(part)),
+            };
+            if taken {
+                return Err(format!("{name} is given twice"));
+            }
+        }
+        let index = index.unwrap_or_default();
+        let with_index = |spec: CacheSpec| CacheSpec { index, ..spec };
+        match unified {
+            Some(_) if photon.is_some() || scene.is_some() => Err(
+                "a unified cache is instead of those of the photon map and the scene; give one or the other"
+                    .into(),
+            ),
+            Some(unified) => Ok(Self::Unified(with_index(unified))),
+            None => Ok(Self::Split {
+                photon: with_index(photon.unwrap_or(CacheSpec::PHOTON)),
+                scene: with_index(scene.unwrap_or(CacheSpec::SCENE)),
+            }),
+        }
+    }
+}
+
+fn usage(part: &str) -> String {
+    format!(
+        "{part:?} is no part of a cache; use photon=SIZE/LINE/WAYS, scene=SIZE/LINE/WAYS or unified=SIZE/LINE/WAYS, and \
+         index=modulo or index=hash, such as photon=128K/128/4,scene=75K/128/4"
+    )
+}
+
+fn set_index(text: &str) -> Result<SetIndex, String> {
+    match text {
+        "modulo" => Ok(SetIndex::Modulo),
+        "hash" => Ok(SetIndex::Hashed),
+        _ => Err(format!("{text:?} is no index of sets; use modulo or hash")),
+    }
+}
+
+fn cache(text: &str) -> Result<CacheSpec, String> {
+    let parts: Vec<&str> = text.split('/').collect();
+    let &[size, line, ways] = parts.as_slice() else {
+        return Err(format!("{text:?} is no cache; use SIZE/LINE/WAYS, such as 128K/128/4"));
+    };
+    let number =
+        |text: &str| text.parse::<u32>().map_err(|_| format!("{text:?} is no number of bytes or ways"));
+    let bytes = match size.strip_suffix(['K', 'M']) {
+        Some(digits) => {
+            let shift = if size.ends_with('K') { 10 } else { 20 };
+            number(digits)?.checked_mul(1 << shift).ok_or_else(|| format!("{size} is too large"))?
+        }
+        None => number(size)?,
+    };
+    let spec = CacheSpec { bytes, line_bytes: number(line)?, ways: number(ways)?, index: SetIndex::Modulo };
+    match spec.shape() {
+        Ok(_) => Ok(spec),
+        Err(ShapeError::LineBytes) => Err(format!(
+            "a cache's line is {LINE_BYTES} bytes, as card memory's, or a multiple up to {}; {line} is none",
+            CacheShape::MOST_LINE_BYTES
+        )),
+        Err(ShapeError::Ways) => Err(format!("a cache of {text} has no {ways} ways; use 1 to all its lines")),
+        Err(ShapeError::Bytes) => Err(format!(
+            "{size} is no whole number of sets of {ways} lines of {line} bytes, or above {} bytes",
+            CacheShape::MOST_BYTES
+        )),
+    }
+}
+
+/// A memory behind caches, counted above and below them.
+pub type ModelledMemory<M> = Counted<LineCaches<Counted<M>, Vec<CacheEntry>, Vec<Line>>>;
+
+impl CacheSettings {
+    /// A memory behind these caches.
+    pub fn over<M: MemoryPort>(&self, memory: M) -> ModelledMemory<M> {
+        let dram = Counted::new(memory);
+        Counted::new(match self {
+            Self::Split { photon, scene } => LineCaches::new(dram, photon.cache(), scene.cache()),
+            Self::Unified(cache) => LineCaches::unified(dram, cache.cache()),
+        })
+    }
+}
+
+/// What a chip asked of its memory, and what of that came from DRAM.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MemoryTraffic {
+    /// Reads by the chip: records and the bytes of each.
+    pub requested: Traffic,
+    /// Reads by its caches: lines of card memory.
+    pub fetched: Traffic,
+}
+
+impl MemoryTraffic {
+    /// Nothing.
+    pub const ZERO: Self = Self { requested: Traffic::ZERO, fetched: Traffic::ZERO };
+
+    /// Adds another chip's.
+    pub fn add(&mut self, other: &Self) {
+        self.requested.add(&other.requested);
+        self.fetched.add(&other.fetched);
+    }
+
+    /// What tiles asked of some structures, and what of that came from DRAM.
+    pub fn of(&self, chosen: impl Fn(Structure) -> bool) -> [Reads; 2] {
+        [self.requested.of_tiles(&chosen), self.fetched.of_tiles(&chosen)]
+    }
+
+    /// Bytes from DRAM of the photon map.
+    pub fn photon_map_bytes(&self) -> u64 {
+        self.fetched.of_tiles(Structure::is_photon_map).bytes
+    }
+
+    /// Bytes from DRAM of the scene.
+    pub fn scene_bytes(&self) -> u64 {
+        self.fetched.of_tiles(|structure| !structure.is_photon_map()).bytes
+    }
+}
+
+/// Memory that tells its traffic, if it is modelled.
+pub trait MeasuredMemory: MemoryPort {
+    /// What was counted since it was made.
+    fn traffic(&self) -> MemoryTraffic;
+}
+
+impl MeasuredMemory for Lines<'_> {
+    fn traffic(&self) -> MemoryTraffic {
+        MemoryTraffic::ZERO
+    }
+}
+
+impl<M: MemoryPort> MeasuredMemory for ModelledMemory<M> {
+    fn traffic(&self) -> MemoryTraffic {
+        MemoryTraffic {
+            requested: Self::traffic(self).clone(),
+            fetched: self.below().below().traffic().clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn caches_are_read_as_they_are_written() {
+        let default = CacheSettings::default();
+        assert_eq!("photon=128K/128/4,scene=75K/128/4".parse(), Ok(default));
+        for text in
+            ["photon=64K/256/2,scene=75K/128/4,index=hash", "unified=1024K/128/16", "unified=2304/128/3"]
+        {
+            let settings: CacheSettings = text.parse().unwrap();
+            assert_eq!(settings.to_string(), text);
+            settings.over(Lines(&[]));
+        }
+        assert_eq!("scene=75K/128/4".parse(), Ok(default));
+        assert_eq!("unified=1M/128/16".parse::<CacheSettings>().unwrap().to_string(), "unified=1024K/128/16");
+    }
+
+    #[test]
+    fn what_is_no_cache_is_refused_with_what_is() {
+        for (text, said) in [
+            ("", "SIZE/LINE/WAYS"),
+            ("photon", "SIZE/LINE/WAYS"),
+            ("photon=128K", "SIZE/LINE/WAYS"),
+            ("photon=128K/128/four", "no number"),
+            ("photon=128K/64/4", "128"),
+            ("photon=128K/0/4", "128"),
+            ("photon=128K/192/4", "128"),
+            ("photon=128K/128/0", "ways"),
+            ("photon=128K/128/2000", "ways"),
+            ("photon=0/128/1", "whole number"),
+            ("photon=128K/128/3", "whole number"),
+            ("photon=99999M/128/4", "too large"),
+            ("photon=1000M/128/4", "above"),
+            ("photon=128K/128/4,photon=128K/128/4", "twice"),
+            ("unified=128K/128/4,scene=128K/128/4", "one or the other"),
+            ("index=random", "modulo or hash"),
+            ("texture=1K/128/1", "photon=SIZE"),
+        ] {
+            let error = text.parse::<CacheSettings>().unwrap_err();
+            assert!(error.contains(said), "{text}: {error}");
+        }
+    }
+}
