@@ -116,6 +116,18 @@ impl PackedScene {
         (SceneImage { header: self.header(1.0, PhotonGrid::UNIT) }, Lines(&self.lines))
     }
 
+    /// The grid for photons' positions: the finest that holds the scene.
+    pub fn photon_grid(&self) -> PhotonGrid {
+        let (scene, mut memory) = self.view();
+        let root = scene.record::<LINE_BYTES, 1>(&mut memory, SectionKind::Nodes, 0);
+        root.map_or(PhotonGrid::UNIT, |bytes| {
+            let root = layout::BvhNode::read(bytes);
+            let lower = root.lower.map(|corners| corners.into_iter().fold(f32::INFINITY, f32::min));
+            let upper = root.upper.map(|corners| corners.into_iter().fold(f32::NEG_INFINITY, f32::max));
+            PhotonGrid::around(lower, upper)
+        })
+    }
+
     /// Bytes of the scene's lines.
     pub fn bytes(&self) -> u64 {
         self.lines.len() as u64 * LINE_BYTES as u64

@@ -50,14 +50,18 @@ struct Session<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: u
     counters: Counters,
     tiles: Deque<Tile, TILE_QUEUE>,
     at_work: Option<TileWork>,
+    /// Pixels of that tile that wait to be sent.
+    pixels: heapless::Vec<u8, { PIXEL_BYTES * PIXELS_PER_REPLY }>,
 }
 
 /// The tile at work.
 #[derive(Clone, Copy)]
 enum TileWork {
     Rendering(Tile),
-    /// Its pixels from this one on are still to be sent.
+    /// Its pixels from this one on are still to be completed and sent.
     Sending(Tile, u32),
+    /// All its pixels are sent.
+    Sent(Tile),
 }
 
 /// The frame on its way out.
@@ -105,6 +109,7 @@ impl<
                 counters: Counters::ZERO,
                 tiles: Deque::new(),
                 at_work: None,
+                pixels: heapless::Vec::new(),
             },
             outgoing: Outgoing { writer: FrameWriter::new(), bytes: heapless::Vec::new(), sent: 0 },
         }
@@ -203,20 +208,11 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
                 Ok(Some(Reply::ImageAccepted))
             }
             Command::BeginFrame(frame) => {
-                let Some(scene) = self.image.scene() else { return Err(OUT_OF_ORDER) };
-                if self.at_work.is_some() || !self.tiles.is_empty() {
+                if self.image.scene().is_none() || self.at_work.is_some() || !self.tiles.is_empty() {
                     return Err(OUT_OF_ORDER);
                 }
                 check_frame(budget, &frame)?;
                 self.counters = Counters::ZERO;
-                let counters = &mut self.counters;
-                self.chip.begin_frame(&mut Context {
-                    scene,
-                    memory,
-                    frame: &frame,
-                    counters,
-                    outlet: None,
-                })?;
                 self.frame = Some(frame);
                 Ok(Some(Reply::FrameAccepted))
             }
@@ -256,6 +252,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
                     if !self.chip.begin(memory, tile) {
                         return Err(Fault { code: FaultCode::Tile, detail: tile.id });
                     }
+                    self.pixels.clear();
                     self.at_work = Some(TileWork::Rendering(tile));
                 }
             }
@@ -267,22 +264,25 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
                     self.at_work = Some(TileWork::Sending(tile, 0));
                 }
             }
-            Some(TileWork::Sending(tile, first)) => {
-                let mut data = heapless::Vec::<u8, { PIXEL_BYTES * PIXELS_PER_REPLY }>::new();
-                let pixels = (first..first.saturating_add(PIXELS_PER_REPLY as u32))
-                    .map_while(|index| self.chip.sum(index as usize))
-                    .map(|sum| sum.pixel(scene, frame));
-                for pixel in pixels {
-                    // There is room for PIXELS_PER_REPLY.
-                    let _ = data.extend_from_slice(&pixel.to_bytes());
+            Some(TileWork::Sending(tile, next)) => {
+                let counters = &mut self.counters;
+                let context = &mut Context { scene, memory, frame, counters, outlet: None };
+                let pixel = self.chip.pixel(context, next as usize)?;
+                let data = &mut self.pixels;
+                // There is room for PIXELS_PER_REPLY.
+                let _ = data.extend_from_slice(&pixel.map_or([0; PIXEL_BYTES], |pixel| pixel.to_bytes()));
+                let is_last = next as u64 + 1 >= tile.pixels();
+                if data.is_full() || is_last {
+                    let first = next + 1 - (data.len() / PIXEL_BYTES) as u32;
+                    outgoing.send(&Reply::Pixels { tile: tile.id, first, data });
+                    data.clear();
                 }
-                if data.is_empty() {
-                    outgoing.send(&Reply::TileDone { tile: tile.id });
-                    self.at_work = None;
-                } else {
-                    outgoing.send(&Reply::Pixels { tile: tile.id, first, data: &data });
-                    self.at_work = Some(TileWork::Sending(tile, first + PIXELS_PER_REPLY as u32));
-                }
+                self.at_work =
+                    Some(if is_last { TileWork::Sent(tile) } else { TileWork::Sending(tile, next + 1) });
+            }
+            Some(TileWork::Sent(tile)) => {
+                outgoing.send(&Reply::TileDone { tile: tile.id });
+                self.at_work = None;
             }
         }
         Ok(())

@@ -26,7 +26,7 @@ fn a_render_writes_picture_preview_and_statistics() {
     for key in ["scene", "photons", "pack", "load", "render", "total"] {
         assert!(statistics["time_s"][key].as_f64().is_some_and(|seconds| seconds >= 0.0), "{key}");
     }
-    assert_eq!(statistics["rays"]["eye"], 64);
+    assert_eq!(statistics["rays"]["eye"], 2 * 64);
     for pointer in ["/rays/shadow", "/rays/gather", "/gathers", "/image_bytes"] {
         assert!(statistics.pointer(pointer).and_then(Value::as_u64).is_some_and(|n| n > 0), "{pointer}");
     }

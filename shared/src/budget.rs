@@ -34,17 +34,17 @@ pub struct Budget {
 }
 
 /// The reference chip: the dissertation's, with 128 KB of photon cache (6.5), a 75 KB ray caster cache (7.3.2), tiles
-/// of 16x16 (up to 32x32 here).
+/// of 16x16 (up to 64x64 here).
 pub const REFERENCE: Budget = Budget {
     sram_bytes: 1 << 20,
     dram_bytes: 512 << 20,
     photon_cache_bytes: 128 << 10,
     scene_cache_bytes: 75 << 10,
     stack_bytes: 16 << 10,
-    tile_pixels: 1024,
+    tile_pixels: 4096,
     neighbors: 256,
     gather_rays: MOST_GATHER_RAYS,
-    gather_queue: 16_384,
+    gather_queue: 18_688,
     irradiance_records: 256,
     shadow_rays: 64,
     samples: 4096,
@@ -82,7 +82,7 @@ pub struct TechniqueMemory {
 impl TechniqueMemory {
     /// What the techniques may add to [`REFERENCE`].
     pub const REFERENCE: Self =
-        Self { reordering: (512 << 10) + 64, irradiance_cache: 48 << 10, importance_sampling: 34 << 10 };
+        Self { reordering: (440 << 10) + 64, irradiance_cache: 48 << 10, importance_sampling: 136 << 10 };
     /// What the techniques may add to [`MICRO`].
     pub const MICRO: Self =
         Self { reordering: (32 << 10) + 64, irradiance_cache: 32 << 10, importance_sampling: 8704 };

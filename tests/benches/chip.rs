@@ -164,7 +164,6 @@ fn tile_of_cornell(bencher: Bencher, order: &str) {
     let mut context =
         Context { scene: &scene, memory: &mut memory, frame: &frame, counters: &mut counters, outlet: None };
     let mut chip = Box::new(ReferenceChip::new());
-    chip.begin_frame(&mut context).expect("sound");
     let tile = Tile { id: 0, x: 256, y: 256, width: 16, height: 16 };
     bencher.counter(ItemsCount::new(256_usize)).bench_local(|| {
         assert!(chip.begin(context.memory, tile));

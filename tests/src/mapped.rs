@@ -74,11 +74,10 @@ impl MappedScene {
         let mut counters = Counters::ZERO;
         let mut context =
             Context { scene: &scene, memory: &mut memory, frame, counters: &mut counters, outlet: None };
-        chip.begin_frame(&mut context).expect("sound");
         assert!(chip.begin(context.memory, tile));
         while chip.step(&mut context).expect("sound") == Progress::Busy {}
-        let sums = (0..tile.pixels() as usize).map_while(|index| chip.sum(index));
-        let radiance = sums.map(|sum| sum.pixel(&scene, frame).radiance.into()).collect();
+        let unit = scene.header.radiance_unit;
+        let radiance = chip.sums().iter().map(|sum| sum.value() * unit).collect();
         (tile, radiance, counters)
     }
 }

@@ -104,7 +104,7 @@ fn image() -> CardImage {
     let scene =
         scene(room([0, 0, 0, 1, 0, 0]), vec![lambertian("wall", 0.5), lamp], camera(Vec3::ZERO, Vec3::NEG_Z));
     let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
-    let map = PhotonMap::new(&trace(&packed, 0, 500, &|_| true).unwrap().arrivals);
+    let map = PhotonMap::new(&trace(&packed, 0, 500, &|_| true).unwrap().arrivals, packed.photon_grid());
     packed.with_photons(&map).unwrap()
 }
 

@@ -5,7 +5,7 @@ use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::scene::{Material, Scene};
-use photoncard_firmware::gather::{GatherRequest, PartialReflection};
+use photoncard_firmware::gather::PartialReflection;
 use photoncard_firmware::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
 use photoncard_firmware::scene::{Reflection, Surface};
 use photoncard_tests::{camera, lambertian, quad, room, scene};
@@ -51,8 +51,7 @@ impl Map {
         };
         let reflection =
             PartialReflection::new(&surface, Vec3::splat(scene.header.photon_power_unit), 1 << 31);
-        let request = GatherRequest { position: position.to_array(), reflection, target: 0, cell: 0 };
-        reflected_radiance(&nearest, &request).x as f64
+        reflected_radiance(&nearest, position, &reflection).x as f64
     }
 
     /// Mean radiance of a hundred places along a line.

@@ -107,7 +107,7 @@ fn the_stored_power_of_coloured_light_is_right_in_every_channel() {
     let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
     for photons in [50_000, 70_000] {
         let pass = trace(&packed, 0, photons, &|_| true).unwrap();
-        let map = PhotonMap::new(&pass.arrivals);
+        let map = PhotonMap::new(&pass.arrivals, packed.photon_grid());
         for channel in 0..3 {
             let stored: f64 = map.photons().iter().map(|photon| photon.power.decode()[channel] as f64).sum();
             let emitted = std::f64::consts::PI * 4.0 * emission[channel] as f64;

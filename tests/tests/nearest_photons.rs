@@ -23,11 +23,9 @@ fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
             direct: false,
         })
         .collect();
-    let map = PhotonMap::new(&arrivals);
-    let image = || {
-        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
-        packed.with_photons(&map).unwrap()
-    };
+    let packed = || PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+    let map = PhotonMap::new(&arrivals, packed().photon_grid());
+    let image = || packed().with_photons(&map).unwrap();
     [image(), image().with_photons_in_leaves(0.1).unwrap()]
 }
 

@@ -1,6 +1,7 @@
 //! Chips without cards: tiles rendered straight from an image, for studies and for what no link could carry.
 
-use photoncard_firmware::chip::{PixelSum, Progress, ReferenceChip};
+use photoncard_firmware::chip::{Progress, ReferenceChip};
+use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::render::{Context, GatherOutlet};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::counters::Counters;
@@ -10,8 +11,8 @@ use super::memory_model::{MeasuredMemory, MemoryTraffic};
 
 /// A rendered tile, and what it took.
 pub struct RenderedTile {
-    /// Its pixels, row by row.
-    pub sums: Vec<PixelSum>,
+    /// The light of its pixels, row by row, in the image's radiance units.
+    pub sums: Vec<ColourSum>,
     /// What was counted.
     pub counters: Counters,
     /// What was read, if the memory is modelled.
@@ -33,11 +34,9 @@ pub fn render_tile(
     let mut counters = Counters::ZERO;
     let outlet = outlet.map(|outlet| outlet as &mut dyn GatherOutlet);
     let mut context = Context { scene, memory: &mut memory, frame, counters: &mut counters, outlet };
-    chip.begin_frame(&mut context)?;
     if !chip.begin(context.memory, tile) {
         return Err(Fault { code: FaultCode::Tile, detail: tile.id });
     }
     while chip.step(&mut context)? == Progress::Busy {}
-    let sums = (0..tile.pixels() as usize).map_while(|index| chip.sum(index).copied()).collect();
-    Ok(RenderedTile { sums, counters, traffic: memory.traffic() })
+    Ok(RenderedTile { sums: chip.sums().to_vec(), counters, traffic: memory.traffic() })
 }

@@ -7,7 +7,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
-use photoncard_firmware::chip::{PixelSum, ReferenceChip};
+use photoncard_firmware::chip::{ReferenceChip, pixel};
+use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::Candidate;
@@ -23,7 +24,7 @@ use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::film::{Film, FilmError};
 use crate::pack::CardImage;
 
-/// The most gathers that are kept at once, 36 bytes each: 4.8 GB.
+/// The most gathers that are kept at once, 32 bytes each: 4.3 GB.
 const MOST_GATHERS: u64 = 1 << 27;
 /// Gathers of the tiles that are cast before the host takes them over, about.
 const GATHERS_PER_CAST: u64 = 1 << 21;
@@ -70,7 +71,6 @@ impl From<Fault> for FrameError {
 /// A gather on its way along the curve.
 #[derive(Clone, Copy)]
 struct Waiting {
-    key: u32,
     /// Index in the frame's sums.
     sum: u32,
     request: GatherRequest,
@@ -78,7 +78,7 @@ struct Waiting {
 
 /// The sums of a frame's pixels, tile after tile, and the gathers that are still to be added.
 struct Frame {
-    sums: Vec<PixelSum>,
+    sums: Vec<ColourSum>,
     waiting: Vec<Waiting>,
     counters: Counters,
     traffic: MemoryTraffic,
@@ -87,15 +87,15 @@ struct Frame {
 /// What one tile leaves to the host.
 struct CastTile {
     tile: RenderedTile,
-    waiting: Vec<(u32, GatherRequest)>,
+    waiting: Vec<GatherRequest>,
 }
 
 /// Takes the gathers of a chip.
-struct Outlet(Vec<(u32, GatherRequest)>);
+struct Outlet(Vec<GatherRequest>);
 
 impl GatherOutlet for Outlet {
-    fn take(&mut self, key: u32, request: GatherRequest) {
-        self.0.push((key, request));
+    fn take(&mut self, request: GatherRequest) {
+        self.0.push(request);
     }
 }
 
@@ -146,7 +146,7 @@ fn render_with<'a, M: MeasuredMemory>(
     film: &mut Film,
     progress: &(dyn Fn(u64, u64) -> bool + Sync),
 ) -> Result<CurveOutcome, FrameError> {
-    let CurveJob { image, frame, tiles, chips } = job;
+    let CurveJob { frame, tiles, chips, .. } = job;
     let mut all = Frame::with_room_for(frame, tiles)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(chips).stack_size(THREAD_STACK).build()?;
     // Casting a tile counts as a tenth of it, doing its gathers as the rest.
@@ -158,7 +158,7 @@ fn render_with<'a, M: MeasuredMemory>(
     for tiles in tiles.chunks(tiles_per_round) {
         all.add(pool.install(|| cast_tiles(job, model, tiles, &go_on))?)?;
     }
-    pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.key));
+    pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.request.place));
     let mut done = 0;
     for waiting in all.waiting.chunks(GATHERS_PER_ROUND.max(chips * gathers_per_task)) {
         let parts: Result<Vec<_>, Fault> = pool.install(|| {
@@ -169,7 +169,7 @@ fn render_with<'a, M: MeasuredMemory>(
             all.counters.add(&counters);
             all.traffic.add(&traffic);
             for (sum, brought) in brought {
-                all.sums[sum as usize].add_gathered(brought);
+                all.sums[sum as usize].add(brought);
             }
         }
         done += waiting.len() as u64;
@@ -177,13 +177,7 @@ fn render_with<'a, M: MeasuredMemory>(
             return Err(FrameError::Stopped);
         }
     }
-    let (scene, _) = image.view();
-    let places = tiles.iter().flat_map(|tile| {
-        (0..tile.height).flat_map(move |y| (0..tile.width).map(move |x| (tile.x + x, tile.y + y)))
-    });
-    for (sum, (x, y)) in all.sums.iter().zip(places) {
-        film.write(x, y, sum.pixel(&scene, frame))?;
-    }
+    complete(job, model, &mut all, film)?;
     Ok(CurveOutcome { counters: all.counters, traffic: all.traffic })
 }
 
@@ -228,11 +222,9 @@ impl Frame {
             self.sums.extend(tile.sums);
             self.counters.add(&tile.counters);
             self.traffic.add(&tile.traffic);
-            self.waiting.extend(waiting.into_iter().map(|(key, request)| Waiting {
-                key,
-                sum: first + request.target as u32,
-                request,
-            }));
+            let sum_of = |request: &GatherRequest| first + request.target as u32;
+            self.waiting
+                .extend(waiting.into_iter().map(|request| Waiting { sum: sum_of(&request), request }));
         }
         Ok(())
     }
@@ -255,6 +247,28 @@ fn cast_tiles<'a, M: MeasuredMemory>(
         Ok(CastTile { tile, waiting: outlet.0 })
     };
     tiles.par_iter().map_init(new_chip, cast_one).collect()
+}
+
+/// Completes the pixels and writes them.
+fn complete<'a, M: MeasuredMemory>(
+    job: CurveJob<'a>,
+    model: &impl Fn(Lines<'a>) -> M,
+    all: &mut Frame,
+    film: &mut Film,
+) -> Result<(), FrameError> {
+    let (scene, memory) = job.image.view();
+    let mut memory = model(memory);
+    let counters = &mut all.counters;
+    let mut context =
+        Context { scene: &scene, memory: &mut memory, frame: job.frame, counters, outlet: None };
+    let places = job.tiles.iter().flat_map(|tile| {
+        (0..tile.height).flat_map(move |y| (0..tile.width).map(move |x| (tile.x + x, tile.y + y)))
+    });
+    for (sum, (x, y)) in all.sums.iter().zip(places) {
+        film.write(x, y, pixel(&mut context, x, y, sum)?)?;
+    }
+    all.traffic.add(&memory.traffic());
+    Ok(())
 }
 
 /// What came of some gathers.

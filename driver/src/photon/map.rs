@@ -26,14 +26,13 @@ struct Node {
 }
 
 impl PhotonMap {
-    /// Builds the tree: the same for the same arrivals, whatever the threads. Positions are put on a grid, a millionth of
-    /// the map's longest side wide, so that every layout of the map can tell them exactly.
+    /// Builds the tree: the same for the same arrivals, whatever the threads. Positions are put on the grid, so that every
+    /// layout of the map can tell them exactly.
     ///
     /// # Panics
     /// If there are 2^32 arrivals or more; `--photons` does not allow so many.
-    pub fn new(arrivals: &[Arrival]) -> Self {
+    pub fn new(arrivals: &[Arrival], grid: PhotonGrid) -> Self {
         assert!(u32::try_from(arrivals.len()).is_ok(), "more photons than 32 bits tell apart");
-        let grid = grid_of(arrivals);
         let on_grid = |place| grid.position(grid.nearest(place));
         let mut nodes: Vec<Node> = (0_u32..)
             .zip(arrivals)
@@ -67,17 +66,6 @@ impl PhotonMap {
     pub fn records(&self) -> impl ExactSizeIterator<Item = [u8; Photon::BYTES]> {
         self.photons.iter().map(Photon::to_bytes)
     }
-}
-
-/// The finest grid that holds all arrivals.
-fn grid_of(arrivals: &[Arrival]) -> PhotonGrid {
-    let corners = arrivals.iter().fold(None, |corners: Option<[[f32; 3]; 2]>, arrival| {
-        let place = arrival.position;
-        let [lower, upper] = corners.unwrap_or([place; 2]);
-        let axes = [0, 1, 2];
-        Some([axes.map(|a| lower[a].min(place[a])), axes.map(|a| upper[a].max(place[a]))])
-    });
-    corners.map_or(PhotonGrid::UNIT, |[lower, upper]| PhotonGrid::around(lower, upper))
 }
 
 fn record(node: &Node, arrivals: &[Arrival], power_unit: f32) -> Photon {
@@ -189,7 +177,7 @@ mod tests {
     #[test]
     fn every_subtree_lies_on_its_side_of_every_plane() {
         for count in [1, 2, 3, 6, 7, 8, 100, 1000, 20_000] {
-            let map = PhotonMap::new(&arrivals(count));
+            let map = PhotonMap::new(&arrivals(count), PhotonGrid::around([0.0; 3], [1.0; 3]));
             let all = check(map.photons(), 0, [f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
             assert_eq!(all, count as usize);
         }

@@ -70,7 +70,7 @@ pub fn map_photons(
     let start = Instant::now();
     let pass = trace(&packed, settings.seed, settings.photons, progress)?;
     let tracing = start.elapsed();
-    let map = PhotonMap::new(&pass.arrivals);
+    let map = PhotonMap::new(&pass.arrivals, packed.photon_grid());
     let mut image = packed.with_photons(&map)?;
     let max_distance = match settings.max_distance {
         // Farther than the scene is wide is as good as that wide.

@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 use heapless::Vec;
-use photoncard_shared::message::{Drain, Fault, FrameParameters};
+use photoncard_shared::message::{Drain, Fault};
 
-use crate::gather::{GatherQueue, GatherRequest, KeyScale};
+use crate::gather::{GatherQueue, GatherRequest};
 use crate::memory::MemoryPort;
 use crate::photon::Candidate;
 use crate::render::Context;
@@ -14,7 +14,6 @@ use crate::render::final_gather::gathered;
 pub(super) struct Gathers<const CANDIDATES: usize, const QUEUE: usize> {
     pub(super) candidates: Vec<Candidate, CANDIDATES>,
     queue: GatherQueue<QUEUE>,
-    key_scale: KeyScale,
 }
 
 /// Waiting gathers that one step does.
@@ -22,11 +21,7 @@ const GATHERS_PER_STEP: usize = 64;
 
 impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
     pub(super) const fn new() -> Self {
-        Self { candidates: Vec::new(), queue: GatherQueue::new(), key_scale: KeyScale::POINT }
-    }
-
-    pub(super) fn set_scale(&mut self, key_scale: KeyScale) {
-        self.key_scale = key_scale;
+        Self { candidates: Vec::new(), queue: GatherQueue::new() }
     }
 
     /// Drops what waits.
@@ -42,11 +37,6 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
     /// Whether waiting gathers are being done.
     pub(super) fn is_draining(&self) -> bool {
         self.queue.is_draining()
-    }
-
-    /// The place of a gather in the frame's order, if it comes now.
-    pub(super) fn key(&self, frame: &FrameParameters, request: &GatherRequest) -> u32 {
-        self.key_scale.key(frame.drain, request.position.into(), self.queue.len() as u32)
     }
 
     /// Does a gather at once, or lets it wait; a queue that is full is drained first. Every gather that was done goes
@@ -67,8 +57,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
                 self.drain(context, add)?;
             }
         }
-        let key = self.key(frame, &request);
-        match self.queue.push(key, request) {
+        match self.queue.push(request) {
             Ok(()) => Ok(()),
             Err(request) => self.gather(context, &request, add),
         }
@@ -78,7 +67,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         let counters = &mut *context.counters;
         counters.drains += 1;
         counters.most_waiting = counters.most_waiting.max(self.queue.len() as u64);
-        self.queue.begin_drain();
+        self.queue.begin_drain(context.frame.drain);
     }
 
     /// Does some of the gathers that wait.

@@ -12,19 +12,18 @@ mod records;
 use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::{Budget, MICRO, REFERENCE, TechniqueMemory, gather_candidates};
-use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::BvhNode;
-use photoncard_shared::message::{Fault, FrameParameters, Tile};
+use photoncard_shared::message::{Fault, FrameParameters, Pixel, Tile};
 
 use self::gathers::Gathers;
-pub use self::pixels::PixelSum;
-use self::pixels::add_gathered;
+pub use self::pixels::pixel;
+use self::pixels::{StoredPoint, add_light};
 use self::position::{Block, Position, Stage};
-use crate::gather::{GatherQueue, KeyScale};
+use crate::fixed_point::ColourSum;
+use crate::gather::GatherQueue;
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
-use crate::memory::{MemoryPort, Stage as MemoryStage};
-use crate::render::{Context, GatherPoint, PixelSample};
+use crate::memory::{CacheEntry, MemoryPort};
+use crate::render::{Context, PixelSample};
 
 /// The chip of [`REFERENCE`].
 pub type ReferenceChip = Chip<
@@ -45,9 +44,9 @@ pub type MicroChip = Chip<
 /// irradiance records.
 pub struct Chip<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize> {
     /// Where gather rays start, in the present sample: what each pixel of the tile sees, or records.
-    points: Vec<Option<GatherPoint>, TILE_PIXELS>,
-    /// What is known of each pixel of the tile so far.
-    sums: Vec<PixelSum, TILE_PIXELS>,
+    points: Vec<StoredPoint, TILE_PIXELS>,
+    /// The light of each pixel of the tile so far, in radiance units.
+    sums: Vec<ColourSum, TILE_PIXELS>,
     gathers: Gathers<CANDIDATES, QUEUE>,
     cache: IrradianceCache<RECORDS>,
     tile: Tile,
@@ -106,17 +105,6 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
         TILE_PIXELS as u64
     }
 
-    /// Begins a frame: reads the scene's box.
-    ///
-    /// # Errors
-    /// If the image is not sound.
-    pub fn begin_frame<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        context.memory.enter(MemoryStage::Begin);
-        let root = context.scene.record::<LINE_BYTES, 1>(context.memory, SectionKind::Nodes, 0)?;
-        self.gathers.set_scale(KeyScale::new(&BvhNode::read(root)));
-        Ok(())
-    }
-
     /// Begins a tile. Returns whether it has pixels and its buffers suffice.
     #[must_use]
     pub fn begin(&mut self, memory: &mut impl MemoryPort, tile: Tile) -> bool {
@@ -129,8 +117,8 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
         self.blocks.clear();
         let Ok(pixels) = usize::try_from(tile.pixels()) else { return false };
         pixels > 0
-            && self.points.resize(pixels, None).is_ok()
-            && self.sums.resize(pixels, PixelSum::ZERO).is_ok()
+            && self.points.resize(pixels, StoredPoint::NOTHING).is_ok()
+            && self.sums.resize(pixels, ColourSum::ZERO).is_ok()
             && self.blocks.push(Block::whole(tile.width, tile.height)).is_ok()
     }
 
@@ -187,13 +175,28 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
             });
         }
         gathers.drain(context, &mut |request, brought| {
-            add_gathered(sums, request.target, brought);
+            add_light(sums, request.target, brought);
         })
     }
 
-    /// The sum of pixel `index` of the complete tile, counted in rows.
-    pub fn sum(&self, index: usize) -> Option<&PixelSum> {
-        self.sums.get(index)
+    /// The light of the complete tile's pixels, in rows, in radiance units.
+    pub fn sums(&self) -> &[ColourSum] {
+        &self.sums
+    }
+
+    /// Pixel `index` of the complete tile, counted in rows; `None` past the last.
+    ///
+    /// # Errors
+    /// If the image is not sound.
+    pub fn pixel<M: MemoryPort>(
+        &self,
+        context: &mut Context<M>,
+        index: usize,
+    ) -> Result<Option<Pixel>, Fault> {
+        let Some(sum) = self.sums.get(index) else { return Ok(None) };
+        let width = self.tile.width.max(1);
+        let [x, y] = [self.tile.x + index as u32 % width, self.tile.y + index as u32 / width];
+        pixel(context, x, y, sum).map(Some)
     }
 }
 
@@ -202,10 +205,9 @@ fn allowed_error(frame: &FrameParameters) -> Option<f32> {
     frame.irradiance_error.filter(|_| frame.gather_rays > 0)
 }
 
-/// On-chip memory that a card of `card_bytes` takes under a budget: its statics, caches and stack.
+/// On-chip memory that a card of `card_bytes` takes under a budget: its statics, caches with their tags, and stack.
 pub const fn sram_bytes(budget: &Budget, card_bytes: usize) -> usize {
-    card_bytes
-        + budget.photon_cache_bytes as usize
-        + budget.scene_cache_bytes as usize
-        + budget.stack_bytes as usize
+    let cache_bytes = budget.photon_cache_bytes as usize + budget.scene_cache_bytes as usize;
+    let tag_bytes = cache_bytes / LINE_BYTES * size_of::<CacheEntry>();
+    card_bytes + cache_bytes + tag_bytes + budget.stack_bytes as usize
 }

@@ -6,60 +6,96 @@ use photoncard_shared::message::{Fault, FrameParameters, Pixel};
 use super::position::Stage;
 use super::{Chip, allowed_error};
 use crate::fixed_point::ColourSum;
+use crate::importance::DirectionTable;
 use crate::irradiance_cache::SeenSample;
 use crate::memory::MemoryPort;
-use crate::render::{Context, GatherPoint, direct, eye, final_gather};
+use crate::render::{Context, GatherPoint, PixelSample, Purpose, direct, eye, final_gather};
 use crate::sampler::{Dimension, Pattern};
-use crate::scene::SceneImage;
+use crate::scene::{Seen, Surface};
 
-/// What is known of a pixel so far: sums over its samples.
+/// What is kept of a gather point from one direction bin to the next, 48 bytes: the rest is read again.
 #[derive(Clone, Copy, Debug)]
-pub struct PixelSum {
-    /// Emission, what shadow rays bring and what is interpolated, W/(sr m^2); samples come in their order.
-    radiance: Vec3,
-    /// The mean of what gather rays bring, in radiance units; they come in any order.
-    gathered: ColourSum,
-    albedo: Vec3,
-    normal: Vec3,
-    depth: f32,
-    surfaces: u32,
+pub(super) struct StoredPoint {
+    /// Of pixels: where on which triangle.
+    seen: Seen,
+    pub(super) directions: DirectionTable,
+    /// Of pixels: what the rays are for; none if there is no surface.
+    purpose: Option<Purpose>,
 }
 
-impl PixelSum {
-    pub(super) const ZERO: Self = Self {
-        radiance: Vec3::ZERO,
-        gathered: ColourSum::ZERO,
-        albedo: Vec3::ZERO,
-        normal: Vec3::ZERO,
-        depth: 0.0,
-        surfaces: 0,
-    };
+const _: () = assert!(size_of::<StoredPoint>() == 48);
 
-    /// Adds what a gather brought, in radiance units.
-    #[inline]
-    pub fn add_gathered(&mut self, brought: Vec3) {
-        self.gathered.add(brought);
-    }
+impl StoredPoint {
+    pub(super) const NOTHING: Self =
+        Self { seen: Seen::NOWHERE, directions: DirectionTable::COSINE, purpose: None };
 
-    /// The pixel of a complete sum.
-    pub fn pixel(&self, scene: &SceneImage, frame: &FrameParameters) -> Pixel {
-        let per_sample = 1.0 / frame.samples.max(1) as f32;
-        let gathered = self.gathered.value() * scene.header.radiance_unit;
-        let per_surface = 1.0 / self.surfaces as f32;
-        Pixel {
-            radiance: (self.radiance * per_sample + gathered).to_array(),
-            albedo: (self.albedo * per_sample).to_array(),
-            normal: (self.normal * per_sample).to_array(),
-            depth: if self.surfaces > 0 { self.depth * per_surface } else { f32::INFINITY },
-        }
+    /// The gather point of a sample of a pixel.
+    #[inline(always)]
+    fn restore<M: MemoryPort>(
+        &self,
+        context: &mut Context<M>,
+        at: PixelSample,
+    ) -> Result<Option<GatherPoint>, Fault> {
+        let Some(purpose) = self.purpose else { return Ok(None) };
+        let place = eye::place(context, at);
+        let surface = eye::surface(context, place, &self.seen)?;
+        let mut point = pixel_point(context.frame, at, surface, purpose);
+        point.directions = self.directions;
+        Ok(Some(point))
     }
 }
 
-/// Adds what a gather brought to the pixel that it is for.
+/// The gather point of a sample, its directions not yet chosen.
+#[inline(always)]
+fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpose: Purpose) -> GatherPoint {
+    let pattern = Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather);
+    // With the cache the rays of Lambertian surfaces are those of a record, and of a pixel; without it those of a sample.
+    let is_of_pixel = allowed_error(frame).is_some() && surface.reflection.has_lambertian();
+    let rays = if is_of_pixel { frame.gather_rays.div_ceil(frame.samples.max(1)) } else { frame.gather_rays };
+    if purpose == Purpose::Lobe {
+        GatherPoint::lobe(surface, pattern, rays)
+    } else {
+        GatherPoint::sample(surface, pattern, rays)
+    }
+}
+
+/// A pixel whose radiance is the sum of all that was brought to it, in the image's radiance units. What else is known
+/// of it is looked up again: no chip has room to keep it.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn pixel<M: MemoryPort>(
+    context: &mut Context<M>,
+    x: u32,
+    y: u32,
+    radiance: &ColourSum,
+) -> Result<Pixel, Fault> {
+    let samples = context.frame.samples;
+    let [mut albedo, mut normal] = [Vec3::ZERO; 2];
+    let (mut depth, mut surfaces) = (0.0, 0);
+    for sample in 0..samples {
+        let place = eye::place(context, PixelSample { x, y, sample });
+        let Some(surface) = eye::see(context, place)? else { continue };
+        albedo += surface.reflection.diffuse + surface.reflection.specular;
+        normal += surface.normal;
+        depth += eye::depth(context, &surface);
+        surfaces += 1;
+    }
+    let per_sample = 1.0 / samples.max(1) as f32;
+    let per_surface = 1.0 / surfaces as f32;
+    Ok(Pixel {
+        radiance: (radiance.value() * context.scene.header.radiance_unit).to_array(),
+        albedo: (albedo * per_sample).to_array(),
+        normal: (normal * per_sample).to_array(),
+        depth: if surfaces > 0 { depth * per_surface } else { f32::INFINITY },
+    })
+}
+
+/// Adds light to the pixel that it is for, in radiance units.
 #[inline]
-pub(super) fn add_gathered(sums: &mut [PixelSum], target: u16, brought: Vec3) {
+pub(super) fn add_light(sums: &mut [ColourSum], target: u16, brought: Vec3) {
     if let Some(sum) = sums.get_mut(target as usize) {
-        sum.add_gathered(brought);
+        sum.add(brought);
     }
 }
 
@@ -70,42 +106,16 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
     pub(super) fn look<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
         let place = eye::place(context, at);
-        let surface = eye::see(context, place)?;
-        let sum = self.sums.get_mut(index);
-        let mut point = None;
-        if let (Some(surface), Some(sum)) = (surface, sum) {
-            sum.radiance += surface.emission;
-            sum.albedo += surface.reflection.diffuse + surface.reflection.specular;
-            sum.normal += surface.normal;
-            sum.depth += eye::depth(context, &surface);
-            sum.surfaces += 1;
-            let frame = context.frame;
-            let pattern = Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather);
-            let allowed = allowed_error(frame);
-            let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
-            let sample = SeenSample { pixel: [at.x, at.y], place, surface: &surface };
-            // With the cache the rays are those of a record, and of a pixel; without it those of a sample.
-            let (interpolated, rays) = match allowed {
-                Some(allowed) if is_lambertian => (
-                    self.cache.interpolate(&sample, allowed),
-                    frame.gather_rays.div_ceil(frame.samples.max(1)),
-                ),
-                _ => (None, frame.gather_rays),
-            };
-            context.counters.lambertian_samples += u64::from(is_lambertian);
-            context.counters.interpolated_samples += u64::from(interpolated.is_some());
-            let mut begun = match interpolated {
-                Some(irradiance) => {
-                    sum.radiance += surface.reflection.diffuse * irradiance;
-                    GatherPoint::lobe(surface, pattern, rays)
-                }
-                None => GatherPoint::sample(surface, pattern, rays),
-            };
-            begun.choose_directions(context, &mut self.gathers.candidates)?;
-            point = Some(begun);
+        let mut stored = StoredPoint::NOTHING;
+        if let Some(seen) = eye::look(context, place)? {
+            let surface = eye::surface(context, place, &seen)?;
+            let purpose = self.light_at_once(context, index, at, place, &surface);
+            let mut point = pixel_point(context.frame, at, surface, purpose);
+            point.choose_directions(context, &mut self.gathers.candidates)?;
+            stored = StoredPoint { seen, directions: point.directions, purpose: Some(purpose) };
         }
         if let Some(slot) = self.points.get_mut(index) {
-            *slot = point;
+            *slot = stored;
         }
         if self.position.next_index(self.block.pixels()) {
             self.position.stage = Stage::Direct;
@@ -113,11 +123,35 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
         Ok(())
     }
 
+    /// Adds what needs no ray: emission and interpolated light. Returns what is left to gather rays.
+    fn light_at_once<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+        index: usize,
+        at: PixelSample,
+        place: [f32; 2],
+        surface: &Surface,
+    ) -> Purpose {
+        let frame = context.frame;
+        let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
+        let sample = SeenSample { pixel: [at.x, at.y], place, surface };
+        let allowed = allowed_error(frame).filter(|_| is_lambertian);
+        let interpolated = allowed.and_then(|allowed| self.cache.interpolate(&sample, allowed));
+        context.counters.lambertian_samples += u64::from(is_lambertian);
+        context.counters.interpolated_samples += u64::from(interpolated.is_some());
+        let reflected = interpolated.map_or(Vec3::ZERO, |light| surface.reflection.diffuse * light);
+        add_light(&mut self.sums, index as u16, (surface.emission + reflected) * sample_share(context));
+        if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample }
+    }
+
     /// What shadow rays bring the present pixel.
     pub(super) fn light_directly<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
-        if let (Some(Some(point)), Some(sum)) = (self.points.get(index), self.sums.get_mut(index)) {
-            sum.radiance += direct::reflected(context, at, point)?;
+        if let Some(stored) = self.points.get(index)
+            && let Some(point) = stored.restore(context, at)?
+        {
+            let reflected = direct::reflected(context, at, &point)?;
+            add_light(&mut self.sums, index as u16, reflected * sample_share(context));
         }
         if self.position.next_index(self.block.pixels()) {
             self.position.stage = Stage::Rays;
@@ -127,34 +161,42 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
 
     /// The gather rays of the present bin and pixel.
     pub(super) fn cast_for_pixel<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let (index, _) = self.present();
+        let (index, at) = self.present();
         let Self { points, sums, gathers, position, .. } = self;
-        if let Some(Some(point)) = points.get(index) {
-            let frame = context.frame;
+        let frame = context.frame;
+        context.memory.enter(crate::memory::Stage::GatherRay);
+        if let Some(stored) = points.get(index)
+            && let Some(point) = stored.restore(context, at)?
+        {
             let share = 1.0 / frame.samples as f32;
             for ray in point.directions.rays(point.pattern, point.rays, position.bin, frame.bins) {
                 // A tile has at most TILE_PIXELS pixels, which 16 bits tell apart.
-                let end = final_gather::cast(context, point, index as u16, share, ray)?;
+                let end = final_gather::cast(context, &point, index as u16, share, ray)?;
                 let Some(end) = end else { continue };
-                add_gathered(sums, index as u16, end.direct);
+                add_light(sums, index as u16, end.direct);
                 match (end.request, &mut context.outlet) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => {
-                        outlet.take(gathers.key(context.frame, &request), request);
+                        outlet.take(request);
                     }
                     (Some(request), None) => {
                         gathers.submit(context, request, &mut |request, brought| {
-                            add_gathered(sums, request.target, brought);
+                            add_light(sums, request.target, brought);
                         })?;
                     }
                 }
             }
         }
-        let frame = context.frame;
         if position.next_index(self.block.pixels()) && position.next_bin(frame.bins) {
             let is_last = position.next_sample(frame.samples);
             position.stage = if is_last { Stage::Done } else { Stage::Eye };
         }
         Ok(())
     }
+}
+
+/// From the radiance of a sample to its part of the pixel's sum.
+#[inline(always)]
+fn sample_share<M>(context: &Context<M>) -> f32 {
+    1.0 / (context.frame.samples.max(1) as f32 * context.scene.header.radiance_unit)
 }

@@ -6,7 +6,7 @@ use super::position::{Position, Stage};
 use super::{Chip, MOST_BLOCKS, allowed_error};
 use crate::irradiance_cache::{Full, SeenSample, Window};
 use crate::memory::MemoryPort;
-use crate::render::{Context, eye, final_gather};
+use crate::render::{Context, GatherPoint, eye, final_gather};
 
 impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
     Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
@@ -69,14 +69,14 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
             self.cache.want(&SeenSample { pixel: [at.x, at.y], place, surface: &surface }, allowed);
         }
         if self.position.next_index(self.block.pixels()) && self.position.next_sample(context.frame.samples) {
-            self.begin_gather(context);
+            self.begin_gather();
         }
         Ok(())
     }
 
     /// Begins the gather of the next records, or goes on to the pixels if all are done.
-    fn begin_gather<M: MemoryPort>(&mut self, context: &Context<M>) {
-        let count = self.cache.begin_gather(context, self.points.as_mut_slice());
+    fn begin_gather(&mut self) {
+        let count = self.cache.begin_gather(self.points.len());
         self.position = Position::at(if count > 0 { Stage::RecordPoints } else { Stage::Eye });
     }
 
@@ -86,9 +86,11 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
         context: &mut Context<M>,
     ) -> Result<(), Fault> {
         let index = self.position.index;
-        if let Some(Some(point)) = self.points.get_mut(index as usize) {
+        let point = self.cache.point(context.frame, index);
+        if let (Some(mut point), Some(stored)) = (point, self.points.get_mut(index as usize)) {
             point.choose_directions(context, &mut self.gathers.candidates)?;
-            self.cache.set_point(index, point);
+            self.cache.set_point(index, &point);
+            stored.directions = point.directions;
         }
         if self.position.next_index(self.cache.being_gathered()) {
             self.position = Position::at(Stage::RecordRays);
@@ -100,7 +102,9 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
     pub(super) fn cast_for_record<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Self { points, cache, gathers, position, .. } = self;
         let index = position.index;
-        if let Some(Some(point)) = points.get(index as usize) {
+        let point = cache.point(context.frame, index);
+        if let (Some(point), Some(stored)) = (point, points.get(index as usize)) {
+            let point = &GatherPoint { directions: stored.directions, ..point };
             for ray in point.directions.rays(point.pattern, point.rays, position.bin, context.frame.bins) {
                 // There are at most as many as the cache gathers at once.
                 let end = final_gather::cast(context, point, index as u16, 1.0, ray)?;
@@ -124,6 +128,6 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
         if let Some(allowed) = allowed_error(context.frame) {
             self.cache.end_gather(context, allowed);
         }
-        self.begin_gather(context);
+        self.begin_gather();
     }
 }

@@ -1,6 +1,6 @@
 //! Photon gathers that wait, and the order in which they are done.
 //!
-//! The end of a gather ray becomes a [`GatherRequest`] of 28 bytes: a place, a partially evaluated reflection and a
+//! The end of a gather ray becomes a [`GatherRequest`] of 24 bytes: a place, a partially evaluated reflection and a
 //! pixel. Requests may be done in any order, as the sum of a pixel does not depend on it. In an order that keeps
 //! neighbours together, the photons of one gather are still in the cache for the next (Steinhurst, Coombe, Lastra 2005,
 //! *Reordering for cache conscious photon mapping*):
@@ -14,6 +14,6 @@ mod order;
 mod queue;
 mod request;
 
-pub use order::{KeyScale, hilbert_index};
+pub use order::{Place, hilbert_cell, hilbert_index};
 pub use queue::GatherQueue;
 pub use request::{GatherRequest, PartialReflection};

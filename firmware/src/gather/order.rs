@@ -1,63 +1,82 @@
-//! Keys of deferred reordering: requests are done in the order of a number that their place gives.
+//! Places as the order of deferred reordering: a place is told by a number, and requests are done in its order.
 
-use glam::Vec3;
-use photoncard_shared::layout::BvhNode;
+use photoncard_shared::layout::{GRID_BITS, PhotonGrid};
 use photoncard_shared::message::Drain;
 
 use crate::sampler::hash;
-use crate::vector::{max, min};
 
-/// Bits of a Hilbert key's coordinates.
-const HILBERT_BITS: u32 = 10;
-/// Bits of a hash cell's coordinates: 16 cells each way.
+/// Bits of a coordinate that the Hilbert curve goes through.
+const CURVE_BITS: u32 = 10;
+/// Bits of a coordinate below them.
+const REST_BITS: u32 = GRID_BITS - CURVE_BITS;
+const REST_MASK: u64 = (1 << REST_BITS) - 1;
+/// Bits of a hash cell's coordinates: 16 cells each way of the grid.
 const CELL_BITS: u32 = 4;
 /// Buckets that cells are hashed to.
 const BUCKETS: u32 = 256;
-/// Requests of one bucket keep the order of their arrival, told by so many bits.
-const ARRIVAL_BITS: u32 = 24;
 
-/// The scene's box, by which a place becomes a cell.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KeyScale {
-    lower: Vec3,
-    inverse_size: Vec3,
-}
+/// A place on the grid of the photons' positions: along the Hilbert curve through its 1024 cells each way, and within the
+/// cell. It is all that is kept of a gather's position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place(u64);
 
-impl KeyScale {
-    /// A scale of which every place is in the first cell.
-    pub const POINT: Self = Self { lower: Vec3::ZERO, inverse_size: Vec3::ZERO };
-
-    /// Of the box of all children of the root.
-    pub fn new(root: &BvhNode) -> Self {
-        let lower = root.lower.map(|corners| corners.into_iter().fold(f32::INFINITY, min));
-        let upper = root.upper.map(|corners| corners.into_iter().fold(f32::NEG_INFINITY, max));
-        let [lower, upper] = [lower, upper].map(Vec3::from_array);
-        let size = (upper - lower).max(Vec3::splat(f32::MIN_POSITIVE));
-        Self { lower, inverse_size: size.recip() }
+impl Place {
+    /// The grid point nearest to a position, metres.
+    #[inline(always)]
+    pub fn new(grid: &PhotonGrid, position: [f32; 3]) -> Self {
+        let point = grid.nearest(position);
+        let curve = hilbert_index(point.map(|coordinate| coordinate >> REST_BITS), CURVE_BITS);
+        let rest = |rest: u64, coordinate: u32| rest << REST_BITS | coordinate as u64 & REST_MASK;
+        Self(point.into_iter().fold(curve as u64, rest))
     }
 
-    /// The cell of a place, of `2^bits` each way; places outside the box are in the cell nearest to them.
+    /// The grid point.
     #[inline(always)]
-    fn cell(&self, position: Vec3, bits: u32) -> [u32; 3] {
-        let cells = 1_u32 << bits;
-        let relative = (position - self.lower) * self.inverse_size * cells as f32;
-        // The conversion takes what is below zero, or no number, as zero.
-        relative.to_array().map(|coordinate| (coordinate as u32).min(cells - 1))
+    fn point(self) -> [u32; 3] {
+        let [x, y, z] = hilbert_cell((self.0 >> (3 * REST_BITS)) as u32, CURVE_BITS);
+        let rest = |axis: u32| (self.0 >> (REST_BITS * (2 - axis)) & REST_MASK) as u32;
+        [x << REST_BITS | rest(0), y << REST_BITS | rest(1), z << REST_BITS | rest(2)]
     }
 
-    /// The key of a request that came as number `arrival` since the queue was last empty.
+    /// The position, metres.
     #[inline(always)]
-    pub fn key(&self, drain: Drain, position: Vec3, arrival: u32) -> u32 {
+    pub fn position(self, grid: &PhotonGrid) -> [f32; 3] {
+        grid.position(self.point())
+    }
+
+    /// The bucket of its cell.
+    fn bucket(self) -> u32 {
+        let [x, y, z] = self.point().map(|coordinate| coordinate >> (GRID_BITS - CELL_BITS));
+        hash((x << CELL_BITS | y) << CELL_BITS | z) % BUCKETS
+    }
+
+    /// What waiting requests are sorted by.
+    #[inline(always)]
+    pub fn key(self, drain: Drain) -> u64 {
         match drain {
-            Drain::Immediate => arrival,
-            Drain::Hash => {
-                let [x, y, z] = self.cell(position, CELL_BITS);
-                let bucket = hash((x << CELL_BITS | y) << CELL_BITS | z) % BUCKETS;
-                bucket << ARRIVAL_BITS | arrival
-            }
-            Drain::Sort => hilbert_index(self.cell(position, HILBERT_BITS), HILBERT_BITS),
+            Drain::Immediate => 0,
+            Drain::Hash => self.bucket() as u64,
+            Drain::Sort => self.0,
         }
     }
+}
+
+/// The bit of every coordinate that a level of the curve turns on, and those below it.
+#[inline(always)]
+fn level_masks(level: u32) -> (u32, u32) {
+    (1 << level, (1 << level) - 1)
+}
+
+/// One step of the curve's turns: mirrors `x`, or exchanges the lower bits of `x` and `other`.
+#[inline(always)]
+fn turn(x: &mut u32, other: u32, (bit, below): (u32, u32)) -> u32 {
+    if other & bit != 0 {
+        *x ^= below;
+        return other;
+    }
+    let exchange = (*x ^ other) & below;
+    *x ^= exchange;
+    other ^ exchange
 }
 
 /// The place of a cell along the Hilbert curve through `2^bits` cells each way (Skilling 2004, *Programming the Hilbert
@@ -65,22 +84,12 @@ impl KeyScale {
 pub fn hilbert_index(cell: [u32; 3], bits: u32) -> u32 {
     let [mut x, mut y, mut z] = cell;
     for level in (1..bits).rev() {
-        let (bit, below) = (1 << level, (1 << level) - 1);
-        let turn = |x: &mut u32, other: u32| {
-            if other & bit != 0 {
-                *x ^= below;
-                return other;
-            }
-            let exchange = (*x ^ other) & below;
-            *x ^= exchange;
-            other ^ exchange
-        };
-        let first = x;
-        if first & bit != 0 {
-            x ^= below;
+        let masks = level_masks(level);
+        if x & masks.0 != 0 {
+            x ^= masks.1;
         }
-        y = turn(&mut x, y);
-        z = turn(&mut x, z);
+        y = turn(&mut x, y, masks);
+        z = turn(&mut x, z, masks);
     }
     y ^= x;
     z ^= y;
@@ -97,6 +106,26 @@ pub fn hilbert_index(cell: [u32; 3], bits: u32) -> u32 {
     })
 }
 
+/// The cell at a place along the curve: the inverse of [`hilbert_index`].
+pub fn hilbert_cell(index: u32, bits: u32) -> [u32; 3] {
+    let coordinate =
+        |offset: u32| (0..bits).fold(0, |v, level| v | (index >> (3 * level + offset) & 1) << level);
+    let [mut x, mut y, mut z] = [coordinate(2), coordinate(1), coordinate(0)];
+    let gray = z >> 1;
+    z ^= y;
+    y ^= x;
+    x ^= gray;
+    for level in 1..bits {
+        let masks = level_masks(level);
+        z = turn(&mut x, z, masks);
+        y = turn(&mut x, y, masks);
+        if x & masks.0 != 0 {
+            x ^= masks.1;
+        }
+    }
+    [x, y, z]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,7 +137,9 @@ mod tests {
         let mut cells = [[u32::MAX; 3]; (SIDE * SIDE * SIDE) as usize];
         for cell in 0..SIDE * SIDE * SIDE {
             let place = [cell / SIDE / SIDE, cell / SIDE % SIDE, cell % SIDE];
-            let visited = &mut cells[hilbert_index(place, BITS) as usize];
+            let index = hilbert_index(place, BITS);
+            assert_eq!(hilbert_cell(index, BITS), place);
+            let visited = &mut cells[index as usize];
             assert_eq!(*visited, [u32::MAX; 3]);
             *visited = place;
         }
@@ -119,18 +150,22 @@ mod tests {
     }
 
     #[test]
-    fn places_outside_the_box_have_a_key() {
-        let mut root = BvhNode::EMPTY;
-        for axis in 0..3 {
-            root.lower[axis][0] = -1.0;
-            root.upper[axis][0] = 1.0;
+    fn a_place_gives_back_its_grid_point() {
+        let grid = PhotonGrid::around([-1.0, -2.0, 0.0], [1.0, 0.5, 4.0]);
+        for i in 0..10_000 {
+            let position = [0, 1, 2].map(|axis| -2.0 + 6.0 * (hash(3 * i + axis) >> 8) as f32 / 16_777_216.0);
+            let expected = grid.position(grid.nearest(position));
+            assert_eq!(Place::new(&grid, position).position(&grid), expected, "{position:?}");
         }
-        let scale = KeyScale::new(&root);
-        for place in [-9.0, 9.0, f32::NAN, f32::INFINITY] {
+    }
+
+    #[test]
+    fn places_outside_the_grid_have_a_key() {
+        for place in [-9e9, 9e9, f32::NAN, f32::INFINITY] {
+            let place = Place::new(&PhotonGrid::UNIT, [place; 3]);
             for drain in [Drain::Hash, Drain::Sort] {
-                scale.key(drain, Vec3::splat(place), 3);
+                place.key(drain);
             }
         }
-        assert_eq!(scale.cell(Vec3::splat(0.999), 4), [15; 3]);
     }
 }

@@ -1,24 +1,16 @@
 //! The gather queue: requests wait here until it is full or their results are needed, and are then done in the order of their
-//! keys. Full is back-pressure: the queue is drained, and nothing is lost.
+//! places. Full is back-pressure: the queue is drained, and nothing is lost.
 
 use heapless::Vec;
+use photoncard_shared::message::Drain;
 
 use super::GatherRequest;
 
-/// A request with its key.
-#[derive(Clone, Copy, Debug)]
-struct Waiting {
-    key: u32,
-    request: GatherRequest,
-}
-
-/// Up to `N` requests, 32 bytes each.
+/// Up to `N` requests, 24 bytes each.
 pub struct GatherQueue<const N: usize> {
-    waiting: Vec<Waiting, N>,
+    waiting: Vec<GatherRequest, N>,
     draining: bool,
 }
-
-const _: () = assert!(size_of::<Waiting>() == 32);
 
 impl<const N: usize> Default for GatherQueue<N> {
     fn default() -> Self {
@@ -57,14 +49,14 @@ impl<const N: usize> GatherQueue<N> {
     ///
     /// # Errors
     /// Gives it back if there is no room.
-    pub fn push(&mut self, key: u32, request: GatherRequest) -> Result<(), GatherRequest> {
-        self.waiting.push(Waiting { key, request }).map_err(|waiting| waiting.request)
+    pub fn push(&mut self, request: GatherRequest) -> Result<(), GatherRequest> {
+        self.waiting.push(request)
     }
 
-    /// Begins to take requests out, in the order of their keys.
-    pub fn begin_drain(&mut self) {
+    /// Begins to take requests out, in the order that `drain` tells.
+    pub fn begin_drain(&mut self, drain: Drain) {
         // The last is taken first: the keys fall along the buffer.
-        self.waiting.sort_unstable_by_key(|waiting| u32::MAX - waiting.key);
+        self.waiting.sort_unstable_by_key(|request| u64::MAX - request.place.key(drain));
         self.draining = true;
     }
 
@@ -72,6 +64,6 @@ impl<const N: usize> GatherQueue<N> {
     pub fn take(&mut self) -> Option<GatherRequest> {
         let next = self.waiting.pop();
         self.draining = next.is_some();
-        next.map(|waiting| waiting.request)
+        next
     }
 }

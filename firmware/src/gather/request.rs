@@ -5,6 +5,7 @@ use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode_normal};
 
+use super::Place;
 use crate::scene::{Surface, lobe_power, mirror};
 use crate::vector::unit;
 
@@ -87,8 +88,8 @@ fn decode_exponent([high, low]: [u8; 2]) -> f32 {
 /// A gather: where, how the photons found there are reflected, and whose sum the result goes to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherRequest {
-    /// The place, metres.
-    pub position: [f32; 3],
+    /// The place.
+    pub place: Place,
     /// The reflection, times the gather ray's weight, from photon power units to radiance units.
     pub reflection: PartialReflection,
     /// Whose sum it is: the number of a gather point on the chip.
@@ -98,4 +99,4 @@ pub struct GatherRequest {
 }
 
 const _: () = assert!(size_of::<PartialReflection>() == 13);
-const _: () = assert!(size_of::<GatherRequest>() == 28);
+const _: () = assert!(size_of::<GatherRequest>() == 24);

@@ -32,7 +32,7 @@ pub use lattice::{LatticePoint, Window};
 use glam::Vec3;
 use heapless::Vec;
 use heapless::index_map::FnvIndexMap;
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, FrameParameters};
 
 use self::gradient::{Coefficients, coefficients, rotation, survey};
 use self::lattice::Cell;
@@ -195,36 +195,34 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
         }
     }
 
-    /// Fills the first gather points for records that are wanted and not yet gathered. Returns how many.
-    pub fn begin_gather<M: MemoryPort>(
-        &mut self,
-        context: &Context<M>,
-        points: &mut [Option<GatherPoint>],
-    ) -> u32 {
+    /// Chooses the next records that are wanted and not yet gathered, `most` of them. Returns how many.
+    pub fn begin_gather(&mut self, most: usize) -> u32 {
         self.gathered.clear();
-        let frame = context.frame;
-        for slot in points.iter_mut().take(MOST_GATHERED) {
-            let wanted = loop {
-                let Some((point, record)) = self.records.get_index(self.next) else { break None };
-                self.next += 1;
-                if let Some(record @ Record { content: Content::Wanted(_), .. }) = record {
-                    break Some((self.next - 1, *point, *record));
-                }
-            };
-            let Some((index, LatticePoint { x, y }, record)) = wanted else { break };
-            let pattern = Pattern::new(frame.seed, x, y, 0, Dimension::Irradiance);
-            *slot = Some(GatherPoint::record(record.surface(), pattern, frame.gather_rays));
-            let gathered = GatheredRecord {
-                record: index,
-                coefficients: [[0.0; 2]; crate::importance::CELLS],
-                mean: ColourSum::ZERO,
-                translation: [ColourSum::ZERO; 2],
-                rotation: [ColourSum::ZERO; 2],
-            };
-            // There is room for as many as there are slots.
-            let _ = self.gathered.push(gathered);
+        while self.gathered.len() < most.min(MOST_GATHERED) {
+            let Some((_, record)) = self.records.get_index(self.next) else { break };
+            if let Some(Record { content: Content::Wanted(_), .. }) = record {
+                let gathered = GatheredRecord {
+                    record: self.next,
+                    coefficients: [[0.0; 2]; crate::importance::CELLS],
+                    mean: ColourSum::ZERO,
+                    translation: [ColourSum::ZERO; 2],
+                    rotation: [ColourSum::ZERO; 2],
+                };
+                // There is room for MOST_GATHERED.
+                let _ = self.gathered.push(gathered);
+            }
+            self.next += 1;
         }
         self.gathered.len() as u32
+    }
+
+    /// Where the rays of record `index` of those being gathered start; the directions are not yet chosen.
+    #[inline(always)]
+    pub fn point(&self, frame: &FrameParameters, index: u32) -> Option<GatherPoint> {
+        let gathered = self.gathered.get(index as usize)?;
+        let (&LatticePoint { x, y }, record) = self.records.get_index(gathered.record)?;
+        let pattern = Pattern::new(frame.seed, x, y, 0, Dimension::Irradiance);
+        Some(GatherPoint::record(record.as_ref()?.surface(), pattern, frame.gather_rays))
     }
 
     /// Records that are being gathered.

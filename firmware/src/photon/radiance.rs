@@ -21,7 +21,7 @@ use photoncard_shared::layout::{FULL_DISC, decode_normal};
 
 use super::{Candidate, NearestPhotons};
 use crate::fixed_point::ColourSum;
-use crate::gather::{GatherRequest, PartialReflection};
+use crate::gather::PartialReflection;
 use crate::vector::{max, unit};
 
 /// Photons whose surface normal is at a lesser cosine to the query's belong to another surface.
@@ -31,11 +31,10 @@ pub const MIN_NORMAL_COSINE: f32 = 0.75;
 /// point have no density.
 const MIN_RADIUS_SHARE: f32 = 1e-6;
 
-/// What a gather adds to its pixel, in the units of the reflection: the photons' power over the area of their disc,
-/// reflected.
+/// What a gather at a position adds to its pixel, in the units of the reflection: the photons' power over the area of their
+/// disc, reflected.
 #[inline(always)]
-pub fn reflected_radiance(nearest: &NearestPhotons, request: &GatherRequest) -> Vec3 {
-    let reflection = &request.reflection;
+pub fn reflected_radiance(nearest: &NearestPhotons, position: Vec3, reflection: &PartialReflection) -> Vec3 {
     let candidates = nearest.candidates();
     let farthest = candidates.iter().max_by_key(|candidate| candidate.order());
     let Some(farthest) = farthest else { return Vec3::ZERO };
@@ -60,7 +59,7 @@ pub fn reflected_radiance(nearest: &NearestPhotons, request: &GatherRequest) -> 
     }
     let Some(closest) = closest else { return Vec3::ZERO };
     let fraction = (closest.disc() as f32 + 1.0) * (1.0 / (FULL_DISC as f32 + 1.0));
-    let least = MIN_RADIUS_SHARE * crate::scene::magnitude(&[request.position.into()]);
+    let least = MIN_RADIUS_SHARE * crate::scene::magnitude(&[position]);
     let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
     sums.reflected() * (1.0 / area)
 }

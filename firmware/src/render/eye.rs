@@ -6,7 +6,7 @@ use photoncard_shared::message::Fault;
 use super::{Context, PixelSample};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
-use crate::scene::{Ray, Surface, closest_hit, read_surface};
+use crate::scene::{Ray, Seen, Surface, closest_hit};
 use crate::vector::unit;
 
 /// The place of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over
@@ -18,16 +18,37 @@ pub fn place<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     [x as f32 + jitter_x, y as f32 + jitter_y]
 }
 
+/// What is seen at a place of the picture.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn look<M: MemoryPort>(context: &mut Context<M>, place: [f32; 2]) -> Result<Option<Seen>, Fault> {
+    context.memory.enter(Stage::Eye);
+    context.counters.eye_rays += 1;
+    let hit = closest_hit(context.scene, context.memory, &eye_ray(context, place))?;
+    Ok(hit.map(|hit| Seen::new(&hit)))
+}
+
+/// The surface of what was seen at a place of the picture.
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(always)]
+pub fn surface<M: MemoryPort>(
+    context: &mut Context<M>,
+    place: [f32; 2],
+    seen: &Seen,
+) -> Result<Surface, Fault> {
+    seen.surface(context.scene, context.memory, &eye_ray(context, place))
+}
+
 /// The surface that is seen at a place of the picture.
 ///
 /// # Errors
 /// If the image is not sound.
 pub fn see<M: MemoryPort>(context: &mut Context<M>, place: [f32; 2]) -> Result<Option<Surface>, Fault> {
-    context.memory.enter(Stage::Eye);
-    let ray = eye_ray(context, place);
-    context.counters.eye_rays += 1;
-    match closest_hit(context.scene, context.memory, &ray)? {
-        Some(hit) => read_surface(context.scene, context.memory, &ray, &hit).map(Some),
+    match look(context, place)? {
+        Some(seen) => surface(context, place, &seen).map(Some),
         None => Ok(None),
     }
 }

@@ -8,7 +8,7 @@ use heapless::VecView;
 use photoncard_shared::message::Fault;
 
 use super::{Context, GatherPoint, direct};
-use crate::gather::{GatherRequest, PartialReflection};
+use crate::gather::{GatherRequest, PartialReflection, Place};
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
 use crate::scene::{Ray, closest_hit, read_surface};
@@ -48,7 +48,7 @@ pub fn cast<M: MemoryPort>(
     let weight = sampled.weight * (share / point.rays as f32);
     let emitted = direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density);
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
-        position: met.position.to_array(),
+        place: Place::new(&header.photon_grid, met.position.to_array()),
         reflection: PartialReflection::new(
             &met,
             weight * (header.photon_power_unit / header.radiance_unit),
@@ -74,8 +74,9 @@ pub fn gathered<M: MemoryPort>(
     candidates: &mut VecView<Candidate>,
 ) -> Result<Vec3, Fault> {
     context.memory.enter(Stage::Gather);
-    let nearest = nearest_photons(context, request.position.into(), candidates)?;
-    Ok(reflected_radiance(&nearest, request))
+    let position = request.place.position(&context.scene.header.photon_grid).into();
+    let nearest = nearest_photons(context, position, candidates)?;
+    Ok(reflected_radiance(&nearest, position, &request.reflection))
 }
 
 /// The frame's number of photons nearest to a place.

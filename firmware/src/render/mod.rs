@@ -29,8 +29,8 @@ pub struct Context<'a, M> {
 
 /// Takes the gathers of pixels from a chip: a host that has room for those of a whole frame.
 pub trait GatherOutlet {
-    /// Takes a gather with the key of its order; its target is the pixel's number in the tile.
-    fn take(&mut self, key: u32, request: GatherRequest);
+    /// Takes a gather; its target is the pixel's number in the tile.
+    fn take(&mut self, request: GatherRequest);
 }
 
 /// One sample of one pixel: what random numbers depend on.

@@ -120,7 +120,11 @@ fn descend(
 }
 
 #[inline(always)]
-fn read_triangle(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Result<Triangle, Fault> {
+pub(super) fn read_triangle(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    index: u32,
+) -> Result<Triangle, Fault> {
     scene
         .record::<{ Triangle::BYTES }, TRIANGLES_PER_LINE>(memory, SectionKind::Triangles, index)
         .map(Triangle::read)

@@ -5,7 +5,7 @@ use core::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{DOUBLE_SIDED, Material, Record};
+use photoncard_shared::layout::{DOUBLE_SIDED, Material, Record, Triangle};
 use photoncard_shared::message::Fault;
 
 use super::{Hit, Ray, SceneImage, magnitude, offset_origin};
@@ -121,18 +121,31 @@ pub fn read_surface(
     ray: &Ray,
     hit: &Hit,
 ) -> Result<Surface, Fault> {
+    let Hit { intersection, triangle, .. } = hit;
+    surface_of(scene, memory, ray, triangle, intersection.barycentric, intersection.distance)
+}
+
+/// The surface of a triangle at a place on it.
+#[inline(always)]
+pub(super) fn surface_of(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    ray: &Ray,
+    triangle: &Triangle,
+    [u, v, w]: [f32; 3],
+    distance: f32,
+) -> Result<Surface, Fault> {
     let bytes = scene.record::<{ Material::BYTES }, MATERIALS_PER_LINE>(
         memory,
         SectionKind::Materials,
-        hit.triangle.material,
+        triangle.material,
     )?;
     let material = Material::read(bytes);
-    let [a, b, c] = hit.triangle.vertices.map(Vec3::from_array);
+    let [a, b, c] = triangle.vertices.map(Vec3::from_array);
     let front_normal = unit((b - a).cross(c - a));
     let is_front = front_normal.dot(ray.direction) < 0.0;
     let double_sided = material.flags & DOUBLE_SIDED != 0;
     let visible = is_front || double_sided;
-    let [u, v, w] = hit.intersection.barycentric;
     let reflection = Reflection {
         diffuse: material.diffuse.into(),
         specular: material.specular.into(),
@@ -146,7 +159,7 @@ pub fn read_surface(
         reflection: if visible { reflection } else { Reflection::BLACK },
         emission: if visible { material.emission.into() } else { Vec3::ZERO },
         double_sided,
-        distance: hit.intersection.distance,
+        distance,
         magnitude: magnitude(&[a, b, c, ray.origin]),
     })
 }

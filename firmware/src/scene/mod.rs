@@ -3,12 +3,14 @@
 mod bvh;
 mod emitter;
 mod material;
+mod seen;
 mod triangle;
 
 pub use bvh::{Hit, closest_hit, is_occluded};
 pub use emitter::{EmitterSample, emitter_density, sample_emitter};
 pub use material::{Reflection, Surface, read_surface};
 pub(crate) use material::{lobe_power, mirror};
+pub use seen::Seen;
 pub use triangle::{Intersection, RayFrame};
 
 use core::ops::Range;
