@@ -208,7 +208,8 @@ fn fill(
         match memory.read(structure, LineAddress(number), 0..LINE_BYTES as u32) {
             Ok(read) => *line = *read,
             Err(_) if number > address.0 => return Ok(Some(number)),
-            Err(fault) => return Err(fault),
+            // Memory ends once: the line asked for comes after one that is not there.
+            Err(fault) => return Err(Fault { detail: address.0, ..fault }),
         }
     }
     Ok(None)
