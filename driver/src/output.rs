@@ -49,7 +49,7 @@ pub enum OutputError {
 /// # Errors
 /// If the folder is missing or cannot be written to, or `path` is something other than a file.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
-    create_beside(&resolve(path)?, path).map(drop)
+    PendingFile::create(path).map(drop)
 }
 
 /// Writes `bytes` to `path`, replacing a file of that name. On failure the old file, if any, is untouched.
@@ -57,18 +57,56 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
 /// # Errors
 /// As [`check_writable`], and if the disk is full or fails.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let target = resolve(path)?;
-    let failed = |source| OutputError::Write { path: path.to_owned(), source };
-    let mut file = create_beside(&target, path)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.as_file().sync_all().map_err(failed)?;
-    file.persist(&target).map_err(|error| failed(error.error))?;
-    // The rename itself survives a power cut only once the folder is on disk too. Not every file system can do
-    // that for a folder, and the file is in place either way.
-    if let Ok(folder) = fs::File::open(folder_of(&target)) {
-        let _ = folder.sync_all();
+    let mut file = PendingFile::create(path)?;
+    file.write_all(bytes).map_err(|source| OutputError::Write { path: path.to_owned(), source })?;
+    file.commit()
+}
+
+/// A file that is written beside its place until [`Self::commit`] puts it there. Dropped before, it leaves nothing behind.
+#[derive(Debug)]
+pub struct PendingFile {
+    file: NamedTempFile,
+    target: PathBuf,
+    path: PathBuf,
+}
+
+impl PendingFile {
+    /// Begins a file that is to become `path`.
+    ///
+    /// # Errors
+    /// As [`check_writable`].
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let target = resolve(path)?;
+        let file = create_beside(&target, path)?;
+        Ok(Self { file, target, path: path.to_owned() })
     }
-    Ok(())
+
+    /// Puts the file in its place, and replaces what is there.
+    ///
+    /// # Errors
+    /// If the disk is full or fails.
+    pub fn commit(self) -> Result<(), OutputError> {
+        let Self { file, target, path } = self;
+        let failed = |source| OutputError::Write { path: path.clone(), source };
+        file.as_file().sync_all().map_err(failed)?;
+        file.persist(&target).map_err(|error| failed(error.error))?;
+        // The rename itself survives a power cut only once the folder is on disk too. Not every file system can do
+        // that for a folder, and the file is in place either way.
+        if let Ok(folder) = fs::File::open(folder_of(&target)) {
+            let _ = folder.sync_all();
+        }
+        Ok(())
+    }
+}
+
+impl Write for PendingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 /// Whether two paths name one file, or would if it were written. Names that a file system takes for one, such as those
@@ -143,6 +181,23 @@ mod tests {
         write(&path, b"second").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
         assert_eq!(names(folder.path()), ["picture.exr"]);
+    }
+
+    #[test]
+    fn a_pending_file_is_in_its_place_at_its_end_or_never() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trace");
+        let mut given_up = PendingFile::create(&path).unwrap();
+        given_up.write_all(b"half").unwrap();
+        assert!(!path.exists());
+        drop(given_up);
+        assert!(names(folder.path()).is_empty());
+        let mut file = PendingFile::create(&path).unwrap();
+        file.write_all(b"one, ").unwrap();
+        file.write_all(b"two").unwrap();
+        file.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"one, two");
+        assert_eq!(names(folder.path()), ["trace"]);
     }
 
     #[test]

@@ -115,6 +115,11 @@ impl<
         }
     }
 
+    /// The card's memory: what it counted, if it counts.
+    pub fn memory(&mut self) -> &mut M {
+        &mut self.memory
+    }
+
     /// Whether there is something to do without a byte from the host.
     pub fn is_busy(&self) -> bool {
         self.session.at_work.is_some() || !self.session.tiles.is_empty()

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
 use photoncard_driver::photon::PhotonLayout;
@@ -117,6 +118,16 @@ pub(crate) struct RenderOptions {
     /// Where to render: emulated:CHIPS or emulated-micro:CHIPS; may be repeated [default: a chip a core]
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
+    /// Model the memory of emulated chips, and tell in the statistics what was read of it
+    #[arg(long)]
+    pub(crate) counters: bool,
+    /// Caches of the modelled memory, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=... [default:
+    /// photon=128K/128/4,scene=75K/128/4]
+    #[arg(long, value_name = "CACHES")]
+    cache: Option<CacheSettings>,
+    /// Write every read of an emulated chip in Dinero's input format, compressed; a frame has billions: use --crop
+    #[arg(long, value_name = "OUT.din.zst")]
+    pub(crate) trace: Option<PathBuf>,
     /// Threads of the host's own work [default: a thread a core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
@@ -266,6 +277,8 @@ impl RenderOptions {
             bins: self.bins,
             queue: self.queue,
             cards: if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() },
+            caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
+            trace: self.trace.clone(),
         })
     }
 

@@ -4,7 +4,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::render::{RenderSettings, Rendering, render};
+use photoncard_driver::render::{
+    MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
+};
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scene::gltf::load;
 use photoncard_driver::{exr, output, preview};
@@ -32,11 +34,35 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let mut rendering = result?;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
-    write(options, &settings, &rendering)
+    write(options, &settings, &rendering)?;
+    if let Some(memory) = rendering.statistics.memory.as_ref().filter(|_| !options.quiet) {
+        tell_memory(memory, &rendering.statistics);
+    }
+    Ok(())
+}
+
+/// Tells in a few lines what was read of card memory.
+fn tell_memory(memory: &MemoryStatistics, statistics: &Statistics) {
+    let gathers = statistics.gathers;
+    let rays = &statistics.rays;
+    let rays = rays.eye + rays.shadow + rays.gather + rays.survey;
+    say(format_args!("photoncard: memory behind {}", memory.caches));
+    say(format_args!("photoncard:             requests     hits          raw bytes         DRAM bytes"));
+    for (name, reads) in [("photon map", &memory.photon_map), ("scene", &memory.scene)] {
+        let ReadStatistics { requests, raw_bytes, line_hits, dram_bytes, .. } = reads;
+        let hits = 100.0 * *line_hits as f64 / (*requests).max(1) as f64;
+        let line = format!("{name:10} {requests:>12} {hits:>6.2} % {raw_bytes:>18} {dram_bytes:>18}");
+        say(format_args!("photoncard: {line}"));
+    }
+    let each = |bytes: u64, count: u64| bytes as f64 / count.max(1) as f64;
+    let of_gather = each(memory.photon_map.dram_bytes, gathers);
+    let of_ray = each(memory.scene.dram_bytes, rays);
+    say(format_args!("photoncard: {of_gather:.1} DRAM bytes of the photon map a gather, of {gathers}"));
+    say(format_args!("photoncard: {of_ray:.1} DRAM bytes of the scene a ray, of {rays}"));
 }
 
 fn outputs(options: &RenderOptions) -> impl Iterator<Item = &Path> {
-    [Some(&options.output), options.preview.as_ref(), options.stats.as_ref()]
+    [Some(&options.output), options.preview.as_ref(), options.stats.as_ref(), options.trace.as_ref()]
         .into_iter()
         .flatten()
         .map(AsRef::as_ref)

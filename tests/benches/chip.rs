@@ -8,6 +8,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
+use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::RenderSettings;
@@ -15,6 +16,7 @@ use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::chip::{Progress, ReferenceChip};
 use photoncard_firmware::importance::sample_reflection;
+use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::photon::{Candidate, NearestPhotons, gather};
 use photoncard_firmware::render::Context;
 use photoncard_firmware::sampler::hash;
@@ -151,6 +153,16 @@ fn ray_in_atrium(bencher: Bencher, any_hit: bool) {
 
 #[divan::bench(sample_count = 10, args = ["tiled", "dirbin", "hash", "sort"])]
 fn tile_of_cornell(bencher: Bencher, order: &str) {
+    render_tile(bencher, order, CORNELL.image.view().1);
+}
+
+/// The same with its reads counted above and below the dissertation's caches.
+#[divan::bench(sample_count = 10, args = ["tiled", "dirbin", "hash", "sort"])]
+fn tile_of_cornell_counted(bencher: Bencher, order: &str) {
+    render_tile(bencher, order, CacheSettings::default().over(CORNELL.image.view().1));
+}
+
+fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
     let order = match order {
         "tiled" => GatherOrder::Tiled,
         "dirbin" => GatherOrder::DirectionBins,
@@ -159,7 +171,7 @@ fn tile_of_cornell(bencher: Bencher, order: &str) {
     };
     let settings = RenderSettings { order, ..RenderSettings::default() };
     let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance);
-    let (scene, mut memory) = CORNELL.image.view();
+    let (scene, _) = CORNELL.image.view();
     let mut counters = Counters::ZERO;
     let mut context =
         Context { scene: &scene, memory: &mut memory, frame: &frame, counters: &mut counters, outlet: None };

@@ -1,5 +1,6 @@
 //! What the tests of the whole share: small scenes of known radiance, and renders of them.
 
+pub mod lru;
 pub mod mapped;
 
 use glam::Vec3;

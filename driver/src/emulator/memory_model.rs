@@ -231,7 +231,11 @@ impl MeasuredMemory for Lines<'_> {
     }
 }
 
-impl<M: MemoryPort> MeasuredMemory for ModelledMemory<M> {
+impl<M: MemoryPort, E, L> MeasuredMemory for Counted<LineCaches<Counted<M>, E, L>>
+where
+    E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>,
+    L: AsRef<[Line]> + AsMut<[Line]>,
+{
     fn traffic(&self) -> MemoryTraffic {
         MemoryTraffic {
             requested: Self::traffic(self).clone(),

@@ -2,9 +2,12 @@
 
 pub mod direct;
 pub mod memory_model;
+pub mod trace;
 pub mod whole_frame;
 
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard, REFERENCE_SRAM_BYTES, ReferenceCard};
@@ -15,6 +18,8 @@ use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::budget::{MICRO, REFERENCE, TechniqueMemory};
 use photoncard_shared::message::{Fault, FaultCode};
 
+use self::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+use self::trace::{TraceFile, Traced};
 use crate::link::{LoopbackPort, loopback};
 
 /// The kind of chip on an emulated card.
@@ -58,24 +63,43 @@ const LINK_CAPACITY: usize = 64 << 10;
 /// Stack of a chip's thread: its buffers are built there before they move to the heap.
 const THREAD_STACK: usize = 8 << 20;
 
+/// What is modelled of a card's memory.
+pub struct MemoryModel {
+    /// Its caches.
+    pub caches: CacheSettings,
+    /// Where its reads are written to.
+    pub trace: Option<TraceFile>,
+}
+
+/// What a card whose memory is modelled leaves at its end.
+pub struct MemoryRecord {
+    /// What was read.
+    pub traffic: MemoryTraffic,
+    /// The trace, still to be finished.
+    pub trace: Option<TraceFile>,
+}
+
 /// A running emulated card. Its thread ends when the port is dropped.
 pub struct EmulatedCard {
-    thread: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<Option<MemoryRecord>>>,
     port: Option<LoopbackPort>,
+    trace_has_failed: Option<Arc<AtomicBool>>,
 }
 
 impl EmulatedCard {
-    /// Starts a card.
+    /// Starts a card; without a model its memory costs nothing and tells nothing.
     ///
     /// # Errors
     /// If the system has no thread for it.
-    pub fn start(kind: ChipKind) -> std::io::Result<Self> {
+    pub fn start(kind: ChipKind, model: Option<MemoryModel>) -> std::io::Result<Self> {
         let (host, card) = loopback(LINK_CAPACITY);
+        let trace = model.as_ref().and_then(|model| model.trace.as_ref());
+        let trace_has_failed = trace.map(TraceFile::has_failed);
         let thread = std::thread::Builder::new()
             .name("chip".into())
             .stack_size(THREAD_STACK)
-            .spawn(move || run(kind, card))?;
-        Ok(Self { thread: Some(thread), port: Some(host) })
+            .spawn(move || run(kind, model, card))?;
+        Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed })
     }
 
     /// The host's end of the link.
@@ -84,6 +108,21 @@ impl EmulatedCard {
     /// Never: the port is there until the card is dropped.
     pub fn port(&mut self) -> &mut LoopbackPort {
         self.port.as_mut().expect("the port lives as long as the card")
+    }
+
+    /// Whether its trace cannot be written.
+    pub fn trace_has_failed(&self) -> bool {
+        self.trace_has_failed.as_ref().is_some_and(|failed| failed.load(Ordering::Relaxed))
+    }
+
+    /// Ends the card. Returns what its memory leaves, if it is modelled.
+    ///
+    /// # Panics
+    /// If the chip did.
+    pub fn finish(mut self) -> Option<MemoryRecord> {
+        drop(self.port.take());
+        let record = self.thread.take()?.join();
+        record.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     }
 }
 
@@ -97,18 +136,43 @@ impl Drop for EmulatedCard {
     }
 }
 
-fn run(kind: ChipKind, mut port: LoopbackPort) {
-    // Both end when the host drops its end of the link: that is no error.
-    let _ = match kind {
+fn run(kind: ChipKind, model: Option<MemoryModel>, mut port: LoopbackPort) -> Option<MemoryRecord> {
+    let dram = GrowingMemory::new(match kind {
+        ChipKind::Reference => REFERENCE.dram_bytes,
+        ChipKind::Micro => MICRO.dram_bytes,
+    });
+    match model {
+        None => serve_on(kind, dram, &mut port, |_| None),
+        Some(MemoryModel { caches, trace }) => {
+            let memory = Traced::new(caches.over(dram), trace);
+            serve_on(kind, memory, &mut port, |memory| {
+                let trace = memory.take_trace();
+                Some(MemoryRecord { traffic: MeasuredMemory::traffic(memory.below()), trace })
+            })
+        }
+    }
+}
+
+/// Serves a card with some memory until the host drops its end of the link. Returns what `end` makes of the memory then.
+fn serve_on<M: CardMemory, R>(
+    kind: ChipKind,
+    memory: M,
+    port: &mut LoopbackPort,
+    end: impl FnOnce(&mut M) -> R,
+) -> R {
+    // The end of the link is no error: it is how the host ends a card.
+    match kind {
         ChipKind::Reference => {
-            let memory = GrowingMemory::new(REFERENCE.dram_bytes);
-            serve(&mut *Box::new(ReferenceCard::new(REFERENCE, memory)), &mut port)
+            let mut card = Box::new(ReferenceCard::new(REFERENCE, memory));
+            let _ = serve(&mut *card, port);
+            end(card.memory())
         }
         ChipKind::Micro => {
-            let memory = GrowingMemory::new(MICRO.dram_bytes);
-            serve(&mut *Box::new(MicroCard::new(MICRO, memory)), &mut port)
+            let mut card = Box::new(MicroCard::new(MICRO, memory));
+            let _ = serve(&mut *card, port);
+            end(card.memory())
         }
-    };
+    }
 }
 
 /// Card DRAM that takes host memory only for the lines that are written.

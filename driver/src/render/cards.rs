@@ -11,7 +11,9 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::link::Port;
 
 use super::{Observer, Phase, RenderError};
-use crate::emulator::{ChipKind, EmulatedCard};
+use crate::emulator::memory_model::{CacheSettings, MemoryTraffic};
+use crate::emulator::trace::TraceFile;
+use crate::emulator::{ChipKind, EmulatedCard, MemoryModel};
 use crate::session::{Job, LinkBytes, Picture, Session, SessionError};
 
 /// Where cards are: an argument of `--card`.
@@ -97,6 +99,11 @@ fn check_chips(chips: usize) -> Result<(), RenderError> {
     })
 }
 
+/// Whether there is one chip at some addresses, and it is emulated.
+pub(super) fn is_one_emulated_chip(addresses: &[CardAddress]) -> bool {
+    matches!(addresses, [CardAddress::Emulated { chips: 1, .. }])
+}
+
 /// Cards that have said hello.
 pub(super) struct Cards {
     cards: Vec<Connected>,
@@ -125,7 +132,7 @@ pub struct CardInfo {
 pub fn card_info(address: CardAddress) -> Result<CardInfo, RenderError> {
     let CardAddress::Emulated { kind, .. } = address;
     let nothing = Mutex::new(Picture::empty()?);
-    let cards = Cards::connect(&[CardAddress::Emulated { kind, chips: 1 }], &nothing)?;
+    let cards = Cards::connect(&[CardAddress::Emulated { kind, chips: 1 }], None, None, &nothing)?;
     let connected = &cards.cards[0];
     Ok(CardInfo { build: connected.session.build().to_owned(), budget: connected.budget })
 }
@@ -135,6 +142,8 @@ pub fn card_info(address: CardAddress) -> Result<CardInfo, RenderError> {
 pub(super) struct Outcome {
     pub(super) counters: Counters,
     pub(super) bytes: LinkBytes,
+    /// What was read, where memory is modelled.
+    pub(super) traffic: Option<MemoryTraffic>,
     pub(super) cards: usize,
     pub(super) load_seconds: f64,
     pub(super) render_seconds: f64,
@@ -154,6 +163,7 @@ struct Shared<'a> {
 struct CardOutcome {
     counters: Counters,
     bytes: LinkBytes,
+    traffic: Option<MemoryTraffic>,
     loaded: Duration,
 }
 
@@ -161,8 +171,13 @@ struct CardOutcome {
 const WAIT: Duration = Duration::from_millis(20);
 
 impl Cards {
-    /// Starts all cards and says hello to each.
-    pub(super) fn connect(addresses: &[CardAddress], picture: &Mutex<Picture>) -> Result<Self, RenderError> {
+    /// Starts all cards and says hello to each. With `caches` their memory is modelled, that of the first with `trace`.
+    pub(super) fn connect(
+        addresses: &[CardAddress],
+        caches: Option<CacheSettings>,
+        mut trace: Option<TraceFile>,
+        picture: &Mutex<Picture>,
+    ) -> Result<Self, RenderError> {
         let start = Instant::now();
         let kinds =
             addresses.iter().flat_map(|&CardAddress::Emulated { kind, chips }| (0..chips).map(move |_| kind));
@@ -170,8 +185,9 @@ impl Cards {
         let cards: Result<Vec<Connected>, RenderError> = kinds
             .enumerate()
             .map(|(index, kind)| {
-                let card =
-                    EmulatedCard::start(kind).map_err(|source| RenderError::Start { card: index, source })?;
+                let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
+                let card = EmulatedCard::start(kind, model)
+                    .map_err(|source| RenderError::Start { card: index, source })?;
                 greet(card, picture, start).map_err(|source| RenderError::Card { card: index, source })
             })
             .collect();
@@ -228,6 +244,7 @@ impl Cards {
         Ok(Outcome {
             counters: sum.counters,
             bytes: sum.bytes,
+            traffic: sum.traffic,
             cards,
             load_seconds: (loaded - begun).as_secs_f64(),
             render_seconds: (ended - loaded).as_secs_f64(),
@@ -240,6 +257,9 @@ impl CardOutcome {
         self.counters.add(&other.counters);
         self.bytes.payload += other.bytes.payload;
         self.bytes.wire += other.bytes.wire;
+        if let Some(traffic) = &other.traffic {
+            self.traffic.get_or_insert(MemoryTraffic::ZERO).add(traffic);
+        }
         self.loaded = self.loaded.max(other.loaded);
     }
 }
@@ -297,7 +317,7 @@ fn render_on(
     let Connected { mut card, mut session, .. } = connected;
     session.start(job, shared.start.elapsed());
     let mut outcome = CardOutcome::default();
-    while !session.is_done() {
+    while !session.is_done() && !card.trace_has_failed() {
         if shared.failed.load(Ordering::Relaxed) || shared.observer.is_stopped() {
             return Err(RenderError::Stopped);
         }
@@ -318,5 +338,9 @@ fn render_on(
     }
     outcome.counters = *session.counters();
     outcome.bytes = session.link_bytes();
+    if let Some(record) = card.finish() {
+        outcome.traffic = Some(record.traffic);
+        record.trace.map_or(Ok(()), TraceFile::finish)?;
+    }
     Ok(outcome)
 }

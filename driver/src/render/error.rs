@@ -5,6 +5,7 @@ use photoncard_shared::message::Fault;
 use crate::emulator::whole_frame::FrameError;
 use crate::error::SceneError;
 use crate::film::FilmError;
+use crate::output::OutputError;
 use crate::pack::PackError;
 use crate::photon::PhotonError;
 use crate::session::SessionError;
@@ -64,6 +65,9 @@ pub enum RenderError {
         #[diagnostic_source]
         source: SessionError,
     },
+    /// The trace cannot be written.
+    #[error(transparent)]
+    Trace(#[from] OutputError),
     /// The observer stopped the render.
     #[error("stopped before the picture was complete")]
     Stopped,
@@ -102,6 +106,7 @@ impl RenderError {
     pub fn is_input(&self) -> bool {
         match self {
             Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,
+            Self::Trace(error) => !matches!(error, OutputError::Write { .. }),
             Self::Image(_) | Self::Start { .. } | Self::Card { .. } | Self::Stopped => false,
         }
     }

@@ -2,15 +2,17 @@
 
 mod cards;
 mod error;
+mod memory;
 mod settings;
 mod statistics;
 
 pub use cards::{CardAddress, CardInfo, card_info};
 pub use error::RenderError;
+pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use photoncard_shared::budget::MOST_BINS;
 pub use photoncard_shared::message::Sampling;
 pub use settings::{LEAST_IRRADIANCE_ERROR, RenderSettings};
-pub use statistics::{LinkStatistics, Rays, Statistics, Times};
+pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -22,6 +24,7 @@ use photoncard_shared::message::FrameParameters;
 
 use self::cards::{Cards, Outcome};
 use crate::emitter::Emitters;
+use crate::emulator::trace::TraceFile;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 use crate::film::Film;
 use crate::pack::PackedScene;
@@ -82,11 +85,13 @@ pub fn render(
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
     let camera = scene.camera(settings.camera.as_deref())?;
+    settings.check_trace()?;
     if settings.order == GatherOrder::Hilbert {
         return render_whole_frame(scene, settings, camera, observer);
     }
     let picture = Mutex::new(Picture::empty()?);
-    let cards = Cards::connect(&settings.cards, &picture)?;
+    let trace = settings.trace.as_deref().map(TraceFile::create).transpose()?;
+    let cards = Cards::connect(&settings.cards, settings.modelled_caches(), trace, &picture)?;
     for budget in cards.budgets() {
         settings.check(&budget)?;
     }
@@ -129,10 +134,12 @@ fn render_whole_frame(
     };
     let begun = Instant::now();
     let job = CurveJob { image: &prepared.image, frame: &frame, tiles: &tiles, chips };
-    let CurveOutcome { counters, .. } = render_along_curve(job, None, &mut film, &progress)?;
+    let caches = settings.modelled_caches();
+    let CurveOutcome { counters, traffic } = render_along_curve(job, caches.as_ref(), &mut film, &progress)?;
     times.render = begun.elapsed().as_secs_f64();
     times.total = start.elapsed().as_secs_f64();
-    let outcome = Outcome { counters, cards: chips, render_seconds: times.render, ..Outcome::default() };
+    let traffic = caches.map(|_| traffic);
+    let outcome = Outcome { counters, traffic, cards: chips, ..Outcome::default() };
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
     Ok(Rendering { film, statistics })
 }
@@ -202,13 +209,19 @@ fn statistics(
         records: counters.records,
         interpolated_share: counters.interpolated_samples as f64 / counters.lambertian_samples.max(1) as f64,
         photons_tested: counters.photons_tested,
+        photons_taken: counters.photons_taken,
+        photons_selected: counters.photons_selected,
         photons_found: counters.photons_found,
+        drains: counters.drains,
+        most_waiting: counters.most_waiting,
+        flops: Flops::new(counters, frame),
         image_bytes: prepared.image.bytes(),
         link: LinkStatistics {
             payload_bytes: outcome.bytes.payload,
             wire_bytes: outcome.bytes.wire,
             retransmitted_frames: 0,
         },
+        memory: settings.modelled_caches().zip(outcome.traffic.as_ref()).map(MemoryStatistics::new),
         peak_memory_bytes: statistics::peak_memory_bytes(),
     }
 }

@@ -1,5 +1,7 @@
 //! What a render is asked to do.
 
+use std::path::PathBuf;
+
 use glam::Vec3;
 pub use photoncard_firmware::card::LEAST_IRRADIANCE_ERROR;
 use photoncard_firmware::card::MAX_PICTURE_SIDE;
@@ -7,7 +9,8 @@ use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::{Budget, MOST_BINS};
 use photoncard_shared::message::{self, FrameParameters, Sampling};
 
-use super::{CardAddress, RenderError};
+use super::{CardAddress, RenderError, cards};
+use crate::emulator::memory_model::CacheSettings;
 use crate::film::Window;
 use crate::photon::{PhotonLayout, PhotonSettings};
 use crate::scene::Camera;
@@ -54,6 +57,10 @@ pub struct RenderSettings {
     pub queue: Option<u32>,
     /// The cards to render on.
     pub cards: Vec<CardAddress>,
+    /// The caches that a chip's memory is modelled with; `None` to model none, which costs nothing.
+    pub caches: Option<CacheSettings>,
+    /// The file that every read of the chip is written to. It takes one chip; without `caches` those of the default.
+    pub trace: Option<PathBuf>,
 }
 
 impl Default for RenderSettings {
@@ -79,6 +86,8 @@ impl Default for RenderSettings {
             bins: None,
             queue: None,
             cards: vec![CardAddress::default()],
+            caches: None,
+            trace: None,
         }
     }
 }
@@ -140,6 +149,41 @@ impl RenderSettings {
             }),
             _ => Ok(()),
         }
+    }
+
+    /// The caches that memory is modelled with, if it is.
+    pub fn modelled_caches(&self) -> Option<CacheSettings> {
+        self.caches.or_else(|| self.trace.as_ref().map(|_| CacheSettings::default()))
+    }
+
+    /// Checks that the reads of the cards can be traced, if they are to be.
+    ///
+    /// # Errors
+    /// If there is no one order of them.
+    pub fn check_trace(&self) -> Result<(), RenderError> {
+        let Some(trace) = &self.trace else { return Ok(()) };
+        let refuse = |reason: &str, remedy: &str| {
+            let value = trace.display().to_string();
+            Err(RenderError::Setting {
+                option: "--trace",
+                value,
+                reason: reason.into(),
+                remedy: remedy.into(),
+            })
+        };
+        if self.order == GatherOrder::Hilbert {
+            return refuse(
+                "with --order hilbert no one chip reads the photon map",
+                "use another --order, such as sort",
+            );
+        }
+        if !cards::is_one_emulated_chip(&self.cards) {
+            return refuse(
+                "several chips read in no one order, and a chip that is not emulated tells nothing of its reads",
+                "use --card emulated:1 or --card emulated-micro:1",
+            );
+        }
+        Ok(())
     }
 
     /// What the photon map is to be.

@@ -1,6 +1,11 @@
 //! What a render took: the keys of `--stats`.
 
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::FrameParameters;
 use serde::Serialize;
+
+use super::MemoryStatistics;
+use crate::study::cost_model::{Cost, Symbols, Workload};
 
 /// The contents of the statistics file. Keys are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -33,12 +38,25 @@ pub struct Statistics {
     pub interpolated_share: f64,
     /// Photons whose distance was computed.
     pub photons_tested: u64,
+    /// Photons that were near enough to become candidates of a search.
+    pub photons_taken: u64,
+    /// Candidates that selections of the nearest went through.
+    pub photons_selected: u64,
     /// Photons that the searches returned.
     pub photons_found: u64,
+    /// Times that waiting gathers were taken out of a chip's queue.
+    pub drains: u64,
+    /// The most gathers that waited at once, on any chip.
+    pub most_waiting: u64,
+    /// Floating-point operations that the cost model of `docs/scaling.md` counts for the work.
+    pub flops: Flops,
     /// Bytes of the card image.
     pub image_bytes: u64,
     /// Bytes over all links.
     pub link: LinkStatistics,
+    /// Reads of card memory; absent where none is modelled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory: Option<MemoryStatistics>,
     /// The most memory the process has held, bytes; absent where the system does not tell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub peak_memory_bytes: Option<u64>,
@@ -72,6 +90,30 @@ pub struct Rays {
     pub gather: u64,
     /// Around irradiance records.
     pub survey: u64,
+}
+
+/// Floating-point operations of each unit of the chip, on all chips together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Flops {
+    /// All rays.
+    pub ray_caster: f64,
+    /// Importance tables and the irradiance cache.
+    pub controller: f64,
+    /// Searches of the photon map and all reflection.
+    pub gather_unit: f64,
+}
+
+impl Flops {
+    /// Of the work that was counted, each piece at its nominal cost.
+    pub(super) fn new(counters: &Counters, frame: &FrameParameters) -> Self {
+        let symbols = Symbols { gather_rays: frame.gather_rays as f64, ..Symbols::NOMINAL };
+        let cost = Cost::new(&Workload::counted(counters), &symbols);
+        Self {
+            ray_caster: cost.ray_caster.flops,
+            controller: cost.controller.flops,
+            gather_unit: cost.gather_unit.flops,
+        }
+    }
 }
 
 /// Bytes over all links.

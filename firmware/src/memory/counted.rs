@@ -39,8 +39,17 @@ impl<M> Counted<M> {
 impl<M: MemoryPort> MemoryPort for Counted<M> {
     #[inline(always)]
     fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault> {
-        self.traffic.count(self.stage, structure, used.end.saturating_sub(used.start));
-        self.memory.read(structure, address, used)
+        let bytes = used.end.saturating_sub(used.start);
+        // Where there is no memory nothing is read: of a cache's line that goes past the end it counts the lines before it.
+        let line = self.memory.read(structure, address, used)?;
+        self.traffic.count(self.stage, structure, bytes);
+        Ok(line)
+    }
+
+    #[inline(always)]
+    fn missed(&mut self, structure: Structure) {
+        self.traffic.count_miss(self.stage, structure);
+        self.memory.missed(structure);
     }
 
     #[inline(always)]

@@ -81,14 +81,19 @@ impl CacheShape {
         self.entries() * self.lines as usize
     }
 
-    /// The entries of the set of a block.
+    /// The set of a block: of the lines of card memory from `block` times those in a line of the cache on.
     #[inline(always)]
-    fn set(&self, block: u32) -> Range<usize> {
-        let set = match self.index {
+    pub fn set(&self, block: u32) -> u32 {
+        match self.index {
             SetIndex::Modulo => block % self.sets,
             SetIndex::Hashed => ((hash(block) as u64 * self.sets as u64) >> 32) as u32,
-        };
-        let first = set as usize * self.ways as usize;
+        }
+    }
+
+    /// The entries of the set of a block.
+    #[inline(always)]
+    fn entries_of(&self, block: u32) -> Range<usize> {
+        let first = self.set(block) as usize * self.ways as usize;
         first..first + self.ways as usize
     }
 }
@@ -117,22 +122,31 @@ pub struct LineCache<E, L> {
     /// By set; the most recently used of a set first.
     entries: E,
     lines: L,
+    /// Whether it is known to hold nothing: an image is loaded in thousands of writes, each of which clears it.
+    is_clear: bool,
+    /// The first line that was found to be outside the memory, while a line of the cache before it was filled.
+    end: u32,
 }
 
 impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Line]>> LineCache<E, L> {
     /// An empty cache; `None` if the buffers are not of the shape's size.
     pub fn new(shape: CacheShape, entries: E, lines: L) -> Option<Self> {
         let fits = entries.as_ref().len() == shape.entries() && lines.as_ref().len() == shape.lines();
-        let mut cache = Self { shape, entries, lines };
+        let mut cache = Self { shape, entries, lines, is_clear: false, end: u32::MAX };
         cache.clear();
         fits.then_some(cache)
     }
 
     /// Forgets all lines.
     pub fn clear(&mut self) {
+        if self.is_clear {
+            return;
+        }
         for (slot, entry) in (0..).zip(self.entries.as_mut()) {
             *entry = CacheEntry { block: NOTHING, slot };
         }
+        self.is_clear = true;
+        self.end = u32::MAX;
     }
 
     /// The line at an address; what is not there is read from `memory`.
@@ -143,11 +157,12 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
         structure: Structure,
         address: LineAddress,
     ) -> Result<&Line, Fault> {
-        let block = address.0 / self.shape.lines;
-        if block == NOTHING {
+        // The last line of 2^32 is not used: its block may be NOTHING.
+        if address.0 >= self.end {
             return Err(outside(address));
         }
-        let set = self.entries.as_mut().get_mut(self.shape.set(block));
+        let block = address.0 / self.shape.lines;
+        let set = self.entries.as_mut().get_mut(self.shape.entries_of(block));
         let set = set.ok_or_else(|| outside(address))?;
         let way = set.iter().position(|entry| entry.block == block);
         let recent = match way {
@@ -163,8 +178,13 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
                 let lines = self.lines.as_mut().get_mut(held).ok_or_else(|| outside(address))?;
                 if way.is_none() {
                     entry.block = NOTHING;
-                    fill(lines, memory, structure, address, block)?;
+                    let end = fill(lines, memory, structure, address, block)?;
                     entry.block = block;
+                    if let Some(end) = end {
+                        self.end = end;
+                    }
+                    self.is_clear = false;
+                    memory.missed(structure);
                 }
                 let line = lines.get((address.0 % self.shape.lines) as usize);
                 return line.ok_or_else(|| outside(address));
@@ -174,7 +194,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
     }
 }
 
-/// Reads a block of lines; of those beside the one at `address` some may be outside the memory.
+/// Reads a block of lines. Those after the one at `address` may be outside the memory: returns the first that is.
 #[inline(always)]
 fn fill(
     lines: &mut [Line],
@@ -182,16 +202,17 @@ fn fill(
     structure: Structure,
     address: LineAddress,
     block: u32,
-) -> Result<(), Fault> {
+) -> Result<Option<u32>, Fault> {
     let first = block * lines.len() as u32;
     for (number, line) in (first..=u32::MAX).zip(lines) {
         match memory.read(structure, LineAddress(number), 0..LINE_BYTES as u32) {
             Ok(read) => *line = *read,
-            Err(fault) if number == address.0 => return Err(fault),
-            Err(_) => {}
+            Err(_) if number > address.0 => return Ok(Some(number)),
+            // Memory ends once: the line asked for comes after one that is not there.
+            Err(fault) => return Err(Fault { detail: address.0, ..fault }),
         }
     }
-    Ok(())
+    Ok(None)
 }
 
 /// A memory behind caches: one for the photon map and one for the scene, or one for both. Every tile begins with empty

@@ -29,6 +29,10 @@ pub trait MemoryPort {
     #[inline(always)]
     fn enter(&mut self, _: Stage) {}
 
+    /// Tells that the lines just read filled one line of a cache above.
+    #[inline(always)]
+    fn missed(&mut self, _: Structure) {}
+
     /// Tells that a tile begins: its reads depend on no tile before it.
     #[inline(always)]
     fn begin_tile(&mut self) {}

@@ -38,14 +38,17 @@ pub struct Reads {
     pub requests: u64,
     /// Bytes that were asked for.
     pub bytes: u64,
+    /// Lines that a cache above missed, in its own size; 0 above all caches.
+    pub misses: u64,
 }
 
 impl Reads {
-    const ZERO: Self = Self { requests: 0, bytes: 0 };
+    const ZERO: Self = Self { requests: 0, bytes: 0, misses: 0 };
 
     fn add(&mut self, other: &Self) {
         self.requests += other.requests;
         self.bytes += other.bytes;
+        self.misses += other.misses;
     }
 }
 
@@ -77,6 +80,13 @@ impl Traffic {
         reads.bytes += bytes as u64;
     }
 
+    /// Counts a line that a cache above missed.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "stages and structures number the rows and columns")]
+    pub(super) fn count_miss(&mut self, stage: Stage, structure: Structure) {
+        self.reads[stage as usize][structure as usize].misses += 1;
+    }
+
     /// The reads of a structure in a stage.
     #[expect(clippy::indexing_slicing, reason = "stages and structures number the rows and columns")]
     pub fn reads(&self, stage: Stage, structure: Structure) -> Reads {
@@ -86,10 +96,14 @@ impl Traffic {
     /// The reads of some structures in all stages of tiles: in all but [`Stage::Begin`], which every chip goes through and
     /// not every tile.
     pub fn of_tiles(&self, chosen: impl Fn(Structure) -> bool) -> Reads {
+        self.sum(|stage, structure| stage != Stage::Begin && chosen(structure))
+    }
+
+    /// The reads of some structures in some stages.
+    pub fn sum(&self, chosen: impl Fn(Stage, Structure) -> bool) -> Reads {
         let mut sum = Reads::ZERO;
-        let stages = Stage::ALL.into_iter().filter(|&stage| stage != Stage::Begin);
-        for stage in stages {
-            let structures = Structure::ALL.into_iter().filter(|&structure| chosen(structure));
+        for stage in Stage::ALL {
+            let structures = Structure::ALL.into_iter().filter(|&structure| chosen(stage, structure));
             structures.for_each(|structure| sum.add(&self.reads(stage, structure)));
         }
         sum

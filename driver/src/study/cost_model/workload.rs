@@ -1,5 +1,7 @@
 //! What one frame takes, by the symbols or as a run counted it.
 
+use photoncard_shared::counters::Counters;
+
 use super::Symbols;
 
 /// What one frame takes, on all chips together. A run fills it with what it counted, Table 7.1 with what it expects.
@@ -73,6 +75,22 @@ impl Workload {
             tiles: symbols.tiles,
             bytes_to_host: pixels * symbols.pixel_bytes,
             bytes_from_host: symbols.tiles * symbols.command_bytes,
+            ..Self::default()
+        }
+    }
+
+    /// The work that chips counted; bytes and tiles are not counted there and left at zero.
+    pub fn counted(counters: &Counters) -> Self {
+        Self {
+            eye_rays: counters.eye_rays as f64,
+            shadow_rays: counters.shadow_rays as f64,
+            gather_rays: counters.gather_rays as f64,
+            survey_rays: counters.survey_rays as f64,
+            ray_gathers: (counters.gathers - counters.tables) as f64,
+            table_gathers: counters.tables as f64,
+            photons_per_gather: counters.photons_found as f64 / counters.gathers.max(1) as f64,
+            interpolated_samples: counters.interpolated_samples as f64,
+            records: counters.records as f64,
             ..Self::default()
         }
     }

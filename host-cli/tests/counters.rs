@@ -1,0 +1,167 @@
+//! Modelled memory: what is counted adds up, what is traced is what is counted, and the picture is the same.
+
+mod support;
+
+use serde_json::Value;
+use support::{Room, scene, shipped};
+
+const KEYS: [&str; 5] = ["requests", "raw_bytes", "line_hits", "line_misses", "dram_bytes"];
+
+fn statistics(room: &Room, name: &str) -> Value {
+    serde_json::from_slice(&room.read(name)).unwrap()
+}
+
+/// A count below `memory`.
+fn count(statistics: &Value, pointer: &str, key: &str) -> u64 {
+    let count = statistics.pointer(&format!("/memory/{pointer}/{key}")).and_then(Value::as_u64);
+    count.unwrap_or_else(|| panic!("no memory/{pointer}/{key} in {statistics:#}"))
+}
+
+/// The sum of a count over some parts.
+fn sum(statistics: &Value, part: &str, names: &[&str], key: &str) -> u64 {
+    names.iter().map(|name| count(statistics, &format!("{part}/{name}"), key)).sum()
+}
+
+fn check_sums(statistics: &Value) {
+    let photon_map = ["photon_nodes", "photons"];
+    let scene = ["nodes", "triangles", "materials", "emitters"];
+    let stages = ["eye", "survey", "table", "shadow", "gather_ray", "gather"];
+    for key in KEYS {
+        let halves = ["photon_map", "scene"].map(|half| count(statistics, half, key));
+        assert_eq!(sum(statistics, "structures", &photon_map, key), halves[0], "{key}");
+        assert_eq!(sum(statistics, "structures", &scene, key), halves[1], "{key}");
+        assert_eq!(sum(statistics, "stages", &stages, key), halves[0] + halves[1], "{key}");
+        assert!(halves.iter().all(|&half| half > 0), "{key}: {halves:?}");
+    }
+    for half in ["photon_map", "scene"] {
+        let of = |key| count(statistics, half, key);
+        assert_eq!(of("line_hits") + of("line_misses"), of("requests"), "{half}");
+    }
+}
+
+#[test]
+fn counters_add_up_and_change_no_picture() {
+    let room = Room::new();
+    let cornell = shipped("cornell-glossy.gltf");
+    let render = |name: &str, options: &[&str]| {
+        let (exr, json) = (format!("{name}.exr"), format!("{name}.json"));
+        let common = ["-o", &exr, "--stats", &json, "--size", "20x20", "--photons", "3000"];
+        room.rendered(&cornell, &[&common, options].concat())
+    };
+    let plain = render("plain", &[]);
+    assert!(!plain.stderr.contains("memory"), "{}", plain.stderr);
+    let without = statistics(&room, "plain.json");
+    assert!(without.get("memory").is_none());
+    for key in ["photons_taken", "photons_selected", "drains", "most_waiting"] {
+        assert!(without[key].as_u64().is_some_and(|count| count > 0), "{key}");
+    }
+    for unit in ["ray_caster", "controller", "gather_unit"] {
+        assert!(without["flops"][unit].as_f64().is_some_and(|flops| flops > 0.0), "{unit}");
+    }
+    for (name, caches, options) in [
+        ("default", "photon=128K/128/4,scene=75K/128/4", &["--counters"][..]),
+        ("small", "photon=1K/128/2,scene=2K/256/2,index=hash", &["--card", "emulated:2"]),
+        ("unified", "unified=4K/512/8", &["--card", "emulated-micro:1", "--counters"]),
+        ("lines", "photon=1536/128/4,scene=75K/128/4", &["--photon-map", "lines"]),
+        ("curve", "unified=32K/128/256", &["--order", "hilbert"]),
+        ("records", "unified=8K/128/1", &["--irradiance-cache", "on"]),
+    ] {
+        let outcome = render(name, &[&["--cache", caches], options].concat());
+        assert!(name == "records" || room.read(&format!("{name}.exr")) == room.read("plain.exr"), "{name}");
+        let told: Vec<_> = outcome.stderr.lines().filter(|line| line.contains("DRAM")).collect();
+        assert_eq!(told.len(), 3, "{}", outcome.stderr);
+        let statistics = statistics(&room, &format!("{name}.json"));
+        assert_eq!(statistics["memory"]["caches"], caches);
+        check_sums(&statistics);
+        let is_counted = |part: &str| count(&statistics, part, "requests") > 0;
+        assert_eq!(is_counted("structures/photon_nodes"), name == "lines");
+        assert_eq!(is_counted("stages/survey"), name == "records");
+    }
+}
+
+#[test]
+fn a_trace_has_a_line_for_every_request_and_every_tile() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    room.rendered("scene.gltf", &["-o", "plain.exr", "--tile", "4"]);
+    for (card, layout) in [("emulated:1", "jensen"), ("emulated-micro:1", "lines")] {
+        let files = ["-o", "a.exr", "--stats", "a.json", "--trace", "a.din.zst"];
+        let options = ["--card", card, "--photon-map", layout, "--tile", "4", "--quiet"];
+        let outcome = room.rendered("scene.gltf", &[&files[..], &options].concat());
+        assert_eq!(outcome.stderr, "");
+        assert!(room.read("a.exr") == room.read("plain.exr"));
+        let statistics = statistics(&room, "a.json");
+        check_sums(&statistics);
+        let text = String::from_utf8(zstd::decode_all(&*room.read("a.din.zst")).unwrap()).unwrap();
+        assert!(text.starts_with("4 0\n") && text.ends_with('\n'));
+        let image_bytes = statistics["image_bytes"].as_u64().unwrap();
+        let [mut requests, mut tiles] = [0_u64; 2];
+        for line in text.lines() {
+            match line.split_once(' ').unwrap() {
+                ("4", "0") => tiles += 1,
+                ("0", address) if u64::from_str_radix(address, 16).unwrap() < image_bytes => requests += 1,
+                _ => panic!("{line}"),
+            }
+        }
+        let counted = ["photon_map", "scene"].map(|half| count(&statistics, half, "requests"));
+        assert_eq!((tiles, requests), (4, counted[0] + counted[1]));
+    }
+}
+
+#[test]
+fn a_trace_is_of_one_chip() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let before = room.names();
+    for (options, words) in [
+        (&["--card", "emulated:2"][..], ["several chips", "--card emulated:1"]),
+        (&["--card", "emulated:1", "--card", "emulated:1"], ["several chips", "--card emulated:1"]),
+        (&["--card", "emulated:1", "--order", "hilbert"], ["--order hilbert", "such as sort"]),
+        (&["--card", "emulated:1", "--trace", "absent/a.zst"], ["folder absent", "create it"]),
+        (&["--card", "emulated:1", "--trace", "out.exr"], ["another output", "a name of its own"]),
+    ] {
+        let trace = if options.contains(&"--trace") { &[][..] } else { &["--trace", "a.zst"] };
+        let outcome = room.render("scene.gltf", &[&["-o", "out.exr"], options, trace].concat());
+        assert_eq!(outcome.status, Some(2), "{options:?}: {}", outcome.stderr);
+        for word in words {
+            assert!(outcome.stderr.contains(word), "{options:?}: {word:?} is not in: {}", outcome.stderr);
+        }
+        assert_eq!(room.names(), before);
+    }
+}
+
+#[test]
+fn what_is_no_cache_is_refused_with_what_is() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for (cache, words) in [
+        ("128K", "such as photon=128K/128/4"),
+        ("photon=128K/64/4", "128 bytes"),
+        ("photon=128K/128/3", "whole number of sets"),
+        ("unified=128K/128/4,scene=1K/128/1", "one or the other"),
+        ("unified=128K/128/4,index=best", "use modulo or hash"),
+    ] {
+        let outcome = room.render("scene.gltf", &["-o", "a.exr", "--cache", cache]);
+        assert_eq!(outcome.status, Some(2), "{cache}: {}", outcome.stderr);
+        assert!(outcome.stderr.contains(words) && outcome.stderr.contains("--cache"), "{}", outcome.stderr);
+        assert_eq!(room.names(), ["scene.gltf"]);
+    }
+}
+
+/// A shell that lets a process write no larger file: the trace is the first that grows beyond it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_trace_that_cannot_be_written_ends_the_render() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    let options = ["-o", "a.exr", "--trace", "a.din.zst", "--card", "emulated:1", "--size", "64x64"];
+    let limited = "ulimit -f 8; trap '' XFSZ; exec \"$0\" \"$@\"";
+    let program = room.command().get_program().to_owned();
+    let mut shell = std::process::Command::new("sh");
+    shell.current_dir(room.path("")).args(["-c", limited]).arg(program);
+    let output = shell.args(support::small_render(&cornell, &options)).output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("cannot write a.din.zst") && message.contains("free space"), "{message}");
+    assert_eq!(room.names(), [""; 0]);
+}

@@ -1,0 +1,125 @@
+//! Caches of lines: they hit and miss as their definition does, and hold what memory holds.
+
+use photoncard_firmware::memory::{
+    CacheEntry, CacheShape, CardMemory, Counted, Dram, LineCache, LineCaches, Lines, MemoryPort, SetIndex,
+    Stage,
+};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::message::{Fault, FaultCode};
+use photoncard_tests::lru::LruOracle;
+use proptest::prelude::*;
+
+/// Lines of which no two are alike.
+fn numbered(count: u32) -> Vec<Line> {
+    (0..count)
+        .map(|number| {
+            let mut line = Line::ZERO;
+            line.0[..4].copy_from_slice(&number.to_le_bytes());
+            line.0[124..].copy_from_slice(&number.to_be_bytes());
+            line
+        })
+        .collect()
+}
+
+fn cache(shape: CacheShape) -> LineCache<Vec<CacheEntry>, Vec<Line>> {
+    let entries = vec![CacheEntry::EMPTY; shape.entries()];
+    LineCache::new(shape, entries, vec![Line::ZERO; shape.lines()]).expect("buffers of its size")
+}
+
+/// Shapes of all kinds: sets and ways, lines of card memory in a line, index.
+fn shapes() -> impl Strategy<Value = (u32, u32, u32, SetIndex)> {
+    let sets = prop_oneof![Just(1), Just(4), 1_u32..14];
+    let ways = prop_oneof![Just(1), Just(4), 1_u32..10];
+    (sets, ways, 1_u32..=8, prop_oneof![Just(SetIndex::Modulo), Just(SetIndex::Hashed)])
+}
+
+/// Addresses below `end`: some anywhere, some again soon, some in a row.
+fn addresses(end: u32) -> impl Strategy<Value = Vec<u32>> {
+    let run = (0..end, 1_u32..5, 1_usize..40);
+    let runs = proptest::collection::vec(run, 1..60);
+    runs.prop_map(move |runs| {
+        let of_run = |(first, stride, count)| (0..count as u32).map(move |i| (first + i * stride) % end);
+        runs.into_iter().flat_map(of_run).collect()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_cache_hits_and_misses_as_its_definition_does(
+        (sets, ways, lines, index) in shapes(),
+        (count, addresses) in (1_u32..700).prop_flat_map(|count| (Just(count), addresses(count))),
+        clear_every in 50_usize..400,
+    ) {
+        let line_bytes = lines * LINE_BYTES as u32;
+        let shape = CacheShape::new(sets * ways * line_bytes, line_bytes, ways, index).unwrap();
+        let of_block = move |block| match index {
+            SetIndex::Modulo => block % sets,
+            SetIndex::Hashed => shape.set(block),
+        };
+        let content = numbered(count);
+        let mut memory = LineCaches::unified(Counted::new(Lines(&content)), cache(shape));
+        let mut oracle = LruOracle::new(sets, ways, lines, of_block);
+        let [mut misses, mut fetched] = [0, 0];
+        for (access, &address) in addresses.iter().enumerate() {
+            if access % clear_every == 0 {
+                memory.begin_tile();
+                oracle = LruOracle::new(sets, ways, lines, of_block);
+            }
+            if !oracle.hits(address) {
+                misses += 1;
+                let first = address / lines * lines;
+                fetched += u64::from(lines.min(count - first));
+            }
+            let read = *memory.read(Structure::Photons, LineAddress(address), 0..20).unwrap();
+            prop_assert_eq!(read, content[address as usize]);
+            let reads = memory.below().traffic().reads(Stage::Begin, Structure::Photons);
+            prop_assert_eq!([reads.misses, reads.requests], [misses, fetched], "access {} of {}", access, address);
+            prop_assert_eq!(reads.bytes, fetched * LINE_BYTES as u64);
+        }
+    }
+
+    /// Whatever was read before, in whatever order: the right line inside the memory, a fault outside.
+    #[test]
+    fn a_cache_has_no_line_that_its_memory_has_not(
+        (sets, ways, lines, index) in shapes(),
+        count in 1_u32..60,
+        addresses in addresses(80),
+    ) {
+        let line_bytes = lines * LINE_BYTES as u32;
+        let shape = CacheShape::new(sets * ways * line_bytes, line_bytes, ways, index).unwrap();
+        let content = numbered(count);
+        let mut memory = LineCaches::unified(Lines(&content), cache(shape));
+        for address in addresses {
+            let read = memory.read(Structure::Nodes, LineAddress(address), 0..128).copied();
+            let fault = Fault { code: FaultCode::LineRange, detail: address };
+            prop_assert_eq!(read, content.get(address as usize).copied().ok_or(fault));
+        }
+    }
+}
+
+#[test]
+fn hashed_sets_are_used_evenly() {
+    let shape = CacheShape::new(100 * 128, 128, 1, SetIndex::Hashed).unwrap();
+    let mut blocks = [0; 100];
+    (0..100_000).for_each(|block| blocks[shape.set(block * 64) as usize] += 1);
+    assert!(blocks.iter().all(|count| (850..1150).contains(count)), "{blocks:?}");
+}
+
+#[test]
+fn what_is_written_is_read_and_not_what_was_cached() {
+    let mut lines = vec![Line::ZERO; 8];
+    let shape = CacheShape::new(1024, 512, 2, SetIndex::Modulo).unwrap();
+    let mut memory = LineCaches::new(Dram::new(&mut lines), cache(shape), cache(shape));
+    for value in 1..4 {
+        for structure in [Structure::Photons, Structure::Nodes] {
+            for first in [0, 5] {
+                memory.write(LineAddress(first), 2).unwrap().fill(Line([value; LINE_BYTES]));
+                let read = memory.read(structure, LineAddress(first + 1), 0..128).unwrap();
+                assert_eq!(read.0, [value; LINE_BYTES]);
+            }
+        }
+    }
+    assert!(memory.write(LineAddress(7), 2).is_none());
+}

@@ -1,0 +1,288 @@
+//! The model of a chip's memory: it counts what is read and what its caches miss, and it changes no picture.
+
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
+use photoncard_driver::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::photon::{MappedImage, PhotonLayout, map_photons};
+use photoncard_driver::render::{MemoryStatistics, ReadStatistics, RenderSettings, Statistics};
+use photoncard_driver::scene::{Scene, gltf};
+use photoncard_driver::scheduler::{GatherOrder, tiles};
+use photoncard_firmware::chip::ReferenceChip;
+use photoncard_firmware::memory::{
+    CacheEntry, CacheShape, Counted, LineCache, LineCaches, Lines, MemoryPort, SetIndex, Stage,
+};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::layout::{BvhNode, Material, Photon, PhotonTreelet, Record};
+use photoncard_shared::message::{Fault, Tile};
+use photoncard_tests::lru::LruOracle;
+use photoncard_tests::{radiances, render_or_panic, with_room_for_a_card};
+
+fn glossy() -> Scene {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf");
+    gltf::load(path.as_ref()).expect("a shipped scene loads")
+}
+
+fn settings() -> RenderSettings {
+    RenderSettings {
+        width: 21,
+        height: 18,
+        photons: 5000,
+        neighbors: 30,
+        gather_rays: 8,
+        shadow_rays: 2,
+        tile: 8,
+        cards: vec!["emulated:1".parse().unwrap()],
+        ..RenderSettings::default()
+    }
+}
+
+fn caches(text: &str) -> CacheSettings {
+    text.parse().unwrap()
+}
+
+/// Small enough to miss a lot.
+const SPLIT: &str = "photon=16K/128/4,scene=16K/128/4";
+const UNIFIED: &str = "unified=9K/384/3,index=hash";
+
+/// A scene's image, and the tiles of a frame of it.
+struct Frame {
+    mapped: MappedImage,
+    frame: photoncard_shared::message::FrameParameters,
+    tiles: Vec<Tile>,
+}
+
+impl Frame {
+    fn new(settings: &RenderSettings) -> Self {
+        let scene = glossy();
+        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+        let mapped = map_photons(packed, &settings.photon_settings(), &|_| true).unwrap();
+        let frame = settings.frame(scene.camera(None).unwrap(), mapped.max_distance);
+        Self { mapped, frame, tiles: tiles(settings.window(), settings.tile, settings.order) }
+    }
+
+    fn lines(&self) -> Lines<'_> {
+        self.mapped.image.view().1
+    }
+
+    fn tile(&self, chip: &mut ReferenceChip, memory: impl MeasuredMemory, tile: Tile) -> RenderedTile {
+        let (scene, _) = self.mapped.image.view();
+        render_tile(chip, &scene, memory, &self.frame, tile, None).expect("a sound image")
+    }
+}
+
+/// Writes down the lines that a tile reads, and compares them with the image's.
+struct Recorder<'a, M> {
+    memory: M,
+    image: &'a [Line],
+    reads: &'a mut Vec<(Structure, u32)>,
+}
+
+impl<M: MemoryPort> MemoryPort for Recorder<'_, M> {
+    fn read(
+        &mut self,
+        structure: Structure,
+        address: LineAddress,
+        used: std::ops::Range<u32>,
+    ) -> Result<&Line, Fault> {
+        self.reads.push((structure, address.0));
+        let line = self.memory.read(structure, address, used)?;
+        assert_eq!(*line, self.image[address.0 as usize]);
+        Ok(line)
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        self.memory.enter(stage);
+    }
+
+    fn begin_tile(&mut self) {
+        self.reads.clear();
+        self.memory.begin_tile();
+    }
+}
+
+impl<M: MeasuredMemory> MeasuredMemory for Recorder<'_, M> {
+    fn traffic(&self) -> MemoryTraffic {
+        self.memory.traffic()
+    }
+}
+
+#[test]
+fn a_tile_hits_and_misses_as_the_definition_of_its_caches_says() {
+    with_room_for_a_card(|| {
+        let mut chip = Box::new(ReferenceChip::new());
+        let split = |_| LruOracle::new(32, 4, 1, |block| block % 32);
+        let shape = CacheShape::new(9 << 10, 384, 3, SetIndex::Hashed).unwrap();
+        for layout in [PhotonLayout::Jensen, PhotonLayout::Lines] {
+            let frame = Frame::new(&RenderSettings { photon_layout: layout, ..settings() });
+            for text in [SPLIT, UNIFIED] {
+                let mut reads = Vec::new();
+                let image = frame.mapped.image.lines();
+                let memory = Recorder { memory: caches(text).over(frame.lines()), image, reads: &mut reads };
+                let traffic = frame.tile(&mut chip, memory, frame.tiles[4]).traffic;
+                let mut oracles = match text {
+                    SPLIT => Vec::from([0, 1].map(split)),
+                    _ => vec![LruOracle::new(8, 3, 3, move |block| shape.set(block))],
+                };
+                let mut misses = [0; Structure::ALL.len()];
+                for &(structure, line) in &reads {
+                    let oracle = usize::from(structure.is_photon_map()) % oracles.len();
+                    misses[structure as usize] += u64::from(!oracles[oracle].hits(line));
+                }
+                for structure in Structure::ALL {
+                    let count = reads.iter().filter(|(read, _)| *read == structure).count() as u64;
+                    let [requested, fetched] = traffic.of(|other| other == structure);
+                    let counted = [requested.requests, fetched.misses];
+                    assert_eq!(counted, [count, misses[structure as usize]], "{structure:?}, {text}");
+                }
+                let of_photons = misses[Structure::Photons as usize];
+                assert!(of_photons > 100 && of_photons < reads.len() as u64 / 2, "{of_photons}");
+            }
+        }
+    });
+}
+
+/// The caches of a board lie in arrays.
+#[test]
+fn a_cache_in_arrays_is_the_cache_in_vectors() {
+    with_room_for_a_card(|| {
+        let mut chip = Box::new(ReferenceChip::new());
+        let frame = Frame::new(&settings());
+        let shape = CacheShape::new(16 << 10, 128, 4, SetIndex::Modulo).unwrap();
+        let in_array = || LineCache::new(shape, [CacheEntry::EMPTY; 128], [Line::ZERO; 128]).unwrap();
+        for tile in &frame.tiles[..3] {
+            let dram = Counted::new(frame.lines());
+            let board = Counted::new(LineCaches::new(dram, in_array(), in_array()));
+            let board = frame.tile(&mut chip, board, *tile);
+            let emulated = frame.tile(&mut chip, caches(SPLIT).over(frame.lines()), *tile);
+            let direct = frame.tile(&mut chip, frame.lines(), *tile);
+            assert_eq!(board.traffic, emulated.traffic);
+            assert_eq!(direct.traffic, MemoryTraffic::ZERO);
+            let (scene, _) = frame.mapped.image.view();
+            let pixels = |rendered: &RenderedTile| -> Vec<_> {
+                rendered.sums.iter().map(|sum| sum.pixel(&scene, &frame.frame).to_bytes()).collect()
+            };
+            assert!(pixels(&board) == pixels(&direct) && pixels(&emulated) == pixels(&direct));
+            assert_eq!([board.counters, emulated.counters], [direct.counters; 2]);
+        }
+    });
+}
+
+#[test]
+fn counting_changes_no_picture() {
+    let scene = glossy();
+    let expected = radiances(&render_or_panic(&scene, &settings()).film);
+    let orders = [
+        GatherOrder::Naive,
+        GatherOrder::Tiled,
+        GatherOrder::DirectionBins,
+        GatherOrder::Hash,
+        GatherOrder::Sort,
+        GatherOrder::Hilbert,
+    ];
+    for order in orders {
+        for photon_layout in [PhotonLayout::Jensen, PhotonLayout::Lines] {
+            for (card, text) in
+                [("emulated:2", SPLIT), ("emulated-micro:2", UNIFIED), ("emulated:2", UNIFIED)]
+            {
+                if order == GatherOrder::Hilbert && card != "emulated:2" {
+                    continue;
+                }
+                let caches = Some(caches(text));
+                let cards = vec![card.parse().unwrap()];
+                let counted = RenderSettings { order, photon_layout, caches, cards, ..settings() };
+                let counted_picture = render_or_panic(&scene, &counted);
+                assert!(radiances(&counted_picture.film) == expected, "{counted:?}");
+                let direct = RenderSettings { caches: None, ..counted.clone() };
+                let direct = render_or_panic(&scene, &direct);
+                assert!(radiances(&direct.film) == expected, "{order:?}");
+                let counted = counted_picture.statistics;
+                let work = |s: &Statistics| (s.rays, s.gathers, s.photons_tested, s.photons_taken, s.drains);
+                assert_eq!(work(&counted), work(&direct.statistics));
+                assert!(direct.statistics.memory.is_none() && counted.memory.is_some());
+            }
+        }
+    }
+}
+
+fn measured(settings: &RenderSettings) -> (MemoryStatistics, Statistics) {
+    let statistics = render_or_panic(&glossy(), settings).statistics;
+    (statistics.memory.clone().expect("memory is modelled"), statistics)
+}
+
+#[test]
+fn what_is_counted_does_not_depend_on_how_tiles_are_dealt() {
+    let irradiance_cache = (Some(0.05), GatherOrder::Sort);
+    for (irradiance_error, order) in [(None, GatherOrder::Sort), (None, GatherOrder::Naive), irradiance_cache]
+    {
+        let with = |cards: &str| RenderSettings {
+            irradiance_error,
+            order,
+            caches: Some(caches(SPLIT)),
+            cards: vec![cards.parse().unwrap()],
+            ..settings()
+        };
+        let (one, statistics) = measured(&with("emulated:1"));
+        assert_eq!(one.written_bytes, statistics.image_bytes);
+        for chips in 2..4 {
+            let (several, statistics) = measured(&with(&format!("emulated:{chips}")));
+            assert_eq!(several.written_bytes, chips * statistics.image_bytes);
+            assert_eq!(MemoryStatistics { written_bytes: one.written_bytes, ..several }, one);
+        }
+        // Chips without cards, one for all tiles, the last tile first.
+        with_room_for_a_card(|| {
+            let frame = Frame::new(&with("emulated:1"));
+            let mut chip = Box::new(ReferenceChip::new());
+            let mut traffic = MemoryTraffic::ZERO;
+            for tile in frame.tiles.iter().rev() {
+                traffic.add(&frame.tile(&mut chip, caches(SPLIT).over(frame.lines()), *tile).traffic);
+            }
+            assert_eq!(traffic.photon_map_bytes(), one.photon_map.dram_bytes);
+            assert_eq!(traffic.scene_bytes(), one.scene.dram_bytes);
+        });
+    }
+}
+
+#[test]
+fn counts_are_of_whole_records_and_whole_lines() {
+    for (photon_layout, irradiance_error) in [(PhotonLayout::Jensen, None), (PhotonLayout::Lines, Some(0.05))]
+    {
+        let settings =
+            RenderSettings { photon_layout, irradiance_error, caches: Some(caches(SPLIT)), ..settings() };
+        let (memory, statistics) = measured(&settings);
+        let structures = &memory.structures;
+        let is_jensen = photon_layout == PhotonLayout::Jensen;
+        let of_photon = if is_jensen { Photon::BYTES } else { LINE_BYTES };
+        let node = PhotonTreelet::NODE_BYTES as usize;
+        for (reads, record) in [
+            (structures.nodes, BvhNode::BYTES),
+            (structures.materials, Material::BYTES),
+            (structures.photon_nodes, node),
+            (structures.photons, of_photon),
+        ] {
+            assert_eq!(reads.raw_bytes, reads.requests * record as u64, "{record}");
+        }
+        let all = [
+            structures.nodes,
+            structures.triangles,
+            structures.materials,
+            structures.emitters,
+            structures.photon_nodes,
+            structures.photons,
+        ];
+        for reads in all {
+            assert_eq!(reads.line_hits + reads.line_misses, reads.requests);
+            assert_eq!(reads.dram_bytes, reads.line_misses * LINE_BYTES as u64);
+        }
+        let requests = |parts: &[ReadStatistics]| parts.iter().map(|reads| reads.requests).sum::<u64>();
+        let halves = requests(&[memory.photon_map, memory.scene]);
+        assert_eq!(requests(&all), halves);
+        let stages = memory.stages;
+        let of_rays = [stages.eye, stages.survey, stages.shadow, stages.gather_ray];
+        assert_eq!(requests(&of_rays), memory.scene.requests);
+        assert_eq!(requests(&[stages.table, stages.gather]), memory.photon_map.requests);
+        assert!(structures.nodes.requests > 0 && structures.triangles.requests > 0);
+        assert_eq!(structures.photons.requests == statistics.photons_tested, is_jensen);
+        assert_eq!(structures.photon_nodes.requests == 0, is_jensen);
+    }
+}
