@@ -158,11 +158,7 @@ fn a_cache_in_arrays_is_the_cache_in_vectors() {
             let direct = frame.tile(&mut chip, frame.lines(), *tile);
             assert_eq!(board.traffic, emulated.traffic);
             assert_eq!(direct.traffic, MemoryTraffic::ZERO);
-            let (scene, _) = frame.mapped.image.view();
-            let pixels = |rendered: &RenderedTile| -> Vec<_> {
-                rendered.sums.iter().map(|sum| sum.pixel(&scene, &frame.frame).to_bytes()).collect()
-            };
-            assert!(pixels(&board) == pixels(&direct) && pixels(&emulated) == pixels(&direct));
+            assert!(board.sums == direct.sums && emulated.sums == direct.sums);
             assert_eq!([board.counters, emulated.counters], [direct.counters; 2]);
         }
     });

@@ -8,7 +8,7 @@ use super::{Chip, allowed_error};
 use crate::fixed_point::ColourSum;
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::SeenSample;
-use crate::memory::MemoryPort;
+use crate::memory::{MemoryPort, Stage as MemoryStage};
 use crate::render::{Context, GatherPoint, PixelSample, Purpose, direct, eye, final_gather};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Seen, Surface};
@@ -147,6 +147,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
     /// What shadow rays bring the present pixel.
     pub(super) fn light_directly<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
+        context.memory.enter(MemoryStage::Shadow);
         if let Some(stored) = self.points.get(index)
             && let Some(point) = stored.restore(context, at)?
         {
@@ -164,7 +165,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
         let (index, at) = self.present();
         let Self { points, sums, gathers, position, .. } = self;
         let frame = context.frame;
-        context.memory.enter(crate::memory::Stage::GatherRay);
+        context.memory.enter(MemoryStage::GatherRay);
         if let Some(stored) = points.get(index)
             && let Some(point) = stored.restore(context, at)?
         {
