@@ -165,7 +165,7 @@ fn check(scale: &Scale, results: &Results, is_cached: bool, name: &str) -> Strin
         let range = spread(&curve);
         let share = 100.0 * (highest - highest / range) / first.value;
         format!(
-            "{} by a factor of {} from its least to its greatest, {} % of the naive value at n = 1",
+            "{} by a factor of {} from its least to its greatest, a range of {} % of the naive value at n = 1",
             order_name(order),
             say(range),
             say(share)

@@ -102,7 +102,12 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         ),
         section(
             "Chips",
-            vec![table("chips", chips(&frames)), frame_rates(&frames), text(discussion(&frames))],
+            vec![
+                table("rates", rates(&frames)),
+                table("chips", chips(&frames)),
+                frame_rates(&frames),
+                text(discussion(&frames)),
+            ],
         ),
         section("Load balance", load_balance(scale, results)),
     ];
@@ -140,10 +145,8 @@ fn workloads(frames: &[Frame]) -> Table {
         ("records", "million"),
         ("photons a gather", ""),
         ("interpolated", "million"),
-        ("photon map", "GB"),
-        ("scene", "GB"),
     ];
-    let mut table = Table::new("Counts of a frame, and bytes from DRAM", columns(&heads));
+    let mut table = Table::new("Counts of a frame", columns(&heads));
     for Frame { name, workload, .. } in frames {
         table.push(vec![
             name.as_str().into(),
@@ -153,8 +156,6 @@ fn workloads(frames: &[Frame]) -> Table {
             (workload.records / 1e6).into(),
             workload.photons_per_gather.into(),
             (workload.interpolated_samples / 1e6).into(),
-            (workload.photon_map_bytes / 1e9).into(),
-            (workload.scene_bytes / 1e9).into(),
         ]);
     }
     table
@@ -165,15 +166,15 @@ fn units(frames: &[Frame]) -> Table {
         ("frame", ""),
         ("ray caster", "GFLOP"),
         ("controller", "GFLOP"),
-        ("photon gather unit", "GFLOP"),
-        ("ray caster", "GB"),
-        ("photon gather unit", "GB"),
-        ("at 30 frames/s", "TFLOPS"),
-        ("at 30 frames/s", "TB/s"),
+        ("gather unit", "GFLOP"),
+        ("scene", "GB"),
+        ("photon map", "GB"),
     ];
-    let mut table = Table::new("What a frame takes of each unit, on all chips together", columns(&heads));
+    let mut table = Table::new(
+        "FLOPs of each unit and bytes from DRAM of a frame, on all chips together",
+        columns(&heads),
+    );
     for Frame { name, cost, .. } in frames {
-        let total = cost.total();
         table.push(vec![
             name.as_str().into(),
             (cost.ray_caster.flops / 1e9).into(),
@@ -181,8 +182,6 @@ fn units(frames: &[Frame]) -> Table {
             (cost.gather_unit.flops / 1e9).into(),
             (cost.ray_caster.dram_bytes / 1e9).into(),
             (cost.gather_unit.dram_bytes / 1e9).into(),
-            (30.0 * total.flops / 1e12).into(),
-            (30.0 * total.dram_bytes / 1e12).into(),
         ]);
     }
     table
@@ -196,16 +195,38 @@ fn resource(resource: Resource) -> &'static str {
     }
 }
 
+fn rates(frames: &[Frame]) -> Table {
+    let heads = [
+        ("frame", ""),
+        ("at 30 frames/s", "TFLOPS"),
+        ("at 30 frames/s", "TB/s"),
+        ("by bandwidth", "tiles/s"),
+        ("by arithmetic", "tiles/s"),
+        ("binds", ""),
+    ];
+    let mut table = Table::new("Demand of 30 frames/s, and tiles that one chip renders", columns(&heads));
+    for frame in frames {
+        let total = frame.cost.total();
+        let prediction = frame.prediction();
+        table.push(vec![
+            frame.name.as_str().into(),
+            (30.0 * total.flops / 1e12).into(),
+            (30.0 * total.dram_bytes / 1e12).into(),
+            prediction.bandwidth_tiles_per_second.into(),
+            prediction.computation_tiles_per_second.into(),
+            resource(prediction.binding(1)).into(),
+        ]);
+    }
+    table
+}
+
 fn chips(frames: &[Frame]) -> Table {
     let heads = [
         ("frame", ""),
-        ("tiles/s of a chip by bandwidth", ""),
-        ("by arithmetic", ""),
-        ("what binds a chip", ""),
-        ("chips for 30 frames/s by bandwidth", ""),
-        ("by arithmetic", ""),
-        ("overall", ""),
-        ("host link at 30 frames/s", "%"),
+        ("by bandwidth", "chips"),
+        ("by arithmetic", "chips"),
+        ("overall", "chips"),
+        ("host link's load", "%"),
     ];
     let mut table = Table::new("Chips for 30 frames/s", columns(&heads));
     for frame in frames {
@@ -213,9 +234,6 @@ fn chips(frames: &[Frame]) -> Table {
         let needed = prediction.chips_needed(30.0);
         table.push(vec![
             frame.name.as_str().into(),
-            prediction.bandwidth_tiles_per_second.into(),
-            prediction.computation_tiles_per_second.into(),
-            resource(prediction.binding(1)).into(),
             needed.bandwidth.into(),
             needed.computation.into(),
             needed.overall.into(),

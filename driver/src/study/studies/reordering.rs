@@ -88,8 +88,9 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         section(
             "Orders",
             vec![
-                table("orders", orders(scale, &nominal)),
+                table("orders", orders(&nominal)),
                 plot_of_orders(&nominal),
+                table("gathers", by_gather(scale, &nominal)),
                 text(comparison(scale, &nominal)),
                 table("published", published(scale, &nominal)),
             ],
@@ -100,43 +101,50 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     page("Reordering photon gathers", introduction, sections)
 }
 
-/// One row an order and layout, behind the nominal caches.
-fn orders<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {
-    let heads = [
-        ("order", ""),
-        ("photon map", ""),
-        ("gathers", "million"),
-        ("raw", "GB"),
-        ("raw a gather", "bytes"),
-        ("from DRAM", "GB"),
-        ("from DRAM a gather", "bytes"),
-        ("less than naive", "times"),
-        ("scene from DRAM", "GB"),
-        ("from DRAM at all rays' gathers", "GB"),
-    ];
-    let title = "Photon map traffic of a frame, cache 128 KB, lines of 128 bytes, 4 ways";
-    let mut table = Table::new(title, columns(&heads));
-    let naive = nominal(GatherOrder::Naive, PhotonLayout::Jensen).photon_map_bytes().value;
+/// A table with a row for every order and layout behind the nominal caches.
+fn by_order<'a>(
+    title: &str,
+    heads: &[(&str, &str)],
+    nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement,
+    cells: impl Fn(&Measurement) -> Vec<Cell>,
+) -> Table {
+    let mut table = Table::new(title, columns(&[&[("order", ""), ("photon map", "")], heads].concat()));
     for order in ORDERS.into_iter().chain([GatherOrder::Hilbert]) {
         for layout in LAYOUTS {
-            let measured = nominal(order, layout);
-            let gathers = measured.gathers();
-            let dram = measured.photon_map_bytes();
-            table.push(vec![
-                order_name(order).into(),
-                layout_name(layout).into(),
-                cell(gathers, 1e6),
-                gigabytes(measured.raw_bytes()),
-                (measured.raw_bytes().value / gathers.value).into(),
-                gigabytes(dram),
-                (dram.value / gathers.value).into(),
-                (naive / dram.value).into(),
-                gigabytes(measured.scene_bytes()),
-                (dram.value / gathers.value * scale.nominal_gathers() / GIGA).into(),
-            ]);
+            let mut row = vec![order_name(order).into(), layout_name(layout).into()];
+            row.extend(cells(nominal(order, layout)));
+            table.push(row);
         }
     }
     table
+}
+
+fn orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {
+    let naive = nominal(GatherOrder::Naive, PhotonLayout::Jensen).photon_map_bytes().value;
+    let heads =
+        [("gathers", "million"), ("raw", "GB"), ("from DRAM", "GB"), ("less than naive, jensen", "times")];
+    let title = "Photon map traffic of a frame, cache 128 KB, lines of 128 bytes, 4 ways";
+    by_order(title, &heads, nominal, |measured| {
+        let dram = measured.photon_map_bytes();
+        let factor = naive / dram.value;
+        vec![cell(measured.gathers(), 1e6), gigabytes(measured.raw_bytes()), gigabytes(dram), factor.into()]
+    })
+}
+
+fn by_gather<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {
+    let heads = [
+        ("raw", "bytes a gather"),
+        ("from DRAM", "bytes a gather"),
+        ("raw at all rays' gathers", "GB"),
+        ("from DRAM at all rays' gathers", "GB"),
+    ];
+    by_order("The same for each gather", &heads, nominal, |measured| {
+        let gathers = measured.gathers().value;
+        let of_gather =
+            [measured.raw_bytes(), measured.photon_map_bytes()].map(|bytes| bytes.value / gathers);
+        let of_all = of_gather.map(|bytes| bytes * scale.nominal_gathers() / GIGA);
+        of_gather.into_iter().chain(of_all).map(Cell::from).collect()
+    })
 }
 
 fn plot_of_orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Block {

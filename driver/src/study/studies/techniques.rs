@@ -80,7 +80,7 @@ impl Technique {
         if !self.changes_pixels() {
             return vec![scale.gather_rays];
         }
-        let mut rays = scale.pick(&[6, 12, 25, 50, 100, 200], &[6, 12, 25, 50]);
+        let mut rays = scale.pick(&[6, 12, 25, 50, 100, 200], &[6, 12, 25, 50, 100]);
         rays.push(scale.gather_rays);
         rays.sort_unstable();
         rays.dedup();
@@ -162,6 +162,7 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         let file = |kind: &str| format!("{kind}-{}", index + 1);
         let blocks = vec![
             table(&file("techniques"), at_equal_rays(scale, results, scene, name)),
+            table(&file("bytes"), bytes(scale, results, scene, name)),
             table(&file("equal-quality"), at_equal_quality(scale, results, scene, name)),
             curves(&file("curves"), scale, results, (scene, name)),
         ];
@@ -192,14 +193,11 @@ fn at_equal_rays(scale: &Scale, results: &Results, scene: &'static str, name: &s
         ("technique", ""),
         ("gather rays", "million"),
         ("gathers", "million"),
-        ("photon map", "GB"),
-        ("scene", "GB"),
-        ("both", "GB"),
         ("less than naive", "times"),
         ("RMSE over mean", ""),
         ("mean over reference", ""),
     ];
-    let title = format!("{name}: a frame at {} gather rays, bytes from DRAM", scale.gather_rays);
+    let title = format!("{name}: a frame at {} gather rays", scale.gather_rays);
     let mut table = Table::new(title, columns(&heads));
     let naive = naive_bytes(scale, results, scene);
     for technique in &TECHNIQUES {
@@ -209,13 +207,22 @@ fn at_equal_rays(scale: &Scale, results: &Results, scene: &'static str, name: &s
             technique.name.into(),
             cell(measured.total(|tile| tile.counters.gather_rays as f64), 1e6),
             cell(measured.gathers(), 1e6),
-            gigabytes(measured.photon_map_bytes()),
-            gigabytes(measured.scene_bytes()),
-            gigabytes(measured.dram_bytes()),
             (naive / measured.dram_bytes().value).into(),
             quality.rmse.into(),
             quality.mean.into(),
         ]);
+    }
+    table
+}
+
+fn bytes(scale: &Scale, results: &Results, scene: &'static str, name: &str) -> Table {
+    let heads = [("technique", ""), ("photon map", "GB"), ("scene", "GB"), ("both", "GB")];
+    let title = format!("{name}: bytes from DRAM of a frame at {} gather rays", scale.gather_rays);
+    let mut table = Table::new(title, columns(&heads));
+    for technique in &TECHNIQUES {
+        let measured = results.traffic(&technique.traffic(scale, scene, scale.gather_rays));
+        let bytes = [measured.photon_map_bytes(), measured.scene_bytes(), measured.dram_bytes()];
+        table.push(std::iter::once(technique.name.into()).chain(bytes.map(gigabytes)).collect());
     }
     table
 }
@@ -231,12 +238,8 @@ fn at_equal_quality(scale: &Scale, results: &Results, scene: &'static str, name:
         let Some(found) = at_quality(&curve(scale, results, scene, technique), rmse) else { continue };
         let (rays, bytes, note) = match found {
             AtQuality::Met { rays, bytes } => (rays, bytes, ""),
-            AtQuality::AtMost { rays, bytes } => {
-                (rays, bytes, "better with the fewest rays tried: at least this factor")
-            }
-            AtQuality::Missed { rays, bytes } => {
-                (rays, bytes, "not reached with the most rays tried: no saving at equal quality")
-            }
+            AtQuality::AtMost { rays, bytes } => (rays, bytes, "at least: better with the fewest rays"),
+            AtQuality::Missed { rays, bytes } => (rays, bytes, "not reached with the most rays"),
         };
         let factor =
             if matches!(found, AtQuality::Missed { .. }) { Cell::Empty } else { (naive / bytes).into() };
