@@ -139,14 +139,14 @@ fn symbol_table() -> Table {
 fn workloads(frames: &[Frame]) -> Table {
     let heads = [
         ("frame", ""),
-        ("rays", "million"),
-        ("gathers", "million"),
-        ("tables", "million"),
-        ("records", "million"),
+        ("rays", ""),
+        ("gathers", ""),
+        ("tables", ""),
+        ("records", ""),
         ("photons a gather", ""),
-        ("interpolated", "million"),
+        ("interpolated", ""),
     ];
-    let mut table = Table::new("Counts of a frame", columns(&heads));
+    let mut table = Table::new("Counts of a frame, in millions but for photons a gather", columns(&heads));
     for Frame { name, workload, .. } in frames {
         table.push(vec![
             name.as_str().into(),

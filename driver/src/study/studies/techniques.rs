@@ -194,10 +194,13 @@ fn at_equal_rays(scale: &Scale, results: &Results, scene: &'static str, name: &s
         ("gather rays", "million"),
         ("gathers", "million"),
         ("less than naive", "times"),
-        ("RMSE over mean", ""),
-        ("mean over reference", ""),
+        ("RMSE", ""),
+        ("mean", ""),
     ];
-    let title = format!("{name}: a frame at {} gather rays", scale.gather_rays);
+    let title = format!(
+        "{name}: a frame at {} gather rays; RMSE over the reference's mean, mean over the same",
+        scale.gather_rays
+    );
     let mut table = Table::new(title, columns(&heads));
     let naive = naive_bytes(scale, results, scene);
     for technique in &TECHNIQUES {
