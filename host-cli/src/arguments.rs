@@ -10,6 +10,8 @@ use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
+use crate::study::StudyArguments;
+
 /// Global illumination by photon mapping on small rendering chips.
 #[derive(Parser)]
 #[command(version, about, max_term_width = 100)]
@@ -30,6 +32,8 @@ pub(crate) enum Command {
     Card(CardCommand),
     /// Compare a picture with a reference
     Diff(DiffOptions),
+    /// Measure how memory traffic and time depend on orders, caches, techniques and chips
+    Study(StudyArguments),
 }
 
 #[derive(Subcommand)]
@@ -316,7 +320,7 @@ fn crop(text: &str) -> Result<Window, String> {
 /// Threads that can be asked for: a system that runs out of them half-way ends the process.
 const MAX_THREADS: usize = 1024;
 
-fn threads(text: &str) -> Result<usize, String> {
+pub(crate) fn threads(text: &str) -> Result<usize, String> {
     let count = text.parse().ok().filter(|count| (1..=MAX_THREADS).contains(count));
     count
         .ok_or_else(|| format!("use 1 to {MAX_THREADS} threads, or leave the option out for a thread a core"))

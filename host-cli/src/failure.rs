@@ -13,14 +13,19 @@ pub(crate) enum Failure {
     Input(Report),
     /// The work failed: status 1.
     Work(Report),
-    /// An interrupt: status 130, as of a process ended by SIGINT.
-    Stopped,
+    /// An interrupt: status 130, as of a process ended by SIGINT. It tells what is left.
+    Stopped(&'static str),
 }
 
 impl Failure {
     /// A failure of input that tells its own remedy.
     pub(crate) fn input(error: impl Diagnostic + Send + Sync + 'static) -> Self {
         Self::Input(Report::new(error))
+    }
+
+    /// A failure of the work that tells its own remedy.
+    pub(crate) fn work(error: impl Diagnostic + Send + Sync + 'static) -> Self {
+        Self::Work(Report::new(error))
     }
 
     /// A failure of input that is an error only, with its causes.
@@ -51,8 +56,8 @@ impl Failure {
                 say(format_args!("{report:?}"));
                 ExitCode::from(1)
             }
-            Self::Stopped => {
-                say(format_args!("photoncard: stopped; no picture was written"));
+            Self::Stopped(text) => {
+                say(format_args!("photoncard: {text}"));
                 ExitCode::from(130)
             }
         }
@@ -62,7 +67,7 @@ impl Failure {
 impl From<RenderError> for Failure {
     fn from(error: RenderError) -> Self {
         match error {
-            RenderError::Stopped => Self::Stopped,
+            RenderError::Stopped => Self::Stopped("stopped; no picture was written"),
             error if error.is_input() => Self::Input(Report::new(error)),
             error => Self::Work(Report::new(error)),
         }

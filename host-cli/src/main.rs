@@ -11,6 +11,7 @@ mod failure;
 mod progress;
 mod render;
 mod scene;
+mod study;
 
 use std::process::ExitCode;
 
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         Command::Scene(SceneCommand::Info { scene }) => scene::info(scene),
         Command::Card(CardCommand::Info { card }) => card::info(card),
         Command::Diff(options) => diff::run(options),
+        Command::Study(arguments) => study::run(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -27,18 +27,13 @@ struct Display {
 impl Progress {
     /// Shows nothing if `quiet`. The first signal stops the render, a second one ends the process.
     pub(crate) fn start(quiet: bool) -> std::io::Result<Self> {
-        let stopped = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
-            signal_hook::flag::register_conditional_shutdown(signal, 130, stopped.clone())?;
-            signal_hook::flag::register(signal, stopped.clone())?;
-        }
         let display = Display {
             phase: None,
             bar: ProgressBar::hidden(),
             on_terminal: std::io::stderr().is_terminal(),
             told: 0,
         };
-        Ok(Self { stopped, display: (!quiet).then_some(Mutex::new(display)) })
+        Ok(Self { stopped: stop_on_signals()?, display: (!quiet).then_some(Mutex::new(display)) })
     }
 
     /// Takes the bar away.
@@ -97,6 +92,16 @@ impl Display {
         );
         self.bar.set_message(name(phase));
     }
+}
+
+/// Set by SIGINT and SIGTERM; a second one ends the process.
+pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, 130, stopped.clone())?;
+        signal_hook::flag::register(signal, stopped.clone())?;
+    }
+    Ok(stopped)
 }
 
 fn name(phase: Phase) -> &'static str {

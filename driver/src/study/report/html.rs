@@ -35,6 +35,13 @@ pub struct Section {
 pub enum Block {
     /// Plain text.
     Paragraph(String),
+    /// A link to a page in this folder or one below.
+    Link {
+        /// What it says.
+        text: String,
+        /// The page, relative to this one.
+        target: String,
+    },
     /// A table, which is also the file `<name>.csv` beside the page.
     Table {
         /// The file's name without its extension.
@@ -95,7 +102,7 @@ impl Block {
     /// The name of the file beside the page and what is in it, if there is one.
     pub(super) fn file(&self) -> Option<(String, String)> {
         match self {
-            Self::Paragraph(_) => None,
+            Self::Paragraph(_) | Self::Link { .. } => None,
             Self::Table { name, table } => Some((format!("{name}.csv"), table.to_csv())),
             Self::Plot { name, plot } => Some((format!("{name}.svg"), plot.to_svg())),
         }
@@ -104,6 +111,9 @@ impl Block {
     fn to_html(&self) -> String {
         match self {
             Self::Paragraph(text) => paragraph(text),
+            Self::Link { text, target } => {
+                format!("<p><a href=\"{}\">{}</a></p>\n", escape(target), escape(text))
+            }
             Self::Table { name, table } => {
                 let caption = format!("<strong>{}</strong> {}", escape(table.title()), link(name, "csv"));
                 format!(

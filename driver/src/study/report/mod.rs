@@ -6,7 +6,7 @@
 mod html;
 mod markup;
 pub(in crate::study) mod name;
-mod number;
+pub(in crate::study) mod number;
 mod plot;
 mod table;
 

@@ -1,0 +1,32 @@
+//! The page that leads to the reports of several studies.
+
+use std::path::Path;
+
+use super::error::StudyError;
+use super::report::{self, Block, Provenance, Report, Section};
+use super::studies::Study;
+
+/// Writes `index.html` into the folder that the studies' folders are in.
+pub(super) fn write(
+    folder: &Path,
+    reports: &[(Study, Report)],
+    provenance: &Provenance,
+) -> Result<(), StudyError> {
+    let sections = reports.iter().map(|(study, report)| {
+        let summary = report.introduction.first().cloned().unwrap_or_default();
+        let link =
+            Block::Link { text: "The report".to_owned(), target: format!("{}/index.html", study.name()) };
+        Section { heading: report.title.clone(), blocks: vec![Block::Paragraph(summary), link] }
+    });
+    let index = Report {
+        title: "Studies of photon mapping on rendering chips".to_owned(),
+        introduction: vec![
+            "Each study renders the same scenes with one thing changed, on emulated chips whose memory is modelled line by \
+             line, and reports what was counted. Every table is a CSV file and every plot an SVG file beside its report."
+                .to_owned(),
+        ],
+        sections: sections.collect(),
+        provenance: provenance.clone(),
+    };
+    Ok(report::write(folder, &index)?)
+}

@@ -1,0 +1,273 @@
+//! Where points are measured: finished ones are found again, and points that share a photon map share it.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use photoncard_shared::frame::Checksum;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::{Deserialize, Serialize};
+
+use super::error::StudyError;
+use super::measure::{Bench, Measurement};
+use super::point::{ImageKey, Point, Task};
+use super::quality::{Quality, Reference};
+use super::store::PointStore;
+use crate::emitter::Emitters;
+use crate::pack::PackedScene;
+use crate::photon::{MappedImage, map_photons};
+use crate::render::RenderError;
+use crate::scene::Scene;
+use crate::scene::gltf;
+
+/// Stack of a chip's thread: its buffers are built there before they move to the heap.
+const THREAD_STACK: usize = 16 << 20;
+
+/// Watches a study, and can stop it.
+pub trait StudyObserver: Sync {
+    /// Tells that so many points of a study are there. `is_new` if the last was measured now, and not found.
+    fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
+
+    /// Tells something about finished points that were not usable.
+    fn notice(&self, text: &str);
+
+    /// Whether to stop as soon as that can be.
+    fn is_stopped(&self) -> bool;
+}
+
+/// What was measured at a point.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub enum Outcome {
+    /// Of [`Task::Traffic`].
+    Traffic(Measurement),
+    /// Of [`Task::Quality`].
+    Quality(Quality),
+}
+
+/// The outcomes of a study's points.
+#[derive(Debug, Default)]
+pub struct Results(Vec<(Point, Outcome)>);
+
+impl Results {
+    /// The work and traffic of a point.
+    ///
+    /// # Panics
+    /// If it is not one of the points that were measured.
+    pub fn traffic(&self, point: &Point) -> &Measurement {
+        match self.find(point) {
+            Some(Outcome::Traffic(measurement)) => measurement,
+            _ => panic!("the traffic of {} was not measured", point.name()),
+        }
+    }
+
+    /// The error of a point.
+    ///
+    /// # Panics
+    /// If it is not one of the points that were measured.
+    pub fn quality(&self, point: &Point) -> Quality {
+        match self.find(point) {
+            Some(Outcome::Quality(quality)) => *quality,
+            _ => panic!("the quality of {} was not measured", point.name()),
+        }
+    }
+
+    fn find(&self, point: &Point) -> Option<&Outcome> {
+        self.0.iter().find(|(other, _)| other == point).map(|(_, outcome)| outcome)
+    }
+}
+
+/// Measures points, and keeps them.
+pub struct Laboratory<'a> {
+    scenes: PathBuf,
+    store: PointStore,
+    pool: ThreadPool,
+    observer: &'a dyn StudyObserver,
+    loaded: HashMap<&'static str, LoadedScene>,
+    /// The last image, which the next point may share.
+    last: Option<LastImage>,
+}
+
+struct LoadedScene {
+    scene: Scene,
+    /// Stands for its content.
+    digest: String,
+}
+
+struct LastImage {
+    key: ImageKey,
+    scene: Scene,
+    mapped: MappedImage,
+    reference: Option<Reference>,
+}
+
+impl<'a> Laboratory<'a> {
+    /// Points are kept in `folder`, scenes are in `scenes`; a chip a thread, and a thread a core if none are given.
+    ///
+    /// # Errors
+    /// If the folder cannot be made, or there are no threads.
+    pub fn new(
+        folder: &Path,
+        scenes: &Path,
+        threads: Option<usize>,
+        observer: &'a dyn StudyObserver,
+    ) -> Result<Self, StudyError> {
+        let pool =
+            ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).stack_size(THREAD_STACK).build()?;
+        let store = PointStore::open(folder)?;
+        Ok(Self { scenes: scenes.to_owned(), store, pool, observer, loaded: HashMap::new(), last: None })
+    }
+
+    /// Measures what is not there yet.
+    ///
+    /// # Errors
+    /// If a scene is missing, a point cannot be measured or kept, or the observer stops it.
+    pub fn measure(&mut self, study: &str, points: &[Point]) -> Result<Results, StudyError> {
+        let points = sharing_images(points);
+        let total = points.len();
+        let mut results = Results::default();
+        self.observer.progress(study, 0, total, false);
+        for point in points {
+            if self.observer.is_stopped() {
+                return Err(StudyError::Stopped);
+            }
+            let (outcome, is_new) = self.outcome(&point)?;
+            results.0.push((point, outcome));
+            self.observer.progress(study, results.0.len(), total, is_new);
+        }
+        Ok(results)
+    }
+
+    /// The scene of a file, without changes.
+    ///
+    /// # Errors
+    /// If it is missing or cannot be read.
+    fn load(&mut self, file: &'static str) -> Result<&LoadedScene, StudyError> {
+        if !self.loaded.contains_key(file) {
+            let path = self.scenes.join(file);
+            if !path.is_file() {
+                return Err(StudyError::NoScene { scene: file, folder: self.scenes.clone() });
+            }
+            let scene = gltf::load(&path)?;
+            let digest = digest(&scene);
+            self.loaded.insert(file, LoadedScene { scene, digest });
+        }
+        Ok(&self.loaded[file])
+    }
+
+    fn outcome(&mut self, point: &Point) -> Result<(Outcome, bool), StudyError> {
+        let key = point.key(&self.load(point.scene)?.digest);
+        let noticed = self.store.notices().len();
+        if let Some(outcome) = self.store.get(&point.name(), &key) {
+            return Ok((outcome, false));
+        }
+        for notice in &self.store.notices()[noticed..] {
+            self.observer.notice(notice);
+        }
+        let outcome = match self.measure_one(point) {
+            Err(StudyError::Render(RenderError::Stopped)) => return Err(StudyError::Stopped),
+            outcome => outcome?,
+        };
+        self.store.put(&point.name(), &key, &outcome)?;
+        Ok((outcome, true))
+    }
+
+    fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {
+        point.settings.check(&photoncard_shared::budget::REFERENCE)?;
+        let mut last = self.image(point)?;
+        let is_stopped = || self.observer.is_stopped();
+        let bench =
+            Bench { scene: &last.scene, mapped: &last.mapped, pool: &self.pool, is_stopped: &is_stopped };
+        let outcome = match &point.task {
+            Task::Traffic { caches, sample, least_tiles } => {
+                Outcome::Traffic(bench.traffic(&point.settings, caches, *sample, *least_tiles)?)
+            }
+            &Task::Quality { tiles, reference_rays } => {
+                let known = last.reference.take();
+                let known = known.filter(|known| known.is_of(&point.settings, tiles, reference_rays));
+                let reference = match known {
+                    Some(reference) => reference,
+                    None => Reference::new(&bench, &point.settings, tiles, reference_rays)?,
+                };
+                let quality = reference.compare(&bench, &point.settings)?;
+                last.reference = Some(reference);
+                Outcome::Quality(quality)
+            }
+        };
+        self.last = Some(last);
+        Ok(outcome)
+    }
+
+    /// The image of a point: the last one, if it is the same.
+    fn image(&mut self, point: &Point) -> Result<LastImage, StudyError> {
+        let key = point.image_key();
+        if let Some(last) = self.last.take_if(|last| last.key == key) {
+            return Ok(last);
+        }
+        // Two images may not fit into memory.
+        self.last = None;
+        let mut scene = self.load(point.scene)?.scene.clone();
+        for assignment in &point.assignments {
+            scene.apply(assignment)?;
+        }
+        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).map_err(RenderError::from)?;
+        let settings = point.settings.photon_settings();
+        let go_on = |_| !self.observer.is_stopped();
+        let mapped = self.pool.install(|| map_photons(packed, &settings, &go_on));
+        Ok(LastImage { key, scene, mapped: mapped.map_err(RenderError::from)?, reference: None })
+    }
+}
+
+/// The points, each once, those that share an image together.
+fn sharing_images(points: &[Point]) -> Vec<Point> {
+    let mut images: Vec<(ImageKey, Vec<Point>)> = Vec::new();
+    for point in points {
+        let key = point.image_key();
+        match images.iter_mut().find(|(other, _)| *other == key) {
+            Some((_, sharing)) if sharing.contains(point) => {}
+            Some((_, sharing)) => sharing.push(point.clone()),
+            None => images.push((key, vec![point.clone()])),
+        }
+    }
+    images.into_iter().flat_map(|(_, sharing)| sharing).collect()
+}
+
+/// A checksum of all that a render takes from a scene.
+fn digest(scene: &Scene) -> String {
+    let mut sum = Checksum::default();
+    for triangle in &scene.triangles {
+        for vertex in triangle.vertices {
+            vertex.to_array().iter().for_each(|coordinate| sum.update(&coordinate.to_le_bytes()));
+        }
+        sum.update(&triangle.material.to_le_bytes());
+    }
+    let mut text = String::new();
+    // Floating-point numbers are written so that they read back the same.
+    let _ = write!(text, "{:?}{:?}", scene.materials, scene.cameras);
+    sum.update(text.as_bytes());
+    format!("{:08x}", sum.value())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::photon::PhotonLayout;
+    use crate::render::RenderSettings;
+
+    fn point(exponent: u32, layout: PhotonLayout, tile: u32) -> Point {
+        Point {
+            scene: "cornell-glossy.gltf",
+            assignments: vec![format!("floor.exponent={exponent}")],
+            settings: RenderSettings { photon_layout: layout, tile, ..RenderSettings::default() },
+            task: Task::Quality { tiles: 1, reference_rays: 1 },
+        }
+    }
+
+    #[test]
+    fn points_of_one_image_come_together_and_once() {
+        use PhotonLayout::{Jensen, Lines};
+        let [a, b, c, d] =
+            [point(1, Jensen, 16), point(2, Jensen, 16), point(1, Lines, 16), point(1, Jensen, 8)];
+        let points = [a.clone(), b.clone(), c.clone(), d.clone(), a.clone(), b.clone()];
+        assert_eq!(sharing_images(&points), [a, d, b, c]);
+    }
+}

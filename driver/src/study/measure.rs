@@ -1,0 +1,204 @@
+//! What a point takes: the work and the memory traffic of some of a picture's tiles.
+
+use photoncard_firmware::chip::ReferenceChip;
+use photoncard_firmware::memory::Lines;
+use photoncard_shared::address::{STRUCTURES, Structure};
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{FrameParameters, Tile};
+use rayon::ThreadPool;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::sample::{Estimate, SampleRate, choose};
+use crate::emulator::direct::{RenderedTile, render_tile};
+use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+use crate::emulator::whole_frame::{CurveJob, render_along_curve};
+use crate::film::Film;
+use crate::photon::MappedImage;
+use crate::render::{RenderError, RenderSettings};
+use crate::scene::Scene;
+use crate::scheduler::{GatherOrder, tiles};
+
+/// Reads of one structure of card memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StructureReads {
+    /// Reads by the chip.
+    pub requests: u64,
+    /// Bytes that they asked for.
+    pub raw_bytes: u64,
+    /// Bytes that caches fetched from DRAM for them.
+    pub dram_bytes: u64,
+}
+
+/// What one tile took.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TileMeasurement {
+    /// Its number in the picture.
+    pub tile: u32,
+    /// Work.
+    pub counters: Counters,
+    /// Reads of each structure.
+    pub reads: [StructureReads; STRUCTURES],
+}
+
+/// What a point took: the sampled tiles, and of how many.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Measurement {
+    /// Tiles of the picture; 1 if it was rendered as a whole.
+    pub population: usize,
+    /// The tiles that were rendered, in the picture's order.
+    pub tiles: Vec<TileMeasurement>,
+}
+
+impl TileMeasurement {
+    fn new(tile: u32, counters: Counters, traffic: &MemoryTraffic) -> Self {
+        let reads = Structure::ALL.map(|structure| {
+            let [requested, fetched] = traffic.of(|other| other == structure);
+            StructureReads {
+                requests: requested.requests,
+                raw_bytes: requested.bytes,
+                dram_bytes: fetched.bytes,
+            }
+        });
+        Self { tile, counters, reads }
+    }
+
+    /// Reads of the photon map.
+    pub fn photon_map(&self) -> StructureReads {
+        self.reads_of(Structure::is_photon_map)
+    }
+
+    /// Reads of everything else.
+    pub fn scene(&self) -> StructureReads {
+        self.reads_of(|structure| !structure.is_photon_map())
+    }
+
+    fn reads_of(&self, chosen: impl Fn(Structure) -> bool) -> StructureReads {
+        let mut sum = StructureReads::default();
+        for (_, reads) in
+            Structure::ALL.into_iter().zip(&self.reads).filter(|(structure, _)| chosen(*structure))
+        {
+            sum.requests += reads.requests;
+            sum.raw_bytes += reads.raw_bytes;
+            sum.dram_bytes += reads.dram_bytes;
+        }
+        sum
+    }
+}
+
+impl Measurement {
+    /// A count of the whole picture.
+    pub fn total(&self, count: impl Fn(&TileMeasurement) -> f64) -> Estimate {
+        let values: Vec<f64> = self.tiles.iter().map(count).collect();
+        Estimate::of_total(&values, self.population)
+    }
+
+    /// Searches of the photon map.
+    pub fn gathers(&self) -> Estimate {
+        self.total(|tile| tile.counters.gathers as f64)
+    }
+
+    /// Bytes of the photon map that chips asked for.
+    pub fn raw_bytes(&self) -> Estimate {
+        self.total(|tile| tile.photon_map().raw_bytes as f64)
+    }
+
+    /// Bytes of the photon map from DRAM.
+    pub fn photon_map_bytes(&self) -> Estimate {
+        self.total(|tile| tile.photon_map().dram_bytes as f64)
+    }
+
+    /// Bytes of the scene from DRAM.
+    pub fn scene_bytes(&self) -> Estimate {
+        self.total(|tile| tile.scene().dram_bytes as f64)
+    }
+
+    /// Bytes from DRAM.
+    pub fn dram_bytes(&self) -> Estimate {
+        self.total(|tile| (tile.photon_map().dram_bytes + tile.scene().dram_bytes) as f64)
+    }
+}
+
+/// A scene with its card image, and the threads that emulate chips.
+pub struct Bench<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its image.
+    pub mapped: &'a MappedImage,
+    /// A chip a thread; their stacks must hold a chip while it is built.
+    pub pool: &'a ThreadPool,
+    /// Whether to stop.
+    pub is_stopped: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Bench<'_> {
+    /// The parameters of a frame.
+    ///
+    /// # Errors
+    /// If the scene has no such camera.
+    pub fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
+        let camera = self.scene.camera(settings.camera.as_deref())?;
+        Ok(settings.frame(camera, self.mapped.max_distance))
+    }
+
+    /// Renders tiles, each on a chip whose memory `model` makes anew.
+    ///
+    /// # Errors
+    /// If the image is not sound, or it is stopped.
+    pub fn render<'b, M: MeasuredMemory>(
+        &'b self,
+        frame: &FrameParameters,
+        tiles: &[Tile],
+        model: &(impl Fn(Lines<'b>) -> M + Sync),
+    ) -> Result<Vec<RenderedTile>, RenderError> {
+        let new_chip = || Box::new(ReferenceChip::new());
+        let render_one = |chip: &mut Box<ReferenceChip>, &tile: &Tile| {
+            if (self.is_stopped)() {
+                return Err(RenderError::Stopped);
+            }
+            let (scene, memory) = self.mapped.image.view();
+            render_tile(chip, &scene, model(memory), frame, tile, None).map_err(RenderError::Image)
+        };
+        self.pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
+    }
+
+    /// Measures the work and the traffic of a frame.
+    ///
+    /// # Errors
+    /// If the scene has no such camera, the image is not sound, or it is stopped.
+    pub fn traffic(
+        &self,
+        settings: &RenderSettings,
+        caches: &CacheSettings,
+        sample: SampleRate,
+        least_tiles: usize,
+    ) -> Result<Measurement, RenderError> {
+        let frame = self.frame(settings)?;
+        let all = tiles(settings.window(), settings.tile, settings.order);
+        if settings.order == GatherOrder::Hilbert {
+            return self.whole_frame(settings, &frame, &all, caches);
+        }
+        let chosen = choose(&all, sample.count(all.len(), least_tiles));
+        let rendered = self.render(&frame, &chosen, &|memory| caches.over(memory))?;
+        let measured = chosen
+            .iter()
+            .zip(&rendered)
+            .map(|(tile, rendered)| TileMeasurement::new(tile.id, rendered.counters, &rendered.traffic));
+        Ok(Measurement { population: all.len(), tiles: measured.collect() })
+    }
+
+    fn whole_frame(
+        &self,
+        settings: &RenderSettings,
+        frame: &FrameParameters,
+        tiles: &[Tile],
+        caches: &CacheSettings,
+    ) -> Result<Measurement, RenderError> {
+        let mut film = Film::new(settings.width, settings.height, settings.window())?;
+        let chips = self.pool.current_num_threads();
+        let job = CurveJob { image: &self.mapped.image, frame, tiles, chips };
+        let outcome = render_along_curve(job, Some(caches), &mut film, &|_, _| !(self.is_stopped)())?;
+        let whole = TileMeasurement::new(0, outcome.counters, &outcome.traffic);
+        Ok(Measurement { population: 1, tiles: vec![whole] })
+    }
+}

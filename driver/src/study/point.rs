@@ -1,0 +1,162 @@
+//! Points: one thing to measure each, with everything that its result depends on.
+
+use photoncard_shared::budget::REFERENCE;
+use photoncard_shared::image::LAYOUT_VERSION;
+use serde_json::{Value, json};
+
+use super::sample::SampleRate;
+use crate::emulator::memory_model::CacheSettings;
+use crate::photon::PhotonLayout;
+use crate::render::{RenderSettings, Sampling};
+use crate::scheduler::GatherOrder;
+
+/// Something to measure of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// The scene's file in the folder of scenes.
+    pub scene: &'static str,
+    /// Changes to its materials, such as `floor.exponent=8`.
+    pub assignments: Vec<String>,
+    /// How it is rendered.
+    pub settings: RenderSettings,
+    /// What is measured.
+    pub task: Task,
+}
+
+/// What is measured at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Task {
+    /// Work and memory traffic of tiles behind caches that are empty when a tile begins.
+    Traffic {
+        /// The caches.
+        caches: CacheSettings,
+        /// The share of the tiles; the order of the whole frame takes all.
+        sample: SampleRate,
+        /// The least number of tiles, as far as there are so many.
+        least_tiles: usize,
+    },
+    /// The error of pixels against many more gather rays.
+    Quality {
+        /// Tiles of 16x16 pixels that are compared.
+        tiles: usize,
+        /// Gather rays of the reference.
+        reference_rays: u32,
+    },
+}
+
+impl Point {
+    /// The name of the point's file: what it is about, not all of its settings.
+    pub fn name(&self) -> String {
+        let task = match self.task {
+            Task::Traffic { .. } => "traffic",
+            Task::Quality { .. } => "quality",
+        };
+        let scene = self.scene.split('.').next().unwrap_or_default();
+        format!("{task}-{scene}-{}", order_name(self.settings.order))
+    }
+
+    /// Everything that the result depends on; `scene` stands for the scene's content.
+    pub fn key(&self, scene: &str) -> Value {
+        let mut key = json!({
+            "program": PROGRAM,
+            "layout_version": LAYOUT_VERSION,
+            "chip": REFERENCE,
+            "scene": self.scene,
+            "scene_content": scene,
+            "set": self.assignments,
+            "settings": settings(&self.settings),
+        });
+        key["task"] = match &self.task {
+            Task::Traffic { caches, sample, least_tiles } => {
+                json!({"traffic": {"caches": caches.to_string(), "sample": sample, "least_tiles": least_tiles}})
+            }
+            Task::Quality { tiles, reference_rays } => {
+                json!({"quality": {"tiles": tiles, "reference_rays": reference_rays}})
+            }
+        };
+        key
+    }
+
+    /// What the point's card image depends on.
+    pub fn image_key(&self) -> ImageKey {
+        let settings = &self.settings;
+        ImageKey {
+            scene: self.scene,
+            assignments: self.assignments.clone(),
+            seed: settings.seed,
+            photons: settings.photons,
+            neighbors: settings.neighbors,
+            max_distance: settings.max_distance,
+            layout: settings.photon_layout,
+        }
+    }
+}
+
+/// The program and its version.
+pub(super) const PROGRAM: &str = concat!("photoncard ", env!("CARGO_PKG_VERSION"));
+
+/// What a card image depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageKey {
+    scene: &'static str,
+    assignments: Vec<String>,
+    seed: u32,
+    photons: usize,
+    neighbors: u32,
+    max_distance: Option<f32>,
+    layout: PhotonLayout,
+}
+
+/// All settings but the cards: a point is always measured on reference chips.
+fn settings(settings: &RenderSettings) -> Value {
+    let crop = settings.crop.map(|window| [window.x0, window.x1, window.y0, window.y1]);
+    json!({
+        "size": [settings.width, settings.height],
+        "crop": crop,
+        "camera": settings.camera,
+        "seed": settings.seed,
+        "photons": settings.photons,
+        "photon_map": layout_name(settings.photon_layout),
+        "neighbors": settings.neighbors,
+        "max_distance": settings.max_distance,
+        "gather_rays": settings.gather_rays,
+        "shadow_rays": settings.shadow_rays,
+        "spp": settings.samples,
+        "tile": settings.tile,
+        "sampling": sampling_name(settings.sampling),
+        "ic_error": settings.irradiance_error,
+        "order": order_name(settings.order),
+        "bins": settings.bins,
+        "queue": settings.queue,
+    })
+}
+
+/// The order as the command line writes it.
+pub(super) fn order_name(order: GatherOrder) -> &'static str {
+    match order {
+        GatherOrder::Naive => "naive",
+        GatherOrder::Tiled => "tiled",
+        GatherOrder::DirectionBins => "dirbin",
+        GatherOrder::Hash => "hash",
+        GatherOrder::Sort => "sort",
+        GatherOrder::Hilbert => "hilbert",
+    }
+}
+
+/// The sampling as the command line writes it.
+pub(super) fn sampling_name(sampling: Sampling) -> &'static str {
+    match sampling {
+        Sampling::Reflection => "brdf",
+        Sampling::Photon => "photon",
+        Sampling::Product => "combined",
+        Sampling::Mixture => "mixture",
+    }
+}
+
+/// The layout as the command line writes it.
+pub(super) fn layout_name(layout: PhotonLayout) -> &'static str {
+    match layout {
+        PhotonLayout::Jensen => "jensen",
+        PhotonLayout::Lines => "lines",
+    }
+}

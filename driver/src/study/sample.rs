@@ -1,0 +1,199 @@
+//! A sample of a picture's tiles, and what it says of all of them.
+//!
+//! Tiles are sorted along the Z-order curve of their middles and cut into as many equal stretches as there are tiles to
+//! choose; a hash chooses one of each. So a sample is spread over the picture whatever the shape of the tiles, does not
+//! beat with the scene's own regularity, and is the same in every run.
+
+use std::fmt;
+use std::str::FromStr;
+
+use photoncard_firmware::sampler::hash;
+use photoncard_shared::message::Tile;
+use serde::{Deserialize, Serialize};
+
+/// The share of a picture's tiles that is rendered: `1/17`, or `1` for all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SampleRate {
+    numerator: u32,
+    denominator: u32,
+}
+
+impl SampleRate {
+    /// All tiles.
+    pub const ALL: Self = Self { numerator: 1, denominator: 1 };
+
+    /// `numerator` of `denominator` tiles; `None` if that is no tile, or more than all.
+    pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
+        if numerator == 0 || numerator > denominator { None } else { Some(Self { numerator, denominator }) }
+    }
+
+    /// How many of `total` tiles that is, rounded up, and at least `least` as far as there are so many.
+    pub fn count(self, total: usize, least: usize) -> usize {
+        let share = (total as u64 * u64::from(self.numerator)).div_ceil(u64::from(self.denominator));
+        (share as usize).max(least).min(total)
+    }
+}
+
+impl fmt::Display for SampleRate {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}/{}", self.numerator, self.denominator)
+    }
+}
+
+impl FromStr for SampleRate {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
+        let rate = numerator.parse().ok().zip(denominator.parse().ok());
+        rate.and_then(|(numerator, denominator)| Self::new(numerator, denominator)).ok_or_else(|| {
+            format!("{text:?} is no share of the tiles; use a fraction above 0 and up to 1, such as 1/17")
+        })
+    }
+}
+
+/// Chooses `count` of the tiles, spread over the picture, in the picture's order; all of them if there are no more.
+pub fn choose(tiles: &[Tile], count: usize) -> Vec<Tile> {
+    if count >= tiles.len() {
+        return tiles.to_vec();
+    }
+    let mut sorted = tiles.to_vec();
+    let middle = |tile: &Tile| (2 * tile.x + tile.width, 2 * tile.y + tile.height);
+    sorted.sort_by_key(|tile| {
+        let (x, y) = middle(tile);
+        (spread_bits(x) | spread_bits(y) << 1, tile.id)
+    });
+    let bound = |stretch: usize| stretch * sorted.len() / count;
+    let mut chosen: Vec<Tile> = (0..count)
+        .map(|stretch| {
+            let stretch_tiles = &sorted[bound(stretch)..bound(stretch + 1)];
+            stretch_tiles[hash(stretch as u32) as usize % stretch_tiles.len()]
+        })
+        .collect();
+    chosen.sort_by_key(|tile| tile.id);
+    chosen
+}
+
+/// The bits of a number with a zero before each.
+fn spread_bits(number: u32) -> u64 {
+    (0..32).map(|bit| (u64::from(number) >> bit & 1) << (2 * bit)).sum()
+}
+
+/// A sum over all tiles, and how sure it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// The sum.
+    pub value: f64,
+    /// Half the width of its 95 % confidence interval; 0 if all tiles were rendered.
+    pub half_width: f64,
+}
+
+impl Estimate {
+    /// The sum over a population of which these values are a sample:
+    /// `N mean +- t N s / sqrt(n) sqrt(1 - n / N)`, with the values' standard deviation `s` and Student's `t` of `n - 1`
+    /// degrees of freedom. The last factor is the correction for a finite population.
+    ///
+    /// It is the interval of a simple random sample. A sample that is spread over the picture errs less, so it is wide
+    /// rather than narrow. Of one value of several nothing is known: the half-width is infinite.
+    pub fn of_total(values: &[f64], population: usize) -> Self {
+        let count = values.len() as f64;
+        let population = population as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let value = population * mean;
+        if count >= population {
+            return Self { value: values.iter().sum(), half_width: 0.0 };
+        }
+        if values.len() < 2 {
+            return Self { value, half_width: f64::INFINITY };
+        }
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let variance = squares / (count - 1.0);
+        let error = population * (variance / count * (1.0 - count / population)).sqrt();
+        Self { value, half_width: students_t(values.len() - 1) * error }
+    }
+
+    /// In another unit.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { value: self.value * factor, half_width: self.half_width * factor.abs() }
+    }
+}
+
+/// The 97.5 % quantile of Student's distribution of one to ten degrees of freedom.
+const FEW: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
+
+/// The 97.5 % quantile of Student's distribution; beyond ten degrees of freedom by the expansion of Cornish and Fisher.
+fn students_t(degrees: usize) -> f64 {
+    const Z: f64 = 1.959_964;
+    FEW.get(degrees.wrapping_sub(1)).copied().unwrap_or_else(|| {
+        let degrees = degrees as f64;
+        let first = (Z.powi(3) + Z) / (4.0 * degrees);
+        let second = (5.0 * Z.powi(5) + 16.0 * Z.powi(3) + 3.0 * Z) / (96.0 * degrees * degrees);
+        let third =
+            (3.0 * Z.powi(7) + 19.0 * Z.powi(5) + 17.0 * Z.powi(3) - 15.0 * Z) / (384.0 * degrees.powi(3));
+        Z + first + second + third
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Window;
+    use crate::scheduler::{GatherOrder, tiles};
+
+    #[test]
+    fn a_share_is_a_fraction_of_some_tiles() {
+        for (text, written) in [("1/17", "1/17"), ("1", "1/1"), ("3/4", "3/4"), ("5/5", "5/5")] {
+            assert_eq!(text.parse::<SampleRate>().unwrap().to_string(), written);
+        }
+        for text in ["0/5", "3/2", "1/0", "0", "2", "", "/", "1/", "a/b", "-1/2", "0.5", "1/2/3"] {
+            let error = text.parse::<SampleRate>().unwrap_err();
+            assert!(error.contains("1/17") && error.contains(&format!("{text:?}")), "{error}");
+        }
+        let rate = SampleRate::new(1, 17).unwrap();
+        assert_eq!([rate.count(1024, 15), rate.count(64, 15), rate.count(4, 15)], [61, 15, 4]);
+    }
+
+    #[test]
+    fn a_sample_is_spread_over_the_picture_whatever_the_shape_of_the_tiles() {
+        let window = Window::full(512, 512);
+        for order in [GatherOrder::Naive, GatherOrder::Sort] {
+            let tiles = tiles(window, 16, order);
+            let chosen = choose(&tiles, 64);
+            assert_eq!(chosen.len(), 64);
+            assert!(chosen.windows(2).all(|pair| pair[0].id < pair[1].id));
+            for quarter in 0..4 {
+                let is_inside = |tile: &&Tile| tile.x / 256 + tile.y / 256 * 2 == quarter;
+                assert_eq!(chosen.iter().filter(is_inside).count(), 16, "{order:?}");
+            }
+            assert_eq!(choose(&tiles, tiles.len()), tiles);
+        }
+    }
+
+    /// Normal, skewed and two-valued populations, drawn again and again.
+    #[test]
+    fn the_interval_covers_the_total_of_a_population_as_often_as_it_says() {
+        let uniform = |index: u32| (f64::from(hash(index)) + 0.5) / 4_294_967_296.0;
+        let populations: [fn(f64) -> f64; 3] =
+            [|u| 5.0 + u, |u| -u.ln(), |u| if u < 0.3 { 0.0 } else { 1.0 }];
+        for (number, shape) in populations.into_iter().enumerate() {
+            let population: Vec<f64> = (0..200).map(|index| shape(uniform(index + 7000))).collect();
+            let total: f64 = population.iter().sum();
+            let covered = (0..1000_u32).filter(|draw| {
+                let mut order: Vec<usize> = (0..population.len()).collect();
+                order.sort_by_key(|&index| hash(hash(*draw + 1) ^ index as u32));
+                let values: Vec<f64> = order[..40].iter().map(|&index| population[index]).collect();
+                let estimate = Estimate::of_total(&values, population.len());
+                (estimate.value - total).abs() <= estimate.half_width
+            });
+            let share = covered.count() as f64 / 1000.0;
+            assert!((0.91..0.98).contains(&share), "population {number}: {share}");
+        }
+    }
+
+    #[test]
+    fn all_tiles_leave_no_doubt_and_one_tile_all() {
+        assert_eq!(Estimate::of_total(&[1.0, 2.0, 4.0], 3), Estimate { value: 7.0, half_width: 0.0 });
+        assert_eq!(Estimate::of_total(&[2.0], 3), Estimate { value: 6.0, half_width: f64::INFINITY });
+        assert!((students_t(30) - 2.0423).abs() < 1e-3 && (students_t(11) - 2.201).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,154 @@
+//! How large a study is: what its renders have in common, and how many values it goes through.
+
+use super::point::{Point, Task, layout_name};
+use super::sample::SampleRate;
+use crate::emulator::memory_model::CacheSettings;
+use crate::photon::PhotonLayout;
+use crate::render::{RenderSettings, Sampling};
+use crate::scheduler::GatherOrder;
+
+/// What all points of a study have in common, and how many there are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scale {
+    /// Pixels of a row, and rows.
+    pub side: u32,
+    /// Photons in the map.
+    pub photons: usize,
+    /// Photons that a gather looks for.
+    pub neighbors: u32,
+    /// Final gather rays a pixel, where they are not what is studied.
+    pub gather_rays: u32,
+    /// Shadow rays a pixel.
+    pub shadow_rays: u32,
+    /// The share of the tiles that is rendered.
+    pub sample: SampleRate,
+    /// Tiles that are rendered at the least.
+    pub least_tiles: usize,
+    /// Tiles of 16x16 pixels that are compared with a reference.
+    pub quality_tiles: usize,
+    /// Gather rays of the reference.
+    pub reference_rays: u32,
+    /// Whether fewer values are gone through.
+    pub is_quick: bool,
+}
+
+impl Scale {
+    /// The dissertation's nominal frame.
+    pub const FULL: Self = Self {
+        side: 512,
+        photons: 500_000,
+        neighbors: 100,
+        gather_rays: 100,
+        shadow_rays: 8,
+        sample: SampleRate::ALL,
+        least_tiles: 15,
+        quality_tiles: 48,
+        reference_rays: 1600,
+        is_quick: false,
+    };
+    /// A small picture of the same, to see that all works.
+    pub const QUICK: Self = Self {
+        side: 128,
+        photons: 60_000,
+        neighbors: 50,
+        gather_rays: 50,
+        shadow_rays: 8,
+        sample: SampleRate::ALL,
+        least_tiles: 15,
+        quality_tiles: 8,
+        reference_rays: 400,
+        is_quick: true,
+    };
+
+    /// With another share of the tiles.
+    pub fn with_sample(self, sample: SampleRate) -> Self {
+        Self { sample, ..self }
+    }
+
+    /// The values to go through.
+    pub fn pick<T: Copy>(&self, full: &[T], quick: &[T]) -> Vec<T> {
+        if self.is_quick { quick.to_vec() } else { full.to_vec() }
+    }
+
+    /// Settings without any technique but an order: 16x16 tiles, rays by the reflection, Jensen's kd-tree.
+    pub fn settings(&self, order: GatherOrder) -> RenderSettings {
+        RenderSettings {
+            width: self.side,
+            height: self.side,
+            photons: self.photons,
+            neighbors: self.neighbors,
+            gather_rays: self.gather_rays,
+            shadow_rays: self.shadow_rays,
+            sampling: Sampling::Reflection,
+            photon_layout: PhotonLayout::Jensen,
+            order,
+            ..RenderSettings::default()
+        }
+    }
+
+    /// Settings with everything on: sorted gathers, combined sampling, the irradiance cache, photons in line leaves.
+    pub fn all_on(&self) -> RenderSettings {
+        RenderSettings {
+            sampling: Sampling::Product,
+            irradiance_error: Some(IRRADIANCE_ERROR),
+            photon_layout: PhotonLayout::Lines,
+            ..self.settings(GatherOrder::Sort)
+        }
+    }
+
+    /// The traffic of sampled tiles behind the nominal caches.
+    pub fn traffic(&self, scene: &'static str, settings: RenderSettings) -> Point {
+        self.traffic_behind(scene, settings, CacheSettings::default())
+    }
+
+    /// The traffic of sampled tiles.
+    pub fn traffic_behind(
+        &self,
+        scene: &'static str,
+        settings: RenderSettings,
+        caches: CacheSettings,
+    ) -> Point {
+        let task = Task::Traffic { caches, sample: self.sample, least_tiles: self.least_tiles };
+        Point { scene, assignments: Vec::new(), settings, task }
+    }
+
+    /// The traffic of all tiles behind the nominal caches.
+    pub fn whole(&self, scene: &'static str, settings: RenderSettings) -> Point {
+        Self { sample: SampleRate::ALL, ..self.clone() }.traffic(scene, settings)
+    }
+
+    /// The error of some tiles.
+    pub fn quality(&self, scene: &'static str, settings: RenderSettings) -> Point {
+        let task = Task::Quality { tiles: self.quality_tiles, reference_rays: self.reference_rays };
+        Point { scene, assignments: Vec::new(), settings, task }
+    }
+
+    /// What a reader needs to know of all points, as settings of a report.
+    pub fn rows(&self) -> Vec<(String, String)> {
+        let settings = self.settings(GatherOrder::Sort);
+        [
+            ("picture", format!("{0}x{0} pixels, 1 sample each, seed {1}", self.side, settings.seed)),
+            ("photons", self.photons.to_string()),
+            ("photons a gather looks for", self.neighbors.to_string()),
+            ("gather rays a pixel", self.gather_rays.to_string()),
+            ("shadow rays a pixel", self.shadow_rays.to_string()),
+            ("tiles", format!("{0}x{0} pixels; in the naive order rows of as many pixels", settings.tile)),
+            ("sampling of gather rays", "brdf, unless said otherwise".to_owned()),
+            ("photon map", format!("{}, unless said otherwise", layout_name(settings.photon_layout))),
+            ("error of the irradiance cache, where it is on", IRRADIANCE_ERROR.to_string()),
+            ("caches, unless said otherwise", CacheSettings::default().to_string()),
+            ("share of the tiles rendered", format!("{}, at least {}", self.sample, self.least_tiles)),
+            ("caches at a tile's begin", "empty".to_owned()),
+        ]
+        .map(|(name, value)| (name.to_owned(), value))
+        .to_vec()
+    }
+
+    /// Gathers of a frame in which every gather ray of every pixel ends in one: 26.2 million at the nominal values.
+    pub fn nominal_gathers(&self) -> f64 {
+        f64::from(self.side) * f64::from(self.side) * f64::from(self.gather_rays)
+    }
+}
+
+/// The dissertation's error bound of the irradiance cache, as figure 6.17 seems to state it.
+const IRRADIANCE_ERROR: f32 = 0.025;

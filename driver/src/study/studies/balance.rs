@@ -1,0 +1,48 @@
+//! How evenly the tiles of a measured frame load chips.
+
+use super::super::load_balance::{Balance, LinkModel, Setup, TileOrder, simulate};
+use super::super::report::{Panel, Point, XScale, YScale};
+use super::present::{panel, series};
+
+/// A way of dealing tiles.
+pub(super) type Dealing = (&'static str, TileOrder, usize);
+
+/// Tile commands that may be unanswered on a chip, tiles in the picture's order.
+pub(super) const CREDITS: [Dealing; 3] = [
+    ("1 credit", TileOrder::Picture, 1),
+    ("2 credits", TileOrder::Picture, 2),
+    ("4 credits", TileOrder::Picture, 4),
+];
+/// Orders of the tiles, one credit a chip.
+pub(super) const ORDERS: [Dealing; 3] = [
+    ("picture's order", TileOrder::Picture, 1),
+    ("random order", TileOrder::Random(1), 1),
+    ("longest first", TileOrder::LongestFirst, 1),
+];
+
+/// Powers of two up to `most` chips.
+pub(super) fn chip_counts(most: usize) -> Vec<usize> {
+    std::iter::successors(Some(1), |chips| Some(2 * chips)).take_while(|&chips| chips <= most).collect()
+}
+
+/// Deals tiles of these seconds; links take no time. `None` if there are no tiles.
+pub(super) fn deal(seconds: &[f64], chips: usize, (_, order, credits): Dealing) -> Option<Balance> {
+    simulate(seconds, order, &Setup { chips, credits, link: LinkModel::default() }).ok()
+}
+
+/// A panel with a line for each way of dealing.
+pub(super) fn curves(
+    title: &str,
+    seconds: &[f64],
+    most_chips: usize,
+    dealings: &[Dealing],
+    (label, scale, value): (&str, YScale, fn(&Balance) -> f64),
+) -> Panel {
+    let line = |&dealing: &Dealing| {
+        let points = chip_counts(most_chips).into_iter().filter_map(|chips| {
+            deal(seconds, chips, dealing).map(|balance| Point::new(chips as f64, value(&balance)))
+        });
+        series(dealing.0, points.collect())
+    };
+    panel(title, ("chips", "", XScale::Log2), (label, "", scale), dealings.iter().map(line).collect())
+}

@@ -1,0 +1,223 @@
+//! Figure 6.17: memory traffic over the exponent of a glossy floor.
+
+use super::super::laboratory::Results;
+use super::super::measure::{Measurement, TileMeasurement};
+use super::super::point::{Point, order_name};
+use super::super::report::{Panel, Report, Table, XScale, YScale};
+use super::super::sample::Estimate;
+use super::super::scale::Scale;
+use super::GLOSSY;
+use super::present::{
+    columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
+};
+use crate::render::{RenderSettings, Sampling};
+use crate::scheduler::GatherOrder::{self, DirectionBins, Hash, Naive, Sort, Tiled};
+
+/// The lines of the figure.
+const LINES: [(GatherOrder, Sampling); 7] = [
+    (Naive, Sampling::Reflection),
+    (Tiled, Sampling::Reflection),
+    (DirectionBins, Sampling::Reflection),
+    (Hash, Sampling::Reflection),
+    (Sort, Sampling::Reflection),
+    (DirectionBins, Sampling::Product),
+    (Hash, Sampling::Product),
+];
+/// Its panels: without and with the irradiance cache.
+const PANELS: [(bool, &str); 2] =
+    [(false, "without the irradiance cache"), (true, "with the irradiance cache")];
+
+fn exponents(scale: &Scale) -> Vec<u32> {
+    scale.pick(&[1, 2, 4, 8, 16, 32, 64, 128], &[1, 16, 128])
+}
+
+fn line_name((order, sampling): (GatherOrder, Sampling)) -> String {
+    match sampling {
+        Sampling::Product => format!("{}, combined", order_name(order)),
+        _ => order_name(order).to_owned(),
+    }
+}
+
+fn point(scale: &Scale, (order, sampling): (GatherOrder, Sampling), is_cached: bool, exponent: u32) -> Point {
+    let settings = RenderSettings {
+        camera: Some("floor".to_owned()),
+        sampling,
+        irradiance_error: scale.all_on().irradiance_error.filter(|_| is_cached),
+        ..scale.settings(order)
+    };
+    let assignments = vec![format!("floor.exponent={exponent}")];
+    Point { assignments, ..scale.traffic(GLOSSY, settings) }
+}
+
+pub(super) fn points(scale: &Scale) -> Vec<Point> {
+    let mut points = Vec::new();
+    for exponent in exponents(scale) {
+        for (is_cached, _) in PANELS {
+            points.extend(LINES.map(|line| point(scale, line, is_cached, exponent)));
+        }
+    }
+    points
+}
+
+pub(super) fn report(scale: &Scale, results: &Results) -> Report {
+    let introduction = vec![
+        "How the memory traffic of the photon map depends on how sharply a glossy floor reflects: the modified Cornell box \
+         of figure 6.17, seen by the camera on its floor, with Phong exponents from 1 to 128, Jensen's kd-tree and a cache of \
+         128 KB."
+            .to_owned(),
+        how_it_counts(),
+        "The lines without a note sample gather rays by the reflection; those of combined importance sampling are marked."
+            .to_owned(),
+    ];
+    let figure = |name: &str, title: &str, bytes: fn(&Measurement) -> Estimate| {
+        let caption = "Left without, right with the irradiance cache.";
+        plot(name, title, caption, panels(scale, results, bytes))
+    };
+    let dram = figure("dram", "Photon map from DRAM by the floor's exponent", Measurement::photon_map_bytes);
+    let raw = figure("raw", "Raw bytes of the photon map by the floor's exponent", Measurement::raw_bytes);
+    let mut claims = vec![text(
+        "The figure is cited for three claims: the naive traffic falls as the reflection sharpens, that of the reordered \
+         gathers is nearly flat, and both hold with the irradiance cache.",
+    )];
+    claims.extend(PANELS.map(|(is_cached, name)| text(check(scale, results, is_cached, name))));
+    claims.push(table("claims", claims_table(scale, results)));
+    let sections = vec![
+        section("Bytes from DRAM", vec![dram, table("traffic", traffic(scale, results))]),
+        section("Raw bytes", vec![raw]),
+        section("The claims", claims),
+    ];
+    page("Figure 6.17: a glossy floor", introduction, sections)
+}
+
+fn panels(scale: &Scale, results: &Results, bytes: fn(&Measurement) -> Estimate) -> Vec<Panel> {
+    let one = |(is_cached, name): (bool, &str)| {
+        let lines = LINES.map(|line| {
+            let points = exponents(scale).into_iter().map(|exponent| {
+                let measured = results.traffic(&point(scale, line, is_cached, exponent));
+                gigabyte_point(f64::from(exponent), bytes(measured))
+            });
+            series(line_name(line), points.collect())
+        });
+        let y = ("photon map", "GB a frame", YScale::LinearFromZero);
+        panel(name, ("exponent n", "", XScale::Log2), y, lines.to_vec())
+    };
+    PANELS.map(one).to_vec()
+}
+
+fn traffic(scale: &Scale, results: &Results) -> Table {
+    let heads = [
+        ("irradiance cache", ""),
+        ("line", ""),
+        ("exponent", ""),
+        ("gathers", "million"),
+        ("raw", "GB"),
+        ("from DRAM", "GB"),
+    ];
+    let mut table = Table::new("Photon map traffic of a frame", columns(&heads));
+    for (is_cached, _) in PANELS {
+        for line in LINES {
+            for exponent in exponents(scale) {
+                let measured = results.traffic(&point(scale, line, is_cached, exponent));
+                table.push(vec![
+                    if is_cached { "on" } else { "off" }.into(),
+                    line_name(line).into(),
+                    exponent.into(),
+                    (measured.gathers().value / 1e6).into(),
+                    gigabytes(measured.raw_bytes()),
+                    gigabytes(measured.photon_map_bytes()),
+                ]);
+            }
+        }
+    }
+    table
+}
+
+/// Bytes from DRAM at all exponents.
+fn curve(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cached: bool) -> Vec<Estimate> {
+    let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent)).photon_map_bytes();
+    exponents(scale).into_iter().map(of).collect()
+}
+
+/// By how much the bytes from DRAM fall from the first to the last exponent. The same tiles are rendered at both, so their
+/// differences are sampled: what tiles have in common does not blur it.
+fn fall(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cached: bool) -> Estimate {
+    let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
+    let exponents = exponents(scale);
+    let (first, last) = (of(exponents[0]), of(exponents[exponents.len() - 1]));
+    let bytes = |tile: &TileMeasurement| tile.photon_map().dram_bytes as f64;
+    let differences: Vec<f64> =
+        first.tiles.iter().zip(&last.tiles).map(|(first, last)| bytes(first) - bytes(last)).collect();
+    Estimate::of_total(&differences, first.population)
+}
+
+/// The last value of a curve over its first.
+fn change(curve: &[Estimate]) -> f64 {
+    curve.last().zip(curve.first()).map_or(f64::NAN, |(last, first)| last.value / first.value)
+}
+
+/// Its greatest value over its least.
+fn spread(curve: &[Estimate]) -> f64 {
+    let greatest = curve.iter().map(|estimate| estimate.value).fold(0.0, f64::max);
+    greatest / curve.iter().map(|estimate| estimate.value).fold(f64::INFINITY, f64::min)
+}
+
+fn check(scale: &Scale, results: &Results, is_cached: bool, name: &str) -> String {
+    let of = |line| curve(scale, results, line, is_cached);
+    let naive = of(LINES[0]);
+    let (first, last) = (naive[0], naive[naive.len() - 1]);
+    let fall = fall(scale, results, LINES[0], is_cached);
+    let verdict = match (fall.value.abs() > fall.half_width, fall.value > 0.0) {
+        (true, true) => "it falls",
+        (true, false) => "it rises",
+        (false, _) => "it changes by less than the sample can tell",
+    };
+    let reordered = [DirectionBins, Hash, Sort].map(|order| {
+        let curve = of((order, Sampling::Reflection));
+        let highest = curve.iter().map(|estimate| estimate.value).fold(0.0, f64::max);
+        let range = spread(&curve);
+        let share = 100.0 * (highest - highest / range) / first.value;
+        format!(
+            "{} by a factor of {} from its least to its greatest, a range of {} % of the naive value at n = 1",
+            order_name(order),
+            say(range),
+            say(share)
+        )
+    });
+    format!(
+        "Panel {name}. Naive: {} GB at n = 1 and {} GB at n = {}, a ratio of {}: {verdict} (by {} ± {} GB, of the same tiles). Reordered: {}.",
+        say(first.value / 1e9),
+        say(last.value / 1e9),
+        exponents(scale).last().copied().unwrap_or(1),
+        say(change(&naive)),
+        say(fall.value / 1e9),
+        say(fall.half_width / 1e9),
+        reordered.join("; "),
+    )
+}
+
+fn claims_table(scale: &Scale, results: &Results) -> Table {
+    let heads = [
+        ("irradiance cache", ""),
+        ("line", ""),
+        ("last over first exponent", ""),
+        ("greatest over least", ""),
+        ("naive over this, mean of all exponents", "times"),
+    ];
+    let mut table = Table::new("How flat the lines are", columns(&heads));
+    for (is_cached, _) in PANELS {
+        let naive = curve(scale, results, LINES[0], is_cached);
+        for line in LINES {
+            let curve = curve(scale, results, line, is_cached);
+            let ratios = naive.iter().zip(&curve).map(|(naive, this)| naive.value / this.value);
+            let mean = ratios.sum::<f64>() / curve.len() as f64;
+            table.push(vec![
+                if is_cached { "on" } else { "off" }.into(),
+                line_name(line).into(),
+                change(&curve).into(),
+                spread(&curve).into(),
+                mean.into(),
+            ]);
+        }
+    }
+    table
+}

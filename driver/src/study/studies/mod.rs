@@ -1,0 +1,78 @@
+//! The studies: each a list of points, and a report on what was measured there.
+
+mod balance;
+mod glossy_floor;
+mod machine;
+mod present;
+mod reordering;
+mod scaling;
+mod techniques;
+mod workload;
+
+use super::laboratory::Results;
+use super::point::Point;
+use super::report::Report;
+use super::scale::Scale;
+
+/// A study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Study {
+    /// Memory traffic by order, cache and layout.
+    Reordering,
+    /// Memory traffic over the exponent of a glossy floor, as figure 6.17 of the dissertation.
+    Figure617,
+    /// The cost model of table 7.1, with nominal and measured counts.
+    Table71,
+    /// Each technique alone and all together, at as many rays and at equal quality.
+    Techniques,
+    /// Photons, tile sides, queues and chips.
+    Scaling,
+}
+
+impl Study {
+    /// All studies.
+    pub const ALL: [Self; 5] =
+        [Self::Reordering, Self::Figure617, Self::Table71, Self::Techniques, Self::Scaling];
+
+    /// The name, which is also that of its folder.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reordering => "reordering",
+            Self::Figure617 => "figure-6.17",
+            Self::Table71 => "table-7.1",
+            Self::Techniques => "techniques",
+            Self::Scaling => "scaling",
+        }
+    }
+
+    /// What it measures.
+    pub fn points(self, scale: &Scale) -> Vec<Point> {
+        match self {
+            Self::Reordering => reordering::points(scale),
+            Self::Figure617 => glossy_floor::points(scale),
+            Self::Table71 => machine::points(scale),
+            Self::Techniques => techniques::points(scale),
+            Self::Scaling => scaling::points(scale),
+        }
+    }
+
+    /// What it says of the results, without provenance.
+    ///
+    /// # Panics
+    /// If `results` lack one of the [points](Self::points) of this scale.
+    pub fn report(self, scale: &Scale, results: &Results) -> Report {
+        match self {
+            Self::Reordering => reordering::report(scale, results),
+            Self::Figure617 => glossy_floor::report(scale, results),
+            Self::Table71 => machine::report(scale, results),
+            Self::Techniques => techniques::report(scale, results),
+            Self::Scaling => scaling::report(scale, results),
+        }
+    }
+}
+
+/// Scenes that stand for simple, glossy and large ones: their files and what they are called.
+const SCENES: [(&str, &str); 3] =
+    [(CORNELL, "Cornell box"), (GLOSSY, "glossy Cornell box"), ("atrium.glb", "atrium")];
+const CORNELL: &str = "cornell.gltf";
+const GLOSSY: &str = "cornell-glossy.gltf";

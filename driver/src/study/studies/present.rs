@@ -1,0 +1,93 @@
+//! What the reports of all studies are made of.
+
+use super::super::report::number::human;
+use super::super::report::{
+    Block, Cell, Column, Panel, Plot, Point, Provenance, Report, Section, Series, Table, XAxis, XScale,
+    YAxis, YScale,
+};
+use super::super::sample::Estimate;
+
+/// Bytes of a gigabyte.
+pub(super) const GIGA: f64 = 1e9;
+
+/// A number in a sentence: three significant digits.
+pub(super) fn say(value: f64) -> String {
+    human(value, 3)
+}
+
+/// A count or an amount with its confidence interval, in units of `unit`.
+pub(super) fn cell(estimate: Estimate, unit: f64) -> Cell {
+    let estimate = estimate.scaled(1.0 / unit);
+    Cell::interval(estimate.value, estimate.half_width)
+}
+
+/// Gigabytes.
+pub(super) fn gigabytes(estimate: Estimate) -> Cell {
+    cell(estimate, GIGA)
+}
+
+/// A point of a plot, in gigabytes.
+pub(super) fn gigabyte_point(x: f64, estimate: Estimate) -> Point {
+    let estimate = estimate.scaled(1.0 / GIGA);
+    Point::with_half_width(x, estimate.value, estimate.half_width)
+}
+
+/// Columns of these names and units.
+pub(super) fn columns(heads: &[(&str, &str)]) -> Vec<Column> {
+    heads.iter().map(|&(name, unit)| Column::new(name, unit)).collect()
+}
+
+/// A report whose provenance is still to be added.
+pub(super) fn page(title: &str, introduction: Vec<String>, sections: Vec<Section>) -> Report {
+    Report { title: title.to_owned(), introduction, sections, provenance: Provenance::default() }
+}
+
+/// A section.
+pub(super) fn section(heading: &str, blocks: Vec<Block>) -> Section {
+    Section { heading: heading.to_owned(), blocks }
+}
+
+/// A paragraph.
+pub(super) fn text(text: impl Into<String>) -> Block {
+    Block::Paragraph(text.into())
+}
+
+/// A table in the file of that name.
+pub(super) fn table(name: &str, table: Table) -> Block {
+    Block::Table { name: name.to_owned(), table }
+}
+
+/// A plot in the file of that name.
+pub(super) fn plot(name: &str, title: &str, caption: &str, panels: Vec<Panel>) -> Block {
+    let plot = Plot { title: title.to_owned(), caption: caption.to_owned(), panels, shares_y_range: true };
+    Block::Plot { name: name.to_owned(), plot }
+}
+
+/// A pair of axes with its series; an axis is its label, unit and scale.
+pub(super) fn panel(
+    title: &str,
+    (x_label, x_unit, x_scale): (&str, &str, XScale),
+    (y_label, y_unit, y_scale): (&str, &str, YScale),
+    series: Vec<Series>,
+) -> Panel {
+    Panel {
+        title: title.to_owned(),
+        x: XAxis { label: x_label.to_owned(), unit: x_unit.to_owned(), scale: x_scale },
+        y: YAxis { label: y_label.to_owned(), unit: y_unit.to_owned(), scale: y_scale },
+        series,
+    }
+}
+
+/// A named line.
+pub(super) fn series(name: impl Into<String>, points: Vec<Point>) -> Series {
+    Series { name: name.into(), points }
+}
+
+/// What every study says of how it counts.
+pub(super) fn how_it_counts() -> String {
+    "Raw bytes are what the chip asks of the photon map; bytes from DRAM are the lines that miss the cache, times a line's \
+     bytes. Sampled tiles are rendered on an emulated chip whose caches are empty when a tile begins; their sum is scaled to \
+     all tiles, and ± is half the width of the 95 % confidence interval of that (Student's t over the tiles, corrected for a \
+     finite population)."
+        .to_owned()
+}

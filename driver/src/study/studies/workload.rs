@@ -1,0 +1,54 @@
+//! Measured counts in the terms of the cost model.
+
+use super::super::cost_model::{Cost, Machine, Symbols, Workload};
+use super::super::measure::{Measurement, TileMeasurement};
+use crate::scheduler::GatherOrder;
+
+type Count<'a> = &'a dyn Fn(&TileMeasurement) -> f64;
+
+/// What one frame took, scaled to all tiles. Bytes on the host's link are the table's: they do not depend on the scene.
+pub(super) fn of_frame(measured: &Measurement, pixels: f64, symbols: &Symbols) -> Workload {
+    let total = |count: Count| measured.total(count).value;
+    of(&total, measured.population as f64, pixels, symbols)
+}
+
+/// What one tile took.
+fn of_tile(tile: &TileMeasurement, symbols: &Symbols) -> Workload {
+    of(&|count: Count| count(tile), 1.0, symbols.tile_pixels, symbols)
+}
+
+fn of(total: &dyn Fn(Count) -> f64, tiles: f64, pixels: f64, symbols: &Symbols) -> Workload {
+    let tables = total(&|tile| tile.counters.tables as f64);
+    let gathers = total(&|tile| tile.counters.gathers as f64);
+    let found = total(&|tile| tile.counters.photons_found as f64);
+    Workload {
+        eye_rays: total(&|tile| tile.counters.eye_rays as f64),
+        shadow_rays: total(&|tile| tile.counters.shadow_rays as f64),
+        gather_rays: total(&|tile| tile.counters.gather_rays as f64),
+        survey_rays: total(&|tile| tile.counters.survey_rays as f64),
+        ray_gathers: gathers - tables,
+        table_gathers: tables,
+        photons_per_gather: if gathers > 0.0 { found / gathers } else { 0.0 },
+        interpolated_samples: total(&|tile| tile.counters.interpolated_samples as f64),
+        records: total(&|tile| tile.counters.records as f64),
+        photon_map_bytes: total(&|tile| tile.photon_map().dram_bytes as f64),
+        scene_bytes: total(&|tile| tile.scene().dram_bytes as f64),
+        tiles,
+        bytes_to_host: pixels * symbols.pixel_bytes,
+        bytes_from_host: tiles * symbols.command_bytes,
+    }
+}
+
+/// The cost of a measured frame. A naive one evaluates the whole reflection for every photon, as the dissertation's does.
+pub(super) fn cost(workload: &Workload, symbols: &Symbols, order: GatherOrder) -> Cost {
+    if order == GatherOrder::Naive { Cost::naive(workload, symbols) } else { Cost::new(workload, symbols) }
+}
+
+/// Seconds that a chip takes for each tile: for its bytes from DRAM or its arithmetic, whichever takes longer.
+pub(super) fn tile_seconds(measured: &Measurement, symbols: &Symbols, machine: &Machine) -> Vec<f64> {
+    let seconds = |tile: &TileMeasurement| {
+        let cost = Cost::new(&of_tile(tile, symbols), symbols).total();
+        (cost.dram_bytes / machine.bandwidth).max(cost.flops / machine.flops)
+    };
+    measured.tiles.iter().map(seconds).collect()
+}
