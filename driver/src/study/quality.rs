@@ -25,7 +25,7 @@ pub struct Quality {
 /// Side of the tiles that are compared, pixels.
 const TILE: u32 = 16;
 
-/// Pixels that show a surface and no emitter, each with the radiance that many rays give it.
+/// Pixels that show a lit surface and no emitter, each with the radiance that many rays give it.
 pub struct Reference {
     /// What was rendered.
     settings: RenderSettings,
@@ -52,8 +52,8 @@ impl Reference {
         let emission = pixels(bench, &emitters, tiles)?;
         let radiance = pixels(bench, &settings, tiles)?;
         let kept = radiance.into_iter().zip(emission).map(|(pixel, emission)| {
-            let is_surface = pixel.has_surface && emission.radiance == [0.0; 3];
-            is_surface.then_some(pixel.radiance)
+            let is_lit = pixel != [0.0; 3] && emission == [0.0; 3];
+            is_lit.then_some(pixel)
         });
         Ok(Self { pixels: kept.collect(), settings, tiles })
     }
@@ -82,7 +82,7 @@ impl Reference {
         let (mut squares, mut sum, mut reference_sum, mut count) = (0.0, 0.0, 0.0, 0);
         for (reference, pixel) in self.pixels.iter().zip(rendered) {
             let Some(reference) = reference else { continue };
-            for (&reference, value) in reference.iter().zip(pixel.radiance) {
+            for (&reference, value) in reference.iter().zip(pixel) {
                 squares += (f64::from(value) - f64::from(reference)).powi(2);
                 sum += f64::from(value);
                 reference_sum += f64::from(reference);
@@ -100,20 +100,12 @@ fn comparable(settings: &RenderSettings) -> RenderSettings {
     RenderSettings { tile: TILE, order: GatherOrder::Sort, bins: None, queue: None, ..settings.clone() }
 }
 
-struct SeenPixel {
-    radiance: [f32; 3],
-    has_surface: bool,
-}
-
-fn pixels(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<Vec<SeenPixel>, RenderError> {
+/// Radiances of the pixels of some tiles.
+fn pixels(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<Vec<[f32; 3]>, RenderError> {
     let frame = bench.frame(settings)?;
     let chosen: Vec<Tile> = choose(&tiles(settings.window(), TILE, settings.order), count);
-    let (scene, _) = bench.mapped.image.view();
+    let unit = bench.mapped.image.view().0.header.radiance_unit;
     let rendered = bench.render(&frame, &chosen, &|memory| memory)?;
     let sums = rendered.iter().flat_map(|tile| &tile.sums);
-    let seen = sums.map(|sum| {
-        let pixel = sum.pixel(&scene, &frame);
-        SeenPixel { radiance: pixel.radiance, has_surface: pixel.depth.is_finite() }
-    });
-    Ok(seen.collect())
+    Ok(sums.map(|sum| (sum.value() * unit).to_array()).collect())
 }
