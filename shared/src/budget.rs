@@ -44,7 +44,7 @@ pub const REFERENCE: Budget = Budget {
     tile_pixels: 4096,
     neighbors: 256,
     gather_rays: MOST_GATHER_RAYS,
-    gather_queue: 18_688,
+    gather_queue: 17_152,
     irradiance_records: 256,
     shadow_rays: 64,
     samples: 4096,
@@ -82,10 +82,10 @@ pub struct TechniqueMemory {
 impl TechniqueMemory {
     /// What the techniques may add to [`REFERENCE`].
     pub const REFERENCE: Self =
-        Self { reordering: (440 << 10) + 64, irradiance_cache: 48 << 10, importance_sampling: 136 << 10 };
+        Self { reordering: (402 << 10) + 64, irradiance_cache: 80 << 10, importance_sampling: 136 << 10 };
     /// What the techniques may add to [`MICRO`].
     pub const MICRO: Self =
-        Self { reordering: (32 << 10) + 64, irradiance_cache: 32 << 10, importance_sampling: 8704 };
+        Self { reordering: (24 << 10) + 64, irradiance_cache: 66 << 10, importance_sampling: 8704 };
 
     /// Whether every technique adds no more than `limit` allows.
     pub const fn is_within(&self, limit: &Self) -> bool {

@@ -1,11 +1,16 @@
 //! How large a study is: what its renders have in common, and how many values it goes through.
 
+use photoncard_shared::budget::REFERENCE;
+
 use super::point::{Point, Task, layout_name};
 use super::sample::SampleRate;
 use crate::emulator::memory_model::CacheSettings;
 use crate::photon::PhotonLayout;
 use crate::render::{RenderSettings, Sampling};
 use crate::scheduler::GatherOrder;
+
+/// Side of the largest tile that the reference chip has room for, pixels.
+pub(super) const WIDEST_TILE: u32 = REFERENCE.tile_pixels.isqrt();
 
 /// What all points of a study have in common, and how many there are.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,12 +91,14 @@ impl Scale {
         }
     }
 
-    /// Settings with everything on: sorted gathers, combined sampling, the irradiance cache, photons in line leaves.
+    /// Settings with everything on: gathers sorted over the largest tiles, combined sampling, the irradiance cache, photons
+    /// in line leaves.
     pub fn all_on(&self) -> RenderSettings {
         RenderSettings {
             sampling: Sampling::Product,
             irradiance_error: Some(IRRADIANCE_ERROR),
             photon_layout: PhotonLayout::Lines,
+            tile: WIDEST_TILE,
             ..self.settings(GatherOrder::Sort)
         }
     }

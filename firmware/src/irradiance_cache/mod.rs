@@ -48,7 +48,7 @@ const MOST_ROOTS: usize = 16;
 /// Cells that wait to be looked at: the coarsest, and three of every level below.
 const MOST_WAITING: usize = MOST_ROOTS + 3 * (lattice::LEVELS as usize - 1);
 /// Records that are gathered at once.
-const MOST_GATHERED: usize = 32;
+const MOST_GATHERED: usize = 128;
 /// A record reaches at least so many pixels.
 const LEAST_REACH: f32 = 3.0;
 /// Records of a block of one pixel at the most: 4 corners, and 5 for each division.

@@ -7,7 +7,7 @@ use super::super::measure::Measurement;
 use super::super::point::{Point, layout_name, order_name};
 use super::super::report::{Block, Cell, Column, Report, Series, Table, XScale, YScale};
 use super::super::sample::Estimate;
-use super::super::scale::Scale;
+use super::super::scale::{Scale, WIDEST_TILE};
 use super::CORNELL;
 use super::present::{
     GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section, series,
@@ -27,6 +27,8 @@ const ORDERS: [GatherOrder; 5] = [
     GatherOrder::Sort,
 ];
 const LAYOUTS: [PhotonLayout; 2] = [PhotonLayout::Jensen, PhotonLayout::Lines];
+/// Sides of tiles, pixels: the dissertation's, and what the reference chip has room for.
+const TILES: [u32; 3] = [16, 32, WIDEST_TILE];
 /// Raw bytes of the naive order, bytes of the practical ones and of the frame along a Hilbert curve (Graphics
 /// Interface 2005).
 const PUBLISHED: [f64; 3] = [196e9, 24e9, 15e6];
@@ -59,6 +61,12 @@ fn point(scale: &Scale, order: GatherOrder, layout: PhotonLayout, caches: CacheS
     scale.traffic_behind(CORNELL, settings, caches)
 }
 
+/// Sorted gathers in tiles of a side.
+fn sorted(scale: &Scale, layout: PhotonLayout, tile: u32) -> Point {
+    let settings = RenderSettings { photon_layout: layout, tile, ..scale.settings(GatherOrder::Sort) };
+    scale.traffic(CORNELL, settings)
+}
+
 pub(super) fn points(scale: &Scale) -> Vec<Point> {
     let mut points = Vec::new();
     for order in ORDERS {
@@ -67,6 +75,7 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
         points.extend(caches.map(|caches| point(scale, order, PhotonLayout::Jensen, caches)));
         points.push(point(scale, order, PhotonLayout::Lines, CacheSettings::default()));
     }
+    points.extend(LAYOUTS.into_iter().flat_map(|layout| TILES.map(|tile| sorted(scale, layout, tile))));
     points.extend(LAYOUTS.map(|layout| point(scale, GatherOrder::Hilbert, layout, CacheSettings::default())));
     points
 }
@@ -95,6 +104,7 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
                 table("published", published(scale, &nominal)),
             ],
         ),
+        section("Larger tiles", vec![table("tiles", by_tile(scale, results, &nominal))]),
         section("Size of the photon cache", by_size(scale, results)),
         section("Associativity and index", by_associativity(scale, results)),
     ];
@@ -129,6 +139,37 @@ fn orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -
         let factor = naive / dram.value;
         vec![cell(measured.gathers(), 1e6), gigabytes(measured.raw_bytes()), gigabytes(dram), factor.into()]
     })
+}
+
+/// Sorted gathers by the side of a tile: each tile reads about the whole map once.
+fn by_tile<'a>(
+    scale: &Scale,
+    results: &Results,
+    nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement,
+) -> Table {
+    let naive = nominal(GatherOrder::Naive, PhotonLayout::Jensen);
+    let of_gather = |measured: &Measurement| measured.photon_map_bytes().value / measured.gathers().value;
+    let heads = [
+        ("side of a tile", "pixels"),
+        ("photon map", ""),
+        ("from DRAM", "GB"),
+        ("from DRAM", "bytes a gather"),
+        ("less than naive, jensen, a gather", "times"),
+    ];
+    let mut table = Table::new("Sorted gathers, the queue drained when it is full", columns(&heads));
+    for layout in LAYOUTS {
+        for tile in TILES {
+            let measured = results.traffic(&sorted(scale, layout, tile));
+            table.push(vec![
+                tile.into(),
+                layout_name(layout).into(),
+                gigabytes(measured.photon_map_bytes()),
+                of_gather(measured).into(),
+                (of_gather(naive) / of_gather(measured)).into(),
+            ]);
+        }
+    }
+    table
 }
 
 fn by_gather<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {

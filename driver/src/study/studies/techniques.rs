@@ -3,7 +3,7 @@
 use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{self, Block, Cell, Report, Table, XScale, YScale};
-use super::super::scale::Scale;
+use super::super::scale::{Scale, WIDEST_TILE};
 use super::SCENES;
 use super::present::{
     GIGA, cell, columns, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
@@ -19,14 +19,18 @@ struct Technique {
     sampling: Sampling,
     is_cached: bool,
     layout: PhotonLayout,
+    tile: u32,
 }
 
+/// Side of the dissertation's tiles, pixels.
+const TILE: u32 = 16;
 const NAIVE: Technique = Technique {
     name: "naive",
     order: GatherOrder::Naive,
     sampling: Sampling::Reflection,
     is_cached: false,
     layout: PhotonLayout::Jensen,
+    tile: TILE,
 };
 const ALL: Technique = Technique {
     name: "all techniques, jensen",
@@ -34,14 +38,22 @@ const ALL: Technique = Technique {
     sampling: Sampling::Product,
     is_cached: true,
     layout: PhotonLayout::Jensen,
+    tile: WIDEST_TILE,
 };
 /// The irradiance cache needs square tiles: rows share few records.
-const TECHNIQUES: [Technique; 7] = [
+const TECHNIQUES: [Technique; 8] = [
     NAIVE,
     Technique { name: "sort", order: GatherOrder::Sort, ..NAIVE },
     Technique { name: "irradiance cache, tiled", order: GatherOrder::Tiled, is_cached: true, ..NAIVE },
     Technique { name: "combined sampling", sampling: Sampling::Product, ..NAIVE },
     Technique { name: "lines", layout: PhotonLayout::Lines, ..NAIVE },
+    Technique {
+        name: "sort, lines, largest tiles",
+        order: GatherOrder::Sort,
+        layout: PhotonLayout::Lines,
+        tile: WIDEST_TILE,
+        ..NAIVE
+    },
     ALL,
     Technique { name: "all techniques, lines", layout: PhotonLayout::Lines, ..ALL },
 ];
@@ -53,6 +65,7 @@ impl Technique {
             sampling: self.sampling,
             irradiance_error: scale.all_on().irradiance_error.filter(|_| self.is_cached),
             photon_layout: self.layout,
+            tile: self.tile,
             ..scale.settings(self.order)
         }
     }
@@ -65,8 +78,12 @@ impl Technique {
     fn quality(&self, scale: &Scale, scene: &'static str, rays: u32) -> Point {
         let settings = self.settings(scale, rays);
         let shared = scale.settings(GatherOrder::Sort);
-        let settings =
-            RenderSettings { order: shared.order, photon_layout: shared.photon_layout, ..settings };
+        let settings = RenderSettings {
+            order: shared.order,
+            photon_layout: shared.photon_layout,
+            tile: shared.tile,
+            ..settings
+        };
         scale.quality(scene, settings)
     }
 
