@@ -13,9 +13,12 @@ use photoncard_shared::layout::{self, Photon, PhotonGrid, Record, power_of_two_a
 
 use crate::bvh::{self, HierarchyError};
 use crate::emitter::Emitters;
-use crate::photon::PhotonMap;
 use crate::photon::leaves::{PhotonLines, Placed};
+use crate::photon::{PhotonLayout, PhotonMap};
 use crate::scene::{Material, Scene, Triangle};
+
+/// Photons of a line of leaves, the inner nodes' lines counted in, about.
+const PHOTONS_OF_A_LEAF: usize = 9;
 
 /// Why a scene does not fit a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
@@ -133,19 +136,28 @@ impl PackedScene {
         self.lines.len() as u64 * LINE_BYTES as u64
     }
 
-    /// Checks that an image of this scene with so many photons fits a card's memory.
+    /// Checks that an image of this scene may fit a card's memory with so many photons: in leaves as they are about.
     ///
     /// # Errors
     /// If not; the error says what to lower.
-    pub fn check_budget(&self, photons: usize, budget: &Budget) -> Result<(), PackError> {
-        let photon_lines = photons.div_ceil(Photon::PER_LINE) as u64;
-        let photon_bytes = photon_lines * LINE_BYTES as u64;
+    pub fn check_budget(
+        &self,
+        photons: usize,
+        layout: PhotonLayout,
+        budget: &Budget,
+    ) -> Result<(), PackError> {
+        let per_line = match layout {
+            PhotonLayout::Jensen => Photon::PER_LINE,
+            // With the inner nodes; what does not fit after all is found when the map is there.
+            PhotonLayout::Lines => PHOTONS_OF_A_LEAF,
+        };
+        let photon_bytes = (photons.div_ceil(per_line) * LINE_BYTES) as u64;
         let needed = self.bytes() + photon_bytes;
         let available = budget.dram_bytes as u64;
         if needed <= available {
             return Ok(());
         }
-        let room = available.saturating_sub(self.bytes()) / LINE_BYTES as u64 * Photon::PER_LINE as u64;
+        let room = available.saturating_sub(self.bytes()) / LINE_BYTES as u64 * per_line as u64;
         let remedy = if room > 0 {
             format!("lower --photons to {room} or less, or use a card with more memory")
         } else {

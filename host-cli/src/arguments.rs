@@ -81,7 +81,7 @@ pub(crate) struct RenderOptions {
     #[arg(long, default_value_t = 500_000, allow_negative_numbers = true)]
     photons: usize,
     /// Layout of the photon map in card memory; it never changes the picture
-    #[arg(long, default_value = "jensen")]
+    #[arg(long, default_value = "lines")]
     photon_map: PhotonMapOption,
     /// Photons that a gather looks for
     #[arg(long, default_value_t = 100, allow_negative_numbers = true)]

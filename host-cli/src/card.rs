@@ -17,6 +17,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("sram            {} bytes", budget.sram_bytes),
         format!("  photon cache  {} bytes", budget.photon_cache_bytes),
         format!("  scene cache   {} bytes", budget.scene_cache_bytes),
+        format!("  cache tags    {} bytes", kind.tag_bytes()),
         format!("  stack         {} bytes", budget.stack_bytes),
         format!("  buffers       {} bytes", ChipKind::buffer_bytes(kind)),
         format!("    reordering  {} bytes: gathers that wait", techniques.reordering),

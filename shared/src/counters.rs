@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Work done since the frame began. Sums over chips do not depend on how tiles were dealt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
-    /// Rays from the eye: to samples, with the irradiance cache twice, and to points of its lattice.
+    /// Rays from the eye: twice to each sample, with the irradiance cache thrice, and to points of its lattice.
     pub eye_rays: u64,
     /// Rays towards emitters.
     pub shadow_rays: u64,

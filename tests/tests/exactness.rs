@@ -71,9 +71,9 @@ fn variants() -> Vec<RenderSettings> {
         RenderSettings { cards: vec![card("emulated:3")], order: GatherOrder::Naive, ..settings() },
         RenderSettings { cards: vec![card("emulated:7")], tile: 4, ..settings() },
         RenderSettings { cards: vec![card("emulated-micro:2"), card("emulated:1")], ..settings() },
-        RenderSettings { photon_layout: PhotonLayout::Lines, ..settings() },
+        RenderSettings { photon_layout: PhotonLayout::Jensen, ..settings() },
         RenderSettings {
-            photon_layout: PhotonLayout::Lines,
+            photon_layout: PhotonLayout::Jensen,
             order: GatherOrder::Sort,
             cards: vec![card("emulated-micro:2")],
             ..settings()

@@ -11,11 +11,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard, REFERENCE_SRAM_BYTES, ReferenceCard};
-use photoncard_firmware::chip::{MicroChip, ReferenceChip, sram_bytes};
+use photoncard_firmware::chip::{MicroChip, ReferenceChip, sram_bytes, tag_bytes};
 use photoncard_firmware::memory::{CardMemory, MemoryPort};
 use photoncard_firmware::serve::serve;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::budget::{MICRO, REFERENCE, TechniqueMemory};
+use photoncard_shared::budget::{Budget, MICRO, REFERENCE, TechniqueMemory};
 use photoncard_shared::message::{Fault, FaultCode};
 
 use self::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
@@ -48,13 +48,21 @@ impl ChipKind {
         }
     }
 
-    /// On-chip memory of the tile's and the link's buffers, bytes.
-    pub fn buffer_bytes(self) -> usize {
-        let budget = match self {
+    /// On-chip memory of the tags of its caches, bytes.
+    pub fn tag_bytes(self) -> usize {
+        tag_bytes(&self.budget())
+    }
+
+    fn budget(self) -> Budget {
+        match self {
             Self::Reference => REFERENCE,
             Self::Micro => MICRO,
-        };
-        self.sram_bytes() - sram_bytes(&budget, 0)
+        }
+    }
+
+    /// On-chip memory of the tile's and the link's buffers, bytes.
+    pub fn buffer_bytes(self) -> usize {
+        self.sram_bytes() - sram_bytes(&self.budget(), 0)
     }
 }
 

@@ -39,9 +39,9 @@ pub struct PhotonSettings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PhotonLayout {
     /// The left-balanced kd-tree of Jensen (2001), of 20-byte records: the dissertation's.
-    #[default]
     Jensen,
-    /// Photons in leaves that fill a line of card memory each.
+    /// Photons in leaves that fill a line of card memory each: smaller, and faster to search.
+    #[default]
     Lines,
 }
 

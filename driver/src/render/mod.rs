@@ -155,7 +155,7 @@ fn prepare(
     let packed = PackedScene::new(scene, &Emitters::new(scene))?;
     let budgets: Vec<Budget> = budgets.collect();
     for budget in &budgets {
-        packed.check_budget(settings.photons, budget)?;
+        packed.check_budget(settings.photons, settings.photon_layout, budget)?;
     }
     let total = settings.photons as u64;
     let progress = |stored: usize| {

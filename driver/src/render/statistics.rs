@@ -82,7 +82,7 @@ pub struct Times {
 /// Rays by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Rays {
-    /// From the eye: to samples, with the irradiance cache twice, and to points of its lattice.
+    /// From the eye: twice to each sample, with the irradiance cache thrice, and to points of its lattice.
     pub eye: u64,
     /// Towards emitters.
     pub shadow: u64,

@@ -207,7 +207,14 @@ fn allowed_error(frame: &FrameParameters) -> Option<f32> {
 
 /// On-chip memory that a card of `card_bytes` takes under a budget: its statics, caches with their tags, and stack.
 pub const fn sram_bytes(budget: &Budget, card_bytes: usize) -> usize {
-    let cache_bytes = budget.photon_cache_bytes as usize + budget.scene_cache_bytes as usize;
-    let tag_bytes = cache_bytes / LINE_BYTES * size_of::<CacheEntry>();
-    card_bytes + cache_bytes + tag_bytes + budget.stack_bytes as usize
+    card_bytes + cache_bytes(budget) + tag_bytes(budget) + budget.stack_bytes as usize
+}
+
+const fn cache_bytes(budget: &Budget) -> usize {
+    budget.photon_cache_bytes as usize + budget.scene_cache_bytes as usize
+}
+
+/// On-chip memory of the tags of a budget's caches, bytes.
+pub const fn tag_bytes(budget: &Budget) -> usize {
+    cache_bytes(budget) / LINE_BYTES * size_of::<CacheEntry>()
 }
