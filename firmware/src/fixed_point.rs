@@ -27,6 +27,14 @@ impl Sum {
         self.add_bits((term * SCALE) as i64);
     }
 
+    /// Adds a term that is not negative, in units; the sum stays at its greatest value when it is reached. In any order: a
+    /// sum that only grows is cut at the same value.
+    #[inline(always)]
+    fn add_up_to_greatest(&mut self, term: f32) {
+        let bits = ((term * SCALE) as i64).max(0);
+        self.0 = self.0.saturating_add(I24F40::from_bits(bits));
+    }
+
     #[inline(always)]
     fn add_bits(&mut self, bits: i64) {
         self.0 = self.0.wrapping_add(I24F40::from_bits(bits));
@@ -58,6 +66,14 @@ impl ColourSum {
         }
     }
 
+    /// Adds light, in units: components that are not negative. A sum that reaches 2^23 units stays there.
+    #[inline(always)]
+    pub fn add_light(&mut self, light: Vec3) {
+        for (sum, component) in self.0.iter_mut().zip(light.to_array()) {
+            sum.add_up_to_greatest(component);
+        }
+    }
+
     /// Adds a shared-exponent colour: what [`Self::add`] does of the decoded one, in integers alone.
     #[inline(always)]
     pub fn add_rgbe(&mut self, Rgbe([r, g, b, exponent]): Rgbe) {
@@ -83,6 +99,24 @@ impl ColourSum {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn light_beyond_the_greatest_sum_stays_there_in_any_order() {
+        let terms = [8e6, 3.0, 7e6, f32::INFINITY, 1e30, 0.5].map(Vec3::splat);
+        let sum = |order: [usize; 6]| {
+            let mut sum = ColourSum::ZERO;
+            order.into_iter().for_each(|index| sum.add_light(terms[index]));
+            sum
+        };
+        let greatest = sum([0, 1, 2, 3, 4, 5]);
+        assert_eq!(greatest.value(), Vec3::splat((1 << 23) as f32));
+        for order in [[5, 4, 3, 2, 1, 0], [3, 0, 1, 2, 5, 4], [1, 5, 0, 2, 4, 3]] {
+            assert_eq!(sum(order), greatest);
+        }
+        let mut nothing = ColourSum::ZERO;
+        nothing.add_light(Vec3::new(f32::NAN, -1.0, -0.0));
+        assert_eq!(nothing, ColourSum::ZERO);
+    }
 
     #[test]
     fn a_sum_is_the_same_in_any_order() {

@@ -4,8 +4,8 @@ use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::{PhotonMap, trace};
-use photoncard_driver::render::RenderSettings;
-use photoncard_driver::scene::{Material, Scene, Triangle};
+use photoncard_driver::render::{RenderSettings, Unobserved, render};
+use photoncard_driver::scene::{Material, Scene, Triangle, gltf};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
 
 fn settings() -> RenderSettings {
@@ -115,4 +115,66 @@ fn the_stored_power_of_coloured_light_is_right_in_every_channel() {
             assert!(error.abs() < 0.015, "{photons} photons, channel {channel}: off by {error}");
         }
     }
+}
+
+/// The Cornell box, whose boxes stand at an angle, and one triangle far away.
+fn box_and_far_triangle(distance: f32) -> Scene {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
+    let mut scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
+    let corner = Vec3::splat(distance);
+    scene.triangles.push(Triangle { vertices: [corner, corner + Vec3::X, corner + Vec3::Y], material: 0 });
+    scene
+}
+
+/// Places are told apart on a grid over the whole scene: what is far away must not show in what is near.
+#[test]
+fn a_far_triangle_changes_no_picture() {
+    let settings = RenderSettings {
+        width: 32,
+        height: 32,
+        photons: 100_000,
+        gather_rays: 16,
+        max_distance: Some(0.1),
+        ..RenderSettings::default()
+    };
+    let picture = |distance| radiances(&render_or_panic(&box_and_far_triangle(distance), &settings).film);
+    let near = picture(10.0);
+    let far = picture(3000.0);
+    assert!((mean(&far) / mean(&near) - 1.0).abs() < 2e-3, "{} {}", mean(&far), mean(&near));
+    let error = render(&box_and_far_triangle(1e6), &settings, &Unobserved).err().expect("is refused");
+    assert!(error.is_input() && error.to_string().contains("too wide"), "{error}");
+}
+
+/// Without gather rays nothing bounds what a shadow ray brings from very near.
+#[test]
+fn shadow_rays_beside_a_small_lamp_bring_no_darkness() {
+    let vertical = |x: f32, side: f32| {
+        [
+            Vec3::new(x, 0.0, -side),
+            Vec3::new(x, 0.0, side),
+            Vec3::new(x, side, side),
+            Vec3::new(x, side, -side),
+        ]
+    };
+    let floor = [[-500.0, -500.0], [-500.0, 500.0], [500.0, 500.0], [500.0, -500.0]];
+    let mut triangles = quad(floor.map(|[x, z]| Vec3::new(x, 0.0, z)), 0).to_vec();
+    triangles.extend(quad(vertical(0.0, 0.05), 1));
+    let lamp = Material { double_sided: true, ..emitting("lamp", 0.5, Vec3::splat(100.0)) };
+    let scene = scene(
+        triangles,
+        vec![lambertian("floor", 0.5), lamp],
+        camera(Vec3::new(0.3, 0.2, 0.0), Vec3::new(-0.3, -0.2, 0.01)),
+    );
+    let settings = RenderSettings {
+        width: 64,
+        height: 64,
+        gather_rays: 0,
+        shadow_rays: 2,
+        samples: 4,
+        photons: 1000,
+        neighbors: 10,
+        ..RenderSettings::default()
+    };
+    let radiances = radiances(&render_or_panic(&scene, &settings).film);
+    assert!(radiances.as_flattened().iter().all(|&radiance| radiance >= 0.0));
 }

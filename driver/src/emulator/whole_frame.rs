@@ -169,7 +169,7 @@ fn render_with<'a, M: MeasuredMemory>(
             all.counters.add(&counters);
             all.traffic.add(&traffic);
             for (sum, brought) in brought {
-                all.sums[sum as usize].add(brought);
+                all.sums[sum as usize].add_light(brought);
             }
         }
         done += waiting.len() as u64;

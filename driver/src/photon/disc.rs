@@ -205,7 +205,7 @@ fn exact_normal(
 ) -> Result<Vec3, Fault> {
     let coded = coded_normal(photon);
     let above = offset_origin(photon.position.into(), coded, magnitude(&[photon.position.into()]))
-        + coded * (1e-3 * radius);
+        + coded * lift(scene, radius);
     let ray = Ray { origin: above, direction: -coded, max_distance: radius };
     let Some(hit) = closest_hit(scene, memory, &ray)? else { return Ok(coded) };
     let normal = read_surface(scene, memory, &ray, &hit)?.normal;
@@ -234,6 +234,12 @@ fn is_inside_surface(searcher: &mut Searcher, photons: &[Photon]) -> Result<bool
     Ok(disc.surface_points(&searcher.scene, &mut memory, GROUP_POINTS)? == GROUP_POINTS)
 }
 
+/// How far above a photon rays start, metres: a little of the disc's radius, and more than the grid may have put the photon
+/// below its surface.
+fn lift(scene: &SceneImage, radius: f32) -> f32 {
+    1e-3 * radius + scene.header.photon_grid.cell
+}
+
 /// A flat disc on a surface.
 struct Disc {
     centre: Vec3,
@@ -252,7 +258,7 @@ impl Disc {
     ) -> Result<u32, Fault> {
         let (tangent, bitangent) = self.normal.any_orthonormal_pair();
         let surface = offset_origin(self.centre, self.normal, magnitude(&[self.centre]))
-            + self.normal * (1e-3 * self.radius);
+            + self.normal * lift(scene, self.radius);
         let above = surface + self.normal * self.clear_height(scene, memory, surface)?;
         let mut found = 0;
         for index in 0..points {

@@ -21,6 +21,20 @@ pub enum PhotonError {
         /// Paths traced.
         paths: u64,
     },
+    /// Photons could not be told apart: the scene is too wide for so small a gather.
+    #[error(
+        "the scene is too wide: places are told apart to {cell} m in it, and a gather looks only {max_distance} m far"
+    )]
+    #[diagnostic(help(
+        "leave out geometry that is far away, move the scene to the origin, or choose a greater --max-distance or fewer \
+         --photons"
+    ))]
+    TooWide {
+        /// Side of a cell of the grid, metres.
+        cell: f32,
+        /// Greatest distance of a gather, metres.
+        max_distance: f32,
+    },
     /// The packed scene is not sound.
     #[error("the packed scene is not sound: {0:?}")]
     Unsound(Fault),

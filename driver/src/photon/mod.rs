@@ -20,6 +20,9 @@ pub use trace::{Arrival, PhotonPass, trace};
 use self::disc::{automatic_max_distance, extent, measure_discs};
 use crate::pack::{CardImage, PackedScene};
 
+/// A gather looks at least so many cells of the grid far, so that the grid does not show.
+const LEAST_CELLS: f32 = 8.0;
+
 /// What a photon map is asked to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonSettings {
@@ -77,6 +80,10 @@ pub fn map_photons(
         Some(distance) => distance.min(extent(&image)),
         None => automatic_max_distance(&image, settings.neighbors)?,
     };
+    let cell = map.grid().cell;
+    if max_distance < LEAST_CELLS * cell {
+        return Err(PhotonError::TooWide { cell, max_distance });
+    }
     measure_discs(&mut image, settings.neighbors, max_distance, &|| progress(settings.photons))?;
     if settings.layout == PhotonLayout::Lines {
         image = image.with_photons_in_leaves(max_distance)?;

@@ -103,6 +103,11 @@ impl Scale {
         }
     }
 
+    /// The same in the dissertation's tiles of 16x16, of which a frame has enough for many chips.
+    pub fn all_on_in_small_tiles(&self) -> RenderSettings {
+        RenderSettings { tile: RenderSettings::default().tile, ..self.all_on() }
+    }
+
     /// The traffic of sampled tiles behind the nominal caches.
     pub fn traffic(&self, scene: &'static str, settings: RenderSettings) -> Point {
         self.traffic_behind(scene, settings, CacheSettings::default())

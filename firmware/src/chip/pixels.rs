@@ -95,7 +95,7 @@ pub fn pixel<M: MemoryPort>(
 #[inline]
 pub(super) fn add_light(sums: &mut [ColourSum], target: u16, brought: Vec3) {
     if let Some(sum) = sums.get_mut(target as usize) {
-        sum.add(brought);
+        sum.add_light(brought);
     }
 }
 

@@ -15,11 +15,16 @@ use photoncard_shared::layout::{PHOTON_CONTENT_BYTES, Photon, Rgbe};
 pub struct Candidate {
     /// The squared distance's bits.
     distance: u32,
-    /// The power's bytes.
+    /// The power's bytes, scrambled: of photons at one distance neither the bright nor the dim ones may come first.
     power: u32,
     /// The direction's code, and the flags without the axis.
     rest: u32,
 }
+
+/// An odd factor, and the one that undoes it.
+const SCRAMBLE: u32 = 0x9e37_79b1;
+const UNSCRAMBLE: u32 = 0x0e8b_2f51;
+const _: () = assert!(SCRAMBLE.wrapping_mul(UNSCRAMBLE) == 1);
 
 impl Candidate {
     /// A photon that carries `content` at a squared distance, m^2, that is not negative.
@@ -30,7 +35,7 @@ impl Candidate {
         Self {
             // The bits of non-negative floats are in the order of their values.
             distance: distance_squared.to_bits(),
-            power: u32::from_le_bytes([r, g, b, exponent]),
+            power: u32::from_le_bytes([r, g, b, exponent]).wrapping_mul(SCRAMBLE),
             rest: u32::from(flags) << 16 | u32::from(u16::from_le_bytes(direction)),
         }
     }
@@ -50,7 +55,7 @@ impl Candidate {
     /// The photon's power, in photon power units.
     #[inline(always)]
     pub fn power(&self) -> Rgbe {
-        Rgbe(self.power.to_le_bytes())
+        Rgbe(self.power.wrapping_mul(UNSCRAMBLE).to_le_bytes())
     }
 
     /// Code of the direction the photon came from.

@@ -9,10 +9,10 @@ use crate::address::LINE_BYTES;
 pub const GRID_BITS: u32 = 20;
 const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
 /// Coordinates are whole numbers below this, so that they are exact as `f32`.
-const MOST_COORDINATE: f64 = (1 << 23) as f64;
+const MOST_COORDINATE: f64 = (1 << 24) as f64;
 
-/// The grid that photons' positions are on: 2^20 cells each way, a millionth of the longest side of the box that holds
-/// them. A position is `(origin + q) * cell`, exact in `f32`.
+/// The grid that photons' positions are on: 2^20 cells each way, of which the longest side of the scene takes half or more;
+/// fewer far from the origin, where `f32` is coarser than that. A position is `(origin + q) * cell`, exact in `f32`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonGrid {
     /// The lower corner, cells.

@@ -37,8 +37,15 @@ fn all_on(scale: &Scale, scene: &'static str) -> Point {
     scale.whole(scene, scale.all_on())
 }
 
+/// The tiles that are dealt to chips.
+fn dealt(scale: &Scale, scene: &'static str) -> Point {
+    scale.whole(scene, scale.all_on_in_small_tiles())
+}
+
 pub(super) fn points(scale: &Scale) -> Vec<Point> {
-    SCENES.iter().flat_map(|(scene, _)| [naive(scale, scene), all_on(scale, scene)]).collect()
+    let of_scene =
+        |&(scene, _): &(&'static str, _)| [naive(scale, scene), all_on(scale, scene), dealt(scale, scene)];
+    SCENES.iter().flat_map(of_scene).collect()
 }
 
 /// The table's symbols, with what this scale changes of them.
@@ -283,12 +290,12 @@ fn discussion(frames: &[Frame]) -> String {
 
 fn load_balance(scale: &Scale, results: &Results) -> Vec<Block> {
     let mut blocks = vec![text(
-        "Each tile of a whole frame with all techniques takes max(bytes from DRAM / 90 GB/s, FLOPs / 500 GFLOPS). The \
+        "Each tile of 16x16 pixels of a whole frame with all techniques takes max(bytes from DRAM / 90 GB/s, FLOPs / 500 GFLOPS). The \
          scheduler deals these tiles to chips whose links take no time. Speed-up is over one chip; the idle share is the \
          chips' time without work until the last is done. Longest first needs the times in advance: a bound.",
     )];
     let scenes = SCENES.map(|(scene, name)| {
-        let measured = results.traffic(&all_on(scale, scene));
+        let measured = results.traffic(&dealt(scale, scene));
         (name, tile_seconds(measured, &symbols(scale), &Machine::NOMINAL))
     });
     let mut add = |file: &str, title: &str, dealings: &[_], value: (&str, YScale, fn(&Balance) -> f64)| {

@@ -112,7 +112,7 @@ impl Sweep {
 }
 
 fn chips_point(scale: &Scale) -> Point {
-    scale.whole(CORNELL, scale.all_on())
+    scale.whole(CORNELL, scale.all_on_in_small_tiles())
 }
 
 pub(super) fn points(scale: &Scale) -> Vec<Point> {

@@ -9,7 +9,8 @@ type Count<'a> = &'a dyn Fn(&TileMeasurement) -> f64;
 /// What one frame took, scaled to all tiles. Bytes on the host's link are the table's: they do not depend on the scene.
 pub(super) fn of_frame(measured: &Measurement, pixels: f64, symbols: &Symbols) -> Workload {
     let total = |count: Count| measured.total(count).value;
-    of(&total, measured.population as f64, pixels, symbols)
+    // Tiles of the table's size, so that rates of frames in tiles of any can be compared.
+    of(&total, pixels / symbols.tile_pixels, pixels, symbols)
 }
 
 /// What one tile took.
