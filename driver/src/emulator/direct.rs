@@ -19,7 +19,8 @@ pub struct RenderedTile {
     pub traffic: MemoryTraffic,
 }
 
-/// Renders a tile on a chip with a memory of its own. The gathers of its pixels go to `outlet`, if there is one.
+/// Renders a tile on a chip with a memory of its own. The gathers of its pixels go to `outlet`, if there is one: whoever does
+/// them completes the pixels.
 ///
 /// # Errors
 /// If the image is not sound, or the chip has no room for the tile.
@@ -38,5 +39,11 @@ pub fn render_tile(
         return Err(Fault { code: FaultCode::Tile, detail: tile.id });
     }
     while chip.step(&mut context)? == Progress::Busy {}
+    if context.outlet.is_none() {
+        // What a card reads to complete its pixels is counted here as well.
+        for index in 0..chip.sums().len() {
+            chip.pixel(&mut context, index)?;
+        }
+    }
     Ok(RenderedTile { sums: chip.sums().to_vec(), counters, traffic: memory.traffic() })
 }

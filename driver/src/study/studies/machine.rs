@@ -49,7 +49,7 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
 }
 
 /// The table's symbols, with what this scale changes of them.
-fn symbols(scale: &Scale) -> Symbols {
+pub(super) fn symbols(scale: &Scale) -> Symbols {
     let tile_pixels = Symbols::NOMINAL.tile_pixels;
     Symbols {
         tiles: f64::from(scale.side * scale.side) / tile_pixels,

@@ -2,7 +2,7 @@
 
 use photoncard_shared::budget::REFERENCE;
 
-use super::super::cost_model::{Machine, Symbols};
+use super::super::cost_model::Machine;
 use super::super::laboratory::Results;
 use super::super::load_balance::Balance;
 use super::super::point::Point;
@@ -10,6 +10,7 @@ use super::super::report::{Block, Column, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
 use super::CORNELL;
 use super::balance::{CREDITS, chip_counts, curves, deal};
+use super::machine::symbols;
 use super::present::{
     columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table, text,
 };
@@ -144,7 +145,7 @@ const MOST_CHIPS: usize = 64;
 
 fn chips(scale: &Scale, results: &Results) -> Vec<Block> {
     let measured = results.traffic(&chips_point(scale));
-    let seconds = tile_seconds(measured, &Symbols::NOMINAL, &Machine::NOMINAL);
+    let seconds = tile_seconds(measured, &symbols(scale), &Machine::NOMINAL);
     let speedup = ("speed-up", YScale::Log10, Balance::speedup as fn(&Balance) -> f64);
     let axes = curves("", &seconds, MOST_CHIPS, &CREDITS, speedup);
     let heads =
