@@ -18,14 +18,15 @@ use crate::address::LINE_BYTES;
 
 mod direction;
 mod photon;
+mod photon_grid;
 mod photon_lines;
 mod scene;
 
 pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
 pub use photon::{FULL_DISC, Photon, Rgbe};
+pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};
 pub use photon_lines::{
-    GRID_BITS, LEAF_PHOTONS, PHOTON_CONTENT_BYTES, PhotonChild, PhotonGrid, PhotonLeaf, PhotonNode,
-    PhotonTreelet, TREELET_NODES, power_of_two_above,
+    LEAF_PHOTONS, PHOTON_CONTENT_BYTES, PhotonChild, PhotonLeaf, PhotonNode, PhotonTreelet, TREELET_NODES,
 };
 pub use scene::{BvhNode, ChildReference, DOUBLE_SIDED, Emitter, MAX_LEAF_TRIANGLES, Material, Triangle};
 

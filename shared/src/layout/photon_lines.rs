@@ -3,93 +3,8 @@
 //! Nothing is lost against [`super::Photon`]: positions lie on a grid in either layout, so that a leaf can tell them by a
 //! few bits each from its own corner.
 
+use super::photon_grid::{GRID_BITS, GRID_MASK};
 use crate::address::LINE_BYTES;
-
-/// Bits of a coordinate on the grid.
-pub const GRID_BITS: u32 = 20;
-const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
-/// Coordinates are whole numbers below this, so that they are exact as `f32`.
-const MOST_COORDINATE: f64 = (1 << 24) as f64;
-
-/// The grid that photons' positions are on: 2^20 cells each way, of which the longest side of the scene takes half or more;
-/// fewer far from the origin, where `f32` is coarser than that. A position is `(origin + q) * cell`, exact in `f32`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PhotonGrid {
-    /// The lower corner, cells.
-    pub origin: [i32; 3],
-    /// Side of a cell, metres: a power of two.
-    pub cell: f32,
-}
-
-impl PhotonGrid {
-    /// Cells of a metre from the origin on.
-    pub const UNIT: Self = Self { origin: [0; 3], cell: 1.0 };
-
-    /// The finest grid that holds all places of a box.
-    pub fn around(lower: [f32; 3], upper: [f32; 3]) -> Self {
-        let mut least = f64::from(f32::MIN_POSITIVE);
-        for (lower, upper) in lower.into_iter().zip(upper) {
-            let [lower, upper] = [f64::from(lower), f64::from(upper)];
-            // Two cells are left for rounding at both ends.
-            let by_side = (upper - lower) / f64::from(GRID_MASK - 2);
-            let by_place = lower.abs().max(upper.abs()) / (MOST_COORDINATE - f64::from(1 << GRID_BITS));
-            least = [by_side, by_place].into_iter().filter(|c| c.is_finite()).fold(least, f64::max);
-        }
-        let cell = power_of_two_above(least);
-        let origin = lower.map(|lower| floor(f64::from(lower) / f64::from(cell)));
-        Self { origin, cell }
-    }
-
-    /// The grid point nearest to a place; of a place outside, the one nearest to it on the grid's border.
-    pub fn nearest(&self, place: [f32; 3]) -> [u32; 3] {
-        let [x, y, z] = place;
-        let [a, b, c] = self.origin;
-        [(x, a), (y, b), (z, c)].map(|(coordinate, origin)| {
-            let relative = f64::from(coordinate) / f64::from(self.cell) - f64::from(origin);
-            ((relative + 0.5) as u32).min(GRID_MASK)
-        })
-    }
-
-    /// The coordinates of a grid point, metres.
-    #[inline(always)]
-    pub fn position(&self, point: [u32; 3]) -> [f32; 3] {
-        let [x, y, z] = point;
-        let [a, b, c] = self.origin;
-        [self.metres(a, x), self.metres(b, y), self.metres(c, z)]
-    }
-
-    /// One coordinate of a grid point, metres.
-    #[inline(always)]
-    pub fn coordinate(&self, axis: u8, point: u32) -> f32 {
-        let [a, b, c] = self.origin;
-        let origin = match axis {
-            0 => a,
-            1 => b,
-            _ => c,
-        };
-        self.metres(origin, point)
-    }
-
-    #[inline(always)]
-    fn metres(&self, origin: i32, point: u32) -> f32 {
-        // Wraps in unsound images only.
-        origin.wrapping_add(point as i32) as f32 * self.cell
-    }
-}
-
-fn floor(value: f64) -> i32 {
-    let towards_zero = value as i32;
-    if f64::from(towards_zero) > value { towards_zero - 1 } else { towards_zero }
-}
-
-/// The least power of two that is not below `value`, within the normal numbers of `f32`.
-pub fn power_of_two_above(value: f64) -> f32 {
-    // By the bits, and not by a logarithm, whose last digit differs between systems.
-    let bits = value.max(f64::MIN_POSITIVE).to_bits();
-    let is_power = bits & ((1 << 52) - 1) == 0;
-    let exponent = (bits >> 52) as i32 - 1023 + i32::from(!is_power);
-    f32::from_bits(((exponent.clamp(-126, 127) + 127) as u32) << 23)
-}
 
 /// A part of the inner tree, one line.
 ///
@@ -403,49 +318,6 @@ mod tests {
         assert!(PhotonTreelet::encode(&nodes, 400, 1000).is_none());
         assert!(PhotonTreelet::encode(&nodes, 501, 1000).is_none());
         assert!(PhotonTreelet::encode(&[nodes[1]; 25], 500, 1000).is_none());
-    }
-
-    #[test]
-    fn places_on_the_grid_are_exact_and_the_nearest_is_half_a_cell_away() {
-        let boxes = [
-            ([0.0; 3], [0.5528, 0.5488, 0.5592]),
-            ([-20.0, 0.0, -7.5], [20.0, 12.0, 7.5]),
-            ([1e6; 3], [1e6 + 1.0; 3]),
-            ([-1e-20; 3], [1e-20; 3]),
-            ([3.0; 3], [3.0; 3]),
-            ([-1e37; 3], [1e37; 3]),
-        ];
-        let mut next = random(1);
-        for (lower, upper) in boxes {
-            let grid = PhotonGrid::around(lower, upper);
-            for _ in 0..1000 {
-                let place: [f32; 3] = [0, 1, 2].map(|axis: usize| {
-                    let t = (next() >> 40) as f32 / 16_777_216.0;
-                    lower[axis] * (1.0 - t) + upper[axis] * t
-                });
-                let point = grid.nearest(place);
-                let snapped = grid.position(point);
-                assert_eq!(grid.nearest(snapped), point, "{place:?} of {grid:?}");
-                for axis in 0..3 {
-                    let error = f64::from(snapped[axis]) - f64::from(place[axis]);
-                    assert!(error.abs() <= 0.5 * f64::from(grid.cell), "{place:?} {snapped:?} {grid:?}");
-                    let exact =
-                        (f64::from(grid.origin[axis]) + f64::from(point[axis])) * f64::from(grid.cell);
-                    assert_eq!(f64::from(snapped[axis]), exact);
-                    assert_eq!(snapped[axis], grid.coordinate(axis as u8, point[axis]));
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn units_are_the_next_power_of_two() {
-        for (value, unit) in [(1.0, 1.0), (1.1, 2.0), (0.3, 0.5), (0.25, 0.25), (1e6, 1_048_576.0)] {
-            assert_eq!(power_of_two_above(value), unit);
-        }
-        for extreme in [0.0, 1e-300, 1e300, f64::INFINITY] {
-            assert!(power_of_two_above(extreme).is_normal());
-        }
     }
 
     #[test]
