@@ -2,7 +2,7 @@
 //!
 //! Whoever runs it ([`crate::serve`], or a simulator) calls [`Card::feed`] with what came, sends what
 //! [`Card::outgoing`] holds, and calls [`Card::work`] while [`Card::is_busy`]. No call takes longer than one stage of one
-//! pixel, or the drain of a gather queue that fills within it; none blocks, and nothing that is fed can make one panic.
+//! pixel, the completion of one over all its samples, or the drain of a gather queue that fills; none blocks, and nothing that is fed can make one panic.
 
 mod load;
 

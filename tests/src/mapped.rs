@@ -3,13 +3,14 @@
 
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
+use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::film::Window;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::tiles;
-use photoncard_firmware::chip::{Progress, ReferenceChip};
+use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::photon::Candidate;
 use photoncard_firmware::render::eye::see;
 use photoncard_firmware::render::final_gather::{cast, gathered};
@@ -70,14 +71,11 @@ impl MappedScene {
         frame: &FrameParameters,
         tile: Tile,
     ) -> (Tile, Vec<Vec3>, Counters) {
-        let (scene, mut memory) = self.image.view();
-        let mut counters = Counters::ZERO;
-        let mut context =
-            Context { scene: &scene, memory: &mut memory, frame, counters: &mut counters, outlet: None };
-        assert!(chip.begin(context.memory, tile));
-        while chip.step(&mut context).expect("sound") == Progress::Busy {}
+        let (scene, memory) = self.image.view();
+        let RenderedTile { sums, counters, .. } =
+            render_tile(chip, &scene, memory, frame, tile, None).expect("sound");
         let unit = scene.header.radiance_unit;
-        let radiance = chip.sums().iter().map(|sum| sum.value() * unit).collect();
+        let radiance = sums.iter().map(|sum| sum.value() * unit).collect();
         (tile, radiance, counters)
     }
 }

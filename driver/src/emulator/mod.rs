@@ -69,7 +69,7 @@ impl ChipKind {
 /// Bytes that wait in each direction of a loopback link.
 const LINK_CAPACITY: usize = 64 << 10;
 /// Stack of a chip's thread: its buffers are built there before they move to the heap.
-const THREAD_STACK: usize = 8 << 20;
+pub(crate) const THREAD_STACK: usize = 16 << 20;
 
 /// What is modelled of a card's memory.
 pub struct MemoryModel {

@@ -19,6 +19,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FrameParameters, Tile};
 use rayon::prelude::*;
 
+use super::THREAD_STACK;
 use super::direct::{RenderedTile, render_tile};
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::film::{Film, FilmError};
@@ -34,8 +35,6 @@ const GATHERS_PER_TASK: usize = 4096;
 const GATHERS_PER_COUNTED_TASK: usize = 1 << 22;
 /// Gathers that are done before the host looks around.
 const GATHERS_PER_ROUND: usize = 256 * GATHERS_PER_TASK;
-/// Stack of a chip's thread: its buffers are built there before they move to the heap.
-const THREAD_STACK: usize = 8 << 20;
 
 /// Why a frame was not rendered.
 #[derive(Debug, thiserror::Error)]

@@ -14,14 +14,12 @@ use super::point::{ImageKey, Point, Task};
 use super::quality::{Quality, Reference};
 use super::store::PointStore;
 use crate::emitter::Emitters;
+use crate::emulator::THREAD_STACK;
 use crate::pack::PackedScene;
 use crate::photon::{MappedImage, map_photons};
 use crate::render::RenderError;
 use crate::scene::Scene;
 use crate::scene::gltf;
-
-/// Stack of a chip's thread: its buffers are built there before they move to the heap.
-const THREAD_STACK: usize = 16 << 20;
 
 /// Watches a study, and can stop it.
 pub trait StudyObserver: Sync {
