@@ -354,6 +354,9 @@ impl<'a> Session<'a> {
         if layout != LAYOUT_VERSION {
             return Err(SessionError::Layout { card: layout, host: LAYOUT_VERSION });
         }
+        if budget.tiles == 0 {
+            return Err(SessionError::NoTiles);
+        }
         self.budget = Some(budget);
         self.state = State::Ready;
         Ok(())

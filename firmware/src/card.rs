@@ -33,18 +33,25 @@ pub struct Card<
     const CANDIDATES: usize,
     const QUEUE: usize,
     const RECORDS: usize,
+    const GATHERED: usize,
 > {
     budget: Budget,
     memory: M,
     reader: FrameReader,
     expected_sequence: u16,
-    session: Session<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>,
+    session: Session<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>,
     outgoing: Outgoing,
 }
 
 /// What commands act on.
-struct Session<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize> {
-    chip: Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>,
+struct Session<
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+    const GATHERED: usize,
+> {
+    chip: Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>,
     image: ImageState,
     frame: Option<FrameParameters>,
     counters: Counters,
@@ -93,7 +100,8 @@ impl<
     const CANDIDATES: usize,
     const QUEUE: usize,
     const RECORDS: usize,
-> Card<M, TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
+    const GATHERED: usize,
+> Card<M, TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
 {
     /// A card that has seen no host yet.
     pub const fn new(budget: Budget, memory: M) -> Self {
@@ -183,8 +191,13 @@ fn check_sequence(expected: &mut u16, sequence: u16, command: &Command) -> Resul
 
 const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
-impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
-    Session<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
+impl<
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+    const GATHERED: usize,
+> Session<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
 {
     fn execute(
         &mut self,
@@ -343,6 +356,7 @@ pub type ReferenceCard<M> = Card<
     { gather_candidates(REFERENCE.neighbors) },
     { REFERENCE.gather_queue as usize },
     { REFERENCE.irradiance_records as usize },
+    { REFERENCE.gathered_records as usize },
 >;
 
 /// The card of the micro chip.
@@ -352,6 +366,7 @@ pub type MicroCard<M> = Card<
     { gather_candidates(MICRO.neighbors) },
     { MICRO.gather_queue as usize },
     { MICRO.irradiance_records as usize },
+    { MICRO.gathered_records as usize },
 >;
 
 /// On-chip memory of the reference card, bytes.

@@ -22,8 +22,9 @@ pub fn serve<
     const CANDIDATES: usize,
     const QUEUE: usize,
     const RECORDS: usize,
+    const GATHERED: usize,
 >(
-    card: &mut Card<M, TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>,
+    card: &mut Card<M, TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>,
     port: &mut impl Port,
 ) -> Result<(), PortError> {
     let mut buffer = [0; 512];

@@ -45,3 +45,15 @@ pub(crate) fn unit(vector: Vec3) -> Vec3 {
 pub(crate) fn max_component(v: Vec3) -> f32 {
     max(max(v.x, v.y), v.z)
 }
+
+/// The upper half of a float's bits, rounded: eight bits of its mantissa. Numbers beyond the greatest are infinite.
+#[inline(always)]
+pub(crate) fn upper_half(value: f32) -> u16 {
+    (value.to_bits().saturating_add(0x8000) >> 16) as u16
+}
+
+/// The float of an upper half.
+#[inline(always)]
+pub(crate) fn from_upper_half(half: u16) -> f32 {
+    f32::from_bits((half as u32) << 16)
+}

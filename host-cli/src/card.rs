@@ -30,7 +30,10 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("gather rays     {} a sample", budget.gather_rays),
         format!("bins            {MOST_BINS} of directions"),
         format!("gather queue    {} gathers", budget.gather_queue),
-        format!("records         {} of irradiance", budget.irradiance_records),
+        format!(
+            "records         {} of irradiance, {} gathered at once",
+            budget.irradiance_records, budget.gathered_records
+        ),
         format!("shadow rays     {} a sample", budget.shadow_rays),
         format!("samples         {} a pixel", budget.samples),
     ];

@@ -25,6 +25,8 @@ pub struct Budget {
     pub gather_queue: u32,
     /// Irradiance records of one block of a tile; a power of two.
     pub irradiance_records: u32,
+    /// Irradiance records that are gathered at once.
+    pub gathered_records: u32,
     /// Shadow rays of one sample.
     pub shadow_rays: u32,
     /// Samples of one pixel.
@@ -44,8 +46,9 @@ pub const REFERENCE: Budget = Budget {
     tile_pixels: 4096,
     neighbors: 256,
     gather_rays: MOST_GATHER_RAYS,
-    gather_queue: 17_152,
-    irradiance_records: 256,
+    gather_queue: 12_736,
+    irradiance_records: 512,
+    gathered_records: 512,
     shadow_rays: 64,
     samples: 4096,
     tiles: 4,
@@ -63,6 +66,7 @@ pub const MICRO: Budget = Budget {
     gather_rays: MOST_GATHER_RAYS,
     gather_queue: 1024,
     irradiance_records: 128,
+    gathered_records: 128,
     shadow_rays: 64,
     samples: 4096,
     tiles: 2,
@@ -82,10 +86,10 @@ pub struct TechniqueMemory {
 impl TechniqueMemory {
     /// What the techniques may add to [`REFERENCE`].
     pub const REFERENCE: Self =
-        Self { reordering: (402 << 10) + 64, irradiance_cache: 80 << 10, importance_sampling: 136 << 10 };
+        Self { reordering: 299 << 10, irradiance_cache: 189 << 10, importance_sampling: 136 << 10 };
     /// What the techniques may add to [`MICRO`].
     pub const MICRO: Self =
-        Self { reordering: (24 << 10) + 64, irradiance_cache: 66 << 10, importance_sampling: 8704 };
+        Self { reordering: (24 << 10) + 64, irradiance_cache: 48 << 10, importance_sampling: 8704 };
 
     /// Whether every technique adds no more than `limit` allows.
     pub const fn is_within(&self, limit: &Self) -> bool {

@@ -20,7 +20,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// The version of this module and of [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 
 /// Lines that one [`Command::WriteLines`] may carry.
 pub const LINES_PER_WRITE: usize = 16;

@@ -29,6 +29,10 @@ pub enum SessionError {
         /// This program's version.
         host: u16,
     },
+    /// The card takes no tile.
+    #[error("the card says that it has room for no tile command at all")]
+    #[diagnostic(help("correct `tiles` in the budget of the card's firmware"))]
+    NoTiles,
     /// The card could not do a command.
     #[error("the card answered with fault {:?} ({})", .0.code, .0.detail)]
     #[diagnostic(help(

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::sample::{Estimate, SampleRate, choose};
+use super::sample::{Chosen, Estimate, SampleRate, choose};
 use crate::emulator::direct::{RenderedTile, render_tile};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
@@ -35,23 +35,23 @@ pub struct StructureReads {
 pub struct TileMeasurement {
     /// Its number in the picture.
     pub tile: u32,
+    /// Tiles that it stands for.
+    pub stands_for: usize,
     /// Work.
     pub counters: Counters,
     /// Reads of each structure.
     pub reads: [StructureReads; STRUCTURES],
 }
 
-/// What a point took: the sampled tiles, and of how many.
+/// What a point took.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// Tiles of the picture; 1 if it was rendered as a whole.
-    pub population: usize,
-    /// The tiles that were rendered, in the picture's order.
+    /// The tiles that were rendered, in the picture's order; one if it was rendered as a whole.
     pub tiles: Vec<TileMeasurement>,
 }
 
 impl TileMeasurement {
-    fn new(tile: u32, counters: Counters, traffic: &MemoryTraffic) -> Self {
+    fn new(tile: u32, stands_for: usize, counters: Counters, traffic: &MemoryTraffic) -> Self {
         let reads = Structure::ALL.map(|structure| {
             let [requested, fetched] = traffic.of(|other| other == structure);
             StructureReads {
@@ -60,7 +60,7 @@ impl TileMeasurement {
                 dram_bytes: fetched.bytes,
             }
         });
-        Self { tile, counters, reads }
+        Self { tile, stands_for, counters, reads }
     }
 
     /// Reads of the photon map.
@@ -89,8 +89,8 @@ impl TileMeasurement {
 impl Measurement {
     /// A count of the whole picture.
     pub fn total(&self, count: impl Fn(&TileMeasurement) -> f64) -> Estimate {
-        let values: Vec<f64> = self.tiles.iter().map(count).collect();
-        Estimate::of_total(&values, self.population)
+        let sample: Vec<_> = self.tiles.iter().map(|tile| (count(tile), tile.stands_for)).collect();
+        Estimate::of_total(&sample)
     }
 
     /// Searches of the photon map.
@@ -179,12 +179,12 @@ impl Bench<'_> {
             return self.whole_frame(settings, &frame, &all, caches);
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
-        let rendered = self.render(&frame, &chosen, &|memory| caches.over(memory))?;
-        let measured = chosen
-            .iter()
-            .zip(&rendered)
-            .map(|(tile, rendered)| TileMeasurement::new(tile.id, rendered.counters, &rendered.traffic));
-        Ok(Measurement { population: all.len(), tiles: measured.collect() })
+        let tiles: Vec<Tile> = chosen.iter().map(|chosen| chosen.tile).collect();
+        let rendered = self.render(&frame, &tiles, &|memory| caches.over(memory))?;
+        let measured = chosen.iter().zip(&rendered).map(|(Chosen { tile, stands_for }, rendered)| {
+            TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic)
+        });
+        Ok(Measurement { tiles: measured.collect() })
     }
 
     fn whole_frame(
@@ -198,7 +198,7 @@ impl Bench<'_> {
         let chips = self.pool.current_num_threads();
         let job = CurveJob { image: &self.mapped.image, frame, tiles, chips };
         let outcome = render_along_curve(job, Some(caches), &mut film, &|_, _| !(self.is_stopped)())?;
-        let whole = TileMeasurement::new(0, outcome.counters, &outcome.traffic);
-        Ok(Measurement { population: 1, tiles: vec![whole] })
+        let whole = TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic);
+        Ok(Measurement { tiles: vec![whole] })
     }
 }

@@ -103,7 +103,8 @@ fn comparable(settings: &RenderSettings) -> RenderSettings {
 /// Radiances of the pixels of some tiles.
 fn pixels(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<Vec<[f32; 3]>, RenderError> {
     let frame = bench.frame(settings)?;
-    let chosen: Vec<Tile> = choose(&tiles(settings.window(), TILE, settings.order), count);
+    let chosen = choose(&tiles(settings.window(), TILE, settings.order), count);
+    let chosen: Vec<Tile> = chosen.into_iter().map(|chosen| chosen.tile).collect();
     let unit = bench.mapped.image.view().0.header.radiance_unit;
     let rendered = bench.render(&frame, &chosen, &|memory| memory)?;
     let sums = rendered.iter().flat_map(|tile| &tile.sums);

@@ -1,7 +1,7 @@
 //! A sample of a picture's tiles, and what it says of all of them.
 //!
-//! Tiles are sorted along the Z-order curve of their middles and cut into as many equal stretches as there are tiles to
-//! choose; a hash chooses one of each. So a sample is spread over the picture whatever the shape of the tiles, does not
+//! Tiles are sorted along the Z-order curve of their middles and cut into as many stretches as there are tiles to choose,
+//! equal but for one tile; a hash chooses one of each, which stands for its stretch. So a sample is spread over the picture whatever the shape of the tiles, does not
 //! beat with the scene's own regularity, and is the same in every run.
 
 use std::fmt;
@@ -52,11 +52,18 @@ impl FromStr for SampleRate {
     }
 }
 
+/// A tile of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chosen {
+    /// The tile.
+    pub tile: Tile,
+    /// Tiles of its stretch.
+    pub stands_for: usize,
+}
+
 /// Chooses `count` of the tiles, spread over the picture, in the picture's order; all of them if there are no more.
-pub fn choose(tiles: &[Tile], count: usize) -> Vec<Tile> {
-    if count >= tiles.len() {
-        return tiles.to_vec();
-    }
+pub fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
+    let count = count.min(tiles.len());
     let mut sorted = tiles.to_vec();
     let middle = |tile: &Tile| (2 * tile.x + tile.width, 2 * tile.y + tile.height);
     sorted.sort_by_key(|tile| {
@@ -64,13 +71,14 @@ pub fn choose(tiles: &[Tile], count: usize) -> Vec<Tile> {
         (spread_bits(x) | spread_bits(y) << 1, tile.id)
     });
     let bound = |stretch: usize| stretch * sorted.len() / count;
-    let mut chosen: Vec<Tile> = (0..count)
+    let mut chosen: Vec<Chosen> = (0..count)
         .map(|stretch| {
             let stretch_tiles = &sorted[bound(stretch)..bound(stretch + 1)];
-            stretch_tiles[hash(stretch as u32) as usize % stretch_tiles.len()]
+            let tile = stretch_tiles[hash(stretch as u32) as usize % stretch_tiles.len()];
+            Chosen { tile, stands_for: stretch_tiles.len() }
         })
         .collect();
-    chosen.sort_by_key(|tile| tile.id);
+    chosen.sort_by_key(|chosen| chosen.tile.id);
     chosen
 }
 
@@ -89,27 +97,27 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The sum over a population of which these values are a sample:
-    /// `N mean +- t N s / sqrt(n) sqrt(1 - n / N)`, with the values' standard deviation `s` and Student's `t` of `n - 1`
+    /// The sum over a population, of which these values each stand for some: the sum of their products,
+    /// `+- t N s / sqrt(n) sqrt(1 - n / N)`, with the standard deviation `s` of the `n` values and Student's `t` of `n - 1`
     /// degrees of freedom. The last factor is the correction for a finite population.
     ///
     /// It is the interval of a simple random sample. A sample that is spread over the picture errs less, so it is wide
     /// rather than narrow. Of one value of several nothing is known: the half-width is infinite.
-    pub fn of_total(values: &[f64], population: usize) -> Self {
-        let count = values.len() as f64;
-        let population = population as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let value = population * mean;
+    pub fn of_total(sample: &[(f64, usize)]) -> Self {
+        let value = sample.iter().map(|&(value, stands_for)| value * stands_for as f64).sum();
+        let count = sample.len() as f64;
+        let population = sample.iter().map(|&(_, stands_for)| stands_for).sum::<usize>() as f64;
         if count >= population {
-            return Self { value: values.iter().sum(), half_width: 0.0 };
+            return Self { value, half_width: 0.0 };
         }
-        if values.len() < 2 {
+        if sample.len() < 2 {
             return Self { value, half_width: f64::INFINITY };
         }
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let mean = sample.iter().map(|(value, _)| value).sum::<f64>() / count;
+        let squares: f64 = sample.iter().map(|(value, _)| (value - mean).powi(2)).sum();
         let variance = squares / (count - 1.0);
         let error = population * (variance / count * (1.0 - count / population)).sqrt();
-        Self { value, half_width: students_t(values.len() - 1) * error }
+        Self { value, half_width: students_t(sample.len() - 1) * error }
     }
 
     /// In another unit.
@@ -160,13 +168,27 @@ mod tests {
             let tiles = tiles(window, 16, order);
             let chosen = choose(&tiles, 64);
             assert_eq!(chosen.len(), 64);
-            assert!(chosen.windows(2).all(|pair| pair[0].id < pair[1].id));
+            assert!(chosen.windows(2).all(|pair| pair[0].tile.id < pair[1].tile.id));
             for quarter in 0..4 {
-                let is_inside = |tile: &&Tile| tile.x / 256 + tile.y / 256 * 2 == quarter;
+                let is_inside = |Chosen { tile, .. }: &&Chosen| tile.x / 256 + tile.y / 256 * 2 == quarter;
                 assert_eq!(chosen.iter().filter(is_inside).count(), 16, "{order:?}");
             }
-            assert_eq!(choose(&tiles, tiles.len()), tiles);
+            let all = tiles.iter().map(|&tile| Chosen { tile, stands_for: 1 });
+            assert_eq!(choose(&tiles, tiles.len() + 1), all.collect::<Vec<_>>());
         }
+    }
+
+    #[test]
+    fn the_tiles_of_a_sample_stand_for_all_and_none_counts_for_more_than_its_stretch() {
+        let tiles = tiles(Window::full(100, 70), 16, GatherOrder::Sort);
+        for count in 1..=tiles.len() {
+            let stands_for: Vec<usize> = choose(&tiles, count).iter().map(|tile| tile.stands_for).collect();
+            assert_eq!(stands_for.len(), count);
+            assert_eq!(stands_for.iter().sum::<usize>(), tiles.len());
+            assert!(stands_for.iter().all(|&stands_for| stands_for.abs_diff(tiles.len() / count) <= 1));
+        }
+        let estimate = Estimate::of_total(&[(1.0, 2), (3.0, 1)]);
+        assert_eq!(estimate.value, 5.0);
     }
 
     /// Normal, skewed and two-valued populations, drawn again and again.
@@ -181,8 +203,8 @@ mod tests {
             let covered = (0..1000_u32).filter(|draw| {
                 let mut order: Vec<usize> = (0..population.len()).collect();
                 order.sort_by_key(|&index| hash(hash(*draw + 1) ^ index as u32));
-                let values: Vec<f64> = order[..40].iter().map(|&index| population[index]).collect();
-                let estimate = Estimate::of_total(&values, population.len());
+                let values: Vec<_> = order[..40].iter().map(|&index| (population[index], 5)).collect();
+                let estimate = Estimate::of_total(&values);
                 (estimate.value - total).abs() <= estimate.half_width
             });
             let share = covered.count() as f64 / 1000.0;
@@ -192,8 +214,11 @@ mod tests {
 
     #[test]
     fn all_tiles_leave_no_doubt_and_one_tile_all() {
-        assert_eq!(Estimate::of_total(&[1.0, 2.0, 4.0], 3), Estimate { value: 7.0, half_width: 0.0 });
-        assert_eq!(Estimate::of_total(&[2.0], 3), Estimate { value: 6.0, half_width: f64::INFINITY });
+        assert_eq!(
+            Estimate::of_total(&[(1.0, 1), (2.0, 1), (4.0, 1)]),
+            Estimate { value: 7.0, half_width: 0.0 }
+        );
+        assert_eq!(Estimate::of_total(&[(2.0, 3)]), Estimate { value: 6.0, half_width: f64::INFINITY });
         assert!((students_t(30) - 2.0423).abs() < 1e-3 && (students_t(11) - 2.201).abs() < 1e-3);
     }
 }

@@ -163,4 +163,4 @@ impl Scale {
 }
 
 /// The dissertation's error bound of the irradiance cache, as figure 6.17 seems to state it.
-const IRRADIANCE_ERROR: f32 = 0.025;
+pub(super) const IRRADIANCE_ERROR: f32 = 0.025;

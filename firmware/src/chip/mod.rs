@@ -31,6 +31,7 @@ pub type ReferenceChip = Chip<
     { gather_candidates(REFERENCE.neighbors) },
     { REFERENCE.gather_queue as usize },
     { REFERENCE.irradiance_records as usize },
+    { REFERENCE.gathered_records as usize },
 >;
 /// The chip of [`MICRO`].
 pub type MicroChip = Chip<
@@ -38,17 +39,24 @@ pub type MicroChip = Chip<
     { gather_candidates(MICRO.neighbors) },
     { MICRO.gather_queue as usize },
     { MICRO.irradiance_records as usize },
+    { MICRO.gathered_records as usize },
 >;
 
 /// A chip's buffers: `TILE_PIXELS` pixels, `CANDIDATES` photons of a gather, `QUEUE` gathers that wait, `RECORDS`
 /// irradiance records.
-pub struct Chip<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize> {
+pub struct Chip<
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+    const GATHERED: usize,
+> {
     /// Where gather rays start, in the present sample: what each pixel of the tile sees, or records.
     points: Vec<StoredPoint, TILE_PIXELS>,
     /// The light of each pixel of the tile so far, in radiance units.
     sums: Vec<ColourSum, TILE_PIXELS>,
     gathers: Gathers<CANDIDATES, QUEUE>,
-    cache: IrradianceCache<RECORDS>,
+    cache: IrradianceCache<RECORDS, GATHERED>,
     tile: Tile,
     /// What of the tile is not begun.
     blocks: Vec<Block, MOST_BLOCKS>,
@@ -68,21 +76,31 @@ pub enum Progress {
     Complete,
 }
 
-impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize> Default
-    for Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
+impl<
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+    const GATHERED: usize,
+> Default for Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
 {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
-    Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
+impl<
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+    const GATHERED: usize,
+> Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
 {
     /// What each technique adds to the chip's memory.
     pub const TECHNIQUES: TechniqueMemory = TechniqueMemory {
         reordering: size_of::<GatherQueue<QUEUE>>(),
-        irradiance_cache: size_of::<IrradianceCache<RECORDS>>(),
+        irradiance_cache: size_of::<IrradianceCache<RECORDS, GATHERED>>(),
         importance_sampling: TILE_PIXELS * size_of::<DirectionTable>(),
     };
 

@@ -99,8 +99,13 @@ pub(super) fn add_light(sums: &mut [ColourSum], target: u16, brought: Vec3) {
     }
 }
 
-impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
-    Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
+impl<
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+    const GATHERED: usize,
+> Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
 {
     /// What the present pixel sees in the present sample, and what of that goes straight into the picture.
     pub(super) fn look<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {

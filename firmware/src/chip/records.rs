@@ -8,8 +8,13 @@ use crate::irradiance_cache::{Full, SeenSample, Window};
 use crate::memory::MemoryPort;
 use crate::render::{Context, GatherPoint, eye, final_gather};
 
-impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, const RECORDS: usize>
-    Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS>
+impl<
+    const TILE_PIXELS: usize,
+    const CANDIDATES: usize,
+    const QUEUE: usize,
+    const RECORDS: usize,
+    const GATHERED: usize,
+> Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
 {
     fn window(&self) -> Window {
         let [x0, y0] = [self.tile.x + self.block.x, self.tile.y + self.block.y];
@@ -48,7 +53,7 @@ impl<const TILE_PIXELS: usize, const CANDIDATES: usize, const QUEUE: usize, cons
             self.do_without_records();
             return Ok(());
         };
-        match self.cache.look_at_next_cell(context, &self.window(), allowed)? {
+        match self.cache.survey(context, &self.window(), allowed)? {
             Ok(true) => self.position = Position::at(Stage::Mark),
             Ok(false) => {}
             Err(Full) => self.divide_block(),

@@ -7,7 +7,7 @@ use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode
 
 use super::Place;
 use crate::scene::{Surface, lobe_power, mirror};
-use crate::vector::unit;
+use crate::vector::{from_upper_half, unit, upper_half};
 
 /// A reflection function with all evaluated that does not depend on a photon: 13 bytes, the dissertation's `S_B`
 /// (section 7.4).
@@ -31,7 +31,7 @@ impl PartialReflection {
     pub fn new(surface: &Surface, weight: Vec3, dither: u32) -> Self {
         let reflection = &surface.reflection;
         let mirror = mirror(surface.outgoing, surface.normal);
-        let [exponent @ .., _, _] = (reflection.exponent.to_bits().saturating_add(0x8000)).to_be_bytes();
+        let exponent = upper_half(reflection.exponent).to_be_bytes();
         let factor = (decode_exponent(exponent) + 2.0) * 0.5 * FRAC_1_PI;
         Self {
             diffuse: Rgbe::encode((reflection.lambertian() * weight).to_array(), dither),
@@ -79,10 +79,9 @@ impl PartialReflection {
     }
 }
 
-/// The upper half of a float's bits as the float.
 #[inline(always)]
-fn decode_exponent([high, low]: [u8; 2]) -> f32 {
-    f32::from_bits(u32::from_be_bytes([high, low, 0, 0]))
+fn decode_exponent(bytes: [u8; 2]) -> f32 {
+    from_upper_half(u16::from_be_bytes(bytes))
 }
 
 /// A gather: where, how the photons found there are reflected, and whose sum the result goes to.

@@ -7,19 +7,8 @@
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
-use photoncard_shared::message::Fault;
-
-use crate::importance::{CELLS, COLUMNS, ROWS, cell_at, cell_centre, direction_in};
-use crate::memory::{MemoryPort, Stage};
-use crate::render::{Context, GatherPoint};
-use crate::sampler::{Pattern, unit_interval};
-use crate::scene::{Ray, Surface, closest_hit};
-use crate::vector::max;
-
-/// The harmonic mean of the distances where there is nothing around, metres: its square is finite.
-const FARTHEST: f32 = 1e18;
-/// Rays of a survey in each cell.
-const RAYS_PER_CELL: u32 = 2;
+use crate::importance::{CELLS, COLUMNS, ROWS, cell_at, cell_centre};
+use crate::render::GatherPoint;
 
 /// The distance of what is around a point in each cell, over their harmonic mean; in eight bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +20,7 @@ const STEPS_PER_OCTAVE: u32 = 16;
 const MEAN_CODE: u32 = 128;
 
 impl Distances {
-    fn new(inverse_distances: &[f32; CELLS], mean: f32) -> Self {
+    pub(super) fn new(inverse_distances: &[f32; CELLS], mean: f32) -> Self {
         Self(inverse_distances.map(|inverse| encode(1.0 / (inverse * mean))))
     }
 
@@ -53,42 +42,6 @@ fn encode(ratio: f32) -> u8 {
 
 fn decode(code: u8) -> f32 {
     f32::from_bits(((code as u32 + ONE - MEAN_CODE) << SHIFT) | 1 << (SHIFT - 1))
-}
-
-/// What a point's surroundings are like.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Survey {
-    /// The harmonic mean of the distances, metres.
-    pub(super) distance: f32,
-    pub(super) distances: Distances,
-}
-
-/// Casts rays in all cells above a surface.
-///
-/// # Errors
-/// If the image is not sound.
-pub(super) fn survey<M: MemoryPort>(
-    context: &mut Context<M>,
-    surface: &Surface,
-    pattern: Pattern,
-) -> Result<Survey, Fault> {
-    context.memory.enter(Stage::Survey);
-    let origin = surface.offset_origin();
-    let mut inverse_distances = [0.0; CELLS];
-    for (cell, inverse) in (0..).zip(inverse_distances.iter_mut()) {
-        for ray in 0..RAYS_PER_CELL {
-            let index = cell as u32 * RAYS_PER_CELL + ray;
-            let along = (ray as f32 + unit_interval(pattern.jitter(index))) / RAYS_PER_CELL as f32;
-            let direction = direction_in(surface.normal, cell, [along, pattern.radical_inverse(index)]);
-            context.counters.survey_rays += 1;
-            if let Some(hit) = closest_hit(context.scene, context.memory, &Ray::new(origin, direction))? {
-                *inverse += 1.0 / max(hit.intersection.distance, f32::MIN_POSITIVE) / RAYS_PER_CELL as f32;
-            }
-        }
-    }
-    let mean = inverse_distances.iter().sum::<f32>() * (1.0 / CELLS as f32);
-    let distance = 1.0 / max(mean, 1.0 / FARTHEST);
-    Ok(Survey { distance, distances: Distances::new(&inverse_distances, distance) })
 }
 
 /// How much of what a gather ray of each cell brings goes into the translational gradient, along the tangent and the
@@ -156,8 +109,9 @@ mod tests {
 
     use super::*;
     use crate::irradiance_cache::record::{Irradiance, Record};
-    use crate::sampler::Dimension;
-    use crate::scene::{Reflection, magnitude};
+    use crate::sampler::{Dimension, Pattern};
+    use crate::scene::{Reflection, Surface, magnitude};
+    use crate::vector::max;
 
     fn white(position: Vec3, normal: Vec3) -> Surface {
         Surface {
@@ -253,8 +207,7 @@ mod tests {
 
     #[test]
     fn the_error_of_a_record_grows_with_distance_and_turn_and_is_infinite_off_its_plane() {
-        let survey = Survey { distance: 1.0, distances: Distances([128; CELLS]) };
-        let record = Record::new(&white(Vec3::ZERO, Vec3::Y), survey, 0.1);
+        let record = Record::new(&white(Vec3::ZERO, Vec3::Y), 1.0);
         let error = |position, normal: Vec3| record.error(1.0, 0.04, position, normal.normalize());
         assert_eq!(error(Vec3::ZERO, Vec3::Y), 0.0);
         assert!((error(Vec3::X * 0.1, Vec3::Y) - 0.01).abs() < 1e-6);

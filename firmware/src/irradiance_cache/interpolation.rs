@@ -52,7 +52,7 @@ struct Weights {
     weights: [f32; 4],
 }
 
-impl<const RECORDS: usize> IrradianceCache<RECORDS> {
+impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
     pub(super) fn corners(&self, cell: &Cell) -> Corners<'_> {
         Corners(cell.corners().map(|corner| self.records.get(&corner).and_then(Option::as_ref)))
     }

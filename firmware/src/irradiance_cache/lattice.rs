@@ -68,15 +68,6 @@ impl Cell {
             .map(|(dx, dy)| LatticePoint { x: x + dx, y: y + dy })
     }
 
-    /// Its four quarters.
-    pub(super) fn children(&self) -> [Self; 4] {
-        let level = self.level + 1;
-        let LatticePoint { x, y } = self.corner;
-        let half = self.side() / 2;
-        [(0, 0), (half, 0), (0, half), (half, half)]
-            .map(|(dx, dy)| Self { corner: LatticePoint { x: x + dx, y: y + dy }, level })
-    }
-
     /// Its number in the tree of its coarsest cell, the root 0; below 21 for a cell that can be halved.
     pub(super) fn tree_number(&self) -> u32 {
         let root = Self::coarsest(self.corner.x, self.corner.y);
@@ -84,6 +75,26 @@ impl Cell {
         let side = self.side();
         let [x, y] = [(self.corner.x - root.corner.x) / side, (self.corner.y - root.corner.y) / side];
         first + (y << self.level) + x
+    }
+
+    /// Cells of a level in the tree of one coarsest cell.
+    pub(super) fn of_level(level: u32) -> usize {
+        1 << (2 * level)
+    }
+
+    /// Cell `number` of a level, in rows, in the tree of the coarsest cell at `root`.
+    pub(super) fn in_tree(root: LatticePoint, level: u32, number: usize) -> Self {
+        let [row, column] = [number as u32 >> level, number as u32 & ((1 << level) - 1)];
+        let side = COARSEST_SIDE >> level;
+        Self { corner: LatticePoint { x: root.x + column * side, y: root.y + row * side }, level }
+    }
+
+    /// The cell that it is a quarter of; `None` of a coarsest one.
+    pub(super) fn parent(&self) -> Option<Self> {
+        let level = self.level.checked_sub(1)?;
+        let floor = |v: u32| v - v % (COARSEST_SIDE >> level);
+        let LatticePoint { x, y } = self.corner;
+        Some(Self { corner: LatticePoint { x: floor(x), y: floor(y) }, level })
     }
 
     /// The child that holds a pixel of this cell.
@@ -128,7 +139,7 @@ mod tests {
             while !cell.is_finest() {
                 numbers.insert((cell.tree_number(), cell.level, cell.corner.x, cell.corner.y));
                 let child = cell.child_at(x, y);
-                assert!(cell.children().contains(&child));
+                assert_eq!(child.parent(), Some(cell));
                 assert!(child.overlaps(&Window { x0: x, x1: x + 1, y0: y, y1: y + 1 }));
                 cell = child;
             }
@@ -139,12 +150,26 @@ mod tests {
     }
 
     #[test]
-    fn children_and_middles_have_the_same_points() {
-        let cell = Cell::coarsest(20, 20);
-        for child in cell.children() {
-            for corner in child.corners() {
-                assert!(cell.middles().contains(&corner) || cell.corners().contains(&corner));
+    fn the_cells_of_a_level_cover_their_coarsest_cell_once() {
+        let root = LatticePoint { x: 48, y: 16 };
+        for level in 0..LEVELS {
+            let cells = (0..Cell::of_level(level)).map(|number| Cell::in_tree(root, level, number));
+            let corners: std::collections::BTreeSet<_> =
+                cells.clone().map(|cell| (cell.corner.x, cell.corner.y)).collect();
+            assert_eq!(corners.len(), Cell::of_level(level));
+            for cell in cells {
+                assert_eq!(Cell::coarsest(cell.corner.x, cell.corner.y).corner, root);
+                assert_eq!(cell.corner.x % cell.side(), 0);
             }
+        }
+    }
+
+    #[test]
+    fn a_division_adds_the_middles_to_the_corners() {
+        let cell = Cell::coarsest(20, 20);
+        let children = (0..4).map(|number| Cell::in_tree(cell.corner, 1, number));
+        for corner in children.flat_map(|child| child.corners()) {
+            assert!(cell.middles().contains(&corner) || cell.corners().contains(&corner));
         }
     }
 }

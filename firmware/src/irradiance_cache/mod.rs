@@ -25,6 +25,7 @@ mod gradient;
 mod interpolation;
 mod lattice;
 mod record;
+mod survey;
 
 pub use interpolation::SeenSample;
 pub use lattice::{LatticePoint, Window};
@@ -32,36 +33,30 @@ pub use lattice::{LatticePoint, Window};
 use glam::Vec3;
 use heapless::Vec;
 use heapless::index_map::FnvIndexMap;
-use photoncard_shared::message::{Fault, FrameParameters};
+use photoncard_shared::message::FrameParameters;
 
-use self::gradient::{Coefficients, coefficients, rotation, survey};
-use self::lattice::Cell;
+use self::gradient::{coefficients, rotation};
 use self::record::{Content, Irradiance, Record};
+use self::survey::Survey;
 use crate::fixed_point::ColourSum;
-use crate::memory::MemoryPort;
-use crate::render::{Context, GatherPoint, eye};
+use crate::importance::CELLS;
+use crate::render::{Context, GatherPoint};
 use crate::sampler::{Dimension, Pattern};
-use crate::vector::max;
+use crate::vector::{from_upper_half, max, upper_half};
 
 /// Coarsest cells that a block may overlap.
 const MOST_ROOTS: usize = 16;
-/// Cells that wait to be looked at: the coarsest, and three of every level below.
-const MOST_WAITING: usize = MOST_ROOTS + 3 * (lattice::LEVELS as usize - 1);
-/// Records that are gathered at once.
-const MOST_GATHERED: usize = 128;
-/// A record reaches at least so many pixels.
-const LEAST_REACH: f32 = 3.0;
 /// Records of a block of one pixel at the most: 4 corners, and 5 for each division.
 const LEAST_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
-/// The records of a block.
-pub struct IrradianceCache<const RECORDS: usize> {
+/// The records of a block: up to `RECORDS`, a power of two, of which `GATHERED` are gathered at once.
+pub struct IrradianceCache<const RECORDS: usize, const GATHERED: usize> {
     /// By lattice point; none where no surface with a Lambertian part is seen.
     records: FnvIndexMap<LatticePoint, Option<Record>, RECORDS>,
     /// The coarsest cells, with a bit for each divided cell of their tree.
     roots: Vec<(LatticePoint, u32), MOST_ROOTS>,
-    waiting: Vec<Cell, MOST_WAITING>,
-    gathered: Vec<GatheredRecord, MOST_GATHERED>,
+    survey: Survey,
+    gathered: Vec<GatheredRecord, GATHERED>,
     /// Records before this one are not wanted or already gathered.
     next: usize,
 }
@@ -70,7 +65,8 @@ pub struct IrradianceCache<const RECORDS: usize> {
 struct GatheredRecord {
     /// Its index.
     record: usize,
-    coefficients: Coefficients,
+    /// The coefficients of each cell for the translational gradient, the upper halves of floats.
+    coefficients: [[u16; 2]; CELLS],
     mean: ColourSum,
     translation: [ColourSum; 2],
     rotation: [ColourSum; 2],
@@ -80,13 +76,13 @@ struct GatheredRecord {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Full;
 
-impl<const RECORDS: usize> Default for IrradianceCache<RECORDS> {
+impl<const RECORDS: usize, const GATHERED: usize> Default for IrradianceCache<RECORDS, GATHERED> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const RECORDS: usize> IrradianceCache<RECORDS> {
+impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
     const SUFFICES: () = assert!(RECORDS >= LEAST_RECORDS, "a block of one pixel must fit");
 
     /// A cache without records.
@@ -95,7 +91,7 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
         Self {
             records: FnvIndexMap::new(),
             roots: Vec::new(),
-            waiting: Vec::new(),
+            survey: Survey::BEGIN,
             gathered: Vec::new(),
             next: 0,
         }
@@ -113,9 +109,7 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
         };
         for y in steps(window.y0, window.y1) {
             for x in steps(window.x0, window.x1) {
-                let cell = Cell::coarsest(x, y);
-                self.roots.push((cell.corner, 0)).map_err(|_| Full)?;
-                self.waiting.push(cell).map_err(|_| Full)?;
+                self.roots.push((LatticePoint { x, y }, 0)).map_err(|_| Full)?;
             }
         }
         Ok(())
@@ -125,90 +119,25 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
     pub fn forget(&mut self) {
         self.records.clear();
         self.roots.clear();
-        self.waiting.clear();
+        self.survey = Survey::BEGIN;
         self.gathered.clear();
         self.next = 0;
-    }
-
-    /// Looks at the next cell: surveys its corners and divides it if they do not cover it. Returns whether it was the
-    /// last.
-    ///
-    /// # Errors
-    /// If the image is not sound. `Ok(Err(Full))` if there is no room for the records.
-    pub fn look_at_next_cell<M: MemoryPort>(
-        &mut self,
-        context: &mut Context<M>,
-        window: &Window,
-        allowed: f32,
-    ) -> Result<Result<bool, Full>, Fault> {
-        let Some(cell) = self.waiting.pop() else { return Ok(Ok(true)) };
-        for corner in cell.corners() {
-            if self.records.contains_key(&corner) {
-                continue;
-            }
-            let record = survey_point(context, corner, allowed)?;
-            if self.records.insert(corner, record).is_err() {
-                return Ok(Err(Full));
-            }
-        }
-        if !cell.is_finest() && !self.is_covered(context, &cell, allowed)? {
-            self.divide(&cell);
-            let children = cell.children().into_iter().filter(|child| child.overlaps(window));
-            for child in children {
-                if self.waiting.push(child).is_err() {
-                    return Ok(Err(Full));
-                }
-            }
-        }
-        Ok(Ok(self.waiting.is_empty()))
-    }
-
-    /// Whether every corner and every point that a division would add is within the error of all corner records.
-    fn is_covered<M: MemoryPort>(
-        &self,
-        context: &mut Context<M>,
-        cell: &Cell,
-        allowed: f32,
-    ) -> Result<bool, Fault> {
-        let corners = self.corners(cell);
-        let mut surfaces = corners.records().map(|record| (record.position, record.normal));
-        let covers = |position: Vec3, normal: Vec3| {
-            corners.errors(allowed, position, normal).all(|error| error < allowed)
-        };
-        if corners.records().count() < 4 || !surfaces.all(|(position, normal)| covers(position, normal)) {
-            return Ok(false);
-        }
-        for point in cell.middles() {
-            let seen = eye::see(context, point.place())?;
-            if !seen.is_some_and(|surface| covers(surface.position, surface.normal)) {
-                return Ok(false);
-            }
-        }
-        Ok(true)
-    }
-
-    fn divide(&mut self, cell: &Cell) {
-        let root = Cell::coarsest(cell.corner.x, cell.corner.y).corner;
-        let divided = self.roots.iter_mut().find(|(corner, _)| *corner == root);
-        if let Some((_, divided)) = divided {
-            *divided |= 1 << cell.tree_number();
-        }
     }
 
     /// Chooses the next records that are wanted and not yet gathered, `most` of them. Returns how many.
     pub fn begin_gather(&mut self, most: usize) -> u32 {
         self.gathered.clear();
-        while self.gathered.len() < most.min(MOST_GATHERED) {
+        while self.gathered.len() < most.min(GATHERED) {
             let Some((_, record)) = self.records.get_index(self.next) else { break };
             if let Some(Record { content: Content::Wanted(_), .. }) = record {
                 let gathered = GatheredRecord {
                     record: self.next,
-                    coefficients: [[0.0; 2]; crate::importance::CELLS],
+                    coefficients: [[0; 2]; CELLS],
                     mean: ColourSum::ZERO,
                     translation: [ColourSum::ZERO; 2],
                     rotation: [ColourSum::ZERO; 2],
                 };
-                // There is room for MOST_GATHERED.
+                // There is room for GATHERED.
                 let _ = self.gathered.push(gathered);
             }
             self.next += 1;
@@ -235,7 +164,7 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
         let Some(gathered) = self.gathered.get_mut(index as usize) else { return };
         let record = self.records.get_index(gathered.record).and_then(|(_, record)| record.as_ref());
         if let Some(Record { content: Content::Wanted(distances), .. }) = record {
-            gathered.coefficients = coefficients(point, distances);
+            gathered.coefficients = coefficients(point, distances).map(|cell| cell.map(upper_half));
         }
     }
 
@@ -246,7 +175,7 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
         gathered.mean.add(brought);
         if let Some(coefficients) = gathered.coefficients.get(cell as usize) {
             for (sum, coefficient) in gathered.translation.iter_mut().zip(coefficients) {
-                sum.add(brought * *coefficient);
+                sum.add(brought * from_upper_half(*coefficient));
             }
         }
         for (sum, coefficient) in gathered.rotation.iter_mut().zip(rotation(cell)) {
@@ -255,7 +184,7 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
     }
 
     /// Ends the gather of the chosen records: their irradiance is known, in W/(sr m^2) over pi.
-    pub fn end_gather<M: MemoryPort>(&mut self, context: &mut Context<M>, allowed: f32) {
+    pub fn end_gather<M>(&mut self, context: &mut Context<M>, allowed: f32) {
         let unit = context.scene.header.radiance_unit;
         for gathered in &self.gathered {
             context.counters.records += 1;
@@ -271,20 +200,4 @@ impl<const RECORDS: usize> IrradianceCache<RECORDS> {
         }
         self.gathered.clear();
     }
-}
-
-/// What is seen at a point of the lattice, and what is around that.
-fn survey_point<M: MemoryPort>(
-    context: &mut Context<M>,
-    point: LatticePoint,
-    allowed: f32,
-) -> Result<Option<Record>, Fault> {
-    let Some(surface) = eye::see(context, point.place())? else { return Ok(None) };
-    if !surface.reflection.has_lambertian() {
-        return Ok(None);
-    }
-    let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
-    let found = survey(context, &surface, pattern)?;
-    let least = LEAST_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
-    Ok(Some(Record::new(&surface, found, least)))
 }

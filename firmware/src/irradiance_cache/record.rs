@@ -2,14 +2,17 @@
 
 use glam::Vec3;
 
-use super::gradient::{Distances, Survey};
+use super::gradient::Distances;
+use crate::importance::CELLS;
 use crate::scene::{Reflection, Surface};
-use crate::vector::{max, tangents};
+use crate::vector::{from_upper_half, max, tangents, upper_half};
 
 /// What a record knows of the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Content {
-    /// Nothing yet but the distances of what is around.
+    /// Nothing yet: the inverse distance of what is around in each cell of the hemisphere, as far as it is known, 1/m.
+    Surveying([u16; CELLS]),
+    /// The distances of what is around.
     Surveyed(Distances),
     /// The same, and some sample of the block needs more.
     Wanted(Distances),
@@ -43,16 +46,37 @@ pub(super) struct Record {
     pub(super) content: Content,
 }
 
+/// The harmonic mean of the distances where there is nothing around, metres: its square is finite.
+const FARTHEST: f32 = 1e18;
 /// Of a record's radius, how far a place may be from its tangent plane, over the square root of the error.
 const PLANE_SHARE: f32 = 0.1;
 
 impl Record {
-    /// The record of a surface that was surveyed, with a radius of at least `least` metres.
-    pub(super) fn new(surface: &Surface, survey: Survey, least: f32) -> Self {
+    /// The record of a surface that is not yet surveyed, with a radius of at least `least` metres.
+    pub(super) fn new(surface: &Surface, least: f32) -> Self {
         let Surface { position, normal, magnitude, .. } = *surface;
-        let Survey { distance, distances } = survey;
-        let radius = max(distance, least);
-        Self { position, normal, magnitude, distance, radius, content: Content::Surveyed(distances) }
+        let content = Content::Surveying([0; CELLS]);
+        Self { position, normal, magnitude, distance: least, radius: least, content }
+    }
+
+    /// Tells the inverse distance of what is around in a cell of the hemisphere, 1/m; rounded to
+    /// eight bits.
+    pub(super) fn set_inverse_distance(&mut self, cell: u8, inverse: f32) {
+        if let Content::Surveying(inverses) = &mut self.content
+            && let Some(known) = inverses.get_mut(cell as usize)
+        {
+            *known = upper_half(inverse.min(FARTHEST));
+        }
+    }
+
+    /// All distances are known: how far the record reaches.
+    pub(super) fn end_survey(&mut self) {
+        let Content::Surveying(inverses) = self.content else { return };
+        let inverses = inverses.map(from_upper_half);
+        let mean = inverses.iter().sum::<f32>() * (1.0 / CELLS as f32);
+        self.distance = 1.0 / max(mean, 1.0 / FARTHEST);
+        self.radius = max(self.distance, self.radius);
+        self.content = Content::Surveyed(Distances::new(&inverses, self.distance));
     }
 
     /// A white Lambertian surface where the record is.

@@ -145,9 +145,10 @@ fn fall(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cach
     let exponents = exponents(scale);
     let (first, last) = (of(exponents[0]), of(exponents[exponents.len() - 1]));
     let bytes = |tile: &TileMeasurement| tile.photon_map().dram_bytes as f64;
-    let differences: Vec<f64> =
-        first.tiles.iter().zip(&last.tiles).map(|(first, last)| bytes(first) - bytes(last)).collect();
-    Estimate::of_total(&differences, first.population)
+    let pairs = first.tiles.iter().zip(&last.tiles);
+    let differences: Vec<_> =
+        pairs.map(|(first, last)| (bytes(first) - bytes(last), first.stands_for)).collect();
+    Estimate::of_total(&differences)
 }
 
 /// The last value of a curve over its first.

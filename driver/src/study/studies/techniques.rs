@@ -3,7 +3,7 @@
 use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{self, Block, Cell, Report, Table, XScale, YScale};
-use super::super::scale::{Scale, WIDEST_TILE};
+use super::super::scale::{IRRADIANCE_ERROR, Scale, WIDEST_TILE};
 use super::SCENES;
 use super::present::{
     GIGA, cell, columns, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
@@ -17,7 +17,8 @@ struct Technique {
     name: &'static str,
     order: GatherOrder,
     sampling: Sampling,
-    is_cached: bool,
+    /// The error that the irradiance cache allows; `None` without it.
+    irradiance_error: Option<f32>,
     layout: PhotonLayout,
     tile: u32,
 }
@@ -28,7 +29,7 @@ const NAIVE: Technique = Technique {
     name: "naive",
     order: GatherOrder::Naive,
     sampling: Sampling::Reflection,
-    is_cached: false,
+    irradiance_error: None,
     layout: PhotonLayout::Jensen,
     tile: TILE,
 };
@@ -36,15 +37,22 @@ const ALL: Technique = Technique {
     name: "all techniques, jensen",
     order: GatherOrder::Sort,
     sampling: Sampling::Product,
-    is_cached: true,
+    irradiance_error: Some(IRRADIANCE_ERROR),
     layout: PhotonLayout::Jensen,
     tile: WIDEST_TILE,
 };
+const ALL_IN_LINES: Technique =
+    Technique { name: "all techniques, lines", layout: PhotonLayout::Lines, ..ALL };
 /// The irradiance cache needs square tiles: rows share few records.
-const TECHNIQUES: [Technique; 8] = [
+const TECHNIQUES: [Technique; 9] = [
     NAIVE,
     Technique { name: "sort", order: GatherOrder::Sort, ..NAIVE },
-    Technique { name: "irradiance cache, tiled", order: GatherOrder::Tiled, is_cached: true, ..NAIVE },
+    Technique {
+        name: "irradiance cache, tiled",
+        order: GatherOrder::Tiled,
+        irradiance_error: Some(IRRADIANCE_ERROR),
+        ..NAIVE
+    },
     Technique { name: "combined sampling", sampling: Sampling::Product, ..NAIVE },
     Technique { name: "lines", layout: PhotonLayout::Lines, ..NAIVE },
     Technique {
@@ -55,7 +63,8 @@ const TECHNIQUES: [Technique; 8] = [
         ..NAIVE
     },
     ALL,
-    Technique { name: "all techniques, lines", layout: PhotonLayout::Lines, ..ALL },
+    ALL_IN_LINES,
+    Technique { name: "all techniques, lines, cache error 0.1", irradiance_error: Some(0.1), ..ALL_IN_LINES },
 ];
 
 impl Technique {
@@ -63,7 +72,7 @@ impl Technique {
         RenderSettings {
             gather_rays,
             sampling: self.sampling,
-            irradiance_error: scale.all_on().irradiance_error.filter(|_| self.is_cached),
+            irradiance_error: self.irradiance_error,
             photon_layout: self.layout,
             tile: self.tile,
             ..scale.settings(self.order)
@@ -89,7 +98,7 @@ impl Technique {
 
     /// Whether its pixels are not those of the naive render.
     fn changes_pixels(&self) -> bool {
-        self.is_cached || self.sampling != NAIVE.sampling
+        self.irradiance_error.is_some() || self.sampling != NAIVE.sampling
     }
 
     /// Gather rays that it is measured with, from few to many.
@@ -287,7 +296,7 @@ fn curves(file: &str, scale: &Scale, results: &Results, (scene, name): (&'static
 }
 
 fn summary(scale: &Scale, results: &Results) -> String {
-    let all = &TECHNIQUES[TECHNIQUES.len() - 1];
+    let all = &ALL_IN_LINES;
     let factors = SCENES.map(|(scene, name)| {
         let naive = naive_bytes(scale, results, scene);
         let same_rays = results.traffic(&all.traffic(scale, scene, scale.gather_rays)).dram_bytes().value;

@@ -1,0 +1,214 @@
+//! The survey: which records a block has, level by level of the lattice.
+//!
+//! The cells of a level first place records at their corners. Then the rays around all of the level's new records are
+//! cast, those of one cell of the hemisphere before those of the next: rays that go the same way meet the same lines of
+//! the scene. Then cells that their corners do not cover are divided, into cells of the next level.
+
+use glam::Vec3;
+use photoncard_shared::message::Fault;
+
+use super::lattice::{Cell, LEVELS};
+use super::record::Record;
+use super::{Full, IrradianceCache, LatticePoint, Window};
+use crate::importance::{CELLS, direction_in};
+use crate::memory::{MemoryPort, Stage};
+use crate::render::{Context, eye};
+use crate::sampler::{Dimension, Pattern, unit_interval};
+use crate::scene::{Ray, Surface, closest_hit};
+use crate::vector::max;
+
+/// A record reaches at least so many pixels.
+const LEAST_REACH: f32 = 3.0;
+/// Rays in each cell of the hemisphere.
+const RAYS_PER_CELL: u32 = 1;
+
+/// How far the survey has come.
+pub(super) struct Survey {
+    level: u32,
+    task: Task,
+    /// What of the task is next: a cell of the level, of all coarsest cells; or a record.
+    index: usize,
+    /// The cell of the hemisphere.
+    direction: u8,
+    /// Records before this one are surveyed.
+    first: usize,
+}
+
+/// What is done of a level, in this order.
+#[derive(Clone, Copy)]
+enum Task {
+    /// Records are placed at the cells' corners.
+    Placing,
+    /// Rays are cast around the new records.
+    Rays,
+    /// Cells are divided.
+    Division,
+}
+
+impl Survey {
+    /// Before the first step.
+    pub(super) const BEGIN: Self = Self { level: 0, task: Task::Placing, index: 0, direction: 0, first: 0 };
+}
+
+impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
+    /// Does the next piece of the survey: one lattice cell, or the rays of one record in one cell of the hemisphere.
+    /// Returns whether it was the last.
+    ///
+    /// # Errors
+    /// If the image is not sound. `Ok(Err(Full))` if there is no room for the records.
+    pub fn survey<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+        window: &Window,
+        allowed: f32,
+    ) -> Result<Result<bool, Full>, Fault> {
+        match self.survey.task {
+            Task::Placing => {
+                if let Some(cell) = self.next_cell(window) {
+                    return Ok(self.place(context, &cell, allowed)?.map(|()| false));
+                }
+                self.survey.task = Task::Rays;
+                self.survey.index = self.survey.first;
+            }
+            Task::Rays => self.cast(context)?,
+            Task::Division if self.survey.level + 1 >= LEVELS => return Ok(Ok(true)),
+            Task::Division => match self.next_cell(window) {
+                Some(cell) => {
+                    if !self.is_covered(context, &cell, allowed)? {
+                        self.divide(&cell);
+                    }
+                }
+                None => {
+                    self.survey =
+                        Survey { level: self.survey.level + 1, first: self.survey.first, ..Survey::BEGIN }
+                }
+            },
+        }
+        Ok(Ok(false))
+    }
+
+    /// The next cell of the level that has a pixel in the window; `None` after the last.
+    fn next_cell(&mut self, window: &Window) -> Option<Cell> {
+        let Survey { level, ref mut index, .. } = self.survey;
+        let of_level = Cell::of_level(level);
+        while let Some(&(root, divided)) = self.roots.get(*index / of_level) {
+            let cell = Cell::in_tree(root, level, *index % of_level);
+            *index += 1;
+            let exists = cell.parent().is_none_or(|parent| divided >> parent.tree_number() & 1 != 0);
+            if exists && cell.overlaps(window) {
+                return Some(cell);
+            }
+        }
+        None
+    }
+
+    /// Places records at a cell's corners.
+    fn place<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+        cell: &Cell,
+        allowed: f32,
+    ) -> Result<Result<(), Full>, Fault> {
+        for corner in cell.corners() {
+            if self.records.contains_key(&corner) {
+                continue;
+            }
+            let record = new_record(context, corner, allowed)?;
+            if self.records.insert(corner, record).is_err() {
+                return Ok(Err(Full));
+            }
+        }
+        Ok(Ok(()))
+    }
+
+    /// Casts the rays of the next new record in the present cell of the hemisphere; after the last in the last cell all
+    /// records are surveyed.
+    fn cast<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+        let Survey { index, direction, first, .. } = self.survey;
+        if let Some((point, Some(record))) = self.records.get_index_mut(index) {
+            let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
+            let inverse = inverse_distance(context, &record.surface(), pattern, direction)?;
+            record.set_inverse_distance(direction, inverse);
+        }
+        let survey = &mut self.survey;
+        survey.index += 1;
+        if survey.index >= self.records.len() {
+            survey.index = first;
+            survey.direction += 1;
+        }
+        if survey.direction as usize >= CELLS || first >= self.records.len() {
+            *survey = Survey { task: Task::Division, index: 0, first: self.records.len(), ..*survey };
+            let new = self.records.values_mut().skip(first);
+            new.flatten().for_each(Record::end_survey);
+        }
+        Ok(())
+    }
+
+    /// Whether every corner and every point that a division would add is within the error of all corner records.
+    fn is_covered<M: MemoryPort>(
+        &self,
+        context: &mut Context<M>,
+        cell: &Cell,
+        allowed: f32,
+    ) -> Result<bool, Fault> {
+        let corners = self.corners(cell);
+        let mut surfaces = corners.records().map(|record| (record.position, record.normal));
+        let covers = |position: Vec3, normal: Vec3| {
+            corners.errors(allowed, position, normal).all(|error| error < allowed)
+        };
+        if corners.records().count() < 4 || !surfaces.all(|(position, normal)| covers(position, normal)) {
+            return Ok(false);
+        }
+        for point in cell.middles() {
+            let seen = eye::see(context, point.place())?;
+            if !seen.is_some_and(|surface| covers(surface.position, surface.normal)) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn divide(&mut self, cell: &Cell) {
+        let root = Cell::coarsest(cell.corner.x, cell.corner.y).corner;
+        let divided = self.roots.iter_mut().find(|(corner, _)| *corner == root);
+        if let Some((_, divided)) = divided {
+            *divided |= 1 << cell.tree_number();
+        }
+    }
+}
+
+/// The record of what is seen at a point of the lattice, not yet surveyed; none without a Lambertian part.
+fn new_record<M: MemoryPort>(
+    context: &mut Context<M>,
+    point: LatticePoint,
+    allowed: f32,
+) -> Result<Option<Record>, Fault> {
+    let seen = eye::see(context, point.place())?;
+    let surface = seen.filter(|surface| surface.reflection.has_lambertian());
+    Ok(surface.map(|surface| {
+        let least = LEAST_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
+        Record::new(&surface, least)
+    }))
+}
+
+/// The mean inverse distance of what is above a surface in a cell of its hemisphere, 1/m; nothing is infinitely far.
+fn inverse_distance<M: MemoryPort>(
+    context: &mut Context<M>,
+    surface: &Surface,
+    pattern: Pattern,
+    cell: u8,
+) -> Result<f32, Fault> {
+    context.memory.enter(Stage::Survey);
+    let origin = surface.offset_origin();
+    let mut sum = 0.0;
+    for ray in 0..RAYS_PER_CELL {
+        let index = cell as u32 * RAYS_PER_CELL + ray;
+        let along = (ray as f32 + unit_interval(pattern.jitter(index))) / RAYS_PER_CELL as f32;
+        let direction = direction_in(surface.normal, cell, [along, pattern.radical_inverse(index)]);
+        context.counters.survey_rays += 1;
+        if let Some(hit) = closest_hit(context.scene, context.memory, &Ray::new(origin, direction))? {
+            sum += 1.0 / max(hit.intersection.distance, f32::MIN_POSITIVE);
+        }
+    }
+    Ok(sum / RAYS_PER_CELL as f32)
+}
