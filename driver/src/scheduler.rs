@@ -88,6 +88,16 @@ impl Scheduler {
         self.done += 1;
     }
 
+    /// A tile waits again: before all others, as it has waited longest.
+    pub fn give_back(&mut self, tile: Tile) {
+        self.waiting.push_front(tile);
+    }
+
+    /// Whether all tiles are done.
+    pub fn is_complete(&self) -> bool {
+        self.done == self.total
+    }
+
     /// Tiles that are done, and all of them.
     pub fn progress(&self) -> (usize, usize) {
         (self.done, self.total)

@@ -1,24 +1,30 @@
 //! The host's side of one card's link: a state machine without I/O, fed with bytes and a clock.
 //!
-//! It says hello, loads the image, sets the frame, keeps the card's credits in use and collects pixels and counters.
-//! Threads, ports and time live outside: [`crate::render`] runs one session a thread, a simulator could run many in one.
+//! It says hello, loads what the card does not have of the image, sets the frame, keeps the card's credits in use and
+//! collects pixels and counters. A card that was reset is greeted and loaded again; its tiles wait for any card. Threads,
+//! ports and time live outside: [`crate::render`] runs one session a thread, a simulator many in one.
 
+mod clock;
 mod error;
+mod load;
 
 pub use error::SessionError;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 
-use photoncard_shared::address::{LINE_BYTES, Line};
+use photoncard_shared::address::Line;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::frame::{FrameReader, FrameWriter, MAX_FRAME};
+use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
-    self, Command, FrameParameters, LINES_PER_WRITE, PIXEL_BYTES, PROTOCOL_VERSION, Pixel, Reply, Tile,
+    self, Command, FrameParameters, PIXEL_BYTES, PROTOCOL_VERSION, Pixel, Reply, Tile,
 };
+use photoncard_shared::transport::{Event, LineStatistics, Transport};
 
+use self::clock::Clock;
+use self::load::Load;
 use crate::film::{Film, FilmError, Window};
 use crate::scheduler::Scheduler;
 
@@ -52,13 +58,30 @@ pub struct Job<'a> {
     pub frame: &'a FrameParameters,
 }
 
-/// Bytes that went over a link.
+/// Bytes that went over a link, and what was repaired on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkBytes {
     /// Image lines and pixels.
     pub payload: u64,
     /// All bytes in both directions.
     pub wire: u64,
+    /// What the host's end has seen of the line.
+    pub line: LineStatistics,
+    /// Times that the card was greeted again.
+    pub resets: u64,
+}
+
+impl LinkBytes {
+    /// Adds those of another link.
+    pub fn add(&mut self, other: &Self) {
+        self.payload += other.payload;
+        self.wire += other.wire;
+        self.line.damaged += other.line.damaged;
+        self.line.repeated += other.line.repeated;
+        self.line.duplicates += other.line.duplicates;
+        self.line.probes += other.line.probes;
+        self.resets += other.resets;
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,18 +90,15 @@ enum State {
     Greeting,
     /// The card is known and has nothing to do.
     Ready,
-    /// Lines from this one on are still to be sent.
-    Loading {
-        next: usize,
-    },
+    /// It is asked which chunks it has.
+    Comparing,
+    /// Lines are still to be sent.
+    Loading,
     /// All lines are sent.
     Accepting,
     /// The frame's parameters are sent.
     Framing,
     Rendering,
-    /// The counters are asked for.
-    Counting,
-    Done,
 }
 
 /// A tile at a card.
@@ -93,45 +113,36 @@ pub struct Session<'a> {
     budget: Option<Budget>,
     build: String,
     job: Option<Job<'a>>,
+    load: Load,
     tiles: HashMap<u32, TileInFlight>,
     counters: Counters,
     bytes: LinkBytes,
-    reader: FrameReader,
-    writer: FrameWriter,
-    expected_sequence: Option<u16>,
-    outgoing: Vec<u8>,
-    sent: usize,
-    heard: Duration,
+    transport: Transport,
+    /// Encoded commands that wait for room on the line.
+    commands: VecDeque<Vec<u8>>,
+    /// The number of the link's present session.
+    number: u16,
+    clock: Clock,
 }
 
-/// How long a card may be silent while an answer is due.
-const SILENCE: Duration = Duration::from_secs(10);
-/// How long a card may be silent while it renders, besides the time of its tiles.
-const RENDERING_SILENCE: Duration = Duration::from_secs(600);
-/// Irradiance records that a card surveys for one pixel at the most, and more than it gathers.
-const MOST_RECORDS_OF_A_PIXEL: u64 = 19;
-/// Time that a slow card may take for one ray and its gather.
-const SLOW_RAY: Duration = Duration::from_millis(1);
-
 impl<'a> Session<'a> {
-    /// A session that says hello first.
-    pub fn new(now: Duration) -> Self {
+    /// A session that says hello first. `number` tells it from what a line may still hold of another: any will do.
+    pub fn new(number: u16, now: Duration) -> Self {
         let mut session = Self {
             state: State::Greeting,
             budget: None,
             build: String::new(),
             job: None,
+            load: Load::default(),
             tiles: HashMap::new(),
             counters: Counters::ZERO,
             bytes: LinkBytes::default(),
-            reader: FrameReader::new(),
-            writer: FrameWriter::new(),
-            expected_sequence: None,
-            outgoing: Vec::with_capacity(MAX_FRAME),
-            sent: 0,
-            heard: now,
+            transport: Transport::host(),
+            commands: VecDeque::new(),
+            number,
+            clock: Clock::new(now),
         };
-        session.send(&Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION });
+        session.greet_card();
         session
     }
 
@@ -148,70 +159,95 @@ impl<'a> Session<'a> {
     /// Gives the card something to do, once it is known.
     pub fn start(&mut self, job: Job<'a>, now: Duration) {
         self.job = Some(job);
-        self.heard = now;
-        self.state = State::Loading { next: 0 };
-        let lines = job.image.len() as u32;
-        self.send(&Command::BeginImage { lines, checksum: job.checksum });
+        self.clock = Clock::new(now);
+        if self.state == State::Ready {
+            self.begin_load();
+        }
     }
 
-    /// Whether the card has nothing left to do: its tiles and counters are here.
-    pub fn is_done(&self) -> bool {
-        self.state == State::Done
-    }
-
-    /// What the card counted; complete when the session is done.
+    /// What the card counted of the tiles that it has completed.
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
 
     /// Bytes over the link so far.
     pub fn link_bytes(&self) -> LinkBytes {
-        self.bytes
+        LinkBytes { line: self.transport.statistics(), ..self.bytes }
     }
 
-    /// Lines of the image that are on their way.
+    /// Lines of the image that are on the card or on their way.
     pub fn loaded_lines(&self) -> usize {
         match self.state {
-            State::Greeting | State::Ready => 0,
-            State::Loading { next } => next,
+            State::Greeting | State::Ready | State::Comparing => 0,
+            State::Loading => self.load.done(),
             _ => self.job.map_or(0, |job| job.image.len()),
         }
     }
 
-    /// Makes what there is to send next, if all before is sent.
+    /// Whether the card has the image and the frame.
+    pub fn is_loaded(&self) -> bool {
+        self.state == State::Rendering
+    }
+
+    /// Whether the card has said anything since it was greeted last.
+    pub fn has_answered(&self) -> bool {
+        self.clock.has_heard()
+    }
+
+    /// Makes what there is to send next.
     pub fn prepare(&mut self, picture: &mut Picture) {
-        if self.sent == self.outgoing.len() {
-            self.outgoing.clear();
-            self.sent = 0;
-            match self.state {
-                State::Loading { next } => self.send_lines(next),
-                State::Rendering => self.send_tiles(picture),
-                _ => {}
+        while self.transport.can_send() {
+            if let Some(command) = self.commands.pop_front() {
+                self.transport.send(|bytes| {
+                    bytes.get_mut(..command.len())?.copy_from_slice(&command);
+                    Some(command.len())
+                });
+            } else if !self.make_command(picture) {
+                break;
             }
         }
     }
 
+    /// Makes a command that there is no answer to wait for. Returns whether there was one.
+    fn make_command(&mut self, picture: &mut Picture) -> bool {
+        match (self.state, self.job) {
+            (State::Loading, Some(job)) => {
+                let sent = self.load.next_lines(job.image, &mut self.transport);
+                self.bytes.payload += sent as u64;
+                if sent == 0 {
+                    self.send(&Command::EndImage);
+                    self.state = State::Accepting;
+                }
+                true
+            }
+            (State::Rendering, _) => {
+                let credits = self.budget.map_or(1, |budget| budget.tiles as usize);
+                let free = self.tiles.len() < credits;
+                let Some(tile) = free.then(|| picture.scheduler.take()).flatten() else { return false };
+                self.tiles.insert(tile.id, TileInFlight { tile, pixels: 0 });
+                self.send(&Command::RenderTile(tile));
+                true
+            }
+            _ => false,
+        }
+    }
+
     /// What is to be sent now.
-    pub fn outgoing(&self) -> &[u8] {
-        &self.outgoing[self.sent..]
+    pub fn outgoing(&mut self) -> &[u8] {
+        self.transport.outgoing()
     }
 
     /// Whether there is something to send without an answer from the card.
-    pub fn has_more_to_send(&self) -> bool {
-        !self.outgoing().is_empty() || matches!(self.state, State::Loading { .. })
-    }
-
-    /// Whether the card has the image and the frame.
-    pub fn is_loaded(&self) -> bool {
-        matches!(self.state, State::Rendering | State::Counting | State::Done)
+    pub fn has_more_to_send(&mut self) -> bool {
+        !self.transport.outgoing().is_empty() || self.state == State::Loading && self.transport.can_send()
     }
 
     /// Tells that the first `bytes` of the outgoing ones are sent.
     pub fn sent(&mut self, bytes: usize, now: Duration) {
-        self.sent = (self.sent + bytes).min(self.outgoing.len());
+        self.transport.sent(bytes);
         self.bytes.wire += bytes as u64;
         if bytes > 0 {
-            self.heard = now;
+            self.clock.sent(now);
         }
     }
 
@@ -227,103 +263,110 @@ impl<'a> Session<'a> {
     ) -> Result<(), SessionError> {
         self.bytes.wire += bytes.len() as u64;
         while !bytes.is_empty() {
-            self.heard = now;
-            let (taken, frame) = self.reader.read(bytes);
+            let (taken, event) = self.transport.receive(bytes);
             bytes = &bytes[taken..];
-            if let Some(frame) = frame {
-                let frame = frame.map_err(SessionError::Frame)?;
-                let (sequence, payload) = (frame.sequence, frame.payload.to_vec());
-                let reply = message::decode(&payload).ok_or(SessionError::Unexpected("not a reply"))?;
-                self.check_sequence(sequence)?;
+            match event {
+                None => {}
+                Some(Event::Heard) => self.clock.heard(now),
+                Some(Event::Unknown) if self.clock.has_heard() => self.reset(picture, now),
+                // Our hello was lost.
+                Some(Event::Unknown) => self.transport.send_again(),
+            }
+            let mut payload = [0; MAX_PAYLOAD];
+            while let Some(message) = self.transport.take() {
+                let payload = &mut payload[..message.len()];
+                payload.copy_from_slice(message);
+                let reply = message::decode(payload).ok_or(SessionError::Unexpected("not a reply"))?;
                 self.take(&reply, picture)?;
             }
         }
         Ok(())
     }
 
-    /// Checks that the card has not been silent for too long.
+    /// Tells the card what has come, when the line is quiet, and asks it when it has been quiet for too long.
     ///
     /// # Errors
-    /// If it has.
-    pub fn check_silence(&self, now: Duration) -> Result<(), SessionError> {
-        let limit = match self.state {
-            State::Ready | State::Done => return Ok(()),
-            State::Rendering if self.tiles.is_empty() => return Ok(()),
-            State::Rendering => self.rendering_silence(),
-            _ => SILENCE,
+    /// If the card has been silent for longer than it may be.
+    pub fn tick(&mut self, now: Duration) -> Result<(), SessionError> {
+        self.transport.acknowledge();
+        let is_waiting = match self.state {
+            State::Ready => false,
+            State::Rendering => !self.tiles.is_empty() || !self.transport.is_acknowledged(),
+            _ => true,
         };
-        if now.saturating_sub(self.heard) > limit { Err(SessionError::Silent(limit)) } else { Ok(()) }
-    }
-
-    /// A tile tells nothing of itself until it is complete: a card may be silent for as long as a slow one would be.
-    fn rendering_silence(&self) -> Duration {
-        let pixels: u64 = self.tiles.values().map(|in_flight| in_flight.tile.pixels()).sum();
-        let rays = self.job.map_or(1, |Job { frame, .. }| {
-            let samples =
-                frame.samples as u64 + frame.irradiance_error.map_or(0, |_| MOST_RECORDS_OF_A_PIXEL);
-            samples * (frame.gather_rays as u64 + 1)
-        });
-        RENDERING_SILENCE + SLOW_RAY.saturating_mul(u32::try_from(pixels * rays).unwrap_or(u32::MAX))
-    }
-
-    fn check_sequence(&mut self, sequence: u16) -> Result<(), SessionError> {
-        // The card may have spoken to another host before: its first number is any.
-        if self.expected_sequence.is_some_and(|expected| expected != sequence) {
-            return Err(SessionError::Unexpected("a frame is missing"));
+        if !is_waiting {
+            self.clock.rest(now);
+            return Ok(());
         }
-        self.expected_sequence = Some(sequence.wrapping_add(1));
-        Ok(())
+        if self.clock.must_ask(now) {
+            self.transport.probe();
+        }
+        self.clock.check(now)
+    }
+
+    /// Gives back the tiles that the card has not completed: it is lost, or was reset.
+    pub fn give_back(&mut self, picture: &mut Picture) {
+        for (_, in_flight) in self.tiles.drain() {
+            picture.scheduler.give_back(in_flight.tile);
+        }
+    }
+
+    /// Greets the card again and gives back its tiles: it does not know the session, as it was reset, or is silent.
+    pub fn reset(&mut self, picture: &mut Picture, now: Duration) {
+        self.give_back(picture);
+        self.bytes.resets += 1;
+        self.number = self.number.wrapping_add(1);
+        self.clock = Clock::new(now);
+        self.greet_card();
+    }
+
+    fn greet_card(&mut self) {
+        self.state = State::Greeting;
+        self.commands.clear();
+        self.transport.open(self.number);
+        self.send(&Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION });
     }
 
     fn send(&mut self, command: &Command) {
+        let mut bytes = vec![0; MAX_PAYLOAD];
         // Every command fits a frame: tests pin the longest.
-        if let Some(frame) = self.writer.write(|bytes| message::encode(command, bytes)) {
-            self.outgoing.extend_from_slice(frame);
+        if let Some(length) = message::encode(command, &mut bytes) {
+            bytes.truncate(length);
+            self.commands.push_back(bytes);
         }
     }
 
-    fn send_lines(&mut self, next: usize) {
+    /// Asks for the next checksums of what the card has, or begins to send lines.
+    fn begin_load(&mut self) {
         let Some(job) = self.job else { return };
-        let end = (next + LINES_PER_WRITE).min(job.image.len());
-        let mut data = [0; LINE_BYTES * LINES_PER_WRITE];
-        for (target, line) in data.as_chunks_mut().0.iter_mut().zip(&job.image[next..end]) {
-            *target = line.0;
+        if let Some(question) = self.load.next_question(job.image) {
+            self.send(&question);
+            self.state = State::Comparing;
+            return;
         }
-        let data = &data[..(end - next) * LINE_BYTES];
-        self.bytes.payload += data.len() as u64;
-        self.send(&Command::WriteLines { first: next as u32, data });
-        self.state = State::Loading { next: end };
-        if end == job.image.len() {
-            self.send(&Command::EndImage);
-            self.state = State::Accepting;
-        }
-    }
-
-    fn send_tiles(&mut self, picture: &mut Picture) {
-        let credits = self.budget.map_or(1, |budget| budget.tiles as usize);
-        while self.tiles.len() < credits {
-            let Some(tile) = picture.scheduler.take() else { break };
-            self.tiles.insert(tile.id, TileInFlight { tile, pixels: 0 });
-            self.send(&Command::RenderTile(tile));
-        }
-        if self.tiles.is_empty() && picture.scheduler.is_drained() {
-            self.send(&Command::ReadCounters);
-            self.state = State::Counting;
-        }
+        let lines = job.image.len() as u32;
+        self.send(&Command::BeginImage { lines, checksum: job.checksum });
+        self.state = State::Loading;
     }
 
     fn take(&mut self, reply: &Reply, picture: &mut Picture) -> Result<(), SessionError> {
         match (self.state, *reply) {
-            (State::Greeting, Reply::Hello { protocol, layout, budget, build }) => {
+            (State::Greeting, Reply::Hello { protocol, layout, budget, written_lines, build }) => {
                 build.clone_into(&mut self.build);
-                self.greet(protocol, layout, budget)
-            }
-            (State::Greeting, _) => {
-                // What another session left on the link.
-                self.expected_sequence = None;
+                self.greet(protocol, layout, budget)?;
+                self.load = Load::new(written_lines);
+                if self.job.is_some() {
+                    self.begin_load();
+                }
                 Ok(())
             }
             (_, Reply::Fault(fault)) => Err(SessionError::Fault(fault)),
+            (State::Comparing, Reply::Checksums { first, data }) => {
+                let Some(job) = self.job else { return Ok(()) };
+                self.load.compare(job.image, first, data)?;
+                self.begin_load();
+                Ok(())
+            }
             (State::Accepting, Reply::ImageAccepted) => {
                 let Some(job) = self.job else { return Ok(()) };
                 self.send(&Command::BeginFrame(*job.frame));
@@ -337,10 +380,9 @@ impl<'a> Session<'a> {
             (State::Rendering, Reply::Pixels { tile, first, data }) => {
                 self.take_pixels(tile, first, data, picture)
             }
-            (State::Rendering, Reply::TileDone { tile }) => self.complete(tile, picture),
-            (State::Counting, Reply::Counters(counters)) => {
-                self.counters = counters;
-                self.state = State::Done;
+            (State::Rendering, Reply::TileDone { tile, counters }) => {
+                self.complete(tile, picture)?;
+                self.counters.add(&counters);
                 Ok(())
             }
             _ => Err(SessionError::Unexpected("not an answer to what was asked")),

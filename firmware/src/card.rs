@@ -1,8 +1,9 @@
 //! A card: commands in, replies out. A state machine without I/O, fed with bytes and giving bytes.
 //!
 //! Whoever runs it ([`crate::serve`], or a simulator) calls [`Card::feed`] with what came, sends what
-//! [`Card::outgoing`] holds, and calls [`Card::work`] while [`Card::is_busy`]. No call takes longer than one stage of one
-//! pixel, the completion of one over all its samples, or the drain of a gather queue that fills; none blocks, and nothing that is fed can make one panic.
+//! [`Card::outgoing`] holds, calls [`Card::work`] while [`Card::is_busy`], and [`Card::acknowledge`] when the line is quiet.
+//! No call takes longer than some rays or gathers, the completion of one pixel over all its samples, or the checksum of a
+//! few lines; none blocks, and nothing that is fed can make one panic.
 
 mod load;
 
@@ -11,14 +12,14 @@ use photoncard_shared::budget::{
     Budget, MICRO, MOST_BINS, MOST_GATHER_RAYS, REFERENCE, TechniqueMemory, gather_candidates,
 };
 use photoncard_shared::counters::Counters;
-use photoncard_shared::frame::{FrameReader, FrameWriter, MAX_FRAME};
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
     self, Command, Fault, FaultCode, FrameParameters, PIXEL_BYTES, PIXELS_PER_REPLY, PROTOCOL_VERSION, Reply,
     Tile,
 };
+use photoncard_shared::transport::Transport;
 
-use self::load::{ImageState, Loader};
+use self::load::{CHECKSUMS_BYTES, Checksums, ImageState, Loader};
 use crate::chip::{Chip, MicroChip, Progress, ReferenceChip, sram_bytes};
 use crate::memory::{CardMemory, Dram};
 use crate::render::Context;
@@ -37,10 +38,8 @@ pub struct Card<
 > {
     budget: Budget,
     memory: M,
-    reader: FrameReader,
-    expected_sequence: u16,
+    transport: Transport,
     session: Session<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>,
-    outgoing: Outgoing,
 }
 
 /// What commands act on.
@@ -53,12 +52,16 @@ struct Session<
 > {
     chip: Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>,
     image: ImageState,
+    /// Lines from the first on that were written since the card was switched on.
+    written: u32,
+    checksums: Option<Checksums>,
     frame: Option<FrameParameters>,
+    /// Of the tile at work.
     counters: Counters,
     tiles: Deque<Tile, TILE_QUEUE>,
     at_work: Option<TileWork>,
-    /// Pixels of that tile that wait to be sent.
-    pixels: heapless::Vec<u8, { PIXEL_BYTES * PIXELS_PER_REPLY }>,
+    /// Pixels of that tile, or checksums, that wait to be sent.
+    data: heapless::Vec<u8, DATA_BYTES>,
 }
 
 /// The tile at work.
@@ -71,28 +74,9 @@ enum TileWork {
     Sent(Tile),
 }
 
-/// The frame on its way out.
-struct Outgoing {
-    writer: FrameWriter,
-    /// What of the writer's last frame is not yet sent.
-    bytes: heapless::Vec<u8, MAX_FRAME>,
-    sent: usize,
-}
-
-impl Outgoing {
-    fn rest(&self) -> &[u8] {
-        self.bytes.get(self.sent..).unwrap_or(&[])
-    }
-
-    fn send(&mut self, reply: &Reply) {
-        self.bytes.clear();
-        self.sent = 0;
-        if let Some(frame) = self.writer.write(|bytes| message::encode(reply, bytes)) {
-            // A frame is never longer than MAX_FRAME.
-            let _ = self.bytes.extend_from_slice(frame);
-        }
-    }
-}
+/// Bytes of pixels or checksums in one reply.
+const DATA_BYTES: usize = PIXEL_BYTES * PIXELS_PER_REPLY;
+const _: () = assert!(CHECKSUMS_BYTES <= DATA_BYTES);
 
 impl<
     M: CardMemory,
@@ -108,18 +92,18 @@ impl<
         Self {
             budget,
             memory,
-            reader: FrameReader::new(),
-            expected_sequence: 0,
+            transport: Transport::card(),
             session: Session {
                 chip: Chip::new(),
                 image: ImageState::None,
+                written: 0,
+                checksums: None,
                 frame: None,
                 counters: Counters::ZERO,
                 tiles: Deque::new(),
                 at_work: None,
-                pixels: heapless::Vec::new(),
+                data: heapless::Vec::new(),
             },
-            outgoing: Outgoing { writer: FrameWriter::new(), bytes: heapless::Vec::new(), sent: 0 },
         }
     }
 
@@ -130,63 +114,67 @@ impl<
 
     /// Whether there is something to do without a byte from the host.
     pub fn is_busy(&self) -> bool {
-        self.session.at_work.is_some() || !self.session.tiles.is_empty()
+        self.session.has_work() && self.transport.can_send()
     }
 
     /// What is to be sent now.
-    pub fn outgoing(&self) -> &[u8] {
-        self.outgoing.rest()
+    pub fn outgoing(&mut self) -> &[u8] {
+        self.transport.outgoing()
     }
 
     /// Tells that the first `bytes` of [`Self::outgoing`] are sent.
     pub fn sent(&mut self, bytes: usize) {
-        self.outgoing.sent = self.outgoing.sent.saturating_add(bytes);
+        self.transport.sent(bytes);
     }
 
-    /// Takes bytes from the host; returns how many. While a reply waits to be sent it takes none.
-    pub fn feed(&mut self, bytes: &[u8]) -> usize {
-        let mut taken = 0;
-        while self.outgoing.rest().is_empty() {
-            let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) else { break };
-            let (count, frame) = self.reader.read(rest);
-            taken += count;
-            let Some(frame) = frame else { continue };
-            let result = match frame {
-                Err(_) => Err(Fault { code: FaultCode::Frame, detail: 0 }),
-                Ok(frame) => match message::decode::<Command>(frame.payload) {
-                    None => Err(Fault { code: FaultCode::Message, detail: frame.payload.len() as u32 }),
-                    Some(command) => check_sequence(&mut self.expected_sequence, frame.sequence, &command)
-                        .and_then(|()| self.session.execute(&self.budget, &mut self.memory, &command)),
-                },
+    /// Takes bytes from the host, and does what they command. What takes long is left to [`Self::work`].
+    pub fn feed(&mut self, bytes: &[u8]) {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let (taken, _) = self.transport.receive(rest);
+            rest = rest.get(taken..).unwrap_or(&[]);
+            self.execute();
+        }
+    }
+
+    /// Does the commands that have come, as long as there is room for a reply to each.
+    fn execute(&mut self) {
+        let Self { budget, memory, transport, session } = self;
+        while transport.can_send() {
+            let Some(payload) = transport.take() else { break };
+            let result = match message::decode::<Command>(payload) {
+                None => Err(Fault { code: FaultCode::Message, detail: payload.len() as u32 }),
+                Some(command) => session.execute(budget, memory, &command),
             };
             match result {
-                Ok(Some(reply)) => self.outgoing.send(&reply),
+                Ok(Some(reply)) => send(transport, &reply),
                 Ok(None) => {}
-                Err(fault) => self.outgoing.send(&Reply::Fault(fault)),
+                Err(fault) => send(transport, &Reply::Fault(fault)),
             }
         }
-        taken
     }
 
-    /// Does the next piece of work, unless a reply waits to be sent.
+    /// Tells the host what has come: before a wait, as when the line is quiet.
+    pub fn acknowledge(&mut self) {
+        self.transport.acknowledge();
+    }
+
+    /// Does the next piece of work, if there is room for a reply.
     pub fn work(&mut self) {
-        if !self.outgoing.rest().is_empty() {
+        if !self.transport.can_send() {
             return;
         }
-        if let Err(fault) = self.session.work(&mut self.memory, &mut self.outgoing) {
+        if let Err(fault) = self.session.work(&mut self.memory, &mut self.transport) {
             self.session.at_work = None;
-            self.outgoing.send(&Reply::Fault(fault));
+            send(&mut self.transport, &Reply::Fault(fault));
         }
     }
 }
 
-/// Compares a frame's number with the one expected; a hello starts the count.
-fn check_sequence(expected: &mut u16, sequence: u16, command: &Command) -> Result<(), Fault> {
-    let fault = Fault { code: FaultCode::Sequence, detail: *expected as u32 };
-    let in_order = sequence == *expected || matches!(command, Command::Hello { .. });
-    // After a gap the count goes on from what came: one fault a gap.
-    *expected = sequence.wrapping_add(1);
-    if in_order { Ok(()) } else { Err(fault) }
+/// Sends a reply; whoever calls it has seen that there is room.
+fn send(transport: &mut Transport, reply: &Reply) {
+    // Every reply fits a frame: tests pin the longest.
+    transport.send(|bytes| message::encode(reply, bytes));
 }
 
 const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
@@ -208,7 +196,15 @@ impl<
         match *command {
             Command::Hello { .. } => {
                 self.forget();
-                Ok(Some(hello(budget)))
+                Ok(Some(hello(budget, self.written)))
+            }
+            Command::ReadChecksums { first, count } => {
+                if self.is_at_work() {
+                    return Err(OUT_OF_ORDER);
+                }
+                self.data.clear();
+                self.checksums = Some(Checksums::new(first, count, self.written)?);
+                Ok(None)
             }
             Command::BeginImage { lines, checksum } => {
                 self.forget();
@@ -216,34 +212,41 @@ impl<
                 Ok(None)
             }
             Command::WriteLines { first, data } => {
-                self.image.loader()?.write(memory, first, data)?;
+                let end = self.image.loader()?.write(memory, first, data)?;
+                self.written = self.written.max(end);
                 Ok(None)
             }
             Command::EndImage => {
-                let finished = self.image.loader()?.finish(memory);
-                self.image = finished.map_or(ImageState::None, ImageState::Ready);
-                finished?;
-                Ok(Some(Reply::ImageAccepted))
+                self.image = ImageState::Checking(self.image.loader()?.check());
+                Ok(None)
             }
             Command::BeginFrame(frame) => {
-                if self.image.scene().is_none() || self.at_work.is_some() || !self.tiles.is_empty() {
+                if self.image.scene().is_none() || self.is_at_work() {
                     return Err(OUT_OF_ORDER);
                 }
                 check_frame(budget, &frame)?;
-                self.counters = Counters::ZERO;
                 self.frame = Some(frame);
                 Ok(Some(Reply::FrameAccepted))
             }
             Command::RenderTile(tile) => self.accept(budget, tile).map(|()| None),
-            Command::ReadCounters => Ok(Some(Reply::Counters(self.counters))),
         }
     }
 
     fn forget(&mut self) {
         self.image = ImageState::None;
+        self.checksums = None;
         self.frame = None;
         self.tiles.clear();
         self.at_work = None;
+    }
+
+    /// Whether tiles or checksums are at work.
+    fn is_at_work(&self) -> bool {
+        self.at_work.is_some() || !self.tiles.is_empty() || self.checksums.is_some()
+    }
+
+    fn has_work(&self) -> bool {
+        self.is_at_work() || matches!(self.image, ImageState::Checking(_))
     }
 
     fn accept(&mut self, budget: &Budget, tile: Tile) -> Result<(), Fault> {
@@ -262,7 +265,40 @@ impl<
         self.tiles.push_back(tile).map_err(|_| too_many)
     }
 
-    fn work(&mut self, memory: &mut impl CardMemory, outgoing: &mut Outgoing) -> Result<(), Fault> {
+    fn work(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {
+        if let Some(checksums) = &mut self.checksums {
+            return match checksums.step(memory, self.written) {
+                Ok((checksum, is_last)) => {
+                    // There is room for CHECKSUMS_PER_REPLY.
+                    let _ = self.data.extend_from_slice(&checksum.to_le_bytes());
+                    if is_last {
+                        send(transport, &Reply::Checksums { first: checksums.first, data: &self.data });
+                        self.checksums = None;
+                    }
+                    Ok(())
+                }
+                Err(fault) => {
+                    self.checksums = None;
+                    Err(fault)
+                }
+            };
+        }
+        if let ImageState::Checking(check) = &mut self.image {
+            let result = check.step(memory);
+            if let Ok(None) = result {
+                return Ok(());
+            }
+            self.image = ImageState::None;
+            if let Some(scene) = result? {
+                self.image = ImageState::Ready(scene);
+                send(transport, &Reply::ImageAccepted);
+            }
+            return Ok(());
+        }
+        self.render(memory, transport)
+    }
+
+    fn render(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {
         let (Some(scene), Some(frame)) = (self.image.scene(), self.frame.as_ref()) else { return Ok(()) };
         match self.at_work {
             None => {
@@ -270,7 +306,8 @@ impl<
                     if !self.chip.begin(memory, tile) {
                         return Err(Fault { code: FaultCode::Tile, detail: tile.id });
                     }
-                    self.pixels.clear();
+                    self.data.clear();
+                    self.counters = Counters::ZERO;
                     self.at_work = Some(TileWork::Rendering(tile));
                 }
             }
@@ -286,20 +323,20 @@ impl<
                 let counters = &mut self.counters;
                 let context = &mut Context { scene, memory, frame, counters, outlet: None };
                 let pixel = self.chip.pixel(context, next as usize)?;
-                let data = &mut self.pixels;
+                let data = &mut self.data;
                 // There is room for PIXELS_PER_REPLY.
                 let _ = data.extend_from_slice(&pixel.map_or([0; PIXEL_BYTES], |pixel| pixel.to_bytes()));
                 let is_last = next as u64 + 1 >= tile.pixels();
                 if data.is_full() || is_last {
                     let first = next + 1 - (data.len() / PIXEL_BYTES) as u32;
-                    outgoing.send(&Reply::Pixels { tile: tile.id, first, data });
+                    send(transport, &Reply::Pixels { tile: tile.id, first, data });
                     data.clear();
                 }
                 self.at_work =
                     Some(if is_last { TileWork::Sent(tile) } else { TileWork::Sending(tile, next + 1) });
             }
             Some(TileWork::Sent(tile)) => {
-                outgoing.send(&Reply::TileDone { tile: tile.id });
+                send(transport, &Reply::TileDone { tile: tile.id, counters: self.counters });
                 self.at_work = None;
             }
         }
@@ -307,11 +344,12 @@ impl<
     }
 }
 
-fn hello(budget: &Budget) -> Reply<'static> {
+fn hello(budget: &Budget, written_lines: u32) -> Reply<'static> {
     Reply::Hello {
         protocol: PROTOCOL_VERSION,
         layout: LAYOUT_VERSION,
         budget: *budget,
+        written_lines,
         build: concat!("photoncard-firmware ", env!("CARGO_PKG_VERSION")),
     }
 }

@@ -12,7 +12,7 @@ const IDLE_WAIT: Duration = Duration::from_millis(20);
 
 /// Serves a card on a port until the port fails: bytes in, work, bytes out.
 ///
-/// Between two looks at the port lies at most one stage of one pixel or irradiance record, or the drain of a gather queue that fills in it.
+/// Between two looks at the port lies at most one call of [`Card::work`].
 ///
 /// # Errors
 /// Why the port cannot go on; [`PortError::Closed`] is how a session ends in order.
@@ -28,17 +28,12 @@ pub fn serve<
     port: &mut impl Port,
 ) -> Result<(), PortError> {
     let mut buffer = [0; 512];
-    let mut received = 0;
-    let mut fed = 0;
     loop {
-        if fed == received {
-            let must_not_wait = card.is_busy() || !card.outgoing().is_empty();
-            let wait = if must_not_wait { Duration::ZERO } else { IDLE_WAIT };
-            received = port.read(&mut buffer, wait)?;
-            fed = 0;
-        }
-        if let Some(bytes) = buffer.get(fed..received) {
-            fed += card.feed(bytes);
+        let must_not_wait = card.is_busy() || !card.outgoing().is_empty();
+        let wait = if must_not_wait { Duration::ZERO } else { IDLE_WAIT };
+        match port.read(&mut buffer, wait)? {
+            0 => card.acknowledge(),
+            received => card.feed(buffer.get(..received).unwrap_or(&[])),
         }
         if card.outgoing().is_empty() {
             card.work();

@@ -46,7 +46,7 @@ pub const REFERENCE: Budget = Budget {
     tile_pixels: 4096,
     neighbors: 256,
     gather_rays: MOST_GATHER_RAYS,
-    gather_queue: 12_736,
+    gather_queue: 12_640,
     irradiance_records: 512,
     gathered_records: 512,
     shadow_rays: 64,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Work done since the frame began. Sums over chips do not depend on how tiles were dealt.
+/// Work done on a tile. Sums over tiles do not depend on how they were dealt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
     /// Rays from the eye: twice to each sample, with the irradiance cache thrice, and to points of its lattice.

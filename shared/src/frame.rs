@@ -1,21 +1,23 @@
-//! Frames: how a message stays whole on a line of bytes.
+//! Frames: how bytes stay whole on a line.
 //!
 //! ```text
-//! COBS( sequence: u16 LE | payload | CRC-32C of both: u32 LE ) 0x00
+//! COBS( kind: u8 | session: u16 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
 //! ```
 //!
-//! Consistent overhead byte stuffing (Cheshire, Baker 1999) leaves no zero byte inside a frame, so that a receiver
-//! finds the next frame after any damage. The sequence number counts the frames of one direction from 0 and wraps: a
-//! gap tells of a lost frame.
+//! Numbers are little-endian. Consistent overhead byte stuffing (Cheshire, Baker 1999) leaves no zero byte inside a
+//! frame, so that a receiver finds the next frame after any damage. What the header's numbers mean is told in
+//! [`crate::transport`].
 
+use cobs::CobsEncoder;
 use crc::{CRC_32_ISCSI, Crc, Table};
 use heapless::Vec;
 
-/// Bytes of the longest payload: sixteen lines and the words of their message.
-pub const MAX_PAYLOAD: usize = 16 * crate::address::LINE_BYTES + 64;
-const SEQUENCE_BYTES: usize = 2;
+/// Bytes of the longest payload: eight lines and the words of their message.
+pub const MAX_PAYLOAD: usize = 8 * crate::address::LINE_BYTES + 32;
+/// Bytes of a frame's header.
+pub const HEADER_BYTES: usize = 8;
 const CHECKSUM_BYTES: usize = 4;
-const MAX_PLAIN: usize = SEQUENCE_BYTES + MAX_PAYLOAD + CHECKSUM_BYTES;
+const MAX_PLAIN: usize = HEADER_BYTES + MAX_PAYLOAD + CHECKSUM_BYTES;
 /// Bytes of the longest frame on the wire, its zero byte included.
 pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_PLAIN) + 1;
 
@@ -59,50 +61,97 @@ pub enum FrameError {
     TooShort,
     /// The checksum differs.
     Checksum,
+    /// A kind that this version does not know.
+    Kind,
+}
+
+/// What a frame is for. The numbers are part of the protocol.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum FrameKind {
+    /// Carries a message.
+    Data = 0,
+    /// The same, and begins a session.
+    Open = 1,
+    /// Tells what has come.
+    Acknowledge = 2,
+    /// Asks what has come; tells that frames below its sequence number, if they are not acknowledged, are lost.
+    Probe = 3,
+    /// Answers a probe: tells what has come, and the number of the next frame.
+    Answer = 4,
+    /// Tells that its session is not known.
+    Unknown = 5,
+}
+
+impl FrameKind {
+    fn read(number: u8) -> Option<Self> {
+        let kinds = [Self::Data, Self::Open, Self::Acknowledge, Self::Probe, Self::Answer, Self::Unknown];
+        kinds.into_iter().find(|&kind| kind as u8 == number)
+    }
+}
+
+/// The header of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameHeader {
+    /// What it is for.
+    pub kind: FrameKind,
+    /// The session that it belongs to.
+    pub session: u16,
+    /// The number of the frame in its direction; see the kinds.
+    pub sequence: u16,
+    /// All frames of the other direction before this number have been taken.
+    pub acknowledged: u16,
+    /// Of the frames from that number on, a bit for each that has come: the lowest is of the number itself.
+    pub held: u8,
+}
+
+impl FrameHeader {
+    fn to_bytes(self) -> [u8; HEADER_BYTES] {
+        let [session, sequence, acknowledged] =
+            [self.session, self.sequence, self.acknowledged].map(u16::to_le_bytes);
+        let [[a, b], [c, d], [e, f]] = [session, sequence, acknowledged];
+        [self.kind as u8, a, b, c, d, e, f, self.held]
+    }
+
+    fn read([kind, a, b, c, d, e, f, held]: [u8; HEADER_BYTES]) -> Option<Self> {
+        let [session, sequence, acknowledged] = [[a, b], [c, d], [e, f]].map(u16::from_le_bytes);
+        Some(Self { kind: FrameKind::read(kind)?, session, sequence, acknowledged, held })
+    }
+}
+
+/// Writes a frame behind what `wire` holds, or nothing if there is no room: a payload of up to [`MAX_PAYLOAD`] bytes fits
+/// [`MAX_FRAME`].
+pub fn write_frame<const N: usize>(header: &FrameHeader, payload: &[u8], wire: &mut Vec<u8, N>) {
+    let begin = wire.len();
+    let header = header.to_bytes();
+    let mut sum = Checksum::default();
+    sum.update(&header);
+    sum.update(payload);
+    let plain = header.len() + payload.len() + CHECKSUM_BYTES;
+    if wire.resize(begin + cobs::max_encoding_length(plain) + 1, 0).is_err() {
+        return;
+    }
+    let mut encoder = CobsEncoder::new(wire.get_mut(begin..).unwrap_or(&mut []));
+    let pushed = [&header[..], payload, &sum.value().to_le_bytes()].map(|bytes| encoder.push(bytes).is_ok());
+    // There is room for all of it.
+    let encoded = if pushed == [true; 3] { encoder.finalize() } else { 0 };
+    if encoded == 0 {
+        wire.truncate(begin);
+        return;
+    }
+    wire.truncate(begin + encoded + 1);
+    if let Some(end) = wire.last_mut() {
+        *end = 0;
+    }
 }
 
 /// A frame that came whole.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Its number.
-    pub sequence: u16,
+    /// Its header.
+    pub header: FrameHeader,
     /// What it carries.
     pub payload: &'a [u8],
-}
-
-/// Writes the frames of one direction.
-pub struct FrameWriter {
-    sequence: u16,
-    plain: [u8; MAX_PLAIN],
-    wire: [u8; MAX_FRAME],
-}
-
-impl Default for FrameWriter {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl FrameWriter {
-    /// A writer whose first frame has number 0.
-    pub const fn new() -> Self {
-        Self { sequence: 0, plain: [0; MAX_PLAIN], wire: [0; MAX_FRAME] }
-    }
-
-    /// Frames the payload that `fill` writes into the slice it is given, returning its length.
-    ///
-    /// `None` if `fill` returns `None` or more than the slice's length: nothing is framed and no number is used.
-    pub fn write(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Option<&[u8]> {
-        let payload = self.plain.get_mut(SEQUENCE_BYTES..SEQUENCE_BYTES + MAX_PAYLOAD)?;
-        let end = fill(payload).filter(|&bytes| bytes <= MAX_PAYLOAD)? + SEQUENCE_BYTES;
-        *self.plain.first_chunk_mut()? = self.sequence.to_le_bytes();
-        let sum = checksum(self.plain.get(..end)?);
-        *self.plain.get_mut(end..)?.first_chunk_mut()? = sum.to_le_bytes();
-        let encoded = cobs::try_encode(self.plain.get(..end + CHECKSUM_BYTES)?, &mut self.wire).ok()?;
-        *self.wire.get_mut(encoded)? = 0;
-        self.sequence = self.sequence.wrapping_add(1);
-        self.wire.get(..=encoded)
-    }
 }
 
 /// Reads the frames of one direction.
@@ -153,9 +202,9 @@ fn decode(wire: &mut [u8]) -> Result<Frame<'_>, FrameError> {
     let length = cobs::decode_in_place(wire).map_err(|_| FrameError::Encoding)?;
     let plain = wire.get(..length).ok_or(FrameError::Encoding)?;
     let (body, sum) = plain.split_last_chunk().ok_or(FrameError::TooShort)?;
-    let (sequence, payload) = body.split_first_chunk().ok_or(FrameError::TooShort)?;
+    let (header, payload) = body.split_first_chunk().ok_or(FrameError::TooShort)?;
     if checksum(body) != u32::from_le_bytes(*sum) {
         return Err(FrameError::Checksum);
     }
-    Ok(Frame { sequence: u16::from_le_bytes(*sequence), payload })
+    Ok(Frame { header: FrameHeader::read(*header).ok_or(FrameError::Kind)?, payload })
 }

@@ -10,7 +10,8 @@
 //! | [`layout`] | record | little-endian photons, nodes, triangles, materials, emitters |
 //! | [`image`] | section | where the records of a scene lie in the card image |
 //! | [`message`] | message | commands of the host, replies of a card |
-//! | [`frame`] | frame | COBS, sequence number, CRC-32C |
+//! | [`transport`] | message | windowed acknowledgement, selective repetition |
+//! | [`frame`] | frame | COBS, header, CRC-32C |
 //! | [`link`] | byte | a port: bytes with a bounded wait |
 //!
 //! Nothing here allocates, and nothing here panics on any input.
@@ -35,3 +36,4 @@ pub mod image;
 pub mod layout;
 pub mod link;
 pub mod message;
+pub mod transport;

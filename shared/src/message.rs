@@ -3,13 +3,13 @@
 //! The host speaks first. A session is
 //!
 //! ```text
-//! Hello           -> Hello                       versions, budget, build
+//! Hello           -> Hello                       versions, budget, build, how much of its memory is written
+//! ReadChecksums   -> Checksums ...               of chunks that are written: what is there already is not sent again
 //! BeginImage      -> (nothing)
-//! WriteLines ...  -> (nothing)                   any number, each up to sixteen lines
+//! WriteLines ...  -> (nothing)                   any number, in any order, each up to eight lines
 //! EndImage        -> ImageAccepted               the checksum of all lines compared, the header read
 //! BeginFrame      -> FrameAccepted
 //! RenderTile ...  -> Pixels ..., TileDone        at most the budget's `tiles` unanswered
-//! ReadCounters    -> Counters
 //! ```
 //!
 //! Whatever a card cannot do it answers with [`Reply::Fault`]; it stays ready for the next command.
@@ -19,11 +19,17 @@ use serde::{Deserialize, Serialize};
 use crate::budget::Budget;
 use crate::counters::Counters;
 
-/// The version of this module and of [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 4;
+/// The version of this module, of [`crate::transport`] and of [`crate::frame`].
+pub const PROTOCOL_VERSION: u16 = 5;
 
 /// Lines that one [`Command::WriteLines`] may carry.
-pub const LINES_PER_WRITE: usize = 16;
+pub const LINES_PER_WRITE: usize = 8;
+
+/// Lines of a chunk: what one of [`Reply::Checksums`] is of.
+pub const CHUNK_LINES: u32 = 64;
+
+/// Checksums that one [`Reply::Checksums`] may carry.
+pub const CHECKSUMS_PER_REPLY: u32 = 128;
 
 /// A pinhole camera. The ray through the picture's point `(u, v)`, both from 0 to 1, v downwards, has the direction
 /// `forward + (2 u - 1) right + (1 - 2 v) up`.
@@ -124,12 +130,19 @@ impl Tile {
 /// From the host to a card.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
-    /// Who are you? Any time; forgets image and frame.
+    /// Who are you? Any time; forgets frame and tiles, and whether there is an image. Lines that are written stay.
     Hello {
         /// The host's [`PROTOCOL_VERSION`].
         protocol: u16,
         /// The host's [`crate::image::LAYOUT_VERSION`].
         layout: u16,
+    },
+    /// Tell the checksums of some chunks, at most [`CHECKSUMS_PER_REPLY`] of them.
+    ReadChecksums {
+        /// The first chunk.
+        first: u32,
+        /// How many.
+        count: u32,
     },
     /// An image of so many lines follows, with this checksum of all its bytes.
     BeginImage {
@@ -138,7 +151,7 @@ pub enum Command<'a> {
         /// CRC-32C.
         checksum: u32,
     },
-    /// The next lines of the image: those from line `first` on.
+    /// Lines of the image.
     WriteLines {
         /// Number of the first.
         first: u32,
@@ -148,12 +161,10 @@ pub enum Command<'a> {
     },
     /// The image is complete.
     EndImage,
-    /// The parameters of the tiles to come; counters start again at zero.
+    /// The parameters of the tiles to come.
     BeginFrame(FrameParameters),
     /// Render a tile.
     RenderTile(Tile),
-    /// Tell the counters.
-    ReadCounters,
 }
 
 /// From a card to the host.
@@ -167,9 +178,19 @@ pub enum Reply<'a> {
         layout: u16,
         /// What the chip can hold.
         budget: Budget,
+        /// Lines of its memory, from the first on, that were written since it was switched on: what is beyond is nothing.
+        written_lines: u32,
         /// Name and version of the firmware.
         #[serde(borrow)]
         build: &'a str,
+    },
+    /// Checksums of chunks.
+    Checksums {
+        /// The first chunk.
+        first: u32,
+        /// A CRC-32C, little-endian, for each.
+        #[serde(borrow)]
+        data: &'a [u8],
     },
     /// The image is in memory and its header is sound.
     ImageAccepted,
@@ -189,9 +210,9 @@ pub enum Reply<'a> {
     TileDone {
         /// The tile's number.
         tile: u32,
+        /// The work that it took.
+        counters: Counters,
     },
-    /// The counters since the frame began.
-    Counters(Counters),
     /// A command could not be done.
     Fault(Fault),
 }
@@ -208,18 +229,16 @@ pub struct Fault {
 /// Numbered faults; the numbers are part of the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FaultCode {
-    /// A frame was damaged; detail: 0.
-    Frame,
-    /// A frame is missing; detail: the number expected.
-    Sequence,
     /// A payload is not a command; detail: its bytes.
     Message,
     /// The command does not fit the state of the session; detail: 0.
     Order,
     /// The image does not fit in the card's memory; detail: the lines there are.
     ImageTooLarge,
-    /// Lines are not the next of the image; detail: the line expected.
-    LineOrder,
+    /// Lines are not whole, not of the image, or too many; detail: the first.
+    Lines,
+    /// Chunks are not of what is written, or too many; detail: the first.
+    Chunks,
     /// The image's checksum differs; detail: the checksum found.
     ImageChecksum,
     /// The image's header is not sound; detail: the image's layout version for a wrong version, else 0.
@@ -254,7 +273,7 @@ pub struct Pixel {
 /// Bytes of one [`Pixel`].
 pub const PIXEL_BYTES: usize = 40;
 /// Pixels that one [`Reply::Pixels`] may carry.
-pub const PIXELS_PER_REPLY: usize = 48;
+pub const PIXELS_PER_REPLY: usize = 25;
 
 impl Pixel {
     /// Reads a record.

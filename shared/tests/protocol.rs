@@ -2,27 +2,29 @@
 
 use photoncard_shared::budget::REFERENCE;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::frame::{FrameError, FrameReader, FrameWriter, MAX_FRAME, MAX_PAYLOAD, checksum};
+use photoncard_shared::frame::{
+    FrameError, FrameHeader, FrameKind, FrameReader, MAX_FRAME, MAX_PAYLOAD, checksum, write_frame,
+};
 use photoncard_shared::message::*;
 use proptest::prelude::*;
 
-fn frame(payload: &[u8]) -> Vec<u8> {
-    let mut writer = FrameWriter::new();
-    let fill = |bytes: &mut [u8]| {
-        bytes.get_mut(..payload.len())?.copy_from_slice(payload);
-        Some(payload.len())
-    };
-    writer.write(fill).expect("fits").to_vec()
+const HEADER: FrameHeader =
+    FrameHeader { kind: FrameKind::Data, session: 0x1234, sequence: 0, acknowledged: 7, held: 0b101 };
+
+fn frame(header: &FrameHeader, payload: &[u8]) -> Vec<u8> {
+    let mut wire = heapless::Vec::<u8, MAX_FRAME>::new();
+    write_frame(header, payload, &mut wire);
+    wire.to_vec()
 }
 
 /// All frames and errors of `bytes`, given to a reader in pieces of `piece`.
-fn read_all(bytes: &[u8], piece: usize) -> Vec<Result<(u16, Vec<u8>), FrameError>> {
+fn read_all(bytes: &[u8], piece: usize) -> Vec<Result<(FrameHeader, Vec<u8>), FrameError>> {
     let mut reader = FrameReader::new();
     let mut found = Vec::new();
     for mut chunk in bytes.chunks(piece) {
         while !chunk.is_empty() {
             let (taken, result) = reader.read(chunk);
-            found.extend(result.map(|r| r.map(|f| (f.sequence, f.payload.to_vec()))));
+            found.extend(result.map(|r| r.map(|f| (f.header, f.payload.to_vec()))));
             chunk = &chunk[taken..];
         }
     }
@@ -32,12 +34,12 @@ fn read_all(bytes: &[u8], piece: usize) -> Vec<Result<(u16, Vec<u8>), FrameError
 proptest! {
     #[test]
     fn a_payload_comes_back_whatever_the_pieces(
-        payload in proptest::collection::vec(any::<u8>(), 0..MAX_PAYLOAD),
+        payload in proptest::collection::vec(any::<u8>(), 0..=MAX_PAYLOAD),
         piece in 1_usize..3000,
     ) {
-        let wire = frame(&payload);
+        let wire = frame(&HEADER, &payload);
         prop_assert!(wire.len() <= MAX_FRAME);
-        prop_assert_eq!(read_all(&wire, piece), vec![Ok((0, payload))]);
+        prop_assert_eq!(read_all(&wire, piece), vec![Ok((HEADER, payload))]);
     }
 
     #[test]
@@ -46,12 +48,12 @@ proptest! {
         position in any::<prop::sample::Index>(),
         bit in 0_u32..8,
     ) {
-        let mut wire = frame(&payload);
+        let mut wire = frame(&HEADER, &payload);
         let position = position.index(wire.len());
         wire[position] ^= 1_u8 << bit;
         wire.push(0);
         for found in read_all(&wire, 64).into_iter().flatten() {
-            prop_assert_eq!(found, (0, payload.clone()));
+            prop_assert_eq!(found, (HEADER, payload.clone()));
         }
     }
 
@@ -59,8 +61,8 @@ proptest! {
     fn after_garbage_the_next_frame_is_found(garbage in proptest::collection::vec(any::<u8>(), 0..6000)) {
         let mut wire = garbage;
         wire.push(0);
-        wire.extend(frame(b"good"));
-        prop_assert_eq!(read_all(&wire, 100).pop(), Some(Ok((0, b"good".to_vec()))));
+        wire.extend(frame(&HEADER, b"good"));
+        prop_assert_eq!(read_all(&wire, 100).pop(), Some(Ok((HEADER, b"good".to_vec()))));
     }
 
     #[test]
@@ -70,15 +72,56 @@ proptest! {
     }
 }
 
+/// The bytes on the wire are part of the protocol.
 #[test]
-fn frames_are_numbered_and_wrap() {
-    let mut writer = FrameWriter::new();
-    for expected in (0..=u16::MAX).chain(0..3) {
-        let wire = writer.write(|_| Some(0)).unwrap().to_vec();
-        assert_eq!(read_all(&wire, 64), vec![Ok((expected, vec![]))]);
+fn golden_frames() {
+    let header = |kind| FrameHeader { kind, session: 0x0102, sequence: 3, acknowledged: 0x0405, held: 6 };
+    let golden: [(FrameKind, &[u8], &[u8]); 6] = [
+        (
+            FrameKind::Data,
+            &[0, 1, 2],
+            &[
+                0x01, 0x04, 0x02, 0x01, 0x03, 0x04, 0x05, 0x04, 0x06, 0x07, 0x01, 0x02, 0x4e, 0x7e, 0xb7,
+                0x9d, 0x00,
+            ],
+        ),
+        (
+            FrameKind::Open,
+            &[104, 105],
+            &[0x05, 0x01, 0x02, 0x01, 0x03, 0x0a, 0x05, 0x04, 0x06, 0x68, 0x69, 0x38, 0xe1, 0x18, 0x42, 0x00],
+        ),
+        (
+            FrameKind::Acknowledge,
+            &[],
+            &[0x05, 0x02, 0x02, 0x01, 0x03, 0x08, 0x05, 0x04, 0x06, 0xe9, 0x7a, 0xe1, 0x3a, 0x00],
+        ),
+        (
+            FrameKind::Probe,
+            &[],
+            &[0x05, 0x03, 0x02, 0x01, 0x03, 0x08, 0x05, 0x04, 0x06, 0xce, 0x07, 0xdd, 0x73, 0x00],
+        ),
+        (
+            FrameKind::Answer,
+            &[],
+            &[0x05, 0x04, 0x02, 0x01, 0x03, 0x08, 0x05, 0x04, 0x06, 0xca, 0x02, 0x84, 0x89, 0x00],
+        ),
+        (
+            FrameKind::Unknown,
+            &[],
+            &[0x05, 0x05, 0x02, 0x01, 0x03, 0x08, 0x05, 0x04, 0x06, 0xed, 0x7f, 0xb8, 0xc0, 0x00],
+        ),
+    ];
+    for (kind, payload, wire) in golden {
+        assert_eq!(frame(&header(kind), payload), wire, "{kind:?}");
+        assert_eq!(read_all(wire, 5), [Ok((header(kind), payload.to_vec()))]);
     }
-    assert_eq!(writer.write(|_| None), None);
-    assert_eq!(writer.write(|_| Some(MAX_PAYLOAD + 1)), None);
+}
+
+#[test]
+fn a_frame_that_does_not_fit_is_not_written() {
+    let mut wire = heapless::Vec::<u8, 20>::new();
+    write_frame(&HEADER, &[1; 20], &mut wire);
+    assert!(wire.is_empty());
 }
 
 #[test]
@@ -93,6 +136,8 @@ fn the_longest_messages_fit_a_frame() {
     assert!(encode(&Command::WriteLines { first: u32::MAX, data: &lines }, &mut bytes).is_some());
     let pixels = [0xff; PIXEL_BYTES * PIXELS_PER_REPLY];
     assert!(encode(&Reply::Pixels { tile: u32::MAX, first: u32::MAX, data: &pixels }, &mut bytes).is_some());
+    let checksums = [0xff; 4 * CHECKSUMS_PER_REPLY as usize];
+    assert!(encode(&Reply::Checksums { first: u32::MAX, data: &checksums }, &mut bytes).is_some());
 }
 
 fn encoded(message: &impl serde::Serialize) -> Vec<u8> {
@@ -106,6 +151,7 @@ fn opcodes_are_pinned() {
     let tile = Tile { id: 1, x: 2, y: 3, width: 4, height: 5 };
     let commands = [
         Command::Hello { protocol: 1, layout: 1 },
+        Command::ReadChecksums { first: 0, count: 1 },
         Command::BeginImage { lines: 2, checksum: 3 },
         Command::WriteLines { first: 0, data: &[9] },
         Command::EndImage,
@@ -113,22 +159,21 @@ fn opcodes_are_pinned() {
     for (opcode, command) in commands.iter().enumerate() {
         assert_eq!(encoded(command)[0] as usize, opcode);
     }
-    assert_eq!(encoded(&Command::RenderTile(tile)), [5, 1, 2, 3, 4, 5]);
-    assert_eq!(encoded(&Command::ReadCounters), [6]);
+    assert_eq!(encoded(&Command::RenderTile(tile)), [6, 1, 2, 3, 4, 5]);
     let fault = |code| Reply::Fault(Fault { code, detail: 7 });
     let replies = [
-        (Reply::Hello { protocol: 1, layout: 1, budget: REFERENCE, build: "x" }, 0),
-        (Reply::ImageAccepted, 1),
-        (Reply::FrameAccepted, 2),
-        (Reply::Pixels { tile: 1, first: 0, data: &[] }, 3),
-        (Reply::TileDone { tile: 1 }, 4),
-        (Reply::Counters(Counters::ZERO), 5),
+        (Reply::Hello { protocol: 1, layout: 1, budget: REFERENCE, written_lines: 0, build: "x" }, 0),
+        (Reply::Checksums { first: 0, data: &[] }, 1),
+        (Reply::ImageAccepted, 2),
+        (Reply::FrameAccepted, 3),
+        (Reply::Pixels { tile: 1, first: 0, data: &[] }, 4),
+        (Reply::TileDone { tile: 1, counters: Counters::ZERO }, 5),
     ];
     for (reply, opcode) in replies {
         assert_eq!(encoded(&reply)[0], opcode);
     }
-    assert_eq!(encoded(&fault(FaultCode::Frame)), [6, 0, 7]);
-    assert_eq!(encoded(&fault(FaultCode::Depth)), [6, 13, 7]);
+    assert_eq!(encoded(&fault(FaultCode::Message)), [6, 0, 7]);
+    assert_eq!(encoded(&fault(FaultCode::Depth)), [6, 12, 7]);
 }
 
 #[test]

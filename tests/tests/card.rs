@@ -9,10 +9,13 @@ use photoncard_firmware::card::ReferenceCard;
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::REFERENCE;
-use photoncard_shared::frame::{FrameReader, FrameWriter, checksum};
+use photoncard_shared::frame::checksum;
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{BvhNode, ChildReference};
-use photoncard_shared::message::{self, Command, Fault, FaultCode, FrameParameters, Reply, Tile};
+use photoncard_shared::message::{
+    self, CHUNK_LINES, Command, Fault, FaultCode, FrameParameters, LINES_PER_WRITE, Reply, Tile,
+};
+use photoncard_shared::transport::Transport;
 use photoncard_tests::{camera, lambertian, room, scene, with_room_for_a_card};
 use proptest::prelude::*;
 
@@ -21,64 +24,87 @@ const DRAM_LINES: usize = 4096;
 /// A card on a wire that loses nothing.
 struct Wire<'a> {
     card: Box<ReferenceCard<Dram<'a>>>,
-    writer: FrameWriter,
-    reader: FrameReader,
+    host: Transport,
+    session: u16,
 }
 
 /// A reply, without what it borrows.
 #[derive(Clone, Debug, PartialEq)]
 enum Answer {
-    Hello,
+    Hello(u32),
+    Checksums(Vec<u8>),
     ImageAccepted,
     FrameAccepted,
     Pixels(usize),
     TileDone(u32),
-    Counters,
     Fault(FaultCode),
 }
 
 impl<'a> Wire<'a> {
     fn new(memory: &'a mut [Line]) -> Self {
         let card = Box::new(ReferenceCard::new(REFERENCE, Dram::new(memory)));
-        Self { card, writer: FrameWriter::new(), reader: FrameReader::new() }
+        Self { card, host: Transport::host(), session: 0 }
     }
 
     /// Sends a command and works until the card rests. Returns its answers.
     fn say(&mut self, command: &Command) -> Vec<Answer> {
-        let frame = self.writer.write(|bytes| message::encode(command, bytes)).expect("fits").to_vec();
-        self.send(&frame)
+        assert!(self.host.send(|bytes| message::encode(command, bytes)));
+        self.work()
     }
 
-    fn send(&mut self, mut bytes: &[u8]) -> Vec<Answer> {
+    /// Sends bytes that are no command.
+    fn say_bytes(&mut self, message: &[u8]) -> Vec<Answer> {
+        assert!(self.host.send(|bytes| {
+            bytes.get_mut(..message.len())?.copy_from_slice(message);
+            Some(message.len())
+        }));
+        self.work()
+    }
+
+    fn work(&mut self) -> Vec<Answer> {
         let mut answers = Vec::new();
         loop {
-            bytes = &bytes[self.card.feed(bytes)..];
+            let to_card = self.host.outgoing().to_vec();
+            self.host.sent(to_card.len());
+            self.card.feed(&to_card);
             self.card.work();
-            let outgoing = self.card.outgoing().to_vec();
-            self.card.sent(outgoing.len());
-            let mut rest = &outgoing[..];
+            let to_host = self.card.outgoing().to_vec();
+            self.card.sent(to_host.len());
+            let mut rest = &to_host[..];
             while !rest.is_empty() {
-                let (taken, frame) = self.reader.read(rest);
-                rest = &rest[taken..];
-                let Some(frame) = frame else { continue };
-                answers.push(answer(message::decode(frame.expect("whole").payload).expect("a reply")));
+                rest = &rest[self.host.receive(rest).0..];
+                while let Some(payload) = self.host.take() {
+                    answers.push(answer(message::decode(payload).expect("a reply")));
+                }
             }
-            if bytes.is_empty() && !self.card.is_busy() && self.card.outgoing().is_empty() {
-                return answers;
+            if to_card.is_empty() && to_host.is_empty() && !self.card.is_busy() {
+                self.card.acknowledge();
+                self.host.acknowledge();
+                if self.card.outgoing().is_empty() && self.host.outgoing().is_empty() {
+                    return answers;
+                }
             }
         }
     }
 
-    fn hello(&mut self) {
-        assert_eq!(self.say(&Command::Hello { protocol: 1, layout: 1 }), [Answer::Hello]);
+    /// Begins a session. Returns the lines that the card has written.
+    fn hello(&mut self) -> u32 {
+        self.session += 1;
+        self.host.open(self.session);
+        match self.say(&Command::Hello { protocol: 1, layout: 1 })[..] {
+            [Answer::Hello(written)] => written,
+            ref other => panic!("{other:?}"),
+        }
     }
 
     fn load(&mut self, lines: &[Line]) -> Vec<Answer> {
         let bytes: Vec<u8> = lines.iter().flat_map(|line| line.0).collect();
         let begin = Command::BeginImage { lines: lines.len() as u32, checksum: checksum(&bytes) };
         let mut answers = self.say(&begin);
-        for (index, data) in bytes.chunks(16 * 128).enumerate() {
-            answers.extend(self.say(&Command::WriteLines { first: 16 * index as u32, data }));
+        // In any order: here from the last to the first.
+        for (index, data) in bytes.chunks(LINES_PER_WRITE * 128).enumerate().rev() {
+            let first = (LINES_PER_WRITE * index) as u32;
+            answers.extend(self.say(&Command::WriteLines { first, data }));
         }
         answers.extend(self.say(&Command::EndImage));
         answers
@@ -87,12 +113,12 @@ impl<'a> Wire<'a> {
 
 fn answer(reply: Reply) -> Answer {
     match reply {
-        Reply::Hello { .. } => Answer::Hello,
+        Reply::Hello { written_lines, .. } => Answer::Hello(written_lines),
+        Reply::Checksums { data, .. } => Answer::Checksums(data.to_vec()),
         Reply::ImageAccepted => Answer::ImageAccepted,
         Reply::FrameAccepted => Answer::FrameAccepted,
         Reply::Pixels { data, .. } => Answer::Pixels(data.len() / message::PIXEL_BYTES),
-        Reply::TileDone { tile } => Answer::TileDone(tile),
-        Reply::Counters(_) => Answer::Counters,
+        Reply::TileDone { tile, .. } => Answer::TileDone(tile),
         Reply::Fault(Fault { code, .. }) => Answer::Fault(code),
     }
 }
@@ -121,8 +147,7 @@ fn renders_a_tile(wire: &mut Wire, image: &CardImage) {
     assert_eq!(wire.load(image.lines()), [Answer::ImageAccepted]);
     assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
     let answers = wire.say(&Command::RenderTile(TILE));
-    assert_eq!(answers, [Answer::Pixels(48), Answer::Pixels(16), Answer::TileDone(7)]);
-    assert_eq!(wire.say(&Command::ReadCounters), [Answer::Counters]);
+    assert_eq!(answers, [Answer::Pixels(25), Answer::Pixels(25), Answer::Pixels(14), Answer::TileDone(7)]);
 }
 
 #[test]
@@ -138,11 +163,17 @@ fn commands_out_of_order_are_faults_and_the_card_goes_on() {
         assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 128] }), fault(FaultCode::Order));
         let too_large = Command::BeginImage { lines: DRAM_LINES as u32 + 1, checksum: 0 };
         assert_eq!(wire.say(&too_large), fault(FaultCode::ImageTooLarge));
+        assert_eq!(wire.say(&Command::ReadChecksums { first: 0, count: 1 }), fault(FaultCode::Chunks));
         assert_eq!(wire.say(&Command::BeginImage { lines: 2, checksum: 0 }), []);
-        assert_eq!(wire.say(&Command::WriteLines { first: 1, data: &[0; 128] }), fault(FaultCode::LineOrder));
-        assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 100] }), fault(FaultCode::LineOrder));
+        assert_eq!(wire.say(&Command::WriteLines { first: 1, data: &[0; 256] }), fault(FaultCode::Lines));
+        assert_eq!(
+            wire.say(&Command::WriteLines { first: u32::MAX, data: &[0; 128] }),
+            fault(FaultCode::Lines)
+        );
+        assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 100] }), fault(FaultCode::Lines));
         assert_eq!(wire.say(&Command::WriteLines { first: 0, data: &[0; 256] }), []);
         assert_eq!(wire.say(&Command::EndImage), fault(FaultCode::ImageChecksum));
+        assert_eq!(wire.say_bytes(&[0xff; 9]), fault(FaultCode::Message));
         renders_a_tile(&mut wire, &image());
     });
 }
@@ -228,32 +259,61 @@ fn unsound_images_end_in_faults_and_not_in_a_hang() {
 }
 
 #[test]
-fn a_damaged_and_a_missing_frame_are_told() {
+fn a_card_tells_what_it_has_of_an_image_and_keeps_it_over_sessions() {
     with_room_for_a_card(|| {
+        let image = image();
         let mut memory = vec![Line::ZERO; DRAM_LINES];
         let mut wire = Wire::new(&mut memory);
-        wire.hello();
-        let frame =
-            wire.writer.write(|bytes| message::encode(&Command::ReadCounters, bytes)).unwrap().to_vec();
-        let mut damaged = frame.clone();
-        damaged[3] ^= 0x10;
-        assert_eq!(wire.send(&damaged), [Answer::Fault(FaultCode::Frame)]);
-        // That frame's number is missing now.
-        assert_eq!(wire.say(&Command::ReadCounters), [Answer::Fault(FaultCode::Sequence)]);
-        assert_eq!(wire.say(&Command::ReadCounters), [Answer::Counters]);
+        assert_eq!(wire.hello(), 0);
+        wire.load(image.lines());
+        let written = wire.hello();
+        assert_eq!(written as usize, image.lines().len());
+        assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::Fault(FaultCode::Order)]);
+        let chunks = written.div_ceil(CHUNK_LINES);
+        let expected = image.lines().chunks(CHUNK_LINES as usize).flat_map(|chunk| {
+            let bytes: Vec<u8> = chunk.iter().flat_map(|line| line.0).collect();
+            checksum(&bytes).to_le_bytes()
+        });
+        let answers = wire.say(&Command::ReadChecksums { first: 0, count: chunks });
+        assert_eq!(answers, [Answer::Checksums(expected.collect())]);
+        for (first, count) in [(0, 0), (0, chunks + 1), (chunks, 1), (u32::MAX, 2)] {
+            let answers = wire.say(&Command::ReadChecksums { first, count });
+            assert_eq!(answers, [Answer::Fault(FaultCode::Chunks)], "{first} {count}");
+        }
+        // All lines are there already.
+        let bytes: Vec<u8> = image.lines().iter().flat_map(|line| line.0).collect();
+        assert_eq!(wire.say(&Command::BeginImage { lines: written, checksum: checksum(&bytes) }), []);
+        assert_eq!(wire.say(&Command::EndImage), [Answer::ImageAccepted]);
+        assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
+        assert_eq!(wire.say(&Command::RenderTile(TILE)).last(), Some(&Answer::TileDone(7)));
     });
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
+    /// Whole messages of any content.
+    #[test]
+    fn no_messages_stop_a_card(
+        messages in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..200), 0..40),
+    ) {
+        with_room_for_a_card(|| {
+            let mut memory = vec![Line::ZERO; DRAM_LINES];
+            let mut wire = Wire::new(&mut memory);
+            wire.hello();
+            messages.iter().for_each(|message| drop(wire.say_bytes(message)));
+            wire.hello();
+        });
+    }
+
     #[test]
     fn no_bytes_stop_a_card(garbage in proptest::collection::vec(any::<u8>(), 0..5000)) {
         with_room_for_a_card(|| {
             let mut memory = vec![Line::ZERO; DRAM_LINES];
             let mut wire = Wire::new(&mut memory);
-            wire.send(&garbage);
-            wire.send(&[0]);
+            wire.card.feed(&garbage);
+            wire.card.feed(&[0]);
+            wire.work();
             wire.hello();
         });
     }

@@ -208,6 +208,11 @@ impl CardMemory for GrowingMemory {
         self.limit
     }
 
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        let end = first.0.checked_add(count)?;
+        self.lines.get(first.0 as usize..end as usize)
+    }
+
     fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
         let end = first.0.checked_add(count).filter(|&end| end <= self.limit)?;
         if self.lines.len() < end as usize {

@@ -144,6 +144,10 @@ impl<M: CardMemory> CardMemory for Traced<M> {
         self.memory.lines()
     }
 
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        self.memory.stored(first, count)
+    }
+
     fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
         self.memory.write(first, count)
     }

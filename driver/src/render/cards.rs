@@ -1,10 +1,11 @@
 //! The cards of a render: each has a thread of the host that moves bytes between its port and its session.
 
 use std::str::FromStr;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
+use photoncard_firmware::sampler::hash;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
@@ -255,8 +256,7 @@ impl Cards {
 impl CardOutcome {
     fn add(&mut self, other: &Self) {
         self.counters.add(&other.counters);
-        self.bytes.payload += other.bytes.payload;
-        self.bytes.wire += other.bytes.wire;
+        self.bytes.add(&other.bytes);
         if let Some(traffic) = &other.traffic {
             self.traffic.get_or_insert(MemoryTraffic::ZERO).add(traffic);
         }
@@ -277,19 +277,17 @@ fn exchange(
     start: Instant,
 ) -> Result<(), SessionError> {
     session.prepare(&mut lock(picture));
-    let sent = if session.outgoing().is_empty() {
-        0
-    } else {
-        port.write(session.outgoing(), WAIT).map_err(SessionError::Port)?
+    let sent = match session.outgoing() {
+        [] => 0,
+        outgoing => port.write(outgoing, WAIT).map_err(SessionError::Port)?,
     };
     session.sent(sent, start.elapsed());
     let mut buffer = [0; 8192];
     let wait = if session.has_more_to_send() { Duration::ZERO } else { WAIT };
-    let received = port.read(&mut buffer, wait).map_err(SessionError::Port)?;
-    if received > 0 {
-        session.receive(&buffer[..received], &mut lock(picture), start.elapsed())?;
+    match port.read(&mut buffer, wait).map_err(SessionError::Port)? {
+        0 => session.tick(start.elapsed()),
+        received => session.receive(&buffer[..received], &mut lock(picture), start.elapsed()),
     }
-    session.check_silence(start.elapsed())
 }
 
 /// Says hello and waits for the answer.
@@ -298,13 +296,20 @@ fn greet(
     picture: &Mutex<Picture>,
     start: Instant,
 ) -> Result<Connected, SessionError> {
-    let mut session = Session::new(start.elapsed());
+    let mut session = Session::new(session_number(), start.elapsed());
     loop {
         if let Some(&budget) = session.budget() {
             return Ok(Connected { card, session, budget });
         }
         exchange(&mut session, card.port(), picture, start)?;
     }
+}
+
+/// A number that another process, or an earlier session of this one, has hardly used on the same line.
+fn session_number() -> u16 {
+    static COUNT: AtomicU16 = AtomicU16::new(0);
+    let time = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.subsec_nanos());
+    hash(time ^ std::process::id()) as u16 ^ COUNT.fetch_add(1, Ordering::Relaxed)
 }
 
 /// Loads the image into a card and renders tiles on it until none is left.
@@ -317,7 +322,7 @@ fn render_on(
     let Connected { mut card, mut session, .. } = connected;
     session.start(job, shared.start.elapsed());
     let mut outcome = CardOutcome::default();
-    while !session.is_done() && !card.trace_has_failed() {
+    while !lock(shared.picture).scheduler.is_complete() && !card.trace_has_failed() {
         if shared.failed.load(Ordering::Relaxed) || shared.observer.is_stopped() {
             return Err(RenderError::Stopped);
         }

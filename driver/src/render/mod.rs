@@ -219,7 +219,9 @@ fn statistics(
         link: LinkStatistics {
             payload_bytes: outcome.bytes.payload,
             wire_bytes: outcome.bytes.wire,
-            retransmitted_frames: 0,
+            retransmitted_frames: outcome.bytes.line.repeated,
+            damaged_frames: outcome.bytes.line.damaged,
+            resets: outcome.bytes.resets,
         },
         memory: settings.modelled_caches().zip(outcome.traffic.as_ref()).map(MemoryStatistics::new),
         peak_memory_bytes: statistics::peak_memory_bytes(),

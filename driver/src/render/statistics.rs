@@ -125,6 +125,10 @@ pub struct LinkStatistics {
     pub wire_bytes: u64,
     /// Frames sent more than once.
     pub retransmitted_frames: u64,
+    /// Frames of cards that came damaged.
+    pub damaged_frames: u64,
+    /// Times that a card was greeted again.
+    pub resets: u64,
 }
 
 /// The process's peak resident memory, where `/proc` tells.

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use photoncard_shared::frame::FrameError;
 use photoncard_shared::link::PortError;
 use photoncard_shared::message::Fault;
 
@@ -39,13 +38,9 @@ pub enum SessionError {
         "this is a fault of the program or of the card: please report it with the command used"
     ))]
     Fault(Fault),
-    /// A frame was damaged on its way.
-    #[error("a frame from the card was damaged on its way: {0:?}")]
-    #[diagnostic(help("check the link's cable and its speed"))]
-    Frame(FrameError),
-    /// A frame is missing, or is not what the session expects.
+    /// A message is not what the session expects.
     #[error("the card's answer is out of order: {0}")]
-    #[diagnostic(help("check the link's cable and its speed"))]
+    #[diagnostic(help("install the firmware and the program of one release"))]
     Unexpected(&'static str),
     /// Nothing came for too long.
     #[error("the card has not answered for {} s", .0.as_secs())]

@@ -1,18 +1,20 @@
-//! Loading of a card image: lines in order, a checksum over all, and a header that is sound.
+//! Loading of a card image: lines in any order, a checksum over all, and a header that is sound.
 
-use photoncard_shared::address::{LINE_BYTES, LineAddress, Structure};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::frame::Checksum;
 use photoncard_shared::image::{Header, HeaderError};
-use photoncard_shared::message::{Fault, FaultCode};
+use photoncard_shared::message::{CHECKSUMS_PER_REPLY, CHUNK_LINES, Fault, FaultCode};
 
 use super::OUT_OF_ORDER;
-use crate::memory::{CardMemory, MemoryPort, Stage};
+use crate::memory::{CardMemory, Stage};
 use crate::scene::SceneImage;
 
 /// The image in memory.
 pub(super) enum ImageState {
     None,
     Loading(Loader),
+    /// All lines have come, and are compared with their checksum.
+    Checking(Check),
     Ready(SceneImage),
 }
 
@@ -21,9 +23,9 @@ impl ImageState {
     ///
     /// # Errors
     /// If no image is being loaded.
-    pub(super) fn loader(&mut self) -> Result<&mut Loader, Fault> {
+    pub(super) fn loader(&self) -> Result<Loader, Fault> {
         match self {
-            Self::Loading(loader) => Ok(loader),
+            Self::Loading(loader) => Ok(*loader),
             _ => Err(OUT_OF_ORDER),
         }
     }
@@ -38,49 +40,59 @@ impl ImageState {
 }
 
 /// An image on its way into memory.
+#[derive(Clone, Copy)]
 pub(super) struct Loader {
     lines: u32,
-    written: u32,
-    expected: u32,
-    checksum: Checksum,
+    checksum: u32,
 }
 
 impl Loader {
-    pub(super) fn new(memory: &impl CardMemory, lines: u32, expected: u32) -> Result<Self, Fault> {
+    pub(super) fn new(memory: &impl CardMemory, lines: u32, checksum: u32) -> Result<Self, Fault> {
         let available = memory.lines();
         if lines == 0 || lines > available {
             return Err(Fault { code: FaultCode::ImageTooLarge, detail: available });
         }
-        Ok(Self { lines, written: 0, expected, checksum: Checksum::default() })
+        Ok(Self { lines, checksum })
     }
 
-    pub(super) fn write(
-        &mut self,
-        memory: &mut impl CardMemory,
-        first: u32,
-        data: &[u8],
-    ) -> Result<(), Fault> {
-        let fault = Fault { code: FaultCode::LineOrder, detail: self.written };
+    /// Writes lines. Returns the line after the last.
+    pub(super) fn write(self, memory: &mut impl CardMemory, first: u32, data: &[u8]) -> Result<u32, Fault> {
+        let fault = Fault { code: FaultCode::Lines, detail: first };
         let (lines, rest) = data.as_chunks::<LINE_BYTES>();
         let count = u32::try_from(lines.len()).map_err(|_| fault)?;
-        if first != self.written || !rest.is_empty() || count > self.lines - self.written {
-            return Err(fault);
-        }
+        let end =
+            first.checked_add(count).filter(|&end| end <= self.lines && rest.is_empty()).ok_or(fault)?;
         let target = memory.write(LineAddress(first), count).ok_or(fault)?;
         for (line, bytes) in target.iter_mut().zip(lines) {
             line.0 = *bytes;
         }
-        self.checksum.update(data);
-        self.written += count;
-        Ok(())
+        Ok(end)
     }
 
-    pub(super) fn finish(&self, memory: &mut impl MemoryPort) -> Result<SceneImage, Fault> {
-        if self.written != self.lines {
-            return Err(Fault { code: FaultCode::LineOrder, detail: self.written });
+    pub(super) fn check(self) -> Check {
+        Check { loader: self, next: 0, checksum: Checksum::default() }
+    }
+}
+
+/// The comparison of an image with its checksum, chunk by chunk.
+pub(super) struct Check {
+    loader: Loader,
+    next: u32,
+    checksum: Checksum,
+}
+
+impl Check {
+    /// Looks at the next chunk. Returns the scene after the last.
+    pub(super) fn step(&mut self, memory: &mut impl CardMemory) -> Result<Option<SceneImage>, Fault> {
+        let Loader { lines, checksum } = self.loader;
+        let count = CHUNK_LINES.min(lines - self.next);
+        add(&mut self.checksum, stored(memory, self.next, count)?);
+        self.next += count;
+        if self.next < lines {
+            return Ok(None);
         }
         let found = self.checksum.value();
-        if found != self.expected {
+        if found != checksum {
             return Err(Fault { code: FaultCode::ImageChecksum, detail: found });
         }
         memory.enter(Stage::Begin);
@@ -90,9 +102,50 @@ impl Loader {
             HeaderError::Version(version) => unsound(version as u32),
             _ => unsound(0),
         })?;
-        if header.lines != self.lines {
+        if header.lines != lines {
             return Err(unsound(0));
         }
-        Ok(SceneImage { header })
+        Ok(Some(SceneImage { header }))
     }
+}
+
+/// The bytes of a reply's checksums.
+pub(super) const CHECKSUMS_BYTES: usize = 4 * CHECKSUMS_PER_REPLY as usize;
+
+/// Checksums of chunks on their way to the host.
+pub(super) struct Checksums {
+    pub(super) first: u32,
+    end: u32,
+    next: u32,
+}
+
+impl Checksums {
+    /// Those of `count` chunks from `first` on, of `written` lines.
+    pub(super) fn new(first: u32, count: u32, written: u32) -> Result<Self, Fault> {
+        let fault = Fault { code: FaultCode::Chunks, detail: first };
+        let in_all = written.div_ceil(CHUNK_LINES);
+        let end = first.checked_add(count).filter(|&end| end <= in_all).ok_or(fault)?;
+        if count == 0 || count > CHECKSUMS_PER_REPLY {
+            return Err(fault);
+        }
+        Ok(Self { first, end, next: first })
+    }
+
+    /// The checksum of the next chunk, and whether it is the last. The last chunk of what is written may be short.
+    pub(super) fn step(&mut self, memory: &impl CardMemory, written: u32) -> Result<(u32, bool), Fault> {
+        let begin = self.next.saturating_mul(CHUNK_LINES);
+        let mut checksum = Checksum::default();
+        add(&mut checksum, stored(memory, begin, CHUNK_LINES.min(written.saturating_sub(begin)))?);
+        self.next += 1;
+        Ok((checksum.value(), self.next >= self.end))
+    }
+}
+
+fn add(checksum: &mut Checksum, lines: &[Line]) {
+    lines.iter().for_each(|line| checksum.update(&line.0));
+}
+
+/// Lines of the memory; those that were never written are a fault.
+fn stored(memory: &impl CardMemory, first: u32, count: u32) -> Result<&[Line], Fault> {
+    memory.stored(LineAddress(first), count).ok_or(Fault { code: FaultCode::LineRange, detail: first })
 }

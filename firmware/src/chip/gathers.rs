@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use heapless::Vec;
-use photoncard_shared::message::{Drain, Fault};
+use photoncard_shared::message::{Drain, Fault, FrameParameters};
 
 use crate::gather::{GatherQueue, GatherRequest};
 use crate::memory::MemoryPort;
@@ -17,7 +17,7 @@ pub(super) struct Gathers<const CANDIDATES: usize, const QUEUE: usize> {
 }
 
 /// Waiting gathers that one step does.
-const GATHERS_PER_STEP: usize = 64;
+const GATHERS_PER_STEP: usize = 16;
 
 impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
     pub(super) const fn new() -> Self {
@@ -39,28 +39,22 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         self.queue.is_draining()
     }
 
-    /// Does a gather at once, or lets it wait; a queue that is full is drained first. Every gather that was done goes
-    /// to `add`.
+    /// Whether the queue holds as many gathers as it may: they are to be done before another ray is cast.
+    pub(super) fn is_full(&self, frame: &FrameParameters) -> bool {
+        self.queue.len() >= most_waiting::<QUEUE>(frame)
+    }
+
+    /// Does a gather at once, or lets it wait. One that finds the queue full, as a step before it did not, is done at
+    /// once. A gather that was done goes to `add`.
     pub(super) fn submit<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
         request: GatherRequest,
         add: &mut impl FnMut(&GatherRequest, Vec3),
     ) -> Result<(), Fault> {
-        let frame = context.frame;
-        if frame.drain == Drain::Immediate {
-            return self.gather(context, &request, add);
-        }
-        if self.queue.len() >= (frame.queue as usize).clamp(1, QUEUE) {
-            self.begin_drain(context);
-            while self.queue.is_draining() {
-                self.drain(context, add)?;
-            }
-        }
-        match self.queue.push(request) {
-            Ok(()) => Ok(()),
-            Err(request) => self.gather(context, &request, add),
-        }
+        let must_not_wait = context.frame.drain == Drain::Immediate || self.is_full(context.frame);
+        let rejected = if must_not_wait { Err(request) } else { self.queue.push(request) };
+        rejected.or_else(|request| self.gather(context, &request, add))
     }
 
     fn begin_drain<M>(&mut self, context: &mut Context<M>) {
@@ -96,4 +90,9 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         add(request, brought);
         Ok(())
     }
+}
+
+/// Gathers that may wait in a queue of `QUEUE`.
+fn most_waiting<const QUEUE: usize>(frame: &FrameParameters) -> usize {
+    (frame.queue as usize).clamp(1, QUEUE)
 }

@@ -148,7 +148,8 @@ impl<
     pub fn step<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<Progress, Fault> {
         let stage = self.position.stage;
         let must_be_empty = matches!(stage, Stage::Done | Stage::RecordSums);
-        if self.gathers.is_draining() || must_be_empty && !self.gathers.is_empty() {
+        let must_drain = self.gathers.is_full(context.frame) || must_be_empty && !self.gathers.is_empty();
+        if self.gathers.is_draining() || must_drain {
             self.drain(context)?;
             return Ok(Progress::Busy);
         }

@@ -165,7 +165,7 @@ impl<
         Ok(())
     }
 
-    /// The gather rays of the present bin and pixel.
+    /// Gather rays of the present bin and pixel.
     pub(super) fn cast_for_pixel<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
         let Self { points, sums, gathers, position, .. } = self;
@@ -175,7 +175,9 @@ impl<
             && let Some(point) = stored.restore(context, at)?
         {
             let share = 1.0 / frame.samples as f32;
-            for ray in point.directions.rays(point.pattern, point.rays, position.bin, frame.bins) {
+            let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, frame.bins);
+            let (rays, is_last) = position.next_rays(of_bin);
+            for ray in rays {
                 // A tile has at most TILE_PIXELS pixels, which 16 bits tell apart.
                 let end = final_gather::cast(context, &point, index as u16, share, ray)?;
                 let Some(end) = end else { continue };
@@ -191,6 +193,9 @@ impl<
                         })?;
                     }
                 }
+            }
+            if !is_last {
+                return Ok(());
             }
         }
         if position.next_index(self.block.pixels()) && position.next_bin(frame.bins) {

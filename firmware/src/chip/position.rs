@@ -1,5 +1,7 @@
 //! How far a tile has come.
 
+use core::ops::Range;
+
 /// A rectangle of a tile's pixels, counted from the tile's corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {
@@ -76,14 +78,28 @@ pub(super) struct Position {
     pub(super) bin: u32,
     /// The pixel of the block, or the gather point of a record.
     pub(super) index: u32,
+    /// Rays of the bin that are cast.
+    rays: u32,
 }
+
+/// Gather rays that one step casts.
+const RAYS_PER_STEP: u32 = 64;
 
 impl Position {
     pub(super) const DONE: Self = Self::at(Stage::Done);
 
     /// The beginning of a stage, of the first sample.
     pub(super) const fn at(stage: Stage) -> Self {
-        Self { stage, sample: 0, bin: 0, index: 0 }
+        Self { stage, sample: 0, bin: 0, index: 0, rays: 0 }
+    }
+
+    /// The next of the rays of the present bin and index that a step casts, and whether they are the last.
+    pub(super) fn next_rays(&mut self, of_bin: Range<u32>) -> (Range<u32>, bool) {
+        let first = of_bin.start + self.rays;
+        let end = of_bin.end.min(first + RAYS_PER_STEP);
+        let is_last = end >= of_bin.end;
+        self.rays = if is_last { 0 } else { self.rays + RAYS_PER_STEP };
+        (first..end, is_last)
     }
 
     /// Goes on to the next of `count` indices; at the end of them to the first again. Returns whether it was the last.
@@ -117,6 +133,23 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+
+    #[test]
+    fn steps_cast_all_rays_of_a_bin_and_none_twice() {
+        for of_bin in [5..5, 0..1, 7..71, 3..500, 0..64, 0..16_384] {
+            let mut position = Position::at(Stage::Rays);
+            let mut cast = Vec::new();
+            loop {
+                let (rays, is_last) = position.next_rays(of_bin.clone());
+                assert!(rays.len() <= RAYS_PER_STEP as usize);
+                cast.extend(rays);
+                if is_last {
+                    break;
+                }
+            }
+            assert!(cast.into_iter().eq(of_bin));
+        }
+    }
 
     #[test]
     fn halves_make_up_the_whole_down_to_one_pixel() {

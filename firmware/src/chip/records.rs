@@ -103,14 +103,16 @@ impl<
         Ok(())
     }
 
-    /// The gather rays of the present bin, for one record.
+    /// Gather rays of the present bin, for one record.
     pub(super) fn cast_for_record<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Self { points, cache, gathers, position, .. } = self;
         let index = position.index;
         let point = cache.point(context.frame, index);
         if let (Some(point), Some(stored)) = (point, points.get(index as usize)) {
             let point = &GatherPoint { directions: stored.directions, ..point };
-            for ray in point.directions.rays(point.pattern, point.rays, position.bin, context.frame.bins) {
+            let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, context.frame.bins);
+            let (rays, is_last) = position.next_rays(of_bin);
+            for ray in rays {
                 // There are at most as many as the cache gathers at once.
                 let end = final_gather::cast(context, point, index as u16, 1.0, ray)?;
                 let Some(end) = end else { continue };
@@ -120,6 +122,9 @@ impl<
                         cache.add(request.target, request.cell, brought);
                     })?;
                 }
+            }
+            if !is_last {
+                return Ok(());
             }
         }
         if position.next_index(cache.being_gathered()) && position.next_bin(context.frame.bins) {

@@ -68,6 +68,10 @@ impl<M: CardMemory> CardMemory for Counted<M> {
         self.memory.lines()
     }
 
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        self.memory.stored(first, count)
+    }
+
     fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
         let lines = self.memory.write(first, count)?;
         self.traffic.written_bytes += count as u64 * LINE_BYTES as u64;

@@ -42,6 +42,11 @@ impl CardMemory for Dram<'_> {
         u32::try_from(self.lines.len()).unwrap_or(u32::MAX)
     }
 
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        let first = first.0 as usize;
+        self.lines.get(first..first.checked_add(count as usize)?)
+    }
+
     fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
         let first = first.0 as usize;
         self.lines.get_mut(first..first.checked_add(count as usize)?)

@@ -283,6 +283,10 @@ where
         self.memory.lines()
     }
 
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        self.memory.stored(first, count)
+    }
+
     fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
         // Lines are written while an image is loaded, between tiles: nothing held may outlive it.
         self.begin_tile();

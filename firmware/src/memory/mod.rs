@@ -43,6 +43,9 @@ pub trait CardMemory: MemoryPort {
     /// Lines there are.
     fn lines(&self) -> u32;
 
+    /// `count` lines from `first` on, past all caches and counts; `None` if they are not all there.
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]>;
+
     /// The bytes of `count` lines from `first` on, to be written; `None` if they are not all there.
     fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]>;
 }

@@ -1,0 +1,454 @@
+//! The transport: messages come once, whole and in order, over a line that damages, loses or repeats bytes.
+//!
+//! Both ends of a link hold one [`Transport`]. It does no I/O and has no clock: it is fed with bytes and gives bytes.
+//!
+//! - The host begins a session with an [`FrameKind::Open`] frame of number 0 and a session number of its choice; the card
+//!   then forgets any other. A card answers a frame of a session that it does not know with [`FrameKind::Unknown`]: that is
+//!   how a host learns that the card was reset.
+//! - Messages are numbered from 0 in each direction. At most [`WINDOW`] are on their way: sent and not acknowledged.
+//! - Every frame tells how many messages of the other direction were taken (`acknowledged`), and which of the next ones
+//!   have come (`held`). A line keeps the order of its bytes. So a message is lost when one that was sent after it has
+//!   come, and only what is lost is sent again.
+//! - A loss at the end of what was sent shows in nothing that comes. It takes a clock to notice, and the host has one: when
+//!   nothing comes for a while it sends a [`FrameKind::Probe`]. The card's [`FrameKind::Answer`] tells which of the host's
+//!   messages have come, all before the probe that have not being lost; and how many the card has sent, those of them that
+//!   have not come being lost, which the host's next probe tells the card.
+
+use heapless::Vec;
+
+use crate::frame::{Frame, FrameHeader, FrameKind, FrameReader, MAX_FRAME, MAX_PAYLOAD, write_frame};
+
+/// Messages on their way in one direction.
+pub const WINDOW: usize = 4;
+/// Messages that are taken before the other end is told without being asked.
+const TOLD_UNASKED: u16 = WINDOW as u16 / 2;
+
+/// What a transport has seen of its line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LineStatistics {
+    /// Frames that came damaged.
+    pub damaged: u64,
+    /// Messages that were sent again.
+    pub repeated: u64,
+    /// Messages that came again.
+    pub duplicates: u64,
+    /// Probes that were sent.
+    pub probes: u64,
+}
+
+/// What came, besides messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A whole frame of this session.
+    Heard,
+    /// The other end does not know this session.
+    Unknown,
+}
+
+/// How far a message is on its way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Passage {
+    /// To be sent, again if `again`.
+    Waiting { again: bool },
+    /// Sent, as this one of all transmissions.
+    Sent { transmission: u16 },
+    /// The other end has it, and has not taken it yet.
+    Held,
+}
+
+/// A message on its way.
+struct Outgoing {
+    payload: Vec<u8, MAX_PAYLOAD>,
+    kind: FrameKind,
+    passage: Passage,
+}
+
+/// A message that has come, if `has_come`, and is not taken.
+struct Incoming {
+    payload: Vec<u8, MAX_PAYLOAD>,
+    has_come: bool,
+}
+
+/// What is to be sent besides messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Control {
+    Acknowledge,
+    Probe,
+    Answer,
+    /// The session of this number is not known.
+    Unknown(u16),
+}
+
+/// Which end of the link it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    Host,
+    Card,
+}
+
+/// One end of a link.
+pub struct Transport {
+    reader: FrameReader,
+    wire: Vec<u8, MAX_FRAME>,
+    /// Bytes of the wire's frame that are sent.
+    sent: usize,
+    session: Session,
+}
+
+/// The state of one session.
+struct Session {
+    end: End,
+    /// `None` before the first.
+    number: Option<u16>,
+    /// Messages on their way, at their number modulo [`WINDOW`].
+    outgoing: [Outgoing; WINDOW],
+    /// The first message that is not acknowledged.
+    oldest: u16,
+    /// The number of the next message.
+    next: u16,
+    /// Frames with messages, and probes, that were sent.
+    transmissions: u16,
+    /// The transmission of the last probe, until it is answered.
+    probe: Option<u16>,
+    /// What the other end had sent when it answered: of that, what has not come is lost.
+    lost_below: u16,
+    /// At their number modulo [`WINDOW`].
+    incoming: [Incoming; WINDOW],
+    /// The number of the message to be taken next.
+    expected: u16,
+    /// Messages that were taken since the other end was told last.
+    untold: u16,
+    control: Option<Control>,
+    statistics: LineStatistics,
+}
+
+/// Whether a number comes before another.
+fn is_before(a: u16, b: u16) -> bool {
+    (a.wrapping_sub(b) as i16) < 0
+}
+
+/// The place of a number among [`WINDOW`] messages.
+fn slot<T>(slots: &mut [T; WINDOW], number: u16) -> &mut T {
+    let [a, b, c, d] = slots;
+    match number % WINDOW as u16 {
+        0 => a,
+        1 => b,
+        2 => c,
+        _ => d,
+    }
+}
+
+impl Transport {
+    const fn new(end: End) -> Self {
+        Self { reader: FrameReader::new(), wire: Vec::new(), sent: 0, session: Session::new(end) }
+    }
+
+    /// The host's end; it has no session yet.
+    pub const fn host() -> Self {
+        Self::new(End::Host)
+    }
+
+    /// A card's end; it has no session yet.
+    pub const fn card() -> Self {
+        Self::new(End::Card)
+    }
+
+    /// Begins a session; all that is on its way in another is forgotten. Its first message is the next that is sent.
+    pub fn open(&mut self, number: u16) {
+        self.session.begin(number);
+    }
+
+    /// Whether there is room for another message on its way.
+    pub fn can_send(&self) -> bool {
+        self.session.on_their_way() < WINDOW as u16
+    }
+
+    /// Whether all messages that were sent have been taken.
+    pub fn is_acknowledged(&self) -> bool {
+        self.session.on_their_way() == 0
+    }
+
+    /// Sends the message that `fill` writes into the slice of [`MAX_PAYLOAD`] bytes that it is given, returning its length.
+    /// Returns whether it was sent: not without room for it, nor if `fill` returns `None` or more than the slice's length.
+    pub fn send(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {
+        self.can_send() && self.session.send(fill)
+    }
+
+    /// Bytes that are to be sent now.
+    pub fn outgoing(&mut self) -> &[u8] {
+        if self.sent >= self.wire.len() {
+            self.wire.clear();
+            self.sent = 0;
+            self.session.write_next(&mut self.wire);
+        }
+        self.wire.get(self.sent..).unwrap_or(&[])
+    }
+
+    /// Tells that the first `bytes` of [`Self::outgoing`] are sent.
+    pub fn sent(&mut self, bytes: usize) {
+        self.sent = self.sent.saturating_add(bytes);
+    }
+
+    /// Takes bytes from the line, up to the end of the next frame. Returns how many, and what they meant.
+    pub fn receive(&mut self, bytes: &[u8]) -> (usize, Option<Event>) {
+        let (taken, frame) = self.reader.read(bytes);
+        let event = match frame {
+            None => None,
+            Some(Ok(frame)) => self.session.hear(&frame),
+            Some(Err(_)) => {
+                self.session.statistics.damaged += 1;
+                None
+            }
+        };
+        (taken, event)
+    }
+
+    /// The next message, in order; `None` if it has not come.
+    pub fn take(&mut self) -> Option<&[u8]> {
+        self.session.take()
+    }
+
+    /// Tells the other end what was taken, if it does not know. An end does so before it waits or works.
+    pub fn acknowledge(&mut self) {
+        if self.session.untold > 0 {
+            self.session.ask_for(Control::Acknowledge);
+        }
+    }
+
+    /// Asks the other end what has come.
+    pub fn probe(&mut self) {
+        self.session.ask_for(Control::Probe);
+    }
+
+    /// Takes all messages on their way for lost.
+    pub fn send_again(&mut self) {
+        self.session.lose(|_, _| true);
+    }
+
+    /// What was seen of the line so far.
+    pub fn statistics(&self) -> LineStatistics {
+        self.session.statistics
+    }
+}
+
+impl Session {
+    const fn new(end: End) -> Self {
+        Self {
+            end,
+            number: None,
+            outgoing: [const { Outgoing { payload: Vec::new(), kind: FrameKind::Data, passage: Passage::Held } };
+                WINDOW],
+            oldest: 0,
+            next: 0,
+            transmissions: 0,
+            probe: None,
+            lost_below: 0,
+            incoming: [const { Incoming { payload: Vec::new(), has_come: false } }; WINDOW],
+            expected: 0,
+            untold: 0,
+            control: None,
+            statistics: LineStatistics { damaged: 0, repeated: 0, duplicates: 0, probes: 0 },
+        }
+    }
+
+    fn begin(&mut self, number: u16) {
+        self.number = Some(number);
+        [self.oldest, self.next, self.transmissions, self.lost_below, self.expected, self.untold] = [0; 6];
+        self.probe = None;
+        self.control = None;
+        self.incoming.iter_mut().for_each(|incoming| incoming.has_come = false);
+    }
+
+    fn on_their_way(&self) -> u16 {
+        self.next.wrapping_sub(self.oldest)
+    }
+
+    fn send(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {
+        let opens = self.end == End::Host && self.transmissions == 0 && self.next == 0;
+        let message = slot(&mut self.outgoing, self.next);
+        // There is room for MAX_PAYLOAD.
+        let _ = message.payload.resize_default(MAX_PAYLOAD);
+        let Some(bytes) = fill(&mut message.payload).filter(|&bytes| bytes <= MAX_PAYLOAD) else {
+            return false;
+        };
+        message.payload.truncate(bytes);
+        message.kind = if opens { FrameKind::Open } else { FrameKind::Data };
+        message.passage = Passage::Waiting { again: false };
+        self.next = self.next.wrapping_add(1);
+        true
+    }
+
+    fn ask_for(&mut self, control: Control) {
+        if matches!(self.control, None | Some(Control::Acknowledge)) {
+            self.control = Some(control);
+        }
+    }
+
+    /// Goes through the messages on their way, from the oldest.
+    fn each_on_its_way(&mut self, mut visit: impl FnMut(u16, &mut Outgoing)) {
+        for offset in 0..self.on_their_way() {
+            let number = self.oldest.wrapping_add(offset);
+            visit(number, slot(&mut self.outgoing, number));
+        }
+    }
+
+    /// Sent messages for which `is_lost`, given their number and transmission, are to be sent again.
+    fn lose(&mut self, is_lost: impl Fn(u16, u16) -> bool) {
+        self.each_on_its_way(|number, message| {
+            if let Passage::Sent { transmission } = message.passage
+                && is_lost(number, transmission)
+            {
+                message.passage = Passage::Waiting { again: true };
+            }
+        });
+    }
+
+    /// The next frame: messages before all else, so that an answer and a probe come after them.
+    fn write_next(&mut self, wire: &mut Vec<u8, MAX_FRAME>) {
+        if let Some(Control::Unknown(number)) = self.control {
+            self.control = None;
+            let header = FrameHeader { session: number, ..self.header(FrameKind::Unknown, 0) };
+            return write_frame(&header, &[], wire);
+        }
+        if self.number.is_none() {
+            return;
+        }
+        for offset in 0..self.on_their_way() {
+            let number = self.oldest.wrapping_add(offset);
+            let header = self.header(FrameKind::Data, number);
+            let message = slot(&mut self.outgoing, number);
+            let Passage::Waiting { again } = message.passage else { continue };
+            message.passage = Passage::Sent { transmission: self.transmissions };
+            write_frame(&FrameHeader { kind: message.kind, ..header }, &message.payload, wire);
+            self.statistics.repeated += u64::from(again);
+            self.transmissions = self.transmissions.wrapping_add(1);
+            self.untold = 0;
+            return;
+        }
+        if self.untold >= TOLD_UNASKED {
+            self.ask_for(Control::Acknowledge);
+        }
+        let (kind, sequence) = match self.control.take() {
+            None | Some(Control::Unknown(_)) => return,
+            Some(Control::Acknowledge) => (FrameKind::Acknowledge, 0),
+            Some(Control::Answer) => (FrameKind::Answer, self.next),
+            Some(Control::Probe) => {
+                self.probe = Some(self.transmissions);
+                self.transmissions = self.transmissions.wrapping_add(1);
+                self.statistics.probes += 1;
+                (FrameKind::Probe, self.lost_below)
+            }
+        };
+        write_frame(&self.header(kind, sequence), &[], wire);
+        self.untold = 0;
+    }
+
+    fn header(&self, kind: FrameKind, sequence: u16) -> FrameHeader {
+        let held = (0..WINDOW as u16).filter(|&offset| self.has_come(self.expected.wrapping_add(offset)));
+        let held = held.fold(0, |bits, offset| bits | 1 << offset);
+        let session = self.number.unwrap_or(0);
+        FrameHeader { kind, session, sequence, acknowledged: self.expected, held }
+    }
+
+    /// Whether a message of the window from the expected one on has come.
+    fn has_come(&self, number: u16) -> bool {
+        self.incoming.get(number as usize % WINDOW).is_some_and(|incoming| incoming.has_come)
+    }
+
+    fn hear(&mut self, frame: &Frame) -> Option<Event> {
+        let header = frame.header;
+        let is_card = self.end == End::Card;
+        if header.kind == FrameKind::Open && is_card && self.number != Some(header.session) {
+            self.begin(header.session);
+        }
+        if self.number != Some(header.session) {
+            if is_card {
+                self.ask_for(Control::Unknown(header.session));
+            }
+            return None;
+        }
+        if header.kind == FrameKind::Unknown {
+            return (!is_card).then_some(Event::Unknown);
+        }
+        self.learn(&header);
+        match header.kind {
+            FrameKind::Data | FrameKind::Open => self.keep(header.sequence, frame.payload),
+            FrameKind::Probe => {
+                self.lose(|number, _| is_before(number, header.sequence));
+                self.ask_for(Control::Answer);
+            }
+            FrameKind::Answer => self.conclude(header.sequence),
+            FrameKind::Acknowledge | FrameKind::Unknown => {}
+        }
+        Some(Event::Heard)
+    }
+
+    /// Learns what the other end has, and with that what is lost.
+    fn learn(&mut self, header: &FrameHeader) {
+        let taken = header.acknowledged.wrapping_sub(self.oldest);
+        if taken > self.on_their_way() {
+            // From before what is known, or of nothing that was sent.
+            return;
+        }
+        let mut latest: Option<u16> = None;
+        self.each_on_its_way(|number, message| {
+            let offset = number.wrapping_sub(header.acknowledged);
+            let is_there = is_before(number, header.acknowledged)
+                || offset < WINDOW as u16 && header.held >> offset & 1 != 0;
+            if !is_there {
+                return;
+            }
+            if let Passage::Sent { transmission } = message.passage {
+                latest = Some(match latest {
+                    Some(latest) if is_before(transmission, latest) => latest,
+                    _ => transmission,
+                });
+            }
+            message.passage = Passage::Held;
+        });
+        self.oldest = header.acknowledged;
+        if let Some(latest) = latest {
+            self.lose(|_, transmission| is_before(transmission, latest));
+        }
+    }
+
+    /// Concludes from an answer what is lost: of ours, what was sent before the probe and is not there; of theirs, what they
+    /// had sent and is not here.
+    fn conclude(&mut self, sent: u16) {
+        if let Some(probe) = self.probe.take() {
+            self.lose(|_, transmission| is_before(transmission, probe));
+        }
+        self.lost_below = sent;
+        let count = sent.wrapping_sub(self.expected).min(WINDOW as u16);
+        let is_missing = |offset| !self.has_come(self.expected.wrapping_add(offset));
+        if is_before(self.expected, sent) && (0..count).any(is_missing) {
+            self.ask_for(Control::Probe);
+        }
+    }
+
+    fn keep(&mut self, number: u16, payload: &[u8]) {
+        let offset = number.wrapping_sub(self.expected);
+        if offset >= WINDOW as u16 || self.has_come(number) {
+            // The other end does not know that it has come, or it would not send it again.
+            self.statistics.duplicates += 1;
+            return self.ask_for(Control::Acknowledge);
+        }
+        let incoming = slot(&mut self.incoming, number);
+        incoming.payload.clear();
+        // A frame's payload is never longer than MAX_PAYLOAD.
+        incoming.has_come = incoming.payload.extend_from_slice(payload).is_ok();
+        if !self.has_come(self.expected) {
+            self.ask_for(Control::Acknowledge);
+        }
+    }
+
+    fn take(&mut self) -> Option<&[u8]> {
+        let incoming = slot(&mut self.incoming, self.expected);
+        if !core::mem::take(&mut incoming.has_come) {
+            return None;
+        }
+        self.expected = self.expected.wrapping_add(1);
+        self.untold = self.untold.saturating_add(1);
+        Some(&incoming.payload)
+    }
+}
