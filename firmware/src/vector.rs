@@ -46,7 +46,8 @@ pub(crate) fn max_component(v: Vec3) -> f32 {
     max(max(v.x, v.y), v.z)
 }
 
-/// The upper half of a float's bits, rounded: eight bits of its mantissa. Numbers beyond the greatest are infinite.
+/// The upper half of a float's bits, rounded, ties away from zero: eight bits of its mantissa. Numbers beyond the
+/// greatest are infinite; what is no number may become any.
 #[inline(always)]
 pub(crate) fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
@@ -56,4 +57,20 @@ pub(crate) fn upper_half(value: f32) -> u16 {
 #[inline(always)]
 pub(crate) fn from_upper_half(half: u16) -> f32 {
     f32::from_bits((half as u32) << 16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn upper_halves_keep_eight_bits_and_the_sign() {
+        for value in [1.0_f32, -1.0, 0.3, -7.7e-12, 1e18, 3.1e38] {
+            let found = from_upper_half(upper_half(value));
+            assert!((found / value - 1.0).abs() <= 1.0 / 256.0, "{value} {found}");
+        }
+        assert_eq!(from_upper_half(upper_half(0.0)), 0.0);
+        assert_eq!(from_upper_half(upper_half(f32::MAX)), f32::INFINITY);
+        assert_eq!(from_upper_half(upper_half(f32::NEG_INFINITY)), f32::NEG_INFINITY);
+    }
 }

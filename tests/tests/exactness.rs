@@ -5,6 +5,7 @@ use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, RenderSettings, Sampling, Unobserved, render};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
+use photoncard_shared::budget::{MICRO, REFERENCE};
 use photoncard_tests::render_or_panic;
 
 fn glossy() -> Scene {
@@ -124,21 +125,29 @@ fn nor_do_they_with_rays_by_the_mixture() {
 
 #[test]
 fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
-    // So small an error divides every cell: an aligned tile of 32x32 needs 289 records, one that is not needs more.
+    // So small an error divides every cell, down to one record at every other pixel: these blocks are halved.
+    let records = |width: u32, height: u32| (width.div_ceil(2) + 1) * (height.div_ceil(2) + 1);
+    assert!(records(61, 61) > REFERENCE.irradiance_records && records(140, 1) > MICRO.irradiance_records);
     let scene = glossy();
-    let settings = |tile, cards| RenderSettings {
+    let settings = |tile, order, cards| RenderSettings {
         irradiance_error: Some(1e-5),
         gather_rays: 2,
         samples: 1,
-        width: 70,
+        width: 140,
+        height: 64,
         tile,
+        order,
         cards: vec![card(cards)],
         ..settings()
     };
-    let expected = bits(&render_or_panic(&scene, &settings(4, "emulated:1")).film);
-    for (tile, cards) in [(32, "emulated:1"), (27, "emulated:1"), (16, "emulated-micro:1")] {
-        let film = render_or_panic(&scene, &settings(tile, cards)).film;
-        assert!(bits(&film) == expected, "tiles of {tile} on {cards} change the picture");
+    let expected = bits(&render_or_panic(&scene, &settings(4, GatherOrder::Sort, "emulated:2")).film);
+    for (tile, order, cards) in [
+        (64, GatherOrder::Sort, "emulated:1"),
+        (61, GatherOrder::DirectionBins, "emulated:2"),
+        (16, GatherOrder::Naive, "emulated-micro:2"),
+    ] {
+        let rendering = render_or_panic(&scene, &settings(tile, order, cards));
+        assert!(bits(&rendering.film) == expected, "tiles of {tile} on {cards} change the picture");
     }
 }
 

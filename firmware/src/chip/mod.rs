@@ -43,7 +43,7 @@ pub type MicroChip = Chip<
 >;
 
 /// A chip's buffers: `TILE_PIXELS` pixels, `CANDIDATES` photons of a gather, `QUEUE` gathers that wait, `RECORDS`
-/// irradiance records.
+/// irradiance records, `GATHERED` of them gathered at once.
 pub struct Chip<
     const TILE_PIXELS: usize,
     const CANDIDATES: usize,
@@ -141,7 +141,7 @@ impl<
     }
 
     /// Does the next piece of the tile: one stage of one pixel or record, in the stages of gather rays one direction
-    /// bin of it, or some of the gathers that wait.
+    /// bin of it, in the survey one cell of the lattice or one ray, or some of the gathers that wait.
     ///
     /// # Errors
     /// If the image is not sound.

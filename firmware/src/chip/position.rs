@@ -49,11 +49,11 @@ impl Block {
 /// cache and left out without it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {
-    /// Which irradiance records there are, cell by cell of the lattice.
+    /// Which irradiance records there are, level by level of the lattice.
     Survey,
     /// Which of them the block's samples use, pixel by pixel, sample by sample.
     Mark,
-    /// Where the rays of the next few records start.
+    /// Where the rays of the next records start, of as many as are gathered at once.
     RecordPoints,
     /// Their gather rays, bin by bin.
     RecordRays,

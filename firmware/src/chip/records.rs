@@ -47,7 +47,7 @@ impl<
         self.position = Position::at(Stage::Eye);
     }
 
-    /// One cell of the lattice.
+    /// The next piece of the survey.
     pub(super) fn survey<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Some(allowed) = allowed_error(context.frame) else {
             self.do_without_records();

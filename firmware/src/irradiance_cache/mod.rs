@@ -83,7 +83,10 @@ impl<const RECORDS: usize, const GATHERED: usize> Default for IrradianceCache<RE
 }
 
 impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
-    const SUFFICES: () = assert!(RECORDS >= LEAST_RECORDS, "a block of one pixel must fit");
+    const SUFFICES: () = {
+        assert!(RECORDS >= LEAST_RECORDS, "a block of one pixel must fit");
+        assert!(GATHERED > 0 && GATHERED <= 1 << 16, "a gather's target is told in 16 bits");
+    };
 
     /// A cache without records.
     pub const fn new() -> Self {

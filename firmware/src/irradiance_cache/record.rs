@@ -39,7 +39,7 @@ pub(super) struct Record {
     pub(super) normal: Vec3,
     /// The greatest coordinate that the position was computed from, metres.
     magnitude: f32,
-    /// Harmonic mean of the distances of what is around, metres.
+    /// Harmonic mean of the distances of what is around, metres; unknown before the survey ends.
     pub(super) distance: f32,
     /// The same, not below what makes the record reach some pixels.
     pub(super) radius: f32,
@@ -48,6 +48,8 @@ pub(super) struct Record {
 
 /// The harmonic mean of the distances where there is nothing around, metres: its square is finite.
 const FARTHEST: f32 = 1e18;
+/// What is nearer is taken to be as far, metres: the sum of the inverse distances, and their squares, are finite.
+const NEAREST: f32 = 1.0 / FARTHEST;
 /// Of a record's radius, how far a place may be from its tangent plane, over the square root of the error.
 const PLANE_SHARE: f32 = 0.1;
 
@@ -59,13 +61,13 @@ impl Record {
         Self { position, normal, magnitude, distance: least, radius: least, content }
     }
 
-    /// Tells the inverse distance of what is around in a cell of the hemisphere, 1/m; rounded to
-    /// eight bits.
-    pub(super) fn set_inverse_distance(&mut self, cell: u8, inverse: f32) {
+    /// Tells the distance of what is around in a cell of the hemisphere, metres, infinite if there is nothing. Its inverse is
+    /// rounded to eight bits.
+    pub(super) fn set_distance(&mut self, cell: u8, distance: f32) {
         if let Content::Surveying(inverses) = &mut self.content
-            && let Some(known) = inverses.get_mut(cell as usize)
+            && let Some(inverse) = inverses.get_mut(cell as usize)
         {
-            *known = upper_half(inverse.min(FARTHEST));
+            *inverse = upper_half(1.0 / max(distance, NEAREST));
         }
     }
 

@@ -15,12 +15,9 @@ use crate::memory::{MemoryPort, Stage};
 use crate::render::{Context, eye};
 use crate::sampler::{Dimension, Pattern, unit_interval};
 use crate::scene::{Ray, Surface, closest_hit};
-use crate::vector::max;
 
 /// A record reaches at least so many pixels.
 const LEAST_REACH: f32 = 3.0;
-/// Rays in each cell of the hemisphere.
-const RAYS_PER_CELL: u32 = 1;
 
 /// How far the survey has come.
 pub(super) struct Survey {
@@ -39,7 +36,7 @@ pub(super) struct Survey {
 enum Task {
     /// Records are placed at the cells' corners.
     Placing,
-    /// Rays are cast around the new records.
+    /// Rays are cast around the new records, one in each cell of the hemisphere.
     Rays,
     /// Cells are divided.
     Division,
@@ -51,7 +48,7 @@ impl Survey {
 }
 
 impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
-    /// Does the next piece of the survey: one lattice cell, or the rays of one record in one cell of the hemisphere.
+    /// Does the next piece of the survey: one lattice cell, or one ray of one record.
     /// Returns whether it was the last.
     ///
     /// # Errors
@@ -121,25 +118,27 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         Ok(Ok(()))
     }
 
-    /// Casts the rays of the next new record in the present cell of the hemisphere; after the last in the last cell all
-    /// records are surveyed.
+    /// Casts the ray of the next new record in the present cell of the hemisphere. After the ray in the last cell the record
+    /// is surveyed.
     fn cast<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Survey { index, direction, first, .. } = self.survey;
+        let is_last = direction as usize + 1 >= CELLS;
         if let Some((point, Some(record))) = self.records.get_index_mut(index) {
             let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
-            let inverse = inverse_distance(context, &record.surface(), pattern, direction)?;
-            record.set_inverse_distance(direction, inverse);
+            let distance = distance_in(context, &record.surface(), pattern, direction)?;
+            record.set_distance(direction, distance);
+            if is_last {
+                record.end_survey();
+            }
         }
         let survey = &mut self.survey;
         survey.index += 1;
         if survey.index >= self.records.len() {
             survey.index = first;
             survey.direction += 1;
-        }
-        if survey.direction as usize >= CELLS || first >= self.records.len() {
-            *survey = Survey { task: Task::Division, index: 0, first: self.records.len(), ..*survey };
-            let new = self.records.values_mut().skip(first);
-            new.flatten().for_each(Record::end_survey);
+            if is_last || first >= self.records.len() {
+                *survey = Survey { task: Task::Division, index: 0, first: self.records.len(), ..*survey };
+            }
         }
         Ok(())
     }
@@ -191,24 +190,17 @@ fn new_record<M: MemoryPort>(
     }))
 }
 
-/// The mean inverse distance of what is above a surface in a cell of its hemisphere, 1/m; nothing is infinitely far.
-fn inverse_distance<M: MemoryPort>(
+/// The distance of what is above a surface in a cell of its hemisphere, metres; nothing is infinitely far.
+fn distance_in<M: MemoryPort>(
     context: &mut Context<M>,
     surface: &Surface,
     pattern: Pattern,
     cell: u8,
 ) -> Result<f32, Fault> {
     context.memory.enter(Stage::Survey);
-    let origin = surface.offset_origin();
-    let mut sum = 0.0;
-    for ray in 0..RAYS_PER_CELL {
-        let index = cell as u32 * RAYS_PER_CELL + ray;
-        let along = (ray as f32 + unit_interval(pattern.jitter(index))) / RAYS_PER_CELL as f32;
-        let direction = direction_in(surface.normal, cell, [along, pattern.radical_inverse(index)]);
-        context.counters.survey_rays += 1;
-        if let Some(hit) = closest_hit(context.scene, context.memory, &Ray::new(origin, direction))? {
-            sum += 1.0 / max(hit.intersection.distance, f32::MIN_POSITIVE);
-        }
-    }
-    Ok(sum / RAYS_PER_CELL as f32)
+    context.counters.survey_rays += 1;
+    let place = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];
+    let ray = Ray::new(surface.offset_origin(), direction_in(surface.normal, cell, place));
+    let hit = closest_hit(context.scene, context.memory, &ray)?;
+    Ok(hit.map_or(f32::INFINITY, |hit| hit.intersection.distance))
 }

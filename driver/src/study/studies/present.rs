@@ -87,7 +87,7 @@ pub(super) fn series(name: impl Into<String>, points: Vec<Point>) -> Series {
 pub(super) fn how_it_counts() -> String {
     "Raw bytes are what the chip asks of the photon map; bytes from DRAM are the lines that miss the cache, times a line's \
      bytes. Sampled tiles are rendered on an emulated chip whose caches are empty when a tile begins; each stands for \
-     its share of all tiles, and ± is half the width of the 95 % confidence interval of that (Student's t over the tiles, corrected for a \
-     finite population)."
+     its share of all tiles, and ± is half the width of the 95 % confidence interval of their sum (Student's t over the \
+     tiles, corrected for a finite population)."
         .to_owned()
 }
