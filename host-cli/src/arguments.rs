@@ -49,9 +49,18 @@ pub(crate) enum SceneCommand {
 pub(crate) enum CardCommand {
     /// Tell what a card can hold
     Info {
-        /// The card: emulated or emulated-micro
+        /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
         #[arg(long, default_value = "emulated:1")]
         card: CardAddress,
+    },
+    /// Say hello some times, and tell how long the card takes to answer
+    Ping {
+        /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
+        #[arg(long, default_value = "emulated:1")]
+        card: CardAddress,
+        /// Number of hellos
+        #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
+        count: u16,
     },
 }
 
@@ -119,7 +128,8 @@ pub(crate) struct RenderOptions {
     /// Gathers that may wait on a chip, for the orders that let any [default: as many as it has room for]
     #[arg(long)]
     queue: Option<u32>,
-    /// Where to render: emulated:CHIPS or emulated-micro:CHIPS; may be repeated [default: a chip a core]
+    /// Where to render: emulated:CHIPS, emulated-micro:CHIPS, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH; may be
+    /// repeated [default: a chip a core]
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
     /// Model the memory of emulated chips, and tell in the statistics what was read of it

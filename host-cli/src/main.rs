@@ -27,6 +27,7 @@ fn main() -> ExitCode {
         Command::Render(options) => render::run(options),
         Command::Scene(SceneCommand::Info { scene }) => scene::info(scene),
         Command::Card(CardCommand::Info { card }) => card::info(card),
+        Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),
         Command::Diff(options) => diff::run(options),
         Command::Study(arguments) => study::run(arguments),
     };

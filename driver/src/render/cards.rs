@@ -1,6 +1,5 @@
 //! The cards of a render: each has a thread of the host that moves bytes between its port and its session.
 
-use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -8,64 +7,15 @@ use std::time::{Duration, Instant};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::link::Port;
+use photoncard_shared::link::{Port, PortError};
 
-use super::{Observer, Phase, RenderError};
+use super::address::{CardAddress, MAX_CHIPS};
+use super::open_card::OpenCard;
+use super::{Observer, Phase, RenderError, Unobserved};
 use crate::emulator::memory_model::{CacheSettings, MemoryTraffic};
 use crate::emulator::trace::TraceFile;
-use crate::emulator::{ChipKind, EmulatedCard, MemoryModel};
+use crate::emulator::{ChipKind, MemoryModel};
 use crate::session::{Job, LinkBytes, Picture, Session, SessionError};
-
-/// Where cards are: an argument of `--card`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CardAddress {
-    /// Chips in this process.
-    Emulated {
-        /// Their kind.
-        kind: ChipKind,
-        /// How many.
-        chips: usize,
-    },
-}
-
-impl Default for CardAddress {
-    /// One emulated reference chip.
-    fn default() -> Self {
-        Self::Emulated { kind: ChipKind::Reference, chips: 1 }
-    }
-}
-
-/// Chips that one process emulates.
-const MAX_CHIPS: usize = 1024;
-
-impl FromStr for CardAddress {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (kind, chips) = text.split_once(':').map_or((text, None), |(kind, chips)| (kind, Some(chips)));
-        let kind = match kind {
-            "emulated" => ChipKind::Reference,
-            "emulated-micro" => ChipKind::Micro,
-            "serial" | "tcp" | "unix" => {
-                return Err(format!("cards on {kind} links cannot be used yet; use emulated[:CHIPS]"));
-            }
-            _ => {
-                return Err(format!(
-                    "{kind:?} is no kind of card; use emulated[:CHIPS] or emulated-micro[:CHIPS]"
-                ));
-            }
-        };
-        let chips = match chips {
-            None => std::thread::available_parallelism().map_or(1, usize::from),
-            Some(chips) => chips
-                .parse()
-                .ok()
-                .filter(|count| (1..=MAX_CHIPS).contains(count))
-                .ok_or_else(|| format!("{chips:?} is no number of chips; use 1 to {MAX_CHIPS}"))?,
-        };
-        Ok(Self::Emulated { kind, chips })
-    }
-}
 
 /// The number of emulated reference chips at some addresses.
 ///
@@ -74,7 +24,7 @@ impl FromStr for CardAddress {
 pub(super) fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
     let counts = addresses.iter().map(|address| match *address {
         CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),
-        CardAddress::Emulated { kind: ChipKind::Micro, .. } => None,
+        _ => None,
     });
     let chips = counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
         option: "--order",
@@ -104,6 +54,11 @@ pub(super) fn is_one_emulated_chip(addresses: &[CardAddress]) -> bool {
     matches!(addresses, [CardAddress::Emulated { chips: 1, .. }])
 }
 
+/// The first card among some addresses that is not emulated in this process.
+pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
+    addresses.iter().find(|address| !matches!(address, CardAddress::Emulated { .. }))
+}
+
 /// Cards that have said hello.
 pub(super) struct Cards {
     cards: Vec<Connected>,
@@ -111,7 +66,7 @@ pub(super) struct Cards {
 }
 
 struct Connected {
-    card: EmulatedCard,
+    card: OpenCard,
     session: Session<'static>,
     budget: Budget,
 }
@@ -128,13 +83,28 @@ pub struct CardInfo {
 /// Says hello to the first card at an address.
 ///
 /// # Errors
-/// If it cannot be started, or does not answer as it should.
-pub fn card_info(address: CardAddress) -> Result<CardInfo, RenderError> {
-    let CardAddress::Emulated { kind, .. } = address;
+/// If it cannot be started or reached, or does not answer as it should.
+pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
     let nothing = Mutex::new(Picture::empty()?);
-    let cards = Cards::connect(&[CardAddress::Emulated { kind, chips: 1 }], None, None, &nothing)?;
-    let connected = &cards.cards[0];
+    let card = OpenCard::open(0, address, None)?;
+    let connected = greet(card, &nothing, Instant::now(), &Unobserved)?;
     Ok(CardInfo { build: connected.session.build().to_owned(), budget: connected.budget })
+}
+
+/// Says hello to the first card at an address some times. Returns how long each answer took.
+///
+/// # Errors
+/// If it cannot be started or reached, or does not answer as it should.
+pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, RenderError> {
+    let nothing = Mutex::new(Picture::empty()?);
+    let mut card = OpenCard::open(0, address, None)?;
+    let mut answers = Vec::with_capacity(count);
+    for _ in 0..count {
+        let start = Instant::now();
+        card = greet(card, &nothing, start, &Unobserved)?.card;
+        answers.push(start.elapsed());
+    }
+    Ok(answers)
 }
 
 /// What came of a run.
@@ -177,18 +147,18 @@ impl Cards {
         caches: Option<CacheSettings>,
         mut trace: Option<TraceFile>,
         picture: &Mutex<Picture>,
+        observer: &dyn Observer,
     ) -> Result<Self, RenderError> {
         let start = Instant::now();
-        let kinds =
-            addresses.iter().flat_map(|&CardAddress::Emulated { kind, chips }| (0..chips).map(move |_| kind));
-        check_chips(kinds.clone().count())?;
-        let cards: Result<Vec<Connected>, RenderError> = kinds
+        check_chips(addresses.iter().map(CardAddress::emulated_chips).sum())?;
+        let each_card = addresses
+            .iter()
+            .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)));
+        let cards: Result<Vec<Connected>, RenderError> = each_card
             .enumerate()
-            .map(|(index, kind)| {
+            .map(|(index, address)| {
                 let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
-                let card = EmulatedCard::start(kind, model)
-                    .map_err(|source| RenderError::Start { card: index, source })?;
-                greet(card, picture, start).map_err(|source| RenderError::Card { card: index, source })
+                greet(OpenCard::open(index, address, model)?, picture, start, observer)
             })
             .collect();
         Ok(Self { cards: cards?, start })
@@ -217,8 +187,8 @@ impl Cards {
         let cards = self.cards.len();
         let results: Vec<Result<CardOutcome, RenderError>> = std::thread::scope(|scope| {
             let shared = &shared;
-            let threads: Vec<_> = (self.cards.into_iter().enumerate())
-                .map(|(index, card)| scope.spawn(move || render_on(index, card, job, shared)))
+            let threads: Vec<_> = (self.cards.into_iter())
+                .map(|card| scope.spawn(move || render_on(card, job, shared)))
                 .collect();
             // A panic of a host thread is a panic of the host.
             threads
@@ -272,7 +242,7 @@ pub(super) fn lock(picture: &Mutex<Picture>) -> MutexGuard<'_, Picture> {
 /// Moves bytes once in each direction, and waits a little if there are none.
 fn exchange(
     session: &mut Session,
-    port: &mut impl Port,
+    port: &mut dyn Port,
     picture: &Mutex<Picture>,
     start: Instant,
 ) -> Result<(), SessionError> {
@@ -294,26 +264,28 @@ fn exchange(
 
 /// Says hello and waits for the answer.
 fn greet(
-    mut card: EmulatedCard,
+    mut card: OpenCard,
     picture: &Mutex<Picture>,
     start: Instant,
-) -> Result<Connected, SessionError> {
+    observer: &dyn Observer,
+) -> Result<Connected, RenderError> {
     let mut session = Session::new(start.elapsed());
     loop {
         if let Some(&budget) = session.budget() {
             return Ok(Connected { card, session, budget });
         }
-        exchange(&mut session, card.port(), picture, start)?;
+        if observer.is_stopped() {
+            return Err(RenderError::Stopped);
+        }
+        exchange(&mut session, card.port(), picture, start).map_err(|source| match source {
+            SessionError::Port(PortError::Closed) => RenderError::Refused { card: card.name() },
+            source => RenderError::Card { card: card.name(), source },
+        })?;
     }
 }
 
 /// Loads the image into a card and renders tiles on it until none is left.
-fn render_on(
-    index: usize,
-    connected: Connected,
-    job: Job,
-    shared: &Shared,
-) -> Result<CardOutcome, RenderError> {
+fn render_on(connected: Connected, job: Job, shared: &Shared) -> Result<CardOutcome, RenderError> {
     let Connected { mut card, mut session, .. } = connected;
     session.start(job, shared.start.elapsed());
     let mut outcome = CardOutcome::default();
@@ -323,7 +295,7 @@ fn render_on(
         }
         exchange(&mut session, card.port(), shared.picture, shared.start).map_err(|source| {
             shared.failed.store(true, Ordering::Relaxed);
-            RenderError::Card { card: index, source }
+            RenderError::Card { card: card.name(), source }
         })?;
         if session.is_loaded() {
             if outcome.loaded.is_zero() {

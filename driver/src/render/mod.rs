@@ -1,12 +1,15 @@
 //! A render, from a loaded scene to a complete film.
 
+mod address;
 mod cards;
 mod error;
 mod memory;
+mod open_card;
 mod settings;
 mod statistics;
 
-pub use cards::{CardAddress, CardInfo, card_info};
+pub use address::CardAddress;
+pub use cards::{CardInfo, card_info, card_ping};
 pub use error::RenderError;
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use photoncard_shared::budget::MOST_BINS;
@@ -86,12 +89,13 @@ pub fn render(
     let start = Instant::now();
     let camera = scene.camera(settings.camera.as_deref())?;
     settings.check_trace()?;
+    settings.check_memory_model()?;
     if settings.order == GatherOrder::Hilbert {
         return render_whole_frame(scene, settings, camera, observer);
     }
     let picture = Mutex::new(Picture::empty()?);
     let trace = settings.trace.as_deref().map(TraceFile::create).transpose()?;
-    let cards = Cards::connect(&settings.cards, settings.modelled_caches(), trace, &picture)?;
+    let cards = Cards::connect(&settings.cards, settings.modelled_caches(), trace, &picture, observer)?;
     for budget in cards.budgets() {
         settings.check(&budget)?;
     }
