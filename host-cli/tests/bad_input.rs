@@ -184,6 +184,24 @@ fn options_for_emulated_cards_alone() {
 }
 
 #[test]
+fn nothing_to_listen_on() {
+    let room = Room::new();
+    for (options, words) in [
+        (&[][..], ["--listen", "required"]),
+        (&["--listen", "abacus"], ["nothing to listen on", "unix:PATH"]),
+        (&["--listen", "unix:"], ["nothing to listen on", "unix:PATH"]),
+        (&["--listen", "tcp:localhost:65536"], ["no port", "0 to 65535"]),
+        (&["--listen", "tcp:::1:7000"], ["no host", "in brackets"]),
+        (&["--listen", "pty", "--card", "tcp:localhost:1"], ["--card", "emulated-micro"]),
+        (&["--listen", "pty", "--card", "emulated:2"], ["--card", "emulated-micro"]),
+    ] {
+        check_refused(&room.run(&[&["emulate"], options].concat()), &words, &format!("{options:?}"));
+    }
+    check_refused(&room.run(&["card", "ping", "--count", "0"]), &["--count"], "no hello");
+    assert!(room.names().is_empty());
+}
+
+#[test]
 fn an_image_larger_than_the_card() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());

@@ -48,6 +48,7 @@ fn every_command_has_help() {
         &["card"],
         &["card", "info"],
         &["card", "ping"],
+        &["emulate"],
         &["diff"],
     ] {
         let outcome = Room::new().run(&[command, &["--help"]].concat());

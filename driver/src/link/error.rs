@@ -55,6 +55,23 @@ impl LinkError {
         Self::new("connect to", address, reason, remedy)
     }
 
+    /// An address that could not be listened on.
+    pub(super) fn listen(address: impl Display, error: &io::Error) -> Self {
+        let (reason, remedy) = match error.kind() {
+            ErrorKind::AddrInUse => ("it is in use", "choose another, or end what listens there"),
+            ErrorKind::AddrNotAvailable => {
+                ("this machine has no such address", "use one of its own, such as 127.0.0.1")
+            }
+            ErrorKind::AlreadyExists => ("a file has that name", "choose another path, or remove the file"),
+            ErrorKind::PermissionDenied => {
+                ("no permission to listen there", "choose a port above 1023, or a folder you may write to")
+            }
+            ErrorKind::NotFound => ("its folder does not exist", "create the folder, or choose another path"),
+            _ => return Self::other("listen on", address, error, "choose another address"),
+        };
+        Self::new("listen on", address, reason, remedy)
+    }
+
     fn new(action: &'static str, address: impl Display, reason: &str, remedy: &'static str) -> Self {
         Self { action, address: address.to_string(), reason: reason.into(), remedy }
     }
