@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use photoncard_driver::emulator::ChipKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
+use photoncard_driver::link::ListenAddress;
 use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
@@ -30,6 +32,8 @@ pub(crate) enum Command {
     /// Look at a card
     #[command(subcommand)]
     Card(CardCommand),
+    /// Serve an emulated card to other processes, one host at a time, until interrupted
+    Emulate(EmulateOptions),
     /// Compare a picture with a reference
     Diff(DiffOptions),
     /// Measure how memory traffic and time depend on orders, caches, techniques and chips
@@ -49,10 +53,48 @@ pub(crate) enum SceneCommand {
 pub(crate) enum CardCommand {
     /// Tell what a card can hold
     Info {
-        /// The card: emulated or emulated-micro
+        /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
         #[arg(long, default_value = "emulated:1")]
         card: CardAddress,
     },
+    /// Say hello some times, and tell how long the card takes to answer
+    Ping {
+        /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
+        #[arg(long, default_value = "emulated:1")]
+        card: CardAddress,
+        /// Number of hellos
+        #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
+        count: u16,
+    },
+}
+
+#[derive(Args)]
+pub(crate) struct EmulateOptions {
+    /// Where hosts come: pty, tcp:PORT on this machine alone, tcp:ADDRESS:PORT or unix:PATH; port 0 is any
+    #[arg(long, value_name = "ADDRESS")]
+    pub(crate) listen: ListenAddress,
+    /// The kind of card
+    #[arg(long, value_enum, default_value = "emulated")]
+    pub(crate) card: CardKind,
+}
+
+/// Kinds of cards that can be served.
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum CardKind {
+    /// The reference chip
+    Emulated,
+    /// The micro chip
+    EmulatedMicro,
+}
+
+impl CardKind {
+    /// The kind of its chip.
+    pub(crate) fn chip(self) -> ChipKind {
+        match self {
+            Self::Emulated => ChipKind::Reference,
+            Self::EmulatedMicro => ChipKind::Micro,
+        }
+    }
 }
 
 #[derive(Args)]
@@ -119,7 +161,8 @@ pub(crate) struct RenderOptions {
     /// Gathers that may wait on a chip, for the orders that let any [default: as many as it has room for]
     #[arg(long)]
     queue: Option<u32>,
-    /// Where to render: emulated:CHIPS or emulated-micro:CHIPS; may be repeated [default: a chip a core]
+    /// Where to render: emulated:CHIPS, emulated-micro:CHIPS, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH; may be
+    /// repeated [default: a chip a core]
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
     /// Model the memory of emulated chips, and tell in the statistics what was read of it

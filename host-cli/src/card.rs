@@ -1,29 +1,31 @@
-//! `photoncard card info`.
+//! `photoncard card`.
+
+use std::time::Duration;
 
 use photoncard_driver::emulator::ChipKind;
-use photoncard_driver::render::{CardAddress, MOST_BINS, card_info};
+use photoncard_driver::render::{CardAddress, MOST_BINS, card_info, card_ping};
 
 use crate::console::print;
 use crate::failure::Failure;
 
-/// Prints what a card says of itself in its hello, and what its firmware takes of the chip.
+/// Prints what a card says of itself in its hello and, of an emulated one, what its firmware takes of the chip.
 pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
-    let info = card_info(*address)?;
-    let CardAddress::Emulated { kind, .. } = *address;
+    let info = card_info(address)?;
     let budget = info.budget;
-    let techniques = kind.techniques();
-    let lines = [
+    let kind = match address {
+        CardAddress::Emulated { kind, .. } => Some(*kind),
+        CardAddress::Serial { .. } | CardAddress::Tcp { .. } | CardAddress::Unix { .. } => None,
+    };
+    let mut lines = vec![
         format!("build           {}", info.build),
         format!("sram            {} bytes", budget.sram_bytes),
         format!("  photon cache  {} bytes", budget.photon_cache_bytes),
         format!("  scene cache   {} bytes", budget.scene_cache_bytes),
-        format!("  cache tags    {} bytes", kind.tag_bytes()),
-        format!("  stack         {} bytes", budget.stack_bytes),
-        format!("  buffers       {} bytes", ChipKind::buffer_bytes(kind)),
-        format!("    reordering  {} bytes: gathers that wait", techniques.reordering),
-        format!("    cache       {} bytes: irradiance records", techniques.irradiance_cache),
-        format!("    sampling    {} bytes: tables of directions", techniques.importance_sampling),
-        format!("  free          {} bytes", budget.sram_bytes as usize - ChipKind::sram_bytes(kind)),
+    ];
+    lines.extend(kind.map(|kind| format!("  cache tags    {} bytes", kind.tag_bytes())));
+    lines.push(format!("  stack         {} bytes", budget.stack_bytes));
+    lines.extend(kind.into_iter().flat_map(|kind| sram_rows(kind, budget.sram_bytes as usize)));
+    lines.extend([
         format!("dram            {} bytes", budget.dram_bytes),
         format!("tile            {} pixels, {} tiles at once", budget.tile_pixels, budget.tiles),
         format!("neighbors       {}", budget.neighbors),
@@ -36,6 +38,38 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         ),
         format!("shadow rays     {} a sample", budget.shadow_rays),
         format!("samples         {} a pixel", budget.samples),
-    ];
+    ]);
     print(&(lines.join("\n") + "\n"))
+}
+
+/// What the firmware's buffers take of a chip, which the host knows of the chips that it emulates.
+fn sram_rows(kind: ChipKind, sram_bytes: usize) -> [String; 5] {
+    let techniques = kind.techniques();
+    [
+        format!("  buffers       {} bytes", kind.buffer_bytes()),
+        format!("    reordering  {} bytes: gathers that wait", techniques.reordering),
+        format!("    cache       {} bytes: irradiance records", techniques.irradiance_cache),
+        format!("    sampling    {} bytes: tables of directions", techniques.importance_sampling),
+        format!("  free          {} bytes", sram_bytes - kind.sram_bytes()),
+    ]
+}
+
+/// Says hello to a card some times, and prints how long each answer took.
+pub(crate) fn ping(address: &CardAddress, count: u16) -> Result<(), Failure> {
+    let answers = card_ping(address, count.into())?;
+    let mut text = String::new();
+    for (number, answer) in (1..).zip(&answers) {
+        text += &format!("hello {number:<9} {}\n", milliseconds(*answer));
+    }
+    let mean = answers.iter().sum::<Duration>() / u32::from(count.max(1));
+    for (name, time) in
+        [("least", answers.iter().min()), ("mean", Some(&mean)), ("most", answers.iter().max())]
+    {
+        text += &time.map_or_else(String::new, |time| format!("{name:<15} {}\n", milliseconds(*time)));
+    }
+    print(&text)
+}
+
+fn milliseconds(time: Duration) -> String {
+    format!("{:.3} ms", time.as_secs_f64() * 1e3)
 }

@@ -7,6 +7,7 @@ mod arguments;
 mod card;
 mod console;
 mod diff;
+mod emulate;
 mod failure;
 mod progress;
 mod render;
@@ -27,6 +28,8 @@ fn main() -> ExitCode {
         Command::Render(options) => render::run(options),
         Command::Scene(SceneCommand::Info { scene }) => scene::info(scene),
         Command::Card(CardCommand::Info { card }) => card::info(card),
+        Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),
+        Command::Emulate(options) => emulate::run(options),
         Command::Diff(options) => diff::run(options),
         Command::Study(arguments) => study::run(arguments),
     };

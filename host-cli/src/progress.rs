@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use photoncard_driver::render::{Observer, Phase};
+use photoncard_driver::session::SessionError;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::console::say;
@@ -53,6 +54,10 @@ impl Observer for Progress {
 
     fn is_stopped(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
+    }
+
+    fn lost(&self, card: &str, error: &SessionError) {
+        say(format_args!("{card} is lost: {error}; the others render its tiles"));
     }
 }
 

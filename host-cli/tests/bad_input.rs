@@ -156,12 +156,49 @@ fn names_that_do_not_exist() {
         ("--set", "floor.gloss=1", ["'gloss'", "the properties are"]),
         ("--set", "floor.diffuse=2", ["albedo", "0 to 1"]),
         ("--ic-error", "nan", ["--ic-error", "0.025"]),
-        ("--card", "serial:/dev/x", ["cannot be used yet", "use emulated[:CHIPS]"]),
+        ("--card", "serial:", ["serial port", "serial:PATH[@BAUD]"]),
+        ("--card", "serial:/dev/x@fast", ["no speed", "such as 115200"]),
+        ("--card", "tcp:localhost", ["no TCP address", "tcp:HOST:PORT"]),
+        ("--card", "unix:", ["Unix socket", "unix:PATH"]),
         ("--card", "abacus", ["no kind of card", "emulated[:CHIPS]"]),
         ("--card", "emulated:0", ["no number of chips", "use 1 to"]),
     ] {
         refused(&room, "scene.gltf", &[option, value], &words);
     }
+}
+
+#[test]
+fn options_for_emulated_cards_alone() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for card in ["serial:/dev/absent", "tcp:127.0.0.1:1", "unix:absent"] {
+        for (options, words) in [
+            (["--counters", "--card", "emulated:1"], ["only the memory", "leave --counters and --cache out"]),
+            (["--cache=unified=64K/128/4", "--card", "emulated:1"], ["only the memory", card]),
+            (["--trace=out.din.zst", "--tile", "8"], ["--trace", "use --card emulated:1"]),
+            (["--order=hilbert", "--tile", "8"], ["--order hilbert", "use --card emulated:CHIPS"]),
+        ] {
+            refused(&room, "scene.gltf", &[&options[..], &["--card", card]].concat(), &words);
+        }
+    }
+}
+
+#[test]
+fn nothing_to_listen_on() {
+    let room = Room::new();
+    for (options, words) in [
+        (&[][..], ["--listen", "required"]),
+        (&["--listen", "abacus"], ["nothing to listen on", "unix:PATH"]),
+        (&["--listen", "unix:"], ["nothing to listen on", "unix:PATH"]),
+        (&["--listen", "tcp:localhost:65536"], ["no port", "0 to 65535"]),
+        (&["--listen", "tcp:::1:7000"], ["no host", "in brackets"]),
+        (&["--listen", "pty", "--card", "tcp:localhost:1"], ["--card", "emulated-micro"]),
+        (&["--listen", "pty", "--card", "emulated:2"], ["--card", "emulated-micro"]),
+    ] {
+        check_refused(&room.run(&[&["emulate"], options].concat()), &words, &format!("{options:?}"));
+    }
+    check_refused(&room.run(&["card", "ping", "--count", "0"]), &["--count"], "no hello");
+    assert!(room.names().is_empty());
 }
 
 #[test]

@@ -40,9 +40,17 @@ fn card_info_tells_what_a_card_holds() {
 
 #[test]
 fn every_command_has_help() {
-    for command in
-        [&[][..], &["render"], &["scene"], &["scene", "info"], &["card"], &["card", "info"], &["diff"]]
-    {
+    for command in [
+        &[][..],
+        &["render"],
+        &["scene"],
+        &["scene", "info"],
+        &["card"],
+        &["card", "info"],
+        &["card", "ping"],
+        &["emulate"],
+        &["diff"],
+    ] {
         let outcome = Room::new().run(&[command, &["--help"]].concat());
         assert_eq!(outcome.status, Some(0), "{command:?}");
         assert!(outcome.stdout.contains("Usage: photoncard"), "{command:?}");

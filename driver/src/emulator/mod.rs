@@ -16,6 +16,7 @@ use photoncard_firmware::memory::{CardMemory, MemoryPort};
 use photoncard_firmware::serve::serve;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::budget::{Budget, MICRO, REFERENCE, TechniqueMemory};
+use photoncard_shared::link::Port;
 use photoncard_shared::message::{Fault, FaultCode};
 
 use self::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
@@ -100,13 +101,13 @@ impl EmulatedCard {
     /// # Errors
     /// If the system has no thread for it.
     pub fn start(kind: ChipKind, model: Option<MemoryModel>) -> std::io::Result<Self> {
-        let (host, card) = loopback(LINK_CAPACITY);
+        let (host, mut card) = loopback(LINK_CAPACITY);
         let trace = model.as_ref().and_then(|model| model.trace.as_ref());
         let trace_has_failed = trace.map(TraceFile::has_failed);
         let thread = std::thread::Builder::new()
             .name("chip".into())
             .stack_size(THREAD_STACK)
-            .spawn(move || run(kind, model, card))?;
+            .spawn(move || run(kind, model, &mut card))?;
         Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed })
     }
 
@@ -144,16 +145,33 @@ impl Drop for EmulatedCard {
     }
 }
 
-fn run(kind: ChipKind, model: Option<MemoryModel>, mut port: LoopbackPort) -> Option<MemoryRecord> {
+/// Serves a card on a port that others reach, until the port fails.
+///
+/// # Errors
+/// If the system has no thread for it.
+///
+/// # Panics
+/// If the chip did.
+pub fn serve_card(kind: ChipKind, mut port: impl Port + Send) -> std::io::Result<()> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new()
+            .name("chip".into())
+            .stack_size(THREAD_STACK)
+            .spawn_scoped(scope, || run(kind, None, &mut port))?;
+        thread.join().map(drop).or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+fn run(kind: ChipKind, model: Option<MemoryModel>, port: &mut impl Port) -> Option<MemoryRecord> {
     let dram = GrowingMemory::new(match kind {
         ChipKind::Reference => REFERENCE.dram_bytes,
         ChipKind::Micro => MICRO.dram_bytes,
     });
     match model {
-        None => serve_on(kind, dram, &mut port, |_| None),
+        None => serve_on(kind, dram, port, |_| None),
         Some(MemoryModel { caches, trace }) => {
             let memory = Traced::new(caches.over(dram), trace);
-            serve_on(kind, memory, &mut port, |memory| {
+            serve_on(kind, memory, port, |memory| {
                 let trace = memory.take_trace();
                 Some(MemoryRecord { traffic: MeasuredMemory::traffic(memory.below()), trace })
             })
@@ -165,7 +183,7 @@ fn run(kind: ChipKind, model: Option<MemoryModel>, mut port: LoopbackPort) -> Op
 fn serve_on<M: CardMemory, R>(
     kind: ChipKind,
     memory: M,
-    port: &mut LoopbackPort,
+    port: &mut impl Port,
     end: impl FnOnce(&mut M) -> R,
 ) -> R {
     // The end of the link is no error: it is how the host ends a card.

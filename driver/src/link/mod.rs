@@ -1,5 +1,33 @@
 //! Links to cards: ports of bytes.
+//!
+//! A card in this process is on a [`loopback`]; others are reached over serial ports ([`open_serial`]) and sockets
+//! ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the other side: where hosts come to a card that this process
+//! emulates, one after another ([`HostPort`]).
 
+mod error;
+mod host_port;
+mod listener;
 mod loopback;
+mod socket;
+mod stream;
 
+#[cfg(unix)]
+mod pty;
+#[cfg(unix)]
+mod serial;
+#[cfg(not(unix))]
+mod unsupported;
+
+pub use error::LinkError;
+pub use host_port::HostPort;
+pub use listener::{ListenAddress, Listener};
 pub use loopback::{LoopbackPort, loopback};
+#[cfg(unix)]
+pub use serial::open_serial;
+pub use socket::connect_tcp;
+#[cfg(unix)]
+pub use socket::connect_unix;
+pub(crate) use socket::{host_name, tcp_address};
+pub use stream::StreamPort;
+#[cfg(not(unix))]
+pub use unsupported::{connect_unix, open_serial};

@@ -1,7 +1,6 @@
 //! The cards of a render: each has a thread of the host that moves bytes between its port and its session.
 
-use std::str::FromStr;
-use std::sync::atomic::{AtomicBool, AtomicU16, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU16, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -9,64 +8,15 @@ use photoncard_firmware::sampler::hash;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::link::Port;
+use photoncard_shared::link::{Port, PortError};
 
-use super::{Observer, Phase, RenderError};
+use super::address::{CardAddress, MAX_CHIPS};
+use super::open_card::OpenCard;
+use super::{Observer, Phase, RenderError, Unobserved};
 use crate::emulator::memory_model::{CacheSettings, MemoryTraffic};
 use crate::emulator::trace::TraceFile;
-use crate::emulator::{ChipKind, EmulatedCard, MemoryModel};
+use crate::emulator::{ChipKind, MemoryModel};
 use crate::session::{Job, LinkBytes, Picture, Session, SessionError};
-
-/// Where cards are: an argument of `--card`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CardAddress {
-    /// Chips in this process.
-    Emulated {
-        /// Their kind.
-        kind: ChipKind,
-        /// How many.
-        chips: usize,
-    },
-}
-
-impl Default for CardAddress {
-    /// One emulated reference chip.
-    fn default() -> Self {
-        Self::Emulated { kind: ChipKind::Reference, chips: 1 }
-    }
-}
-
-/// Chips that one process emulates.
-const MAX_CHIPS: usize = 1024;
-
-impl FromStr for CardAddress {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (kind, chips) = text.split_once(':').map_or((text, None), |(kind, chips)| (kind, Some(chips)));
-        let kind = match kind {
-            "emulated" => ChipKind::Reference,
-            "emulated-micro" => ChipKind::Micro,
-            "serial" | "tcp" | "unix" => {
-                return Err(format!("cards on {kind} links cannot be used yet; use emulated[:CHIPS]"));
-            }
-            _ => {
-                return Err(format!(
-                    "{kind:?} is no kind of card; use emulated[:CHIPS] or emulated-micro[:CHIPS]"
-                ));
-            }
-        };
-        let chips = match chips {
-            None => std::thread::available_parallelism().map_or(1, usize::from),
-            Some(chips) => chips
-                .parse()
-                .ok()
-                .filter(|count| (1..=MAX_CHIPS).contains(count))
-                .ok_or_else(|| format!("{chips:?} is no number of chips; use 1 to {MAX_CHIPS}"))?,
-        };
-        Ok(Self::Emulated { kind, chips })
-    }
-}
 
 /// The number of emulated reference chips at some addresses.
 ///
@@ -75,7 +25,7 @@ impl FromStr for CardAddress {
 pub(super) fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
     let counts = addresses.iter().map(|address| match *address {
         CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),
-        CardAddress::Emulated { kind: ChipKind::Micro, .. } => None,
+        _ => None,
     });
     let chips = counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
         option: "--order",
@@ -105,6 +55,11 @@ pub(super) fn is_one_emulated_chip(addresses: &[CardAddress]) -> bool {
     matches!(addresses, [CardAddress::Emulated { chips: 1, .. }])
 }
 
+/// The first card among some addresses that is not emulated in this process.
+pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
+    addresses.iter().find(|address| !matches!(address, CardAddress::Emulated { .. }))
+}
+
 /// Cards that have said hello.
 pub(super) struct Cards {
     cards: Vec<Connected>,
@@ -112,7 +67,7 @@ pub(super) struct Cards {
 }
 
 struct Connected {
-    card: EmulatedCard,
+    card: OpenCard,
     session: Session<'static>,
     budget: Budget,
 }
@@ -129,13 +84,28 @@ pub struct CardInfo {
 /// Says hello to the first card at an address.
 ///
 /// # Errors
-/// If it cannot be started, or does not answer as it should.
-pub fn card_info(address: CardAddress) -> Result<CardInfo, RenderError> {
-    let CardAddress::Emulated { kind, .. } = address;
+/// If it cannot be started or reached, or does not answer as it should.
+pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
     let nothing = Mutex::new(Picture::empty()?);
-    let cards = Cards::connect(&[CardAddress::Emulated { kind, chips: 1 }], None, None, &nothing)?;
-    let connected = &cards.cards[0];
+    let card = OpenCard::open(0, address, None)?;
+    let connected = greet(card, &nothing, Instant::now(), &Unobserved)?;
     Ok(CardInfo { build: connected.session.build().to_owned(), budget: connected.budget })
+}
+
+/// Says hello to the first card at an address some times. Returns how long each answer took.
+///
+/// # Errors
+/// If it cannot be started or reached, or does not answer as it should.
+pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, RenderError> {
+    let nothing = Mutex::new(Picture::empty()?);
+    let mut card = OpenCard::open(0, address, None)?;
+    let mut answers = Vec::with_capacity(count);
+    for _ in 0..count {
+        let start = Instant::now();
+        card = greet(card, &nothing, start, &Unobserved)?.card;
+        answers.push(start.elapsed());
+    }
+    Ok(answers)
 }
 
 /// What came of a run.
@@ -154,6 +124,8 @@ pub(super) struct Outcome {
 struct Shared<'a> {
     picture: &'a Mutex<Picture>,
     failed: AtomicBool,
+    /// Cards that are not lost.
+    alive: AtomicUsize,
     observer: &'a dyn Observer,
     start: Instant,
     image_bytes: u64,
@@ -178,18 +150,18 @@ impl Cards {
         caches: Option<CacheSettings>,
         mut trace: Option<TraceFile>,
         picture: &Mutex<Picture>,
+        observer: &dyn Observer,
     ) -> Result<Self, RenderError> {
         let start = Instant::now();
-        let kinds =
-            addresses.iter().flat_map(|&CardAddress::Emulated { kind, chips }| (0..chips).map(move |_| kind));
-        check_chips(kinds.clone().count())?;
-        let cards: Result<Vec<Connected>, RenderError> = kinds
+        check_chips(addresses.iter().map(CardAddress::emulated_chips).sum())?;
+        let each_card = addresses
+            .iter()
+            .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)));
+        let cards: Result<Vec<Connected>, RenderError> = each_card
             .enumerate()
-            .map(|(index, kind)| {
+            .map(|(index, address)| {
                 let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
-                let card = EmulatedCard::start(kind, model)
-                    .map_err(|source| RenderError::Start { card: index, source })?;
-                greet(card, picture, start).map_err(|source| RenderError::Card { card: index, source })
+                greet(OpenCard::open(index, address, model)?, picture, start, observer)
             })
             .collect();
         Ok(Self { cards: cards?, start })
@@ -211,6 +183,7 @@ impl Cards {
         let shared = Shared {
             picture,
             failed: AtomicBool::new(false),
+            alive: AtomicUsize::new(self.cards.len()),
             observer,
             start: self.start,
             image_bytes: (job.image.len() * LINE_BYTES) as u64,
@@ -218,8 +191,8 @@ impl Cards {
         let cards = self.cards.len();
         let results: Vec<Result<CardOutcome, RenderError>> = std::thread::scope(|scope| {
             let shared = &shared;
-            let threads: Vec<_> = (self.cards.into_iter().enumerate())
-                .map(|(index, card)| scope.spawn(move || render_on(index, card, job, shared)))
+            let threads: Vec<_> = (self.cards.into_iter())
+                .map(|card| scope.spawn(move || render_on(card, job, shared)))
                 .collect();
             // A panic of a host thread is a panic of the host.
             threads
@@ -272,7 +245,7 @@ pub(super) fn lock(picture: &Mutex<Picture>) -> MutexGuard<'_, Picture> {
 /// Moves bytes once in each direction, and waits a little if there are none.
 fn exchange(
     session: &mut Session,
-    port: &mut impl Port,
+    port: &mut dyn Port,
     picture: &Mutex<Picture>,
     start: Instant,
 ) -> Result<(), SessionError> {
@@ -292,16 +265,23 @@ fn exchange(
 
 /// Says hello and waits for the answer.
 fn greet(
-    mut card: EmulatedCard,
+    mut card: OpenCard,
     picture: &Mutex<Picture>,
     start: Instant,
-) -> Result<Connected, SessionError> {
+    observer: &dyn Observer,
+) -> Result<Connected, RenderError> {
     let mut session = Session::new(session_number(), start.elapsed());
     loop {
         if let Some(&budget) = session.budget() {
             return Ok(Connected { card, session, budget });
         }
-        exchange(&mut session, card.port(), picture, start)?;
+        if observer.is_stopped() {
+            return Err(RenderError::Stopped);
+        }
+        exchange(&mut session, card.port(), picture, start).map_err(|source| match source {
+            SessionError::Port(PortError::Closed) => RenderError::Refused { card: card.name() },
+            source => RenderError::Card { card: card.name(), source },
+        })?;
     }
 }
 
@@ -312,34 +292,62 @@ fn session_number() -> u16 {
     hash(time ^ std::process::id()) as u16 ^ COUNT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// Loads the image into a card and renders tiles on it until none is left.
-fn render_on(
-    index: usize,
-    connected: Connected,
-    job: Job,
-    shared: &Shared,
-) -> Result<CardOutcome, RenderError> {
+impl Shared<'_> {
+    /// Whether there is nothing left to do.
+    ///
+    /// # Errors
+    /// If the observer or the failure of a card has stopped the render.
+    fn is_complete(&self) -> Result<bool, RenderError> {
+        if self.failed.load(Ordering::Relaxed) || self.observer.is_stopped() {
+            return Err(RenderError::Stopped);
+        }
+        Ok(lock(self.picture).scheduler.is_complete())
+    }
+
+    /// A card is lost; the others go on with its tiles.
+    ///
+    /// # Errors
+    /// If it was the last, or what it answers is wrong.
+    fn lose(&self, card: &OpenCard, error: SessionError) -> Result<(), RenderError> {
+        let may_go_on = matches!(error, SessionError::Silent(_) | SessionError::Port(_));
+        let was_last = self.alive.fetch_sub(1, Ordering::Relaxed) <= 1;
+        if was_last || !may_go_on {
+            self.failed.store(true, Ordering::Relaxed);
+            return Err(RenderError::Card { card: card.name(), source: error });
+        }
+        self.observer.lost(&card.name(), &error);
+        Ok(())
+    }
+}
+
+/// Loads the image into a card and renders tiles on it until none is left. A card that is lost is tried again as long as
+/// there are others.
+fn render_on(connected: Connected, job: Job, shared: &Shared) -> Result<CardOutcome, RenderError> {
     let Connected { mut card, mut session, .. } = connected;
     session.start(job, shared.start.elapsed());
     let mut outcome = CardOutcome::default();
-    while !lock(shared.picture).scheduler.is_complete() && !card.trace_has_failed() {
-        if shared.failed.load(Ordering::Relaxed) || shared.observer.is_stopped() {
-            return Err(RenderError::Stopped);
-        }
-        exchange(&mut session, card.port(), shared.picture, shared.start).map_err(|source| {
-            shared.failed.store(true, Ordering::Relaxed);
-            RenderError::Card { card: index, source }
-        })?;
-        if session.is_loaded() {
-            if outcome.loaded.is_zero() {
-                outcome.loaded = shared.start.elapsed();
+    let mut is_lost = false;
+    while !shared.is_complete()? && !card.trace_has_failed() {
+        let result = exchange(&mut session, card.port(), shared.picture, shared.start);
+        match result {
+            Ok(()) if is_lost && session.is_loaded() => {
+                is_lost = false;
+                shared.alive.fetch_add(1, Ordering::Relaxed);
             }
-            let (done, total) = lock(shared.picture).scheduler.progress();
-            shared.observer.progress(Phase::Tiles, done as u64, total as u64);
-        } else {
-            let loaded = session.loaded_lines() as u64 * LINE_BYTES as u64;
-            shared.observer.progress(Phase::Load, loaded, shared.image_bytes);
+            Ok(()) => {}
+            Err(error) => {
+                session.reset(&mut lock(shared.picture), shared.start.elapsed());
+                let is_closed = matches!(error, SessionError::Port(_));
+                if !is_lost {
+                    shared.lose(&card, error)?;
+                    is_lost = true;
+                }
+                if is_closed && !reopen(&mut card, shared)? {
+                    break;
+                }
+            }
         }
+        tell_progress(&session, &mut outcome, shared);
     }
     outcome.counters = *session.counters();
     outcome.bytes = session.link_bytes();
@@ -348,4 +356,34 @@ fn render_on(
         record.trace.map_or(Ok(()), TraceFile::finish)?;
     }
     Ok(outcome)
+}
+
+/// How long a lost card is left alone.
+const RETRY: Duration = Duration::from_millis(500);
+
+/// Tries to reach a card again until it is there. Returns whether there is any sense in that.
+fn reopen(card: &mut OpenCard, shared: &Shared) -> Result<bool, RenderError> {
+    loop {
+        if shared.is_complete()? {
+            return Ok(true);
+        }
+        match card.reopen() {
+            None => return Ok(false),
+            Some(true) => return Ok(true),
+            Some(false) => std::thread::sleep(RETRY),
+        }
+    }
+}
+
+fn tell_progress(session: &Session, outcome: &mut CardOutcome, shared: &Shared) {
+    if session.is_loaded() {
+        if outcome.loaded.is_zero() {
+            outcome.loaded = shared.start.elapsed();
+        }
+        let (done, total) = lock(shared.picture).scheduler.progress();
+        shared.observer.progress(Phase::Tiles, done as u64, total as u64);
+    } else if outcome.loaded.is_zero() {
+        let loaded = session.loaded_lines() as u64 * LINE_BYTES as u64;
+        shared.observer.progress(Phase::Load, loaded, shared.image_bytes);
+    }
 }

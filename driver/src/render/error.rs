@@ -5,6 +5,7 @@ use photoncard_shared::message::Fault;
 use crate::emulator::whole_frame::FrameError;
 use crate::error::SceneError;
 use crate::film::FilmError;
+use crate::link::LinkError;
 use crate::output::OutputError;
 use crate::pack::PackError;
 use crate::photon::PhotonError;
@@ -55,11 +56,30 @@ pub enum RenderError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// A card failed.
+    /// A card could not be reached.
     #[error("card {card}: {source}")]
-    Card {
+    Link {
         /// Its number.
         card: usize,
+        /// What happened.
+        #[source]
+        #[diagnostic_source]
+        source: LinkError,
+    },
+    /// A card's link was closed before the card had said hello.
+    #[error("{card} closed the link before it said hello")]
+    #[diagnostic(help(
+        "another host may be using the card: wait until it is done; or what listens there is no card"
+    ))]
+    Refused {
+        /// Its number, and its address if it is not emulated.
+        card: String,
+    },
+    /// A card failed.
+    #[error("{card}: {source}")]
+    Card {
+        /// Its number, and its address if it is not emulated.
+        card: String,
         /// What happened.
         #[source]
         #[diagnostic_source]
@@ -107,7 +127,12 @@ impl RenderError {
         match self {
             Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,
             Self::Trace(error) => !matches!(error, OutputError::Write { .. }),
-            Self::Image(_) | Self::Start { .. } | Self::Card { .. } | Self::Stopped => false,
+            Self::Image(_)
+            | Self::Start { .. }
+            | Self::Link { .. }
+            | Self::Refused { .. }
+            | Self::Card { .. }
+            | Self::Stopped => false,
         }
     }
 }

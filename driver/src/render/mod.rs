@@ -1,12 +1,15 @@
 //! A render, from a loaded scene to a complete film.
 
+mod address;
 mod cards;
 mod error;
 mod memory;
+mod open_card;
 mod settings;
 mod statistics;
 
-pub use cards::{CardAddress, CardInfo, card_info};
+pub use address::CardAddress;
+pub use cards::{CardInfo, card_info, card_ping};
 pub use error::RenderError;
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use photoncard_shared::budget::MOST_BINS;
@@ -31,7 +34,7 @@ use crate::pack::PackedScene;
 use crate::photon::{MappedImage, map_photons};
 use crate::scene::{Camera, Scene};
 use crate::scheduler::{GatherOrder, Scheduler, tiles};
-use crate::session::{Job, Picture};
+use crate::session::{Job, Picture, SessionError};
 
 /// What a render is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +56,9 @@ pub trait Observer: Sync {
 
     /// Whether the render is to stop as soon as it can.
     fn is_stopped(&self) -> bool;
+
+    /// Tells that a card was lost; the others go on with its tiles.
+    fn lost(&self, _card: &str, _error: &SessionError) {}
 }
 
 /// Watches nothing and never stops.
@@ -86,12 +92,13 @@ pub fn render(
     let start = Instant::now();
     let camera = scene.camera(settings.camera.as_deref())?;
     settings.check_trace()?;
+    settings.check_memory_model()?;
     if settings.order == GatherOrder::Hilbert {
         return render_whole_frame(scene, settings, camera, observer);
     }
     let picture = Mutex::new(Picture::empty()?);
     let trace = settings.trace.as_deref().map(TraceFile::create).transpose()?;
-    let cards = Cards::connect(&settings.cards, settings.modelled_caches(), trace, &picture)?;
+    let cards = Cards::connect(&settings.cards, settings.modelled_caches(), trace, &picture, observer)?;
     for budget in cards.budgets() {
         settings.check(&budget)?;
     }

@@ -186,6 +186,22 @@ impl RenderSettings {
         Ok(())
     }
 
+    /// Checks that the memory of every card can be modelled, if it is to be.
+    ///
+    /// # Errors
+    /// If a card is not emulated in this process.
+    pub fn check_memory_model(&self) -> Result<(), RenderError> {
+        match cards::first_remote(&self.cards).filter(|_| self.modelled_caches().is_some()) {
+            None => Ok(()),
+            Some(address) => Err(RenderError::Setting {
+                option: "--counters",
+                value: format!("with --card {address}"),
+                reason: "only the memory of cards that are emulated in this process is modelled".into(),
+                remedy: "use --card emulated:CHIPS, or leave --counters and --cache out".into(),
+            }),
+        }
+    }
+
     /// What the photon map is to be.
     pub fn photon_settings(&self) -> PhotonSettings {
         PhotonSettings {

@@ -1,0 +1,82 @@
+//! Why a link could not be opened.
+
+use std::fmt::Display;
+use std::io::{self, ErrorKind};
+
+/// Why a link could not be opened: the address, what is wrong with it, and what to do.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+#[error("cannot {action} {address}: {reason}")]
+#[diagnostic(help("{remedy}"))]
+pub struct LinkError {
+    action: &'static str,
+    address: String,
+    reason: String,
+    remedy: &'static str,
+}
+
+impl LinkError {
+    /// A serial port that could not be opened.
+    pub(super) fn open(address: impl Display, error: &io::Error) -> Self {
+        let (reason, remedy) = match error.kind() {
+            ErrorKind::NotFound => ("there is no such device", "check the cable and the device's name"),
+            ErrorKind::PermissionDenied => (
+                "no permission to use the device",
+                "join the group that owns it, often `dialout`, or change its permissions",
+            ),
+            // An exclusive lock that is taken.
+            ErrorKind::WouldBlock | ErrorKind::ResourceBusy => {
+                ("the device is busy", "end the program that uses it, or wait until it is done")
+            }
+            ErrorKind::InvalidInput => {
+                ("it does not run at that speed", "choose a speed that both ends have, such as @115200")
+            }
+            _ => return Self::other("open", address, error, "check that the path names a serial port"),
+        };
+        Self::new("open", address, reason, remedy)
+    }
+
+    /// A socket that could not be connected to.
+    pub(super) fn connect(address: impl Display, error: &io::Error) -> Self {
+        let (reason, remedy) = match error.kind() {
+            ErrorKind::NotFound => {
+                ("there is no such socket", "start the card that listens there, or check the path")
+            }
+            ErrorKind::PermissionDenied => {
+                ("no permission to use the socket", "change its permissions, or run as its owner")
+            }
+            ErrorKind::ConnectionRefused => {
+                ("nothing listens there", "start the card that listens there, or check the address")
+            }
+            ErrorKind::TimedOut | ErrorKind::HostUnreachable | ErrorKind::NetworkUnreachable => {
+                ("it does not answer", "check the network, the address and firewalls")
+            }
+            _ => return Self::other("connect to", address, error, "check the address"),
+        };
+        Self::new("connect to", address, reason, remedy)
+    }
+
+    /// An address that could not be listened on.
+    pub(super) fn listen(address: impl Display, error: &io::Error) -> Self {
+        let (reason, remedy) = match error.kind() {
+            ErrorKind::AddrInUse => ("it is in use", "choose another, or end what listens there"),
+            ErrorKind::AddrNotAvailable => {
+                ("this machine has no such address", "use one of its own, such as 127.0.0.1")
+            }
+            ErrorKind::AlreadyExists => ("a file has that name", "choose another path, or remove the file"),
+            ErrorKind::PermissionDenied => {
+                ("no permission to listen there", "choose a port above 1023, or a folder you may write to")
+            }
+            ErrorKind::NotFound => ("its folder does not exist", "create the folder, or choose another path"),
+            _ => return Self::other("listen on", address, error, "choose another address"),
+        };
+        Self::new("listen on", address, reason, remedy)
+    }
+
+    fn new(action: &'static str, address: impl Display, reason: &str, remedy: &'static str) -> Self {
+        Self { action, address: address.to_string(), reason: reason.into(), remedy }
+    }
+
+    fn other(action: &'static str, address: impl Display, error: &io::Error, remedy: &'static str) -> Self {
+        Self::new(action, address, &error.to_string(), remedy)
+    }
+}

@@ -1,0 +1,87 @@
+//! A port on a stream of the system: a socket, a serial port or a pseudo terminal.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::time::Duration;
+
+use photoncard_shared::link::{Port, PortError};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fd::AsFd;
+
+/// A port on a stream that does not block: waiting is done by `poll`, so that every call is bounded.
+pub struct StreamPort<S> {
+    stream: S,
+}
+
+impl<S: Read + Write + AsFd> StreamPort<S> {
+    /// A port on a stream. It must have been set not to block.
+    pub(super) fn new(stream: S) -> Self {
+        Self { stream }
+    }
+
+    fn try_read(&mut self, buffer: &mut [u8]) -> Result<usize, PortError> {
+        match self.stream.read(buffer) {
+            Ok(0) if !buffer.is_empty() => Err(PortError::Closed),
+            result => moved(result),
+        }
+    }
+
+    fn try_write(&mut self, bytes: &[u8]) -> Result<usize, PortError> {
+        moved(self.stream.write(bytes))
+    }
+}
+
+impl<S: Read + Write + AsFd> Port for StreamPort<S> {
+    fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
+        match self.try_read(buffer)? {
+            0 if !wait.is_zero() => {
+                wait_for(&self.stream, PollFlags::IN, wait);
+                self.try_read(buffer)
+            }
+            count => Ok(count),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
+        match self.try_write(bytes)? {
+            0 if !bytes.is_empty() => {
+                // A terminal that nobody has open neither takes bytes nor fails to.
+                if wait_for(&self.stream, PollFlags::OUT, wait).contains(PollFlags::HUP) {
+                    return Err(PortError::Closed);
+                }
+                self.try_write(bytes)
+            }
+            count => Ok(count),
+        }
+    }
+}
+
+/// Waits until one of `events` happens to a stream or the time is over. Returns what has happened.
+pub(super) fn wait_for(stream: &impl AsFd, events: PollFlags, wait: Duration) -> PollFlags {
+    let mut streams = [PollFd::new(stream, events)];
+    // A signal ends the wait early; a time beyond the system's is none.
+    let timeout = Timespec::try_from(wait).ok();
+    let _ = poll(&mut streams, timeout.as_ref());
+    streams[0].revents()
+}
+
+/// The bytes that have moved; none if they could not yet.
+fn moved(result: io::Result<usize>) -> Result<usize, PortError> {
+    result.or_else(|error| match error.kind() {
+        ErrorKind::WouldBlock | ErrorKind::Interrupted => Ok(0),
+        ErrorKind::ConnectionReset
+        | ErrorKind::ConnectionAborted
+        | ErrorKind::BrokenPipe
+        | ErrorKind::NotConnected
+        | ErrorKind::TimedOut => Err(PortError::Closed),
+        // A terminal whose other end is gone; a serial adapter that was pulled out.
+        _ if is_gone(&error) => Err(PortError::Closed),
+        _ => Err(PortError::Device(error.raw_os_error().unwrap_or(0).unsigned_abs())),
+    })
+}
+
+fn is_gone(error: &io::Error) -> bool {
+    cfg!(unix)
+        && rustix::io::Errno::from_io_error(error).is_some_and(|errno| {
+            [rustix::io::Errno::IO, rustix::io::Errno::NODEV, rustix::io::Errno::NXIO].contains(&errno)
+        })
+}

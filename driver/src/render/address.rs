@@ -1,0 +1,183 @@
+//! Where cards are: an argument of `--card`.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use crate::emulator::ChipKind;
+use crate::link::{host_name, tcp_address};
+
+/// Where cards are: an argument of `--card`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum CardAddress {
+    /// Chips in this process.
+    Emulated {
+        /// Their kind.
+        kind: ChipKind,
+        /// How many.
+        chips: usize,
+    },
+    /// A card on a serial port, or a pseudo terminal.
+    Serial {
+        /// The device.
+        path: PathBuf,
+        /// Bits a second.
+        baud: u32,
+    },
+    /// A card that listens on a TCP port.
+    Tcp {
+        /// Name or number of the host.
+        host: String,
+        /// The port.
+        port: u16,
+    },
+    /// A card that listens on a Unix socket.
+    Unix {
+        /// The socket's path.
+        path: PathBuf,
+    },
+}
+
+/// Chips that one process emulates.
+pub(super) const MAX_CHIPS: usize = 1024;
+/// The speed of a serial port for which none is given.
+const DEFAULT_BAUD: u32 = 115_200;
+
+impl Default for CardAddress {
+    /// One emulated reference chip.
+    fn default() -> Self {
+        Self::Emulated { kind: ChipKind::Reference, chips: 1 }
+    }
+}
+
+impl CardAddress {
+    /// Chips that this process emulates there.
+    pub(super) fn emulated_chips(&self) -> usize {
+        match *self {
+            Self::Emulated { chips, .. } => chips,
+            Self::Serial { .. } | Self::Tcp { .. } | Self::Unix { .. } => 0,
+        }
+    }
+}
+
+impl fmt::Display for CardAddress {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Emulated { kind: ChipKind::Reference, chips } => write!(f, "emulated:{chips}"),
+            Self::Emulated { kind: ChipKind::Micro, chips } => write!(f, "emulated-micro:{chips}"),
+            Self::Serial { path, baud } => write!(f, "serial:{}@{baud}", path.display()),
+            Self::Tcp { host, port } => f.write_str(&tcp_address(host, *port)),
+            Self::Unix { path } => write!(f, "unix:{}", path.display()),
+        }
+    }
+}
+
+impl FromStr for CardAddress {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (kind, rest) = text.split_once(':').map_or((text, None), |(kind, rest)| (kind, Some(rest)));
+        match kind {
+            "emulated" => emulated(ChipKind::Reference, rest),
+            "emulated-micro" => emulated(ChipKind::Micro, rest),
+            "serial" => serial(rest.unwrap_or_default()),
+            "tcp" => tcp(rest.unwrap_or_default()),
+            "unix" => match rest {
+                Some(path) if !path.is_empty() => Ok(Self::Unix { path: path.into() }),
+                _ => Err("a card on a Unix socket is unix:PATH".into()),
+            },
+            _ => Err(format!(
+                "{kind:?} is no kind of card; use emulated[:CHIPS], emulated-micro[:CHIPS], serial:PATH[@BAUD], \
+                 tcp:HOST:PORT or unix:PATH"
+            )),
+        }
+    }
+}
+
+fn emulated(kind: ChipKind, chips: Option<&str>) -> Result<CardAddress, String> {
+    let chips = match chips {
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+        Some(chips) => chips
+            .parse()
+            .ok()
+            .filter(|count| (1..=MAX_CHIPS).contains(count))
+            .ok_or_else(|| format!("{chips:?} is no number of chips; use 1 to {MAX_CHIPS}"))?,
+    };
+    Ok(CardAddress::Emulated { kind, chips })
+}
+
+fn serial(text: &str) -> Result<CardAddress, String> {
+    // A folder's name may have an @ as well.
+    let (path, baud) = match text.rsplit_once('@') {
+        Some((path, baud)) if !baud.contains('/') => (path, Some(baud)),
+        _ => (text, None),
+    };
+    if path.is_empty() {
+        return Err(
+            "a card on a serial port is serial:PATH[@BAUD], such as serial:/dev/ttyUSB0@115200".into()
+        );
+    }
+    let baud = match baud {
+        None => DEFAULT_BAUD,
+        Some(baud) => baud
+            .parse()
+            .ok()
+            .filter(|&baud| baud > 0)
+            .ok_or_else(|| format!("{baud:?} is no speed in bits a second; use one such as 115200"))?,
+    };
+    Ok(CardAddress::Serial { path: path.into(), baud })
+}
+
+fn tcp(text: &str) -> Result<CardAddress, String> {
+    let usage = || format!("{text:?} is no TCP address; use tcp:HOST:PORT, such as tcp:localhost:7000");
+    let (host, port) = text.rsplit_once(':').ok_or_else(usage)?;
+    let port = port.parse().ok().filter(|&port| port > 0).ok_or_else(usage)?;
+    Ok(CardAddress::Tcp { host: host_name(host)?, port })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_read_as_they_are_written() {
+        for (text, full) in [
+            ("emulated:3", "emulated:3"),
+            ("emulated-micro:1", "emulated-micro:1"),
+            ("serial:/dev/ttyUSB0", "serial:/dev/ttyUSB0@115200"),
+            ("serial:/dev/a@b/c@921600", "serial:/dev/a@b/c@921600"),
+            ("serial:/dev/a@b/c", "serial:/dev/a@b/c@115200"),
+            ("tcp:localhost:7000", "tcp:localhost:7000"),
+            ("tcp:[::1]:7000", "tcp:[::1]:7000"),
+            ("unix:/tmp/a:b", "unix:/tmp/a:b"),
+        ] {
+            let address: CardAddress = text.parse().unwrap();
+            assert_eq!(address.to_string(), full);
+            assert_eq!(full.parse(), Ok(address));
+        }
+    }
+
+    #[test]
+    fn what_is_no_address_is_refused_with_what_is() {
+        for (text, said) in [
+            ("", "no kind of card"),
+            ("abacus", "no kind of card"),
+            ("emulated:0", "1 to 1024"),
+            ("emulated:two", "1 to 1024"),
+            ("serial", "serial:PATH"),
+            ("serial:@9600", "serial:PATH"),
+            ("serial:/dev/ttyUSB0@fast", "no speed"),
+            ("serial:/dev/ttyUSB0@0", "no speed"),
+            ("tcp", "tcp:HOST:PORT"),
+            ("tcp:localhost", "tcp:HOST:PORT"),
+            ("tcp:localhost:0", "tcp:HOST:PORT"),
+            ("tcp:localhost:65536", "tcp:HOST:PORT"),
+            ("tcp::7000", "no host"),
+            ("tcp:::1:7000", "in brackets"),
+            ("unix:", "unix:PATH"),
+        ] {
+            let error = text.parse::<CardAddress>().unwrap_err();
+            assert!(error.contains(said), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! A card at the host's end of its link.
+
+use photoncard_shared::link::Port;
+
+use super::RenderError;
+use super::address::CardAddress;
+use crate::emulator::{ChipKind, EmulatedCard, MemoryModel, MemoryRecord};
+use crate::link::{LinkError, connect_tcp, connect_unix, open_serial};
+
+/// A card that can be talked to.
+pub(super) struct OpenCard {
+    /// Its number.
+    index: usize,
+    place: Place,
+}
+
+enum Place {
+    Emulated(EmulatedCard),
+    Remote { address: CardAddress, port: Box<dyn Port + Send> },
+}
+
+impl OpenCard {
+    /// Starts or reaches the card at an address, the first if it has many. One that is emulated may have a model of its
+    /// memory.
+    pub(super) fn open(
+        index: usize,
+        address: &CardAddress,
+        model: Option<MemoryModel>,
+    ) -> Result<Self, RenderError> {
+        let place = match reach(address) {
+            Err(kind) => {
+                let card = EmulatedCard::start(kind, model);
+                Place::Emulated(card.map_err(|source| RenderError::Start { card: index, source })?)
+            }
+            Ok(port) => {
+                let port = port.map_err(|source| RenderError::Link { card: index, source })?;
+                Place::Remote { address: address.clone(), port }
+            }
+        };
+        Ok(Self { index, place })
+    }
+
+    /// Tries to reach a card again whose link was closed. Returns whether it is there; `None` of one that cannot come back.
+    pub(super) fn reopen(&mut self) -> Option<bool> {
+        match &mut self.place {
+            Place::Emulated(_) => None,
+            Place::Remote { address, port } => {
+                let found = reach(address).ok()?;
+                Some(found.map(|found| *port = found).is_ok())
+            }
+        }
+    }
+
+    /// The host's end of the link.
+    pub(super) fn port(&mut self) -> &mut dyn Port {
+        match &mut self.place {
+            Place::Emulated(card) => card.port(),
+            Place::Remote { port, .. } => port.as_mut(),
+        }
+    }
+
+    /// What errors call it: its number, and its address if it is not emulated.
+    pub(super) fn name(&self) -> String {
+        match &self.place {
+            Place::Emulated(_) => format!("card {}", self.index),
+            Place::Remote { address, .. } => format!("card {} ({address})", self.index),
+        }
+    }
+
+    /// Whether its trace cannot be written.
+    pub(super) fn trace_has_failed(&self) -> bool {
+        matches!(&self.place, Place::Emulated(card) if card.trace_has_failed())
+    }
+
+    /// Ends an emulated card, or the link to another. Returns what its memory leaves, if it is modelled.
+    pub(super) fn finish(self) -> Option<MemoryRecord> {
+        match self.place {
+            Place::Emulated(card) => card.finish(),
+            Place::Remote { .. } => None,
+        }
+    }
+}
+
+type Reached = Result<Box<dyn Port + Send>, LinkError>;
+
+/// Opens the link to a card that is not emulated in this process; of one that is, its kind.
+fn reach(address: &CardAddress) -> Result<Reached, ChipKind> {
+    fn boxed(port: Result<impl Port + Send + 'static, LinkError>) -> Reached {
+        port.map(|port| Box::new(port) as Box<dyn Port + Send>)
+    }
+    match address {
+        CardAddress::Emulated { kind, .. } => Err(*kind),
+        CardAddress::Serial { path, baud } => Ok(boxed(open_serial(path, *baud))),
+        CardAddress::Tcp { host, port } => Ok(boxed(connect_tcp(host, *port))),
+        CardAddress::Unix { path } => Ok(boxed(connect_unix(path))),
+    }
+}
