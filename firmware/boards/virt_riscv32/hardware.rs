@@ -130,3 +130,25 @@ fn exception(_: &TrapFrame) -> ! {
         mtval::read()
     ));
 }
+
+// What goes wrong before `main` has no stack yet: a status without a message.
+core::arch::global_asm!(
+    ".section .text.abort, \"ax\"",
+    ".global _pre_init_trap",
+    ".global abort",
+    ".balign 16",
+    "_pre_init_trap:",
+    "abort:",
+    "li a0, 0x20", // exit with a status: the two words below
+    "la a1, 1f",
+    ".balign 16",
+    ".option push",
+    ".option norvc",
+    "slli x0, x0, 0x1f",
+    "ebreak",
+    "srai x0, x0, 7",
+    ".option pop",
+    "0: j 0b",
+    ".balign 4",
+    "1: .word 0x20026, 101",
+);
