@@ -1,4 +1,5 @@
 //! The host half of photoncard.
+#![forbid(unsafe_code)]
 
 pub mod bvh;
 pub mod difference;

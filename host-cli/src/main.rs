@@ -2,6 +2,7 @@
 //!
 //! Standard output is for data, standard error for people. Exit status: 0 done; 1 the work failed; 2 wrong arguments or
 //! unreadable input; 130 stopped by an interrupt.
+#![forbid(unsafe_code)]
 
 mod arguments;
 mod card;

@@ -1,6 +1,7 @@
 //! The scenes that ship with photoncard, made from numbers.
 //!
 //! Every run on every machine makes the same bytes; a test holds the files beside this crate to that.
+#![forbid(unsafe_code)]
 
 mod atrium;
 pub mod builder;

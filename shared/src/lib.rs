@@ -15,6 +15,7 @@
 //! | [`link`] | byte | a port: bytes with a bounded wait |
 //!
 //! Nothing here allocates, and nothing here panics on any input.
+#![forbid(unsafe_code)]
 #![no_std]
 // A chip never panics: what could is kept out, or its reason given.
 #![cfg_attr(

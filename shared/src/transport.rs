@@ -10,9 +10,9 @@
 //!   have come (`held`). A line keeps the order of its bytes. So a message is lost when one that was sent after it has
 //!   come, and only what is lost is sent again.
 //! - A loss at the end of what was sent shows in nothing that comes. It takes a clock to notice, and the host has one: when
-//!   nothing comes for a while it sends a [`FrameKind::Probe`]. The card's [`FrameKind::Answer`] tells which of the host's
-//!   messages have come, all before the probe that have not being lost; and how many the card has sent, those of them that
-//!   have not come being lost, which the host's next probe tells the card.
+//!   nothing comes for a while it sends a [`FrameKind::Probe`], which carries the number of its transmission. The card's
+//!   [`FrameKind::Answer`] carries the same: what was sent before it and has not come is lost. It tells as well how many
+//!   messages the card has sent; those of them that have not come are lost, which the host's next probe tells the card.
 
 use heapless::Vec;
 
@@ -108,10 +108,10 @@ struct Session {
     next: u16,
     /// Frames with messages, and probes, that were sent.
     transmissions: u16,
-    /// The transmission of the last probe, until it is answered.
-    probe: Option<u16>,
-    /// What the other end had sent when it answered: of that, what has not come is lost.
-    lost_below: u16,
+    /// What the other end had sent when it last answered: of that, what has not come is lost. Told once.
+    lost_below: Option<u16>,
+    /// What the last probe of the other end carried.
+    asked: [u8; 2],
     /// At their number modulo [`WINDOW`].
     incoming: [Incoming; WINDOW],
     /// The number of the message to be taken next.
@@ -241,8 +241,8 @@ impl Session {
             oldest: 0,
             next: 0,
             transmissions: 0,
-            probe: None,
-            lost_below: 0,
+            lost_below: None,
+            asked: [0; 2],
             incoming: [const { Incoming { payload: Vec::new(), has_come: false } }; WINDOW],
             expected: 0,
             untold: 0,
@@ -253,8 +253,8 @@ impl Session {
 
     fn begin(&mut self, number: u16) {
         self.number = Some(number);
-        [self.oldest, self.next, self.transmissions, self.lost_below, self.expected, self.untold] = [0; 6];
-        self.probe = None;
+        [self.oldest, self.next, self.transmissions, self.expected, self.untold] = [0; 5];
+        self.lost_below = None;
         self.control = None;
         self.incoming.iter_mut().for_each(|incoming| incoming.has_come = false);
     }
@@ -328,18 +328,23 @@ impl Session {
         if self.untold >= TOLD_UNASKED {
             self.ask_for(Control::Acknowledge);
         }
+        let mut payload: &[u8] = &[];
+        let transmission = self.transmissions.to_le_bytes();
         let (kind, sequence) = match self.control.take() {
             None | Some(Control::Unknown(_)) => return,
             Some(Control::Acknowledge) => (FrameKind::Acknowledge, 0),
-            Some(Control::Answer) => (FrameKind::Answer, self.next),
+            Some(Control::Answer) => {
+                payload = &self.asked;
+                (FrameKind::Answer, self.next)
+            }
             Some(Control::Probe) => {
-                self.probe = Some(self.transmissions);
+                payload = &transmission;
                 self.transmissions = self.transmissions.wrapping_add(1);
                 self.statistics.probes += 1;
-                (FrameKind::Probe, self.lost_below)
+                (FrameKind::Probe, self.lost_below.take().unwrap_or(self.expected))
             }
         };
-        write_frame(&self.header(kind, sequence), &[], wire);
+        write_frame(&self.header(kind, sequence), payload, wire);
         self.untold = 0;
     }
 
@@ -375,9 +380,13 @@ impl Session {
             FrameKind::Data | FrameKind::Open => self.keep(header.sequence, frame.payload),
             FrameKind::Probe => {
                 self.lose(|number, _| is_before(number, header.sequence));
+                self.asked = frame.payload.first_chunk().copied().unwrap_or_default();
                 self.ask_for(Control::Answer);
             }
-            FrameKind::Answer => self.conclude(header.sequence),
+            FrameKind::Answer => {
+                let probe = frame.payload.first_chunk().map_or(0, |bytes| u16::from_le_bytes(*bytes));
+                self.conclude(probe, header.sequence);
+            }
             FrameKind::Acknowledge | FrameKind::Unknown => {}
         }
         Some(Event::Heard)
@@ -414,11 +423,9 @@ impl Session {
 
     /// Concludes from an answer what is lost: of ours, what was sent before the probe and is not there; of theirs, what they
     /// had sent and is not here.
-    fn conclude(&mut self, sent: u16) {
-        if let Some(probe) = self.probe.take() {
-            self.lose(|_, transmission| is_before(transmission, probe));
-        }
-        self.lost_below = sent;
+    fn conclude(&mut self, probe: u16, sent: u16) {
+        self.lose(|_, transmission| is_before(transmission, probe));
+        self.lost_below = Some(sent);
         let count = sent.wrapping_sub(self.expected).min(WINDOW as u16);
         let is_missing = |offset| !self.has_come(self.expected.wrapping_add(offset));
         if is_before(self.expected, sent) && (0..count).any(is_missing) {

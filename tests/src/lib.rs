@@ -1,4 +1,5 @@
 //! What the tests of the whole share: small scenes of known radiance, and renders of them.
+#![forbid(unsafe_code)]
 
 pub mod lru;
 pub mod mapped;

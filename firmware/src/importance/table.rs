@@ -100,7 +100,8 @@ impl DirectionTable {
         let [entry, part] = [bin * ENTRIES as u32 / bins, bin * ENTRIES as u32 % bins];
         // In units of 1 / bins of a share, so that all is whole.
         let beginning = (self.before(entry as usize) * bins + self.share(entry as usize) * part) as u64;
-        let total = (self.total() * bins) as u64;
+        // No table is without a share, but the compiler does not know.
+        let total = (self.total() * bins).max(1) as u64;
         let ray = (beginning * count as u64 / total) as u32;
         let is_before = ray < count && stratum_point(pattern, ray) * total < beginning * whole(count);
         ray + u32::from(is_before)

@@ -7,6 +7,12 @@ pub(super) const COARSEST_SIDE: u32 = 16;
 /// Levels: sides of 16, 8, 4 and 2 pixels.
 pub(super) const LEVELS: u32 = 4;
 
+/// Side of a cell of a level, pixels: never 0, so that it divides without a panic.
+const fn side(level: u32) -> u32 {
+    let side = COARSEST_SIDE >> level;
+    if side == 0 { 1 } else { side }
+}
+
 /// A corner of pixels, counted from the picture's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LatticePoint {
@@ -45,7 +51,7 @@ impl Cell {
 
     /// Its side, pixels.
     pub(super) fn side(&self) -> u32 {
-        COARSEST_SIDE >> self.level
+        side(self.level)
     }
 
     /// Whether it cannot be halved.
@@ -85,14 +91,14 @@ impl Cell {
     /// Cell `number` of a level, in rows, in the tree of the coarsest cell at `root`.
     pub(super) fn in_tree(root: LatticePoint, level: u32, number: usize) -> Self {
         let [row, column] = [number as u32 >> level, number as u32 & ((1 << level) - 1)];
-        let side = COARSEST_SIDE >> level;
+        let side = side(level);
         Self { corner: LatticePoint { x: root.x + column * side, y: root.y + row * side }, level }
     }
 
     /// The cell that it is a quarter of; `None` of a coarsest one.
     pub(super) fn parent(&self) -> Option<Self> {
         let level = self.level.checked_sub(1)?;
-        let floor = |v: u32| v - v % (COARSEST_SIDE >> level);
+        let floor = |v: u32| v - v % side(level);
         let LatticePoint { x, y } = self.corner;
         Some(Self { corner: LatticePoint { x: floor(x), y: floor(y) }, level })
     }

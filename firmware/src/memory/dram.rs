@@ -14,7 +14,7 @@ pub struct Dram<'a> {
 
 impl<'a> Dram<'a> {
     /// The memory in `lines`; what is beyond 2^32 lines is not used.
-    pub fn new(lines: &'a mut [Line]) -> Self {
+    pub const fn new(lines: &'a mut [Line]) -> Self {
         Self { lines }
     }
 }

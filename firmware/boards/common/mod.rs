@@ -1,0 +1,86 @@
+//! What the images of all boards share: a board tells its registers, time and interrupts, and is served from here.
+
+#[expect(unsafe_code, reason = "the linker script tells where card memory is")]
+mod dram;
+#[expect(unsafe_code, reason = "a static is handed out once")]
+mod once;
+mod port;
+#[expect(unsafe_code, reason = "registers are memory that changes by itself")]
+pub(crate) mod register;
+mod report;
+mod ring;
+#[expect(unsafe_code, reason = "a debugger is called by an instruction of its own")]
+pub(crate) mod semihosting;
+#[expect(unsafe_code, reason = "what the stack leaves behind is read as memory")]
+mod stack;
+
+use core::panic::PanicInfo;
+
+use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard};
+use photoncard_firmware::memory::Dram;
+use photoncard_firmware::serve::serve;
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::budget::MICRO;
+
+use self::once::Once;
+use self::port::BoardPort;
+pub(crate) use self::port::receive_all;
+use self::report::Reporting;
+
+/// A board: one UART, one clock, one processor. There is one of each, so nothing has a `self`.
+pub(crate) trait Board {
+    /// Its name.
+    const NAME: &'static str;
+
+    /// Sets up clock and UART, and lets interrupts in.
+    fn start();
+
+    /// A byte that the UART has received.
+    fn receive() -> Option<u8>;
+
+    /// Hands the UART a byte to send. Returns whether it had room.
+    fn transmit(byte: u8) -> bool;
+
+    /// Whether a received byte is an interrupt.
+    fn listen(is_interrupt: bool);
+
+    /// Time since the start, milliseconds, modulo 2^32.
+    fn milliseconds() -> u32;
+
+    /// Does some work without interrupts.
+    fn masked<R>(work: impl FnOnce() -> R) -> R;
+
+    /// Sleeps until there is an interrupt to be taken, masked or not: a byte's, or the clock's within a millisecond.
+    fn sleep();
+}
+
+/// The card. Made by the compiler: its buffers never lie on the stack.
+static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(MICRO, Dram::new(&mut [])));
+
+// The buffers of the image beside the card's are small change, and still fit with the caches that the budget has.
+const _: () = assert!(MICRO_SRAM_BYTES + port::STATIC_BYTES <= MICRO.sram_bytes as usize);
+
+/// Serves the card on the board's UART for ever.
+pub(crate) fn run<B: Board>() -> ! {
+    stack::paint();
+    report::memory(B::NAME);
+    if stack::bytes() > MICRO.stack_bytes as usize {
+        semihosting::fail(format_args!("the stack is larger than the budget's: {} bytes\n", stack::bytes()));
+    }
+    let (Some(card), Some(lines)) = (CARD.take(), dram::take()) else {
+        semihosting::fail(format_args!("the card is already in use\n"));
+    };
+    if lines.len() * LINE_BYTES < MICRO.dram_bytes as usize {
+        semihosting::fail(format_args!("card memory is smaller than the budget's: {} lines\n", lines.len()));
+    }
+    *card.memory() = Dram::new(lines);
+    B::start();
+    semihosting::print(format_args!("ready\n"));
+    let error = serve(card, &mut Reporting::new(BoardPort::<B>::new()));
+    semihosting::fail(format_args!("the port failed: {error:?}\n"));
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    semihosting::fail(format_args!("{info}\n"));
+}

@@ -1,0 +1,30 @@
+//! Statics that are taken once, to be changed by whoever took them.
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+/// A value in a static that one owner may take.
+pub(super) struct Once<T> {
+    taken: AtomicBool,
+    value: UnsafeCell<T>,
+}
+
+// SAFETY: the value is reached through `take` alone, which hands it out once: it moves between threads, and is not shared.
+unsafe impl<T: Send> Sync for Once<T> {}
+
+impl<T> Once<T> {
+    /// A value that is not yet taken.
+    pub(super) const fn new(value: T) -> Self {
+        Self { taken: AtomicBool::new(false), value: UnsafeCell::new(value) }
+    }
+
+    /// The value; `None` if it has been taken.
+    #[expect(clippy::mut_from_ref, reason = "it is the only reference: see below")]
+    pub(super) fn take(&'static self) -> Option<&'static mut T> {
+        if self.taken.swap(true, Ordering::Acquire) {
+            return None;
+        }
+        // SAFETY: this line is reached once, so this is the only reference.
+        Some(unsafe { &mut *self.value.get() })
+    }
+}

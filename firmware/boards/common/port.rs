@@ -1,0 +1,90 @@
+//! A board's UART as a port: received by interrupts into a ring, sent by looking.
+
+use core::marker::PhantomData;
+use core::time::Duration;
+
+use photoncard_shared::link::{Port, PortError};
+
+use super::Board;
+use super::ring::Ring;
+
+/// Received bytes that wait: far more than a host sends while a card computes, which is a few tile commands.
+const RECEIVED_BYTES: usize = 512;
+
+static RECEIVED: Ring<RECEIVED_BYTES> = Ring::new();
+
+/// What ports take of on-chip memory.
+pub(super) const STATIC_BYTES: usize = size_of::<Ring<RECEIVED_BYTES>>();
+
+/// Moves what the UART has received into the ring: what the interrupt of a byte does. In a full ring it does not wait:
+/// the rest stays in the UART, which interrupts no more until [`BoardPort`] has read.
+pub(crate) fn receive_all<B: Board>() {
+    while !RECEIVED.is_full() {
+        let Some(byte) = B::receive() else { return };
+        RECEIVED.put(byte);
+    }
+    B::listen(false);
+}
+
+/// The port of a board.
+pub(super) struct BoardPort<B>(PhantomData<B>);
+
+impl<B: Board> BoardPort<B> {
+    /// The one port.
+    pub(super) const fn new() -> Self {
+        Self(PhantomData)
+    }
+}
+
+/// A bound on waiting.
+struct Deadline {
+    start: u32,
+    wait: u32,
+}
+
+impl Deadline {
+    fn new<B: Board>(wait: Duration) -> Self {
+        Self { start: B::milliseconds(), wait: u32::try_from(wait.as_millis()).unwrap_or(u32::MAX) }
+    }
+
+    fn is_over<B: Board>(&self) -> bool {
+        B::milliseconds().wrapping_sub(self.start) >= self.wait
+    }
+}
+
+impl<B: Board> Port for BoardPort<B> {
+    fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
+        let deadline = Deadline::new::<B>(wait);
+        loop {
+            let mut count = 0;
+            for target in &mut *buffer {
+                let Some(byte) = RECEIVED.take() else { break };
+                *target = byte;
+                count += 1;
+            }
+            // The ring has room again. An interrupt may have been refused for want of it.
+            B::masked(|| {
+                B::listen(true);
+                receive_all::<B>();
+            });
+            if count > 0 || deadline.is_over::<B>() {
+                return Ok(count);
+            }
+            B::masked(|| {
+                if RECEIVED.is_empty() {
+                    B::sleep();
+                }
+            });
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
+        let deadline = Deadline::new::<B>(wait);
+        loop {
+            let sent = bytes.iter().take_while(|&&byte| B::transmit(byte)).count();
+            if sent > 0 || deadline.is_over::<B>() {
+                return Ok(sent);
+            }
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! Bytes on their way from an interrupt to the program: one puts, one takes, and neither waits.
+
+use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
+
+/// A ring of `N` bytes, a power of two.
+pub(crate) struct Ring<const N: usize> {
+    bytes: [AtomicU8; N],
+    /// Bytes ever put, modulo 2^32 or 2^64.
+    put: AtomicUsize,
+    /// Bytes ever taken.
+    taken: AtomicUsize,
+}
+
+impl<const N: usize> Ring<N> {
+    const IS_POWER_OF_TWO: () = assert!(N.is_power_of_two());
+
+    /// An empty ring.
+    pub(crate) const fn new() -> Self {
+        let () = Self::IS_POWER_OF_TWO;
+        Self { bytes: [const { AtomicU8::new(0) }; N], put: AtomicUsize::new(0), taken: AtomicUsize::new(0) }
+    }
+
+    /// Whether there is nothing to take.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.put.load(Ordering::Acquire) == self.taken.load(Ordering::Relaxed)
+    }
+
+    /// Whether there is no room.
+    pub(crate) fn is_full(&self) -> bool {
+        self.put.load(Ordering::Relaxed).wrapping_sub(self.taken.load(Ordering::Acquire)) >= N
+    }
+
+    /// Puts a byte. Returns whether there was room.
+    pub(crate) fn put(&self, byte: u8) -> bool {
+        let put = self.put.load(Ordering::Relaxed);
+        let Some(place) = self.bytes.get(put % N).filter(|_| !self.is_full()) else { return false };
+        place.store(byte, Ordering::Relaxed);
+        self.put.store(put.wrapping_add(1), Ordering::Release);
+        true
+    }
+
+    /// Takes the oldest byte.
+    pub(crate) fn take(&self) -> Option<u8> {
+        let taken = self.taken.load(Ordering::Relaxed);
+        let byte = self.bytes.get(taken % N).filter(|_| !self.is_empty())?.load(Ordering::Relaxed);
+        self.taken.store(taken.wrapping_add(1), Ordering::Release);
+        Some(byte)
+    }
+}

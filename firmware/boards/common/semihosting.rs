@@ -1,0 +1,89 @@
+//! Messages and exit by a debugger, which QEMU is one of (Arm's specification "Semihosting"; that of
+//! RISC-V differs in the instructions alone).
+
+use core::arch::asm;
+use core::fmt::{self, Write};
+
+const WRITE0: usize = 0x04;
+const EXIT_EXTENDED: usize = 0x20;
+/// The program ended by its own will: the reason that carries an exit code.
+const APPLICATION_EXIT: usize = 0x20026;
+/// What Rust programs that panic exit with.
+const FAILED: usize = 101;
+
+/// Calls the debugger.
+///
+/// # Safety
+/// `argument` is what `operation` takes.
+unsafe fn call(operation: usize, argument: *const ()) {
+    #[cfg(target_arch = "arm")]
+    // SAFETY: the debugger reads what the argument points to, and answers in r0.
+    unsafe {
+        asm!("bkpt 0xab", inout("r0") operation => _, in("r1") argument, options(nostack));
+    }
+    #[cfg(target_arch = "riscv32")]
+    // SAFETY: as above, in a0. The three instructions are known by their words, uncompressed and in one page.
+    unsafe {
+        asm!(
+            ".balign 16",
+            ".option push",
+            ".option norvc",
+            "slli x0, x0, 0x1f",
+            "ebreak",
+            "srai x0, x0, 7",
+            ".option pop",
+            inout("a0") operation => _, in("a1") argument, options(nostack)
+        );
+    }
+}
+
+/// Collects text into pieces that end with a zero.
+struct Console {
+    bytes: [u8; 128],
+    length: usize,
+}
+
+impl Console {
+    fn flush(&mut self) {
+        if let Some(end) = self.bytes.get_mut(self.length) {
+            *end = 0;
+            // SAFETY: the text ends with a zero.
+            unsafe { call(WRITE0, self.bytes.as_ptr().cast()) };
+        }
+        self.length = 0;
+    }
+}
+
+impl Write for Console {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for &byte in text.as_bytes() {
+            if self.length + 1 >= self.bytes.len() {
+                self.flush();
+            }
+            if let Some(target) = self.bytes.get_mut(self.length) {
+                *target = byte;
+                self.length += 1;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Prints a message.
+pub(crate) fn print(message: fmt::Arguments) {
+    let mut console = Console { bytes: [0; 128], length: 0 };
+    // Writing to a console does not fail.
+    let _ = console.write_fmt(message);
+    console.flush();
+}
+
+/// Prints a message and ends the program with an exit status that tells of a failure.
+pub(crate) fn fail(message: fmt::Arguments) -> ! {
+    print(message);
+    let exit = [APPLICATION_EXIT, FAILED];
+    // SAFETY: the two words that this operation takes.
+    unsafe { call(EXIT_EXTENDED, exit.as_ptr().cast()) };
+    loop {
+        core::hint::spin_loop();
+    }
+}

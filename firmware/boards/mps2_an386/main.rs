@@ -1,0 +1,18 @@
+//! The card on Arm's MPS2 board with the image AN386 (Cortex-M4F), as QEMU's machine `mps2-an386` emulates it.
+#![no_std]
+#![no_main]
+
+#[path = "../common/mod.rs"]
+mod common;
+#[expect(unsafe_code, reason = "registers, and instructions that no function stands for")]
+mod hardware;
+
+use cortex_m_rt::entry;
+
+use self::common::run;
+use self::hardware::Mps2An386;
+
+#[entry]
+fn main() -> ! {
+    run::<Mps2An386>();
+}

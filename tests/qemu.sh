@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Builds the image of a board and starts it in QEMU, until it is interrupted.
+# On a pty, QEMU prints the path to be used as --card serial:PATH. What the image tells of itself goes to standard error.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+usage() {
+    echo "usage: $0 mps2-an386|virt [pty|unix:PATH]" >&2
+    exit 2
+}
+
+case "${1:-}" in
+mps2-an386)
+    image=mps2-an386 target=thumbv7em-none-eabihf package=qemu-system-arm
+    qemu=(qemu-system-arm -machine mps2-an386)
+    ;;
+virt)
+    image=virt-riscv32 target=riscv32imafc-unknown-none-elf package=qemu-system-misc
+    qemu=(qemu-system-riscv32 -machine virt -bios none -m 64M)
+    ;;
+*) usage ;;
+esac
+case "${2:-pty}" in
+pty) serial=pty ;;
+unix:?*) serial="$2,server=on,wait=off" ;;
+*) usage ;;
+esac
+
+command -v "${qemu[0]}" >/dev/null || {
+    echo "$0: ${qemu[0]} is missing; run: sudo apt-get install $package" >&2
+    exit 1
+}
+"${CARGO:-cargo}" build --quiet --locked -p photoncard-firmware --bin "$image" --features "board-$image" \
+    --target "$target" --profile card
+exec "${qemu[@]}" -display none -monitor none -serial "$serial" \
+    -semihosting-config enable=on,target=native \
+    -kernel "${CARGO_TARGET_DIR:-target}/$target/card/$image"

@@ -1,0 +1,152 @@
+//! The firmware's images on the machines that QEMU emulates render what the emulated card renders, bit for bit.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::{Duration, Instant};
+
+use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::scene::gltf;
+use photoncard_shared::budget::MICRO;
+use photoncard_tests::render_or_panic;
+
+/// How long a machine may take to be built and to start.
+const START: Duration = Duration::from_secs(600);
+/// Prints a line that is seen although the test passes.
+fn say(line: &str) {
+    // Where there is nobody to read it the test goes on.
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// A running machine, with its image.
+struct Machine {
+    process: Child,
+    /// What QEMU and the image print.
+    lines: Receiver<String>,
+}
+
+/// Sends the lines of a stream.
+fn forward(stream: impl Read + Send + 'static, sender: Sender<String>) {
+    std::thread::spawn(move || {
+        for line in BufReader::new(stream).lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                break;
+            }
+        }
+    });
+}
+
+impl Machine {
+    /// Starts a machine and waits until its image is ready. Returns where its UART is as well.
+    fn start(name: &str) -> (Self, CardAddress) {
+        let mut process = Command::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("qemu.sh"))
+            .args([name, "pty"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("tests/qemu.sh starts");
+        let (sender, lines) = channel();
+        forward(process.stdout.take().expect("it is piped"), sender.clone());
+        forward(process.stderr.take().expect("it is piped"), sender);
+        let mut machine = Self { process, lines };
+        let start = Instant::now();
+        let (mut address, mut is_ready) = (None, false);
+        while address.is_none() || !is_ready {
+            let line = machine.next_line(name, START.saturating_sub(start.elapsed()));
+            is_ready |= line == "ready";
+            if let Some(path) = line.split(' ').find(|word| word.starts_with("/dev/")) {
+                address = Some(format!("serial:{path}").parse().expect("an address"));
+            }
+        }
+        (machine, address.expect("the loop ends with one"))
+    }
+
+    fn next_line(&mut self, name: &str, wait: Duration) -> String {
+        match self.lines.recv_timeout(wait) {
+            Ok(line) => {
+                say(&format!("{name}: {line}"));
+                line
+            }
+            Err(RecvTimeoutError::Timeout) => panic!("{name} is not ready"),
+            Err(RecvTimeoutError::Disconnected) => panic!(
+                "{name} ended: {}; to leave these tests out, set PHOTONCARD_SKIP_QEMU to the reason",
+                self.process.wait().expect("it was started")
+            ),
+        }
+    }
+
+    /// The most bytes of the stack that were in use, and its size, as the image says when it is idle.
+    fn stack(&self, name: &str) -> Option<(usize, usize)> {
+        let mut last = None;
+        while let Ok(line) = self.lines.recv_timeout(Duration::from_millis(500)) {
+            say(&format!("{name}: {line}"));
+            let numbers: Vec<usize> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
+            if let (true, [used, size]) = (line.starts_with("stack "), &numbers[..]) {
+                last = Some((*used, *size));
+            }
+        }
+        last
+    }
+}
+
+impl Drop for Machine {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// The Cornell box as a small frame, with as many gather rays as `PHOTONCARD_QEMU_GATHER_RAYS` says.
+fn settings() -> RenderSettings {
+    let gather_rays = std::env::var("PHOTONCARD_QEMU_GATHER_RAYS").map(|text| text.parse());
+    RenderSettings {
+        width: 64,
+        height: 64,
+        photons: 20_000,
+        gather_rays: gather_rays.unwrap_or(Ok(4)).expect("a number of gather rays"),
+        irradiance_error: None,
+        cards: vec!["emulated-micro:1".parse().expect("a card")],
+        ..RenderSettings::default()
+    }
+}
+
+fn renders_as_the_emulated_card(name: &str) {
+    if let Ok(reason) = std::env::var("PHOTONCARD_SKIP_QEMU") {
+        say(&format!("SKIPPED: {name} is not tested, as PHOTONCARD_SKIP_QEMU is set: {reason}"));
+        return;
+    }
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell.gltf");
+    let scene = gltf::load(&path).expect("a shipped scene loads");
+    let (machine, address) = Machine::start(name);
+    let cached = RenderSettings { irradiance_error: Some(0.1), ..settings() };
+    for (settings, is_loaded) in [(settings(), false), (cached, true)] {
+        let expected = render_or_panic(&scene, &settings).film;
+        let remote = RenderSettings { cards: vec![address.clone()], ..settings };
+        let rendering = render_or_panic(&scene, &remote);
+        let (statistics, pixels) = (&rendering.statistics, rendering.film.pixels());
+        say(&format!(
+            "{name}: load {:.1} s, render {:.1} s, {} gathers, {:?}",
+            statistics.time_s.load, statistics.time_s.render, statistics.gathers, statistics.link
+        ));
+        for (index, (pixel, expected)) in pixels.iter().zip(expected.pixels()).enumerate() {
+            assert_eq!(pixel.to_bytes(), expected.to_bytes(), "pixel {index}: {pixel:?}, not {expected:?}");
+        }
+        // The image that is there already is not sent again.
+        assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, is_loaded);
+    }
+    let (used, size) = machine.stack(name).expect("the image tells how much of its stack is used");
+    assert!(used < size && size <= MICRO.stack_bytes as usize);
+}
+
+#[test]
+fn an_arm_board_renders_the_same_picture() {
+    renders_as_the_emulated_card("mps2-an386");
+}
+
+#[test]
+fn a_risc_v_board_renders_the_same_picture() {
+    renders_as_the_emulated_card("virt");
+}
