@@ -7,7 +7,7 @@ use photoncard_driver::emulator::ChipKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
-use photoncard_driver::link::ListenAddress;
+use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
@@ -165,6 +165,10 @@ pub(crate) struct RenderOptions {
     /// repeated [default: a chip a core]
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
+    /// Make the links to the cards bad ones, to try how that is repaired: rates a byte as flips=1e-5,drops=1e-6,repeats=1e-6,
+    /// delays=1e-3,seed=1
+    #[arg(long, value_name = "FAULTS")]
+    faults: Option<LineFaults>,
     /// Model the memory of emulated chips, and tell in the statistics what was read of it
     #[arg(long)]
     pub(crate) counters: bool,
@@ -324,6 +328,7 @@ impl RenderOptions {
             bins: self.bins,
             queue: self.queue,
             cards: if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() },
+            faults: self.faults,
             caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
             trace: self.trace.clone(),
         })

@@ -7,6 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
+use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{CardAddress, RenderSettings};
 use photoncard_driver::scene::gltf;
 use photoncard_shared::budget::MICRO;
@@ -113,6 +114,13 @@ fn settings() -> RenderSettings {
     }
 }
 
+/// The bad lines that are tried: those that `PHOTONCARD_QEMU_FAULTS` says, with blanks between them.
+fn faults() -> Vec<LineFaults> {
+    let asked = std::env::var("PHOTONCARD_QEMU_FAULTS");
+    let asked = asked.as_deref().unwrap_or("flips=1e-4,drops=1e-5,repeats=1e-5,delays=0.01,seed=1");
+    asked.split_whitespace().map(|faults| faults.parse().expect("faults of a line")).collect()
+}
+
 fn renders_as_the_emulated_card(name: &str) {
     if let Ok(reason) = std::env::var("PHOTONCARD_SKIP_QEMU") {
         say(&format!("SKIPPED: {name} is not tested, as PHOTONCARD_SKIP_QEMU is set: {reason}"));
@@ -122,20 +130,29 @@ fn renders_as_the_emulated_card(name: &str) {
     let scene = gltf::load(&path).expect("a shipped scene loads");
     let (machine, address) = Machine::start(name);
     let cached = RenderSettings { irradiance_error: Some(0.1), ..settings() };
-    for (settings, is_loaded) in [(settings(), false), (cached, true)] {
+    // Other photons: another image, of which the card has little.
+    let mut renders = vec![(settings(), None), (cached, None)];
+    for (seed, faults) in (1..).zip(faults()) {
+        renders.push((RenderSettings { seed, photons: 5_000, ..settings() }, Some(faults)));
+    }
+    for (number, (settings, faults)) in renders.into_iter().enumerate() {
         let expected = render_or_panic(&scene, &settings).film;
-        let remote = RenderSettings { cards: vec![address.clone()], ..settings };
+        let remote = RenderSettings { cards: vec![address.clone()], faults, ..settings };
         let rendering = render_or_panic(&scene, &remote);
         let (statistics, pixels) = (&rendering.statistics, rendering.film.pixels());
         say(&format!(
-            "{name}: load {:.1} s, render {:.1} s, {} gathers, {:?}",
-            statistics.time_s.load, statistics.time_s.render, statistics.gathers, statistics.link
+            "{name}: {}load {:.1} s, render {:.1} s, {} gathers, {:?}",
+            faults.map_or(String::new(), |faults| format!("{faults}: ")),
+            statistics.time_s.load,
+            statistics.time_s.render,
+            statistics.gathers,
+            statistics.link
         ));
         for (index, (pixel, expected)) in pixels.iter().zip(expected.pixels()).enumerate() {
             assert_eq!(pixel.to_bytes(), expected.to_bytes(), "pixel {index}: {pixel:?}, not {expected:?}");
         }
         // The image that is there already is not sent again.
-        assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, is_loaded);
+        assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, number == 1);
     }
     let (used, size) = machine.stack(name).expect("the image tells how much of its stack is used");
     assert!(used < size && size <= MICRO.stack_bytes as usize);

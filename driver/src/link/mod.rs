@@ -2,9 +2,10 @@
 //!
 //! A card in this process is on a [`loopback`]; others are reached over serial ports ([`open_serial`]) and sockets
 //! ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the other side: where hosts come to a card that this process
-//! emulates, one after another ([`HostPort`]).
+//! emulates, one after another ([`HostPort`]). A [`FaultInjector`] makes any of them a bad one.
 
 mod error;
+mod fault_injector;
 mod host_port;
 mod listener;
 mod loopback;
@@ -19,6 +20,7 @@ mod serial;
 mod unsupported;
 
 pub use error::LinkError;
+pub use fault_injector::{FaultInjector, LineFaults};
 pub use host_port::HostPort;
 pub use listener::{ListenAddress, Listener};
 pub use loopback::{LoopbackPort, loopback};

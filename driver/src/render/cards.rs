@@ -12,8 +12,8 @@ use photoncard_shared::link::{Port, PortError};
 
 use super::address::{CardAddress, MAX_CHIPS};
 use super::open_card::OpenCard;
-use super::{Observer, Phase, RenderError, Unobserved};
-use crate::emulator::memory_model::{CacheSettings, MemoryTraffic};
+use super::{Observer, Phase, RenderError, RenderSettings, Unobserved};
+use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{ChipKind, MemoryModel};
 use crate::session::{Job, LinkBytes, Picture, Session, SessionError};
@@ -87,7 +87,7 @@ pub struct CardInfo {
 /// If it cannot be started or reached, or does not answer as it should.
 pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
     let nothing = Mutex::new(Picture::empty()?);
-    let card = OpenCard::open(0, address, None)?;
+    let card = OpenCard::open(0, address, None, None)?;
     let connected = greet(card, &nothing, Instant::now(), &Unobserved)?;
     Ok(CardInfo { build: connected.session.build().to_owned(), budget: connected.budget })
 }
@@ -98,7 +98,7 @@ pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
 /// If it cannot be started or reached, or does not answer as it should.
 pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, RenderError> {
     let nothing = Mutex::new(Picture::empty()?);
-    let mut card = OpenCard::open(0, address, None)?;
+    let mut card = OpenCard::open(0, address, None, None)?;
     let mut answers = Vec::with_capacity(count);
     for _ in 0..count {
         let start = Instant::now();
@@ -144,15 +144,17 @@ struct CardOutcome {
 const WAIT: Duration = Duration::from_millis(20);
 
 impl Cards {
-    /// Starts all cards and says hello to each. With `caches` their memory is modelled, that of the first with `trace`.
+    /// Starts all cards and says hello to each. Their memory is modelled if the settings say so, that of the
+    /// first with `trace`.
     pub(super) fn connect(
-        addresses: &[CardAddress],
-        caches: Option<CacheSettings>,
+        settings: &RenderSettings,
         mut trace: Option<TraceFile>,
         picture: &Mutex<Picture>,
         observer: &dyn Observer,
     ) -> Result<Self, RenderError> {
         let start = Instant::now();
+        let RenderSettings { cards: addresses, faults, .. } = settings;
+        let caches = settings.modelled_caches();
         check_chips(addresses.iter().map(CardAddress::emulated_chips).sum())?;
         let each_card = addresses
             .iter()
@@ -161,7 +163,7 @@ impl Cards {
             .enumerate()
             .map(|(index, address)| {
                 let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
-                greet(OpenCard::open(index, address, model)?, picture, start, observer)
+                greet(OpenCard::open(index, address, model, *faults)?, picture, start, observer)
             })
             .collect();
         Ok(Self { cards: cards?, start })
@@ -245,7 +247,7 @@ pub(super) fn lock(picture: &Mutex<Picture>) -> MutexGuard<'_, Picture> {
 /// Moves bytes once in each direction, and waits a little if there are none.
 fn exchange(
     session: &mut Session,
-    port: &mut dyn Port,
+    port: &mut OpenCard,
     picture: &Mutex<Picture>,
     start: Instant,
 ) -> Result<(), SessionError> {
@@ -278,7 +280,7 @@ fn greet(
         if observer.is_stopped() {
             return Err(RenderError::Stopped);
         }
-        exchange(&mut session, card.port(), picture, start).map_err(|source| match source {
+        exchange(&mut session, &mut card, picture, start).map_err(|source| match source {
             SessionError::Port(PortError::Closed) => RenderError::Refused { card: card.name() },
             source => RenderError::Card { card: card.name(), source },
         })?;
@@ -328,7 +330,7 @@ fn render_on(connected: Connected, job: Job, shared: &Shared) -> Result<CardOutc
     let mut outcome = CardOutcome::default();
     let mut is_lost = false;
     while !shared.is_complete()? && !card.trace_has_failed() {
-        let result = exchange(&mut session, card.port(), shared.picture, shared.start);
+        let result = exchange(&mut session, &mut card, shared.picture, shared.start);
         match result {
             Ok(()) if is_lost && session.is_loaded() => {
                 is_lost = false;

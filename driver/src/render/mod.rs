@@ -98,7 +98,7 @@ pub fn render(
     }
     let picture = Mutex::new(Picture::empty()?);
     let trace = settings.trace.as_deref().map(TraceFile::create).transpose()?;
-    let cards = Cards::connect(&settings.cards, settings.modelled_caches(), trace, &picture, observer)?;
+    let cards = Cards::connect(settings, trace, &picture, observer)?;
     for budget in cards.budgets() {
         settings.check(&budget)?;
     }

@@ -1,17 +1,20 @@
 //! A card at the host's end of its link.
 
-use photoncard_shared::link::Port;
+use std::time::Duration;
+
+use photoncard_shared::link::{Port, PortError};
 
 use super::RenderError;
 use super::address::CardAddress;
 use crate::emulator::{ChipKind, EmulatedCard, MemoryModel, MemoryRecord};
-use crate::link::{LinkError, connect_tcp, connect_unix, open_serial};
+use crate::link::{FaultInjector, LineFaults, LinkError, connect_tcp, connect_unix, open_serial};
 
 /// A card that can be talked to.
 pub(super) struct OpenCard {
     /// Its number.
     index: usize,
     place: Place,
+    injector: Option<FaultInjector>,
 }
 
 enum Place {
@@ -26,6 +29,7 @@ impl OpenCard {
         index: usize,
         address: &CardAddress,
         model: Option<MemoryModel>,
+        faults: Option<LineFaults>,
     ) -> Result<Self, RenderError> {
         let place = match reach(address) {
             Err(kind) => {
@@ -37,7 +41,8 @@ impl OpenCard {
                 Place::Remote { address: address.clone(), port }
             }
         };
-        Ok(Self { index, place })
+        let injector = faults.map(|faults| FaultInjector::new(faults, index));
+        Ok(Self { index, place, injector })
     }
 
     /// Tries to reach a card again whose link was closed. Returns whether it is there; `None` of one that cannot come back.
@@ -48,14 +53,6 @@ impl OpenCard {
                 let found = reach(address).ok()?;
                 Some(found.map(|found| *port = found).is_ok())
             }
-        }
-    }
-
-    /// The host's end of the link.
-    pub(super) fn port(&mut self) -> &mut dyn Port {
-        match &mut self.place {
-            Place::Emulated(card) => card.port(),
-            Place::Remote { port, .. } => port.as_mut(),
         }
     }
 
@@ -77,6 +74,34 @@ impl OpenCard {
         match self.place {
             Place::Emulated(card) => card.finish(),
             Place::Remote { .. } => None,
+        }
+    }
+}
+
+impl Place {
+    fn port(&mut self) -> &mut dyn Port {
+        match self {
+            Self::Emulated(card) => card.port(),
+            Self::Remote { port, .. } => port.as_mut(),
+        }
+    }
+}
+
+/// The host's end of the link.
+impl Port for OpenCard {
+    fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
+        let port = self.place.port();
+        match &mut self.injector {
+            None => port.read(buffer, wait),
+            Some(injector) => injector.read(port, buffer, wait),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
+        let port = self.place.port();
+        match &mut self.injector {
+            None => port.write(bytes, wait),
+            Some(injector) => injector.write(port, bytes, wait),
         }
     }
 }

@@ -12,6 +12,7 @@ use photoncard_shared::message::{self, FrameParameters, Sampling};
 use super::{CardAddress, RenderError, cards};
 use crate::emulator::memory_model::CacheSettings;
 use crate::film::Window;
+use crate::link::LineFaults;
 use crate::photon::{PhotonLayout, PhotonSettings};
 use crate::scene::Camera;
 use crate::scheduler::GatherOrder;
@@ -57,6 +58,8 @@ pub struct RenderSettings {
     pub queue: Option<u32>,
     /// The cards to render on.
     pub cards: Vec<CardAddress>,
+    /// What the links to the cards do to bytes, to try how that is repaired; `None` for nothing.
+    pub faults: Option<LineFaults>,
     /// The caches that a chip's memory is modelled with; `None` to model none, which costs nothing.
     pub caches: Option<CacheSettings>,
     /// The file that every read of the chip is written to. It takes one chip; without `caches` those of the default.
@@ -86,6 +89,7 @@ impl Default for RenderSettings {
             bins: None,
             queue: None,
             cards: vec![CardAddress::default()],
+            faults: None,
             caches: None,
             trace: None,
         }

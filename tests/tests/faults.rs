@@ -1,0 +1,48 @@
+//! A render over bad lines is the same picture, and tells what was repaired.
+
+use photoncard_driver::film::PixelValue;
+use photoncard_driver::render::{RenderSettings, Statistics};
+use photoncard_driver::scene::gltf;
+use photoncard_tests::render_or_panic;
+
+fn settings() -> RenderSettings {
+    RenderSettings {
+        width: 40,
+        height: 40,
+        photons: 5_000,
+        gather_rays: 2,
+        cards: vec!["emulated:2".parse().expect("cards"), "emulated-micro:1".parse().expect("a card")],
+        ..RenderSettings::default()
+    }
+}
+
+fn render(faults: Option<&str>) -> (Vec<PixelValue>, Statistics) {
+    let path = format!("{}/../scenes/cornell.gltf", env!("CARGO_MANIFEST_DIR"));
+    let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
+    let faults = faults.map(|faults| faults.parse().expect("faults"));
+    let rendering = render_or_panic(&scene, &RenderSettings { faults, ..settings() });
+    (rendering.film.pixels().to_vec(), rendering.statistics)
+}
+
+#[test]
+fn bad_lines_render_the_same_picture() {
+    let (expected, sound) = render(None);
+    assert_eq!((sound.link.damaged_frames, sound.link.resets), (0, 0));
+    for faults in [
+        "flips=1e-6,seed=1",
+        "flips=1e-5,seed=2",
+        "flips=1e-4,seed=3",
+        "drops=1e-4,seed=4",
+        "repeats=1e-4,seed=5",
+        "delays=0.05,seed=6",
+        "flips=1e-4,drops=1e-4,repeats=1e-4,delays=0.01,seed=7",
+    ] {
+        let (pixels, statistics) = render(Some(faults));
+        assert!(pixels == expected, "{faults}: another picture");
+        println!("{faults}: {:?}", statistics.link);
+        if faults.contains("1e-4") {
+            assert!(statistics.link.retransmitted_frames > 0, "{faults}: {:?}", statistics.link);
+        }
+        assert_eq!(statistics.gathers, sound.gathers, "{faults}");
+    }
+}
