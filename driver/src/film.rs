@@ -1,6 +1,7 @@
 //! The picture while it is being rendered: what is known of each pixel of the crop window.
 
 pub use photoncard_shared::message::Pixel as PixelValue;
+use photoncard_shared::message::Tile;
 use thiserror::Error;
 
 /// The most pixels a film may hold: 2^28, about 10 GiB.
@@ -173,6 +174,14 @@ impl Film {
     /// Whether every pixel of the crop window was written.
     pub fn is_complete(&self) -> bool {
         self.missing == 0
+    }
+
+    /// Whether every pixel of a tile was written.
+    pub fn has(&self, tile: &Tile) -> bool {
+        let mut rows = tile.y..tile.y + tile.height;
+        rows.all(|y| {
+            (tile.x..tile.x + tile.width).all(|x| self.index(x, y).is_some_and(|index| self.written[index]))
+        })
     }
 
     fn index(&self, x: u32, y: u32) -> Option<usize> {

@@ -11,6 +11,7 @@ pub mod film;
 pub mod link;
 pub mod output;
 pub mod pack;
+pub mod partial;
 pub mod photon;
 pub mod preview;
 pub mod render;

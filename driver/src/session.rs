@@ -26,6 +26,7 @@ use photoncard_shared::transport::{Event, LineStatistics, Transport};
 use self::clock::Clock;
 use self::load::Load;
 use crate::film::{Film, FilmError, Window};
+use crate::partial::PartialRender;
 use crate::scheduler::Scheduler;
 
 /// What sessions work on together.
@@ -34,6 +35,8 @@ pub struct Picture {
     pub scheduler: Scheduler,
     /// Where pixels go.
     pub film: Film,
+    /// Where finished tiles are kept, if they are.
+    pub partial: Option<PartialRender>,
 }
 
 impl Picture {
@@ -43,7 +46,7 @@ impl Picture {
     /// If there is no memory for a pixel.
     pub fn empty() -> Result<Self, FilmError> {
         let film = Film::new(1, 1, Window::full(1, 1))?;
-        Ok(Self { scheduler: Scheduler::new(Vec::new()), film })
+        Ok(Self { scheduler: Scheduler::new(Vec::new()), film, partial: None })
     }
 }
 
@@ -431,6 +434,10 @@ impl<'a> Session<'a> {
         match self.tiles.remove(&tile) {
             Some(in_flight) if in_flight.pixels == in_flight.tile.pixels() => {
                 picture.scheduler.complete();
+                let Picture { film, partial, .. } = picture;
+                if let Some(partial) = partial {
+                    partial.keep(&in_flight.tile, film);
+                }
                 Ok(())
             }
             _ => Err(SessionError::Unexpected("a tile that is not complete")),

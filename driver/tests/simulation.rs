@@ -150,7 +150,7 @@ impl Fixture {
         let RenderSettings { width, height, tile, order, .. } = self.settings;
         let window = self.settings.window();
         let film = Film::new(width, height, window).unwrap();
-        Picture { scheduler: Scheduler::new(tiles(window, tile, order)), film }
+        Picture { scheduler: Scheduler::new(tiles(window, tile, order)), film, partial: None }
     }
 }
 

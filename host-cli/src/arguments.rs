@@ -8,6 +8,7 @@ use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
 use photoncard_driver::link::{LineFaults, ListenAddress};
+use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
@@ -165,6 +166,10 @@ pub(crate) struct RenderOptions {
     /// repeated [default: a chip a core]
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
+    /// Go on with a render that was stopped or has failed: the tiles it finished are kept beside the picture, in
+    /// OUT.exr.partial, until that is written
+    #[arg(long)]
+    resume: bool,
     /// Make the links to the cards bad ones, to try how that is repaired: rates a byte as flips=1e-5,drops=1e-6,repeats=1e-6,
     /// delays=1e-3,seed=1
     #[arg(long, value_name = "FAULTS")]
@@ -329,9 +334,17 @@ impl RenderOptions {
             queue: self.queue,
             cards: if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() },
             faults: self.faults,
+            partial: Some(PartialSettings { path: self.partial_path(), resume: self.resume }),
             caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
             trace: self.trace.clone(),
         })
+    }
+
+    /// Where finished tiles are kept until the picture is written.
+    pub(crate) fn partial_path(&self) -> PathBuf {
+        let mut name = self.output.clone().into_os_string();
+        name.push(".partial");
+        name.into()
     }
 
     /// The name of the sampling.

@@ -56,8 +56,14 @@ impl Observer for Progress {
         self.stopped.load(Ordering::Relaxed)
     }
 
+    fn resumed(&self, done: usize, total: usize) {
+        if self.display.is_some() {
+            say(format_args!("photoncard: {done} of {total} tiles were rendered before"));
+        }
+    }
+
     fn lost(&self, card: &str, error: &SessionError) {
-        say(format_args!("{card} is lost: {error}; the others render its tiles"));
+        say(format_args!("photoncard: {card} is lost: {error}; the others render its tiles"));
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
+use photoncard_driver::partial::remove_partial;
 use photoncard_driver::render::{
     MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
 };
@@ -31,10 +32,16 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let progress = Progress::start(options.quiet).map_err(|error| Failure::work_error(&error))?;
     let result = on_threads(options.threads, || render(&scene, &settings, &progress))?;
     progress.finish();
-    let mut rendering = result?;
+    let mut rendering = result.inspect_err(|error| {
+        let path = options.partial_path();
+        if !error.is_input() && path.exists() {
+            say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
+        }
+    })?;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
     write(options, &settings, &rendering)?;
+    remove_partial(&options.partial_path()).map_err(Failure::work)?;
     if let Some(memory) = rendering.statistics.memory.as_ref().filter(|_| !options.quiet) {
         tell_memory(memory, &rendering.statistics);
     }

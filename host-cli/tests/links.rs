@@ -3,47 +3,11 @@
 
 mod support;
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader};
 use std::net::{TcpListener, TcpStream};
-use std::process::{Child, Command, Stdio};
+use std::process::Stdio;
 
-use support::{Outcome, Room, shipped, small_render};
-
-/// A card that another process serves, until it is dropped.
-struct Emulator {
-    process: Child,
-    address: String,
-}
-
-impl Emulator {
-    fn start(room: &Room, listen: &str, options: &[&str]) -> Self {
-        let mut command = room.command();
-        command.args(["emulate", "--listen", listen]).args(options);
-        let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        let mut address = String::new();
-        BufReader::new(process.stdout.as_mut().unwrap()).read_line(&mut address).unwrap();
-        assert!(address.ends_with('\n'), "{address:?}");
-        Self { process, address: address.trim_end().to_owned() }
-    }
-
-    /// Ends it by a signal. Returns its exit status and what it said.
-    fn end(mut self, signal: &str) -> (Option<i32>, String) {
-        let id = self.process.id().to_string();
-        assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
-        let status = self.process.wait().unwrap().code();
-        let mut said = String::new();
-        self.process.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-        (status, said)
-    }
-}
-
-impl Drop for Emulator {
-    fn drop(&mut self) {
-        // Both fail if it has ended.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
+use support::{Emulator, Outcome, Room, shipped, small_render};
 
 const LISTEN: [&str; 3] = ["tcp:", "unix:card", "pty"];
 

@@ -303,7 +303,11 @@ impl Shared<'_> {
         if self.failed.load(Ordering::Relaxed) || self.observer.is_stopped() {
             return Err(RenderError::Stopped);
         }
-        Ok(lock(self.picture).scheduler.is_complete())
+        let mut picture = lock(self.picture);
+        if let Some(partial) = &mut picture.partial {
+            partial.check().inspect_err(|_| self.failed.store(true, Ordering::Relaxed))?;
+        }
+        Ok(picture.scheduler.is_complete())
     }
 
     /// A card is lost; the others go on with its tiles.

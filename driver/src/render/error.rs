@@ -8,6 +8,7 @@ use crate::film::FilmError;
 use crate::link::LinkError;
 use crate::output::OutputError;
 use crate::pack::PackError;
+use crate::partial::PartialError;
 use crate::photon::PhotonError;
 use crate::session::SessionError;
 
@@ -85,6 +86,10 @@ pub enum RenderError {
         #[diagnostic_source]
         source: SessionError,
     },
+    /// Finished tiles cannot be kept, or gone on with.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Partial(#[from] PartialError),
     /// The trace cannot be written.
     #[error(transparent)]
     Trace(#[from] OutputError),
@@ -126,6 +131,7 @@ impl RenderError {
     pub fn is_input(&self) -> bool {
         match self {
             Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,
+            Self::Partial(error) => !matches!(error, PartialError::File { .. }),
             Self::Trace(error) => !matches!(error, OutputError::Write { .. }),
             Self::Image(_)
             | Self::Start { .. }

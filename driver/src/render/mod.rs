@@ -31,6 +31,7 @@ use crate::emulator::trace::TraceFile;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 use crate::film::Film;
 use crate::pack::PackedScene;
+use crate::partial::PartialRender;
 use crate::photon::{MappedImage, map_photons};
 use crate::scene::{Camera, Scene};
 use crate::scheduler::{GatherOrder, Scheduler, tiles};
@@ -56,6 +57,9 @@ pub trait Observer: Sync {
 
     /// Whether the render is to stop as soon as it can.
     fn is_stopped(&self) -> bool;
+
+    /// Tells that so many of all tiles were rendered before.
+    fn resumed(&self, _done: usize, _total: usize) {}
 
     /// Tells that a card was lost; the others go on with its tiles.
     fn lost(&self, _card: &str, _error: &SessionError) {}
@@ -103,12 +107,19 @@ pub fn render(
         settings.check(&budget)?;
     }
     // Not before the settings are known to be possible: a film may be large.
-    let film = Film::new(settings.width, settings.height, settings.window())?;
+    let mut film = Film::new(settings.width, settings.height, settings.window())?;
+    let begin = |partial| PartialRender::begin(partial, settings.identity(scene), &mut film);
+    let partial = settings.partial.as_ref().map(begin).transpose()?;
+    let mut all = tiles(settings.window(), settings.tile, settings.order);
+    let count = all.len();
+    all.retain(|tile| !film.has(tile));
+    if all.len() < count {
+        observer.resumed(count - all.len(), count);
+    }
     let mut times = Times::default();
     let prepared = prepare(scene, settings, cards.budgets(), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance);
-    let scheduler = Scheduler::new(tiles(settings.window(), settings.tile, settings.order));
-    *cards::lock(&picture) = Picture { scheduler, film };
+    *cards::lock(&picture) = Picture { scheduler: Scheduler::new(all), film, partial };
     let job =
         Job { image: prepared.image.lines(), checksum: checksum(prepared.image.lines()), frame: &frame };
     let outcome = cards.run(job, &picture, observer)?;
@@ -116,7 +127,7 @@ pub fn render(
     times.render = outcome.render_seconds;
     times.total = start.elapsed().as_secs_f64();
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
-    let film = picture.into_inner().unwrap_or_else(PoisonError::into_inner).film;
+    let Picture { film, .. } = picture.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok(Rendering { film, statistics })
 }
 

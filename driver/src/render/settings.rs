@@ -7,14 +7,17 @@ pub use photoncard_firmware::card::LEAST_IRRADIANCE_ERROR;
 use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::{Budget, MOST_BINS};
+use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, FrameParameters, Sampling};
+use serde_json::{Value, json};
 
 use super::{CardAddress, RenderError, cards};
 use crate::emulator::memory_model::CacheSettings;
 use crate::film::Window;
 use crate::link::LineFaults;
+use crate::partial::PartialSettings;
 use crate::photon::{PhotonLayout, PhotonSettings};
-use crate::scene::Camera;
+use crate::scene::{Camera, Scene};
 use crate::scheduler::GatherOrder;
 
 /// The settings of a render; each field is an option of the command line.
@@ -62,6 +65,9 @@ pub struct RenderSettings {
     pub faults: Option<LineFaults>,
     /// The caches that a chip's memory is modelled with; `None` to model none, which costs nothing.
     pub caches: Option<CacheSettings>,
+    /// Where finished tiles are kept until the picture is written; `None` to keep none. Not with the order `hilbert`, which has
+    /// no finished tiles before the end.
+    pub partial: Option<PartialSettings>,
     /// The file that every read of the chip is written to. It takes one chip; without `caches` those of the default.
     pub trace: Option<PathBuf>,
 }
@@ -90,6 +96,7 @@ impl Default for RenderSettings {
             queue: None,
             cards: vec![CardAddress::default()],
             faults: None,
+            partial: None,
             caches: None,
             trace: None,
         }
@@ -103,6 +110,28 @@ const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 const MAX_PHOTONS: usize = 1 << 27;
 
 impl RenderSettings {
+    /// All that the pixels depend on, by name.
+    pub fn identity(&self, scene: &Scene) -> Value {
+        let window = self.window();
+        json!({
+            "program": concat!("photoncard ", env!("CARGO_PKG_VERSION")),
+            "layout": LAYOUT_VERSION,
+            "scene": scene.checksum(),
+            "size": [self.width, self.height],
+            "crop": [window.x0, window.x1, window.y0, window.y1],
+            "camera": self.camera,
+            "seed": self.seed,
+            "photons": self.photons,
+            "neighbors": self.neighbors,
+            "max-distance": self.max_distance,
+            "gather-rays": self.gather_rays,
+            "shadow-rays": self.shadow_rays,
+            "spp": self.samples,
+            "sampling": format!("{:?}", self.sampling),
+            "irradiance-cache": self.irradiance_error,
+        })
+    }
+
     /// The part to render.
     pub fn window(&self) -> Window {
         self.crop.unwrap_or(Window::full(self.width, self.height))

@@ -6,7 +6,10 @@ pub mod gltf;
 mod material;
 mod settings;
 
+use std::fmt::Write;
+
 use glam::Vec3;
+use photoncard_shared::frame::Checksum;
 
 pub use self::material::MAX_EXPONENT;
 use crate::error::SceneError;
@@ -32,6 +35,22 @@ impl Scene {
         let mut vertices = self.triangles.iter().flat_map(|triangle| triangle.vertices);
         let first = vertices.next().unwrap_or(Vec3::ZERO);
         vertices.fold((first, first), |(low, high), vertex| (low.min(vertex), high.max(vertex)))
+    }
+
+    /// A checksum of all that a render takes from the scene, as text.
+    pub fn checksum(&self) -> String {
+        let mut sum = Checksum::default();
+        for triangle in &self.triangles {
+            for vertex in triangle.vertices {
+                vertex.to_array().iter().for_each(|coordinate| sum.update(&coordinate.to_le_bytes()));
+            }
+            sum.update(&triangle.material.to_le_bytes());
+        }
+        let mut text = String::new();
+        // Floating-point numbers are written so that they read back the same.
+        let _ = write!(text, "{:?}{:?}", self.materials, self.cameras);
+        sum.update(text.as_bytes());
+        format!("{:08x}", sum.value())
     }
 
     /// The camera of that name, or the first one.

@@ -1,10 +1,8 @@
 //! Where points are measured: finished ones are found again, and points that share a photon map share it.
 
 use std::collections::HashMap;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use photoncard_shared::frame::Checksum;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Deserialize, Serialize};
 
@@ -146,7 +144,7 @@ impl<'a> Laboratory<'a> {
                 return Err(StudyError::NoScene { scene: file, folder: self.scenes.clone() });
             }
             let scene = gltf::load(&path)?;
-            let digest = digest(&scene);
+            let digest = scene.checksum();
             self.loaded.insert(file, LoadedScene { scene, digest });
         }
         Ok(&self.loaded[file])
@@ -227,22 +225,6 @@ fn sharing_images(points: &[Point]) -> Vec<Point> {
         }
     }
     images.into_iter().flat_map(|(_, sharing)| sharing).collect()
-}
-
-/// A checksum of all that a render takes from a scene.
-fn digest(scene: &Scene) -> String {
-    let mut sum = Checksum::default();
-    for triangle in &scene.triangles {
-        for vertex in triangle.vertices {
-            vertex.to_array().iter().for_each(|coordinate| sum.update(&coordinate.to_le_bytes()));
-        }
-        sum.update(&triangle.material.to_le_bytes());
-    }
-    let mut text = String::new();
-    // Floating-point numbers are written so that they read back the same.
-    let _ = write!(text, "{:?}{:?}", scene.materials, scene.cameras);
-    sum.update(text.as_bytes());
-    format!("{:08x}", sum.value())
 }
 
 #[cfg(test)]

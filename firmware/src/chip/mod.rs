@@ -188,7 +188,7 @@ impl<
     /// Some of the gathers that wait.
     fn drain<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Self { sums, gathers, cache, position, .. } = self;
-        if position.stage == Stage::RecordSums {
+        if matches!(position.stage, Stage::RecordRays | Stage::RecordSums) {
             return gathers.drain(context, &mut |request, brought| {
                 cache.add(request.target, request.cell, brought);
             });

@@ -3,8 +3,9 @@
 
 use std::fmt::Write;
 use std::fs;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -86,6 +87,47 @@ impl Room {
         assert_eq!(outcome.status, Some(0), "{options:?}: {}", outcome.stderr);
         assert_eq!(outcome.stdout, "");
         outcome
+    }
+}
+
+/// A card that another process serves, until it is dropped.
+pub(crate) struct Emulator {
+    pub(crate) process: Child,
+    pub(crate) address: String,
+}
+
+impl Emulator {
+    pub(crate) fn start(room: &Room, listen: &str, options: &[&str]) -> Self {
+        let mut command = room.command();
+        command.args(["emulate", "--listen", listen]).args(options);
+        let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut address = String::new();
+        BufReader::new(process.stdout.as_mut().unwrap()).read_line(&mut address).unwrap();
+        assert!(address.ends_with('\n'), "{address:?}");
+        Self { process, address: address.trim_end().to_owned() }
+    }
+
+    /// Sends it a signal.
+    pub(crate) fn signal(&self, signal: &str) {
+        let id = self.process.id().to_string();
+        assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
+    }
+
+    /// Ends it by a signal. Returns its exit status and what it said.
+    pub(crate) fn end(mut self, signal: &str) -> (Option<i32>, String) {
+        self.signal(signal);
+        let status = self.process.wait().unwrap().code();
+        let mut said = String::new();
+        self.process.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        (status, said)
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        // Both fail if it has ended.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
     }
 }
 

@@ -1,0 +1,158 @@
+//! What is lost when something ends in the middle of a render: cards, their links, or the host. Finished tiles are kept.
+#![cfg(unix)]
+
+mod support;
+
+use std::fs;
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+use support::{Emulator, Room, shipped};
+
+/// A picture of 64 tiles that takes a second or two.
+const PICTURE: [&str; 6] = ["--size", "128x128", "--photons", "2000", "--gather-rays", "50"];
+/// Bytes of a tile in the file of finished tiles.
+const TILE_BYTES: u64 = 16 + 40 * 256 + 4;
+/// How long anything here may take.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn arguments<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a str> {
+    [&["render", scene, "-o", "a.exr"][..], &PICTURE, options].concat()
+}
+
+fn partial_bytes(room: &Room) -> u64 {
+    fs::metadata(room.path("a.exr.partial")).map_or(0, |found| found.len())
+}
+
+/// Starts a render, and waits until it has finished some tiles.
+fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
+    let cornell = shipped("cornell.gltf");
+    let mut command = room.command();
+    let mut host = command.args(arguments(&cornell, options)).stderr(Stdio::piped()).spawn().unwrap();
+    let start = Instant::now();
+    while partial_bytes(room) < tiles * TILE_BYTES {
+        assert_eq!(host.try_wait().unwrap(), None, "the render has ended");
+        assert!(start.elapsed() < PATIENCE, "the render does not begin");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    host
+}
+
+/// The picture that nothing has disturbed.
+fn expected() -> Vec<u8> {
+    let room = Room::new();
+    let outcome = room.run(&arguments(&shipped("cornell.gltf"), &["--quiet"]));
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    assert_eq!(room.names(), ["a.exr"]);
+    room.read("a.exr")
+}
+
+/// Goes on with a render, and checks that it had finished some tiles and becomes the picture.
+fn resumes(room: &Room, options: &[&str], expected: &[u8]) {
+    let options = [options, &["--resume"]].concat();
+    let outcome = room.run(&arguments(&shipped("cornell.gltf"), &options));
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("of 64 tiles were rendered before"), "{}", outcome.stderr);
+    assert!(room.read("a.exr") == expected);
+    assert!(!room.names().contains(&"a.exr.partial".to_owned()));
+}
+
+#[test]
+fn a_host_that_is_killed_loses_the_tiles_in_flight_alone() {
+    let expected = expected();
+    let room = Room::new();
+    let mut host = begun(&room, &[], 5);
+    host.kill().unwrap();
+    host.wait().unwrap();
+    assert_eq!(room.names(), ["a.exr.partial"]);
+    // A tile that was being written.
+    let mut bytes = room.read("a.exr.partial");
+    bytes.truncate(bytes.len() - 100);
+    room.write("a.exr.partial", &bytes);
+    // Other tiles and another order do not matter.
+    resumes(&room, &["--tile", "16", "--order", "hash", "--card", "emulated-micro:2"], &expected);
+}
+
+#[test]
+fn only_the_same_picture_is_gone_on_with() {
+    let room = Room::new();
+    let mut host = begun(&room, &[], 1);
+    host.kill().unwrap();
+    host.wait().unwrap();
+    let kept = room.read("a.exr.partial");
+    let cornell = shipped("cornell.gltf");
+    let refused = |options: &[&str], words: &[&str]| {
+        let outcome = room.run(&arguments(&cornell, &[options, &["--resume"]].concat()));
+        assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+        assert!(words.iter().all(|word| outcome.stderr.contains(word)), "{words:?}: {}", outcome.stderr);
+        assert_eq!(room.names(), ["a.exr.partial"]);
+    };
+    refused(&["--seed", "7", "--neighbors", "50"], &["seed was 0 and is 7", "neighbors was 100 and is 50"]);
+    refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene was"]);
+    assert!(room.read("a.exr.partial") == kept);
+    for foreign in [&b"something else"[..], b"", &[0xff; 100], b"photoncard partial render 1\n{]\n"] {
+        room.write("a.exr.partial", foreign);
+        refused(&[], &["is no partial render"]);
+    }
+}
+
+#[test]
+fn a_card_that_is_killed_leaves_its_tiles_to_the_other() {
+    let expected = expected();
+    let room = Room::new();
+    let [dying, living] = ["tcp:", "unix:card"].map(|listen| Emulator::start(&room, listen, &[]));
+    let host = begun(&room, &["--card", &dying.address, "--card", &living.address], 5);
+    let address = dying.address.clone();
+    dying.end("-KILL");
+    let outcome = host.wait_with_output().unwrap();
+    let said = String::from_utf8(outcome.stderr).unwrap();
+    assert_eq!(outcome.status.code(), Some(0), "{said}");
+    assert!(said.contains(&format!("({address}) is lost")), "{said}");
+    assert!(room.read("a.exr") == expected);
+}
+
+#[test]
+fn a_card_that_is_restarted_is_greeted_again() {
+    let expected = expected();
+    let room = Room::new();
+    let living = Emulator::start(&room, "tcp:", &[]);
+    let dying = Emulator::start(&room, "unix:card", &[]);
+    let host = begun(&room, &["--card", &dying.address, "--card", &living.address], 5);
+    dying.end("-KILL");
+    let _reborn = Emulator::start(&room, "unix:card", &[]);
+    let outcome = host.wait_with_output().unwrap();
+    assert_eq!(outcome.status.code(), Some(0), "{}", String::from_utf8_lossy(&outcome.stderr));
+    assert!(room.read("a.exr") == expected);
+}
+
+#[test]
+fn a_card_that_freezes_leaves_its_tiles_to_the_other() {
+    let expected = expected();
+    let room = Room::new();
+    let [frozen, living] = ["tcp:", "pty"].map(|listen| Emulator::start(&room, listen, &[]));
+    let host = begun(&room, &["--card", &frozen.address, "--card", &living.address], 5);
+    frozen.signal("-STOP");
+    let outcome = host.wait_with_output().unwrap();
+    frozen.signal("-CONT");
+    let said = String::from_utf8(outcome.stderr).unwrap();
+    assert_eq!(outcome.status.code(), Some(0), "{said}");
+    assert!(said.contains("has not answered for 10 s"), "{said}");
+    assert!(room.read("a.exr") == expected);
+}
+
+#[test]
+fn without_any_card_the_finished_tiles_are_kept() {
+    let expected = expected();
+    for listen in ["tcp:", "pty"] {
+        let room = Room::new();
+        let card = Emulator::start(&room, listen, &[]);
+        let host = begun(&room, &["--card", &card.address], 5);
+        card.end("-KILL");
+        let outcome = host.wait_with_output().unwrap();
+        let said = String::from_utf8(outcome.stderr).unwrap();
+        assert_eq!(outcome.status.code(), Some(1), "{listen}: {said}");
+        assert!(said.contains("finished tiles are kept in a.exr.partial; --resume goes on"), "{said}");
+        assert_eq!(room.names(), ["a.exr.partial"]);
+        resumes(&room, &[], &expected);
+    }
+}
