@@ -90,6 +90,14 @@ pub enum ExrError {
         /// The channels there are.
         channels: String,
     },
+    /// The compression is none that can be read safely.
+    #[error("{} has {compression}, which is not read; store the picture with ZIP compression", path.display())]
+    Compression {
+        /// The file.
+        path: PathBuf,
+        /// The compression's name.
+        compression: String,
+    },
     /// The picture is too large to be read at once.
     #[error("{} has {width} x {height} pixels, more than {MAX_READ_PIXELS}; compare crops of it", path.display())]
     TooLarge {
@@ -260,7 +268,13 @@ fn check_size(path: &Path, header: &Header, length: u64) -> Result<(), ExrError>
     if (header.chunk_count as u64).saturating_mul(CHUNK_OVERHEAD) > length {
         return contradiction(format!("{} blocks do not fit into {length} bytes", header.chunk_count));
     }
-    let held = length.saturating_mul(most_compressed(header.compression));
+    let Some(most) = most_compressed(header.compression) else {
+        return Err(ExrError::Compression {
+            path: path.to_owned(),
+            compression: header.compression.to_string(),
+        });
+    };
+    let held = length.saturating_mul(most);
     let stated = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
     if stated > held {
         return contradiction(format!("{width} x {height} pixels do not fit into {length} bytes"));
@@ -273,15 +287,17 @@ fn check_size(path: &Path, header: &Header, length: u64) -> Result<(), ExrError>
     Ok(())
 }
 
-/// A bound on the bytes one byte of a file stands for.
-fn most_compressed(compression: Compression) -> u64 {
+/// A bound on the bytes one byte of a file stands for; `None` for what is not read.
+///
+/// Blocks of DWA state the sizes of their parts, and the `exr` crate allocates what they state: a few bytes would end the
+/// process, as no panic can be caught of an allocation that fails.
+fn most_compressed(compression: Compression) -> Option<u64> {
     match compression {
-        Compression::Uncompressed => 1,
-        Compression::RLE => 64,
+        Compression::Uncompressed => Some(1),
+        Compression::RLE => Some(64),
         // Deflate reaches 1032 to 1; the others stay below.
-        Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 => 1100,
-        Compression::PIZ | Compression::B44 | Compression::B44A => 1100,
-        // Deflate over blocks of 64 samples of which one code may stand for all.
-        _ => 64 * 1100,
+        Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 => Some(1100),
+        Compression::PIZ | Compression::B44 | Compression::B44A => Some(1100),
+        _ => None,
     }
 }

@@ -4,7 +4,10 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use exr::prelude::{ReadChannels, ReadLayers, Vec2};
+use exr::prelude::{
+    Compression, Encoding, Image, LayerAttributes, ReadChannels, ReadLayers, SpecificChannels, Vec2,
+    WritableImage,
+};
 use photoncard_driver::exr::{ExrError, SampleFormat, read_rgb, write};
 use photoncard_driver::film::{Film, PixelValue, Window};
 use proptest::prelude::{ProptestConfig, any, proptest};
@@ -50,6 +53,20 @@ fn radiance_is_read_back_to_the_format_s_precision() {
                 assert!((read - expected).abs() <= precision * expected, "{format:?}: {read} {expected}");
             }
         }
+    }
+}
+
+/// A block of DWA states sizes that are allocated unseen: no such picture may reach its decoder.
+#[test]
+fn compressions_whose_sizes_cannot_be_checked_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.exr");
+    for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
+        let channels = SpecificChannels::rgb(|Vec2(x, y)| (x as f32, y as f32, 0.5_f32));
+        let encoding = Encoding { compression, ..Encoding::default() };
+        let layer = exr::prelude::Layer::new((16, 16), LayerAttributes::default(), encoding, channels);
+        Image::from_layer(layer).write().to_file(&path).unwrap();
+        assert!(matches!(read_rgb(&path), Err(ExrError::Compression { .. })), "{compression}");
     }
 }
 

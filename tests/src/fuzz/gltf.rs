@@ -1,0 +1,141 @@
+//! Scenes: glTF as text and as GLB, loaded and packed.
+
+use std::fs;
+use std::path::PathBuf;
+
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::scene::gltf;
+use tempfile::TempDir;
+
+use super::{Random, Target, bound, mutation};
+
+/// Scenes of more triangles are loaded only.
+const MOST_PACKED: usize = 2000;
+
+/// The target.
+pub(super) struct Scenes {
+    texts: Vec<Vec<u8>>,
+    /// The JSON and the bytes of scenes in GLB.
+    binaries: Vec<(Vec<u8>, Vec<u8>)>,
+    /// All of them as files.
+    files: Vec<Vec<u8>>,
+    folder: TempDir,
+}
+
+/// Everything that the loader reads: a hierarchy, sparse positions, normals, a lobe, lights, an orthographic camera.
+const RICH: &[u8] = include_bytes!("../../fuzz/rich.gltf");
+const SHIPPED: [&[u8]; 3] = [
+    include_bytes!("../../../scenes/furnace.gltf"),
+    include_bytes!("../../../scenes/cornell.gltf"),
+    include_bytes!("../../../scenes/cornell-glossy.gltf"),
+];
+
+/// A triangle's vertices, its indices, and an index and a position that take the place of another.
+fn triangle_bytes() -> Vec<u8> {
+    let vertices = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
+    let indices = [0_u16, 1, 2, 1].map(u16::to_le_bytes);
+    let replaced = [1.0_f32, 0.5, 0.0].map(f32::to_le_bytes);
+    [vertices.as_flattened(), indices.as_flattened(), replaced.as_flattened()].concat()
+}
+
+/// A scene whose bytes are in its text.
+fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
+    let data: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
+    let text = String::from_utf8_lossy(text);
+    text.replace("\"byteLength\": 56", &format!("\"byteLength\": 56, \"uri\": \"data:,{data}\"")).into_bytes()
+}
+
+/// A GLB of some JSON and bytes. What its header and chunks say of their lengths is true.
+fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
+    let mut text = text.to_vec();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut file = b"glTF".to_vec();
+    for word in [2, 12 + 8 + text.len() + 8 + bytes.len(), text.len()] {
+        file.extend((word as u32).to_le_bytes());
+    }
+    file.extend(b"JSON");
+    file.extend(&text);
+    file.extend((bytes.len() as u32).to_le_bytes());
+    file.extend(b"BIN\0");
+    file.extend(bytes);
+    file
+}
+
+impl Scenes {
+    pub(super) fn new() -> Self {
+        let rich = with_data(RICH, &triangle_bytes());
+        let texts: Vec<_> = SHIPPED.iter().map(|text| text.to_vec()).chain([rich]).collect();
+        let binaries = vec![(RICH.to_vec(), triangle_bytes())];
+        let mut files = texts.clone();
+        files.extend(binaries.iter().map(|(text, bytes)| glb(text, bytes)));
+        let folder = tempfile::tempdir().expect("there is room for a folder");
+        Self { texts, binaries, files, folder }
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.path().join("scene")
+    }
+}
+
+/// Makes few edits: one alone is refused more often than not.
+fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
+    for _ in 0..1 + random.edits() / 3 {
+        mutation::edit_json(text, random);
+    }
+}
+
+impl Target for Scenes {
+    fn name(&self) -> &'static str {
+        "gltf"
+    }
+
+    fn allocation_bound(&self, input: usize) -> usize {
+        // A node of JSON is a few bytes as text, and some hundred once it is read.
+        bound(input, 1024)
+    }
+
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        match random.below(8) {
+            0..=2 => {
+                let mut text = random.pick(&self.texts).clone();
+                edit_json(&mut text, random);
+                text
+            }
+            3..=5 => {
+                let (mut text, mut bytes) = random.pick(&self.binaries).clone();
+                edit_json(&mut text, random);
+                if random.once_in(2) {
+                    mutation::edit(&mut bytes, &[], random);
+                }
+                let mut file = glb(&text, &bytes);
+                if random.once_in(8) {
+                    mutation::edit(&mut file, &self.files, random);
+                }
+                file
+            }
+            _ => {
+                let mut file = random.pick(&self.files).clone();
+                mutation::edit(&mut file, &self.files, random);
+                file
+            }
+        }
+    }
+
+    fn read(&self, input: &[u8]) -> bool {
+        fs::write(self.path(), input).expect("there is room for a scene");
+        let scene = match gltf::load(&self.path()) {
+            Ok(scene) => scene,
+            Err(error) => {
+                let _ = error.to_string();
+                return false;
+            }
+        };
+        if scene.triangles.len() <= MOST_PACKED
+            && let Err(error) = PackedScene::new(&scene, &Emitters::new(&scene))
+        {
+            let _ = error.to_string();
+        }
+        true
+    }
+}

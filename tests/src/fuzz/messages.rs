@@ -1,0 +1,127 @@
+//! Messages: payloads of frames that are commands, replies, or neither.
+
+use photoncard_shared::budget::{MICRO, REFERENCE};
+use photoncard_shared::counters::Counters;
+use photoncard_shared::frame::MAX_PAYLOAD;
+use photoncard_shared::message::{
+    self, Camera, Command, Drain, Fault, FaultCode, FrameParameters, Reply, Sampling, Tile,
+};
+
+use super::{Random, Target, bound, mutation};
+
+/// The target.
+pub(super) struct Messages {
+    seeds: Vec<Vec<u8>>,
+}
+
+/// A frame that any chip renders.
+fn frame() -> FrameParameters {
+    let camera = Camera {
+        origin: [0.0, 1.0, 5.0],
+        forward: [0.0, 0.0, -1.0],
+        right: [1.0, 0.0, 0.0],
+        up: [0.0, 1.0, 0.0],
+    };
+    FrameParameters {
+        width: 640,
+        height: 480,
+        camera,
+        seed: 7,
+        samples: 16,
+        gather_rays: 200,
+        shadow_rays: 8,
+        neighbors: 100,
+        max_distance: 0.5,
+        sampling: Sampling::Product,
+        irradiance_error: Some(0.1),
+        bins: 64,
+        drain: Drain::Sort,
+        queue: 1024,
+    }
+}
+
+/// One of every command.
+pub(super) fn commands() -> Vec<Vec<u8>> {
+    let data = [0x5a; 256];
+    let commands = [
+        Command::Hello { protocol: 5, layout: 3 },
+        Command::ReadChecksums { first: 3, count: 70_000 },
+        Command::BeginImage { lines: 300, checksum: 0xdead_beef },
+        Command::WriteLines { first: 200, data: &data },
+        Command::EndImage,
+        Command::BeginFrame(frame()),
+        Command::RenderTile(Tile { id: 7, x: 300, y: 16, width: 16, height: 16 }),
+    ];
+    commands.iter().map(|command| written(MAX_PAYLOAD, |bytes| message::encode(command, bytes))).collect()
+}
+
+/// One of every reply.
+pub(super) fn replies() -> Vec<Vec<u8>> {
+    let data = [0x5a; 400];
+    let hello =
+        |budget| Reply::Hello { protocol: 5, layout: 3, budget, written_lines: 300, build: "firmware 1" };
+    let replies = [
+        hello(REFERENCE),
+        hello(MICRO),
+        Reply::Checksums { first: 3, data: &data },
+        Reply::ImageAccepted,
+        Reply::FrameAccepted,
+        Reply::Pixels { tile: 7, first: 25, data: &data },
+        Reply::TileDone { tile: 7, counters: Counters::ZERO },
+        Reply::Fault(Fault { code: FaultCode::Depth, detail: 1 << 30 }),
+    ];
+    replies.iter().map(|reply| written(MAX_PAYLOAD, |bytes| message::encode(reply, bytes))).collect()
+}
+
+fn written(most: usize, encode: impl FnOnce(&mut [u8]) -> Option<usize>) -> Vec<u8> {
+    let mut bytes = vec![0; most];
+    let length = encode(&mut bytes).expect("there is room for the message");
+    bytes.truncate(length);
+    bytes
+}
+
+impl Messages {
+    pub(super) fn new() -> Self {
+        Self { seeds: [commands(), replies()].concat() }
+    }
+}
+
+/// Writes a command that was read: in no more bytes.
+fn rewritten_command(input: &[u8]) -> Option<Vec<u8>> {
+    let command = message::decode::<Command>(input)?;
+    Some(written(input.len(), |bytes| message::encode(&command, bytes)))
+}
+
+/// Writes a reply that was read: in no more bytes.
+fn rewritten_reply(input: &[u8]) -> Option<Vec<u8>> {
+    let reply = message::decode::<Reply>(input)?;
+    Some(written(input.len(), |bytes| message::encode(&reply, bytes)))
+}
+
+impl Target for Messages {
+    fn name(&self) -> &'static str {
+        "messages"
+    }
+
+    fn allocation_bound(&self, input: usize) -> usize {
+        bound(input, 16)
+    }
+
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        let mut bytes = random.pick(&self.seeds).clone();
+        mutation::edit(&mut bytes, &self.seeds, random);
+        bytes.truncate(MAX_PAYLOAD);
+        bytes
+    }
+
+    fn read(&self, input: &[u8]) -> bool {
+        let mut is_sound = false;
+        for rewritten in [rewritten_command, rewritten_reply] {
+            if let Some(once) = rewritten(input) {
+                assert_eq!(rewritten(&once).as_ref(), Some(&once), "written otherwise than read");
+                is_sound = true;
+            }
+        }
+        is_sound
+    }
+}

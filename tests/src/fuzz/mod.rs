@@ -1,0 +1,56 @@
+//! Fuzzing of everything that reads what others wrote: mutated inputs, each a function of its target, a seed and a number.
+//!
+//! No input may panic, take longer than some seconds, or allocate more than a bound. What that finds is what a coverage
+//! guided fuzzer would be used for; this one needs no other compiler, and a failing input is replayed by its number.
+
+mod gltf;
+mod image;
+mod messages;
+mod mutation;
+mod picture;
+mod random;
+mod run;
+mod transport;
+
+use std::sync::Arc;
+
+pub use self::random::Random;
+pub use self::run::{Failure, Report, Settings, fuzz};
+
+/// Something that reads what others wrote.
+pub trait Target: Send + Sync {
+    /// Its name on the command line.
+    fn name(&self) -> &'static str;
+
+    /// The most bytes that it may have allocated at once for an input of so many bytes.
+    fn allocation_bound(&self, input: usize) -> usize;
+
+    /// Makes an input.
+    fn input(&self, random: &mut Random) -> Vec<u8>;
+
+    /// Reads an input. Returns whether it was sound.
+    ///
+    /// # Panics
+    /// If it is read otherwise than it must be.
+    fn read(&self, input: &[u8]) -> bool;
+}
+
+/// The names of all targets.
+pub const NAMES: [&str; 5] = ["frames", "messages", "image", "gltf", "exr"];
+
+/// The target of a name.
+pub fn target(name: &str) -> Option<Arc<dyn Target>> {
+    match name {
+        "frames" => Some(Arc::new(transport::Frames::new())),
+        "messages" => Some(Arc::new(messages::Messages::new())),
+        "image" => Some(Arc::new(image::Image::new())),
+        "gltf" => Some(Arc::new(gltf::Scenes::new())),
+        "exr" => Some(Arc::new(picture::Pictures::new())),
+        _ => None,
+    }
+}
+
+/// A bound on allocations: some of any input, and some for each byte.
+const fn bound(input: usize, for_each: usize) -> usize {
+    (64 << 20) + input * for_each
+}

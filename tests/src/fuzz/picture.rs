@@ -1,0 +1,121 @@
+//! Pictures: `OpenEXR` files of every compression, read and compared.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::PathBuf;
+
+use exr::image::Blocks;
+use exr::prelude::{
+    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image, LayerAttributes, LineOrder, Vec2,
+    WritableImage, f16,
+};
+use photoncard_driver::difference::compare;
+use photoncard_driver::exr::read_rgb;
+use tempfile::TempDir;
+
+use super::{Random, Target, bound, mutation};
+
+/// Columns and rows of the pictures.
+const SIZE: [usize; 2] = [20, 36];
+/// Larger pictures are read only.
+const MOST_COMPARED: usize = 1 << 16;
+
+/// The target.
+pub(super) struct Pictures {
+    seeds: Vec<Vec<u8>>,
+    folder: TempDir,
+}
+
+fn picture(compression: Compression, blocks: Blocks, is_half: bool) -> Option<Vec<u8>> {
+    let [width, height] = SIZE;
+    let values = |phase: usize| (0..width * height).map(move |i| ((i + phase) * 7 % 64) as f32 / 16.0);
+    let channels = ["R", "G", "B", "Z"].into_iter().enumerate().map(|(phase, name)| {
+        let samples = if is_half {
+            FlatSamples::F16(values(phase).map(f16::from_f32).collect())
+        } else {
+            FlatSamples::F32(values(phase).collect())
+        };
+        AnyChannel::new(name, samples)
+    });
+    let encoding = Encoding { compression, blocks, line_order: LineOrder::Increasing };
+    let channels = AnyChannels::sort(channels.collect());
+    let layer = exr::prelude::Layer::new(Vec2(width, height), LayerAttributes::default(), encoding, channels);
+    let mut bytes = Cursor::new(Vec::new());
+    Image::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).ok()?;
+    Some(bytes.into_inner())
+}
+
+impl Pictures {
+    pub(super) fn new() -> Self {
+        let compressions = [
+            Compression::Uncompressed,
+            Compression::RLE,
+            Compression::ZIP1,
+            Compression::ZIP16,
+            Compression::PIZ,
+            Compression::PXR24,
+            Compression::B44,
+            Compression::B44A,
+            Compression::DWAA(None),
+            Compression::DWAB(None),
+        ];
+        let mut seeds = Vec::new();
+        for compression in compressions {
+            for (blocks, is_half) in
+                [(Blocks::ScanLines, true), (Blocks::ScanLines, false), (Blocks::Tiles(Vec2(8, 8)), true)]
+            {
+                seeds.extend(picture(compression, blocks, is_half));
+            }
+        }
+        Self { seeds, folder: tempfile::tempdir().expect("there is room for a folder") }
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.path().join("picture.exr")
+    }
+}
+
+impl Target for Pictures {
+    fn name(&self) -> &'static str {
+        "exr"
+    }
+
+    fn allocation_bound(&self, input: usize) -> usize {
+        // Deflate makes a byte at most 1032: of halves of three channels, which are read as floats twice that.
+        bound(input, 4096)
+    }
+
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        let mut file = random.pick(&self.seeds).clone();
+        // The header is a small part of a file, and has most of its meaning.
+        let header = 400.min(file.len());
+        for _ in 0..random.edits() {
+            let place = random.below(header);
+            match random.below(4) {
+                0 => mutation::put_word(&mut file, place, random),
+                1 => file[place] ^= 1 << random.below(8),
+                _ => mutation::edit_bytes(&mut file, &self.seeds, random),
+            }
+            if file.len() < header {
+                break;
+            }
+        }
+        file
+    }
+
+    fn read(&self, input: &[u8]) -> bool {
+        fs::write(self.path(), input).expect("there is room for a picture");
+        let image = match read_rgb(&self.path()) {
+            Ok(image) => image,
+            Err(error) => {
+                let _ = error.to_string();
+                return false;
+            }
+        };
+        assert_eq!(image.pixels.len(), image.width * image.height);
+        if image.pixels.len() <= MOST_COMPARED {
+            let _ = compare(&image, &image, 8, Some(2.0));
+        }
+        true
+    }
+}

@@ -1,0 +1,86 @@
+//! Some thousands of mutated inputs of everything that reads what others wrote. The example `fuzz` runs any number.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use peak_alloc::PeakAlloc;
+use photoncard_tests::fuzz::{NAMES, Random, Settings, Target, fuzz, target};
+
+#[global_allocator]
+static ALLOCATOR: PeakAlloc = PeakAlloc;
+
+/// Inputs of each target: some seconds of each.
+const INPUTS: [(&str, u64); NAMES.len()] =
+    [("frames", 100_000), ("messages", 500_000), ("image", 6000), ("gltf", 8000), ("exr", 8000)];
+
+/// One test at a time, so that no other's allocations are counted.
+static ALONE: Mutex<()> = Mutex::new(());
+
+fn settings(inputs: u64, patience: Duration) -> Settings {
+    Settings {
+        seed: 0,
+        first: 0,
+        inputs,
+        time: None,
+        patience,
+        folder: PathBuf::from(env!("CARGO_TARGET_TMPDIR")),
+    }
+}
+
+#[test]
+fn no_input_panics_hangs_or_takes_much_memory() {
+    let _alone = ALONE.lock();
+    for (name, inputs) in INPUTS {
+        let settings = settings(inputs, Duration::from_secs(60));
+        let report = fuzz(&target(name).expect("a target"), &settings);
+        println!("{name}: {report:?}");
+        assert!(report.failures.is_empty(), "{name}: {:#?}", report.failures);
+        assert_eq!(report.inputs, inputs, "{name}");
+        // Inputs that are all refused at once would test nothing.
+        assert!(report.sound * 20 > inputs && report.sound < inputs, "{name}: {report:?}");
+    }
+}
+
+/// Fails in every way, at the number that its input tells.
+struct Faulty;
+
+impl Target for Faulty {
+    fn name(&self) -> &'static str {
+        "faulty"
+    }
+
+    fn allocation_bound(&self, _input: usize) -> usize {
+        1 << 24
+    }
+
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        vec![random.next() as u8 % 16]
+    }
+
+    fn read(&self, input: &[u8]) -> bool {
+        match input {
+            [0] => panic!("a panic"),
+            [1] => drop(std::hint::black_box(vec![1_u8; 1 << 25])),
+            [2] => std::thread::sleep(Duration::from_secs(5)),
+            _ => {}
+        }
+        true
+    }
+}
+
+#[test]
+fn panics_hangs_and_allocations_are_found_and_replayed() {
+    let _alone = ALONE.lock();
+    let faulty: Arc<dyn Target> = Arc::new(Faulty);
+    let input = |number| faulty.input(&mut Random::new("faulty", 0, number))[0];
+    let alone = |number| Settings { first: number, ..settings(1, Duration::from_millis(300)) };
+    for (kind, word) in [(0, "a panic"), (1, "allocated"), (2, "hangs")] {
+        let number = (0..).find(|&number| input(number) == kind).expect("an input of the kind");
+        let failures = fuzz(&faulty, &alone(number)).failures;
+        let [failure] = &failures[..] else { panic!("{failures:?}") };
+        assert!(failure.number == number && failure.what.contains(word), "{failure:?}");
+        let path = settings(1, Duration::ZERO).folder.join(format!("faulty-0-{number}.hex"));
+        assert_eq!(std::fs::read_to_string(path).expect("a dump"), format!("{kind:02x}\n"));
+    }
+}
