@@ -11,11 +11,17 @@ struct Board {
     architecture: &'static str,
 }
 
-const BOARDS: [Board; 2] = [
+const BOARDS: [Board; 3] = [
     Board {
         feature: "CARGO_FEATURE_BOARD_MPS2_AN386",
         image: "mps2-an386",
         directory: "mps2_an386",
+        architecture: "arm",
+    },
+    Board {
+        feature: "CARGO_FEATURE_BOARD_STM32H747I_DISCO",
+        image: "stm32h747i-disco",
+        directory: "stm32h747i_disco",
         architecture: "arm",
     },
     Board {

@@ -6,8 +6,15 @@ cd "$(dirname "$0")/.."
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
 
 # The images of boards, and the target of each.
-images=(mps2-an386 virt-riscv32)
-declare -A target_of=([mps2-an386]=thumbv7em-none-eabihf [virt-riscv32]=riscv32imafc-unknown-none-elf)
+images=(mps2-an386 stm32h747i-disco virt-riscv32)
+declare -A target_of=(
+    [mps2-an386]=thumbv7em-none-eabihf
+    [stm32h747i-disco]=thumbv7em-none-eabihf
+    [virt-riscv32]=riscv32imafc-unknown-none-elf
+)
+# Code that panics and may be in any image all the same, and in that of one board: docs/bring-up.md has the reasons.
+allowed_panics='core::slice::sort::shared::smallsort::panic_on_ord_violation|core::panicking::panic_fmt'
+declare -A also_allowed=([stm32h747i-disco]='core::option::expect_failed|core::panicking::panic')
 
 step() { printf '\n== %s\n' "$*"; }
 
@@ -23,7 +30,7 @@ command -v cc >/dev/null || {
     [ "$(id -u)" = 0 ] || fail "a C linker is missing; run: sudo apt-get install build-essential"
     apt-get update -qq && apt-get install -y -qq build-essential
 }
-rustup component add rustfmt clippy
+rustup component add rustfmt clippy llvm-tools
 rustup target add "${target_of[@]}"
 
 # The machines that boards are tested on. Without them all else is tested, and the end says what is not.
@@ -52,11 +59,22 @@ cargo fmt --all --check
 step "lints"
 cargo clippy --workspace --all-targets --locked -- -D warnings
 
+# Fails if code that panics is linked into an image, unless it is allowed.
+refuse_panics() {
+    local symbols panics allowed="$allowed_panics|${also_allowed[${1##*/}]:-none}"
+    symbols=$("$(rustc --print target-libdir)/../bin/llvm-nm" --demangle --defined-only --format=just-symbols "$1")
+    # The image's own entry shows that symbols are there to be read.
+    grep -q "^main$" <<<"$symbols" || fail "$1 has no symbols"
+    panics=$(grep -E '^core::.*(panic|fail|unwind)' <<<"$symbols" | grep -vxE "$allowed" || true)
+    [ -z "$panics" ] || fail "$1 can panic, by: $panics"
+}
+
 for image in "${images[@]}"; do
     step "image of $image"
     arguments=(-p photoncard-firmware --bin "$image" --features "board-$image" --target "${target_of[$image]}")
     cargo clippy "${arguments[@]}" --profile card --locked -- -D warnings
     cargo build "${arguments[@]}" --profile card --locked
+    refuse_panics "${CARGO_TARGET_DIR:-target}/${target_of[$image]}/card/$image"
 done
 
 step "tests"

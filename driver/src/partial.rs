@@ -14,7 +14,7 @@ use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use photoncard_shared::frame::checksum;
+use photoncard_shared::checksum::checksum;
 use photoncard_shared::message::{PIXEL_BYTES, Pixel, Tile};
 use serde_json::{Map, Value};
 

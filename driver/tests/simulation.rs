@@ -22,8 +22,8 @@ use photoncard_firmware::memory::{CardMemory, MemoryPort};
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::address::{Line, LineAddress, Structure};
 use photoncard_shared::budget::MICRO;
+use photoncard_shared::checksum::Checksum;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::frame::Checksum;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters};
 
 /// Runs of each test, if nothing else is asked for.

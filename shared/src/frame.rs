@@ -4,13 +4,14 @@
 //! COBS( kind: u8 | session: u16 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
 //! ```
 //!
-//! Numbers are little-endian. Consistent overhead byte stuffing (Cheshire, Baker 1999) leaves no zero byte inside a
-//! frame, so that a receiver finds the next frame after any damage. What the header's numbers mean is told in
+//! Numbers are little-endian. Stuffing ([`crate::stuffing`]) leaves no zero byte inside a frame, so that a receiver finds
+//! the next frame after any damage. What the header's numbers mean is told in
 //! [`crate::transport`].
 
-use cobs::CobsEncoder;
-use crc::{CRC_32_ISCSI, Crc, Table};
 use heapless::Vec;
+
+use crate::checksum::{Checksum, checksum};
+use crate::stuffing::{max_stuffed_bytes, stuff, unstuff};
 
 /// Bytes of the longest payload: eight lines and the words of their message.
 pub const MAX_PAYLOAD: usize = 8 * crate::address::LINE_BYTES + 32;
@@ -19,36 +20,7 @@ pub const HEADER_BYTES: usize = 8;
 const CHECKSUM_BYTES: usize = 4;
 const MAX_PLAIN: usize = HEADER_BYTES + MAX_PAYLOAD + CHECKSUM_BYTES;
 /// Bytes of the longest frame on the wire, its zero byte included.
-pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_PLAIN) + 1;
-
-static CRC_32C: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISCSI);
-
-/// CRC-32C (Castagnoli) of some bytes.
-pub fn checksum(bytes: &[u8]) -> u32 {
-    CRC_32C.checksum(bytes)
-}
-
-/// A CRC-32C over bytes that come in pieces.
-#[derive(Clone)]
-pub struct Checksum(crc::Digest<'static, u32, Table<16>>);
-
-impl Default for Checksum {
-    fn default() -> Self {
-        Self(CRC_32C.digest())
-    }
-}
-
-impl Checksum {
-    /// Goes on with the next bytes.
-    pub fn update(&mut self, bytes: &[u8]) {
-        self.0.update(bytes);
-    }
-
-    /// The checksum of all bytes so far.
-    pub fn value(&self) -> u32 {
-        self.0.clone().finalize()
-    }
-}
+pub const MAX_FRAME: usize = max_stuffed_bytes(MAX_PLAIN) + 1;
 
 /// Why what came is not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,21 +99,10 @@ pub fn write_frame<const N: usize>(header: &FrameHeader, payload: &[u8], wire: &
     let mut sum = Checksum::default();
     sum.update(&header);
     sum.update(payload);
-    let plain = header.len() + payload.len() + CHECKSUM_BYTES;
-    if wire.resize(begin + cobs::max_encoding_length(plain) + 1, 0).is_err() {
-        return;
-    }
-    let mut encoder = CobsEncoder::new(wire.get_mut(begin..).unwrap_or(&mut []));
-    let pushed = [&header[..], payload, &sum.value().to_le_bytes()].map(|bytes| encoder.push(bytes).is_ok());
-    // There is room for all of it.
-    let encoded = if pushed == [true; 3] { encoder.finalize() } else { 0 };
-    if encoded == 0 {
+    let sum = sum.value().to_le_bytes();
+    let plain = [&header[..], payload, &sum].into_iter().flatten().copied();
+    if !stuff(plain, wire) || wire.push(0).is_err() {
         wire.truncate(begin);
-        return;
-    }
-    wire.truncate(begin + encoded + 1);
-    if let Some(end) = wire.last_mut() {
-        *end = 0;
     }
 }
 
@@ -199,8 +160,7 @@ impl FrameReader {
 }
 
 fn decode(wire: &mut [u8]) -> Result<Frame<'_>, FrameError> {
-    let length = cobs::decode_in_place(wire).map_err(|_| FrameError::Encoding)?;
-    let plain = wire.get(..length).ok_or(FrameError::Encoding)?;
+    let plain: &[u8] = unstuff(wire).ok_or(FrameError::Encoding)?;
     let (body, sum) = plain.split_last_chunk().ok_or(FrameError::TooShort)?;
     let (header, payload) = body.split_first_chunk().ok_or(FrameError::TooShort)?;
     if checksum(body) != u32::from_le_bytes(*sum) {

@@ -31,10 +31,12 @@
 
 pub mod address;
 pub mod budget;
+pub mod checksum;
 pub mod counters;
 pub mod frame;
 pub mod image;
 pub mod layout;
 pub mod link;
 pub mod message;
+pub mod stuffing;
 pub mod transport;

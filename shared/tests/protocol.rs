@@ -1,9 +1,10 @@
 //! What crosses the wire: frames come back whole or not at all, opcodes stay what they are.
 
 use photoncard_shared::budget::REFERENCE;
+use photoncard_shared::checksum::checksum;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::{
-    FrameError, FrameHeader, FrameKind, FrameReader, MAX_FRAME, MAX_PAYLOAD, checksum, write_frame,
+    FrameError, FrameHeader, FrameKind, FrameReader, MAX_FRAME, MAX_PAYLOAD, write_frame,
 };
 use photoncard_shared::message::*;
 use proptest::prelude::*;

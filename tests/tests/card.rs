@@ -9,7 +9,7 @@ use photoncard_firmware::card::ReferenceCard;
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::REFERENCE;
-use photoncard_shared::frame::checksum;
+use photoncard_shared::checksum::checksum;
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{BvhNode, ChildReference};
 use photoncard_shared::message::{

@@ -22,7 +22,7 @@ use std::time::Instant;
 
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::{Budget, REFERENCE};
-use photoncard_shared::frame::Checksum;
+use photoncard_shared::checksum::Checksum;
 use photoncard_shared::message::FrameParameters;
 
 use self::cards::{Cards, Outcome};

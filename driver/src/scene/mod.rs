@@ -9,7 +9,7 @@ mod settings;
 use std::fmt::Write;
 
 use glam::Vec3;
-use photoncard_shared::frame::Checksum;
+use photoncard_shared::checksum::Checksum;
 
 pub use self::material::MAX_EXPONENT;
 use crate::error::SceneError;

@@ -1,7 +1,7 @@
 //! Loading the image: what the card has of it already is not sent again.
 
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::frame::Checksum;
+use photoncard_shared::checksum::Checksum;
 use photoncard_shared::message::{self, CHECKSUMS_PER_REPLY, CHUNK_LINES, Command, LINES_PER_WRITE};
 use photoncard_shared::transport::Transport;
 

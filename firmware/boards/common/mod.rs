@@ -5,6 +5,7 @@ mod dram;
 #[expect(unsafe_code, reason = "a static is handed out once")]
 mod once;
 mod port;
+#[allow(dead_code, reason = "a board may have a crate that knows its registers")]
 #[expect(unsafe_code, reason = "registers are memory that changes by itself")]
 pub(crate) mod register;
 mod report;

@@ -1,7 +1,7 @@
 //! Loading of a card image: lines in any order, a checksum over all, and a header that is sound.
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::frame::Checksum;
+use photoncard_shared::checksum::Checksum;
 use photoncard_shared::image::{Header, HeaderError};
 use photoncard_shared::message::{CHECKSUMS_PER_REPLY, CHUNK_LINES, Fault, FaultCode};
 

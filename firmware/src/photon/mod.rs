@@ -4,6 +4,7 @@ mod kdtree;
 mod leaves;
 mod nearest;
 mod radiance;
+mod select;
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -11,6 +12,7 @@ use photoncard_shared::message::Fault;
 
 pub use nearest::{Candidate, NearestPhotons};
 pub use radiance::{MIN_NORMAL_COSINE, SameSurface, reflected_radiance};
+pub use select::select;
 
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;

@@ -7,6 +7,8 @@
 use heapless::VecView;
 use photoncard_shared::layout::{PHOTON_CONTENT_BYTES, Photon, Rgbe};
 
+use super::select::select;
+
 /// A photon near a query, with all that its reflection needs.
 ///
 /// Candidates are in the order of their distance, then of what they carry. So it does not matter in which layout or place
@@ -14,11 +16,11 @@ use photoncard_shared::layout::{PHOTON_CONTENT_BYTES, Photon, Rgbe};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
     /// The squared distance's bits.
-    distance: u32,
+    pub(super) distance: u32,
     /// The power's bytes, scrambled: of photons at one distance neither the bright nor the dim ones may come first.
-    power: u32,
+    pub(super) power: u32,
     /// The direction's code, and the flags without the axis.
-    rest: u32,
+    pub(super) rest: u32,
 }
 
 /// An odd factor, and the one that undoes it.
@@ -44,6 +46,16 @@ impl Candidate {
     #[inline(always)]
     pub fn order(&self) -> (u64, u32) {
         ((self.distance as u64) << 32 | self.power as u64, self.rest)
+    }
+
+    /// Bits of [`Self::key`].
+    pub(super) const KEY_BITS: u32 = 96;
+
+    /// The same as one number.
+    #[inline(always)]
+    pub(super) fn key(&self) -> u128 {
+        let (distance, power) = (u128::from(self.distance), u128::from(self.power));
+        distance << 64 | power << 32 | u128::from(self.rest)
     }
 
     /// Squared distance from the query, m^2.
@@ -139,8 +151,9 @@ impl<'a> NearestPhotons<'a> {
         }
         self.selected += candidates.len() as u32;
         self.dropped += (candidates.len() - self.neighbors) as u32;
-        let (_, last, _) = candidates.select_nth_unstable_by_key(self.neighbors - 1, Candidate::order);
-        self.limit = last.distance_squared();
+        if let Some(last) = select(candidates, self.neighbors) {
+            self.limit = last.distance_squared();
+        }
         self.candidates.truncate(self.neighbors);
     }
 

@@ -9,7 +9,7 @@ use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::budget::MICRO;
-use photoncard_shared::frame::checksum;
+use photoncard_shared::checksum::checksum;
 use photoncard_shared::message::{
     self, Command, Drain, FrameParameters, LINES_PER_WRITE, PIXEL_BYTES, PROTOCOL_VERSION, Reply, Sampling,
     Tile,

@@ -1,0 +1,67 @@
+//! Stuffing and checksum are those of everyone else.
+
+use photoncard_shared::checksum::{Checksum, checksum};
+use photoncard_shared::stuffing::{max_stuffed_bytes, stuff, unstuff};
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+/// Bytes with runs on both sides of a piece's 254.
+fn plain() -> impl Strategy<Value = Vec<u8>> {
+    let run = (0_u8..4, prop_oneof![0_usize..4, 252_usize..258, 505_usize..512]);
+    let runs = vec(run, 0..6).prop_map(|runs| runs.iter().flat_map(|&(b, n)| vec![b; n]).collect());
+    prop_oneof![runs, vec(any::<u8>(), 0..600), vec(0_u8..2, 0..600)]
+}
+
+fn stuffed(plain: &[u8]) -> Vec<u8> {
+    let mut wire = heapless::Vec::<u8, 4096>::new();
+    assert!(stuff(plain.iter().copied(), &mut wire));
+    wire.to_vec()
+}
+
+proptest! {
+    #[test]
+    fn stuffing_is_that_of_cobs(plain in plain()) {
+        let mut expected = vec![0; cobs::max_encoding_length(plain.len())];
+        let length = cobs::encode(&plain, &mut expected);
+        expected.truncate(length);
+        let mut wire = stuffed(&plain);
+        prop_assert_eq!(&wire, &expected);
+        prop_assert!(wire.len() <= max_stuffed_bytes(plain.len()) && !wire.contains(&0));
+        prop_assert_eq!(unstuff(&mut wire), Some(&mut plain.clone()[..]));
+    }
+
+    #[test]
+    fn what_cobs_refuses_is_refused(wire in vec(prop_oneof![1_u8..8, 1_u8..=255], 1..600)) {
+        let mut expected = wire.clone();
+        let length = cobs::decode_in_place(&mut expected).ok();
+        let mut unstuffed = wire.clone();
+        let unstuffed = unstuff(&mut unstuffed).map(|plain| plain.to_vec());
+        prop_assert_eq!(unstuffed, length.map(|length| expected[..length].to_vec()));
+    }
+
+    #[test]
+    fn no_room_is_told(plain in plain()) {
+        let mut wire = heapless::Vec::<u8, 300>::new();
+        let fits = stuffed(&plain).len() <= 300;
+        prop_assert_eq!(stuff(plain.iter().copied(), &mut wire), fits);
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic(mut wire in vec(any::<u8>(), 0..600)) {
+        let _ = unstuff(&mut wire);
+    }
+
+    #[test]
+    fn the_checksum_is_that_of_crc(bytes in vec(any::<u8>(), 0..600), cuts in vec(1_usize..40, 1..40)) {
+        let expected = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
+        prop_assert_eq!(checksum(&bytes), expected);
+        let (mut sum, mut rest) = (Checksum::default(), &bytes[..]);
+        for cut in cuts {
+            let (piece, behind) = rest.split_at(cut.min(rest.len()));
+            sum.update(piece);
+            rest = behind;
+        }
+        sum.update(rest);
+        prop_assert_eq!(sum.value(), expected);
+    }
+}

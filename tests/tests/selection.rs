@@ -1,0 +1,81 @@
+//! The first candidates that are selected are those that sorting puts first, whatever the candidates.
+
+use photoncard_firmware::photon::{Candidate, select};
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+fn candidate(distance: f32, content: u8) -> Candidate {
+    Candidate::new(distance, [content, 0, 0, 0, content / 2, 0, content / 4, 0])
+}
+
+/// Distances as on a surface, and such as no guess or pivot divides well.
+fn candidates() -> impl Strategy<Value = Vec<Candidate>> {
+    let distance = prop_oneof![
+        4 => 0.0_f32..1.0,
+        1 => (0_i32..40).prop_map(|exponent| 2.0_f32.powi(-exponent)),
+        1 => Just(0.25),
+    ];
+    let any_distance = (0_u32..=f32::INFINITY.to_bits()).prop_map(f32::from_bits);
+    let few = || 0_u8..8;
+    let pairs = prop_oneof![
+        vec((0.0_f32..1.0, few()), 0..600),
+        vec((Just(0.5_f32), few()), 0..600),
+        vec((0.5_f32..0.500_001, few()), 0..600),
+        vec((distance, any::<u8>()), 0..600),
+        vec((any_distance, any::<u8>()), 0..600),
+    ];
+    let pairs = (pairs, 0_usize..3).prop_map(|(mut pairs, order)| {
+        match order {
+            0 => pairs.sort_by(|a, b| a.0.total_cmp(&b.0)),
+            1 => pairs.sort_by(|a, b| b.0.total_cmp(&a.0)),
+            _ => {}
+        }
+        pairs
+    });
+    pairs
+        .prop_map(|pairs| pairs.into_iter().map(|(distance, content)| candidate(distance, content)).collect())
+}
+
+fn sorted(candidates: &[Candidate]) -> Vec<Candidate> {
+    let mut sorted = candidates.to_vec();
+    sorted.sort_unstable_by_key(Candidate::order);
+    sorted
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
+    #[test]
+    fn the_first_are_selected(candidates in candidates(), share in 0.0_f32..=1.0) {
+        let count = (candidates.len() as f32 * share) as usize;
+        let mut selected = candidates.clone();
+        let last = select(&mut selected, count);
+        let expected = &sorted(&candidates)[..count];
+        prop_assert_eq!(last, expected.last().copied());
+        prop_assert_eq!(&sorted(&selected[..count])[..], expected);
+    }
+}
+
+#[test]
+fn more_than_there_are_cannot_be_selected() {
+    let candidates = [candidate(1.0, 1), candidate(0.5, 2)];
+    let mut selected = candidates;
+    assert_eq!((select(&mut selected, 3), select(&mut selected, 0)), (None, None));
+    assert_eq!(selected, candidates);
+}
+
+/// An order in which the median of three medians is nearly the least at first: many pivots, then bits.
+#[test]
+fn a_bad_order_is_selected_too() {
+    for length in [300, 512] {
+        let mut candidates: Vec<Candidate> = (0..length).map(|i| candidate(f32::from_bits(i), 0)).collect();
+        for round in 0..length as usize / 9 {
+            for ninth in 0..9 {
+                candidates.swap(round + ninth, length as usize * ninth / 9);
+            }
+        }
+        for count in [1, 100, length as usize - 1] {
+            let mut selected = candidates.clone();
+            assert_eq!(select(&mut selected, count), sorted(&candidates).get(count - 1).copied());
+        }
+    }
+}
