@@ -1,0 +1,336 @@
+//! The state of one session of a transport.
+
+use heapless::Vec;
+
+use super::{Event, LineStatistics, WINDOW};
+use crate::frame::{Frame, FrameHeader, FrameKind, MAX_FRAME, MAX_PAYLOAD, write_frame};
+
+/// Messages that are taken before the other end is told without being asked.
+const TOLD_UNASKED: u16 = WINDOW as u16 / 2;
+
+/// How far a message is on its way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Passage {
+    /// To be sent, again if `again`.
+    Waiting { again: bool },
+    /// Sent, as this one of all transmissions.
+    Sent { transmission: u16 },
+    /// The other end has it, and has not taken it yet.
+    Held,
+}
+
+/// A message on its way.
+struct Outgoing {
+    payload: Vec<u8, MAX_PAYLOAD>,
+    kind: FrameKind,
+    passage: Passage,
+}
+
+/// A message that has come, if `has_come`, and is not taken.
+struct Incoming {
+    payload: Vec<u8, MAX_PAYLOAD>,
+    has_come: bool,
+}
+
+/// What is to be sent besides messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Control {
+    Acknowledge,
+    Probe,
+    Answer,
+    /// The session of this number is not known.
+    Unknown(u16),
+}
+
+/// Which end of the link it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    Host,
+    Card,
+}
+
+/// The state of one session.
+pub(super) struct Session {
+    end: End,
+    /// `None` before the first.
+    number: Option<u16>,
+    /// Messages on their way, at their number modulo [`WINDOW`].
+    outgoing: [Outgoing; WINDOW],
+    /// The first message that is not acknowledged.
+    oldest: u16,
+    /// The number of the next message.
+    next: u16,
+    /// Frames with messages, and probes, that were sent.
+    transmissions: u16,
+    /// What the other end had sent when it last answered: of that, what has not come is lost. Told once.
+    lost_below: Option<u16>,
+    /// What the last probe of the other end carried.
+    asked: [u8; 2],
+    /// At their number modulo [`WINDOW`].
+    incoming: [Incoming; WINDOW],
+    /// The number of the message to be taken next.
+    expected: u16,
+    /// Messages that were taken since the other end was told last.
+    untold: u16,
+    control: Option<Control>,
+    statistics: LineStatistics,
+}
+
+/// Whether a number comes before another.
+fn is_before(a: u16, b: u16) -> bool {
+    (a.wrapping_sub(b) as i16) < 0
+}
+
+/// The place of a number among [`WINDOW`] messages.
+fn slot<T>(slots: &mut [T; WINDOW], number: u16) -> &mut T {
+    let [a, b, c, d] = slots;
+    match number % WINDOW as u16 {
+        0 => a,
+        1 => b,
+        2 => c,
+        _ => d,
+    }
+}
+
+impl Session {
+    pub(super) const fn new(end: End) -> Self {
+        Self {
+            end,
+            number: None,
+            outgoing: [const { Outgoing { payload: Vec::new(), kind: FrameKind::Data, passage: Passage::Held } };
+                WINDOW],
+            oldest: 0,
+            next: 0,
+            transmissions: 0,
+            lost_below: None,
+            asked: [0; 2],
+            incoming: [const { Incoming { payload: Vec::new(), has_come: false } }; WINDOW],
+            expected: 0,
+            untold: 0,
+            control: None,
+            statistics: LineStatistics { damaged: 0, repeated: 0, duplicates: 0, probes: 0 },
+        }
+    }
+
+    pub(super) fn begin(&mut self, number: u16) {
+        self.number = Some(number);
+        [self.oldest, self.next, self.transmissions, self.expected, self.untold] = [0; 5];
+        self.lost_below = None;
+        self.control = None;
+        self.incoming.iter_mut().for_each(|incoming| incoming.has_come = false);
+    }
+
+    pub(super) fn on_their_way(&self) -> u16 {
+        self.next.wrapping_sub(self.oldest)
+    }
+
+    pub(super) fn send(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {
+        let opens = self.end == End::Host && self.transmissions == 0 && self.next == 0;
+        let message = slot(&mut self.outgoing, self.next);
+        // There is room for MAX_PAYLOAD.
+        let _ = message.payload.resize_default(MAX_PAYLOAD);
+        let Some(bytes) = fill(&mut message.payload).filter(|&bytes| bytes <= MAX_PAYLOAD) else {
+            return false;
+        };
+        message.payload.truncate(bytes);
+        message.kind = if opens { FrameKind::Open } else { FrameKind::Data };
+        message.passage = Passage::Waiting { again: false };
+        self.next = self.next.wrapping_add(1);
+        true
+    }
+
+    /// Whether the other end does not know of all that was taken.
+    pub(super) fn has_untold(&self) -> bool {
+        self.untold > 0
+    }
+
+    /// A frame came damaged.
+    pub(super) fn count_damaged(&mut self) {
+        self.statistics.damaged += 1;
+    }
+
+    pub(super) fn statistics(&self) -> LineStatistics {
+        self.statistics
+    }
+
+    pub(super) fn ask_for(&mut self, control: Control) {
+        if matches!(self.control, None | Some(Control::Acknowledge)) {
+            self.control = Some(control);
+        }
+    }
+
+    /// Goes through the messages on their way, from the oldest.
+    fn each_on_its_way(&mut self, mut visit: impl FnMut(u16, &mut Outgoing)) {
+        for offset in 0..self.on_their_way() {
+            let number = self.oldest.wrapping_add(offset);
+            visit(number, slot(&mut self.outgoing, number));
+        }
+    }
+
+    /// Sent messages for which `is_lost`, given their number and transmission, are to be sent again.
+    pub(super) fn lose(&mut self, is_lost: impl Fn(u16, u16) -> bool) {
+        self.each_on_its_way(|number, message| {
+            if let Passage::Sent { transmission } = message.passage
+                && is_lost(number, transmission)
+            {
+                message.passage = Passage::Waiting { again: true };
+            }
+        });
+    }
+
+    /// The next frame: messages before all else, so that an answer and a probe come after them.
+    pub(super) fn write_next(&mut self, wire: &mut Vec<u8, MAX_FRAME>) {
+        if let Some(Control::Unknown(number)) = self.control {
+            self.control = None;
+            let header = FrameHeader { session: number, ..self.header(FrameKind::Unknown, 0) };
+            return write_frame(&header, &[], wire);
+        }
+        if self.number.is_none() {
+            return;
+        }
+        for offset in 0..self.on_their_way() {
+            let number = self.oldest.wrapping_add(offset);
+            let header = self.header(FrameKind::Data, number);
+            let message = slot(&mut self.outgoing, number);
+            let Passage::Waiting { again } = message.passage else { continue };
+            message.passage = Passage::Sent { transmission: self.transmissions };
+            write_frame(&FrameHeader { kind: message.kind, ..header }, &message.payload, wire);
+            self.statistics.repeated += u64::from(again);
+            self.transmissions = self.transmissions.wrapping_add(1);
+            self.untold = 0;
+            return;
+        }
+        if self.untold >= TOLD_UNASKED {
+            self.ask_for(Control::Acknowledge);
+        }
+        let mut payload: &[u8] = &[];
+        let transmission = self.transmissions.to_le_bytes();
+        let (kind, sequence) = match self.control.take() {
+            None | Some(Control::Unknown(_)) => return,
+            Some(Control::Acknowledge) => (FrameKind::Acknowledge, 0),
+            Some(Control::Answer) => {
+                payload = &self.asked;
+                (FrameKind::Answer, self.next)
+            }
+            Some(Control::Probe) => {
+                payload = &transmission;
+                self.transmissions = self.transmissions.wrapping_add(1);
+                self.statistics.probes += 1;
+                (FrameKind::Probe, self.lost_below.take().unwrap_or(self.expected))
+            }
+        };
+        write_frame(&self.header(kind, sequence), payload, wire);
+        self.untold = 0;
+    }
+
+    fn header(&self, kind: FrameKind, sequence: u16) -> FrameHeader {
+        let held = (0..WINDOW as u16).filter(|&offset| self.has_come(self.expected.wrapping_add(offset)));
+        let held = held.fold(0, |bits, offset| bits | 1 << offset);
+        let session = self.number.unwrap_or(0);
+        FrameHeader { kind, session, sequence, acknowledged: self.expected, held }
+    }
+
+    /// Whether a message of the window from the expected one on has come.
+    fn has_come(&self, number: u16) -> bool {
+        self.incoming.get(number as usize % WINDOW).is_some_and(|incoming| incoming.has_come)
+    }
+
+    pub(super) fn hear(&mut self, frame: &Frame) -> Option<Event> {
+        let header = frame.header;
+        let is_card = self.end == End::Card;
+        if header.kind == FrameKind::Open && is_card && self.number != Some(header.session) {
+            self.begin(header.session);
+        }
+        if self.number != Some(header.session) {
+            if is_card {
+                self.ask_for(Control::Unknown(header.session));
+            }
+            return None;
+        }
+        if header.kind == FrameKind::Unknown {
+            return (!is_card).then_some(Event::Unknown);
+        }
+        self.learn(&header);
+        match header.kind {
+            FrameKind::Data | FrameKind::Open => self.keep(header.sequence, frame.payload),
+            FrameKind::Probe => {
+                self.lose(|number, _| is_before(number, header.sequence));
+                self.asked = frame.payload.first_chunk().copied().unwrap_or_default();
+                self.ask_for(Control::Answer);
+            }
+            FrameKind::Answer => {
+                let probe = frame.payload.first_chunk().map_or(0, |bytes| u16::from_le_bytes(*bytes));
+                self.conclude(probe, header.sequence);
+            }
+            FrameKind::Acknowledge | FrameKind::Unknown => {}
+        }
+        Some(Event::Heard)
+    }
+
+    /// Learns what the other end has, and with that what is lost.
+    fn learn(&mut self, header: &FrameHeader) {
+        let taken = header.acknowledged.wrapping_sub(self.oldest);
+        if taken > self.on_their_way() {
+            // From before what is known, or of nothing that was sent.
+            return;
+        }
+        let mut latest: Option<u16> = None;
+        self.each_on_its_way(|number, message| {
+            let offset = number.wrapping_sub(header.acknowledged);
+            let is_there = is_before(number, header.acknowledged)
+                || offset < WINDOW as u16 && header.held >> offset & 1 != 0;
+            if !is_there {
+                return;
+            }
+            if let Passage::Sent { transmission } = message.passage {
+                latest = Some(match latest {
+                    Some(latest) if is_before(transmission, latest) => latest,
+                    _ => transmission,
+                });
+            }
+            message.passage = Passage::Held;
+        });
+        self.oldest = header.acknowledged;
+        if let Some(latest) = latest {
+            self.lose(|_, transmission| is_before(transmission, latest));
+        }
+    }
+
+    /// Concludes from an answer what is lost: of ours, what was sent before the probe and is not there; of theirs, what they
+    /// had sent and is not here.
+    fn conclude(&mut self, probe: u16, sent: u16) {
+        self.lose(|_, transmission| is_before(transmission, probe));
+        self.lost_below = Some(sent);
+        let count = sent.wrapping_sub(self.expected).min(WINDOW as u16);
+        let is_missing = |offset| !self.has_come(self.expected.wrapping_add(offset));
+        if is_before(self.expected, sent) && (0..count).any(is_missing) {
+            self.ask_for(Control::Probe);
+        }
+    }
+
+    fn keep(&mut self, number: u16, payload: &[u8]) {
+        let offset = number.wrapping_sub(self.expected);
+        if offset >= WINDOW as u16 || self.has_come(number) {
+            // The other end does not know that it has come, or it would not send it again.
+            self.statistics.duplicates += 1;
+            return self.ask_for(Control::Acknowledge);
+        }
+        let incoming = slot(&mut self.incoming, number);
+        incoming.payload.clear();
+        // A frame's payload is never longer than MAX_PAYLOAD.
+        incoming.has_come = incoming.payload.extend_from_slice(payload).is_ok();
+        if !self.has_come(self.expected) {
+            self.ask_for(Control::Acknowledge);
+        }
+    }
+
+    pub(super) fn take(&mut self) -> Option<&[u8]> {
+        let incoming = slot(&mut self.incoming, self.expected);
+        if !core::mem::take(&mut incoming.has_come) {
+            return None;
+        }
+        self.expected = self.expected.wrapping_add(1);
+        self.untold = self.untold.saturating_add(1);
+        Some(&incoming.payload)
+    }
+}
