@@ -104,6 +104,9 @@ enum State {
     Rendering,
 }
 
+/// Tiles that a card may hold at the most, whatever it says: those of a card that holds many come late if it is lost.
+const MOST_CREDITS: u32 = 16;
+
 /// A tile at a card.
 struct TileInFlight {
     tile: Tile,
@@ -162,7 +165,7 @@ impl<'a> Session<'a> {
     /// Gives the card something to do, once it is known.
     pub fn start(&mut self, job: Job<'a>, now: Duration) {
         self.job = Some(job);
-        self.clock = Clock::new(now);
+        self.clock.rest(now);
         if self.state == State::Ready {
             self.begin_load();
         }
@@ -224,7 +227,7 @@ impl<'a> Session<'a> {
                 true
             }
             (State::Rendering, _) => {
-                let credits = self.budget.map_or(1, |budget| budget.tiles as usize);
+                let credits = self.budget.map_or(1, |budget| budget.tiles.min(MOST_CREDITS) as usize);
                 let free = self.tiles.len() < credits;
                 let Some(tile) = free.then(|| picture.scheduler.take()).flatten() else { return false };
                 self.tiles.insert(tile.id, TileInFlight { tile, pixels: 0 });
@@ -286,12 +289,16 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Tells the card what has come, when the line is quiet, and asks it when it has been quiet for too long.
+    /// Tells the card what has come: when the line is quiet.
+    pub fn acknowledge(&mut self) {
+        self.transport.acknowledge();
+    }
+
+    /// Asks a card that has been quiet for too long whether it is there. To be called often.
     ///
     /// # Errors
     /// If the card has been silent for longer than it may be.
     pub fn tick(&mut self, now: Duration) -> Result<(), SessionError> {
-        self.transport.acknowledge();
         let is_waiting = match self.state {
             State::Ready => false,
             State::Rendering => !self.tiles.is_empty() || !self.transport.is_acknowledged(),

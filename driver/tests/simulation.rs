@@ -319,7 +319,10 @@ impl<'a> Station<'a> {
             Ok(())
         } else {
             let received = self.to_host.pop(bytes);
-            if received.is_empty() { session.tick(now) } else { session.receive(&received, picture, now) }
+            if received.is_empty() {
+                session.acknowledge();
+            }
+            session.receive(&received, picture, now).and_then(|()| session.tick(now))
         };
         if let Err(error) = result {
             assert!(matches!(error, SessionError::Silent(_)), "seed {}: {error}", run.seed);
@@ -479,5 +482,34 @@ fn faults_end_in_the_same_picture_or_with_no_card_left() {
         if runs > 50 {
             assert!(repaired.line.damaged > 0 && repaired.line.repeated > 0 && repaired.resets > 0);
         }
+    });
+}
+
+/// The card is reset while the host is busy with something else, before there is a job.
+#[test]
+fn a_card_that_is_reset_before_the_start_is_greeted_again() {
+    with_room_for_a_card(|| {
+        let fixture = Fixture::new();
+        let alone = Run::new(&fixture, 1, 0).go();
+        let random = &mut Random(7);
+        let run = Run::new(&fixture, 1, 7);
+        let mut station = Station::new(&fixture, random);
+        let mut picture = fixture.picture();
+        // Greets, without starting.
+        station.started = true;
+        let mut step = 0;
+        while station.session.budget().is_none() {
+            station.step(&run, &mut picture, step, random);
+            step += 1;
+        }
+        station.card = fixture.card();
+        station.started = false;
+        while !picture.scheduler.is_complete() {
+            station.step(&run, &mut picture, step, random);
+            step += 1;
+            assert!(step < MOST_STEPS && !station.is_lost, "the card is not greeted again");
+        }
+        assert!(Some(picture.film.pixels().to_vec()) == alone.pixels);
+        assert_eq!(station.session.link_bytes().resets, 1);
     });
 }

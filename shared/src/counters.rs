@@ -59,20 +59,20 @@ impl Counters {
 
     /// Adds another chip's counts.
     pub fn add(&mut self, other: &Self) {
-        self.eye_rays += other.eye_rays;
-        self.shadow_rays += other.shadow_rays;
-        self.gather_rays += other.gather_rays;
-        self.survey_rays += other.survey_rays;
-        self.gathers += other.gathers;
-        self.tables += other.tables;
-        self.records += other.records;
-        self.lambertian_samples += other.lambertian_samples;
-        self.interpolated_samples += other.interpolated_samples;
-        self.photons_tested += other.photons_tested;
-        self.photons_taken += other.photons_taken;
-        self.photons_selected += other.photons_selected;
-        self.photons_found += other.photons_found;
-        self.drains += other.drains;
+        self.eye_rays = self.eye_rays.saturating_add(other.eye_rays);
+        self.shadow_rays = self.shadow_rays.saturating_add(other.shadow_rays);
+        self.gather_rays = self.gather_rays.saturating_add(other.gather_rays);
+        self.survey_rays = self.survey_rays.saturating_add(other.survey_rays);
+        self.gathers = self.gathers.saturating_add(other.gathers);
+        self.tables = self.tables.saturating_add(other.tables);
+        self.records = self.records.saturating_add(other.records);
+        self.lambertian_samples = self.lambertian_samples.saturating_add(other.lambertian_samples);
+        self.interpolated_samples = self.interpolated_samples.saturating_add(other.interpolated_samples);
+        self.photons_tested = self.photons_tested.saturating_add(other.photons_tested);
+        self.photons_taken = self.photons_taken.saturating_add(other.photons_taken);
+        self.photons_selected = self.photons_selected.saturating_add(other.photons_selected);
+        self.photons_found = self.photons_found.saturating_add(other.photons_found);
+        self.drains = self.drains.saturating_add(other.drains);
         self.most_waiting = self.most_waiting.max(other.most_waiting);
     }
 }

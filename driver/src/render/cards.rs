@@ -260,9 +260,10 @@ fn exchange(
     let mut buffer = [0; 8192];
     let wait = if session.has_more_to_send() { Duration::ZERO } else { WAIT };
     match port.read(&mut buffer, wait).map_err(SessionError::Port)? {
-        0 => session.tick(start.elapsed()),
-        received => session.receive(&buffer[..received], &mut lock(picture), start.elapsed()),
+        0 => session.acknowledge(),
+        received => session.receive(&buffer[..received], &mut lock(picture), start.elapsed())?,
     }
+    session.tick(start.elapsed())
 }
 
 /// Says hello and waits for the answer.
@@ -373,10 +374,12 @@ fn reopen(card: &mut OpenCard, shared: &Shared) -> Result<bool, RenderError> {
         if shared.is_complete()? {
             return Ok(true);
         }
+        // Before the first try as well: what closes each link at once is not to be asked without a pause.
+        std::thread::sleep(RETRY);
         match card.reopen() {
             None => return Ok(false),
             Some(true) => return Ok(true),
-            Some(false) => std::thread::sleep(RETRY),
+            Some(false) => {}
         }
     }
 }

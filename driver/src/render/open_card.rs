@@ -19,7 +19,11 @@ pub(super) struct OpenCard {
 
 enum Place {
     Emulated(EmulatedCard),
-    Remote { address: CardAddress, port: Box<dyn Port + Send> },
+    /// Its port is closed before it is opened again, as a device may have one user at a time.
+    Remote {
+        address: CardAddress,
+        port: Option<Box<dyn Port + Send>>,
+    },
 }
 
 impl OpenCard {
@@ -38,7 +42,7 @@ impl OpenCard {
             }
             Ok(port) => {
                 let port = port.map_err(|source| RenderError::Link { card: index, source })?;
-                Place::Remote { address: address.clone(), port }
+                Place::Remote { address: address.clone(), port: Some(port) }
             }
         };
         let injector = faults.map(|faults| FaultInjector::new(faults, index));
@@ -50,8 +54,9 @@ impl OpenCard {
         match &mut self.place {
             Place::Emulated(_) => None,
             Place::Remote { address, port } => {
-                let found = reach(address).ok()?;
-                Some(found.map(|found| *port = found).is_ok())
+                drop(port.take());
+                *port = reach(address).ok()?.ok();
+                Some(port.is_some())
             }
         }
     }
@@ -79,10 +84,13 @@ impl OpenCard {
 }
 
 impl Place {
-    fn port(&mut self) -> &mut dyn Port {
+    fn port(&mut self) -> Result<&mut dyn Port, PortError> {
         match self {
-            Self::Emulated(card) => card.port(),
-            Self::Remote { port, .. } => port.as_mut(),
+            Self::Emulated(card) => Ok(card.port()),
+            Self::Remote { port, .. } => match port {
+                Some(port) => Ok(port.as_mut()),
+                None => Err(PortError::Closed),
+            },
         }
     }
 }
@@ -90,7 +98,7 @@ impl Place {
 /// The host's end of the link.
 impl Port for OpenCard {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
-        let port = self.place.port();
+        let port = self.place.port()?;
         match &mut self.injector {
             None => port.read(buffer, wait),
             Some(injector) => injector.read(port, buffer, wait),
@@ -98,7 +106,7 @@ impl Port for OpenCard {
     }
 
     fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
-        let port = self.place.port();
+        let port = self.place.port()?;
         match &mut self.injector {
             None => port.write(bytes, wait),
             Some(injector) => injector.write(port, bytes, wait),

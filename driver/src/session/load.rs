@@ -14,6 +14,8 @@ pub(super) struct Load {
     written: u32,
     /// Chunks that were asked for.
     asked: u32,
+    /// Those of them whose checksums have come.
+    compared: u32,
     /// Chunks of the image that the card has.
     there: Vec<u32>,
     /// The next line to look at.
@@ -48,9 +50,11 @@ impl Load {
     pub(super) fn compare(&mut self, image: &[Line], first: u32, data: &[u8]) -> Result<(), SessionError> {
         let (checksums, rest) = data.as_chunks::<4>();
         let end = first.checked_add(checksums.len() as u32);
-        if end != Some(self.asked) || !rest.is_empty() || checksums.is_empty() {
+        let begins_as_asked = first == self.compared;
+        if end != Some(self.asked) || !rest.is_empty() || checksums.is_empty() || !begins_as_asked {
             return Err(SessionError::Unexpected("checksums that were not asked for"));
         }
+        self.compared = self.asked;
         let mut chunks = image.chunks(CHUNK_LINES as usize).skip(first as usize);
         for (number, found) in (first..).zip(checksums) {
             let mut checksum = Checksum::default();

@@ -54,6 +54,8 @@ pub(super) struct Session {
     end: End,
     /// `None` before the first.
     number: Option<u16>,
+    /// Whether its first message was sent.
+    has_opened: bool,
     /// Messages on their way, at their number modulo [`WINDOW`].
     outgoing: [Outgoing; WINDOW],
     /// The first message that is not acknowledged.
@@ -97,6 +99,7 @@ impl Session {
         Self {
             end,
             number: None,
+            has_opened: false,
             outgoing: [const { Outgoing { payload: Vec::new(), kind: FrameKind::Data, passage: Passage::Held } };
                 WINDOW],
             oldest: 0,
@@ -114,6 +117,7 @@ impl Session {
 
     pub(super) fn begin(&mut self, number: u16) {
         self.number = Some(number);
+        self.has_opened = false;
         [self.oldest, self.next, self.transmissions, self.expected, self.untold] = [0; 5];
         self.lost_below = None;
         self.control = None;
@@ -125,7 +129,7 @@ impl Session {
     }
 
     pub(super) fn send(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {
-        let opens = self.end == End::Host && self.transmissions == 0 && self.next == 0;
+        let opens = self.end == End::Host && !core::mem::replace(&mut self.has_opened, true);
         let message = slot(&mut self.outgoing, self.next);
         // There is room for MAX_PAYLOAD.
         let _ = message.payload.resize_default(MAX_PAYLOAD);
@@ -300,10 +304,10 @@ impl Session {
     /// had sent and is not here.
     fn conclude(&mut self, probe: u16, sent: u16) {
         self.lose(|_, transmission| is_before(transmission, probe));
-        self.lost_below = Some(sent);
         let count = sent.wrapping_sub(self.expected).min(WINDOW as u16);
         let is_missing = |offset| !self.has_come(self.expected.wrapping_add(offset));
         if is_before(self.expected, sent) && (0..count).any(is_missing) {
+            self.lost_below = Some(sent);
             self.ask_for(Control::Probe);
         }
     }
