@@ -102,11 +102,6 @@ impl Scheduler {
     pub fn progress(&self) -> (usize, usize) {
         (self.done, self.total)
     }
-
-    /// Whether no tile waits.
-    pub fn is_drained(&self) -> bool {
-        self.waiting.is_empty()
-    }
 }
 
 #[cfg(test)]
