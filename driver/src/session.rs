@@ -19,7 +19,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
-    self, Command, FrameParameters, PIXEL_BYTES, PROTOCOL_VERSION, Pixel, Reply, Tile,
+    self, Command, FrameParameters, MemoryUse, PIXEL_BYTES, PROTOCOL_VERSION, Pixel, Reply, Tile,
 };
 use photoncard_shared::transport::{Event, LineStatistics, Transport};
 
@@ -118,6 +118,7 @@ pub struct Session<'a> {
     state: State,
     budget: Option<Budget>,
     build: String,
+    memory_use: Option<MemoryUse>,
     job: Option<Job<'a>>,
     load: Load,
     tiles: HashMap<u32, TileInFlight>,
@@ -138,6 +139,7 @@ impl<'a> Session<'a> {
             state: State::Greeting,
             budget: None,
             build: String::new(),
+            memory_use: None,
             job: None,
             load: Load::default(),
             tiles: HashMap::new(),
@@ -160,6 +162,11 @@ impl<'a> Session<'a> {
     /// Name and version of the card's firmware, once it has said so.
     pub fn build(&self) -> &str {
         &self.build
+    }
+
+    /// What the card's firmware takes of on-chip memory, if the card measures it and has said so.
+    pub fn memory_use(&self) -> Option<MemoryUse> {
+        self.memory_use
     }
 
     /// Gives the card something to do, once it is known.
@@ -361,8 +368,12 @@ impl<'a> Session<'a> {
 
     fn take(&mut self, reply: &Reply, picture: &mut Picture) -> Result<(), SessionError> {
         match (self.state, *reply) {
-            (State::Greeting, Reply::Hello { protocol, layout, budget, written_lines, build }) => {
+            (
+                State::Greeting,
+                Reply::Hello { protocol, layout, budget, written_lines, memory_use, build },
+            ) => {
                 build.clone_into(&mut self.build);
+                self.memory_use = memory_use;
                 self.greet(protocol, layout, budget)?;
                 self.load = Load::new(written_lines);
                 if self.job.is_some() {

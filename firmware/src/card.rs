@@ -14,8 +14,8 @@ use photoncard_shared::budget::{
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
-    self, Command, Fault, FaultCode, FrameParameters, PIXEL_BYTES, PIXELS_PER_REPLY, PROTOCOL_VERSION, Reply,
-    Tile,
+    self, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXEL_BYTES, PIXELS_PER_REPLY,
+    PROTOCOL_VERSION, Reply, Tile,
 };
 use photoncard_shared::transport::Transport;
 
@@ -52,6 +52,8 @@ struct Session<
 > {
     chip: Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>,
     image: ImageState,
+    /// How a board measures what its image takes of on-chip memory.
+    measure: Option<fn() -> MemoryUse>,
     /// Lines from the first on that were written since the card was switched on.
     written: u32,
     checksums: Option<Checksums>,
@@ -96,6 +98,7 @@ impl<
             session: Session {
                 chip: Chip::new(),
                 image: ImageState::None,
+                measure: None,
                 written: 0,
                 checksums: None,
                 frame: None,
@@ -110,6 +113,11 @@ impl<
     /// The card's memory: what it counted, if it counts.
     pub fn memory(&mut self) -> &mut M {
         &mut self.memory
+    }
+
+    /// Makes the card tell hosts what `measure` finds. Without it nobody knows.
+    pub fn measure_memory_by(&mut self, measure: fn() -> MemoryUse) {
+        self.session.measure = Some(measure);
     }
 
     /// Whether there is something to do without a byte from the host.
@@ -196,7 +204,7 @@ impl<
         match *command {
             Command::Hello { .. } => {
                 self.forget();
-                Ok(Some(hello(budget, self.written)))
+                Ok(Some(hello(budget, self.written, self.measure.map(|measure| measure()))))
             }
             Command::ReadChecksums { first, count } => {
                 if self.is_at_work() {
@@ -344,12 +352,13 @@ impl<
     }
 }
 
-fn hello(budget: &Budget, written_lines: u32) -> Reply<'static> {
+fn hello(budget: &Budget, written_lines: u32, memory_use: Option<MemoryUse>) -> Reply<'static> {
     Reply::Hello {
         protocol: PROTOCOL_VERSION,
         layout: LAYOUT_VERSION,
         budget: *budget,
         written_lines,
+        memory_use,
         build: concat!("photoncard-firmware ", env!("CARGO_PKG_VERSION")),
     }
 }

@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use photoncard_driver::emulator::ChipKind;
-use photoncard_driver::render::{CardAddress, MOST_BINS, card_info, card_ping};
+use photoncard_driver::render::{CardAddress, MOST_BINS, MemoryUse, card_info, card_ping};
 
 use crate::console::print;
 use crate::failure::Failure;
 
-/// Prints what a card says of itself in its hello and, of an emulated one, what its firmware takes of the chip.
+/// Prints what a card says of itself in its hello, as a board what it has measured of its memory and, of an emulated
+/// one, what its firmware takes of the chip.
 pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     let info = card_info(address)?;
     let budget = info.budget;
@@ -24,6 +25,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     ];
     lines.extend(kind.map(|kind| format!("  cache tags    {} bytes", kind.tag_bytes())));
     lines.push(format!("  stack         {} bytes", budget.stack_bytes));
+    lines.extend(info.memory_use.iter().flat_map(measured_rows));
     lines.extend(kind.into_iter().flat_map(|kind| sram_rows(kind, budget.sram_bytes as usize)));
     lines.extend([
         format!("dram            {} bytes", budget.dram_bytes),
@@ -40,6 +42,15 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("samples         {} a pixel", budget.samples),
     ]);
     print(&(lines.join("\n") + "\n"))
+}
+
+/// What the firmware of a board takes of on-chip memory, as the board has measured it.
+fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
+    let MemoryUse { static_bytes, stack_bytes, stack_used } = memory_use;
+    [
+        format!("    used        {stack_used} bytes at most of {stack_bytes}"),
+        format!("  static data   {static_bytes} bytes"),
+    ]
 }
 
 /// What the firmware's buffers take of a chip, which the host knows of the chips that it emulates.

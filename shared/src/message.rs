@@ -20,13 +20,24 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// The version of this module, of [`crate::transport`] and of [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 5;
+pub const PROTOCOL_VERSION: u16 = 6;
 
 /// Lines that one [`Command::WriteLines`] may carry.
 pub const LINES_PER_WRITE: usize = 8;
 
 /// Lines of a chunk: what one of [`Reply::Checksums`] is of.
 pub const CHUNK_LINES: u32 = 64;
+
+/// What a firmware takes of its chip's on-chip memory, as its board measures it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MemoryUse {
+    /// Static data, initialised and zeroed, bytes.
+    pub static_bytes: u32,
+    /// Size of the stack, bytes.
+    pub stack_bytes: u32,
+    /// The most bytes of the stack that have been in use since the chip was switched on.
+    pub stack_used: u32,
+}
 
 /// Checksums that one [`Reply::Checksums`] may carry.
 pub const CHECKSUMS_PER_REPLY: u32 = 128;
@@ -180,6 +191,8 @@ pub enum Reply<'a> {
         budget: Budget,
         /// Lines of its memory, from the first on, that were written since it was switched on: what is beyond is nothing.
         written_lines: u32,
+        /// What the firmware takes of on-chip memory; `None` where nobody measures it, as of an emulated chip.
+        memory_use: Option<MemoryUse>,
         /// Name and version of the firmware.
         #[serde(borrow)]
         build: &'a str,

@@ -161,9 +161,13 @@ fn opcodes_are_pinned() {
         assert_eq!(encoded(command)[0] as usize, opcode);
     }
     assert_eq!(encoded(&Command::RenderTile(tile)), [6, 1, 2, 3, 4, 5]);
+    let hello = |memory_use| {
+        let budget = REFERENCE;
+        Reply::Hello { protocol: 1, layout: 1, budget, written_lines: 0, memory_use, build: "x" }
+    };
     let fault = |code| Reply::Fault(Fault { code, detail: 7 });
     let replies = [
-        (Reply::Hello { protocol: 1, layout: 1, budget: REFERENCE, written_lines: 0, build: "x" }, 0),
+        (hello(None), 0),
         (Reply::Checksums { first: 0, data: &[] }, 1),
         (Reply::ImageAccepted, 2),
         (Reply::FrameAccepted, 3),
@@ -173,6 +177,9 @@ fn opcodes_are_pinned() {
     for (reply, opcode) in replies {
         assert_eq!(encoded(&reply)[0], opcode);
     }
+    assert!(encoded(&hello(None)).ends_with(&[0, 0, 1, b'x']));
+    let memory_use = MemoryUse { static_bytes: 3, stack_bytes: 5, stack_used: 4 };
+    assert!(encoded(&hello(Some(memory_use))).ends_with(&[0, 1, 3, 5, 4, 1, b'x']));
     assert_eq!(encoded(&fault(FaultCode::Message)), [6, 0, 7]);
     assert_eq!(encoded(&fault(FaultCode::Depth)), [6, 12, 7]);
 }

@@ -13,7 +13,7 @@ use photoncard_shared::checksum::checksum;
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{BvhNode, ChildReference};
 use photoncard_shared::message::{
-    self, CHUNK_LINES, Command, Fault, FaultCode, FrameParameters, LINES_PER_WRITE, Reply, Tile,
+    self, CHUNK_LINES, Command, Fault, FaultCode, FrameParameters, LINES_PER_WRITE, MemoryUse, Reply, Tile,
 };
 use photoncard_shared::transport::Transport;
 use photoncard_tests::{camera, lambertian, room, scene, with_room_for_a_card};
@@ -31,7 +31,7 @@ struct Wire<'a> {
 /// A reply, without what it borrows.
 #[derive(Clone, Debug, PartialEq)]
 enum Answer {
-    Hello(u32),
+    Hello(u32, Option<MemoryUse>),
     Checksums(Vec<u8>),
     ImageAccepted,
     FrameAccepted,
@@ -92,7 +92,7 @@ impl<'a> Wire<'a> {
         self.session += 1;
         self.host.open(self.session);
         match self.say(&Command::Hello { protocol: 1, layout: 1 })[..] {
-            [Answer::Hello(written)] => written,
+            [Answer::Hello(written, _)] => written,
             ref other => panic!("{other:?}"),
         }
     }
@@ -113,7 +113,7 @@ impl<'a> Wire<'a> {
 
 fn answer(reply: Reply) -> Answer {
     match reply {
-        Reply::Hello { written_lines, .. } => Answer::Hello(written_lines),
+        Reply::Hello { written_lines, memory_use, .. } => Answer::Hello(written_lines, memory_use),
         Reply::Checksums { data, .. } => Answer::Checksums(data.to_vec()),
         Reply::ImageAccepted => Answer::ImageAccepted,
         Reply::FrameAccepted => Answer::FrameAccepted,
@@ -286,6 +286,20 @@ fn a_card_tells_what_it_has_of_an_image_and_keeps_it_over_sessions() {
         assert_eq!(wire.say(&Command::EndImage), [Answer::ImageAccepted]);
         assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
         assert_eq!(wire.say(&Command::RenderTile(TILE)).last(), Some(&Answer::TileDone(7)));
+    });
+}
+
+#[test]
+fn a_card_tells_what_its_board_measures_of_its_memory() {
+    with_room_for_a_card(|| {
+        let hello = Command::Hello { protocol: 1, layout: 1 };
+        let mut memory = vec![Line::ZERO; 1];
+        let mut wire = Wire::new(&mut memory);
+        wire.hello();
+        assert_eq!(wire.say(&hello), [Answer::Hello(0, None)]);
+        const MEASURED: MemoryUse = MemoryUse { static_bytes: 100, stack_bytes: 20, stack_used: 10 };
+        wire.card.measure_memory_by(|| MEASURED);
+        assert_eq!(wire.say(&hello), [Answer::Hello(0, Some(MEASURED))]);
     });
 }
 

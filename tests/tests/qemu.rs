@@ -8,8 +8,10 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
 use photoncard_driver::link::LineFaults;
-use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::render::{CardAddress, MemoryUse, RenderSettings, card_info};
 use photoncard_driver::scene::gltf;
+use photoncard_firmware::card::MicroCard;
+use photoncard_firmware::memory::Dram;
 use photoncard_shared::budget::MICRO;
 use photoncard_tests::render_or_panic;
 
@@ -77,19 +79,6 @@ impl Machine {
             ),
         }
     }
-
-    /// The most bytes of the stack that were in use, and its size, as the image says when it is idle.
-    fn stack(&self, name: &str) -> Option<(usize, usize)> {
-        let mut last = None;
-        while let Ok(line) = self.lines.recv_timeout(Duration::from_millis(500)) {
-            say(&format!("{name}: {line}"));
-            let numbers: Vec<usize> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
-            if let (true, [used, size]) = (line.starts_with("stack "), &numbers[..]) {
-                last = Some((*used, *size));
-            }
-        }
-        last
-    }
 }
 
 impl Drop for Machine {
@@ -154,8 +143,20 @@ fn renders_as_the_emulated_card(name: &str) {
         // The image that is there already is not sent again.
         assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, number == 1);
     }
-    let (used, size) = machine.stack(name).expect("the image tells how much of its stack is used");
-    assert!(used < size && size <= MICRO.stack_bytes as usize);
+    stays_within_the_budget(name, &address);
+    drop(machine);
+}
+
+/// What the image says over its link that it takes of on-chip memory, after all that it has rendered.
+fn stays_within_the_budget(name: &str, address: &CardAddress) {
+    let MemoryUse { static_bytes, stack_bytes, stack_used } =
+        card_info(address).expect("the card answers").memory_use.expect("a board measures its memory");
+    say(&format!("{name}: {static_bytes} bytes of static data, {stack_used} of {stack_bytes} of stack used"));
+    assert!(0 < stack_used && stack_used < stack_bytes && stack_bytes <= MICRO.stack_bytes);
+    assert!(static_bytes as usize >= size_of::<MicroCard<Dram<'static>>>() / 2, "32-bit pointers take half");
+    // The images have no caches: the memory that the budget has for them is not theirs.
+    let caches = MICRO.photon_cache_bytes + MICRO.scene_cache_bytes;
+    assert!(static_bytes + stack_bytes + caches <= MICRO.sram_bytes);
 }
 
 #[test]

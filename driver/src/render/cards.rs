@@ -9,6 +9,7 @@ use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::link::{Port, PortError};
+use photoncard_shared::message::MemoryUse;
 
 use super::address::{CardAddress, MAX_CHIPS};
 use super::open_card::OpenCard;
@@ -79,6 +80,8 @@ pub struct CardInfo {
     pub build: String,
     /// What it can hold.
     pub budget: Budget,
+    /// What its firmware takes of on-chip memory; `None` of a card that does not measure it.
+    pub memory_use: Option<MemoryUse>,
 }
 
 /// Says hello to the first card at an address.
@@ -89,7 +92,8 @@ pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
     let nothing = Mutex::new(Picture::empty()?);
     let card = OpenCard::open(0, address, None, None)?;
     let connected = greet(card, &nothing, Instant::now(), &Unobserved)?;
-    Ok(CardInfo { build: connected.session.build().to_owned(), budget: connected.budget })
+    let Connected { session, budget, .. } = connected;
+    Ok(CardInfo { build: session.build().to_owned(), budget, memory_use: session.memory_use() })
 }
 
 /// Says hello to the first card at an address some times. Returns how long each answer took.

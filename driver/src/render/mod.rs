@@ -13,6 +13,7 @@ pub use cards::{CardInfo, card_info, card_ping};
 pub use error::RenderError;
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use photoncard_shared::budget::MOST_BINS;
+pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::Sampling;
 pub use settings::{LEAST_IRRADIANCE_ERROR, RenderSettings};
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};

@@ -26,7 +26,7 @@ use photoncard_shared::budget::MICRO;
 use self::once::Once;
 use self::port::BoardPort;
 pub(crate) use self::port::receive_all;
-use self::report::Reporting;
+use self::report::StackCheck;
 
 /// A board: one UART, one clock, one processor. There is one of each, so nothing has a `self`.
 pub(crate) trait Board {
@@ -64,7 +64,7 @@ const _: () = assert!(MICRO_SRAM_BYTES + port::STATIC_BYTES <= MICRO.sram_bytes 
 /// Serves the card on the board's UART for ever.
 pub(crate) fn run<B: Board>() -> ! {
     stack::paint();
-    report::memory(B::NAME);
+    report::sections(B::NAME);
     if stack::bytes() > MICRO.stack_bytes as usize {
         semihosting::fail(format_args!("the stack is larger than the budget's: {} bytes\n", stack::bytes()));
     }
@@ -75,9 +75,10 @@ pub(crate) fn run<B: Board>() -> ! {
         semihosting::fail(format_args!("card memory is smaller than the budget's: {} lines\n", lines.len()));
     }
     *card.memory() = Dram::new(lines);
+    card.measure_memory_by(report::memory_use);
     B::start();
     semihosting::print(format_args!("ready\n"));
-    let error = serve(card, &mut Reporting::new(BoardPort::<B>::new()));
+    let error = serve(card, &mut StackCheck(BoardPort::<B>::new()));
     semihosting::fail(format_args!("the port failed: {error:?}\n"));
 }
 

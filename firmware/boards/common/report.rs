@@ -1,8 +1,9 @@
-//! What an image tells a debugger of its memory.
+//! What an image tells of its memory: a debugger at the start, and hosts whenever they ask.
 
 use core::time::Duration;
 
 use photoncard_shared::link::{Port, PortError};
+use photoncard_shared::message::MemoryUse;
 
 use super::{semihosting, stack};
 
@@ -18,47 +19,51 @@ unsafe extern "C" {
     static __ebss: [u8; 0];
 }
 
+fn bytes(start: *const [u8; 0], end: *const [u8; 0]) -> usize {
+    end.addr() - start.addr()
+}
+
+fn data_bytes() -> usize {
+    bytes(&raw const __sdata, &raw const __edata)
+}
+
+fn zeroed_bytes() -> usize {
+    bytes(&raw const __sbss, &raw const __ebss)
+}
+
 /// Prints the sizes of the image's sections.
-pub(super) fn memory(board: &str) {
-    let bytes = |start: *const [u8; 0], end: *const [u8; 0]| end.addr() - start.addr();
+pub(super) fn sections(board: &str) {
     semihosting::print(format_args!(
         "photoncard on {board}: code {}, constants {}, data {}, zeroed data {}, stack {} bytes\n",
         bytes(&raw const __stext, &raw const __etext),
         bytes(&raw const __srodata, &raw const __erodata),
-        bytes(&raw const __sdata, &raw const __edata),
-        bytes(&raw const __sbss, &raw const __ebss),
+        data_bytes(),
+        zeroed_bytes(),
         stack::bytes(),
     ));
 }
 
-/// A port that prints the stack's high water when it has risen and nothing else is to be done.
-pub(super) struct Reporting<P> {
-    port: P,
-    printed: usize,
-}
-
-impl<P> Reporting<P> {
-    /// Reports beside a port.
-    pub(super) const fn new(port: P) -> Self {
-        Self { port, printed: 0 }
+/// What the image takes of on-chip memory, and has taken of its stack.
+pub(super) fn memory_use() -> MemoryUse {
+    MemoryUse {
+        static_bytes: (data_bytes() + zeroed_bytes()) as u32,
+        stack_bytes: stack::bytes() as u32,
+        stack_used: stack::high_water() as u32,
     }
 }
 
-impl<P: Port> Port for Reporting<P> {
+/// A port that fails the image when its stack has been used to the end: what lies there may be lost already.
+pub(super) struct StackCheck<P>(pub(super) P);
+
+impl<P: Port> Port for StackCheck<P> {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
-        let count = self.port.read(buffer, wait)?;
-        let is_idle = count == 0 && !wait.is_zero();
-        if is_idle && stack::high_water() > self.printed {
-            self.printed = stack::high_water();
-            semihosting::print(format_args!("stack {} of {} bytes used\n", self.printed, stack::bytes()));
-            if self.printed >= stack::bytes() {
-                semihosting::fail(format_args!("the stack is too small\n"));
-            }
+        if stack::is_used_up() {
+            semihosting::fail(format_args!("the stack of {} bytes is too small\n", stack::bytes()));
         }
-        Ok(count)
+        self.0.read(buffer, wait)
     }
 
     fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
-        self.port.write(bytes, wait)
+        self.0.write(bytes, wait)
     }
 }

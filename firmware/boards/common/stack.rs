@@ -18,7 +18,7 @@ fn lowest() -> *mut u32 {
 }
 
 /// Size of the stack.
-pub(crate) fn bytes() -> usize {
+pub(super) fn bytes() -> usize {
     (&raw mut _stack_start).addr() - lowest().addr()
 }
 
@@ -37,8 +37,14 @@ pub(super) fn paint() {
     }
 }
 
+/// Whether the stack has been used to its last word.
+pub(super) fn is_used_up() -> bool {
+    // SAFETY: as below.
+    (unsafe { lowest().read_volatile() }) != PAINT
+}
+
 /// The most bytes of the stack that have been in use at once.
-pub(crate) fn high_water() -> usize {
+pub(super) fn high_water() -> usize {
     let words = bytes() / size_of::<u32>();
     let mut unused = 0;
     // SAFETY: the words belong to the stack; they are read as memory, whatever they hold.

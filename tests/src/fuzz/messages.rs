@@ -4,7 +4,7 @@ use photoncard_shared::budget::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::message::{
-    self, Camera, Command, Drain, Fault, FaultCode, FrameParameters, Reply, Sampling, Tile,
+    self, Camera, Command, Drain, Fault, FaultCode, FrameParameters, MemoryUse, Reply, Sampling, Tile,
 };
 
 use super::{Random, Target, bound, mutation};
@@ -44,7 +44,7 @@ fn frame() -> FrameParameters {
 pub(super) fn commands() -> Vec<Vec<u8>> {
     let data = [0x5a; 256];
     let commands = [
-        Command::Hello { protocol: 5, layout: 3 },
+        Command::Hello { protocol: 6, layout: 3 },
         Command::ReadChecksums { first: 3, count: 70_000 },
         Command::BeginImage { lines: 300, checksum: 0xdead_beef },
         Command::WriteLines { first: 200, data: &data },
@@ -58,11 +58,18 @@ pub(super) fn commands() -> Vec<Vec<u8>> {
 /// One of every reply.
 pub(super) fn replies() -> Vec<Vec<u8>> {
     let data = [0x5a; 400];
-    let hello =
-        |budget| Reply::Hello { protocol: 5, layout: 3, budget, written_lines: 300, build: "firmware 1" };
+    let hello = |budget, memory_use| Reply::Hello {
+        protocol: 6,
+        layout: 3,
+        budget,
+        written_lines: 300,
+        memory_use,
+        build: "firmware 1",
+    };
+    let memory_use = MemoryUse { static_bytes: 107_872, stack_bytes: 16_384, stack_used: 5948 };
     let replies = [
-        hello(REFERENCE),
-        hello(MICRO),
+        hello(REFERENCE, None),
+        hello(MICRO, Some(memory_use)),
         Reply::Checksums { first: 3, data: &data },
         Reply::ImageAccepted,
         Reply::FrameAccepted,
