@@ -55,8 +55,8 @@ impl Picture {
 pub struct Job<'a> {
     /// The card image.
     pub image: &'a [Line],
-    /// CRC-32C of the image's bytes.
-    pub checksum: u32,
+    /// [`photoncard_shared::checksum::image_checksum`] of the image.
+    pub checksum: u64,
     /// The frame's parameters.
     pub frame: &'a FrameParameters,
 }

@@ -22,7 +22,7 @@ use photoncard_firmware::memory::{CardMemory, MemoryPort};
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::address::{Line, LineAddress, Structure};
 use photoncard_shared::budget::MICRO;
-use photoncard_shared::checksum::Checksum;
+use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters};
 
@@ -121,7 +121,7 @@ impl CardMemory for Memory {
 struct Fixture {
     settings: RenderSettings,
     mapped: MappedImage,
-    checksum: u32,
+    checksum: u64,
     frame: FrameParameters,
 }
 
@@ -131,9 +131,8 @@ impl Fixture {
         let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
         let mapped = map_photons(packed, &settings.photon_settings(), &|_| true).unwrap();
         let frame = settings.frame(&scene.cameras[0], mapped.max_distance);
-        let mut checksum = Checksum::default();
-        mapped.image.lines().iter().for_each(|line| checksum.update(&line.0));
-        Self { settings, mapped, checksum: checksum.value(), frame }
+        let checksum = image_checksum(mapped.image.lines());
+        Self { settings, mapped, checksum, frame }
     }
 
     fn job(&self) -> Job<'_> {

@@ -1,7 +1,15 @@
-//! CRC-32C (Castagnoli), sixteen bytes at a time (Kounavis, Berry 2005): one table for each place among the sixteen.
+//! The checksums of frames and of images. They are of two polynomials, so that what is wrong in a way that one does not
+//! show is shown by the other.
+//!
+//! [`Checksum`], of frames, is CRC-32C (Castagnoli), sixteen bytes at a time (Kounavis, Berry 2005): one table for each
+//! place among the sixteen. [`ImageChecksum`], of chunks and of the whole image, is CRC-64/XZ (ECMA-182), byte by byte.
 
-/// The polynomial, its lowest coefficient first.
+use crate::address::Line;
+
+/// The polynomial of frames, its lowest coefficient first.
 const POLYNOMIAL: u32 = 0x82f6_3b78;
+/// The polynomial of images, its lowest coefficient first.
+const IMAGE_POLYNOMIAL: u64 = 0xc96c_5795_d787_0f42;
 
 /// What a byte adds that is followed by as many zero bytes as its table's number.
 static TABLES: [[u32; 256]; 16] = tables();
@@ -32,10 +40,29 @@ const fn tables() -> [[u32; 256]; 16] {
     tables
 }
 
+/// What a byte adds to the checksum of an image.
+static IMAGE_TABLE: [u64; 256] = image_table();
+
+#[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
+const fn image_table() -> [u64; 256] {
+    let mut table = [0; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let (mut sum, mut bit) = (byte as u64, 0);
+        while bit < 8 {
+            sum = (sum >> 1) ^ (IMAGE_POLYNOMIAL & (sum & 1).wrapping_neg());
+            bit += 1;
+        }
+        table[byte] = sum;
+        byte += 1;
+    }
+    table
+}
+
 /// What a byte adds.
 #[expect(clippy::indexing_slicing, reason = "a byte is below 256: the compiler drops the check")]
 #[inline(always)]
-fn look_up(table: &[u32; 256], byte: u8) -> u32 {
+fn look_up<T: Copy>(table: &[T; 256], byte: u8) -> T {
     table[usize::from(byte)]
 }
 
@@ -77,6 +104,38 @@ impl Checksum {
 
     /// The checksum of all bytes so far.
     pub fn value(&self) -> u32 {
+        !self.0
+    }
+}
+
+/// CRC-64/XZ of the bytes of some lines.
+pub fn image_checksum(lines: &[Line]) -> u64 {
+    let mut sum = ImageChecksum::default();
+    sum.update(lines);
+    sum.value()
+}
+
+/// A CRC-64/XZ over lines that come in pieces.
+#[derive(Clone)]
+pub struct ImageChecksum(u64);
+
+impl Default for ImageChecksum {
+    fn default() -> Self {
+        Self(u64::MAX)
+    }
+}
+
+impl ImageChecksum {
+    /// Goes on with the next lines.
+    pub fn update(&mut self, lines: &[Line]) {
+        for &byte in lines.iter().flat_map(|line| &line.0) {
+            let [low, ..] = self.0.to_le_bytes();
+            self.0 = (self.0 >> 8) ^ look_up(&IMAGE_TABLE, low ^ byte);
+        }
+    }
+
+    /// The checksum of all lines so far.
+    pub fn value(&self) -> u64 {
         !self.0
     }
 }

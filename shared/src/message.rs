@@ -40,7 +40,7 @@ pub struct MemoryUse {
 }
 
 /// Checksums that one [`Reply::Checksums`] may carry.
-pub const CHECKSUMS_PER_REPLY: u32 = 128;
+pub const CHECKSUMS_PER_REPLY: u32 = 64;
 
 /// A pinhole camera. The ray through the picture's point `(u, v)`, both from 0 to 1, v downwards, has the direction
 /// `forward + (2 u - 1) right + (1 - 2 v) up`.
@@ -159,8 +159,8 @@ pub enum Command<'a> {
     BeginImage {
         /// Lines.
         lines: u32,
-        /// CRC-32C.
-        checksum: u32,
+        /// [`crate::checksum::image_checksum`] of them.
+        checksum: u64,
     },
     /// Lines of the image.
     WriteLines {
@@ -201,7 +201,7 @@ pub enum Reply<'a> {
     Checksums {
         /// The first chunk.
         first: u32,
-        /// A CRC-32C, little-endian, for each.
+        /// The [`crate::checksum::image_checksum`] of each, eight bytes, little-endian.
         #[serde(borrow)]
         data: &'a [u8],
     },
@@ -252,7 +252,7 @@ pub enum FaultCode {
     Lines,
     /// Chunks are not of what is written, or too many; detail: the first.
     Chunks,
-    /// The image's checksum differs; detail: the checksum found.
+    /// The image's checksum differs; detail: the lower half of the checksum found.
     ImageChecksum,
     /// The image's header is not sound; detail: the image's layout version for a wrong version, else 0.
     ImageHeader,

@@ -1,6 +1,7 @@
 //! Stuffing and checksum are those of everyone else.
 
-use photoncard_shared::checksum::{Checksum, checksum};
+use photoncard_shared::address::{LINE_BYTES, Line};
+use photoncard_shared::checksum::{Checksum, ImageChecksum, checksum, image_checksum};
 use photoncard_shared::stuffing::{max_stuffed_bytes, stuff, unstuff};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -52,6 +53,19 @@ proptest! {
     }
 
     #[test]
+    fn the_image_checksum_is_that_of_crc(bytes in vec(any::<u8>(), 0..10 * LINE_BYTES), cut in 0_usize..10) {
+        let lines: Vec<Line> = bytes.as_chunks().0.iter().map(|&line| Line(line)).collect();
+        let whole = &bytes[..lines.len() * LINE_BYTES];
+        let expected = crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(whole);
+        prop_assert_eq!(image_checksum(&lines), expected);
+        let mut sum = ImageChecksum::default();
+        let (first, rest) = lines.split_at(cut.min(lines.len()));
+        sum.update(first);
+        sum.update(rest);
+        prop_assert_eq!(sum.value(), expected);
+    }
+
+    #[test]
     fn the_checksum_is_that_of_crc(bytes in vec(any::<u8>(), 0..600), cuts in vec(1_usize..40, 1..40)) {
         let expected = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
         prop_assert_eq!(checksum(&bytes), expected);
@@ -64,4 +78,18 @@ proptest! {
         sum.update(rest);
         prop_assert_eq!(sum.value(), expected);
     }
+}
+
+/// An error that a frame's checksum does not show: the polynomial itself, laid over the bytes.
+#[test]
+fn what_a_frames_checksum_misses_an_images_shows() {
+    // The polynomial of CRC-32C has 33 bits. The first on the wire, a byte's lowest, is the highest coefficient.
+    let multiple = 1 | u64::from(0x82f6_3b78_u32) << 1;
+    let (sound, mut damaged) = (Line([0x5a; LINE_BYTES]), Line([0x5a; LINE_BYTES]));
+    for (byte, error) in damaged.0[50..].iter_mut().zip(multiple.to_le_bytes()) {
+        *byte ^= error;
+    }
+    assert_ne!(sound, damaged);
+    assert_eq!(checksum(&sound.0), checksum(&damaged.0));
+    assert_ne!(image_checksum(&[sound]), image_checksum(&[damaged]));
 }

@@ -137,7 +137,7 @@ fn the_longest_messages_fit_a_frame() {
     assert!(encode(&Command::WriteLines { first: u32::MAX, data: &lines }, &mut bytes).is_some());
     let pixels = [0xff; PIXEL_BYTES * PIXELS_PER_REPLY];
     assert!(encode(&Reply::Pixels { tile: u32::MAX, first: u32::MAX, data: &pixels }, &mut bytes).is_some());
-    let checksums = [0xff; 4 * CHECKSUMS_PER_REPLY as usize];
+    let checksums = [0xff; 8 * CHECKSUMS_PER_REPLY as usize];
     assert!(encode(&Reply::Checksums { first: u32::MAX, data: &checksums }, &mut bytes).is_some());
 }
 

@@ -4,6 +4,7 @@
 pub mod fuzz;
 pub mod lru;
 pub mod mapped;
+pub mod wire;
 
 use glam::Vec3;
 use photoncard_driver::film::Film;

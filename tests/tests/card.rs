@@ -5,123 +5,19 @@ use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{PhotonMap, trace};
 use photoncard_driver::render::RenderSettings;
-use photoncard_firmware::card::ReferenceCard;
-use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::Line;
-use photoncard_shared::budget::REFERENCE;
-use photoncard_shared::checksum::checksum;
+use photoncard_shared::budget::MICRO;
+use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{BvhNode, ChildReference};
 use photoncard_shared::message::{
-    self, CHUNK_LINES, Command, Fault, FaultCode, FrameParameters, LINES_PER_WRITE, MemoryUse, Reply, Tile,
+    CHUNK_LINES, Command, FaultCode, FrameParameters, MemoryUse, PROTOCOL_VERSION, Tile,
 };
-use photoncard_shared::transport::Transport;
+use photoncard_tests::wire::{Answer, Wire};
 use photoncard_tests::{camera, lambertian, room, scene, with_room_for_a_card};
 use proptest::prelude::*;
 
 const DRAM_LINES: usize = 4096;
-
-/// A card on a wire that loses nothing.
-struct Wire<'a> {
-    card: Box<ReferenceCard<Dram<'a>>>,
-    host: Transport,
-    session: u16,
-}
-
-/// A reply, without what it borrows.
-#[derive(Clone, Debug, PartialEq)]
-enum Answer {
-    Hello(u32, Option<MemoryUse>),
-    Checksums(Vec<u8>),
-    ImageAccepted,
-    FrameAccepted,
-    Pixels(usize),
-    TileDone(u32),
-    Fault(FaultCode),
-}
-
-impl<'a> Wire<'a> {
-    fn new(memory: &'a mut [Line]) -> Self {
-        let card = Box::new(ReferenceCard::new(REFERENCE, Dram::new(memory)));
-        Self { card, host: Transport::host(), session: 0 }
-    }
-
-    /// Sends a command and works until the card rests. Returns its answers.
-    fn say(&mut self, command: &Command) -> Vec<Answer> {
-        assert!(self.host.send(|bytes| message::encode(command, bytes)));
-        self.work()
-    }
-
-    /// Sends bytes that are no command.
-    fn say_bytes(&mut self, message: &[u8]) -> Vec<Answer> {
-        assert!(self.host.send(|bytes| {
-            bytes.get_mut(..message.len())?.copy_from_slice(message);
-            Some(message.len())
-        }));
-        self.work()
-    }
-
-    fn work(&mut self) -> Vec<Answer> {
-        let mut answers = Vec::new();
-        loop {
-            let to_card = self.host.outgoing().to_vec();
-            self.host.sent(to_card.len());
-            self.card.feed(&to_card);
-            self.card.work();
-            let to_host = self.card.outgoing().to_vec();
-            self.card.sent(to_host.len());
-            let mut rest = &to_host[..];
-            while !rest.is_empty() {
-                rest = &rest[self.host.receive(rest).0..];
-                while let Some(payload) = self.host.take() {
-                    answers.push(answer(message::decode(payload).expect("a reply")));
-                }
-            }
-            if to_card.is_empty() && to_host.is_empty() && !self.card.is_busy() {
-                self.card.acknowledge();
-                self.host.acknowledge();
-                if self.card.outgoing().is_empty() && self.host.outgoing().is_empty() {
-                    return answers;
-                }
-            }
-        }
-    }
-
-    /// Begins a session. Returns the lines that the card has written.
-    fn hello(&mut self) -> u32 {
-        self.session += 1;
-        self.host.open(self.session);
-        match self.say(&Command::Hello { protocol: 1, layout: 1 })[..] {
-            [Answer::Hello(written, _)] => written,
-            ref other => panic!("{other:?}"),
-        }
-    }
-
-    fn load(&mut self, lines: &[Line]) -> Vec<Answer> {
-        let bytes: Vec<u8> = lines.iter().flat_map(|line| line.0).collect();
-        let begin = Command::BeginImage { lines: lines.len() as u32, checksum: checksum(&bytes) };
-        let mut answers = self.say(&begin);
-        // In any order: here from the last to the first.
-        for (index, data) in bytes.chunks(LINES_PER_WRITE * 128).enumerate().rev() {
-            let first = (LINES_PER_WRITE * index) as u32;
-            answers.extend(self.say(&Command::WriteLines { first, data }));
-        }
-        answers.extend(self.say(&Command::EndImage));
-        answers
-    }
-}
-
-fn answer(reply: Reply) -> Answer {
-    match reply {
-        Reply::Hello { written_lines, memory_use, .. } => Answer::Hello(written_lines, memory_use),
-        Reply::Checksums { data, .. } => Answer::Checksums(data.to_vec()),
-        Reply::ImageAccepted => Answer::ImageAccepted,
-        Reply::FrameAccepted => Answer::FrameAccepted,
-        Reply::Pixels { data, .. } => Answer::Pixels(data.len() / message::PIXEL_BYTES),
-        Reply::TileDone { tile, .. } => Answer::TileDone(tile),
-        Reply::Fault(Fault { code, .. }) => Answer::Fault(code),
-    }
-}
 
 /// A lit room with a few photons.
 fn image() -> CardImage {
@@ -188,8 +84,8 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
         let bad_frames = [
             FrameParameters { width: 0, ..frame() },
             FrameParameters { samples: 0, ..frame() },
-            FrameParameters { gather_rays: REFERENCE.gather_rays + 1, ..frame() },
-            FrameParameters { neighbors: REFERENCE.neighbors + 1, ..frame() },
+            FrameParameters { gather_rays: MICRO.gather_rays + 1, ..frame() },
+            FrameParameters { neighbors: MICRO.neighbors + 1, ..frame() },
             FrameParameters { max_distance: f32::NAN, ..frame() },
         ];
         for bad in bad_frames {
@@ -270,10 +166,8 @@ fn a_card_tells_what_it_has_of_an_image_and_keeps_it_over_sessions() {
         assert_eq!(written as usize, image.lines().len());
         assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::Fault(FaultCode::Order)]);
         let chunks = written.div_ceil(CHUNK_LINES);
-        let expected = image.lines().chunks(CHUNK_LINES as usize).flat_map(|chunk| {
-            let bytes: Vec<u8> = chunk.iter().flat_map(|line| line.0).collect();
-            checksum(&bytes).to_le_bytes()
-        });
+        let chunks_of_image = image.lines().chunks(CHUNK_LINES as usize);
+        let expected = chunks_of_image.flat_map(|chunk| image_checksum(chunk).to_le_bytes());
         let answers = wire.say(&Command::ReadChecksums { first: 0, count: chunks });
         assert_eq!(answers, [Answer::Checksums(expected.collect())]);
         for (first, count) in [(0, 0), (0, chunks + 1), (chunks, 1), (u32::MAX, 2)] {
@@ -281,8 +175,8 @@ fn a_card_tells_what_it_has_of_an_image_and_keeps_it_over_sessions() {
             assert_eq!(answers, [Answer::Fault(FaultCode::Chunks)], "{first} {count}");
         }
         // All lines are there already.
-        let bytes: Vec<u8> = image.lines().iter().flat_map(|line| line.0).collect();
-        assert_eq!(wire.say(&Command::BeginImage { lines: written, checksum: checksum(&bytes) }), []);
+        let checksum = image_checksum(image.lines());
+        assert_eq!(wire.say(&Command::BeginImage { lines: written, checksum }), []);
         assert_eq!(wire.say(&Command::EndImage), [Answer::ImageAccepted]);
         assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
         assert_eq!(wire.say(&Command::RenderTile(TILE)).last(), Some(&Answer::TileDone(7)));
@@ -292,7 +186,7 @@ fn a_card_tells_what_it_has_of_an_image_and_keeps_it_over_sessions() {
 #[test]
 fn a_card_tells_what_its_board_measures_of_its_memory() {
     with_room_for_a_card(|| {
-        let hello = Command::Hello { protocol: 1, layout: 1 };
+        let hello = Command::Hello { protocol: PROTOCOL_VERSION, layout: 1 };
         let mut memory = vec![Line::ZERO; 1];
         let mut wire = Wire::new(&mut memory);
         wire.hello();

@@ -21,9 +21,8 @@ pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use photoncard_shared::address::Line;
 use photoncard_shared::budget::{Budget, REFERENCE};
-use photoncard_shared::checksum::Checksum;
+use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::FrameParameters;
 
 use self::cards::{Cards, Outcome};
@@ -121,8 +120,11 @@ pub fn render(
     let prepared = prepare(scene, settings, cards.budgets(), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance);
     *cards::lock(&picture) = Picture { scheduler: Scheduler::new(all), film, partial };
-    let job =
-        Job { image: prepared.image.lines(), checksum: checksum(prepared.image.lines()), frame: &frame };
+    let job = Job {
+        image: prepared.image.lines(),
+        checksum: image_checksum(prepared.image.lines()),
+        frame: &frame,
+    };
     let outcome = cards.run(job, &picture, observer)?;
     times.load = outcome.load_seconds;
     times.render = outcome.render_seconds;
@@ -191,13 +193,6 @@ fn prepare(
     times.photons = mapped.tracing.as_secs_f64();
     times.pack = start.elapsed().as_secs_f64() - times.photons;
     Ok(mapped)
-}
-
-/// CRC-32C of an image's bytes.
-fn checksum(lines: &[Line]) -> u32 {
-    let mut sum = Checksum::default();
-    lines.iter().for_each(|line| sum.update(&line.0));
-    sum.value()
 }
 
 fn statistics(

@@ -1,7 +1,7 @@
 //! Loading the image: what the card has of it already is not sent again.
 
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::checksum::Checksum;
+use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{self, CHECKSUMS_PER_REPLY, CHUNK_LINES, Command, LINES_PER_WRITE};
 use photoncard_shared::transport::Transport;
 
@@ -48,7 +48,7 @@ impl Load {
     /// # Errors
     /// If they are not those that were asked for last.
     pub(super) fn compare(&mut self, image: &[Line], first: u32, data: &[u8]) -> Result<(), SessionError> {
-        let (checksums, rest) = data.as_chunks::<4>();
+        let (checksums, rest) = data.as_chunks::<8>();
         let end = first.checked_add(checksums.len() as u32);
         let begins_as_asked = first == self.compared;
         if end != Some(self.asked) || !rest.is_empty() || checksums.is_empty() || !begins_as_asked {
@@ -57,9 +57,7 @@ impl Load {
         self.compared = self.asked;
         let mut chunks = image.chunks(CHUNK_LINES as usize).skip(first as usize);
         for (number, found) in (first..).zip(checksums) {
-            let mut checksum = Checksum::default();
-            chunks.next().unwrap_or(&[]).iter().for_each(|line| checksum.update(&line.0));
-            if checksum.value() == u32::from_le_bytes(*found) {
+            if image_checksum(chunks.next().unwrap_or(&[])) == u64::from_le_bytes(*found) {
                 self.there.push(number);
             }
         }

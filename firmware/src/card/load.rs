@@ -1,7 +1,7 @@
 //! Loading of a card image: lines in any order, a checksum over all, and a header that is sound.
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::checksum::Checksum;
+use photoncard_shared::checksum::{ImageChecksum, image_checksum};
 use photoncard_shared::image::{Header, HeaderError};
 use photoncard_shared::message::{CHECKSUMS_PER_REPLY, CHUNK_LINES, Fault, FaultCode};
 
@@ -43,11 +43,11 @@ impl ImageState {
 #[derive(Clone, Copy)]
 pub(super) struct Loader {
     lines: u32,
-    checksum: u32,
+    checksum: u64,
 }
 
 impl Loader {
-    pub(super) fn new(memory: &impl CardMemory, lines: u32, checksum: u32) -> Result<Self, Fault> {
+    pub(super) fn new(memory: &impl CardMemory, lines: u32, checksum: u64) -> Result<Self, Fault> {
         let available = memory.lines();
         if lines == 0 || lines > available {
             return Err(Fault { code: FaultCode::ImageTooLarge, detail: available });
@@ -70,7 +70,7 @@ impl Loader {
     }
 
     pub(super) fn check(self) -> Check {
-        Check { loader: self, next: 0, checksum: Checksum::default() }
+        Check { loader: self, next: 0, checksum: ImageChecksum::default() }
     }
 }
 
@@ -78,7 +78,7 @@ impl Loader {
 pub(super) struct Check {
     loader: Loader,
     next: u32,
-    checksum: Checksum,
+    checksum: ImageChecksum,
 }
 
 impl Check {
@@ -86,14 +86,14 @@ impl Check {
     pub(super) fn step(&mut self, memory: &mut impl CardMemory) -> Result<Option<SceneImage>, Fault> {
         let Loader { lines, checksum } = self.loader;
         let count = CHUNK_LINES.min(lines - self.next);
-        add(&mut self.checksum, stored(memory, self.next, count)?);
+        self.checksum.update(stored(memory, self.next, count)?);
         self.next += count;
         if self.next < lines {
             return Ok(None);
         }
         let found = self.checksum.value();
         if found != checksum {
-            return Err(Fault { code: FaultCode::ImageChecksum, detail: found });
+            return Err(Fault { code: FaultCode::ImageChecksum, detail: found as u32 });
         }
         memory.enter(Stage::Begin);
         let line = memory.read(Structure::Header, LineAddress(0), 0..LINE_BYTES as u32)?;
@@ -110,7 +110,7 @@ impl Check {
 }
 
 /// The bytes of a reply's checksums.
-pub(super) const CHECKSUMS_BYTES: usize = 4 * CHECKSUMS_PER_REPLY as usize;
+pub(super) const CHECKSUMS_BYTES: usize = 8 * CHECKSUMS_PER_REPLY as usize;
 
 /// Checksums of chunks on their way to the host.
 pub(super) struct Checksums {
@@ -132,17 +132,12 @@ impl Checksums {
     }
 
     /// The checksum of the next chunk, and whether it is the last. The last chunk of what is written may be short.
-    pub(super) fn step(&mut self, memory: &impl CardMemory, written: u32) -> Result<(u32, bool), Fault> {
+    pub(super) fn step(&mut self, memory: &impl CardMemory, written: u32) -> Result<(u64, bool), Fault> {
         let begin = self.next.saturating_mul(CHUNK_LINES);
-        let mut checksum = Checksum::default();
-        add(&mut checksum, stored(memory, begin, CHUNK_LINES.min(written.saturating_sub(begin)))?);
+        let lines = stored(memory, begin, CHUNK_LINES.min(written.saturating_sub(begin)))?;
         self.next += 1;
-        Ok((checksum.value(), self.next >= self.end))
+        Ok((image_checksum(lines), self.next >= self.end))
     }
-}
-
-fn add(checksum: &mut Checksum, lines: &[Line]) {
-    lines.iter().for_each(|line| checksum.update(&line.0));
 }
 
 /// Lines of the memory; those that were never written are a fault.

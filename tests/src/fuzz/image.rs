@@ -5,18 +5,11 @@ use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{PhotonMap, trace};
 use photoncard_driver::render::RenderSettings;
-use photoncard_firmware::card::MicroCard;
-use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::budget::MICRO;
-use photoncard_shared::checksum::checksum;
-use photoncard_shared::message::{
-    self, Command, Drain, FrameParameters, LINES_PER_WRITE, PIXEL_BYTES, PROTOCOL_VERSION, Reply, Sampling,
-    Tile,
-};
-use photoncard_shared::transport::Transport;
+use photoncard_shared::message::{Command, Drain, FrameParameters, Sampling, Tile};
 
 use super::{Random, Target, bound, mutation};
+use crate::wire::{Answer, Wire};
 use crate::{camera, lambertian, room, scene};
 
 /// Lines of the card's memory.
@@ -27,75 +20,6 @@ const TILE: Tile = Tile { id: 7, x: 2, y: 2, width: 4, height: 4 };
 /// The target. An input is a byte that chooses the techniques, and an image.
 pub(super) struct Image {
     seeds: Vec<Vec<u8>>,
-}
-
-/// How a card's answers end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Answer {
-    Nothing,
-    Accepted,
-    Pixels(usize),
-    Done(u32),
-    Fault,
-}
-
-/// A card on a wire that loses nothing.
-struct Wire<'a> {
-    card: Box<MicroCard<Dram<'a>>>,
-    host: Transport,
-    pixels: usize,
-}
-
-impl Wire<'_> {
-    /// Sends a command and works until the card rests. Returns its last answer.
-    fn say(&mut self, command: &Command) -> Answer {
-        assert!(self.host.send(|bytes| message::encode(command, bytes)), "there is room for a command");
-        let mut answer = Answer::Nothing;
-        loop {
-            let to_card = self.host.outgoing().to_vec();
-            self.host.sent(to_card.len());
-            self.card.feed(&to_card);
-            self.card.work();
-            let to_host = self.card.outgoing().to_vec();
-            self.card.sent(to_host.len());
-            let mut rest = &to_host[..];
-            while !rest.is_empty() {
-                rest = &rest[self.host.receive(rest).0..];
-                while let Some(payload) = self.host.take() {
-                    answer = read_answer(message::decode(payload).expect("a card sends replies"));
-                    if let Answer::Pixels(count) = answer {
-                        self.pixels += count;
-                    }
-                }
-            }
-            if to_card.is_empty() && to_host.is_empty() && !self.card.is_busy() {
-                self.card.acknowledge();
-                self.host.acknowledge();
-                if self.card.outgoing().is_empty() && self.host.outgoing().is_empty() {
-                    return answer;
-                }
-            }
-        }
-    }
-
-    fn load(&mut self, bytes: &[u8]) -> Answer {
-        let lines = (bytes.len() / LINE_BYTES) as u32;
-        self.say(&Command::BeginImage { lines, checksum: checksum(bytes) });
-        for (index, data) in bytes.chunks(LINES_PER_WRITE * LINE_BYTES).enumerate() {
-            self.say(&Command::WriteLines { first: (LINES_PER_WRITE * index) as u32, data });
-        }
-        self.say(&Command::EndImage)
-    }
-}
-
-fn read_answer(reply: Reply) -> Answer {
-    match reply {
-        Reply::ImageAccepted | Reply::FrameAccepted => Answer::Accepted,
-        Reply::Pixels { data, .. } => Answer::Pixels(data.len() / PIXEL_BYTES),
-        Reply::TileDone { tile, .. } => Answer::Done(tile),
-        Reply::Fault(_) => Answer::Fault,
-        Reply::Hello { .. } | Reply::Checksums { .. } => Answer::Nothing,
-    }
 }
 
 /// A lit room with a few photons, in both layouts of the photon map.
@@ -195,25 +119,31 @@ impl Target for Image {
 
     fn read(&self, input: &[u8]) -> bool {
         let Some((&choice, image)) = input.split_first() else { return false };
-        let whole = image.len() / LINE_BYTES * LINE_BYTES;
+        let lines: Vec<Line> = image.as_chunks().0.iter().map(|&line| Line(line)).collect();
         let mut memory = vec![Line::ZERO; DRAM_LINES];
-        let card = Box::new(MicroCard::new(MICRO, Dram::new(&mut memory)));
-        let mut wire = Wire { card, host: Transport::host(), pixels: 0 };
-        wire.host.open(1);
-        wire.say(&Command::Hello { protocol: PROTOCOL_VERSION, layout: 0 });
-        match wire.load(&image[..whole]) {
-            Answer::Accepted => {}
-            Answer::Fault => return false,
+        let mut wire = Wire::new(&mut memory);
+        wire.hello();
+        // Where there is no room for it, each of its commands is a fault.
+        match wire.load(&lines).last() {
+            Some(Answer::ImageAccepted) => {}
+            Some(Answer::Fault(_)) => return false,
             other => panic!("loading ends in {other:?}"),
         }
-        assert_eq!(wire.say(&Command::BeginFrame(frame(choice))), Answer::Accepted);
-        match wire.say(&Command::RenderTile(TILE)) {
-            Answer::Done(id) => {
-                assert_eq!((id, wire.pixels as u64), (TILE.id, TILE.pixels()));
+        assert_eq!(wire.say(&Command::BeginFrame(frame(choice))), [Answer::FrameAccepted]);
+        let answers = wire.say(&Command::RenderTile(TILE));
+        match answers.last() {
+            Some(&Answer::TileDone(id)) => {
+                assert_eq!((id, pixels(&answers) as u64), (TILE.id, TILE.pixels()));
                 true
             }
-            Answer::Fault => false,
+            Some(Answer::Fault(_)) => false,
             other => panic!("rendering ends in {other:?}"),
         }
     }
+}
+
+/// The pixels that came.
+fn pixels(answers: &[Answer]) -> usize {
+    let count = |answer: &Answer| if let Answer::Pixels(count) = answer { *count } else { 0 };
+    answers.iter().map(count).sum()
 }

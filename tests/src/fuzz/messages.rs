@@ -46,7 +46,7 @@ pub(super) fn commands() -> Vec<Vec<u8>> {
     let commands = [
         Command::Hello { protocol: 6, layout: 3 },
         Command::ReadChecksums { first: 3, count: 70_000 },
-        Command::BeginImage { lines: 300, checksum: 0xdead_beef },
+        Command::BeginImage { lines: 300, checksum: 0xdead_beef_cafe_f00d },
         Command::WriteLines { first: 200, data: &data },
         Command::EndImage,
         Command::BeginFrame(frame()),
