@@ -25,7 +25,7 @@ pub const MAX_FRAME: usize = max_stuffed_bytes(MAX_PLAIN) + 1;
 /// Why what came is not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// No zero byte within [`MAX_FRAME`] bytes.
+    /// No zero byte within [`MAX_FRAME`] bytes, or a payload above [`MAX_PAYLOAD`].
     TooLong,
     /// Not a COBS encoding.
     Encoding,
@@ -117,7 +117,8 @@ pub struct Frame<'a> {
 
 /// Reads the frames of one direction.
 pub struct FrameReader {
-    wire: Vec<u8, MAX_FRAME>,
+    /// The bytes of the present frame: all but its zero byte.
+    wire: Vec<u8, { MAX_FRAME - 1 }>,
     /// The bytes of the present frame are more than can be held: they are dropped up to the next zero byte.
     overrun: bool,
     complete: bool,
@@ -165,6 +166,9 @@ fn decode(wire: &mut [u8]) -> Result<Frame<'_>, FrameError> {
     let (header, payload) = body.split_first_chunk().ok_or(FrameError::TooShort)?;
     if checksum(body) != u32::from_le_bytes(*sum) {
         return Err(FrameError::Checksum);
+    }
+    if payload.len() > MAX_PAYLOAD {
+        return Err(FrameError::TooLong);
     }
     Ok(Frame { header: FrameHeader::read(*header).ok_or(FrameError::Kind)?, payload })
 }

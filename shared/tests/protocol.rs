@@ -118,6 +118,26 @@ fn golden_frames() {
     }
 }
 
+/// The numbers of `docs/protocol.md`.
+#[test]
+fn the_longest_frame_is_pinned() {
+    assert_eq!((MAX_PAYLOAD, MAX_FRAME), (1056, 1074));
+    let longest = frame(&HEADER, &[1; MAX_PAYLOAD]);
+    assert_eq!(longest.len(), MAX_FRAME);
+    assert_eq!(read_all(&longest, 100), [Ok((HEADER, vec![1; MAX_PAYLOAD]))]);
+}
+
+#[test]
+fn what_is_longer_than_the_longest_frame_is_told() {
+    let mut longer = vec![2; MAX_FRAME];
+    longer.push(0);
+    assert_eq!(read_all(&longer, 100), [Err(FrameError::TooLong)]);
+    // As short as the longest frame, as zero bytes are stuffed for less: still no frame of this protocol.
+    let payload = [0; MAX_PAYLOAD + 1];
+    assert!(frame(&HEADER, &payload).len() < MAX_FRAME);
+    assert_eq!(read_all(&frame(&HEADER, &payload), 100), [Err(FrameError::TooLong)]);
+}
+
 #[test]
 fn a_frame_that_does_not_fit_is_not_written() {
     let mut wire = heapless::Vec::<u8, 20>::new();
