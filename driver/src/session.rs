@@ -24,6 +24,7 @@ use photoncard_shared::message::{
 use photoncard_shared::transport::{Event, LineStatistics, Transport};
 
 use self::clock::Clock;
+use self::error::check_versions;
 use self::load::Load;
 use crate::film::{Film, FilmError, Window};
 use crate::partial::PartialRender;
@@ -289,6 +290,9 @@ impl<'a> Session<'a> {
             while let Some(message) = self.transport.take() {
                 let payload = &mut payload[..message.len()];
                 payload.copy_from_slice(message);
+                if let (State::Greeting, Some(versions)) = (self.state, message::hello_versions(payload)) {
+                    check_versions(versions)?;
+                }
                 let reply = message::decode(payload).ok_or(SessionError::Unexpected("not a reply"))?;
                 self.take(&reply, picture)?;
             }
@@ -368,13 +372,10 @@ impl<'a> Session<'a> {
 
     fn take(&mut self, reply: &Reply, picture: &mut Picture) -> Result<(), SessionError> {
         match (self.state, *reply) {
-            (
-                State::Greeting,
-                Reply::Hello { protocol, layout, budget, written_lines, memory_use, build },
-            ) => {
+            (State::Greeting, Reply::Hello { budget, written_lines, memory_use, build, .. }) => {
                 build.clone_into(&mut self.build);
                 self.memory_use = memory_use;
-                self.greet(protocol, layout, budget)?;
+                self.greet(budget)?;
                 self.load = Load::new(written_lines);
                 if self.job.is_some() {
                     self.begin_load();
@@ -410,13 +411,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn greet(&mut self, protocol: u16, layout: u16, budget: Budget) -> Result<(), SessionError> {
-        if protocol != PROTOCOL_VERSION {
-            return Err(SessionError::Protocol { card: protocol, host: PROTOCOL_VERSION });
-        }
-        if layout != LAYOUT_VERSION {
-            return Err(SessionError::Layout { card: layout, host: LAYOUT_VERSION });
-        }
+    fn greet(&mut self, budget: Budget) -> Result<(), SessionError> {
         if budget.tiles == 0 {
             return Err(SessionError::NoTiles);
         }

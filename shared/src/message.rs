@@ -142,6 +142,7 @@ impl Tile {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
     /// Who are you? Any time; forgets frame and tiles, and whether there is an image. Lines that are written stay.
+    /// It is the same in all versions of the protocol.
     Hello {
         /// The host's [`PROTOCOL_VERSION`].
         protocol: u16,
@@ -181,7 +182,7 @@ pub enum Command<'a> {
 /// From a card to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply<'a> {
-    /// Who I am.
+    /// Who I am. The versions come first in all versions of the protocol: [`hello_versions`].
     Hello {
         /// The card's [`PROTOCOL_VERSION`].
         protocol: u16,
@@ -315,4 +316,21 @@ pub fn encode<T: Serialize>(message: &T, bytes: &mut [u8]) -> Option<usize> {
 /// Reads a message that fills all of `bytes`; `None` if they are anything else.
 pub fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
     postcard::take_from_bytes(bytes).ok().filter(|(_, rest)| rest.is_empty()).map(|(message, _)| message)
+}
+
+/// The versions of a hello.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Versions {
+    /// The protocol's.
+    pub protocol: u16,
+    /// The card image's layout's.
+    pub layout: u16,
+}
+
+/// Reads the versions of a [`Reply::Hello`] of any version of the protocol; `None` of any other reply. They come first in
+/// all versions, whatever follows.
+pub fn hello_versions(bytes: &[u8]) -> Option<Versions> {
+    let (opcode, rest) = postcard::take_from_bytes::<u32>(bytes).ok()?;
+    let (versions, _) = postcard::take_from_bytes(rest).ok()?;
+    (opcode == 0).then_some(versions)
 }

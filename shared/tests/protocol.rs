@@ -205,6 +205,20 @@ fn opcodes_are_pinned() {
 }
 
 #[test]
+fn the_versions_of_a_hello_are_read_whatever_follows() {
+    let budget = REFERENCE;
+    let hello =
+        Reply::Hello { protocol: 300, layout: 2, budget, written_lines: 0, memory_use: None, build: "x" };
+    let versions = Versions { protocol: 300, layout: 2 };
+    assert_eq!(hello_versions(&encoded(&hello)), Some(versions));
+    assert_eq!(hello_versions(&[0, 0xac, 2, 2]), Some(versions));
+    assert_eq!(hello_versions(&[0, 0xac, 2, 2, 0xff, 0xff, 0xff]), Some(versions));
+    assert_eq!(hello_versions(&[0, 0xac]), None);
+    assert_eq!(hello_versions(&encoded(&Reply::ImageAccepted)), None);
+    assert_eq!(hello_versions(&encoded(&Reply::Checksums { first: 1, data: &[] })), None);
+}
+
+#[test]
 fn a_pixel_survives_its_record() {
     let pixel =
         Pixel { radiance: [1., 2., 3.], albedo: [4., 5., 6.], normal: [7., 8., 9.], depth: f32::INFINITY };

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
+use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::link::PortError;
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, PROTOCOL_VERSION, Versions};
 
 use crate::film::FilmError;
 
@@ -52,4 +53,16 @@ pub enum SessionError {
     /// A pixel does not belong to the picture.
     #[error(transparent)]
     Film(#[from] FilmError),
+}
+
+/// Compares a card's versions with this program's. They are read before the rest of a hello, which another version of the
+/// protocol may have changed.
+pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
+    if card.protocol != PROTOCOL_VERSION {
+        return Err(SessionError::Protocol { card: card.protocol, host: PROTOCOL_VERSION });
+    }
+    if card.layout != LAYOUT_VERSION {
+        return Err(SessionError::Layout { card: card.layout, host: LAYOUT_VERSION });
+    }
+    Ok(())
 }

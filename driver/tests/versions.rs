@@ -1,0 +1,41 @@
+//! A host says which version it would need, however much of another version's hello it can read.
+
+use std::time::Duration;
+
+use photoncard_driver::session::{Picture, Session, SessionError};
+use photoncard_shared::message::PROTOCOL_VERSION;
+use photoncard_shared::transport::Transport;
+
+/// What a host makes of a card that answers its hello with some bytes.
+fn greeted_with(answer: &[u8]) -> SessionError {
+    let mut picture = Picture::empty().expect("there is memory for a pixel");
+    let mut session = Session::new(1, Duration::ZERO);
+    let mut card = Transport::card();
+    session.prepare(&mut picture);
+    let hello = session.outgoing().to_vec();
+    card.receive(&hello);
+    assert!(card.take().is_some());
+    assert!(card.send(|bytes| {
+        bytes.get_mut(..answer.len())?.copy_from_slice(answer);
+        Some(answer.len())
+    }));
+    let answer = card.outgoing().to_vec();
+    session.receive(&answer, &mut picture, Duration::ZERO).expect_err("it is another version's")
+}
+
+#[test]
+fn a_hello_of_another_version_is_told_by_its_number() {
+    for rest in [&[][..], &[1, 2, 3], &[0xff; 200]] {
+        let error = greeted_with(&[&[0, 0xac, 2, 7], rest].concat());
+        assert!(matches!(error, SessionError::Protocol { card: 300, host: PROTOCOL_VERSION }), "{error}");
+        let error = greeted_with(&[&[0, PROTOCOL_VERSION as u8, 0], rest].concat());
+        assert!(matches!(error, SessionError::Layout { card: 0, .. }), "{error}");
+    }
+}
+
+#[test]
+fn what_has_no_versions_is_no_reply() {
+    for answer in [&[][..], &[0], &[0, 0x80], &[9, 1, 1]] {
+        assert!(matches!(greeted_with(answer), SessionError::Unexpected(_)), "{answer:?}");
+    }
+}
