@@ -2,8 +2,8 @@
 //!
 //! Whoever runs it ([`crate::serve`], or a simulator) calls [`Card::feed`] with what came, sends what
 //! [`Card::outgoing`] holds, calls [`Card::work`] while [`Card::is_busy`], and [`Card::acknowledge`] when the line is quiet.
-//! No call takes longer than some rays or gathers, the completion of one pixel over all its samples, or the checksum of a
-//! few lines; none blocks, and nothing that is fed can make one panic.
+//! No call takes longer than some rays or gathers, or the checksum of a few lines; none blocks, and nothing that is fed can
+//! make one panic.
 
 mod load;
 
@@ -330,10 +330,10 @@ impl<
             Some(TileWork::Sending(tile, next)) => {
                 let counters = &mut self.counters;
                 let context = &mut Context { scene, memory, frame, counters, outlet: None };
-                let pixel = self.chip.pixel(context, next as usize)?;
+                let Some(pixel) = self.chip.complete(context, next as usize)? else { return Ok(()) };
                 let data = &mut self.data;
                 // There is room for PIXELS_PER_REPLY.
-                let _ = data.extend_from_slice(&pixel.map_or([0; PIXEL_BYTES], |pixel| pixel.to_bytes()));
+                let _ = data.extend_from_slice(&pixel.to_bytes());
                 let is_last = next as u64 + 1 >= tile.pixels();
                 if data.is_full() || is_last {
                     let first = next + 1 - (data.len() / PIXEL_BYTES) as u32;

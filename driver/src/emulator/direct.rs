@@ -42,7 +42,7 @@ pub fn render_tile(
     if context.outlet.is_none() {
         // What a card reads to complete its pixels is counted here as well.
         for index in 0..chip.sums().len() {
-            chip.pixel(&mut context, index)?;
+            while chip.complete(&mut context, index)?.is_none() {}
         }
     }
     Ok(RenderedTile { sums: chip.sums().to_vec(), counters, traffic: memory.traffic() })

@@ -7,7 +7,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
-use photoncard_firmware::chip::{ReferenceChip, pixel};
+use photoncard_firmware::chip::{Completion, ReferenceChip};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::memory::Lines;
@@ -264,7 +264,9 @@ fn complete<'a, M: MeasuredMemory>(
         (0..tile.height).flat_map(move |y| (0..tile.width).map(move |x| (tile.x + x, tile.y + y)))
     });
     for (sum, (x, y)) in all.sums.iter().zip(places) {
-        film.write(x, y, pixel(&mut context, x, y, sum)?)?;
+        let mut completion = Completion::NOTHING;
+        while !completion.step(&mut context, x, y)? {}
+        film.write(x, y, completion.pixel(&context, sum))?;
     }
     all.traffic.add(&memory.traffic());
     Ok(())

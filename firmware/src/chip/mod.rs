@@ -4,6 +4,7 @@
 //! every stage is done for all pixels before the next begins, so that gathers of neighbouring pixels come together. Each
 //! call of [`Chip::step`] is one small piece of it.
 
+mod completion;
 mod gathers;
 mod pixels;
 mod position;
@@ -14,8 +15,8 @@ use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::{Budget, MICRO, REFERENCE, TechniqueMemory, gather_candidates};
 use photoncard_shared::message::{Fault, FrameParameters, Pixel, Tile};
 
+pub use self::completion::Completion;
 use self::gathers::Gathers;
-pub use self::pixels::pixel;
 use self::pixels::{StoredPoint, add_light};
 use self::position::{Block, Position, Stage};
 use crate::fixed_point::ColourSum;
@@ -62,6 +63,8 @@ pub struct Chip<
     blocks: Vec<Block, MOST_BLOCKS>,
     block: Block,
     position: Position,
+    /// Of the pixel of the complete tile that is at work.
+    completion: Completion,
 }
 
 /// Blocks that wait: a tile is halved at most so often.
@@ -115,6 +118,7 @@ impl<
             blocks: Vec::new(),
             block: Block::EMPTY,
             position: Position::DONE,
+            completion: Completion::NOTHING,
         }
     }
 
@@ -129,6 +133,7 @@ impl<
         memory.begin_tile();
         self.tile = tile;
         self.position = Position::DONE;
+        self.completion = Completion::NOTHING;
         self.points.clear();
         self.sums.clear();
         self.gathers.clear();
@@ -203,19 +208,24 @@ impl<
         &self.sums
     }
 
-    /// Pixel `index` of the complete tile, counted in rows; `None` past the last.
+    /// Looks at the next samples of pixel `index` of the complete tile, counted in rows; to be called for one pixel until it
+    /// is there. Returns the pixel after the last of its samples.
     ///
     /// # Errors
     /// If the image is not sound.
-    pub fn pixel<M: MemoryPort>(
-        &self,
+    pub fn complete<M: MemoryPort>(
+        &mut self,
         context: &mut Context<M>,
         index: usize,
     ) -> Result<Option<Pixel>, Fault> {
-        let Some(sum) = self.sums.get(index) else { return Ok(None) };
         let width = self.tile.width.max(1);
         let [x, y] = [self.tile.x + index as u32 % width, self.tile.y + index as u32 / width];
-        pixel(context, x, y, sum).map(Some)
+        if !self.completion.step(context, x, y)? {
+            return Ok(None);
+        }
+        let completion = core::mem::replace(&mut self.completion, Completion::NOTHING);
+        // Past the last pixel there is no light.
+        Ok(Some(completion.pixel(context, self.sums.get(index).unwrap_or(&ColourSum::ZERO))))
     }
 }
 

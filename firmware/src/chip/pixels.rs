@@ -1,7 +1,7 @@
 //! The stages of a block's pixels, sample by sample.
 
 use glam::Vec3;
-use photoncard_shared::message::{Fault, FrameParameters, Pixel};
+use photoncard_shared::message::{Fault, FrameParameters};
 
 use super::position::Stage;
 use super::{Chip, allowed_error};
@@ -57,38 +57,6 @@ fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpo
     } else {
         GatherPoint::sample(surface, pattern, rays)
     }
-}
-
-/// A pixel whose radiance is the sum of all that was brought to it, in the image's radiance units. What else is known
-/// of it is looked up again: no chip has room to keep it.
-///
-/// # Errors
-/// If the image is not sound.
-pub fn pixel<M: MemoryPort>(
-    context: &mut Context<M>,
-    x: u32,
-    y: u32,
-    radiance: &ColourSum,
-) -> Result<Pixel, Fault> {
-    let samples = context.frame.samples;
-    let [mut albedo, mut normal] = [Vec3::ZERO; 2];
-    let (mut depth, mut surfaces) = (0.0, 0);
-    for sample in 0..samples {
-        let place = eye::place(context, PixelSample { x, y, sample });
-        let Some(surface) = eye::see(context, place)? else { continue };
-        albedo += surface.reflection.diffuse + surface.reflection.specular;
-        normal += surface.normal;
-        depth += eye::depth(context, &surface);
-        surfaces += 1;
-    }
-    let per_sample = 1.0 / samples.max(1) as f32;
-    let per_surface = 1.0 / surfaces as f32;
-    Ok(Pixel {
-        radiance: (radiance.value() * context.scene.header.radiance_unit).to_array(),
-        albedo: (albedo * per_sample).to_array(),
-        normal: (normal * per_sample).to_array(),
-        depth: if surfaces > 0 { depth * per_surface } else { f32::INFINITY },
-    })
 }
 
 /// Adds light to the pixel that it is for, in radiance units.

@@ -1,0 +1,63 @@
+//! The completion of a pixel: what a picture tells of it besides its light.
+//!
+//! It is looked up again, over all samples: no chip has room to keep it. A pixel may have thousands of samples, so it is
+//! done in steps.
+
+use glam::Vec3;
+use photoncard_shared::message::{Fault, Pixel};
+
+use crate::fixed_point::ColourSum;
+use crate::memory::MemoryPort;
+use crate::render::{Context, PixelSample, eye};
+
+/// Samples that one step looks at.
+const SAMPLES_PER_STEP: u32 = 64;
+
+/// What is known of a pixel so far.
+#[derive(Clone, Copy)]
+pub struct Completion {
+    albedo: Vec3,
+    normal: Vec3,
+    depth: f32,
+    /// Samples that see a surface.
+    surfaces: u32,
+    /// The next sample to look at.
+    next: u32,
+}
+
+impl Completion {
+    /// Nothing is known.
+    pub const NOTHING: Self =
+        Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, depth: 0.0, surfaces: 0, next: 0 };
+
+    /// Looks at the next samples of the pixel in column `x` and row `y` of the picture. Returns whether they were the last.
+    ///
+    /// # Errors
+    /// If the image is not sound.
+    pub fn step<M: MemoryPort>(&mut self, context: &mut Context<M>, x: u32, y: u32) -> Result<bool, Fault> {
+        let samples = context.frame.samples;
+        let end = samples.min(self.next.saturating_add(SAMPLES_PER_STEP));
+        for sample in self.next..end {
+            let place = eye::place(context, PixelSample { x, y, sample });
+            let Some(surface) = eye::see(context, place)? else { continue };
+            self.albedo += surface.reflection.diffuse + surface.reflection.specular;
+            self.normal += surface.normal;
+            self.depth += eye::depth(context, &surface);
+            self.surfaces += 1;
+        }
+        self.next = end;
+        Ok(end >= samples)
+    }
+
+    /// The pixel, after the last step. Its radiance is the sum of all that was brought to it, in the image's radiance units.
+    pub fn pixel<M>(&self, context: &Context<M>, radiance: &ColourSum) -> Pixel {
+        let per_sample = 1.0 / context.frame.samples.max(1) as f32;
+        let per_surface = 1.0 / self.surfaces as f32;
+        Pixel {
+            radiance: (radiance.value() * context.scene.header.radiance_unit).to_array(),
+            albedo: (self.albedo * per_sample).to_array(),
+            normal: (self.normal * per_sample).to_array(),
+            depth: if self.surfaces > 0 { self.depth * per_surface } else { f32::INFINITY },
+        }
+    }
+}
