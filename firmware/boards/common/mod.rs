@@ -1,4 +1,5 @@
-//! What the images of all boards share: a board tells its registers, time and interrupts, and is served from here.
+//! What the images of all boards share, their `main` among it: a board tells its registers, time and interrupts, and is
+//! served from here.
 
 #[expect(unsafe_code, reason = "the linker script tells where card memory is")]
 mod dram;
@@ -17,21 +18,30 @@ mod stack;
 
 use core::panic::PanicInfo;
 
+#[cfg(target_arch = "arm")]
+use cortex_m_rt::entry;
 use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard};
 use photoncard_firmware::memory::Dram;
 use photoncard_firmware::serve::serve;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::MICRO;
+#[cfg(target_arch = "riscv32")]
+use riscv_rt::entry;
 
 use self::once::Once;
 use self::port::BoardPort;
 pub(crate) use self::port::receive_all;
 use self::report::StackCheck;
+use crate::hardware::ThisBoard;
 
-/// A board: one UART, one clock, one processor. There is one of each, so nothing has a `self`.
+/// A board: one UART, one clock, one processor. There is one of each, so nothing has a `self`. The module `hardware` of an
+/// image calls its own [`ThisBoard`].
 pub(crate) trait Board {
     /// Its name.
     const NAME: &'static str;
+
+    /// Does what comes before the first message.
+    fn prepare() {}
 
     /// Sets up clock and UART, and lets interrupts in.
     fn start();
@@ -61,8 +71,14 @@ static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(MICRO, Dr
 // The buffers of the image beside the card's are small change, and still fit with the caches that the budget has.
 const _: () = assert!(MICRO_SRAM_BYTES + port::STATIC_BYTES <= MICRO.sram_bytes as usize);
 
+#[entry]
+fn main() -> ! {
+    run::<ThisBoard>();
+}
+
 /// Serves the card on the board's UART for ever.
-pub(crate) fn run<B: Board>() -> ! {
+fn run<B: Board>() -> ! {
+    B::prepare();
     stack::paint();
     report::sections(B::NAME);
     if stack::bytes() > MICRO.stack_bytes as usize {

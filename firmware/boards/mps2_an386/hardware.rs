@@ -39,6 +39,8 @@ static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
 /// The board.
 pub(crate) struct Mps2An386;
 
+pub(crate) type ThisBoard = Mps2An386;
+
 impl Board for Mps2An386 {
     const NAME: &'static str = "mps2-an386";
 

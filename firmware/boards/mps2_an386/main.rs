@@ -6,13 +6,3 @@
 mod common;
 #[expect(unsafe_code, reason = "registers, and instructions that no function stands for")]
 mod hardware;
-
-use cortex_m_rt::entry;
-
-use self::common::run;
-use self::hardware::Mps2An386;
-
-#[entry]
-fn main() -> ! {
-    run::<Mps2An386>();
-}

@@ -27,14 +27,9 @@ static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
 /// The board.
 pub(crate) struct Disco;
 
-impl Disco {
-    /// Without a debugger nobody takes messages, and a failure is a fault, which resets: see below.
-    pub(crate) fn look_for_debugger() {
-        if !DCB::is_debugger_attached() {
-            semihosting::leave_alone();
-        }
-    }
+pub(crate) type ThisBoard = Disco;
 
+impl Disco {
     /// The UART that the debugger's serial port is of.
     fn uart() -> &'static pac::usart1::RegisterBlock {
         // SAFETY: every register that is written here is written by single stores, with interrupts masked where
@@ -60,6 +55,13 @@ impl Disco {
 
 impl Board for Disco {
     const NAME: &'static str = "stm32h747i-disco";
+
+    /// Without a debugger nobody takes messages, and a failure is a fault, which resets: see below.
+    fn prepare() {
+        if !DCB::is_debugger_attached() {
+            semihosting::leave_alone();
+        }
+    }
 
     fn start() {
         let (Some(mut core), Some(chip)) = (cortex_m::Peripherals::take(), pac::Peripherals::take()) else {

@@ -7,14 +7,3 @@ mod common;
 #[expect(unsafe_code, reason = "registers, and the region of external memory")]
 mod hardware;
 mod sdram;
-
-use cortex_m_rt::entry;
-
-use self::common::run;
-use self::hardware::Disco;
-
-#[entry]
-fn main() -> ! {
-    Disco::look_for_debugger();
-    run::<Disco>();
-}

@@ -39,6 +39,8 @@ const FIFO_ON: u8 = 7;
 /// The machine.
 pub(crate) struct Virt;
 
+pub(crate) type ThisBoard = Virt;
+
 impl Virt {
     fn ticks() -> u64 {
         loop {

@@ -6,13 +6,3 @@
 mod common;
 #[expect(unsafe_code, reason = "registers, and instructions that no function stands for")]
 mod hardware;
-
-use riscv_rt::entry;
-
-use self::common::run;
-use self::hardware::Virt;
-
-#[entry]
-fn main() -> ! {
-    run::<Virt>();
-}
