@@ -3,6 +3,7 @@
 
 #[expect(unsafe_code, reason = "the linker script tells where card memory is")]
 mod dram;
+mod measure;
 #[expect(unsafe_code, reason = "a static is handed out once")]
 mod once;
 mod port;
@@ -21,10 +22,12 @@ use core::panic::PanicInfo;
 #[cfg(target_arch = "arm")]
 use cortex_m_rt::entry;
 use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard};
+use photoncard_firmware::chip::MicroChip;
 use photoncard_firmware::memory::Dram;
 use photoncard_firmware::serve::serve;
-use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::budget::MICRO;
+use photoncard_shared::counters::Counters;
 #[cfg(target_arch = "riscv32")]
 use riscv_rt::entry;
 
@@ -90,12 +93,33 @@ fn run<B: Board>() -> ! {
     if lines.len() * LINE_BYTES < MICRO.dram_bytes as usize {
         semihosting::fail(format_args!("card memory is smaller than the budget's: {} lines\n", lines.len()));
     }
+    if cfg!(feature = "measure") {
+        measure_and_exit::<B>(lines);
+    }
     *card.memory() = Dram::new(lines);
     card.measure_memory_by(report::memory_use);
     B::start();
     semihosting::print(format_args!("ready\n"));
     let error = serve(card, &mut StackCheck(BoardPort::<B>::new()));
     semihosting::fail(format_args!("the port failed: {error:?}\n"));
+}
+
+/// Prints what each work of [`measure`] counts, and its time, milliseconds: where a clock ticks with the instructions, as QEMU's
+/// does with `-icount shift=0`, a millisecond is a million of them.
+fn measure_and_exit<B: Board>(lines: &[Line]) -> ! {
+    static CHIP: Once<MicroChip> = Once::new(MicroChip::new());
+    let Some(chip) = CHIP.take() else { semihosting::fail(format_args!("the chip is in use\n")) };
+    B::start();
+    for work in measure::Work::ALL {
+        let start = B::milliseconds();
+        let Some(counters) = measure::render(chip, lines, work) else {
+            semihosting::fail(format_args!("card memory holds no image and frame\n"));
+        };
+        let Counters { eye_rays, gather_rays, gathers, .. } = counters;
+        let time = B::milliseconds().wrapping_sub(start);
+        semihosting::print(format_args!("{work:?} {eye_rays} {gather_rays} {gathers} {time}\n"));
+    }
+    semihosting::exit(0);
 }
 
 #[panic_handler]

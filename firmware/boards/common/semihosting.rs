@@ -94,7 +94,12 @@ pub(crate) fn print(message: fmt::Arguments) {
 /// Prints a message and ends the program with an exit status that tells of a failure.
 pub(crate) fn fail(message: fmt::Arguments) -> ! {
     print(message);
-    let exit = [APPLICATION_EXIT, FAILED];
+    exit(FAILED);
+}
+
+/// Ends the program with an exit status.
+pub(crate) fn exit(status: usize) -> ! {
+    let exit = [APPLICATION_EXIT, status];
     // SAFETY: the two words that this operation takes.
     unsafe { call(EXIT_EXTENDED, exit.as_ptr().cast()) };
     loop {

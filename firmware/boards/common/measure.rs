@@ -1,0 +1,59 @@
+//! What a gather costs, in a processor's instructions: one tile rendered three times, with more of its work each time. The
+//! differences are the cost of gather rays, and that of the gathers at their ends. `tests/instructions.sh` runs it.
+
+use photoncard_firmware::chip::{MicroChip, Progress};
+use photoncard_firmware::gather::GatherRequest;
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::render::{Context, GatherOutlet};
+use photoncard_firmware::scene::SceneImage;
+use photoncard_shared::address::Line;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::image::Header;
+use photoncard_shared::message::{self, FrameParameters, Tile};
+
+/// How much of the work is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Work {
+    /// Eye and shadow rays.
+    Eye,
+    /// Gather rays as well.
+    Rays,
+    /// And the gathers at their ends.
+    Gathers,
+}
+
+impl Work {
+    pub(crate) const ALL: [Self; 3] = [Self::Eye, Self::Rays, Self::Gathers];
+}
+
+/// Pixels in a row and a column of the tile, which lies in the middle of the picture.
+const TILE_SIDE: u32 = 16;
+
+/// Drops gathers.
+struct Nowhere;
+
+impl GatherOutlet for Nowhere {
+    fn take(&mut self, _: GatherRequest) {}
+}
+
+/// Renders the tile. The frame's parameters lie in the line behind the image, after their length. Returns what was counted;
+/// `None` if the memory holds anything else.
+pub(crate) fn render(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option<Counters> {
+    let scene = SceneImage { header: Header::read(lines.first()?).ok()? };
+    let (&length, bytes) = lines.get(scene.header.lines as usize)?.0.split_first()?;
+    let mut frame: FrameParameters = message::decode(bytes.get(..length.into())?)?;
+    if work == Work::Eye {
+        frame.gather_rays = 0;
+    }
+    let middle = |side: u32| side.saturating_sub(TILE_SIDE) / 2;
+    let [x, y] = [middle(frame.width), middle(frame.height)];
+    let (memory, counters) = (&mut Lines(lines), &mut Counters::ZERO.clone());
+    let mut nowhere = Nowhere;
+    let outlet = (work == Work::Rays).then_some(&mut nowhere as &mut dyn GatherOutlet);
+    let mut context = Context { scene: &scene, memory, frame: &frame, counters, outlet };
+    if !chip.begin(context.memory, Tile { id: 0, x, y, width: TILE_SIDE, height: TILE_SIDE }) {
+        return None;
+    }
+    while chip.step(&mut context).ok()? == Progress::Busy {}
+    Some(*context.counters)
+}

@@ -1,0 +1,65 @@
+//! The host's part of `tests/instructions.sh`, which counts the instructions of a gather.
+//!
+//! `instructions write FILE` writes what a board's memory is to hold: the image of the Cornell box with its photons, and the
+//! frame's parameters in the line behind it. `instructions render FILE WORK` does the work `Eye`, `Rays` or `Gathers` of one
+//! tile as a board does, in the function `measured`, and prints what it counted.
+
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::photon::map_photons;
+use photoncard_driver::render::{RenderSettings, Sampling};
+use photoncard_driver::scene::gltf;
+use photoncard_firmware::chip::MicroChip;
+use photoncard_shared::address::{LINE_BYTES, Line};
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{self, Drain, FrameParameters};
+
+#[path = "../../firmware/boards/common/measure.rs"]
+mod measure;
+
+use measure::{Work, render};
+
+fn memory() -> Vec<u8> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
+    let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
+    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("it is packed");
+    // One gather a ray, done at once.
+    let settings = RenderSettings {
+        width: 64,
+        height: 64,
+        photons: 20_000,
+        gather_rays: 16,
+        neighbors: 100,
+        sampling: Sampling::Reflection,
+        irradiance_error: None,
+        ..RenderSettings::default()
+    };
+    let mapped = map_photons(packed, &settings.photon_settings(), &|_| true).expect("it is lit");
+    let frame = settings.frame(&scene.cameras[0], mapped.max_distance);
+    let frame = FrameParameters { drain: Drain::Immediate, ..frame };
+    let mut behind = [0; LINE_BYTES];
+    let (length, bytes) = behind.split_first_mut().expect("a line has bytes");
+    *length = message::encode(&frame, bytes).expect("the parameters fit a line") as u8;
+    mapped.image.lines().iter().map(|line| line.0).chain([behind]).flatten().collect()
+}
+
+/// What Callgrind counts.
+#[inline(never)]
+fn measured(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option<Counters> {
+    render(chip, lines, work)
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["write", path] => std::fs::write(path, memory()).expect("the file is written"),
+        ["render", path, work] => {
+            let bytes = std::fs::read(path).expect("the file is read");
+            let lines: Vec<Line> = bytes.as_chunks().0.iter().map(|&line| Line(line)).collect();
+            let work = Work::ALL.into_iter().find(|each| format!("{each:?}") == work).expect("a work");
+            let counters = measured(&mut MicroChip::new(), &lines, work).expect("the file is sound");
+            println!("{work:?} {} {} {}", counters.eye_rays, counters.gather_rays, counters.gathers);
+        }
+        _ => panic!("usage: instructions write FILE | render FILE WORK"),
+    }
+}
