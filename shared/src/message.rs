@@ -3,7 +3,7 @@
 //! The host speaks first. A session is
 //!
 //! ```text
-//! Hello           -> Hello                       versions, budget, build, how much of its memory is written
+//! Hello           -> Hello                       versions, budget, build, what of its memory is written and in use
 //! ReadChecksums   -> Checksums ...               of chunks that are written: what is there already is not sent again
 //! BeginImage      -> (nothing)
 //! WriteLines ...  -> (nothing)                   any number, in any order, each up to eight lines
