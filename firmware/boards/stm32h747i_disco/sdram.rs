@@ -1,4 +1,4 @@
-//! The pins and the chip of external memory (ST, "UM2411", schematic MB1248, STM32CubeH7; ISSI, "IS42S32800").
+//! The pins and the chip of external memory (ST, "UM2411", schematic MB1248, `STM32CubeH7`; ISSI, "IS42S32800").
 
 use stm32_fmc::Sdram;
 use stm32_fmc::devices::is42s32800g_6::Is42s32800g;
