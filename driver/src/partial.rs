@@ -13,6 +13,7 @@
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use photoncard_shared::checksum::checksum;
 use photoncard_shared::message::{PIXEL_BYTES, Pixel, Tile};
@@ -70,6 +71,11 @@ pub enum PartialError {
 pub struct PartialRender {
     path: PathBuf,
     settings: Value,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
     file: Option<File>,
     failed: Option<io::Error>,
 }
@@ -86,11 +92,15 @@ impl PartialRender {
         film: &mut Film,
     ) -> Result<Self, PartialError> {
         let path = partial.path.clone();
-        let mut this = Self { path, settings, file: None, failed: None };
+        let this = Self { path, settings, state: Mutex::default() };
         if partial.resume {
-            this.file = this.resume(film)?;
+            this.lock().file = this.resume(film)?;
         }
         Ok(this)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn error(&self, source: io::Error) -> PartialError {
@@ -134,16 +144,8 @@ impl PartialRender {
         Ok((title.len() + settings.len()) as u64)
     }
 
-    /// Keeps a finished tile. What goes wrong is told by [`Self::check`].
-    pub(crate) fn keep(&mut self, tile: &Tile, film: &Film) {
-        if self.failed.is_none()
-            && let Err(error) = self.append(tile, film)
-        {
-            self.failed = Some(error);
-        }
-    }
-
-    fn append(&mut self, tile: &Tile, film: &Film) -> io::Result<()> {
+    /// What is kept of a finished tile.
+    pub(crate) fn record(tile: &Tile, film: &Film) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(PLACE_BYTES + tile.pixels() as usize * PIXEL_BYTES + 4);
         for number in [tile.x, tile.y, tile.width, tile.height] {
             bytes.extend(number.to_le_bytes());
@@ -152,7 +154,21 @@ impl PartialRender {
             bytes.extend(film.pixel(x, y).copied().unwrap_or_default().to_bytes());
         }
         bytes.extend(checksum(&bytes).to_le_bytes());
-        let file = match &mut self.file {
+        bytes
+    }
+
+    /// Keeps a finished tile's record. What goes wrong is told by [`Self::check`].
+    pub(crate) fn keep(&self, record: &[u8]) {
+        let State { file, failed } = &mut *self.lock();
+        if failed.is_none()
+            && let Err(error) = self.append(file, record)
+        {
+            *failed = Some(error);
+        }
+    }
+
+    fn append(&self, file: &mut Option<File>, record: &[u8]) -> io::Result<()> {
+        let file = match file {
             Some(file) => file,
             none => {
                 let mut file = File::create(&self.path)?;
@@ -161,15 +177,17 @@ impl PartialRender {
             }
         };
         // One call: another process sees a tile whole or cut off.
-        file.write_all(&bytes)
+        file.write_all(record)
     }
 
     /// Tells what went wrong while tiles were kept.
     ///
     /// # Errors
     /// If anything did.
-    pub(crate) fn check(&mut self) -> Result<(), PartialError> {
-        self.failed.take().map_or(Ok(()), |error| Err(self.error(error)))
+    pub(crate) fn check(&self) -> Result<(), PartialError> {
+        // Whoever holds the lock writes, and tells of it later.
+        let Ok(mut state) = self.state.try_lock() else { return Ok(()) };
+        state.failed.take().map_or(Ok(()), |error| Err(self.error(error)))
     }
 }
 

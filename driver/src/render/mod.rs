@@ -1,10 +1,12 @@
 //! A render, from a loaded scene to a complete film.
 
 mod address;
+mod card_thread;
 mod cards;
 mod error;
 mod memory;
 mod open_card;
+mod reopening;
 mod settings;
 mod statistics;
 
@@ -17,7 +19,6 @@ pub use photoncard_shared::message::Sampling;
 pub use settings::{LEAST_IRRADIANCE_ERROR, RenderSettings};
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use photoncard_shared::address::Line;
@@ -61,7 +62,7 @@ pub trait Observer: Sync {
     /// Tells that so many of all tiles were rendered before.
     fn resumed(&self, _done: usize, _total: usize) {}
 
-    /// Tells that a card was lost; the others go on with its tiles.
+    /// Tells that a card was lost, or is used no more; the others go on with its tiles.
     fn lost(&self, _card: &str, _error: &SessionError) {}
 }
 
@@ -100,9 +101,8 @@ pub fn render(
     if settings.order == GatherOrder::Hilbert {
         return render_whole_frame(scene, settings, camera, observer);
     }
-    let picture = Mutex::new(Picture::empty()?);
     let trace = settings.trace.as_deref().map(TraceFile::create).transpose()?;
-    let cards = Cards::connect(settings, trace, &picture, observer)?;
+    let cards = Cards::connect(settings, trace, observer)?;
     for budget in cards.budgets() {
         settings.check(&budget)?;
     }
@@ -119,7 +119,7 @@ pub fn render(
     let mut times = Times::default();
     let prepared = prepare(scene, settings, cards.budgets(), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance);
-    *cards::lock(&picture) = Picture { scheduler: Scheduler::new(all), film, partial };
+    let picture = Picture::new(Scheduler::new(all), film, partial);
     let job =
         Job { image: prepared.image.lines(), checksum: checksum(prepared.image.lines()), frame: &frame };
     let outcome = cards.run(job, &picture, observer)?;
@@ -127,7 +127,7 @@ pub fn render(
     times.render = outcome.render_seconds;
     times.total = start.elapsed().as_secs_f64();
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
-    let Picture { film, .. } = picture.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let (film, _) = picture.into_parts();
     Ok(Rendering { film, statistics })
 }
 
@@ -239,6 +239,8 @@ fn statistics(
             wire_bytes: outcome.bytes.wire,
             retransmitted_frames: outcome.bytes.line.repeated,
             damaged_frames: outcome.bytes.line.damaged,
+            duplicate_frames: outcome.bytes.line.duplicates,
+            probes: outcome.bytes.line.probes,
             resets: outcome.bytes.resets,
         },
         memory: settings.modelled_caches().zip(outcome.traffic.as_ref()).map(MemoryStatistics::new),
