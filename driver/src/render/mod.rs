@@ -83,6 +83,8 @@ pub struct Rendering {
     pub film: Film,
     /// What it took.
     pub statistics: Statistics,
+    /// Where finished tiles are kept: to be removed when the picture is written.
+    pub partial: Option<PartialRender>,
 }
 
 /// Renders a scene.
@@ -108,8 +110,7 @@ pub fn render(
     }
     // Not before the settings are known to be possible: a film may be large.
     let mut film = Film::new(settings.width, settings.height, settings.window())?;
-    let begin = |partial| PartialRender::begin(partial, settings.identity(scene), &mut film);
-    let partial = settings.partial.as_ref().map(begin).transpose()?;
+    let partial = begin_partial(scene, settings, &mut film)?;
     let mut all = tiles(settings.window(), settings.tile, settings.order);
     let count = all.len();
     all.retain(|tile| !film.has(tile));
@@ -127,8 +128,8 @@ pub fn render(
     times.render = outcome.render_seconds;
     times.total = start.elapsed().as_secs_f64();
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
-    let (film, _) = picture.into_parts();
-    Ok(Rendering { film, statistics })
+    let (film, partial) = picture.into_parts();
+    Ok(Rendering { film, statistics, partial })
 }
 
 /// Renders with all gathers of the frame along one curve: the chips are emulated, and leave the gathers to the host.
@@ -139,9 +140,11 @@ fn render_whole_frame(
     observer: &dyn Observer,
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
+    settings.check_resume()?;
     let chips = cards::reference_chips(&settings.cards)?;
     settings.check(&REFERENCE)?;
     let mut film = Film::new(settings.width, settings.height, settings.window())?;
+    let partial = begin_partial(scene, settings, &mut film)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, std::iter::once(REFERENCE), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance);
@@ -159,7 +162,17 @@ fn render_whole_frame(
     let traffic = caches.map(|_| traffic);
     let outcome = Outcome { counters, traffic, cards: chips, ..Outcome::default() };
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
-    Ok(Rendering { film, statistics })
+    Ok(Rendering { film, statistics, partial })
+}
+
+/// Begins to keep finished tiles, and takes over those of an earlier render, if the settings say so.
+fn begin_partial(
+    scene: &Scene,
+    settings: &RenderSettings,
+    film: &mut Film,
+) -> Result<Option<PartialRender>, RenderError> {
+    let begin = |partial| PartialRender::begin(partial, settings.identity(scene), film);
+    Ok(settings.partial.as_ref().map(begin).transpose()?)
 }
 
 fn prepare(
