@@ -4,6 +4,8 @@
 //! any order. A tile's pixels do not depend on who renders it, nor when.
 
 use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use photoncard_shared::message::{Drain, Tile};
 
@@ -64,48 +66,84 @@ pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     tiles
 }
 
-/// The tiles of a picture, and how far they are.
+/// The tiles of a picture, and how far they are: shared by the threads of all cards.
 #[derive(Debug)]
 pub struct Scheduler {
+    state: Mutex<State>,
+    /// A tile waits again, or all are done.
+    changed: Condvar,
+    total: usize,
+}
+
+#[derive(Debug)]
+struct State {
     waiting: VecDeque<Tile>,
     done: usize,
-    total: usize,
 }
 
 impl Scheduler {
     /// All tiles wait.
     pub fn new(tiles: Vec<Tile>) -> Self {
-        Self { total: tiles.len(), waiting: tiles.into(), done: 0 }
+        let total = tiles.len();
+        let state = Mutex::new(State { waiting: tiles.into(), done: 0 });
+        Self { state, changed: Condvar::new(), total }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // A thread that panicked holding the lock has left whole tiles.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The next tile for a card with a free credit.
-    pub fn take(&mut self) -> Option<Tile> {
-        self.waiting.pop_front()
+    pub fn take(&self) -> Option<Tile> {
+        self.lock().waiting.pop_front()
     }
 
     /// A tile's pixels are all there.
-    pub fn complete(&mut self) {
-        self.done += 1;
+    pub fn complete(&self) {
+        let mut state = self.lock();
+        state.done += 1;
+        if state.done == self.total {
+            self.changed.notify_all();
+        }
     }
 
     /// A tile waits again: before all others, as it has waited longest.
-    pub fn give_back(&mut self, tile: Tile) {
-        self.waiting.push_front(tile);
+    pub fn give_back(&self, tile: Tile) {
+        self.lock().waiting.push_front(tile);
+        self.changed.notify_all();
     }
 
     /// Whether all tiles are done.
     pub fn is_complete(&self) -> bool {
-        self.done == self.total
+        self.lock().done == self.total
     }
 
     /// Tiles that are done, and all of them.
     pub fn progress(&self) -> (usize, usize) {
-        (self.done, self.total)
+        (self.lock().done, self.total)
+    }
+
+    /// Waits until a tile waits or all are done, not longer than `most`.
+    pub fn wait_for_tile(&self, most: Duration) {
+        self.wait_while(most, |state| state.waiting.is_empty() && state.done < self.total);
+    }
+
+    /// Waits until all tiles are done, not longer than `most`.
+    pub fn wait_for_end(&self, most: Duration) {
+        self.wait_while(most, |state| state.done < self.total);
+    }
+
+    fn wait_while(&self, most: Duration, must_wait: impl Fn(&State) -> bool) {
+        let waited = self.changed.wait_timeout_while(self.lock(), most, |state| must_wait(state));
+        drop(waited);
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Instant;
+
     use super::*;
 
     #[test]
@@ -130,5 +168,27 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn waits_end_with_what_they_wait_for() {
+        let tile = Tile { id: 0, x: 0, y: 0, width: 1, height: 1 };
+        let scheduler = Scheduler::new(vec![tile, tile]);
+        let long = Duration::from_secs(60);
+        scheduler.wait_for_tile(long);
+        let [first, _] = [scheduler.take().unwrap(), scheduler.take().unwrap()];
+        scheduler.wait_for_tile(Duration::ZERO);
+        let begin = Instant::now();
+        std::thread::scope(|scope| {
+            scope.spawn(|| scheduler.wait_for_end(long));
+            scope.spawn(|| {
+                scheduler.wait_for_tile(long);
+                assert_eq!(scheduler.take(), Some(first));
+                scheduler.complete();
+                scheduler.complete();
+            });
+            scheduler.give_back(first);
+        });
+        assert!(begin.elapsed() < long && scheduler.is_complete());
     }
 }

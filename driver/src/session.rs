@@ -6,11 +6,16 @@
 
 mod clock;
 mod error;
+mod link_bytes;
 mod load;
+mod picture;
+mod tiles;
 
 pub use error::SessionError;
+pub use link_bytes::LinkBytes;
+pub use picture::Picture;
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use photoncard_shared::address::Line;
@@ -18,38 +23,13 @@ use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{
-    self, Command, FrameParameters, MemoryUse, PIXEL_BYTES, PROTOCOL_VERSION, Pixel, Reply, Tile,
-};
-use photoncard_shared::transport::{Event, LineStatistics, Transport};
+use photoncard_shared::message::{self, Command, FrameParameters, MemoryUse, PROTOCOL_VERSION, Reply};
+use photoncard_shared::transport::{Event, Transport};
 
 use self::clock::Clock;
 use self::error::check_versions;
 use self::load::Load;
-use crate::film::{Film, FilmError, Window};
-use crate::partial::PartialRender;
-use crate::scheduler::Scheduler;
-
-/// What sessions work on together.
-pub struct Picture {
-    /// Which tiles are left.
-    pub scheduler: Scheduler,
-    /// Where pixels go.
-    pub film: Film,
-    /// Where finished tiles are kept, if they are.
-    pub partial: Option<PartialRender>,
-}
-
-impl Picture {
-    /// A picture of one pixel and no tile, for a session that has nothing to render yet.
-    ///
-    /// # Errors
-    /// If there is no memory for a pixel.
-    pub fn empty() -> Result<Self, FilmError> {
-        let film = Film::new(1, 1, Window::full(1, 1))?;
-        Ok(Self { scheduler: Scheduler::new(Vec::new()), film, partial: None })
-    }
-}
+use self::tiles::TilesInFlight;
 
 /// What a card is to do, the same for every card.
 #[derive(Clone, Copy)]
@@ -60,32 +40,6 @@ pub struct Job<'a> {
     pub checksum: u64,
     /// The frame's parameters.
     pub frame: &'a FrameParameters,
-}
-
-/// Bytes that went over a link, and what was repaired on it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LinkBytes {
-    /// Image lines and pixels.
-    pub payload: u64,
-    /// All bytes in both directions.
-    pub wire: u64,
-    /// What the host's end has seen of the line.
-    pub line: LineStatistics,
-    /// Times that the card was greeted again.
-    pub resets: u64,
-}
-
-impl LinkBytes {
-    /// Adds those of another link.
-    pub fn add(&mut self, other: &Self) {
-        self.payload += other.payload;
-        self.wire += other.wire;
-        self.line.damaged += other.line.damaged;
-        self.line.repeated += other.line.repeated;
-        self.line.duplicates += other.line.duplicates;
-        self.line.probes += other.line.probes;
-        self.resets += other.resets;
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,11 +62,8 @@ enum State {
 /// Tiles that a card may hold at the most, whatever it says: those of a card that holds many come late if it is lost.
 const MOST_CREDITS: u32 = 16;
 
-/// A tile at a card.
-struct TileInFlight {
-    tile: Tile,
-    pixels: u64,
-}
+/// Times that a card may be greeted again without having completed a tile: what it crashes at, it is given again.
+const MOST_RESETS: u32 = 4;
 
 /// The session with one card.
 pub struct Session<'a> {
@@ -122,7 +73,7 @@ pub struct Session<'a> {
     memory_use: Option<MemoryUse>,
     job: Option<Job<'a>>,
     load: Load,
-    tiles: HashMap<u32, TileInFlight>,
+    tiles: TilesInFlight,
     counters: Counters,
     bytes: LinkBytes,
     transport: Transport,
@@ -131,6 +82,8 @@ pub struct Session<'a> {
     /// The number of the link's present session.
     number: u16,
     clock: Clock,
+    /// Times that the card was heard and then had to be greeted again, since it completed a tile.
+    resets: u32,
 }
 
 impl<'a> Session<'a> {
@@ -143,13 +96,14 @@ impl<'a> Session<'a> {
             memory_use: None,
             job: None,
             load: Load::default(),
-            tiles: HashMap::new(),
+            tiles: TilesInFlight::default(),
             counters: Counters::ZERO,
             bytes: LinkBytes::default(),
             transport: Transport::host(),
             commands: VecDeque::new(),
             number,
             clock: Clock::new(now),
+            resets: 0,
         };
         session.greet_card();
         session
@@ -203,13 +157,22 @@ impl<'a> Session<'a> {
         self.state == State::Rendering
     }
 
-    /// Whether the card has said anything since it was greeted last.
-    pub fn has_answered(&self) -> bool {
-        self.clock.has_heard()
+    /// Whether the card has nothing to do, and there is no tile for it.
+    pub fn is_idle(&mut self) -> bool {
+        self.is_loaded() && !self.is_waiting() && self.transport.outgoing().is_empty()
+    }
+
+    /// Whether an answer of the card is due.
+    fn is_waiting(&self) -> bool {
+        match self.state {
+            State::Ready => false,
+            State::Rendering => !self.tiles.is_empty() || !self.transport.is_acknowledged(),
+            _ => true,
+        }
     }
 
     /// Makes what there is to send next.
-    pub fn prepare(&mut self, picture: &mut Picture) {
+    pub fn prepare(&mut self, picture: &Picture) {
         while self.transport.can_send() {
             if let Some(command) = self.commands.pop_front() {
                 self.transport.send(|bytes| {
@@ -223,7 +186,7 @@ impl<'a> Session<'a> {
     }
 
     /// Makes a command that there is no answer to wait for. Returns whether there was one.
-    fn make_command(&mut self, picture: &mut Picture) -> bool {
+    fn make_command(&mut self, picture: &Picture) -> bool {
         match (self.state, self.job) {
             (State::Loading, Some(job)) => {
                 let sent = self.load.next_lines(job.image, &mut self.transport);
@@ -237,8 +200,8 @@ impl<'a> Session<'a> {
             (State::Rendering, _) => {
                 let credits = self.budget.map_or(1, |budget| budget.tiles.min(MOST_CREDITS) as usize);
                 let free = self.tiles.len() < credits;
-                let Some(tile) = free.then(|| picture.scheduler.take()).flatten() else { return false };
-                self.tiles.insert(tile.id, TileInFlight { tile, pixels: 0 });
+                let Some(tile) = free.then(|| picture.scheduler().take()).flatten() else { return false };
+                self.tiles.push(tile);
                 self.send(&Command::RenderTile(tile));
                 true
             }
@@ -268,21 +231,22 @@ impl<'a> Session<'a> {
     /// Takes what came from the card.
     ///
     /// # Errors
-    /// If it is not what a card of this protocol answers, or tells of a fault.
+    /// If it is not what a card of this protocol answers, tells of a fault, or the card was reset too often.
     pub fn receive(
         &mut self,
         mut bytes: &[u8],
-        picture: &mut Picture,
+        picture: &Picture,
         now: Duration,
     ) -> Result<(), SessionError> {
         self.bytes.wire += bytes.len() as u64;
         while !bytes.is_empty() {
+            let passed = self.transport.passed();
             let (taken, event) = self.transport.receive(bytes);
             bytes = &bytes[taken..];
             match event {
                 None => {}
                 Some(Event::Heard) => self.clock.heard(now),
-                Some(Event::Unknown) if self.clock.has_heard() => self.reset(picture, now),
+                Some(Event::Unknown) if self.clock.has_heard() => self.reset(picture, now)?,
                 // Our hello was lost.
                 Some(Event::Unknown) => self.transport.send_again(),
             }
@@ -296,6 +260,9 @@ impl<'a> Session<'a> {
                 let reply = message::decode(payload).ok_or(SessionError::Unexpected("not a reply"))?;
                 self.take(&reply, picture)?;
             }
+            if self.transport.passed() != passed {
+                self.clock.passed(now);
+            }
         }
         Ok(())
     }
@@ -308,37 +275,43 @@ impl<'a> Session<'a> {
     /// Asks a card that has been quiet for too long whether it is there. To be called often.
     ///
     /// # Errors
-    /// If the card has been silent for longer than it may be.
-    pub fn tick(&mut self, now: Duration) -> Result<(), SessionError> {
-        let is_waiting = match self.state {
-            State::Ready => false,
-            State::Rendering => !self.tiles.is_empty() || !self.transport.is_acknowledged(),
-            _ => true,
-        };
-        if !is_waiting {
+    /// If the card has been silent, or has come no further, for longer than it may.
+    pub fn tick(&mut self, picture: &Picture, now: Duration) -> Result<(), SessionError> {
+        if !self.is_waiting() {
             self.clock.rest(now);
             return Ok(());
+        }
+        // A card that holds a session of this very number, of another host, takes the hello for one that came before.
+        if self.state == State::Greeting && self.clock.is_greeted_in_vain(now) {
+            return self.reset(picture, now);
         }
         if self.clock.must_ask(now) {
             self.transport.probe();
         }
-        self.clock.check(now)
+        let rays = self.job.map_or(0, |job| self.tiles.most_rays(job.frame));
+        self.clock.check(rays, now)
     }
 
     /// Gives back the tiles that the card has not completed: it is lost, or was reset.
-    pub fn give_back(&mut self, picture: &mut Picture) {
-        for (_, in_flight) in self.tiles.drain() {
-            picture.scheduler.give_back(in_flight.tile);
-        }
+    pub fn give_back(&mut self, picture: &Picture) {
+        self.tiles.give_back(picture);
     }
 
     /// Greets the card again and gives back its tiles: it does not know the session, as it was reset, or is silent.
-    pub fn reset(&mut self, picture: &mut Picture, now: Duration) {
+    ///
+    /// # Errors
+    /// If it was greeted too often since it completed a tile. A card that has not been heard since is only waited for.
+    pub fn reset(&mut self, picture: &Picture, now: Duration) -> Result<(), SessionError> {
         self.give_back(picture);
+        self.resets += u32::from(self.clock.has_heard());
+        if self.resets > MOST_RESETS {
+            return Err(SessionError::Resets(self.resets));
+        }
         self.bytes.resets += 1;
         self.number = self.number.wrapping_add(1);
         self.clock = Clock::new(now);
         self.greet_card();
+        Ok(())
     }
 
     fn greet_card(&mut self) {
@@ -370,7 +343,7 @@ impl<'a> Session<'a> {
         self.state = State::Loading;
     }
 
-    fn take(&mut self, reply: &Reply, picture: &mut Picture) -> Result<(), SessionError> {
+    fn take(&mut self, reply: &Reply, picture: &Picture) -> Result<(), SessionError> {
         match (self.state, *reply) {
             (State::Greeting, Reply::Hello { budget, written_lines, memory_use, build, .. }) => {
                 build.clone_into(&mut self.build);
@@ -400,11 +373,14 @@ impl<'a> Session<'a> {
                 Ok(())
             }
             (State::Rendering, Reply::Pixels { tile, first, data }) => {
-                self.take_pixels(tile, first, data, picture)
+                self.tiles.take_pixels(tile, first, data, picture)?;
+                self.bytes.payload += data.len() as u64;
+                Ok(())
             }
             (State::Rendering, Reply::TileDone { tile, counters }) => {
-                self.complete(tile, picture)?;
+                self.tiles.complete(tile, picture)?;
                 self.counters.add(&counters);
+                self.resets = 0;
                 Ok(())
             }
             _ => Err(SessionError::Unexpected("not an answer to what was asked")),
@@ -418,42 +394,5 @@ impl<'a> Session<'a> {
         self.budget = Some(budget);
         self.state = State::Ready;
         Ok(())
-    }
-
-    fn take_pixels(
-        &mut self,
-        tile: u32,
-        first: u32,
-        data: &[u8],
-        picture: &mut Picture,
-    ) -> Result<(), SessionError> {
-        let in_flight =
-            self.tiles.get_mut(&tile).ok_or(SessionError::Unexpected("pixels of another tile"))?;
-        let (pixels, rest) = data.as_chunks::<PIXEL_BYTES>();
-        let end = first as u64 + pixels.len() as u64;
-        if first as u64 != in_flight.pixels || !rest.is_empty() || end > in_flight.tile.pixels() {
-            return Err(SessionError::Unexpected("pixels that are not the next"));
-        }
-        in_flight.pixels = end;
-        let Tile { x, y, width, .. } = in_flight.tile;
-        self.bytes.payload += data.len() as u64;
-        for (index, pixel) in (first..).zip(pixels) {
-            picture.film.write(x + index % width, y + index / width, Pixel::read(pixel))?;
-        }
-        Ok(())
-    }
-
-    fn complete(&mut self, tile: u32, picture: &mut Picture) -> Result<(), SessionError> {
-        match self.tiles.remove(&tile) {
-            Some(in_flight) if in_flight.pixels == in_flight.tile.pixels() => {
-                picture.scheduler.complete();
-                let Picture { film, partial, .. } = picture;
-                if let Some(partial) = partial {
-                    partial.keep(&in_flight.tile, film);
-                }
-                Ok(())
-            }
-            _ => Err(SessionError::Unexpected("a tile that is not complete")),
-        }
     }
 }

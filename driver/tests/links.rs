@@ -20,7 +20,7 @@ fn card(folder: &Path) -> (HostPort, PathBuf, Arc<AtomicBool>) {
     let path = folder.join("card");
     let listener = Listener::new(&ListenAddress::Unix { path: path.clone() }).unwrap();
     let stop = Arc::new(AtomicBool::new(false));
-    (HostPort::new(listener, stop.clone()), path, stop)
+    (HostPort::new(listener, stop.clone(), |_| {}), path, stop)
 }
 
 /// What the card reads next.
@@ -102,7 +102,7 @@ fn a_host_that_comes_after_the_last_is_gone_is_never_refused() {
 fn terminals_carry_every_byte() {
     let listener = Listener::new(&ListenAddress::Pty).unwrap();
     let path = listener.card_address().strip_prefix("serial:").unwrap().to_owned();
-    let mut card = HostPort::new(listener, Arc::default());
+    let mut card = HostPort::new(listener, Arc::default(), |_| {});
     for _ in 0..2 {
         assert_eq!(card.read(&mut [0; 8], SOON), Ok(0));
         let mut host = open_serial(path.as_ref(), 9600).unwrap();

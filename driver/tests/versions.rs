@@ -8,10 +8,10 @@ use photoncard_shared::transport::Transport;
 
 /// What a host makes of a card that answers its hello with some bytes.
 fn greeted_with(answer: &[u8]) -> SessionError {
-    let mut picture = Picture::empty().expect("there is memory for a pixel");
+    let picture = Picture::empty().expect("there is memory for a pixel");
     let mut session = Session::new(1, Duration::ZERO);
     let mut card = Transport::card();
-    session.prepare(&mut picture);
+    session.prepare(&picture);
     let hello = session.outgoing().to_vec();
     card.receive(&hello);
     assert!(card.take().is_some());
@@ -20,7 +20,7 @@ fn greeted_with(answer: &[u8]) -> SessionError {
         Some(answer.len())
     }));
     let answer = card.outgoing().to_vec();
-    session.receive(&answer, &mut picture, Duration::ZERO).expect_err("it is another version's")
+    session.receive(&answer, &picture, Duration::ZERO).expect_err("it is another version's")
 }
 
 #[test]

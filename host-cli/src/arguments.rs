@@ -171,7 +171,7 @@ pub(crate) struct RenderOptions {
     #[arg(long)]
     resume: bool,
     /// Make the links to the cards bad ones, to try how that is repaired: rates a byte as flips=1e-5,drops=1e-6,repeats=1e-6,
-    /// delays=1e-3,seed=1
+    /// delays=1e-4,seed=1
     #[arg(long, value_name = "FAULTS")]
     faults: Option<LineFaults>,
     /// Model the memory of emulated chips, and tell in the statistics what was read of it

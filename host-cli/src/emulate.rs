@@ -19,7 +19,7 @@ pub(crate) fn run(options: &EmulateOptions) -> Result<(), Failure> {
         ));
     }
     print(&format!("{}\n", listener.card_address()))?;
-    serve_card(options.card.chip(), HostPort::new(listener, stop))
+    serve_card(options.card.chip(), HostPort::new(listener, stop, say))
         .map_err(|error| Failure::work_error(&error))?;
     Err(Failure::Stopped("stopped; the card is gone"))
 }

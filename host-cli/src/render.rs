@@ -4,7 +4,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::partial::remove_partial;
 use photoncard_driver::render::{
     MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
 };
@@ -41,7 +40,9 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
     write(options, &settings, &rendering)?;
-    remove_partial(&options.partial_path()).map_err(Failure::work)?;
+    if let Some(partial) = rendering.partial {
+        partial.remove().map_err(Failure::work)?;
+    }
     if let Some(memory) = rendering.statistics.memory.as_ref().filter(|_| !options.quiet) {
         tell_memory(memory, &rendering.statistics);
     }

@@ -3,9 +3,10 @@
 
 mod support;
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::Stdio;
+use std::time::{Duration, Instant};
 
 use support::{Emulator, Outcome, Room, shipped, small_render};
 
@@ -95,6 +96,29 @@ fn a_host_is_not_disturbed_by_a_second_one() {
     check_failed(&room, &info(), &[&emulator.address, "another host may be using the card"], &[]);
     drop(first);
     assert_eq!(info().status, Some(0));
+}
+
+#[test]
+fn who_is_no_host_does_not_hold_a_card() {
+    let silent_for_long = |said: &[u8]| {
+        let room = Room::new();
+        let emulator = Emulator::start(&room, "tcp:", &[]);
+        let info = || room.run(&["card", "info", "--card", &emulator.address]);
+        let mut other = TcpStream::connect(emulator.address.strip_prefix("tcp:").unwrap()).unwrap();
+        other.write_all(said).unwrap();
+        let begin = Instant::now();
+        while info().status != Some(0) {
+            assert!(begin.elapsed() < Duration::from_secs(30), "{said:?}");
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        assert!(begin.elapsed() > Duration::from_secs(5), "{said:?}");
+        assert!(emulator.end("-INT").1.contains("for 10 s is dropped"));
+    };
+    std::thread::scope(|scope| {
+        for said in [&b""[..], b"GET / HTTP/1.0\r\n\r\n", b"\0\0\0"] {
+            scope.spawn(move || silent_for_long(said));
+        }
+    });
 }
 
 #[test]

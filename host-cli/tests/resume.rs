@@ -89,11 +89,25 @@ fn only_the_same_picture_is_gone_on_with() {
     };
     refused(&["--seed", "7", "--neighbors", "50"], &["seed was 0 and is 7", "neighbors was 100 and is 50"]);
     refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene was"]);
+    refused(&["--order", "hilbert"], &["--resume with --order hilbert is not possible"]);
     assert!(room.read("a.exr.partial") == kept);
     for foreign in [&b"something else"[..], b"", &[0xff; 100], b"photoncard partial render 1\n{]\n"] {
         room.write("a.exr.partial", foreign);
         refused(&[], &["is no partial render"]);
     }
+}
+
+#[test]
+fn a_second_render_of_the_same_output_is_refused() {
+    let room = Room::new();
+    let mut host = begun(&room, &[], 1);
+    for options in [&[][..], &["--resume"]] {
+        let outcome = room.run(&arguments(&shipped("cornell.gltf"), options));
+        assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains("another render is writing a.exr.partial"), "{}", outcome.stderr);
+    }
+    host.kill().unwrap();
+    host.wait().unwrap();
 }
 
 #[test]

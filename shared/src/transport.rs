@@ -87,6 +87,12 @@ impl Transport {
         self.session.on_their_way() == 0
     }
 
+    /// A number that is another as soon as a message has passed: one of the other end was taken, or one of this end is known to
+    /// have been.
+    pub fn passed(&self) -> u16 {
+        self.session.passed()
+    }
+
     /// Sends the message that `fill` writes into the slice of [`MAX_PAYLOAD`] bytes that it is given, returning its length.
     /// Returns whether it was sent: not without room for it, nor if `fill` returns `None` or more than the slice's length.
     pub fn send(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {

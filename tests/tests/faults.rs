@@ -34,8 +34,8 @@ fn bad_lines_render_the_same_picture() {
         "flips=1e-4,seed=3",
         "drops=1e-4,seed=4",
         "repeats=1e-4,seed=5",
-        "delays=0.05,seed=6",
-        "flips=1e-4,drops=1e-4,repeats=1e-4,delays=0.01,seed=7",
+        "delays=1e-3,seed=6",
+        "flips=1e-4,drops=1e-4,repeats=1e-4,delays=1e-3,seed=7",
     ] {
         let (pixels, statistics) = render(Some(faults));
         assert!(pixels == expected, "{faults}: another picture");

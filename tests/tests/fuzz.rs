@@ -11,8 +11,14 @@ use photoncard_tests::fuzz::{NAMES, Random, Settings, Target, fuzz, target};
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 /// Inputs of each target: some seconds of each.
-const INPUTS: [(&str, u64); NAMES.len()] =
-    [("frames", 100_000), ("messages", 500_000), ("image", 6000), ("gltf", 8000), ("exr", 8000)];
+const INPUTS: [(&str, u64); NAMES.len()] = [
+    ("frames", 100_000),
+    ("messages", 500_000),
+    ("session", 20_000),
+    ("image", 6000),
+    ("gltf", 8000),
+    ("exr", 8000),
+];
 
 /// One test at a time, so that no other's allocations are counted.
 static ALONE: Mutex<()> = Mutex::new(());

@@ -106,7 +106,7 @@ fn settings() -> RenderSettings {
 /// The bad lines that are tried: those that `PHOTONCARD_QEMU_FAULTS` says, with blanks between them.
 fn faults() -> Vec<LineFaults> {
     let asked = std::env::var("PHOTONCARD_QEMU_FAULTS");
-    let asked = asked.as_deref().unwrap_or("flips=1e-4,drops=1e-5,repeats=1e-5,delays=0.01,seed=1");
+    let asked = asked.as_deref().unwrap_or("flips=1e-4,drops=1e-5,repeats=1e-5,delays=1e-4,seed=1");
     asked.split_whitespace().map(|faults| faults.parse().expect("faults of a line")).collect()
 }
 

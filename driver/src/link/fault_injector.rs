@@ -1,9 +1,12 @@
 //! A bad line: bytes are damaged, lost, repeated, held back and cut into pieces as a seed decides.
+//!
+//! What happens to a byte depends on the seed, its direction and its position among all bytes of that direction: neither on
+//! time nor on how the bytes are cut.
 
 use std::collections::VecDeque;
 use std::fmt;
 use std::str::FromStr;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::link::{Port, PortError};
@@ -17,7 +20,7 @@ pub struct LineFaults {
     pub drops: f64,
     /// The byte comes twice.
     pub repeats: f64,
-    /// What comes is held back for some reads; a rate a read.
+    /// The byte, on its way to the host, and all behind it are held back for some milliseconds.
     pub delays: f64,
     /// What random numbers depend on.
     pub seed: u32,
@@ -69,53 +72,88 @@ impl fmt::Display for LineFaults {
 /// Makes a port a bad one, in both directions.
 pub struct FaultInjector {
     faults: LineFaults,
-    random: u32,
-    incoming: VecDeque<u8>,
-    outgoing: VecDeque<u8>,
-    /// Reads for which what comes is still held back.
-    held: u32,
+    incoming: Direction,
+    outgoing: Direction,
+    /// Until when bytes that come are held back.
+    held: Instant,
+}
+
+/// One direction of a line.
+struct Direction {
+    /// What its random numbers depend on.
+    key: u32,
+    /// Bytes that have entered it.
+    position: u32,
+    /// What of them has not left it.
+    bytes: VecDeque<Passing>,
+}
+
+/// A byte that leaves the line.
+#[derive(Clone, Copy)]
+struct Passing {
+    byte: u8,
+    /// How long it is held back.
+    delay: Duration,
+}
+
+/// What a random number is for: the numbers of each kind are others.
+#[derive(Clone, Copy)]
+enum Kind {
+    Flip,
+    Bit,
+    Drop,
+    Repeat,
+    Delay,
+    DelayTime,
+    Piece,
 }
 
 /// Bytes that move at once at the most.
 const PIECE: usize = 600;
-/// Reads that a delay lasts at the most.
+/// The longest delay, milliseconds.
 const LONGEST_DELAY: u32 = 20;
+
+impl Direction {
+    fn new(key: u32) -> Self {
+        Self { key, position: 0, bytes: VecDeque::new() }
+    }
+
+    /// The random number of the next byte. After 2^32 bytes they come again.
+    fn random(&self, kind: Kind) -> u32 {
+        hash(hash(self.position) ^ hash(self.key ^ hash(kind as u32 + 1)))
+    }
+
+    fn happens(&self, kind: Kind, rate: f64) -> bool {
+        f64::from(self.random(kind)) < rate * 4_294_967_296.0
+    }
+
+    /// Lets bytes enter the line.
+    fn pass(&mut self, bytes: &[u8], faults: &LineFaults) {
+        for &byte in bytes {
+            let is_delayed = self.happens(Kind::Delay, faults.delays);
+            let delay = if is_delayed { 1 + self.random(Kind::DelayTime) % LONGEST_DELAY } else { 0 };
+            let is_flipped = self.happens(Kind::Flip, faults.flips);
+            let byte = if is_flipped { byte ^ 1 << (self.random(Kind::Bit) % 8) } else { byte };
+            let passing = Passing { byte, delay: Duration::from_millis(delay.into()) };
+            let copies = usize::from(!self.happens(Kind::Drop, faults.drops))
+                * (1 + usize::from(self.happens(Kind::Repeat, faults.repeats)));
+            self.bytes.extend(std::iter::repeat_n(passing, copies));
+            self.position = self.position.wrapping_add(1);
+        }
+    }
+
+    /// How many bytes enter at once, at most `most`.
+    fn piece(&self, most: usize) -> usize {
+        (1 + self.random(Kind::Piece) as usize % PIECE).min(most)
+    }
+}
 
 impl FaultInjector {
     /// Faults of the line to card `index`: those of each card are others.
     pub fn new(faults: LineFaults, index: usize) -> Self {
-        let random = hash(faults.seed) ^ hash(index as u32 + 1);
-        Self { faults, random, incoming: VecDeque::new(), outgoing: VecDeque::new(), held: 0 }
-    }
-
-    fn random(&mut self) -> u32 {
-        self.random = self.random.wrapping_add(0x9e37_79b9);
-        hash(self.random)
-    }
-
-    fn happens(&mut self, rate: f64) -> bool {
-        rate > 0.0 && f64::from(self.random()) < rate * 4_294_967_296.0
-    }
-
-    /// What of some bytes comes out of the line.
-    fn pass(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let LineFaults { flips, drops, repeats, .. } = self.faults;
-        let mut passed = Vec::with_capacity(bytes.len());
-        for &byte in bytes {
-            if self.happens(drops) {
-                continue;
-            }
-            let byte = if self.happens(flips) { byte ^ 1 << (self.random() % 8) } else { byte };
-            passed.push(byte);
-            if self.happens(repeats) {
-                passed.push(byte);
-            }
-        }
-        passed
-    }
-
-    fn piece(&mut self, most: usize) -> usize {
-        (1 + self.random() as usize % PIECE).min(most)
+        let key = hash(faults.seed) ^ hash(index as u32 + 1);
+        let [incoming, outgoing] = [1, 2].map(|direction| Direction::new(hash(key ^ hash(direction))));
+        Self { faults, incoming, outgoing, held: Instant::now() }
     }
 
     /// Reads from a port as [`Port::read`] does.
@@ -128,24 +166,37 @@ impl FaultInjector {
         buffer: &mut [u8],
         wait: Duration,
     ) -> Result<usize, PortError> {
-        if self.held == 0 && self.happens(self.faults.delays) {
-            self.held = 1 + self.random() % LONGEST_DELAY;
-        }
-        if self.incoming.is_empty() {
+        // Nothing else may be written for long. That the port is closed, the read tells as well.
+        let _ = self.flush(port, Duration::ZERO);
+        if self.incoming.bytes.is_empty() {
             let mut bytes = [0; PIECE];
-            let count = port.read(&mut bytes, wait)?;
-            let passed = self.pass(&bytes[..count]);
-            self.incoming.extend(passed);
+            let most = self.incoming.piece(PIECE);
+            let count = port.read(&mut bytes[..most], wait)?;
+            self.incoming.pass(&bytes[..count], &self.faults);
         }
-        if self.held > 0 {
-            self.held -= 1;
-            return Ok(0);
+        let left = self.held.saturating_duration_since(Instant::now());
+        if !left.is_zero() {
+            std::thread::sleep(left.min(wait));
         }
-        let count = self.piece(buffer.len()).min(self.incoming.len());
-        for (target, byte) in buffer.iter_mut().zip(self.incoming.drain(..count)) {
-            *target = byte;
+        Ok(self.release(buffer))
+    }
+
+    /// Gives the bytes that are not held back.
+    fn release(&mut self, buffer: &mut [u8]) -> usize {
+        let mut count = 0;
+        while let (Some(target), Some(next)) = (buffer.get_mut(count), self.incoming.bytes.front_mut()) {
+            let now = Instant::now();
+            if !next.delay.is_zero() {
+                self.held = self.held.max(now) + std::mem::take(&mut next.delay);
+            }
+            if self.held > now {
+                break;
+            }
+            *target = next.byte;
+            self.incoming.bytes.pop_front();
+            count += 1;
         }
-        Ok(count)
+        count
     }
 
     /// Writes to a port as [`Port::write`] does.
@@ -154,14 +205,23 @@ impl FaultInjector {
     /// As the port's.
     pub fn write(&mut self, port: &mut dyn Port, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
         let mut taken = 0;
-        if self.outgoing.is_empty() {
-            taken = self.piece(bytes.len());
-            let passed = self.pass(&bytes[..taken]);
-            self.outgoing.extend(passed);
+        if self.outgoing.bytes.is_empty() {
+            taken = self.outgoing.piece(bytes.len());
+            self.outgoing.pass(&bytes[..taken], &self.faults);
         }
-        let sent = port.write(self.outgoing.make_contiguous(), wait)?;
-        self.outgoing.drain(..sent);
+        self.flush(port, wait)?;
         Ok(taken)
+    }
+
+    /// Writes what is on its way to the card.
+    fn flush(&mut self, port: &mut dyn Port, wait: Duration) -> Result<(), PortError> {
+        if self.outgoing.bytes.is_empty() {
+            return Ok(());
+        }
+        let bytes: Vec<u8> = self.outgoing.bytes.iter().map(|passing| passing.byte).collect();
+        let sent = port.write(&bytes, wait)?;
+        self.outgoing.bytes.drain(..sent);
+        Ok(())
     }
 }
 
@@ -199,21 +259,69 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_holds_bytes_back_and_loses_none() {
-        let (mut near, mut far) = loopback(100);
-        let mut injector = FaultInjector::new("delays=0.1,seed=1".parse().unwrap(), 3);
-        let (mut next, mut empty) = (0, 0);
-        for byte in 0..200_u8 {
-            near.write(&[byte], SOON).unwrap();
-            let mut buffer = [0; 8];
-            let count = injector.read(&mut far, &mut buffer, Duration::ZERO).unwrap();
-            empty += u32::from(count == 0);
-            for &found in &buffer[..count] {
-                assert_eq!(found, next);
-                next += 1;
+    fn a_fault_depends_on_the_place_of_its_byte_alone() {
+        let faults: LineFaults = "flips=0.05,drops=0.05,repeats=0.05,delays=0.001,seed=3".parse().unwrap();
+        let bytes: Vec<u8> = (0..10_000_u32).map(|index| hash(index) as u8).collect();
+        let read = |step: usize, answers: usize| {
+            let (mut near, mut far) = loopback(1 << 20);
+            let mut injector = FaultInjector::new(faults, 0);
+            let mut passed = Vec::<u8>::new();
+            for piece in bytes.chunks(step) {
+                far.write(piece, SOON).unwrap();
+                // What goes the other way changes nothing.
+                injector.write(&mut near, &bytes[..answers], SOON).unwrap();
+                let mut buffer = [0; 700];
+                let count = injector.read(&mut near, &mut buffer, Duration::ZERO).unwrap();
+                passed.extend(&buffer[..count]);
             }
+            drop(far);
+            let mut buffer = [0; 700];
+            // The link is closed once all has come.
+            while let Ok(count) = injector.read(&mut near, &mut buffer, SOON) {
+                passed.extend(&buffer[..count]);
+            }
+            passed
+        };
+        let expected = read(10_000, 0);
+        assert!(expected != bytes);
+        assert!(read(1, 3) == expected && read(77, 0) == expected);
+        let written = through(faults, &bytes);
+        assert!(written != expected, "both directions have the same faults");
+    }
+
+    #[test]
+    fn a_delay_holds_bytes_back_and_loses_none() {
+        let (mut near, mut far) = loopback(1000);
+        let mut injector = FaultInjector::new("delays=0.1,seed=1".parse().unwrap(), 3);
+        let bytes: Vec<u8> = (0..200).collect();
+        near.write(&bytes, SOON).unwrap();
+        let (mut passed, mut reads) = (Vec::<u8>::new(), 0);
+        let begin = Instant::now();
+        while passed.len() < bytes.len() {
+            let mut buffer = [0; 300];
+            let count = injector.read(&mut far, &mut buffer, Duration::from_secs(1)).unwrap();
+            passed.extend(&buffer[..count]);
+            reads += 1;
         }
-        assert!(empty > 20 && next > 20, "{empty} {next}");
+        assert!(passed == bytes);
+        // About twenty delays of ten milliseconds, and no more reads than there is something to read.
+        assert!(begin.elapsed() > Duration::from_millis(60), "{:?}", begin.elapsed());
+        assert!((5..100).contains(&reads), "{reads}");
+    }
+
+    #[test]
+    fn what_was_taken_goes_on_while_the_host_only_reads() {
+        let (mut near, mut far) = loopback(4);
+        let mut injector = FaultInjector::new(LineFaults::default(), 0);
+        let taken = injector.write(&mut near, b"twelve bytes", SOON).unwrap();
+        let mut passed = Vec::<u8>::new();
+        for _ in 0..taken {
+            let mut buffer = [0; 8];
+            let count = far.read(&mut buffer, SOON).unwrap();
+            passed.extend(&buffer[..count]);
+            assert_eq!(injector.read(&mut near, &mut buffer, Duration::ZERO), Ok(0));
+        }
+        assert!(taken > 4 && passed == b"twelve bytes"[..taken]);
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! A card's port on which hosts come and go.
 
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use photoncard_shared::frame::FrameReader;
 use photoncard_shared::link::{Port, PortError};
 
 use super::Listener;
@@ -12,7 +14,8 @@ use super::Listener;
 ///
 /// To the card this is one link that never closes: what it says while no host listens is lost, as on a cable that is
 /// pulled out. Between two hosts the link is cut at the end of a frame in both directions. A host hears nothing before it
-/// has spoken. Hosts that come while another is served are refused: their link is closed at once.
+/// has spoken. Hosts that come while another is served are refused: their link is closed at once. Who is on a socket and has
+/// sent no whole frame for some seconds is no host, and is dropped; a host may be silent after its first one, as it packs a scene.
 pub struct HostPort {
     listener: Listener,
     stop: Arc<AtomicBool>,
@@ -23,10 +26,15 @@ pub struct HostPort {
     looked: Instant,
     /// Whether the card's last byte was not the end of a frame.
     in_frame: bool,
+    /// Takes what there is to tell of hosts.
+    say: fn(fmt::Arguments),
 }
 
 struct Host {
     port: Box<dyn Port + Send>,
+    since: Instant,
+    /// Looks for its first whole frame, until that has come.
+    first_frame: Option<FrameReader>,
     has_spoken: bool,
     /// Whether the card's present frame began before the host had spoken.
     skips_frame: bool,
@@ -34,13 +42,15 @@ struct Host {
 
 /// A card at work looks at its port after every little step: a system call each time would slow it down.
 const LOOK_INTERVAL: Duration = Duration::from_micros(200);
+/// How long a host's first whole frame may take.
+const FIRST_FRAME: Duration = Duration::from_secs(10);
 /// The byte between two frames.
 const FRAME_END: u8 = 0;
 
 impl HostPort {
-    /// A port for the hosts that come to a listener, until `stop` is set.
-    pub fn new(listener: Listener, stop: Arc<AtomicBool>) -> Self {
-        Self { listener, stop, host: None, next: None, looked: Instant::now(), in_frame: false }
+    /// A port for the hosts that come to a listener, until `stop` is set. `say` is told of those that are dropped.
+    pub fn new(listener: Listener, stop: Arc<AtomicBool>, say: fn(fmt::Arguments)) -> Self {
+        Self { listener, stop, host: None, next: None, looked: Instant::now(), in_frame: false, say }
     }
 
     fn check_stop(&self) -> Result<(), PortError> {
@@ -69,9 +79,26 @@ impl HostPort {
     fn welcome(&mut self, buffer: &mut [u8], wait: Duration) -> usize {
         let Some(byte) = buffer.first_mut() else { return 0 };
         let Some(port) = self.next.take().or_else(|| self.listener.accept(wait)) else { return 0 };
-        self.host = Some(Host { port, has_spoken: false, skips_frame: false });
+        // A terminal that is dropped is open still, and keeps nobody out.
+        let first_frame = self.listener.is_socket().then(FrameReader::new);
+        self.host =
+            Some(Host { port, since: Instant::now(), first_frame, has_spoken: false, skips_frame: false });
         *byte = FRAME_END;
         1
+    }
+}
+
+impl Host {
+    /// Whether it has sent no whole frame yet, with what it sends now.
+    fn is_none_yet(&mut self, mut bytes: &[u8]) -> bool {
+        while let Some(reader) = self.first_frame.as_mut().filter(|_| !bytes.is_empty()) {
+            let (taken, frame) = reader.read(bytes);
+            bytes = &bytes[taken..];
+            if matches!(frame, Some(Ok(_))) {
+                self.first_frame = None;
+            }
+        }
+        self.first_frame.is_some()
     }
 }
 
@@ -90,6 +117,12 @@ impl Port for HostPort {
         if count > 0 && !host.has_spoken {
             host.has_spoken = true;
             host.skips_frame = self.in_frame;
+        }
+        if host.is_none_yet(&buffer[..count]) && host.since.elapsed() > FIRST_FRAME {
+            let seconds = FIRST_FRAME.as_secs();
+            (self.say)(format_args!("photoncard: who has sent nothing of a host for {seconds} s is dropped"));
+            self.host = None;
+            return Ok(0);
         }
         self.look_for_others(count == 0);
         Ok(count)

@@ -149,6 +149,17 @@ impl Listener {
         }
     }
 
+    /// Whether hosts come on connections of their own.
+    pub(super) fn is_socket(&self) -> bool {
+        match &self.kind {
+            Kind::Tcp(_) => true,
+            #[cfg(unix)]
+            Kind::Unix(..) => true,
+            #[cfg(unix)]
+            Kind::Pty(_) => false,
+        }
+    }
+
     /// The next host, if one comes within `wait`. One that is gone again, or that the system has no room for, is none.
     pub(super) fn accept(&mut self, wait: Duration) -> Option<Box<dyn Port + Send>> {
         match &mut self.kind {

@@ -1,19 +1,18 @@
-//! The cards of a render: each has a thread of the host that moves bytes between its port and its session.
+//! The cards of a render: reached, greeted, and put to work together.
 
-use std::sync::atomic::{AtomicBool, AtomicU16, AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use photoncard_firmware::sampler::hash;
-use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::link::{Port, PortError};
 use photoncard_shared::message::MemoryUse;
 
 use super::address::{CardAddress, MAX_CHIPS};
+use super::card_thread::{self, CardOutcome, Shared};
 use super::open_card::OpenCard;
-use super::{Observer, Phase, RenderError, RenderSettings, Unobserved};
+use super::{Observer, RenderError, RenderSettings, Unobserved};
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{ChipKind, MemoryModel};
@@ -67,9 +66,9 @@ pub(super) struct Cards {
     start: Instant,
 }
 
-struct Connected {
-    card: OpenCard,
-    session: Session<'static>,
+pub(super) struct Connected {
+    pub(super) card: OpenCard,
+    pub(super) session: Session<'static>,
     budget: Budget,
 }
 
@@ -89,7 +88,7 @@ pub struct CardInfo {
 /// # Errors
 /// If it cannot be started or reached, or does not answer as it should.
 pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
-    let nothing = Mutex::new(Picture::empty()?);
+    let nothing = Picture::empty()?;
     let card = OpenCard::open(0, address, None, None)?;
     let connected = greet(card, &nothing, Instant::now(), &Unobserved)?;
     let Connected { session, budget, .. } = connected;
@@ -101,7 +100,7 @@ pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
 /// # Errors
 /// If it cannot be started or reached, or does not answer as it should.
 pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, RenderError> {
-    let nothing = Mutex::new(Picture::empty()?);
+    let nothing = Picture::empty()?;
     let mut card = OpenCard::open(0, address, None, None)?;
     let mut answers = Vec::with_capacity(count);
     for _ in 0..count {
@@ -124,28 +123,8 @@ pub(super) struct Outcome {
     pub(super) render_seconds: f64,
 }
 
-/// What the threads of all cards share.
-struct Shared<'a> {
-    picture: &'a Mutex<Picture>,
-    failed: AtomicBool,
-    /// Cards that are not lost.
-    alive: AtomicUsize,
-    observer: &'a dyn Observer,
-    start: Instant,
-    image_bytes: u64,
-}
-
-/// What came of one card.
-#[derive(Default)]
-struct CardOutcome {
-    counters: Counters,
-    bytes: LinkBytes,
-    traffic: Option<MemoryTraffic>,
-    loaded: Duration,
-}
-
 /// How long a port may wait for a byte.
-const WAIT: Duration = Duration::from_millis(20);
+pub(super) const WAIT: Duration = Duration::from_millis(20);
 
 impl Cards {
     /// Starts all cards and says hello to each. Their memory is modelled if the settings say so, that of the
@@ -153,10 +132,10 @@ impl Cards {
     pub(super) fn connect(
         settings: &RenderSettings,
         mut trace: Option<TraceFile>,
-        picture: &Mutex<Picture>,
         observer: &dyn Observer,
     ) -> Result<Self, RenderError> {
         let start = Instant::now();
+        let nothing = Picture::empty()?;
         let RenderSettings { cards: addresses, faults, .. } = settings;
         let caches = settings.modelled_caches();
         check_chips(addresses.iter().map(CardAddress::emulated_chips).sum())?;
@@ -167,7 +146,7 @@ impl Cards {
             .enumerate()
             .map(|(index, address)| {
                 let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
-                greet(OpenCard::open(index, address, model, *faults)?, picture, start, observer)
+                greet(OpenCard::open(index, address, model, *faults)?, &nothing, start, observer)
             })
             .collect();
         Ok(Self { cards: cards?, start })
@@ -182,23 +161,16 @@ impl Cards {
     pub(super) fn run(
         self,
         job: Job,
-        picture: &Mutex<Picture>,
+        picture: &Picture,
         observer: &dyn Observer,
     ) -> Result<Outcome, RenderError> {
         let begun = self.start.elapsed();
-        let shared = Shared {
-            picture,
-            failed: AtomicBool::new(false),
-            alive: AtomicUsize::new(self.cards.len()),
-            observer,
-            start: self.start,
-            image_bytes: (job.image.len() * LINE_BYTES) as u64,
-        };
         let cards = self.cards.len();
+        let shared = Shared::new(picture, observer, self.start, cards);
         let results: Vec<Result<CardOutcome, RenderError>> = std::thread::scope(|scope| {
             let shared = &shared;
             let threads: Vec<_> = (self.cards.into_iter())
-                .map(|card| scope.spawn(move || render_on(card, job, shared)))
+                .map(|card| scope.spawn(move || card_thread::render_on(card, job, shared)))
                 .collect();
             // A panic of a host thread is a panic of the host.
             threads
@@ -232,48 +204,32 @@ impl Cards {
     }
 }
 
-impl CardOutcome {
-    fn add(&mut self, other: &Self) {
-        self.counters.add(&other.counters);
-        self.bytes.add(&other.bytes);
-        if let Some(traffic) = &other.traffic {
-            self.traffic.get_or_insert(MemoryTraffic::ZERO).add(traffic);
-        }
-        self.loaded = self.loaded.max(other.loaded);
-    }
-}
-
-/// The picture; a thread that panicked holding it has left whole pixels.
-pub(super) fn lock(picture: &Mutex<Picture>) -> MutexGuard<'_, Picture> {
-    picture.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// Moves bytes once in each direction, and waits a little if there are none.
-fn exchange(
+pub(super) fn exchange(
     session: &mut Session,
     port: &mut OpenCard,
-    picture: &Mutex<Picture>,
+    picture: &Picture,
     start: Instant,
 ) -> Result<(), SessionError> {
-    session.prepare(&mut lock(picture));
+    session.prepare(picture);
     let sent = match session.outgoing() {
         [] => 0,
         outgoing => port.write(outgoing, WAIT).map_err(SessionError::Port)?,
     };
     session.sent(sent, start.elapsed());
     let mut buffer = [0; 8192];
-    let wait = if session.has_more_to_send() { Duration::ZERO } else { WAIT };
+    let wait = if session.has_more_to_send() || session.is_idle() { Duration::ZERO } else { WAIT };
     match port.read(&mut buffer, wait).map_err(SessionError::Port)? {
         0 => session.acknowledge(),
-        received => session.receive(&buffer[..received], &mut lock(picture), start.elapsed())?,
+        received => session.receive(&buffer[..received], picture, start.elapsed())?,
     }
-    session.tick(start.elapsed())
+    session.tick(picture, start.elapsed())
 }
 
 /// Says hello and waits for the answer.
 fn greet(
     mut card: OpenCard,
-    picture: &Mutex<Picture>,
+    picture: &Picture,
     start: Instant,
     observer: &dyn Observer,
 ) -> Result<Connected, RenderError> {
@@ -297,106 +253,4 @@ fn session_number() -> u16 {
     static COUNT: AtomicU16 = AtomicU16::new(0);
     let time = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.subsec_nanos());
     hash(time ^ std::process::id()) as u16 ^ COUNT.fetch_add(1, Ordering::Relaxed)
-}
-
-impl Shared<'_> {
-    /// Whether there is nothing left to do.
-    ///
-    /// # Errors
-    /// If the observer or the failure of a card has stopped the render.
-    fn is_complete(&self) -> Result<bool, RenderError> {
-        if self.failed.load(Ordering::Relaxed) || self.observer.is_stopped() {
-            return Err(RenderError::Stopped);
-        }
-        let mut picture = lock(self.picture);
-        if let Some(partial) = &mut picture.partial {
-            partial.check().inspect_err(|_| self.failed.store(true, Ordering::Relaxed))?;
-        }
-        Ok(picture.scheduler.is_complete())
-    }
-
-    /// A card is lost; the others go on with its tiles.
-    ///
-    /// # Errors
-    /// If it was the last, or what it answers is wrong.
-    fn lose(&self, card: &OpenCard, error: SessionError) -> Result<(), RenderError> {
-        let may_go_on = matches!(error, SessionError::Silent(_) | SessionError::Port(_));
-        let was_last = self.alive.fetch_sub(1, Ordering::Relaxed) <= 1;
-        if was_last || !may_go_on {
-            self.failed.store(true, Ordering::Relaxed);
-            return Err(RenderError::Card { card: card.name(), source: error });
-        }
-        self.observer.lost(&card.name(), &error);
-        Ok(())
-    }
-}
-
-/// Loads the image into a card and renders tiles on it until none is left. A card that is lost is tried again as long as
-/// there are others.
-fn render_on(connected: Connected, job: Job, shared: &Shared) -> Result<CardOutcome, RenderError> {
-    let Connected { mut card, mut session, .. } = connected;
-    session.start(job, shared.start.elapsed());
-    let mut outcome = CardOutcome::default();
-    let mut is_lost = false;
-    while !shared.is_complete()? && !card.trace_has_failed() {
-        let result = exchange(&mut session, &mut card, shared.picture, shared.start);
-        match result {
-            Ok(()) if is_lost && session.is_loaded() => {
-                is_lost = false;
-                shared.alive.fetch_add(1, Ordering::Relaxed);
-            }
-            Ok(()) => {}
-            Err(error) => {
-                session.reset(&mut lock(shared.picture), shared.start.elapsed());
-                let is_closed = matches!(error, SessionError::Port(_));
-                if !is_lost {
-                    shared.lose(&card, error)?;
-                    is_lost = true;
-                }
-                if is_closed && !reopen(&mut card, shared)? {
-                    break;
-                }
-            }
-        }
-        tell_progress(&session, &mut outcome, shared);
-    }
-    outcome.counters = *session.counters();
-    outcome.bytes = session.link_bytes();
-    if let Some(record) = card.finish() {
-        outcome.traffic = Some(record.traffic);
-        record.trace.map_or(Ok(()), TraceFile::finish)?;
-    }
-    Ok(outcome)
-}
-
-/// How long a lost card is left alone.
-const RETRY: Duration = Duration::from_millis(500);
-
-/// Tries to reach a card again until it is there. Returns whether there is any sense in that.
-fn reopen(card: &mut OpenCard, shared: &Shared) -> Result<bool, RenderError> {
-    loop {
-        if shared.is_complete()? {
-            return Ok(true);
-        }
-        // Before the first try as well: what closes each link at once is not to be asked without a pause.
-        std::thread::sleep(RETRY);
-        match card.reopen() {
-            None => return Ok(false),
-            Some(true) => return Ok(true),
-            Some(false) => {}
-        }
-    }
-}
-
-fn tell_progress(session: &Session, outcome: &mut CardOutcome, shared: &Shared) {
-    if session.is_loaded() {
-        if outcome.loaded.is_zero() {
-            outcome.loaded = shared.start.elapsed();
-        }
-        let (done, total) = lock(shared.picture).scheduler.progress();
-        shared.observer.progress(Phase::Tiles, done as u64, total as u64);
-    } else if outcome.loaded.is_zero() {
-        let loaded = session.loaded_lines() as u64 * LINE_BYTES as u64;
-        shared.observer.progress(Phase::Load, loaded, shared.image_bytes);
-    }
 }

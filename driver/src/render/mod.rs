@@ -1,10 +1,12 @@
 //! A render, from a loaded scene to a complete film.
 
 mod address;
+mod card_thread;
 mod cards;
 mod error;
 mod memory;
 mod open_card;
+mod reopening;
 mod settings;
 mod statistics;
 
@@ -18,7 +20,6 @@ pub use photoncard_shared::message::Sampling;
 pub use settings::{LEAST_IRRADIANCE_ERROR, RenderSettings};
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use photoncard_shared::budget::{Budget, REFERENCE};
@@ -61,7 +62,7 @@ pub trait Observer: Sync {
     /// Tells that so many of all tiles were rendered before.
     fn resumed(&self, _done: usize, _total: usize) {}
 
-    /// Tells that a card was lost; the others go on with its tiles.
+    /// Tells that a card was lost, or is used no more; the others go on with its tiles.
     fn lost(&self, _card: &str, _error: &SessionError) {}
 }
 
@@ -82,6 +83,8 @@ pub struct Rendering {
     pub film: Film,
     /// What it took.
     pub statistics: Statistics,
+    /// Where finished tiles are kept: to be removed when the picture is written.
+    pub partial: Option<PartialRender>,
 }
 
 /// Renders a scene.
@@ -100,16 +103,14 @@ pub fn render(
     if settings.order == GatherOrder::Hilbert {
         return render_whole_frame(scene, settings, camera, observer);
     }
-    let picture = Mutex::new(Picture::empty()?);
     let trace = settings.trace.as_deref().map(TraceFile::create).transpose()?;
-    let cards = Cards::connect(settings, trace, &picture, observer)?;
+    let cards = Cards::connect(settings, trace, observer)?;
     for budget in cards.budgets() {
         settings.check(&budget)?;
     }
     // Not before the settings are known to be possible: a film may be large.
     let mut film = Film::new(settings.width, settings.height, settings.window())?;
-    let begin = |partial| PartialRender::begin(partial, settings.identity(scene), &mut film);
-    let partial = settings.partial.as_ref().map(begin).transpose()?;
+    let partial = begin_partial(scene, settings, &mut film)?;
     let mut all = tiles(settings.window(), settings.tile, settings.order);
     let count = all.len();
     all.retain(|tile| !film.has(tile));
@@ -119,7 +120,7 @@ pub fn render(
     let mut times = Times::default();
     let prepared = prepare(scene, settings, cards.budgets(), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance);
-    *cards::lock(&picture) = Picture { scheduler: Scheduler::new(all), film, partial };
+    let picture = Picture::new(Scheduler::new(all), film, partial);
     let job = Job {
         image: prepared.image.lines(),
         checksum: image_checksum(prepared.image.lines()),
@@ -130,8 +131,8 @@ pub fn render(
     times.render = outcome.render_seconds;
     times.total = start.elapsed().as_secs_f64();
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
-    let Picture { film, .. } = picture.into_inner().unwrap_or_else(PoisonError::into_inner);
-    Ok(Rendering { film, statistics })
+    let (film, partial) = picture.into_parts();
+    Ok(Rendering { film, statistics, partial })
 }
 
 /// Renders with all gathers of the frame along one curve: the chips are emulated, and leave the gathers to the host.
@@ -142,9 +143,11 @@ fn render_whole_frame(
     observer: &dyn Observer,
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
+    settings.check_resume()?;
     let chips = cards::reference_chips(&settings.cards)?;
     settings.check(&REFERENCE)?;
     let mut film = Film::new(settings.width, settings.height, settings.window())?;
+    let partial = begin_partial(scene, settings, &mut film)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, std::iter::once(REFERENCE), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance);
@@ -162,7 +165,17 @@ fn render_whole_frame(
     let traffic = caches.map(|_| traffic);
     let outcome = Outcome { counters, traffic, cards: chips, ..Outcome::default() };
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
-    Ok(Rendering { film, statistics })
+    Ok(Rendering { film, statistics, partial })
+}
+
+/// Begins to keep finished tiles, and takes over those of an earlier render, if the settings say so.
+fn begin_partial(
+    scene: &Scene,
+    settings: &RenderSettings,
+    film: &mut Film,
+) -> Result<Option<PartialRender>, RenderError> {
+    let begin = |partial| PartialRender::begin(partial, settings.identity(scene), film);
+    Ok(settings.partial.as_ref().map(begin).transpose()?)
 }
 
 fn prepare(
@@ -235,6 +248,8 @@ fn statistics(
             wire_bytes: outcome.bytes.wire,
             retransmitted_frames: outcome.bytes.line.repeated,
             damaged_frames: outcome.bytes.line.damaged,
+            duplicate_frames: outcome.bytes.line.duplicates,
+            probes: outcome.bytes.line.probes,
             resets: outcome.bytes.resets,
         },
         memory: settings.modelled_caches().zip(outcome.traffic.as_ref()).map(MemoryStatistics::new),

@@ -6,6 +6,8 @@ use photoncard_shared::link::{Port, PortError};
 
 use super::RenderError;
 use super::address::CardAddress;
+use super::card_thread::Shared;
+use super::reopening::reopen;
 use crate::emulator::{ChipKind, EmulatedCard, MemoryModel, MemoryRecord};
 use crate::link::{FaultInjector, LineFaults, LinkError, connect_tcp, connect_unix, open_serial};
 
@@ -49,14 +51,15 @@ impl OpenCard {
         Ok(Self { index, place, injector })
     }
 
-    /// Tries to reach a card again whose link was closed. Returns whether it is there; `None` of one that cannot come back.
-    pub(super) fn reopen(&mut self) -> Option<bool> {
+    /// Tries to reach a card again whose link was closed, until it is there or nothing is left to do. Returns whether there is
+    /// any sense in that: an emulated card does not come back.
+    pub(super) fn reopen(&mut self, shared: &Shared) -> Result<bool, RenderError> {
         match &mut self.place {
-            Place::Emulated(_) => None,
+            Place::Emulated(_) => Ok(false),
             Place::Remote { address, port } => {
                 drop(port.take());
-                *port = reach(address).ok()?.ok();
-                Some(port.is_some())
+                *port = reopen(address, shared)?;
+                Ok(true)
             }
         }
     }
@@ -114,10 +117,10 @@ impl Port for OpenCard {
     }
 }
 
-type Reached = Result<Box<dyn Port + Send>, LinkError>;
+pub(super) type Reached = Result<Box<dyn Port + Send>, LinkError>;
 
 /// Opens the link to a card that is not emulated in this process; of one that is, its kind.
-fn reach(address: &CardAddress) -> Result<Reached, ChipKind> {
+pub(super) fn reach(address: &CardAddress) -> Result<Reached, ChipKind> {
     fn boxed(port: Result<impl Port + Send + 'static, LinkError>) -> Reached {
         port.map(|port| Box::new(port) as Box<dyn Port + Send>)
     }

@@ -235,6 +235,19 @@ impl RenderSettings {
         }
     }
 
+    /// Checks that there are tiles to go on with: gathers along a curve through the frame complete all tiles at once.
+    pub(super) fn check_resume(&self) -> Result<(), RenderError> {
+        if !self.partial.as_ref().is_some_and(|partial| partial.resume) {
+            return Ok(());
+        }
+        Err(RenderError::Setting {
+            option: "--resume",
+            value: "with --order hilbert".into(),
+            reason: "that order completes all tiles at the end, and keeps none".into(),
+            remedy: "use another --order, the picture is the same; or leave --resume out".into(),
+        })
+    }
+
     /// What the photon map is to be.
     pub fn photon_settings(&self) -> PhotonSettings {
         PhotonSettings {

@@ -127,6 +127,10 @@ pub struct LinkStatistics {
     pub retransmitted_frames: u64,
     /// Frames of cards that came damaged.
     pub damaged_frames: u64,
+    /// Frames of cards that came again.
+    pub duplicate_frames: u64,
+    /// Times that a silent card was asked what has come.
+    pub probes: u64,
     /// Times that a card was greeted again.
     pub resets: u64,
 }

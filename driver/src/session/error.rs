@@ -47,6 +47,16 @@ pub enum SessionError {
     #[error("the card has not answered for {} s", .0.as_secs())]
     #[diagnostic(help("check that the card is powered and its firmware runs"))]
     Silent(Duration),
+    /// It answers, and comes no further.
+    #[error("the card answers, but has come no further for {} s", .0.as_secs())]
+    #[diagnostic(help("this is a fault of the card's firmware: please report it with the command used"))]
+    Standstill(Duration),
+    /// It was greeted again and again.
+    #[error("the card was greeted {0} times without completing a tile")]
+    #[diagnostic(help(
+        "it may crash at a tile or lack power: watch the card's own messages; then try another card, or --crop"
+    ))]
+    Resets(u32),
     /// The link failed.
     #[error("the link to the card is closed ({0:?})")]
     Port(PortError),
@@ -65,4 +75,11 @@ pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
         return Err(SessionError::Layout { card: card.layout, host: LAYOUT_VERSION });
     }
     Ok(())
+}
+
+impl SessionError {
+    /// Whether the card may be used again once it answers: nothing that it has said is wrong.
+    pub fn may_pass(&self) -> bool {
+        matches!(self, Self::Silent(_) | Self::Standstill(_) | Self::Port(_))
+    }
 }

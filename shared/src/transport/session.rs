@@ -128,6 +128,11 @@ impl Session {
         self.next.wrapping_sub(self.oldest)
     }
 
+    /// Messages that were taken at either end.
+    pub(super) fn passed(&self) -> u16 {
+        self.oldest.wrapping_add(self.expected)
+    }
+
     pub(super) fn send(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {
         let opens = self.end == End::Host && !core::mem::replace(&mut self.has_opened, true);
         let message = slot(&mut self.outgoing, self.next);

@@ -15,7 +15,7 @@ pub(super) struct Messages {
 }
 
 /// A frame that any chip renders.
-fn frame() -> FrameParameters {
+pub(super) fn frame() -> FrameParameters {
     let camera = Camera {
         origin: [0.0, 1.0, 5.0],
         forward: [0.0, 0.0, -1.0],

@@ -10,6 +10,7 @@ mod mutation;
 mod picture;
 mod random;
 mod run;
+mod session;
 mod transport;
 
 use std::sync::Arc;
@@ -36,13 +37,14 @@ pub trait Target: Send + Sync {
 }
 
 /// The names of all targets.
-pub const NAMES: [&str; 5] = ["frames", "messages", "image", "gltf", "exr"];
+pub const NAMES: [&str; 6] = ["frames", "messages", "session", "image", "gltf", "exr"];
 
 /// The target of a name.
 pub fn target(name: &str) -> Option<Arc<dyn Target>> {
     match name {
         "frames" => Some(Arc::new(transport::Frames::new())),
         "messages" => Some(Arc::new(messages::Messages::new())),
+        "session" => Some(Arc::new(session::Sessions::new())),
         "image" => Some(Arc::new(image::Image::new())),
         "gltf" => Some(Arc::new(gltf::Scenes::new())),
         "exr" => Some(Arc::new(picture::Pictures::new())),

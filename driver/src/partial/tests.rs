@@ -1,0 +1,93 @@
+use serde_json::json;
+
+use super::*;
+use crate::film::Window;
+
+const TILES: u32 = 6;
+
+fn film() -> Film {
+    Film::new(4 * TILES, 3, Window::full(4 * TILES, 3)).unwrap()
+}
+
+fn tile(id: u32) -> Tile {
+    Tile { id, x: 4 * id, y: 0, width: 4, height: 3 }
+}
+
+/// The settings of a file in a folder.
+fn partial(folder: &tempfile::TempDir, resume: bool) -> PartialSettings {
+    PartialSettings { path: folder.path().join("partial"), resume }
+}
+
+/// Writes a file of all tiles, and returns its bytes.
+fn written(folder: &tempfile::TempDir) -> Vec<u8> {
+    let mut film = film();
+    for (number, (x, y)) in places(&Tile { id: 0, x: 0, y: 0, width: 4 * TILES, height: 3 }).enumerate() {
+        film.write(x, y, Pixel { depth: number as f32, ..Pixel::default() }).unwrap();
+    }
+    let settings = partial(folder, false);
+    let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
+    (0..TILES).for_each(|id| partial.keep(&PartialRender::record(&tile(id), &film)));
+    partial.check().unwrap();
+    fs::read(settings.path).unwrap()
+}
+
+/// The tiles that a render that is gone on with takes over.
+fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
+    let settings = partial(folder, true);
+    fs::write(&settings.path, bytes).unwrap();
+    let mut film = film();
+    let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
+    let taken: Vec<u32> = (0..TILES).filter(|&id| film.has(&tile(id))).collect();
+    // What is missing is kept behind the rest.
+    for id in (0..TILES).filter(|id| !taken.contains(id)) {
+        partial.keep(&PartialRender::record(&tile(id), &film));
+    }
+    drop(partial);
+    let mut again = self::film();
+    PartialRender::begin(&settings, json!({ "seed": 1 }), &mut again).unwrap();
+    assert!((0..TILES).all(|id| again.has(&tile(id))));
+    taken
+}
+
+#[test]
+fn damage_loses_the_tile_that_it_hits_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = written(&folder);
+    let record = PLACE_BYTES + 12 * PIXEL_BYTES + CHECKSUM_BYTES;
+    let start = bytes.len() - TILES as usize * record;
+    assert_eq!(taken_over(&folder, &bytes), [0, 1, 2, 3, 4, 5]);
+    for place in [0, 3, 8, 12, PLACE_BYTES, 200, record - 1] {
+        let mut damaged = bytes.clone();
+        damaged[start + record + place] ^= 0x81;
+        assert_eq!(taken_over(&folder, &damaged), [0, 2, 3, 4, 5], "{place}");
+    }
+    let mut shorter = bytes.clone();
+    shorter.drain(start + 2 * record + 30..start + 2 * record + 50);
+    assert_eq!(taken_over(&folder, &shorter), [0, 1, 3, 4, 5]);
+    assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
+}
+
+#[test]
+fn a_file_has_one_render() {
+    let folder = tempfile::tempdir().unwrap();
+    let [mut one, mut two, mut three] = [film(), film(), film()];
+    let begin = |resume, film: &mut Film| PartialRender::begin(&partial(&folder, resume), json!({}), film);
+    // Neither has made the file yet.
+    let (first, second) = (begin(false, &mut one).unwrap(), begin(false, &mut two).unwrap());
+    for partial in [&first, &second] {
+        partial.keep(&PartialRender::record(&tile(0), &one));
+    }
+    first.check().unwrap();
+    assert!(matches!(second.check(), Err(PartialError::Busy { .. })));
+    for resume in [false, true] {
+        assert!(matches!(begin(resume, &mut three), Err(PartialError::Busy { .. })));
+    }
+    first.remove().unwrap();
+    begin(false, &mut three).unwrap();
+}
+
+#[test]
+fn names_of_settings_are_fit_for_a_terminal() {
+    let said = differences(&json!({ "\u{1b}[2J\u{9b}": "\u{9b}x" }), &json!({}));
+    assert_eq!(said, ["\\u{1b}[2J\\u{9b} was \"\\u{9b}x\" and is nothing"]);
+}

@@ -1,0 +1,66 @@
+//! What sessions work on together.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use photoncard_shared::message::Tile;
+
+use crate::film::{Film, FilmError, Window};
+use crate::partial::{PartialError, PartialRender};
+use crate::scheduler::Scheduler;
+
+/// What sessions work on together. Each part has a lock of its own, which is held while that part is used: no card waits
+/// for another's lines to be encoded, nor for a file.
+pub struct Picture {
+    scheduler: Scheduler,
+    film: Mutex<Film>,
+    partial: Option<PartialRender>,
+}
+
+impl Picture {
+    /// The tiles that are left, the film they go to, and where finished ones are kept, if they are.
+    pub fn new(scheduler: Scheduler, film: Film, partial: Option<PartialRender>) -> Self {
+        Self { scheduler, film: Mutex::new(film), partial }
+    }
+
+    /// A picture of one pixel and no tile, for a session that has nothing to render yet.
+    ///
+    /// # Errors
+    /// If there is no memory for a pixel.
+    pub fn empty() -> Result<Self, FilmError> {
+        let film = Film::new(1, 1, Window::full(1, 1))?;
+        Ok(Self::new(Scheduler::new(Vec::new()), film, None))
+    }
+
+    /// Which tiles are left.
+    pub fn scheduler(&self) -> &Scheduler {
+        &self.scheduler
+    }
+
+    /// Where pixels go.
+    pub fn film(&self) -> MutexGuard<'_, Film> {
+        // A thread that panicked holding the lock has left whole pixels.
+        self.film.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A tile's pixels are all in the film.
+    pub(super) fn complete(&self, tile: &Tile) {
+        if let Some(partial) = &self.partial {
+            let record = PartialRender::record(tile, &self.film());
+            partial.keep(&record);
+        }
+        self.scheduler.complete();
+    }
+
+    /// Tells what went wrong while finished tiles were kept.
+    ///
+    /// # Errors
+    /// If anything did.
+    pub(crate) fn check_partial(&self) -> Result<(), PartialError> {
+        self.partial.as_ref().map_or(Ok(()), PartialRender::check)
+    }
+
+    /// The film, and where finished tiles are kept.
+    pub(crate) fn into_parts(self) -> (Film, Option<PartialRender>) {
+        (self.film.into_inner().unwrap_or_else(PoisonError::into_inner), self.partial)
+    }
+}

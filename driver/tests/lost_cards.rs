@@ -1,0 +1,119 @@
+//! What a render does with a card that is lost, while another goes on.
+#![cfg(unix)]
+
+mod scripted_card;
+
+use std::io::{Read, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use photoncard_driver::render::{Observer, Phase, RenderError, RenderSettings, Rendering, render};
+use photoncard_driver::scene::gltf;
+use photoncard_driver::session::SessionError;
+use photoncard_shared::message::{Command, PROTOCOL_VERSION, Reply};
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketType, bind, listen, socket};
+use scripted_card::{Answer, Card, sound};
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Notes which cards are lost, and stops when as many are as it says, or after a minute.
+struct Losses {
+    told: Mutex<Vec<String>>,
+    most: usize,
+    begin: Instant,
+}
+
+impl Losses {
+    fn new(most: usize) -> Self {
+        Self { told: Mutex::default(), most, begin: Instant::now() }
+    }
+}
+
+impl Observer for Losses {
+    fn progress(&self, _: Phase, _: u64, _: u64) {}
+
+    fn is_stopped(&self) -> bool {
+        self.told.lock().unwrap().len() >= self.most || self.begin.elapsed() > PATIENCE
+    }
+
+    fn lost(&self, _: &str, error: &SessionError) {
+        self.told.lock().unwrap().push(error.to_string());
+    }
+}
+
+/// Renders on an emulated card and on one at a Unix socket.
+fn render_with(path: &Path, side: u32, losses: &Losses) -> Result<Rendering, RenderError> {
+    let scene = format!("{}/../scenes/cornell.gltf", env!("CARGO_MANIFEST_DIR"));
+    let cards = [format!("unix:{}", path.display()), "emulated:1".into()];
+    let settings = RenderSettings {
+        width: side,
+        height: side,
+        photons: 1000,
+        gather_rays: 10,
+        cards: cards.iter().map(|card| card.parse().unwrap()).collect(),
+        ..RenderSettings::default()
+    };
+    render(&gltf::load(scene.as_ref()).unwrap(), &settings, losses)
+}
+
+/// Answers a host until it has been given a frame, or leaves.
+fn serve(mut stream: UnixStream, answer: Answer) {
+    let mut card = Card::new(answer);
+    let mut buffer = [0; 4096];
+    while !card.has_frame {
+        match stream.read(&mut buffer) {
+            Ok(count) if count > 0 => drop(stream.write_all(&card.step(&buffer[..count]))),
+            _ => return,
+        }
+    }
+}
+
+#[test]
+fn a_card_that_comes_back_as_another_is_told_of_and_given_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("card");
+    let listener = UnixListener::bind(&path).unwrap();
+    std::thread::spawn(move || {
+        serve(listener.accept().unwrap().0, sound);
+        let other = |command: &Command| match sound(command) {
+            Some(Reply::Hello { layout, budget, written_lines, memory_use, build, .. }) => {
+                let protocol = PROTOCOL_VERSION + 1;
+                Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build })
+            }
+            reply => reply,
+        };
+        serve(listener.accept().unwrap().0, other);
+    });
+    let losses = Losses::new(2);
+    // It would take hours.
+    assert!(matches!(render_with(&path, 4096, &losses), Err(RenderError::Stopped)));
+    let told = losses.told.into_inner().unwrap();
+    assert!(told.len() == 2 && told[0].contains("closed") && told[1].contains("speaks protocol"), "{told:?}");
+}
+
+#[test]
+fn a_render_ends_while_a_lost_card_is_tried() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("card");
+    let listener = socket(AddressFamily::UNIX, SocketType::STREAM, None).unwrap();
+    bind(&listener, &SocketAddrUnix::new(&path).unwrap()).unwrap();
+    listen(&listener, 1).unwrap();
+    std::thread::scope(|scope| {
+        let first = scope.spawn(|| {
+            let stream = UnixStream::from(rustix::net::accept(&listener).unwrap());
+            // The queue of hosts is full from now on: who connects waits.
+            for _ in 0..3 {
+                let path = path.clone();
+                std::thread::spawn(move || drop(UnixStream::connect(path)));
+            }
+            serve(stream, sound);
+        });
+        let losses = Losses::new(usize::MAX);
+        let rendering = render_with(&path, 256, &losses);
+        assert!(rendering.is_ok() && losses.begin.elapsed() < PATIENCE / 2, "{:?}", losses.begin.elapsed());
+        assert_eq!(losses.told.lock().unwrap().len(), 1);
+        first.join().unwrap();
+    });
+}

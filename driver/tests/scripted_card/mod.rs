@@ -1,0 +1,64 @@
+//! A card of which a test says what it answers.
+
+use photoncard_shared::budget::MICRO;
+use photoncard_shared::frame::MAX_PAYLOAD;
+use photoncard_shared::image::LAYOUT_VERSION;
+use photoncard_shared::message::{self, Command, PROTOCOL_VERSION, Reply};
+use photoncard_shared::transport::Transport;
+
+/// What a card answers to a command, if anything.
+pub(crate) type Answer = fn(&Command) -> Option<Reply<'static>>;
+
+/// The other end of a session: what it answers is up to a function of the command.
+pub(crate) struct Card {
+    transport: Transport,
+    answer: Answer,
+    /// Whether it was given a frame.
+    pub(crate) has_frame: bool,
+}
+
+impl Card {
+    pub(crate) fn new(answer: Answer) -> Self {
+        Self { transport: Transport::card(), answer, has_frame: false }
+    }
+
+    /// Takes what has come and answers it. Returns what it sends.
+    pub(crate) fn step(&mut self, mut bytes: &[u8]) -> Vec<u8> {
+        while !bytes.is_empty() {
+            let (taken, _) = self.transport.receive(bytes);
+            bytes = &bytes[taken..];
+            while let Some(message) = self.transport.take() {
+                let command = message::decode::<Command>(message).expect("the host sends commands");
+                self.has_frame |= matches!(command, Command::BeginFrame(_));
+                let reply = (self.answer)(&command);
+                if let Some(reply) = reply {
+                    assert!(self.transport.send(|bytes| message::encode(&reply, bytes)));
+                }
+            }
+        }
+        self.transport.acknowledge();
+        let mut sent = Vec::new();
+        while !self.transport.outgoing().is_empty() {
+            sent.extend(self.transport.outgoing());
+            self.transport.sent(MAX_PAYLOAD * 2);
+        }
+        sent
+    }
+}
+
+/// The answers of a card that takes any image and renders no tile.
+pub(crate) fn sound(command: &Command) -> Option<Reply<'static>> {
+    match command {
+        Command::Hello { .. } => Some(Reply::Hello {
+            protocol: PROTOCOL_VERSION,
+            layout: LAYOUT_VERSION,
+            budget: MICRO,
+            written_lines: 0,
+            memory_use: None,
+            build: "a card",
+        }),
+        Command::EndImage => Some(Reply::ImageAccepted),
+        Command::BeginFrame(_) => Some(Reply::FrameAccepted),
+        _ => None,
+    }
+}

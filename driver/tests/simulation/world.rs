@@ -1,0 +1,129 @@
+//! What all runs have in common: a scene, its image, and cards that were just switched on.
+
+use std::ops::Range;
+
+use glam::Vec3;
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::film::Film;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::photon::{MappedImage, map_photons};
+use photoncard_driver::render::RenderSettings;
+use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
+use photoncard_driver::scheduler::{Scheduler, tiles};
+use photoncard_driver::session::{Job, Picture};
+use photoncard_firmware::card::MicroCard;
+use photoncard_firmware::memory::{CardMemory, MemoryPort};
+use photoncard_shared::address::{Line, LineAddress, Structure};
+use photoncard_shared::budget::MICRO;
+use photoncard_shared::checksum::image_checksum;
+use photoncard_shared::message::{Fault, FaultCode, FrameParameters};
+
+/// A corner of floor and wall under a lamp.
+fn scene() -> Scene {
+    let quad = |a: Vec3, u: Vec3, v: Vec3, material| {
+        [[a, a + u, a + u + v], [a, a + u + v, a + v]].map(|vertices| Triangle { vertices, material })
+    };
+    let material = |diffuse: f32, emission: f32| Material {
+        name: "material".into(),
+        diffuse: Vec3::splat(diffuse),
+        specular: Vec3::ZERO,
+        exponent: 0.0,
+        emission: Vec3::splat(emission),
+        double_sided: true,
+    };
+    let quads = [
+        quad(Vec3::new(-1.0, -1.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0, 0),
+        quad(Vec3::new(-1.0, -1.0, -1.0), Vec3::X * 2.0, Vec3::Y * 2.0, 0),
+        quad(Vec3::new(-0.3, 0.9, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6, 1),
+    ];
+    let camera = Camera {
+        name: "camera".into(),
+        origin: Vec3::new(0.0, 0.0, 2.0),
+        right: Vec3::X,
+        up: Vec3::Y,
+        forward: Vec3::NEG_Z,
+        vertical_fov: 1.0,
+        aspect: None,
+    };
+    Scene {
+        triangles: quads.concat(),
+        materials: vec![material(0.7, 0.0), material(0.0, 5.0)],
+        cameras: vec![camera],
+        ..Scene::default()
+    }
+}
+
+fn settings() -> RenderSettings {
+    RenderSettings {
+        width: 12,
+        height: 10,
+        tile: 3,
+        photons: 60,
+        neighbors: 8,
+        gather_rays: 2,
+        shadow_rays: 1,
+        ..RenderSettings::default()
+    }
+}
+
+/// Card memory of its own.
+pub(crate) struct Memory {
+    lines: Vec<Line>,
+}
+
+impl MemoryPort for Memory {
+    fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
+        let fault = Fault { code: FaultCode::LineRange, detail: address.0 };
+        self.lines.get(address.0 as usize).ok_or(fault)
+    }
+}
+
+impl CardMemory for Memory {
+    fn lines(&self) -> u32 {
+        self.lines.len() as u32
+    }
+
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        self.lines.get(first.0 as usize..first.0 as usize + count as usize)
+    }
+
+    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
+        self.lines.get_mut(first.0 as usize..first.0 as usize + count as usize)
+    }
+}
+
+/// What the runs have in common.
+pub(crate) struct Fixture {
+    settings: RenderSettings,
+    pub(crate) mapped: MappedImage,
+    checksum: u64,
+    frame: FrameParameters,
+}
+
+impl Fixture {
+    pub(crate) fn new() -> Self {
+        let (scene, settings) = (scene(), settings());
+        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+        let mapped = map_photons(packed, &settings.photon_settings(), &|_| true).unwrap();
+        let frame = settings.frame(&scene.cameras[0], mapped.max_distance);
+        let checksum = image_checksum(mapped.image.lines());
+        Self { settings, mapped, checksum, frame }
+    }
+
+    pub(crate) fn job(&self) -> Job<'_> {
+        Job { image: self.mapped.image.lines(), checksum: self.checksum, frame: &self.frame }
+    }
+
+    /// A card that was just switched on.
+    pub(crate) fn card(&self) -> Box<MicroCard<Memory>> {
+        let lines = self.mapped.image.lines().len();
+        Box::new(MicroCard::new(MICRO, Memory { lines: vec![Line::ZERO; lines] }))
+    }
+
+    pub(crate) fn picture(&self) -> Picture {
+        let RenderSettings { width, height, tile, order, .. } = self.settings;
+        let window = self.settings.window();
+        let film = Film::new(width, height, window).unwrap();
+        Picture::new(Scheduler::new(tiles(window, tile, order)), film, None)
+    }
+}
