@@ -6,6 +6,7 @@
 
 mod clock;
 mod error;
+mod failures;
 mod link_bytes;
 mod load;
 mod picture;
@@ -27,7 +28,8 @@ use photoncard_shared::message::{self, Command, FrameParameters, MemoryUse, PROT
 use photoncard_shared::transport::{Event, Transport};
 
 use self::clock::Clock;
-use self::error::check_versions;
+use self::error::{check_budget, check_versions};
+use self::failures::Failures;
 use self::load::Load;
 use self::tiles::TilesInFlight;
 
@@ -62,9 +64,6 @@ enum State {
 /// Tiles that a card may hold at the most, whatever it says: those of a card that holds many come late if it is lost.
 const MOST_CREDITS: u32 = 16;
 
-/// Times that a card may be greeted again without having completed a tile: what it crashes at, it is given again.
-const MOST_RESETS: u32 = 4;
-
 /// The session with one card.
 pub struct Session<'a> {
     state: State,
@@ -82,8 +81,7 @@ pub struct Session<'a> {
     /// The number of the link's present session.
     number: u16,
     clock: Clock,
-    /// Times that the card was heard and then had to be greeted again, since it completed a tile.
-    resets: u32,
+    failures: Failures,
 }
 
 impl<'a> Session<'a> {
@@ -103,7 +101,7 @@ impl<'a> Session<'a> {
             commands: VecDeque::new(),
             number,
             clock: Clock::new(now),
-            resets: 0,
+            failures: Failures::default(),
         };
         session.greet_card();
         session
@@ -231,7 +229,7 @@ impl<'a> Session<'a> {
     /// Takes what came from the card.
     ///
     /// # Errors
-    /// If it is not what a card of this protocol answers, tells of a fault, or the card was reset too often.
+    /// If it is not what a card of this protocol answers, tells of a fault, or the card has failed too often.
     pub fn receive(
         &mut self,
         mut bytes: &[u8],
@@ -275,8 +273,9 @@ impl<'a> Session<'a> {
     /// Asks a card that has been quiet for too long whether it is there. To be called often.
     ///
     /// # Errors
-    /// If the card has been silent, or has come no further, for longer than it may.
+    /// If the card has been silent, or has come no further, for longer than it may, or has failed too often.
     pub fn tick(&mut self, picture: &Picture, now: Duration) -> Result<(), SessionError> {
+        self.clock.look(now);
         if !self.is_waiting() {
             self.clock.rest(now);
             return Ok(());
@@ -289,7 +288,11 @@ impl<'a> Session<'a> {
             self.transport.probe();
         }
         let rays = self.job.map_or(0, |job| self.tiles.most_rays(job.frame));
-        self.clock.check(rays, now)
+        let result = self.clock.check(rays, now);
+        if matches!(result, Err(SessionError::Standstill(_))) {
+            self.failures.stands_still()?;
+        }
+        result
     }
 
     /// Gives back the tiles that the card has not completed: it is lost, or was reset.
@@ -297,20 +300,19 @@ impl<'a> Session<'a> {
         self.tiles.give_back(picture);
     }
 
-    /// Greets the card again and gives back its tiles: it does not know the session, as it was reset, or is silent.
-    ///
-    /// # Errors
-    /// If it was greeted too often since it completed a tile. A card that has not been heard since is only waited for.
-    pub fn reset(&mut self, picture: &Picture, now: Duration) -> Result<(), SessionError> {
+    /// Greets the card again and gives back its tiles: its link was closed, or it is silent.
+    pub fn greet_again(&mut self, picture: &Picture, now: Duration) {
         self.give_back(picture);
-        self.resets += u32::from(self.clock.has_heard());
-        if self.resets > MOST_RESETS {
-            return Err(SessionError::Resets(self.resets));
-        }
         self.bytes.resets += 1;
         self.number = self.number.wrapping_add(1);
         self.clock = Clock::new(now);
         self.greet_card();
+    }
+
+    /// Greets a card again that does not know the session, or answers and leaves its greeting without a reply.
+    fn reset(&mut self, picture: &Picture, now: Duration) -> Result<(), SessionError> {
+        self.failures.is_reset()?;
+        self.greet_again(picture, now);
         Ok(())
     }
 
@@ -348,7 +350,7 @@ impl<'a> Session<'a> {
             (State::Greeting, Reply::Hello { budget, written_lines, memory_use, build, .. }) => {
                 build.clone_into(&mut self.build);
                 self.memory_use = memory_use;
-                self.greet(budget)?;
+                self.greet(budget, written_lines)?;
                 self.load = Load::new(written_lines);
                 if self.job.is_some() {
                     self.begin_load();
@@ -364,6 +366,7 @@ impl<'a> Session<'a> {
             }
             (State::Accepting, Reply::ImageAccepted) => {
                 let Some(job) = self.job else { return Ok(()) };
+                self.failures.is_loaded(job.image.len() as u32);
                 self.send(&Command::BeginFrame(*job.frame));
                 self.state = State::Framing;
                 Ok(())
@@ -380,17 +383,16 @@ impl<'a> Session<'a> {
             (State::Rendering, Reply::TileDone { tile, counters }) => {
                 self.tiles.complete(tile, picture)?;
                 self.counters.add(&counters);
-                self.resets = 0;
+                self.failures.completes_tile();
                 Ok(())
             }
             _ => Err(SessionError::Unexpected("not an answer to what was asked")),
         }
     }
 
-    fn greet(&mut self, budget: Budget) -> Result<(), SessionError> {
-        if budget.tiles == 0 {
-            return Err(SessionError::NoTiles);
-        }
+    fn greet(&mut self, budget: Budget, written_lines: u32) -> Result<(), SessionError> {
+        check_budget(&budget, self.budget.as_ref())?;
+        self.failures.says_hello(written_lines)?;
         self.budget = Some(budget);
         self.state = State::Ready;
         Ok(())

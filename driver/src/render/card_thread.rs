@@ -98,7 +98,7 @@ impl<'a> Shared<'a> {
 }
 
 /// Loads the image into a card and renders tiles on it until none is left. A card that is lost is tried again as long as
-/// there are others; one that answers what is wrong, or is reset again and again, is not.
+/// there are others; one that answers what is wrong, or fails again and again, is not.
 pub(super) fn render_on(connected: Connected, job: Job, shared: &Shared) -> Result<CardOutcome, RenderError> {
     let Connected { mut card, mut session, .. } = connected;
     session.start(job, shared.start.elapsed());
@@ -139,8 +139,8 @@ fn recover(
     is_lost: &mut bool,
     shared: &Shared,
 ) -> Result<bool, RenderError> {
-    session.give_back(shared.picture);
     if !error.may_pass() {
+        session.give_back(shared.picture);
         shared.lose(card, error, *is_lost)?;
         return Ok(false);
     }
@@ -148,10 +148,7 @@ fn recover(
     if !std::mem::replace(is_lost, true) {
         shared.lose(card, error, false)?;
     }
-    if let Err(error) = session.reset(shared.picture, shared.start.elapsed()) {
-        shared.lose(card, error, true)?;
-        return Ok(false);
-    }
+    session.greet_again(shared.picture, shared.start.elapsed());
     if is_closed { card.reopen(shared) } else { Ok(true) }
 }
 

@@ -9,7 +9,8 @@ const SILENCE: Duration = Duration::from_secs(10);
 /// How long it may be silent before it is asked; after each question without an answer twice as long.
 const PATIENCE: Duration = Duration::from_millis(200);
 const MOST_PATIENCE: Duration = Duration::from_secs(1);
-/// How long a card that answers may leave a hello without its reply. A slow serial line takes a second or two.
+/// How long a card that answers may leave a hello without its reply, from its first answer on. A slow serial line takes a
+/// second or two.
 const GREETING: Duration = Duration::from_secs(5);
 /// How long a card that answers may take to come further with all but tiles. The longest is to look through a whole image
 /// that has come, and takes seconds.
@@ -18,9 +19,13 @@ const STANDSTILL: Duration = Duration::from_secs(120);
 /// the slowest chip takes that has been measured.
 const RAY: Duration = Duration::from_millis(20);
 
+/// The most time between two looks at a link of a host that runs. For the rest it is absent: stopped, or without a
+/// processor.
+const MOST_BETWEEN_LOOKS: Duration = Duration::from_secs(1);
+
 /// When a card was heard.
 pub(super) struct Clock {
-    begun: Duration,
+    /// When the first of the session came.
     heard: Option<Duration>,
     /// When silence began that counts.
     since: Duration,
@@ -29,16 +34,18 @@ pub(super) struct Clock {
     /// When there was last a reason to wait for an answer.
     asked: Duration,
     patience: Duration,
+    /// When the host looked last.
+    looked: Duration,
 }
 
 impl Clock {
     pub(super) fn new(now: Duration) -> Self {
-        Self { begun: now, heard: None, since: now, passed: now, asked: now, patience: PATIENCE }
+        Self { heard: None, since: now, passed: now, asked: now, patience: PATIENCE, looked: now }
     }
 
     /// Something of the session came.
     pub(super) fn heard(&mut self, now: Duration) {
-        self.heard = Some(now);
+        self.heard.get_or_insert(now);
         self.since = now;
         self.asked = now;
         self.patience = PATIENCE;
@@ -57,6 +64,16 @@ impl Clock {
     /// Something was sent: its answer takes its time. A line that takes no byte is silent.
     pub(super) fn sent(&mut self, now: Duration) {
         self.asked = now;
+    }
+
+    /// The host looks at the link. What it was absent is not the card's silence.
+    pub(super) fn look(&mut self, now: Duration) {
+        let absent = now.saturating_sub(self.looked).saturating_sub(MOST_BETWEEN_LOOKS);
+        self.looked = now;
+        let times = [&mut self.since, &mut self.passed, &mut self.asked];
+        for time in times.into_iter().chain(&mut self.heard) {
+            *time = (*time + absent).min(now);
+        }
     }
 
     /// Nothing is expected.
@@ -78,7 +95,7 @@ impl Clock {
 
     /// Whether a card that is greeted answers, but not with a hello.
     pub(super) fn is_greeted_in_vain(&self, now: Duration) -> bool {
-        self.has_heard() && now.saturating_sub(self.begun) > GREETING
+        self.heard.is_some_and(|heard| now.saturating_sub(heard) > GREETING)
     }
 
     /// Checks that the silence is not too long, nor the standstill of a card at work on tiles of `rays` rays at the most.

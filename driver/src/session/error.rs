@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use photoncard_shared::budget::Budget;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::link::PortError;
 use photoncard_shared::message::{Fault, PROTOCOL_VERSION, Versions};
@@ -33,6 +34,13 @@ pub enum SessionError {
     #[error("the card says that it has room for no tile command at all")]
     #[diagnostic(help("correct `tiles` in the budget of the card's firmware"))]
     NoTiles,
+    /// It is another card than at first, or has another firmware.
+    #[error("the card has come back with another budget than it had at first")]
+    #[diagnostic(help(
+        "leave a card and its firmware as they are while a picture is rendered; to use it as it is now, begin again with \
+         --resume"
+    ))]
+    OtherBudget,
     /// The card could not do a command.
     #[error("the card answered with fault {:?} ({})", .0.code, .0.detail)]
     #[diagnostic(help(
@@ -49,14 +57,18 @@ pub enum SessionError {
     Silent(Duration),
     /// It answers, and comes no further.
     #[error("the card answers, but has come no further for {} s", .0.as_secs())]
-    #[diagnostic(help("this is a fault of the card's firmware: please report it with the command used"))]
-    Standstill(Duration),
-    /// It was greeted again and again.
-    #[error("the card was greeted {0} times without completing a tile")]
     #[diagnostic(help(
-        "it may crash at a tile or lack power: watch the card's own messages; then try another card, or --crop"
+        "its line may damage nearly all (--stats counts `damaged_frames`): check cable and speed; if it does not, this is a \
+         fault of the card's firmware: please report it with the command used"
     ))]
-    Resets(u32),
+    Standstill(Duration),
+    /// It was reset or came no further, again and again.
+    #[error("the card was reset or came no further {0} times without completing a tile")]
+    #[diagnostic(help(
+        "it may crash at a tile, lack power, or have a line that damages nearly all (--stats counts `damaged_frames`): \
+         watch the card's own messages, check the cable; then try another card, or --crop"
+    ))]
+    Failures(u32),
     /// The link failed.
     #[error("the link to the card is closed ({0:?})")]
     Port(PortError),
@@ -73,6 +85,17 @@ pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
     }
     if card.layout != LAYOUT_VERSION {
         return Err(SessionError::Layout { card: card.layout, host: LAYOUT_VERSION });
+    }
+    Ok(())
+}
+
+/// Checks that a card can be used with its budget. Settings, image and tiles were checked against the one that it said first.
+pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<(), SessionError> {
+    if budget.tiles == 0 {
+        return Err(SessionError::NoTiles);
+    }
+    if first.is_some_and(|first| first != budget) {
+        return Err(SessionError::OtherBudget);
     }
     Ok(())
 }

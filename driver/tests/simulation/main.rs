@@ -85,6 +85,10 @@ fn faults_end_in_the_same_picture_or_with_no_card_left() {
             let cards = 1 + seed as usize % 8;
             let faults = Faults::of(&mut Random(hash(!seed)));
             let outcome = Run { faults, ..Run::new(&fixture, cards, seed) }.go();
+            if faults.stalls + faults.resets + faults.deaths == 0 {
+                assert!(outcome.pixels.is_some(), "seed {seed}: bad lines end the render, {faults:?}");
+                assert_eq!(outcome.given_up, 0, "seed {seed}: sound cards are given up, {faults:?}");
+            }
             match outcome.pixels {
                 Some(pixels) => {
                     assert!(Some(pixels) == alone.pixels, "seed {seed}: other pixels, {faults:?}");

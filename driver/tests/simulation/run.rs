@@ -33,7 +33,7 @@ pub(crate) struct Outcome {
     pub(crate) bytes: LinkBytes,
     /// Cards that rendered a tile.
     pub(crate) working: usize,
-    /// Cards that were reset too often.
+    /// Cards that have failed too often.
     pub(crate) given_up: usize,
 }
 

@@ -116,10 +116,14 @@ impl<'a> Station<'a> {
         };
         let result = result.or_else(|error| {
             self.is_lost = true;
-            if error.may_pass() { session.reset(picture, now) } else { Err(error) }
+            if !error.may_pass() {
+                return Err(error);
+            }
+            session.greet_again(picture, now);
+            Ok(())
         });
         if let Err(error) = result {
-            assert!(matches!(error, SessionError::Resets(_)), "seed {}: {error}", run.seed);
+            assert!(matches!(error, SessionError::Failures(_)), "seed {}: {error}", run.seed);
             session.give_back(picture);
             self.given_up = Some(error);
         } else if session.is_loaded() {

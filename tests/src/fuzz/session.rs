@@ -141,11 +141,12 @@ impl Ends<'_> {
     }
 
     /// What a render does with an error. Returns whether it goes on.
-    fn goes_on(&mut self, result: Result<(), SessionError>) -> bool {
-        let reset = |error: SessionError| {
-            if error.may_pass() { self.session.reset(&self.picture, self.now) } else { Err(error) }
-        };
-        result.or_else(reset).is_ok()
+    fn goes_on(&mut self, result: &Result<(), SessionError>) -> bool {
+        let may_pass = result.as_ref().err().is_some_and(SessionError::may_pass);
+        if may_pass {
+            self.session.greet_again(&self.picture, self.now);
+        }
+        may_pass || result.is_ok()
     }
 }
 
@@ -192,7 +193,7 @@ impl Target for Sessions {
                 _ => {
                     // The host's command comes first.
                     let result = ends.step(false);
-                    if !ends.goes_on(result) {
+                    if !ends.goes_on(&result) {
                         return was_loaded;
                     }
                     ends.card.send(|bytes| {
@@ -202,7 +203,7 @@ impl Target for Sessions {
                 }
             }
             let result = ends.step(false);
-            if !ends.goes_on(result) {
+            if !ends.goes_on(&result) {
                 return was_loaded;
             }
             was_loaded |= ends.session.is_loaded();
