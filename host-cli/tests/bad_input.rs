@@ -158,6 +158,7 @@ fn names_that_do_not_exist() {
         ("--ic-error", "nan", ["--ic-error", "0.025"]),
         ("--card", "serial:", ["serial port", "serial:PATH[@BAUD]"]),
         ("--card", "serial:/dev/x@fast", ["no speed", "such as 115200"]),
+        ("--card", "serial:/dev/x@1200", ["too slow", "use 4800 or more"]),
         ("--card", "tcp:localhost", ["no TCP address", "tcp:HOST:PORT"]),
         ("--card", "unix:", ["Unix socket", "unix:PATH"]),
         ("--card", "abacus", ["no kind of card", "emulated[:CHIPS]"]),

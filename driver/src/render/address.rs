@@ -42,6 +42,9 @@ pub enum CardAddress {
 pub(super) const MAX_CHIPS: usize = 1024;
 /// The speed of a serial port for which none is given.
 const DEFAULT_BAUD: u32 = 115_200;
+/// A card acknowledges two whole frames at a time, and is silent meanwhile. Even if one acknowledgement is lost the next is
+/// to come within the 10 s after which a card is taken for lost.
+const LEAST_BAUD: u32 = 4800;
 
 impl Default for CardAddress {
     /// One emulated reference chip.
@@ -119,13 +122,19 @@ fn serial(text: &str) -> Result<CardAddress, String> {
     }
     let baud = match baud {
         None => DEFAULT_BAUD,
-        Some(baud) => baud
-            .parse()
-            .ok()
-            .filter(|&baud| baud > 0)
-            .ok_or_else(|| format!("{baud:?} is no speed in bits a second; use one such as 115200"))?,
+        Some(baud) => speed(baud)?,
     };
     Ok(CardAddress::Serial { path: path.into(), baud })
+}
+
+fn speed(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(baud) if baud >= LEAST_BAUD => Ok(baud),
+        Ok(baud) if baud > 0 => Err(format!(
+            "{baud} bits a second are too slow: a card would be taken for silent; use {LEAST_BAUD} or more, such as 115200"
+        )),
+        _ => Err(format!("{text:?} is no speed in bits a second; use one such as 115200")),
+    }
 }
 
 fn tcp(text: &str) -> Result<CardAddress, String> {
@@ -146,6 +155,7 @@ mod tests {
             ("emulated-micro:1", "emulated-micro:1"),
             ("serial:/dev/ttyUSB0", "serial:/dev/ttyUSB0@115200"),
             ("serial:/dev/a@b/c@921600", "serial:/dev/a@b/c@921600"),
+            ("serial:/dev/ttyUSB0@4800", "serial:/dev/ttyUSB0@4800"),
             ("serial:/dev/a@b/c", "serial:/dev/a@b/c@115200"),
             ("tcp:localhost:7000", "tcp:localhost:7000"),
             ("tcp:[::1]:7000", "tcp:[::1]:7000"),
@@ -168,6 +178,7 @@ mod tests {
             ("serial:@9600", "serial:PATH"),
             ("serial:/dev/ttyUSB0@fast", "no speed"),
             ("serial:/dev/ttyUSB0@0", "no speed"),
+            ("serial:/dev/ttyUSB0@2400", "4800 or more"),
             ("tcp", "tcp:HOST:PORT"),
             ("tcp:localhost", "tcp:HOST:PORT"),
             ("tcp:localhost:0", "tcp:HOST:PORT"),
