@@ -11,26 +11,27 @@
 //! What a picture does not depend on is not in the settings: tiles, order and cards may be others when it is gone on with.
 //! The file is locked by the render that writes it.
 
+mod records;
 #[cfg(test)]
 mod tests;
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use photoncard_shared::checksum::checksum;
-use photoncard_shared::message::{PIXEL_BYTES, Pixel, Tile};
 use serde_json::{Map, Value};
 
+use self::records::read_tiles;
+pub(crate) use self::records::record;
 use crate::film::Film;
 
 /// The first line.
 const TITLE: &str = "photoncard partial render 1";
 /// Bytes of the settings at the most.
 const MOST_SETTINGS: u64 = 1 << 20;
-const PLACE_BYTES: usize = 16;
-const CHECKSUM_BYTES: usize = 4;
+/// Times that a file is opened which others remove meanwhile.
+const MOST_TRIES: usize = 16;
 
 /// Where finished tiles are kept, and whether those of an earlier render are taken over.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,6 +93,8 @@ struct State {
     file: Option<File>,
     /// Whether it begins with title and settings.
     is_begun: bool,
+    /// Whether it holds a tile that this render has taken over or kept.
+    holds_tiles: bool,
     failed: Option<PartialError>,
 }
 
@@ -108,28 +111,40 @@ impl PartialRender {
     ) -> Result<Self, PartialError> {
         let path = partial.path.clone();
         let this = Self { path, settings, state: Mutex::default() };
-        match File::options().read(true).write(true).open(&this.path) {
-            Ok(file) => {
-                this.lock_file(&file)?;
-                if partial.resume {
-                    this.resume(&file, film)?;
-                }
-                *this.lock() = State { file: Some(file), is_begun: partial.resume, failed: None };
+        if let Some(file) = this.open(false)? {
+            let mut state = this.lock();
+            if partial.resume {
+                this.resume(&mut state, &file, film)?;
             }
-            Err(error) if error.kind() == ErrorKind::NotFound => {}
-            Err(error) => return Err(this.error(error)),
+            state.file = Some(file);
         }
         Ok(this)
     }
 
-    /// Makes the file this render's own. Where the system has no locks, nothing is checked.
-    fn lock_file(&self, file: &File) -> Result<(), PartialError> {
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => Err(PartialError::Busy { path: self.path.clone() }),
-            Err(TryLockError::Error(error)) if error.kind() != ErrorKind::Unsupported => {
-                Err(self.error(error))
+    /// Opens the file and makes it this render's own. One that is not there is made if `create` says so.
+    fn open(&self, create: bool) -> Result<Option<File>, PartialError> {
+        for _ in 0..MOST_TRIES {
+            // Not cut off before it is locked: it may be another render's.
+            let opened =
+                File::options().read(true).write(true).create(create).truncate(false).open(&self.path);
+            let file = match opened {
+                Err(error) if !create && error.kind() == ErrorKind::NotFound => return Ok(None),
+                opened => opened.map_err(|error| self.error(error))?,
+            };
+            self.check_lock(&file.try_lock())?;
+            // Whoever had it may have removed it before it was locked.
+            if is_at(&file, &self.path).map_err(|error| self.error(error))? {
+                return Ok(Some(file));
             }
-            _ => Ok(()),
+        }
+        Err(PartialError::Busy { path: self.path.clone() })
+    }
+
+    /// Tells whether another render has the file. Where the system has no locks, or refuses them, nothing is known.
+    fn check_lock(&self, locked: &Result<(), TryLockError>) -> Result<(), PartialError> {
+        match locked {
+            Err(TryLockError::WouldBlock) => Err(PartialError::Busy { path: self.path.clone() }),
+            Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
         }
     }
 
@@ -142,48 +157,41 @@ impl PartialRender {
     }
 
     /// Takes the sound tiles of the file into the film, and cuts off what is behind the last.
-    fn resume(&self, mut file: &File, film: &mut Film) -> Result<(), PartialError> {
+    fn resume(&self, state: &mut State, mut file: &File, film: &mut Film) -> Result<(), PartialError> {
         let mut reader = BufReader::new(file);
-        let head = self.read_head(&mut reader)?;
+        let Some(head) = self.read_head(&mut reader)? else { return Ok(()) };
         let sound = read_tiles(&mut reader, head, film).and_then(|sound| {
             file.set_len(sound)?;
             file.seek(SeekFrom::End(0))
         });
-        sound.map(drop).map_err(|error| self.error(error))
+        state.holds_tiles = sound.map_err(|error| self.error(error))? > head;
+        state.is_begun = true;
+        Ok(())
     }
 
-    /// Compares title and settings. Returns their bytes.
-    fn read_head(&self, reader: &mut impl BufRead) -> Result<u64, PartialError> {
+    /// Compares title and settings. Returns their bytes; `None` if the file ends before theirs do.
+    fn read_head(&self, reader: &mut impl BufRead) -> Result<Option<u64>, PartialError> {
         let foreign = || PartialError::Foreign { path: self.path.clone() };
-        let mut line = |expected: &str| -> Result<String, PartialError> {
+        let mut line = |expected: &str| -> Result<Option<String>, PartialError> {
             let mut text = Vec::new();
             let mut limited = reader.by_ref().take(MOST_SETTINGS);
             limited.read_until(b'\n', &mut text).map_err(|error| self.error(error))?;
+            let is_cut_off = !text.ends_with(b"\n") && (text.len() as u64) < MOST_SETTINGS;
             let text = String::from_utf8(text).map_err(|_| foreign())?;
+            if is_cut_off && (text.starts_with(expected) || expected.starts_with(&text)) {
+                return Ok(None);
+            }
             let is_line = text.ends_with('\n') && text.starts_with(expected);
-            is_line.then_some(text).ok_or_else(foreign)
+            is_line.then_some(Some(text)).ok_or_else(foreign)
         };
-        let title = line(TITLE)?;
-        let settings = line("{")?;
+        let Some(title) = line(TITLE)? else { return Ok(None) };
+        let Some(settings) = line("{")? else { return Ok(None) };
         let found: Value = serde_json::from_str(&settings).map_err(|_| foreign())?;
         let differences = differences(&found, &self.settings);
         if !differences.is_empty() {
             return Err(PartialError::Differs { path: self.path.clone(), differences });
         }
-        Ok((title.len() + settings.len()) as u64)
-    }
-
-    /// What is kept of a finished tile.
-    pub(crate) fn record(tile: &Tile, film: &Film) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(PLACE_BYTES + tile.pixels() as usize * PIXEL_BYTES + 4);
-        for number in [tile.x, tile.y, tile.width, tile.height] {
-            bytes.extend(number.to_le_bytes());
-        }
-        for (x, y) in places(tile) {
-            bytes.extend(film.pixel(x, y).copied().unwrap_or_default().to_bytes());
-        }
-        bytes.extend(checksum(&bytes).to_le_bytes());
-        bytes
+        Ok(Some((title.len() + settings.len()) as u64))
     }
 
     /// Keeps a finished tile's record. What goes wrong is told by [`Self::check`].
@@ -192,32 +200,45 @@ impl PartialRender {
         if state.failed.is_none()
             && let Err(error) = self.append(&mut state, record)
         {
+            self.discard_empty(&mut state);
             state.failed = Some(error);
         }
     }
 
     fn append(&self, state: &mut State, record: &[u8]) -> Result<(), PartialError> {
-        let file = match &mut state.file {
-            Some(file) => file,
-            none => none.insert(self.create()?),
-        };
-        let begin = |file: &mut File| {
-            file.set_len(0)?;
-            writeln!(file, "{TITLE}\n{}", self.settings)
-        };
-        if !std::mem::replace(&mut state.is_begun, true) {
-            begin(file).map_err(|error| self.error(error))?;
+        if state.file.is_none() {
+            state.file = self.open(true)?;
+        }
+        let Some(file) = &mut state.file else { return Ok(()) };
+        if !state.is_begun {
+            self.write_head(file).map_err(|error| self.error(error))?;
+            state.is_begun = true;
         }
         // One call: another process sees a tile whole or cut off.
-        file.write_all(record).map_err(|error| self.error(error))
+        file.write_all(record).map_err(|error| self.error(error))?;
+        state.holds_tiles = true;
+        Ok(())
     }
 
-    fn create(&self) -> Result<File, PartialError> {
-        // Not cut off before it is locked: another render may have made it meanwhile.
-        let options = File::options().read(true).write(true).create(true).truncate(false).open(&self.path);
-        let file = options.map_err(|error| self.error(error))?;
-        self.lock_file(&file)?;
-        Ok(file)
+    fn write_head(&self, file: &mut File) -> io::Result<()> {
+        file.set_len(0)?;
+        file.rewind()?;
+        file.write_all(format!("{TITLE}\n{}\n", self.settings).as_bytes())
+    }
+
+    /// Removes a file without a tile that cannot be written: there is nothing to go on from.
+    fn discard_empty(&self, state: &mut State) {
+        if let Some(file) = state.file.take_if(|_| !state.holds_tiles) {
+            // What cannot be removed is empty.
+            let _ = file.set_len(0);
+            let _ = fs::remove_file(&self.path);
+            state.is_begun = false;
+        }
+    }
+
+    /// Whether the file holds a tile that this render has taken over or kept.
+    pub(crate) fn holds_tiles(&self) -> bool {
+        self.lock().holds_tiles
     }
 
     /// Tells what went wrong while tiles were kept.
@@ -230,11 +251,14 @@ impl PartialRender {
         state.failed.take().map_or(Ok(()), Err)
     }
 
-    /// Removes the file, when the picture is written. One that is not there is none.
+    /// Removes the file, when the picture is written. Where this render has none, one that is there is another's.
     ///
     /// # Errors
     /// If it cannot be removed.
     pub fn remove(self) -> Result<(), PartialError> {
+        if self.lock().file.is_none() {
+            return Ok(());
+        }
         match fs::remove_file(&self.path) {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(self.error(error)),
             _ => Ok(()),
@@ -242,73 +266,22 @@ impl PartialRender {
     }
 }
 
-fn places(tile: &Tile) -> impl Iterator<Item = (u32, u32)> {
-    let Tile { x, y, width, height, .. } = *tile;
-    (y..y + height).flat_map(move |row| (x..x + width).map(move |column| (column, row)))
-}
-
-/// Reads all sound tiles of a file, from `start` on, into the film. Returns where the last one ends. After what is no sound tile
-/// the next one is looked for at every byte: its place in the picture and its checksum tell it.
-fn read_tiles(reader: &mut BufReader<&File>, start: u64, film: &mut Film) -> io::Result<u64> {
-    let end = reader.get_ref().metadata()?.len();
-    let (mut at, mut sound) = (start, start);
-    while at < end {
-        let position = reader.stream_position()?;
-        reader.seek_relative(at as i64 - position as i64)?;
-        match read_tile(reader, end - at, film)? {
-            Some(bytes) => {
-                at += bytes;
-                sound = at;
-            }
-            None => at += 1,
-        }
-    }
-    Ok(sound)
-}
-
-/// Reads a tile of at most `most` bytes into the film. Returns its bytes; `None` if there is no sound one.
-fn read_tile(reader: &mut impl Read, most: u64, film: &mut Film) -> io::Result<Option<u64>> {
-    let mut place = [0; PLACE_BYTES];
-    if most < PLACE_BYTES as u64 || !read_all(reader, &mut place)? {
-        return Ok(None);
-    }
-    let number = |index: usize| place.as_chunks().0.get(index).map_or(0, |bytes| u32::from_le_bytes(*bytes));
-    let tile = Tile { id: 0, x: number(0), y: number(1), width: number(2), height: number(3) };
-    let window = film.window();
-    let fits = |first: u32, count: u32, [low, high]: [u32; 2]| {
-        count > 0 && first >= low && first.checked_add(count).is_some_and(|end| end <= high)
-    };
-    if !fits(tile.x, tile.width, [window.x0, window.x1]) || !fits(tile.y, tile.height, [window.y0, window.y1])
-    {
-        return Ok(None);
-    }
-    let length = (PLACE_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * PIXEL_BYTES as u64;
-    if length > most {
-        return Ok(None);
-    }
-    let mut bytes = place.to_vec();
-    bytes.resize(length as usize, 0);
-    if !read_all(reader, &mut bytes[PLACE_BYTES..])? {
-        return Ok(None);
-    }
-    let (bytes, sum) = bytes.split_at(length as usize - CHECKSUM_BYTES);
-    if checksum(bytes).to_le_bytes() != sum {
-        return Ok(None);
-    }
-    for ((x, y), pixel) in places(&tile).zip(bytes[PLACE_BYTES..].as_chunks::<PIXEL_BYTES>().0) {
-        // The tile lies inside the window.
-        let _ = film.write(x, y, Pixel::read(pixel));
-    }
-    Ok(Some(length))
-}
-
-/// Fills a buffer. Returns whether there were so many bytes.
-fn read_all(reader: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
-    match reader.read_exact(buffer) {
-        Ok(()) => Ok(true),
-        Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(false),
+/// Whether a path still names a file that was opened there.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    let file = file.metadata()?;
+    match fs::metadata(path) {
+        Ok(named) => Ok((named.dev(), named.ino()) == (file.dev(), file.ino())),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
         Err(error) => Err(error),
     }
+}
+
+/// Elsewhere a file that is open keeps its name.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> io::Result<bool> {
+    Ok(true)
 }
 
 /// Text of a file, fit for a terminal.

@@ -14,6 +14,7 @@ use crate::console::say;
 /// Shows progress, and is stopped by SIGINT and SIGTERM.
 pub(crate) struct Progress {
     stopped: Arc<AtomicBool>,
+    kept: AtomicBool,
     display: Option<Mutex<Display>>,
 }
 
@@ -34,7 +35,13 @@ impl Progress {
             on_terminal: std::io::stderr().is_terminal(),
             told: 0,
         };
-        Ok(Self { stopped: stop_on_signals()?, display: (!quiet).then_some(Mutex::new(display)) })
+        let display = (!quiet).then_some(Mutex::new(display));
+        Ok(Self { stopped: stop_on_signals()?, kept: AtomicBool::new(false), display })
+    }
+
+    /// Whether finished tiles are kept.
+    pub(crate) fn has_kept(&self) -> bool {
+        self.kept.load(Ordering::Relaxed)
     }
 
     /// Takes the bar away.
@@ -60,6 +67,10 @@ impl Observer for Progress {
         if self.display.is_some() {
             say(format_args!("photoncard: {done} of {total} tiles were rendered before"));
         }
+    }
+
+    fn kept(&self) {
+        self.kept.store(true, Ordering::Relaxed);
     }
 
     fn lost(&self, card: &str, error: &SessionError) {

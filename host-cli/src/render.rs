@@ -32,8 +32,8 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let result = on_threads(options.threads, || render(&scene, &settings, &progress))?;
     progress.finish();
     let mut rendering = result.inspect_err(|error| {
-        let path = options.partial_path();
-        if !error.is_input() && path.exists() {
+        if !error.is_input() && progress.has_kept() {
+            let path = options.partial_path();
             say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
         }
     })?;
@@ -79,7 +79,8 @@ fn outputs(options: &RenderOptions) -> impl Iterator<Item = &Path> {
 /// Checks that no output replaces the scene or another output.
 fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
     let mut taken = vec![(options.scene.as_path(), "the scene")];
-    for path in outputs(options) {
+    let partial = options.partial_path();
+    for path in outputs(options).chain([partial.as_path()]) {
         let same = taken.iter().find(|(other, _)| output::is_same_file(path, other));
         if let Some((_, what)) = same {
             let text = format!("cannot write {}: it is {what} as well", path.display());

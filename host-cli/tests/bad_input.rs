@@ -229,6 +229,8 @@ fn outputs_that_cannot_be_written() {
         refused(&room, "scene.gltf", &options, &words);
         assert_eq!(room.read("scene.gltf"), scene_before);
     }
+    let outcome = room.render("scene.gltf", &["-o", "out.exr", "--stats", "out.exr.partial"]);
+    check_refused(&outcome, &["out.exr.partial: it is another output as well", own_name], "partial");
 }
 
 #[test]

@@ -91,7 +91,11 @@ fn only_the_same_picture_is_gone_on_with() {
     refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene was"]);
     refused(&["--order", "hilbert"], &["--resume with --order hilbert is not possible"]);
     assert!(room.read("a.exr.partial") == kept);
-    for foreign in [&b"something else"[..], b"", &[0xff; 100], b"photoncard partial render 1\n{]\n"] {
+    // Nothing that this render has kept, or could go on with.
+    let outcome = room.run(&arguments(&cornell, &["--seed", "7", "--card", "unix:absent"]));
+    assert_eq!(outcome.status, Some(1), "{}", outcome.stderr);
+    assert!(!outcome.stderr.contains("--resume goes on"), "{}", outcome.stderr);
+    for foreign in [&b"something else"[..], b"x", &[0xff; 100], b"photoncard partial render 1\n{]\n"] {
         room.write("a.exr.partial", foreign);
         refused(&[], &["is no partial render"]);
     }

@@ -1,5 +1,7 @@
+use photoncard_shared::message::{PIXEL_BYTES, Pixel, Tile};
 use serde_json::json;
 
+use super::records::{CHECKSUM_BYTES, PLACE_BYTES, places};
 use super::*;
 use crate::film::Window;
 
@@ -26,7 +28,7 @@ fn written(folder: &tempfile::TempDir) -> Vec<u8> {
     }
     let settings = partial(folder, false);
     let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
-    (0..TILES).for_each(|id| partial.keep(&PartialRender::record(&tile(id), &film)));
+    (0..TILES).for_each(|id| partial.keep(&record(&tile(id), &film)));
     partial.check().unwrap();
     fs::read(settings.path).unwrap()
 }
@@ -40,7 +42,7 @@ fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
     let taken: Vec<u32> = (0..TILES).filter(|&id| film.has(&tile(id))).collect();
     // What is missing is kept behind the rest.
     for id in (0..TILES).filter(|id| !taken.contains(id)) {
-        partial.keep(&PartialRender::record(&tile(id), &film));
+        partial.keep(&record(&tile(id), &film));
     }
     drop(partial);
     let mut again = self::film();
@@ -53,16 +55,16 @@ fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
 fn damage_loses_the_tile_that_it_hits_alone() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = written(&folder);
-    let record = PLACE_BYTES + 12 * PIXEL_BYTES + CHECKSUM_BYTES;
-    let start = bytes.len() - TILES as usize * record;
+    let length = PLACE_BYTES + 12 * PIXEL_BYTES + CHECKSUM_BYTES;
+    let start = bytes.len() - TILES as usize * length;
     assert_eq!(taken_over(&folder, &bytes), [0, 1, 2, 3, 4, 5]);
-    for place in [0, 3, 8, 12, PLACE_BYTES, 200, record - 1] {
+    for place in [0, 3, 8, 12, PLACE_BYTES, 200, length - 1] {
         let mut damaged = bytes.clone();
-        damaged[start + record + place] ^= 0x81;
+        damaged[start + length + place] ^= 0x81;
         assert_eq!(taken_over(&folder, &damaged), [0, 2, 3, 4, 5], "{place}");
     }
     let mut shorter = bytes.clone();
-    shorter.drain(start + 2 * record + 30..start + 2 * record + 50);
+    shorter.drain(start + 2 * length + 30..start + 2 * length + 50);
     assert_eq!(taken_over(&folder, &shorter), [0, 1, 3, 4, 5]);
     assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
 }
@@ -75,13 +77,16 @@ fn a_file_has_one_render() {
     // Neither has made the file yet.
     let (first, second) = (begin(false, &mut one).unwrap(), begin(false, &mut two).unwrap());
     for partial in [&first, &second] {
-        partial.keep(&PartialRender::record(&tile(0), &one));
+        partial.keep(&record(&tile(0), &one));
     }
     first.check().unwrap();
     assert!(matches!(second.check(), Err(PartialError::Busy { .. })));
     for resume in [false, true] {
         assert!(matches!(begin(resume, &mut three), Err(PartialError::Busy { .. })));
     }
+    // That one has none: the file is the first one's.
+    second.remove().unwrap();
+    assert!(partial(&folder, false).path.exists());
     first.remove().unwrap();
     begin(false, &mut three).unwrap();
 }
@@ -90,4 +95,71 @@ fn a_file_has_one_render() {
 fn names_of_settings_are_fit_for_a_terminal() {
     let said = differences(&json!({ "\u{1b}[2J\u{9b}": "\u{9b}x" }), &json!({}));
     assert_eq!(said, ["\\u{1b}[2J\\u{9b} was \"\\u{9b}x\" and is nothing"]);
+}
+
+/// A file of nothing but places of the largest tile: each is read and summed for nothing.
+#[test]
+fn a_hostile_file_does_not_take_hours() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bytes = written(&folder);
+    let settings = partial(&folder, true);
+    let side = 64_u32;
+    let wide = || Film::new(4 * TILES + side, 2 * side, Window::full(4 * TILES + side, 2 * side)).unwrap();
+    let sound = bytes.len() as u64;
+    bytes.extend([4 * TILES, side, side, side].map(u32::to_le_bytes).concat().repeat(4 << 16));
+    fs::write(&settings.path, bytes).unwrap();
+    let mut film = wide();
+    let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
+    assert!((0..TILES).all(|id| film.has(&tile(id))) && partial.holds_tiles());
+    assert_eq!(fs::metadata(&settings.path).unwrap().len(), sound);
+}
+
+#[test]
+fn a_head_that_is_cut_off_holds_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = written(&folder);
+    let head = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(1).unwrap().0;
+    for length in [0, 1, TITLE.len(), TITLE.len() + 1, TITLE.len() + 2, head] {
+        assert!(taken_over(&folder, &bytes[..length]).is_empty(), "{length}");
+    }
+    assert_eq!(taken_over(&folder, &bytes), [0, 1, 2, 3, 4, 5]);
+}
+
+#[test]
+fn a_file_that_cannot_be_begun_is_not_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = partial(&folder, false).path;
+    let mut film = film();
+    let partial = PartialRender::begin(&partial(&folder, false), json!({}), &mut film).unwrap();
+    fs::write(&path, b"").unwrap();
+    // It takes no byte, as on a disk that is full.
+    partial.lock().file = Some(File::open(&path).unwrap());
+    partial.keep(&record(&tile(0), &film));
+    assert!(matches!(partial.check(), Err(PartialError::File { .. })));
+    assert!(!path.exists() && !partial.holds_tiles());
+    // There is room again: it is begun anew.
+    partial.keep(&record(&tile(0), &film));
+    partial.check().unwrap();
+    assert!(partial.holds_tiles() && fs::read(&path).unwrap().starts_with(TITLE.as_bytes()));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_that_was_removed_is_not_at_its_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("partial");
+    let file = File::create(&path).unwrap();
+    assert!(is_at(&file, &path).unwrap());
+    fs::remove_file(&path).unwrap();
+    assert!(!is_at(&file, &path).unwrap());
+    let other = File::create(&path).unwrap();
+    assert!(!is_at(&file, &path).unwrap() && is_at(&other, &path).unwrap());
+}
+
+#[test]
+fn locks_that_the_system_refuses_hinder_no_render() {
+    let folder = tempfile::tempdir().unwrap();
+    let partial = PartialRender::begin(&partial(&folder, false), json!({}), &mut film()).unwrap();
+    partial.check_lock(&Err(TryLockError::Error(io::Error::other("no locks available")))).unwrap();
+    assert!(partial.check_lock(&Err(TryLockError::WouldBlock)).is_err());
 }

@@ -62,6 +62,9 @@ pub trait Observer: Sync {
     /// Tells that so many of all tiles were rendered before.
     fn resumed(&self, _done: usize, _total: usize) {}
 
+    /// Tells that finished tiles are kept, so that a render that ends early can be gone on with.
+    fn kept(&self) {}
+
     /// Tells that a card was lost, or is used no more; the others go on with its tiles.
     fn lost(&self, _card: &str, _error: &SessionError) {}
 }
@@ -89,6 +92,9 @@ pub struct Rendering {
 
 /// Renders a scene.
 ///
+/// A serial port may still be held for about a second after the end: one that was just being opened again is on a thread that
+/// nobody waits for.
+///
 /// # Errors
 /// If settings or scene do not fit the cards, a card fails, or the observer stops it.
 pub fn render(
@@ -110,7 +116,7 @@ pub fn render(
     }
     // Not before the settings are known to be possible: a film may be large.
     let mut film = Film::new(settings.width, settings.height, settings.window())?;
-    let partial = begin_partial(scene, settings, &mut film)?;
+    let partial = begin_partial(scene, settings, &mut film, observer)?;
     let mut all = tiles(settings.window(), settings.tile, settings.order);
     let count = all.len();
     all.retain(|tile| !film.has(tile));
@@ -126,7 +132,11 @@ pub fn render(
         checksum: image_checksum(prepared.image.lines()),
         frame: &frame,
     };
-    let outcome = cards.run(job, &picture, observer)?;
+    let outcome = cards.run(job, &picture, observer).inspect_err(|_| {
+        if picture.holds_tiles() {
+            observer.kept();
+        }
+    })?;
     times.load = outcome.load_seconds;
     times.render = outcome.render_seconds;
     times.total = start.elapsed().as_secs_f64();
@@ -147,7 +157,7 @@ fn render_whole_frame(
     let chips = cards::reference_chips(&settings.cards)?;
     settings.check(&REFERENCE)?;
     let mut film = Film::new(settings.width, settings.height, settings.window())?;
-    let partial = begin_partial(scene, settings, &mut film)?;
+    let partial = begin_partial(scene, settings, &mut film, observer)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, std::iter::once(REFERENCE), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance);
@@ -173,9 +183,14 @@ fn begin_partial(
     scene: &Scene,
     settings: &RenderSettings,
     film: &mut Film,
+    observer: &dyn Observer,
 ) -> Result<Option<PartialRender>, RenderError> {
     let begin = |partial| PartialRender::begin(partial, settings.identity(scene), film);
-    Ok(settings.partial.as_ref().map(begin).transpose()?)
+    let partial = settings.partial.as_ref().map(begin).transpose()?;
+    if partial.as_ref().is_some_and(PartialRender::holds_tiles) {
+        observer.kept();
+    }
+    Ok(partial)
 }
 
 fn prepare(

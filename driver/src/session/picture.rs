@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use photoncard_shared::message::Tile;
 
 use crate::film::{Film, FilmError, Window};
-use crate::partial::{PartialError, PartialRender};
+use crate::partial::{self, PartialError, PartialRender};
 use crate::scheduler::Scheduler;
 
 /// What sessions work on together. Each part has a lock of its own, which is held while that part is used: no card waits
@@ -45,7 +45,7 @@ impl Picture {
     /// A tile's pixels are all in the film.
     pub(super) fn complete(&self, tile: &Tile) {
         if let Some(partial) = &self.partial {
-            let record = PartialRender::record(tile, &self.film());
+            let record = partial::record(tile, &self.film());
             partial.keep(&record);
         }
         self.scheduler.complete();
@@ -57,6 +57,11 @@ impl Picture {
     /// If anything did.
     pub(crate) fn check_partial(&self) -> Result<(), PartialError> {
         self.partial.as_ref().map_or(Ok(()), PartialRender::check)
+    }
+
+    /// Whether finished tiles are kept.
+    pub(crate) fn holds_tiles(&self) -> bool {
+        self.partial.as_ref().is_some_and(PartialRender::holds_tiles)
     }
 
     /// The film, and where finished tiles are kept.
