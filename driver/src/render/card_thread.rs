@@ -23,6 +23,18 @@ pub(super) struct Shared<'a> {
     start: Instant,
 }
 
+/// Ends the threads of the other cards if this one panics: they would wait for its tiles without end.
+struct EndOthersOnPanic<'a>(&'a AtomicBool);
+
+impl Drop for EndOthersOnPanic<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            // No thread waits for longer than a moment without looking at this.
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
 /// What came of one card.
 #[derive(Default)]
 pub(super) struct CardOutcome {
@@ -100,6 +112,7 @@ impl<'a> Shared<'a> {
 /// Loads the image into a card and renders tiles on it until none is left. A card that is lost is tried again as long as
 /// there are others; one that answers what is wrong, or fails again and again, is not.
 pub(super) fn render_on(connected: Connected, job: Job, shared: &Shared) -> Result<CardOutcome, RenderError> {
+    let _guard = EndOthersOnPanic(&shared.failed);
     let Connected { mut card, mut session, .. } = connected;
     session.start(job, shared.start.elapsed());
     let mut outcome = CardOutcome::default();

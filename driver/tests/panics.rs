@@ -1,0 +1,45 @@
+//! A thread of the host that panics: the render ends in that panic, and does not wait for ever.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use photoncard_driver::render::{Observer, Phase, RenderSettings, render};
+use photoncard_driver::scene::gltf;
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Panics in the thread of the card that tells of tiles first.
+struct Panics {
+    has_panicked: AtomicBool,
+    begin: Instant,
+}
+
+impl Observer for Panics {
+    fn progress(&self, phase: Phase, _: u64, _: u64) {
+        if phase == Phase::Tiles && !self.has_panicked.swap(true, Ordering::Relaxed) {
+            panic!("the observer panics");
+        }
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.begin.elapsed() > PATIENCE
+    }
+}
+
+#[test]
+fn a_panic_in_the_thread_of_one_card_ends_the_others() {
+    let scene = format!("{}/../scenes/cornell.gltf", env!("CARGO_MANIFEST_DIR"));
+    let scene = gltf::load(scene.as_ref()).unwrap();
+    let settings = RenderSettings {
+        width: 4096,
+        height: 4096,
+        photons: 1000,
+        gather_rays: 10,
+        cards: vec!["emulated:2".parse().unwrap()],
+        ..RenderSettings::default()
+    };
+    let observer = Panics { has_panicked: AtomicBool::new(false), begin: Instant::now() };
+    let result = catch_unwind(AssertUnwindSafe(|| render(&scene, &settings, &observer).map(drop)));
+    assert!(result.is_err() && observer.begin.elapsed() < PATIENCE, "{:?}", observer.begin.elapsed());
+}
