@@ -1,6 +1,6 @@
 //! What crosses the wire: frames come back whole or not at all, opcodes stay what they are.
 
-use photoncard_shared::budget::REFERENCE;
+use photoncard_shared::budget::{Budget, REFERENCE};
 use photoncard_shared::checksum::checksum;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::{
@@ -185,7 +185,6 @@ fn opcodes_are_pinned() {
         let budget = REFERENCE;
         Reply::Hello { protocol: 1, layout: 1, budget, written_lines: 0, memory_use, build: "x" }
     };
-    let fault = |code| Reply::Fault(Fault { code, detail: 7 });
     let replies = [
         (hello(None), 0),
         (Reply::Checksums { first: 0, data: &[] }, 1),
@@ -200,8 +199,103 @@ fn opcodes_are_pinned() {
     assert!(encoded(&hello(None)).ends_with(&[0, 0, 1, b'x']));
     let memory_use = MemoryUse { static_bytes: 3, stack_bytes: 5, stack_used: 4 };
     assert!(encoded(&hello(Some(memory_use))).ends_with(&[0, 1, 3, 5, 4, 1, b'x']));
-    assert_eq!(encoded(&fault(FaultCode::Message)), [6, 0, 7]);
-    assert_eq!(encoded(&fault(FaultCode::Depth)), [6, 12, 7]);
+}
+
+/// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
+#[test]
+fn golden_structures() {
+    assert_eq!(PROTOCOL_VERSION, 6);
+    let budget = Budget {
+        sram_bytes: 1,
+        dram_bytes: 2,
+        photon_cache_bytes: 3,
+        scene_cache_bytes: 4,
+        stack_bytes: 5,
+        tile_pixels: 6,
+        neighbors: 7,
+        gather_rays: 8,
+        gather_queue: 9,
+        irradiance_records: 10,
+        gathered_records: 11,
+        shadow_rays: 12,
+        samples: 13,
+        tiles: 300,
+    };
+    let hello =
+        Reply::Hello { protocol: 6, layout: 5, budget, written_lines: 14, memory_use: None, build: "x" };
+    let bytes = [0, 6, 5, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 0xac, 2, 14, 0, 1, b'x'];
+    assert_eq!(encoded(&hello), bytes);
+
+    let one = 1.0_f32.to_le_bytes();
+    let camera = Camera {
+        origin: [1.0, 0.0, 0.0],
+        forward: [0.0, 1.0, 0.0],
+        right: [0.0, 0.0, 1.0],
+        up: [1.0, 1.0, 0.0],
+    };
+    let frame = FrameParameters {
+        width: 1,
+        height: 2,
+        camera,
+        seed: 3,
+        samples: 4,
+        gather_rays: 5,
+        shadow_rays: 6,
+        neighbors: 7,
+        max_distance: 1.0,
+        sampling: Sampling::Product,
+        irradiance_error: Some(1.0),
+        bins: 8,
+        drain: Drain::Sort,
+        queue: 300,
+    };
+    let zero = [0; 4];
+    let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero].concat();
+    let bytes = [&[5, 1, 2][..], &camera, &[3, 4, 5, 6, 7], &one, &[2, 1], &one, &[8, 2, 0xac, 2]].concat();
+    assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);
+
+    let counters = Counters {
+        eye_rays: 1,
+        shadow_rays: 2,
+        gather_rays: 3,
+        survey_rays: 4,
+        gathers: 5,
+        tables: 6,
+        records: 7,
+        lambertian_samples: 8,
+        interpolated_samples: 9,
+        photons_tested: 10,
+        photons_taken: 11,
+        photons_selected: 12,
+        photons_found: 13,
+        drains: 14,
+        most_waiting: 300,
+    };
+    let bytes = [5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 0xac, 2];
+    assert_eq!(encoded(&Reply::TileDone { tile: 16, counters }), bytes);
+}
+
+#[test]
+fn fault_codes_are_pinned() {
+    use FaultCode::*;
+    let codes = [
+        Message,
+        Order,
+        ImageTooLarge,
+        Lines,
+        Chunks,
+        ImageChecksum,
+        ImageHeader,
+        Parameter,
+        Tile,
+        TooManyTiles,
+        LineRange,
+        Record,
+        Depth,
+    ];
+    for (number, code) in (0..).zip(codes) {
+        assert_eq!(encoded(&Reply::Fault(Fault { code, detail: 7 })), [6, number, 7]);
+    }
 }
 
 #[test]
