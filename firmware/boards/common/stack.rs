@@ -3,6 +3,9 @@
 /// What the unused stack holds.
 const PAINT: u32 = 0x5AFE_57AC;
 
+/// Words at the end of the stack that nothing may use: a frame may leave some of its own as they were.
+const GUARD: usize = 16;
+
 /// Bytes below the caller's frame that the painting itself may use.
 const MARGIN: usize = 512;
 
@@ -37,10 +40,10 @@ pub(super) fn paint() {
     }
 }
 
-/// Whether the stack has been used to its last word.
+/// Whether the stack has been used to its last words.
 pub(super) fn is_used_up() -> bool {
     // SAFETY: as below.
-    (unsafe { lowest().read_volatile() }) != PAINT
+    (0..GUARD).any(|word| (unsafe { lowest().add(word).read_volatile() }) != PAINT)
 }
 
 /// The most bytes of the stack that have been in use at once.

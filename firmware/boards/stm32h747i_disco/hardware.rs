@@ -39,7 +39,7 @@ impl Disco {
 
     /// Without a region of its own the memory at this address is a device's: slow, and unaligned words fault.
     fn make_cacheable(mpu: &MPU, scb: &mut SCB) {
-        // SAFETY: nothing lies there yet. Read and write by all, normal memory, write-through, no code.
+        // SAFETY: nothing lies there that is in use. Read and write by all, normal memory, write-through, no code.
         unsafe {
             mpu.rnr.write(0);
             mpu.rbar.write(SDRAM);
@@ -78,10 +78,11 @@ impl Board for Disco {
             h: chip.GPIOH.split(clocks.peripheral.GPIOH),
             i: chip.GPIOI.split(clocks.peripheral.GPIOI),
         };
-        Self::make_cacheable(&core.MPU, &mut core.SCB);
         let mut memory = sdram::controller(chip.FMC, ports, clocks.peripheral.FMC, &clocks.clocks);
         let mut delay = core.SYST.delay(clocks.clocks);
         let _: *mut u32 = memory.init(&mut delay);
+        // Not before: the processor may read normal memory ahead, and nothing answers there yet.
+        Self::make_cacheable(&core.MPU, &mut core.SCB);
         let gpioa = chip.GPIOA.split(clocks.peripheral.GPIOA);
         let pins = (gpioa.pa9.into_alternate(), gpioa.pa10.into_alternate());
         let Ok(mut serial) = chip.USART1.serial(pins, BAUD.bps(), clocks.peripheral.USART1, &clocks.clocks)
