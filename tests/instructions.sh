@@ -32,7 +32,10 @@ on_this_processor() {
     local work line
     for work in Eye Rays Gathers; do
         line=$(valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect='*measured*' \
-            "$example" render "$files/memory" "$work" 2>"$files/valgrind")
+            "$example" render "$files/memory" "$work" 2>"$files/valgrind") || {
+            cat "$files/valgrind" >&2
+            return 1
+        }
         echo "$line $(awk '/Collected/ { print $NF }' "$files/valgrind")"
     done
 }
