@@ -1,66 +1,84 @@
-//! The bounding volume hierarchy: built by obvhs as a binary tree, made four-wide for the chip.
+//! The bounding volume hierarchy: built by obvhs as a binary tree, folded into wide nodes for the chip by the surface area
+//! heuristic.
 
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
+use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::BVH_STACK;
-use photoncard_shared::layout::{BvhNode, ChildReference, Record, Triangle as TriangleRecord};
+use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, NodeBox};
 
+use crate::fold::{Folded, Tree};
 use crate::scene::Triangle;
-
-/// Triangles in a leaf: one line of them.
-const LEAF_TRIANGLES: u32 = TriangleRecord::PER_LINE as u32;
 
 /// A hierarchy in the chip's records.
 #[derive(Debug)]
 pub struct Hierarchy {
     /// Nodes, the root first.
-    pub nodes: Vec<BvhNode>,
-    /// The triangles' indices in the order of the leaves.
-    pub order: Vec<u32>,
+    pub nodes: Vec<[u8; LINE_BYTES]>,
+    /// Leaves of triangles.
+    pub leaves: Vec<[u8; LINE_BYTES]>,
 }
 
 /// Why there is no hierarchy of these triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HierarchyError {
     /// A descent could need more than the chip's stack.
-    #[error("the bounding volume hierarchy is {levels} levels deep; the chip's stack holds {most}")]
+    #[error(
+        "a descent in the bounding volume hierarchy may put off {entries} parts; the chip's stack holds {BVH_STACK}"
+    )]
     TooDeep {
-        /// Levels of the hierarchy.
-        levels: usize,
-        /// Levels that the stack is enough for.
-        most: usize,
+        /// Entries of the stack that a descent may need.
+        entries: usize,
     },
-    /// More triangles or nodes than a reference can tell apart.
-    #[error("the scene has {triangles} triangles; a card can tell {} apart", ChildReference::LIMIT)]
+    /// More triangles than can be told apart.
+    #[error("the scene has {triangles} triangles; a card can tell {MOST_TRIANGLES} apart")]
     TooMany {
         /// Triangles of the scene.
         triangles: usize,
     },
+    /// A corner that is not finite.
+    #[error("a triangle has a corner that is not a finite place")]
+    NotFinite,
 }
 
-/// Every level may leave three of four children on the stack.
-const MOST_LEVELS: usize = BVH_STACK / 3;
+/// Each may have a leaf of its own, and its index is three times that of the leaf.
+const MOST_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
+
+/// The cost of a visit of a leaf, of which that of a node is 1.
+const LEAF_COST: f32 = 1.0;
 
 /// Builds the hierarchy of some triangles, at least one. The same on every machine: obvhs runs on one thread.
 ///
 /// # Errors
 /// If the chip could not descend in it.
 pub fn build(triangles: &[Triangle]) -> Result<Hierarchy, HierarchyError> {
-    let too_many = HierarchyError::TooMany { triangles: triangles.len() };
-    if u32::try_from(triangles.len()).map_or(true, |count| count >= ChildReference::LIMIT) {
-        return Err(too_many);
+    if triangles.len() > MOST_TRIANGLES {
+        return Err(HierarchyError::TooMany { triangles: triangles.len() });
     }
     let boxes: Vec<Aabb> = triangles.iter().map(bounding_box).collect();
-    let parameters = BvhBuildParams { max_prims_per_leaf: LEAF_TRIANGLES, ..BvhBuildParams::medium_build() };
+    // Leaves are made when the tree is folded.
+    let parameters = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::slow_build() };
     let binary = build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
-    let hierarchy = Widening::new(&binary).run().ok_or(too_many)?;
-    let levels = depth(&hierarchy.nodes);
-    if levels > MOST_LEVELS {
-        return Err(HierarchyError::TooDeep { levels, most: MOST_LEVELS });
+    let mut folded = Folded::new(tree(&binary));
+    if folded.stack > BVH_STACK {
+        // Halves of halves are not the best of trees, but no deeper than their number asks for.
+        let mut indices: Vec<u32> = (0..triangles.len() as u32).collect();
+        folded = Folded::new(halves(&mut indices, &boxes));
     }
-    Ok(hierarchy)
+    let Folded { nodes, leaves, stack } = folded;
+    if stack > BVH_STACK {
+        return Err(HierarchyError::TooDeep { entries: stack });
+    }
+    let nodes = nodes.iter().map(|node| BvhNode::encode(&node.children, node.links));
+    let nodes = nodes.collect::<Option<_>>().ok_or(HierarchyError::NotFinite)?;
+    let leaves = leaves.into_iter().map(|indices| {
+        let records: Vec<layout::Triangle> =
+            indices.iter().map(|&index| record(&triangles[index as usize])).collect();
+        BvhLeaf::encode(&records).unwrap_or_else(|| unreachable!("a leaf of {} triangles", records.len()))
+    });
+    Ok(Hierarchy { nodes, leaves: leaves.collect() })
 }
 
 fn bounding_box(triangle: &Triangle) -> Aabb {
@@ -68,88 +86,132 @@ fn bounding_box(triangle: &Triangle) -> Aabb {
     Aabb { min: a.min(b).min(c).into(), max: a.max(b).max(c).into() }
 }
 
-/// Turns a binary tree into four-wide nodes.
-struct Widening<'a> {
-    binary: &'a Bvh2,
-    nodes: Vec<BvhNode>,
-    order: Vec<u32>,
+fn record(triangle: &Triangle) -> layout::Triangle {
+    let vertices = triangle.vertices.map(|vertex| vertex.to_array());
+    layout::Triangle { vertices, material: triangle.material }
 }
 
-impl<'a> Widening<'a> {
-    fn new(binary: &'a Bvh2) -> Self {
-        Self { binary, nodes: Vec::new(), order: Vec::new() }
+/// The indices of the triangles of a leaf, in order.
+type Indices = heapless::Vec<u32, LEAF_TRIANGLES>;
+
+/// A tree that may be folded. Whatever has few enough triangles may be one leaf.
+fn tree(binary: &Bvh2) -> Tree<Indices, NodeBox> {
+    // Parents before children.
+    let mut order = vec![0];
+    let mut next = 0;
+    while let Some(&node) = order.get(next) {
+        let node = &binary.nodes[node as usize];
+        if !node.is_leaf() {
+            order.extend([node.first_index, node.first_index + 1]);
+        }
+        next += 1;
+    }
+    let mut trees: Vec<Option<Tree<Indices, NodeBox>>> = binary.nodes.iter().map(|_| None).collect();
+    let missing = || unreachable!("a part is made before its parent");
+    for &index in order.iter().rev() {
+        let node = &binary.nodes[index as usize];
+        let first = node.first_index as usize;
+        let bounds = NodeBox { lower: node.aabb().min.to_array(), upper: node.aabb().max.to_array() };
+        let area = node.aabb().half_area();
+        trees[index as usize] = Some(if node.is_leaf() {
+            let indices = binary.primitive_indices[first..first + node.prim_count as usize].iter().copied();
+            Tree::leaf(indices.collect(), bounds, LEAF_COST * area)
+        } else {
+            let parts = [first, first + 1].map(|part| trees[part].take().unwrap_or_else(missing));
+            let leaf = both(&parts).map(|leaf| (leaf, LEAF_COST * area));
+            Tree::node(parts, bounds, area, leaf)
+        });
+    }
+    trees[0].take().unwrap_or_else(missing)
+}
+
+/// A tree of parts of as many triangles each.
+fn halves(indices: &mut [u32], boxes: &[Aabb]) -> Tree<Indices, NodeBox> {
+    let bounds = indices.iter().fold(Aabb::empty(), |bounds, &index| bounds.union(&boxes[index as usize]));
+    let area = bounds.half_area();
+    let node_box = NodeBox { lower: bounds.min.to_array(), upper: bounds.max.to_array() };
+    if let Ok(leaf) = Indices::from_slice(indices) {
+        return Tree::leaf(leaf, node_box, LEAF_COST * area);
+    }
+    let axis = bounds.diagonal().max_position();
+    let (middle, center) = (indices.len() / 2, |index: u32| boxes[index as usize].center()[axis]);
+    indices.select_nth_unstable_by(middle, |&a, &b| center(a).total_cmp(&center(b)).then(a.cmp(&b)));
+    let (below, above) = indices.split_at_mut(middle);
+    Tree::node([halves(below, boxes), halves(above, boxes)], node_box, area, None)
+}
+
+/// The triangles of two parts, if one leaf holds them.
+fn both(parts: &[Tree<Indices, NodeBox>; 2]) -> Option<Indices> {
+    let mut indices = Indices::new();
+    for part in parts {
+        indices.extend_from_slice(part.as_leaf()?).ok()?;
+    }
+    indices.sort_unstable();
+    Some(indices)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use photoncard_firmware::sampler::hash;
+    use photoncard_shared::layout::{Child, WideNode};
+
+    use super::*;
+
+    fn triangles(count: u32) -> Vec<Triangle> {
+        let random = |i: u32, k: u32| (hash(hash(i).wrapping_add(k)) >> 8) as f32 / 16_777_216.0;
+        let point = |i: u32, k: u32| Vec3::new(random(i, k), random(i, k + 1), random(i, k + 2));
+        let corners = |i: u32| [0, 3, 6].map(|k| point(i, 9) + 0.1 * point(i, k));
+        (0..count).map(|i| Triangle { vertices: corners(i), material: i }).collect()
     }
 
-    /// `None` if there is more than a reference can tell.
-    fn run(mut self) -> Option<Hierarchy> {
-        self.nodes.push(BvhNode::EMPTY);
-        let root = &self.binary.nodes[0];
-        let children = if root.is_leaf() { vec![0] } else { self.four_children(0) };
-        let mut waiting = vec![(0, children)];
-        while let Some((target, children)) = waiting.pop() {
-            for (slot, child) in children.into_iter().enumerate() {
-                let node = &self.binary.nodes[child];
-                let reference = if node.is_leaf() {
-                    self.leaf(node.first_index as usize, node.prim_count as usize)?
-                } else {
-                    let index = self.nodes.len();
-                    self.nodes.push(BvhNode::EMPTY);
-                    waiting.push((index, self.four_children(child)));
-                    ChildReference::node(u32::try_from(index).ok()?)?
-                };
-                self.place(target, slot, child, reference);
+    /// The triangles below a child, each within the boxes that the nodes above give.
+    fn walk(hierarchy: &Hierarchy, child: Child, room: NodeBox, found: &mut Vec<u32>) {
+        let node = match child {
+            Child::Leaf(leaf) => {
+                let leaf = BvhLeaf(&hierarchy.leaves[leaf as usize]);
+                let mut indices: Vec<u32> = (0..LEAF_TRIANGLES)
+                    .map(|slot| {
+                        let triangle = leaf.triangle(slot);
+                        let corners = triangle.vertices.map(|v| NodeBox { lower: v, upper: v });
+                        assert!(corners.into_iter().all(|corner| room.union(corner) == room));
+                        triangle.material
+                    })
+                    .collect();
+                // A leaf that is not full repeats its first.
+                indices.sort_unstable();
+                indices.dedup();
+                found.extend(indices);
+                return;
             }
-        }
-        Some(Hierarchy { nodes: self.nodes, order: self.order })
-    }
-
-    /// Up to four descendants of an inner node: its children, the largest of them opened until there are four.
-    fn four_children(&self, node: usize) -> Vec<usize> {
-        let children_of = |node: usize| {
-            let first = self.binary.nodes[node].first_index as usize;
-            [first, first + 1]
+            Child::Node(node) => &hierarchy.nodes[node as usize],
         };
-        let mut children = children_of(node).to_vec();
-        while children.len() < 4 {
-            let area = |child: usize| self.binary.nodes[child].aabb().half_area();
-            let inner = (0..children.len()).filter(|&slot| !self.binary.nodes[children[slot]].is_leaf());
-            let Some(slot) = inner.max_by(|&a, &b| area(children[a]).total_cmp(&area(children[b]))) else {
-                break;
+        for index in 0..WideNode(node).children() {
+            let child = BvhNode(node).bounds(index as usize).expect("a child");
+            let room = NodeBox {
+                lower: [0, 1, 2].map(|axis| child.lower[axis].max(room.lower[axis])),
+                upper: [0, 1, 2].map(|axis| child.upper[axis].min(room.upper[axis])),
             };
-            let [left, right] = children_of(children[slot]);
-            children[slot] = left;
-            children.push(right);
+            walk(hierarchy, WideNode(node).links().child(index), room, found);
         }
-        children
     }
 
-    fn leaf(&mut self, first: usize, count: usize) -> Option<ChildReference> {
-        let start = u32::try_from(self.order.len()).ok()?;
-        self.order.extend_from_slice(&self.binary.primitive_indices[first..first + count]);
-        ChildReference::leaf(start, u32::try_from(count).ok()?)
-    }
-
-    fn place(&mut self, target: usize, slot: usize, child: usize, reference: ChildReference) {
-        let bounds = self.binary.nodes[child].aabb();
-        let (lower, upper) = (bounds.min.to_array(), bounds.max.to_array());
-        let node = &mut self.nodes[target];
-        for axis in 0..3 {
-            node.lower[axis][slot] = lower[axis];
-            node.upper[axis][slot] = upper[axis];
+    #[test]
+    fn every_triangle_is_in_one_leaf_and_in_its_boxes() {
+        for count in [1, 2, 3, 4, 17, 1000, 20_000] {
+            let hierarchy = build(&triangles(count)).expect("builds");
+            let everywhere = NodeBox { lower: [-9.0; 3], upper: [9.0; 3] };
+            let mut found = Vec::new();
+            walk(&hierarchy, Child::Node(0), everywhere, &mut found);
+            found.sort_unstable();
+            assert!(found.into_iter().eq(0..count), "{count} triangles");
         }
-        node.children[slot] = reference;
     }
-}
 
-/// Levels of nodes.
-fn depth(nodes: &[BvhNode]) -> usize {
-    let mut deepest = 0;
-    let mut waiting = vec![(0, 1)];
-    while let Some((index, level)) = waiting.pop() {
-        deepest = deepest.max(level);
-        let children = nodes[index as usize].children.into_iter();
-        let inner = children.filter(|&child| child != ChildReference::EMPTY && child.triangles().is_none());
-        waiting.extend(inner.map(|child| (child.0, level + 1)));
+    #[test]
+    fn triangles_in_one_place_are_no_trouble() {
+        let [triangle] = triangles(1)[..] else { unreachable!() };
+        let hierarchy = build(&vec![triangle; 5000]).expect("builds");
+        assert!(hierarchy.leaves.len() >= 5000 / 3);
     }
-    deepest
 }

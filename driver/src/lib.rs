@@ -8,6 +8,7 @@ pub mod emulator;
 pub mod error;
 pub mod exr;
 pub mod film;
+mod fold;
 pub mod link;
 pub mod output;
 pub mod pack;

@@ -4,18 +4,21 @@
 //! in it with the chip's own ray caster, so that photons land on exactly the surfaces that gather rays meet. With a
 //! photon map it becomes a [`CardImage`].
 
+use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::budget::Budget;
 use photoncard_shared::image::{Header, SECTIONS, Section, SectionKind};
-use photoncard_shared::layout::{self, Photon, PhotonGrid, Record, power_of_two_above};
+use photoncard_shared::layout::{
+    self, BvhNode, NodeBox, Photon, PhotonGrid, Record, WideNode, power_of_two_above,
+};
 
 use crate::bvh::{self, HierarchyError};
 use crate::emitter::Emitters;
 use crate::photon::leaves::{PhotonLines, Placed};
 use crate::photon::{PhotonLayout, PhotonMap};
-use crate::scene::{Material, Scene, Triangle};
+use crate::scene::{Material, Scene};
 
 /// Photons of a line of leaves, the inner nodes' lines counted in, about.
 const PHOTONS_OF_A_LEAF: usize = 9;
@@ -78,10 +81,8 @@ impl PackedScene {
             radiance_unit: radiance_unit(scene, emitters),
             emitter_density: emitters.density_per_radiance(),
         };
-        packed.append(SectionKind::Nodes, hierarchy.nodes.iter().map(layout::BvhNode::to_bytes))?;
-        let triangles =
-            hierarchy.order.iter().map(|&index| triangle_record(&scene.triangles[index as usize]));
-        packed.append(SectionKind::Triangles, triangles)?;
+        packed.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
+        packed.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
         packed.append(SectionKind::Materials, scene.materials.iter().map(material_record))?;
         packed.append(SectionKind::Emitters, emitters.records().iter().map(layout::Emitter::to_bytes))?;
         packed
@@ -122,13 +123,8 @@ impl PackedScene {
     /// The grid for photons' positions: the finest that holds the scene.
     pub fn photon_grid(&self) -> PhotonGrid {
         let (scene, mut memory) = self.view();
-        let root = scene.record::<LINE_BYTES, 1>(&mut memory, SectionKind::Nodes, 0);
-        root.map_or(PhotonGrid::UNIT, |bytes| {
-            let root = layout::BvhNode::read(bytes);
-            let lower = root.lower.map(|corners| corners.into_iter().fold(f32::INFINITY, f32::min));
-            let upper = root.upper.map(|corners| corners.into_iter().fold(f32::NEG_INFINITY, f32::max));
-            PhotonGrid::around(lower, upper)
-        })
+        root_box(&scene, &mut memory)
+            .map_or(PhotonGrid::UNIT, |NodeBox { lower, upper }| PhotonGrid::around(lower, upper))
     }
 
     /// Bytes of the scene's lines.
@@ -199,6 +195,13 @@ impl CardImage {
         (SceneImage { header }, Lines(&self.lines))
     }
 
+    /// The diagonal of the box around the scene, metres.
+    pub fn diagonal(&self) -> f32 {
+        let (scene, mut memory) = self.view();
+        root_box(&scene, &mut memory)
+            .map_or(1.0, |NodeBox { lower, upper }| Vec3::from(upper).distance(Vec3::from(lower)))
+    }
+
     /// The same image with its photons in leaves, for searches of about `radius` metres. It finds the same photons.
     ///
     /// # Errors
@@ -228,7 +231,7 @@ impl CardImage {
             emitter_density: header.emitter_density,
         };
         scene.sections[SectionKind::Photons as usize] = Section::default();
-        scene.append(SectionKind::PhotonTreelets, map.treelets.into_iter())?;
+        scene.append(SectionKind::PhotonNodes, map.nodes.into_iter())?;
         scene.append(SectionKind::PhotonLeaves, map.leaves.into_iter())?;
         scene.lines[0] = scene.header(header.photon_power_unit, grid).to_line();
         Ok(Self { lines: scene.lines })
@@ -247,7 +250,7 @@ impl CardImage {
         let lines = |kind| header.section(kind).records as u64 * LINE_BYTES as u64;
         Err(PackError::Dram {
             needed,
-            photons: lines(SectionKind::PhotonTreelets) + lines(SectionKind::PhotonLeaves),
+            photons: lines(SectionKind::PhotonNodes) + lines(SectionKind::PhotonLeaves),
             available,
             remedy: "lower --photons, or use a card with more memory".into(),
         })
@@ -257,6 +260,13 @@ impl CardImage {
     pub fn bytes(&self) -> u64 {
         self.lines.len() as u64 * LINE_BYTES as u64
     }
+}
+
+/// The box around a scene, and little more.
+fn root_box(scene: &SceneImage, memory: &mut Lines) -> Option<NodeBox> {
+    let line = scene.line(memory, SectionKind::Nodes, 0, 0..LINE_BYTES as u32).ok()?;
+    let children = 0..WideNode(line).children() as usize;
+    children.filter_map(|child| BvhNode(line).bounds(child)).reduce(NodeBox::union)
 }
 
 /// Packs records into lines, none of them across a border.
@@ -271,11 +281,6 @@ fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl It
         }
         Some(line)
     })
-}
-
-fn triangle_record(triangle: &Triangle) -> [u8; layout::Triangle::BYTES] {
-    let vertices = triangle.vertices.map(|vertex| vertex.to_array());
-    layout::Triangle { vertices, material: triangle.material }.to_bytes()
 }
 
 fn material_record(material: &Material) -> [u8; layout::Material::BYTES] {

@@ -76,16 +76,31 @@ impl ColourSum {
 
     /// Adds a shared-exponent colour: what [`Self::add`] does of the decoded one, in integers alone.
     #[inline(always)]
-    pub fn add_rgbe(&mut self, Rgbe([r, g, b, exponent]): Rgbe) {
-        let shift = exponent as i32 - Rgbe::EXPONENT_BIAS + I24F40::FRAC_NBITS as i32;
-        for (sum, mantissa) in self.0.iter_mut().zip([r, g, b]) {
-            // A shift of 63 or more leaves nothing of a byte on either side.
-            let bits = if shift >= 0 {
-                (mantissa as i64) << shift.min(63)
-            } else {
-                mantissa as i64 >> (-shift).min(63)
-            };
-            sum.add_bits(bits);
+    pub fn add_rgbe(&mut self, power: Rgbe) {
+        self.add_powers(&[u32::from_le_bytes(power.0).into()]);
+    }
+
+    /// Adds the [`Rgbe`] colours that are the first four bytes of each little-endian number.
+    #[inline(always)]
+    pub(crate) fn add_powers(&mut self, photons: &[u64]) {
+        let mut sums = [0_u64; 3];
+        for &photon in photons {
+            let [r, g, b] = &mut sums;
+            let [more_r, more_g, more_b] = bits_of_power(photon);
+            *r = r.wrapping_add(more_r);
+            *g = g.wrapping_add(more_g);
+            *b = b.wrapping_add(more_b);
+        }
+        for (sum, bits) in self.0.iter_mut().zip(sums) {
+            sum.add_bits(bits.cast_signed());
+        }
+    }
+
+    /// Takes one of the colours away that [`Self::add_powers`] has added.
+    #[inline(always)]
+    pub(crate) fn subtract_power(&mut self, photon: u64) {
+        for (sum, bits) in self.0.iter_mut().zip(bits_of_power(photon)) {
+            sum.add_bits(bits.wrapping_neg().cast_signed());
         }
     }
 
@@ -94,6 +109,17 @@ impl ColourSum {
     pub fn value(&self) -> Vec3 {
         Vec3::from_array(self.0.map(Sum::value))
     }
+}
+
+/// What a shared-exponent colour, the first four bytes, adds to the bits of three sums.
+#[inline(always)]
+fn bits_of_power(photon: u64) -> [u64; 3] {
+    // Of the exponent's byte, that of which a mantissa is in units of the sum's last bit.
+    const UNIT: u32 = Rgbe::EXPONENT_BIAS as u32 - I24F40::FRAC_NBITS;
+    let exponent = (photon >> 24) as u32 & 0xff;
+    // A shift of 63 leaves nothing of a byte on either side; one of the two is none.
+    let [up, down] = [exponent.saturating_sub(UNIT).min(63), UNIT.saturating_sub(exponent).min(63)];
+    [photon, photon >> 8, photon >> 16].map(|mantissa| (mantissa & 0xff) << up >> down)
 }
 
 #[cfg(test)]

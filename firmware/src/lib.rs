@@ -32,7 +32,8 @@
 //! Random numbers depend on (pixel, sample, dimension) alone. Sums over photons and over gather rays are made in fixed
 //! point ([`fixed_point`]), so their order does not matter. Nothing depends on the processor: `f32` operations, `libm`
 //! and integer arithmetic, never a fused multiply-add.
-#![forbid(unsafe_code)]
+// But for the instructions that `simd` chooses.
+#![deny(unsafe_code)]
 #![no_std]
 // A chip never panics: what could is kept out, or its reason given.
 #![cfg_attr(
@@ -61,4 +62,6 @@ pub mod render;
 pub mod sampler;
 pub mod scene;
 pub mod serve;
+pub mod simd;
 mod vector;
+mod wide_tree;

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::layout::LEAF_LANES;
+
 /// The fixed capacities of one kind of chip. A host reads them in the card's hello and keeps within them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Budget {
@@ -106,15 +108,16 @@ pub const MOST_GATHER_RAYS: u32 = 1 << 14;
 pub const MOST_BINS: u32 = 256;
 
 /// Entries of the stack of a descent in the bounding volume hierarchy: a host refuses a hierarchy that needs more.
-pub const BVH_STACK: usize = 96;
+pub const BVH_STACK: usize = 160;
 
 /// Levels of the photon kd-tree: enough for 2^27 photons.
 pub const KD_TREE_LEVELS: usize = 27;
 
-/// Entries of the stack of a search in a photon map of leaves: a host makes no deeper tree.
-pub const PHOTON_STACK: usize = 48;
+/// Entries of the stack of a search in a photon map of leaves: a host makes no tree that needs more.
+pub const PHOTON_STACK: usize = 160;
 
-/// Candidates that a gather of `neighbors` photons may hold before it selects the nearest of them.
+/// Candidates that a gather of `neighbors` photons has room for: those before it selects the nearest of them, and those
+/// that are tested at once.
 pub const fn gather_candidates(neighbors: u32) -> usize {
-    2 * neighbors as usize
+    2 * neighbors as usize + LEAF_LANES
 }

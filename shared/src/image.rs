@@ -5,15 +5,15 @@
 //! zero bytes.
 //!
 //! The photon map has one of two layouts, and the sections of the other are empty: [`SectionKind::Photons`], or
-//! [`SectionKind::PhotonTreelets`] and [`SectionKind::PhotonLeaves`].
+//! [`SectionKind::PhotonNodes`] and [`SectionKind::PhotonLeaves`].
 
 use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
-use crate::layout::{BvhNode, Emitter, Material, Photon, PhotonGrid, Record, Triangle};
+use crate::layout::{Emitter, Material, Photon, PhotonGrid, Record};
 
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// The version of everything in this module and in [`crate::layout`].
-pub const LAYOUT_VERSION: u16 = 3;
+pub const LAYOUT_VERSION: u16 = 4;
 /// Emitter thresholds in one line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
@@ -21,9 +21,9 @@ pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SectionKind {
-    /// [`BvhNode`]s, the root first.
+    /// [`crate::layout::BvhNode`]s, the root first.
     Nodes = 0,
-    /// [`Triangle`]s, in the order of the leaves.
+    /// [`crate::layout::BvhLeaf`]s, of triangles.
     Triangles = 1,
     /// [`Material`]s.
     Materials = 2,
@@ -33,8 +33,8 @@ pub enum SectionKind {
     EmitterThresholds = 4,
     /// [`Photon`]s, a left-balanced kd-tree: the children of `i` are `2 i + 1` and `2 i + 2`.
     Photons = 5,
-    /// [`crate::layout::PhotonTreelet`]s, the root first.
-    PhotonTreelets = 6,
+    /// [`crate::layout::PhotonNode`]s, the root first.
+    PhotonNodes = 6,
     /// [`crate::layout::PhotonLeaf`]s.
     PhotonLeaves = 7,
 }
@@ -51,20 +51,18 @@ impl SectionKind {
         Self::Emitters,
         Self::EmitterThresholds,
         Self::Photons,
-        Self::PhotonTreelets,
+        Self::PhotonNodes,
         Self::PhotonLeaves,
     ];
 
     /// Records that one line holds.
     pub const fn records_per_line(self) -> u32 {
         match self {
-            Self::Nodes => BvhNode::PER_LINE as u32,
-            Self::Triangles => Triangle::PER_LINE as u32,
             Self::Materials => Material::PER_LINE as u32,
             Self::Emitters => Emitter::PER_LINE as u32,
             Self::EmitterThresholds => THRESHOLDS_PER_LINE,
             Self::Photons => Photon::PER_LINE as u32,
-            Self::PhotonTreelets | Self::PhotonLeaves => 1,
+            Self::Nodes | Self::Triangles | Self::PhotonNodes | Self::PhotonLeaves => 1,
         }
     }
 
@@ -76,7 +74,7 @@ impl SectionKind {
             Self::Triangles => Structure::Triangles,
             Self::Materials => Structure::Materials,
             Self::Emitters | Self::EmitterThresholds => Structure::Emitters,
-            Self::PhotonTreelets => Structure::PhotonNodes,
+            Self::PhotonNodes => Structure::PhotonNodes,
             Self::Photons | Self::PhotonLeaves => Structure::Photons,
         }
     }

@@ -3,10 +3,10 @@
 //! | record | bytes | a line holds |
 //! |---|---|---|
 //! | [`Photon`] | 20 | 6 |
-//! | [`PhotonTreelet`] | 128 | 1 |
+//! | [`PhotonNode`] | 128 | 1 |
 //! | [`PhotonLeaf`] | 128 | 1 |
 //! | [`BvhNode`] | 128 | 1 |
-//! | [`Triangle`] | 40 | 3 |
+//! | [`BvhLeaf`], up to three triangles | 128 | 1 |
 //! | [`Material`] | 64 | 2 |
 //! | [`Emitter`] | 64 | 2 |
 //! | emitter threshold | 4 | 32 |
@@ -16,19 +16,27 @@
 
 use crate::address::LINE_BYTES;
 
+mod bvh_leaf;
+mod bvh_node;
 mod direction;
 mod photon;
 mod photon_grid;
-mod photon_lines;
+mod photon_leaf;
+mod photon_node;
 mod scene;
+mod wide_node;
 
+pub use bvh_leaf::{BvhLeaf, LEAF_TRIANGLES, TRIANGLE_LANES, Triangle};
+pub use bvh_node::{BvhAxis, BvhNode, NodeBox};
 pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
 pub use photon::{FULL_DISC, Photon, Rgbe};
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};
-pub use photon_lines::{
-    LEAF_PHOTONS, PHOTON_CONTENT_BYTES, PhotonChild, PhotonLeaf, PhotonNode, PhotonTreelet, TREELET_NODES,
+pub use photon_leaf::{
+    LEAF_LANES, LEAF_PHOTONS, LeafCoordinates, PHOTON_CONTENT_BYTES, PhotonLeaf, leaf_capacity,
 };
-pub use scene::{BvhNode, ChildReference, DOUBLE_SIDED, Emitter, MAX_LEAF_TRIANGLES, Material, Triangle};
+pub use photon_node::{GridBox, NodeCoordinates, PhotonNode};
+pub use scene::{DOUBLE_SIDED, Emitter, Material};
+pub use wide_node::{Child, Links, NODE_CHILDREN, WideNode};
 
 /// A record of fixed size in card memory.
 pub trait Record: Sized {
@@ -70,5 +78,19 @@ fn write_f32<const N: usize>(bytes: &mut [u8; N], offset: usize, value: f32) {
 fn write_vector<const N: usize>(bytes: &mut [u8; N], offset: usize, value: [f32; 3]) {
     for (axis, component) in value.into_iter().enumerate() {
         write_f32(bytes, offset + 4 * axis, component);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    /// Numbers that look random, the same for the same seed.
+    pub(super) fn random(seed: u64) -> impl FnMut() -> u64 {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        move || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            state
+        }
     }
 }

@@ -17,7 +17,7 @@ use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::chip::{Progress, ReferenceChip};
 use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::MemoryPort;
-use photoncard_firmware::photon::{Candidate, NearestPhotons, gather};
+use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather};
 use photoncard_firmware::render::Context;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{Ray, closest_hit, is_occluded, read_surface};
@@ -107,13 +107,13 @@ impl Prepared {
 fn gather_all(bencher: Bencher, image: &CardImage, shuffled: bool) {
     let queries = CORNELL.queries(2000, shuffled);
     let (scene, mut memory) = image.view();
-    let mut buffer = heapless::Vec::<Candidate, 512>::new();
+    let mut buffer = CandidateBuffer::<512>::new();
     bencher.counter(ItemsCount::new(queries.len())).bench_local(|| {
         let mut found = 0;
         for &query in &queries {
-            let mut nearest = NearestPhotons::new(&mut buffer, NEIGHBORS, CORNELL.max_distance);
+            let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, CORNELL.max_distance);
             gather(&scene, &mut memory, query, &mut nearest).expect("sound");
-            found += nearest.candidates().len();
+            found += nearest.len();
         }
         found
     });

@@ -11,7 +11,7 @@ use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::tiles;
 use photoncard_firmware::chip::ReferenceChip;
-use photoncard_firmware::photon::Candidate;
+use photoncard_firmware::photon::CandidateBuffer;
 use photoncard_firmware::render::eye::see;
 use photoncard_firmware::render::final_gather::{cast, gathered};
 use photoncard_firmware::render::{Context, GatherPoint};
@@ -132,15 +132,15 @@ impl<'a> IndirectLight<'a> {
                 counters: &mut counters,
                 outlet: None,
             };
-            let mut candidates = heapless::Vec::<Candidate, 512>::new();
+            let mut candidates = CandidateBuffer::<512>::new();
             let pattern = Pattern::new(seed, index as u32, 0, 0, Dimension::Gather);
             let mut point = GatherPoint::sample(*surface, pattern, rays);
-            point.choose_directions(&mut context, &mut candidates).expect("sound");
+            point.choose_directions(&mut context, candidates.view()).expect("sound");
             let mut sum = Vec3::ZERO;
             for ray in 0..rays {
                 let end = cast(&mut context, &point, 0, 1.0, ray).expect("sound");
                 if let Some(request) = end.and_then(|end| end.request) {
-                    sum += gathered(&mut context, &request, &mut candidates).expect("sound");
+                    sum += gathered(&mut context, &request, candidates.view()).expect("sound");
                 }
             }
             sum * scene.header.radiance_unit

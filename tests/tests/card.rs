@@ -9,7 +9,7 @@ use photoncard_shared::address::Line;
 use photoncard_shared::budget::MICRO;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::image::{Header, SectionKind};
-use photoncard_shared::layout::{BvhNode, ChildReference};
+use photoncard_shared::layout::{BvhNode, Links, NodeBox};
 use photoncard_shared::message::{
     CHUNK_LINES, Command, FaultCode, FrameParameters, MemoryUse, PROTOCOL_VERSION, Tile,
 };
@@ -108,13 +108,12 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
     });
 }
 
-/// A copy of the image with another root node.
-fn with_root(image: &CardImage, change: impl FnOnce(&mut BvhNode)) -> Vec<Line> {
+/// A copy of the image with another root node: one of so many children, each of them everywhere.
+fn with_root(image: &CardImage, children: usize, links: Links) -> Vec<Line> {
     let mut lines = image.lines().to_vec();
     let root = Header::read(&lines[0]).unwrap().section(SectionKind::Nodes).first_line as usize;
-    let mut node = BvhNode::read(&lines[root].0);
-    change(&mut node);
-    lines[root] = Line(node.to_bytes());
+    let everywhere = NodeBox { lower: [-9.0; 3], upper: [9.0; 3] };
+    lines[root] = Line(BvhNode::encode(&vec![everywhere; children], links).unwrap());
     lines
 }
 
@@ -122,25 +121,12 @@ fn with_root(image: &CardImage, change: impl FnOnce(&mut BvhNode)) -> Vec<Line> 
 fn unsound_images_end_in_faults_and_not_in_a_hang() {
     with_room_for_a_card(|| {
         let image = image();
-        let everywhere = |node: &mut BvhNode, child: ChildReference| {
-            node.lower = [[-9.0; 4]; 3];
-            node.upper = [[9.0; 4]; 3];
-            node.children = [child; 4];
-        };
+        let nodes = |first_node: u32| Links { leaves: 0, first_leaf: 0, first_node };
         let unsound = [
-            (with_root(&image, |node| everywhere(node, ChildReference(0))), FaultCode::Depth),
-            (
-                with_root(&image, |node| {
-                    everywhere(node, ChildReference::EMPTY);
-                    node.children[0] = ChildReference(0);
-                }),
-                FaultCode::Depth,
-            ),
-            (with_root(&image, |node| everywhere(node, ChildReference(1_000_000))), FaultCode::Record),
-            (
-                with_root(&image, |node| everywhere(node, ChildReference::leaf(5_000, 3).unwrap())),
-                FaultCode::Record,
-            ),
+            (with_root(&image, 1, nodes(0)), FaultCode::Depth),
+            (with_root(&image, 16, nodes(1_000_000)), FaultCode::Record),
+            (with_root(&image, 2, nodes(u32::MAX)), FaultCode::Depth),
+            (with_root(&image, 3, Links { leaves: 3, first_leaf: 5_000, first_node: 0 }), FaultCode::Record),
         ];
         let mut memory = vec![Line::ZERO; DRAM_LINES];
         let mut wire = Wire::new(&mut memory);

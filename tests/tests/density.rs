@@ -6,8 +6,9 @@ use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::scene::{Material, Scene};
 use photoncard_firmware::gather::PartialReflection;
-use photoncard_firmware::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
+use photoncard_firmware::photon::{CandidateBuffer, Estimate, NearestPhotons, gather};
 use photoncard_firmware::scene::{Reflection, Surface};
+use photoncard_firmware::simd::Level;
 use photoncard_tests::{camera, lambertian, quad, room, scene};
 
 const NEIGHBORS: u32 = 100;
@@ -33,11 +34,11 @@ impl Map {
         Self { image, max_distance }
     }
 
-    /// Radiance, W/(sr m^2), that a Lambertian surface reflects at a place.
+    /// Radiance, W/(sr m^2), that a Lambertian surface reflects at a place: the same whatever instructions sum it.
     fn radiance(&self, position: Vec3, normal: Vec3) -> f64 {
         let (scene, mut memory) = self.image.view();
-        let mut buffer = heapless::Vec::<Candidate, 512>::new();
-        let mut nearest = NearestPhotons::new(&mut buffer, NEIGHBORS, self.max_distance);
+        let mut buffer = CandidateBuffer::<512>::new();
+        let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, self.max_distance);
         gather(&scene, &mut memory, position, &mut nearest).unwrap();
         let surface = Surface {
             position,
@@ -51,7 +52,11 @@ impl Map {
         };
         let reflection =
             PartialReflection::new(&surface, Vec3::splat(scene.header.photon_power_unit), 1 << 31);
-        reflected_radiance(&nearest, position, &reflection).x as f64
+        let estimate = || Estimate { nearest: &nearest, position, reflection: &reflection };
+        let mut radiances = Level::ALL.iter().filter_map(|level| level.run(estimate()));
+        let radiance = radiances.next().expect("what every processor has");
+        assert!(radiances.all(|other| other == radiance), "{position}");
+        radiance.x as f64
     }
 
     /// Mean radiance of a hundred places along a line.

@@ -13,7 +13,7 @@ use photoncard_firmware::memory::{
     CacheEntry, CacheShape, Counted, LineCache, LineCaches, Lines, MemoryPort, SetIndex, Stage,
 };
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::layout::{BvhNode, Material, Photon, PhotonTreelet, Record};
+use photoncard_shared::layout::{Material, Photon, Record};
 use photoncard_shared::message::{Fault, Tile};
 use photoncard_tests::lru::LruOracle;
 use photoncard_tests::{radiances, render_or_panic, with_room_for_a_card};
@@ -222,7 +222,9 @@ fn what_is_counted_does_not_depend_on_how_tiles_are_dealt() {
         assert_eq!(one.written_bytes, statistics.image_bytes);
         for chips in 2..4 {
             let (several, statistics) = measured(&with(&format!("emulated:{chips}")));
-            assert_eq!(several.written_bytes, chips * statistics.image_bytes);
+            // The others may have done all tiles before a chip is loaded.
+            let written = statistics.image_bytes..=chips * statistics.image_bytes;
+            assert!(written.contains(&several.written_bytes), "{}", several.written_bytes);
             assert_eq!(MemoryStatistics { written_bytes: one.written_bytes, ..several }, one);
         }
         // Chips without cards, one for all tiles, the last tile first.
@@ -249,11 +251,11 @@ fn counts_are_of_whole_records_and_whole_lines() {
         let structures = &memory.structures;
         let is_jensen = photon_layout == PhotonLayout::Jensen;
         let of_photon = if is_jensen { Photon::BYTES } else { LINE_BYTES };
-        let node = PhotonTreelet::NODE_BYTES as usize;
         for (reads, record) in [
-            (structures.nodes, BvhNode::BYTES),
+            (structures.nodes, LINE_BYTES),
+            (structures.triangles, LINE_BYTES),
             (structures.materials, Material::BYTES),
-            (structures.photon_nodes, node),
+            (structures.photon_nodes, LINE_BYTES),
             (structures.photons, of_photon),
         ] {
             assert_eq!(reads.raw_bytes, reads.requests * record as u64, "{record}");

@@ -4,7 +4,8 @@ use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{Arrival, PhotonMap};
-use photoncard_firmware::photon::{Candidate, NearestPhotons, gather};
+use photoncard_firmware::photon::{Candidate, CandidateBuffer, NearestPhotons, Search};
+use photoncard_firmware::simd::Level;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::Photon;
 use photoncard_tests::{camera, lambertian, room, scene};
@@ -32,15 +33,23 @@ fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
 /// What tells a photon from another, as far as it matters.
 type Found = (u32, [u8; 2]);
 
-/// Distances and directions of the chip's search, nearest first.
+/// Distances and directions of the chip's search, nearest first, whatever instructions it uses.
 fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<Found> {
-    let (scene, mut memory) = image.view();
-    let mut buffer = heapless::Vec::<Candidate, 512>::new();
-    let mut nearest = NearestPhotons::new(&mut buffer, neighbors, max_distance);
-    gather(&scene, &mut memory, query, &mut nearest).unwrap();
-    let mut all: Vec<Candidate> = nearest.candidates().to_vec();
-    all.sort_unstable_by_key(Candidate::order);
-    all.into_iter().map(|c| (c.distance_squared().to_bits(), c.direction())).collect()
+    let mut results = Level::ALL.iter().filter_map(|level| {
+        let (scene, mut memory) = image.view();
+        let mut buffer = CandidateBuffer::<512>::new();
+        let mut nearest = NearestPhotons::new(buffer.view(), neighbors, max_distance);
+        let search = Search { scene: &scene, memory: &mut memory, position: query, nearest: &mut nearest };
+        let tested = level.run(search)?.unwrap();
+        let mut all: Vec<Candidate> = nearest.candidates().collect();
+        all.sort_unstable_by_key(Candidate::order);
+        let all: Vec<Found> =
+            all.into_iter().map(|c| (c.distance_squared().to_bits(), c.direction())).collect();
+        Some((tested, all))
+    });
+    let first = results.next().expect("what every processor has");
+    assert!(results.all(|result| result == first), "query {query}");
+    first.1
 }
 
 /// The same by looking at every photon.

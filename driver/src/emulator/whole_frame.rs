@@ -11,7 +11,7 @@ use photoncard_firmware::chip::{Completion, ReferenceChip};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::photon::Candidate;
+use photoncard_firmware::photon::CandidateBuffer;
 use photoncard_firmware::render::final_gather::gathered;
 use photoncard_firmware::render::{Context, GatherOutlet};
 use photoncard_shared::budget::{REFERENCE, gather_candidates};
@@ -295,10 +295,10 @@ fn do_gathers<'a, M: MeasuredMemory>(
         counters: &mut counters,
         outlet: None,
     };
-    let mut candidates = heapless::Vec::<Candidate, { gather_candidates(REFERENCE.neighbors) }>::new();
+    let mut candidates = CandidateBuffer::<{ gather_candidates(REFERENCE.neighbors) }>::new();
     let mut brought = Vec::with_capacity(waiting.len());
     for Waiting { sum, request, .. } in waiting {
-        brought.push((*sum, gathered(&mut context, request, &mut candidates)?));
+        brought.push((*sum, gathered(&mut context, request, candidates.view())?));
     }
     Ok(Gathered { brought, counters, traffic: memory.traffic() })
 }

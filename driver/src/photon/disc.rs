@@ -10,7 +10,7 @@
 
 use glam::Vec3;
 use photoncard_firmware::memory::{Lines, MemoryPort};
-use photoncard_firmware::photon::{Candidate, MIN_NORMAL_COSINE, NearestPhotons, gather};
+use photoncard_firmware::photon::{CandidateBuffer, MIN_NORMAL_COSINE, NearestPhotons, gather};
 use photoncard_firmware::scene::{Ray, SceneImage, closest_hit, magnitude, offset_origin, read_surface};
 use photoncard_shared::budget::{REFERENCE, gather_candidates};
 use photoncard_shared::image::SectionKind;
@@ -32,13 +32,13 @@ const SAMPLED_PHOTONS: usize = 2048;
 /// Share of the sampled photons whose k-th neighbour lies within the automatic greatest distance.
 const COVERED_SHARE: f64 = 0.95;
 
-type CandidateBuffer = heapless::Vec<Candidate, { gather_candidates(REFERENCE.neighbors) }>;
+type Buffer = CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>;
 
 /// A search of the photon map, with its buffer.
 struct Searcher<'a> {
     scene: SceneImage,
     memory: Lines<'a>,
-    buffer: Box<CandidateBuffer>,
+    buffer: Box<Buffer>,
     neighbors: u32,
     max_distance: f32,
 }
@@ -51,12 +51,12 @@ impl<'a> Searcher<'a> {
 
     /// The radius of a gather at `position`, metres: the distance of the k-th photon, or the greatest distance.
     fn radius(&mut self, position: Vec3) -> Result<f32, Fault> {
-        let mut nearest = NearestPhotons::new(&mut *self.buffer, self.neighbors, self.max_distance);
+        let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
         gather(&self.scene, &mut self.memory, position, &mut nearest)?;
         if !nearest.is_full() {
             return Ok(self.max_distance);
         }
-        let farthest = nearest.candidates().iter().map(Candidate::distance_squared).fold(0.0, f32::max);
+        let farthest = nearest.candidates().map(|candidate| candidate.distance_squared()).fold(0.0, f32::max);
         Ok(farthest.sqrt())
     }
 }
@@ -88,22 +88,7 @@ pub(super) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Resul
     distances.sort_by(f32::total_cmp);
     let place = (distances.len() as f64 * COVERED_SHARE) as usize;
     let covered = distances.get(place.min(distances.len().saturating_sub(1))).copied();
-    Ok(covered.unwrap_or_else(|| extent(image)).max(f32::MIN_POSITIVE.sqrt()))
-}
-
-/// The diagonal of the root's box, metres.
-pub(super) fn extent(image: &CardImage) -> f32 {
-    let (scene, mut memory) = image.view();
-    let root = scene.record::<128, 1>(&mut memory, SectionKind::Nodes, 0);
-    root.map_or(1.0, |bytes| {
-        let node = photoncard_shared::layout::BvhNode::read(bytes);
-        let side = |axis: usize| {
-            let lower = node.lower[axis].into_iter().fold(f32::INFINITY, f32::min);
-            let upper = node.upper[axis].into_iter().fold(f32::NEG_INFINITY, f32::max);
-            upper - lower
-        };
-        Vec3::new(side(0), side(1), side(2)).length()
-    })
+    Ok(covered.unwrap_or_else(|| image.diagonal()).max(f32::MIN_POSITIVE.sqrt()))
 }
 
 /// Measures the disc fraction of every photon for gathers of `neighbors` photons within `max_distance`, and writes it

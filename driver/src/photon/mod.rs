@@ -17,7 +17,7 @@ pub use error::PhotonError;
 pub use map::PhotonMap;
 pub use trace::{Arrival, PhotonPass, trace};
 
-use self::disc::{automatic_max_distance, extent, measure_discs};
+use self::disc::{automatic_max_distance, measure_discs};
 use crate::pack::{CardImage, PackedScene};
 
 /// A gather looks at least so many cells of the grid far, so that the grid does not show.
@@ -77,7 +77,7 @@ pub fn map_photons(
     let mut image = packed.with_photons(&map)?;
     let max_distance = match settings.max_distance {
         // Farther than the scene is wide is as good as that wide.
-        Some(distance) => distance.min(extent(&image)),
+        Some(distance) => distance.min(image.diagonal()),
         None => automatic_max_distance(&image, settings.neighbors)?,
     };
     let cell = map.grid().cell;

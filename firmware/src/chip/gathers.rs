@@ -1,18 +1,17 @@
 //! The gathers of a chip: done at once, or waiting in the queue.
 
 use glam::Vec3;
-use heapless::Vec;
 use photoncard_shared::message::{Drain, Fault, FrameParameters};
 
 use crate::gather::{GatherQueue, GatherRequest};
 use crate::memory::MemoryPort;
-use crate::photon::Candidate;
+use crate::photon::CandidateBuffer;
 use crate::render::Context;
 use crate::render::final_gather::gathered;
 
 /// The candidates of a gather, and the gathers that wait.
 pub(super) struct Gathers<const CANDIDATES: usize, const QUEUE: usize> {
-    pub(super) candidates: Vec<Candidate, CANDIDATES>,
+    pub(super) candidates: CandidateBuffer<CANDIDATES>,
     queue: GatherQueue<QUEUE>,
 }
 
@@ -21,7 +20,7 @@ const GATHERS_PER_STEP: usize = 16;
 
 impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
     pub(super) const fn new() -> Self {
-        Self { candidates: Vec::new(), queue: GatherQueue::new() }
+        Self { candidates: CandidateBuffer::new(), queue: GatherQueue::new() }
     }
 
     /// Drops what waits.
@@ -86,7 +85,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         request: &GatherRequest,
         add: &mut impl FnMut(&GatherRequest, Vec3),
     ) -> Result<(), Fault> {
-        let brought = gathered(context, request, &mut self.candidates)?;
+        let brought = gathered(context, request, self.candidates.view())?;
         add(request, brought);
         Ok(())
     }

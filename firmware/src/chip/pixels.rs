@@ -84,7 +84,7 @@ impl<
             let surface = eye::surface(context, place, &seen)?;
             let purpose = self.light_at_once(context, index, at, place, &surface);
             let mut point = pixel_point(context.frame, at, surface, purpose);
-            point.choose_directions(context, &mut self.gathers.candidates)?;
+            point.choose_directions(context, self.gathers.candidates.view())?;
             stored = StoredPoint { seen, directions: point.directions, purpose: Some(purpose) };
         }
         if let Some(slot) = self.points.get_mut(index) {

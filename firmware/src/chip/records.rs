@@ -93,7 +93,7 @@ impl<
         let index = self.position.index;
         let point = self.cache.point(context.frame, index);
         if let (Some(mut point), Some(stored)) = (point, self.points.get_mut(index as usize)) {
-            point.choose_directions(context, &mut self.gathers.candidates)?;
+            point.choose_directions(context, self.gathers.candidates.view())?;
             self.cache.set_point(index, &point);
             stored.directions = point.directions;
         }

@@ -24,6 +24,11 @@ impl MemoryPort for Dram<'_> {
     fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         self.lines.get(address.0 as usize).ok_or_else(|| outside(address))
     }
+
+    #[inline(always)]
+    fn near(&self, address: LineAddress) -> Option<&Line> {
+        self.lines.get(address.0 as usize)
+    }
 }
 
 /// Lines that are only read: many readers may share them.
@@ -34,6 +39,11 @@ impl MemoryPort for Lines<'_> {
     #[inline(always)]
     fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         self.0.get(address.0 as usize).ok_or_else(|| outside(address))
+    }
+
+    #[inline(always)]
+    fn near(&self, address: LineAddress) -> Option<&Line> {
+        self.0.get(address.0 as usize)
     }
 }
 

@@ -25,6 +25,13 @@ pub trait MemoryPort {
     /// [`FaultCode::LineRange`] outside the memory.
     fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault>;
 
+    /// A line that may be read soon, where the processor reads the memory itself: for it to be brought near. This is no
+    /// read, and where reads are counted or cached there is none.
+    #[inline(always)]
+    fn near(&self, _: LineAddress) -> Option<&Line> {
+        None
+    }
+
     /// Tells what the reads to come are for.
     #[inline(always)]
     fn enter(&mut self, _: Stage) {}

@@ -11,6 +11,7 @@ use photoncard_shared::message::{Fault, FaultCode};
 use super::{Candidate, NearestPhotons};
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
+use crate::simd::Isa;
 
 const PHOTONS_PER_LINE: u32 = Photon::PER_LINE as u32;
 
@@ -26,6 +27,7 @@ struct Deferred {
 /// If the image is not sound.
 #[inline(always)]
 pub(super) fn gather(
+    isa: impl Isa,
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     position: Vec3,
@@ -49,7 +51,7 @@ pub(super) fn gather(
             _ => z,
         };
         if distance_squared <= nearest.limit() {
-            nearest.insert(Candidate::new(distance_squared, Photon::content(record)));
+            nearest.insert(isa, Candidate::new(distance_squared, Photon::content(record)));
         }
         let left = 2 * node + 1;
         let (near, far) = if offset < 0.0 { (left, left + 1) } else { (left + 1, left) };

@@ -1,56 +1,20 @@
-//! The photon map in lines: photons in leaves that fill a line each, inner nodes in treelets of a line.
-//!
-//! A kd-tree like [`super::kdtree`], but a visit of a leaf tests ten photons of one line, where a visit of a node there tests
-//! one of a line that is mostly other nodes. The distance to a subtree is that to its part of space, kept coordinate by
-//! coordinate (Arya, Mount 1993, *Algorithms for fast vector quantization*), and not to the last plane alone.
+//! The photon map in lines: photons in leaves that fill a line each, and above them nodes of sixteen children each.
 
 use glam::Vec3;
-use heapless::Vec;
-use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::PHOTON_STACK;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    PHOTON_CONTENT_BYTES, PhotonChild, PhotonLeaf, PhotonTreelet, TREELET_NODES,
+    Child, LEAF_LANES, LeafCoordinates, NodeCoordinates, PhotonGrid, PhotonLeaf, PhotonNode, WideNode,
 };
-use photoncard_shared::message::{Fault, FaultCode};
+use photoncard_shared::message::Fault;
 
-use super::{Candidate, NearestPhotons};
+use super::NearestPhotons;
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
+use crate::simd::{Isa, LANES};
+use crate::wide_tree::{BEYOND, Descent, Order, Stack};
 
-/// A part of the tree.
-#[derive(Clone, Copy)]
-enum Part {
-    /// A node of a treelet.
-    Node(u32, u8),
-    Leaf(u32),
-}
-
-impl Part {
-    fn new(child: PhotonChild, treelet: u32) -> Self {
-        match child {
-            PhotonChild::Node(node) => Self::Node(treelet, node),
-            PhotonChild::Leaf(leaf) => Self::Leaf(leaf),
-            PhotonChild::Treelet(treelet) => Self::Node(treelet, 0),
-        }
-    }
-}
-
-/// A part of the tree put off, and how far its part of space is off, coordinate by coordinate.
-#[derive(Clone, Copy)]
-struct Deferred {
-    part: Part,
-    offset: [f32; 3],
-}
-
-impl Deferred {
-    /// A lower bound of the squared distance of all its photons, rounded as theirs is.
-    #[inline(always)]
-    fn distance_squared(&self) -> f32 {
-        let [x, y, z] = self.offset;
-        x * x + y * y + z * z
-    }
-}
+const _: () = assert!(LEAF_LANES == LANES);
 
 /// Searches the photons nearest to `position` into `nearest`. Returns the number of photons tested.
 ///
@@ -58,93 +22,93 @@ impl Deferred {
 /// If the image is not sound.
 #[inline(always)]
 pub(super) fn gather(
+    isa: impl Isa,
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     position: Vec3,
     nearest: &mut NearestPhotons,
 ) -> Result<u32, Fault> {
-    let [treelets, leaves] = [SectionKind::PhotonTreelets, SectionKind::PhotonLeaves]
-        .map(|kind| scene.header.section(kind).records);
     let query = position.to_array();
-    let mut deferred: Vec<Deferred, PHOTON_STACK> = Vec::new();
-    let root = if treelets > 0 { Part::Node(0, 0) } else { Part::Leaf(0) };
-    let mut next = (leaves > 0).then_some(Deferred { part: root, offset: [0.0; 3] });
-    // A tree's part is visited once: more visits tell of a cycle in an unsound image.
-    let mut visits_left = treelets as u64 * TREELET_NODES as u64 + leaves as u64;
+    let grid = &scene.header.photon_grid;
+    let mut stack = Stack::<{ PHOTON_STACK + LANES }>::new();
+    let mut descent = Descent::new(scene, SectionKind::PhotonNodes, SectionKind::PhotonLeaves, &mut stack);
     let mut tested = 0;
-    while let Some(visited) = next {
-        if visited.distance_squared() > nearest.limit() {
-            next = deferred.pop();
-            continue;
-        }
-        match visited.part {
-            Part::Leaf(leaf) => {
-                tested += test_leaf(scene, memory, query, leaf, nearest)?;
-                next = deferred.pop();
+    while let Some(part) = descent.next(nearest.limit().to_bits())? {
+        match part {
+            Child::Leaf(leaf) => {
+                let line = descent.leaf(memory, leaf)?;
+                tested += test_leaf(isa, grid, PhotonLeaf::read(line), query, nearest);
             }
-            Part::Node(treelet, node) => {
-                let depth = Fault { code: FaultCode::Depth, detail: treelet };
-                visits_left = visits_left.checked_sub(1).ok_or(depth)?;
-                let [near, far] = divide(scene, memory, query, visited.offset, treelet, node)?;
-                if far.distance_squared() <= nearest.limit() {
-                    deferred.push(far).map_err(|_| depth)?;
-                }
-                next = Some(near);
-            }
+            Child::Node(node) => descent.enter(isa, memory, node, Order::NearestFirst, |line| {
+                distances_to_boxes(isa, grid, PhotonNode(line), query, nearest.limit())
+            })?,
         }
     }
     Ok(tested)
 }
 
-/// The two sides of a node's plane: that of the query, and the other.
+/// Lower bounds of the squared distances of what the boxes of a node hold, rounded as those are, up to a limit; as bits.
 #[inline(always)]
-fn divide(
-    scene: &SceneImage,
-    memory: &mut impl MemoryPort,
+fn distances_to_boxes(
+    isa: impl Isa,
+    grid: &PhotonGrid,
+    node: PhotonNode,
     query: [f32; 3],
-    offset: [f32; 3],
-    treelet: u32,
-    node: u8,
-) -> Result<[Deferred; 2], Fault> {
-    let first = node as u32 * PhotonTreelet::NODE_BYTES;
-    let line =
-        scene.line(memory, SectionKind::PhotonTreelets, treelet, first..first + PhotonTreelet::NODE_BYTES)?;
-    let depth = Fault { code: FaultCode::Depth, detail: treelet };
-    let node = PhotonTreelet(line).node(node).ok_or(depth)?;
-    let plane = scene.header.photon_grid.coordinate(node.axis, node.plane);
-    let mut far_offset = offset;
-    let [x, y, z] = &mut far_offset;
-    let (coordinate, offset_there) = match node.axis {
-        0 => (query[0], x),
-        1 => (query[1], y),
-        _ => (query[2], z),
-    };
-    let to_plane = coordinate - plane;
-    *offset_there = to_plane;
-    let [below, above] = node.children.map(|child| Part::new(child, treelet));
-    let (near, far) = if to_plane < 0.0 { (below, above) } else { (above, below) };
-    Ok([Deferred { part: near, offset }, Deferred { part: far, offset: far_offset }])
+    limit: f32,
+) -> [u32; LANES] {
+    let [x, y, z] = node.coordinates();
+    let [a, b, c] = grid.origin;
+    let [p, q, r] = query;
+    let mut distances = [0; LANES];
+    for lane in 0..isa.lanes(WideNode(node.0).children() as usize) {
+        let to_box = |axis: &NodeCoordinates, origin: i32, query: f32| {
+            let side = |sides: &[u8; LANES]| {
+                let side = u32::from(sides.get(lane).copied().unwrap_or(0)) << axis.exponent;
+                // Wraps in unsound images only.
+                (origin.wrapping_add((axis.corner + side).cast_signed())) as f32 * grid.cell
+            };
+            let (below, above) = (side(axis.lower) - query, query - side(axis.upper));
+            let outside = if below > above { below } else { above };
+            if outside > 0.0 { outside } else { 0.0 }
+        };
+        let [x, y, z] = [to_box(&x, a, p), to_box(&y, b, q), to_box(&z, c, r)];
+        if let Some(distance) = distances.get_mut(lane) {
+            let squared = x * x + y * y + z * z;
+            *distance = if squared <= limit { squared.to_bits() } else { BEYOND };
+        }
+    }
+    distances
 }
 
 /// Tests the photons of a leaf. Returns how many there are.
 #[inline(always)]
 fn test_leaf(
-    scene: &SceneImage,
-    memory: &mut impl MemoryPort,
+    isa: impl Isa,
+    grid: &PhotonGrid,
+    leaf: PhotonLeaf,
     query: [f32; 3],
-    index: u32,
     nearest: &mut NearestPhotons,
-) -> Result<u32, Fault> {
-    let line = scene.line(memory, SectionKind::PhotonLeaves, index, 0..LINE_BYTES as u32)?;
-    let leaf = PhotonLeaf::read(line);
-    for photon in 0..leaf.photons() {
-        let place = scene.header.photon_grid.position(leaf.point(photon));
-        let [x, y, z] = [query[0] - place[0], query[1] - place[1], query[2] - place[2]];
-        let distance_squared = x * x + y * y + z * z;
-        if distance_squared <= nearest.limit() {
-            let content: [u8; PHOTON_CONTENT_BYTES] = leaf.content(photon);
-            nearest.insert(Candidate::new(distance_squared, content));
+) -> u32 {
+    let photons = leaf.photons();
+    let [x, y, z] = leaf.coordinates();
+    let [a, b, c] = grid.origin;
+    let [p, q, r] = query;
+    let mut distances = [0; LANES];
+    for lane in 0..isa.lanes(photons as usize) {
+        let to_photon = |axis: &LeafCoordinates, origin: i32, query: f32| {
+            let offset = u16::from_le_bytes(axis.offsets.get(lane).copied().unwrap_or_default()) & axis.mask;
+            let point = axis.corner + u32::from(offset);
+            query - origin.wrapping_add(point.cast_signed()) as f32 * grid.cell
+        };
+        let [x, y, z] = [to_photon(&x, a, p), to_photon(&y, b, q), to_photon(&z, c, r)];
+        if let Some(distance) = distances.get_mut(lane) {
+            *distance = (x * x + y * y + z * z).to_bits();
         }
     }
-    Ok(leaf.photons())
+    let mut contents = [0; LANES];
+    for (content, bytes) in contents.iter_mut().zip(leaf.contents().iter().rev()) {
+        *content = u64::from_le_bytes(*bytes);
+    }
+    nearest.insert_lanes(isa, photons, &distances, &contents);
+    photons
 }

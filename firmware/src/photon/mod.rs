@@ -1,5 +1,6 @@
 //! The photon map: the k photons nearest to a point, and the radiance that they reflect.
 
+mod candidates;
 mod kdtree;
 mod leaves;
 mod nearest;
@@ -10,12 +11,13 @@ use glam::Vec3;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::message::Fault;
 
-pub use nearest::{Candidate, NearestPhotons};
-pub use radiance::{MIN_NORMAL_COSINE, SameSurface, reflected_radiance};
-pub use select::select;
+pub use candidates::{Candidate, CandidateBuffer, Candidates};
+pub use nearest::NearestPhotons;
+pub use radiance::{Estimate, MIN_NORMAL_COSINE, SameSurface, reflected_radiance};
 
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
+use crate::simd::{self, Isa, Kernel};
 
 /// Searches the photons nearest to `position` into `nearest`, in whichever layout the map is: what is found is the same.
 /// Returns the number of photons tested.
@@ -29,11 +31,53 @@ pub fn gather(
     position: Vec3,
     nearest: &mut NearestPhotons,
 ) -> Result<u32, Fault> {
-    let tested = if scene.header.section(SectionKind::PhotonLeaves).records > 0 {
-        leaves::gather(scene, memory, position, nearest)?
-    } else {
-        kdtree::gather(scene, memory, position, nearest)?
-    };
-    nearest.finish();
-    Ok(tested)
+    simd::run(Search { scene, memory, position, nearest })
+}
+
+/// What [`gather`] does, for any processor.
+pub struct Search<'s, 'n, M> {
+    /// The scene, with its photon map.
+    pub scene: &'s SceneImage,
+    /// Card memory.
+    pub memory: &'s mut M,
+    /// Where to search, metres.
+    pub position: Vec3,
+    /// Where to put the photons.
+    pub nearest: &'s mut NearestPhotons<'n>,
+}
+
+impl<M: MemoryPort> Kernel for Search<'_, '_, M> {
+    type Output = Result<u32, Fault>;
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> Self::Output {
+        let Self { scene, memory, position, nearest } = self;
+        let tested = if scene.header.section(SectionKind::PhotonLeaves).records > 0 {
+            leaves::gather(isa, scene, memory, position, nearest)?
+        } else {
+            kdtree::gather(isa, scene, memory, position, nearest)?
+        };
+        nearest.finish(isa);
+        Ok(tested)
+    }
+}
+
+/// The selection of the nearest candidates by itself, for any processor: see [`NearestPhotons`].
+pub struct Selection<'a> {
+    /// From which to select.
+    pub candidates: Candidates<'a>,
+    /// How many to select.
+    pub count: usize,
+}
+
+impl Kernel for Selection<'_> {
+    type Output = Option<Candidate>;
+
+    /// Moves the first `count` candidates, in their order, to the front, and returns the last of these. What lies behind
+    /// is no longer of use. `None`, and no change, if there are none or fewer than `count`.
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> Self::Output {
+        let length = self.candidates.capacity();
+        select::select(isa, self.candidates, length, self.count)
+    }
 }

@@ -14,7 +14,6 @@
 //! What is left is the estimate's blur: the radiance is a mean over the disc.
 
 use core::f32::consts::PI;
-use core::ptr;
 
 use glam::Vec3;
 use photoncard_shared::layout::{FULL_DISC, decode_normal};
@@ -22,6 +21,7 @@ use photoncard_shared::layout::{FULL_DISC, decode_normal};
 use super::{Candidate, NearestPhotons};
 use crate::fixed_point::ColourSum;
 use crate::gather::PartialReflection;
+use crate::simd::{self, Isa, Kernel};
 use crate::vector::{max, unit};
 
 /// Photons whose surface normal is at a lesser cosine to the query's belong to another surface.
@@ -35,34 +35,108 @@ const MIN_RADIUS_SHARE: f32 = 1e-6;
 /// disc, reflected.
 #[inline(always)]
 pub fn reflected_radiance(nearest: &NearestPhotons, position: Vec3, reflection: &PartialReflection) -> Vec3 {
-    let candidates = nearest.candidates();
-    let farthest = candidates.iter().max_by_key(|candidate| candidate.order());
-    let Some(farthest) = farthest else { return Vec3::ZERO };
-    let (radius_squared, excluded) = if nearest.is_full() {
-        (farthest.distance_squared(), Some(farthest))
-    } else {
-        (nearest.max_distance_squared(), None)
-    };
+    simd::run(Estimate { nearest, position, reflection })
+}
+
+/// What [`reflected_radiance`] does, for any processor.
+pub struct Estimate<'a, 'n> {
+    /// The photons nearest to a place.
+    pub nearest: &'a NearestPhotons<'n>,
+    /// The place, metres.
+    pub position: Vec3,
+    /// How the surface there reflects.
+    pub reflection: &'a PartialReflection,
+}
+
+impl Kernel for Estimate<'_, '_> {
+    type Output = Vec3;
+
+    #[inline(always)]
+    fn run(self, _: impl Isa) -> Vec3 {
+        let Self { nearest, position, reflection } = self;
+        let (radius_squared, farthest) = if nearest.is_full() {
+            let farthest = extreme(nearest, u32::max, |candidate, other| candidate.order() > other.order());
+            (farthest.map_or(0.0, |farthest| farthest.distance_squared()), farthest)
+        } else {
+            (nearest.max_distance_squared(), None)
+        };
+        let Some((closest, sums)) = sum(nearest, farthest, reflection) else { return Vec3::ZERO };
+        let fraction = (closest.disc() as f32 + 1.0) * (1.0 / (FULL_DISC as f32 + 1.0));
+        let least = MIN_RADIUS_SHARE * crate::scene::magnitude(&[position]);
+        let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
+        sums.reflected() * (1.0 / area)
+    }
+}
+
+/// The first or the last candidate, as `choose` tells of distances and `is_better` of candidates.
+#[inline(always)]
+fn extreme(
+    nearest: &NearestPhotons,
+    choose: impl Fn(u32, u32) -> u32,
+    is_better: impl Fn(&Candidate, &Candidate) -> bool,
+) -> Option<Candidate> {
+    let (distances, contents) = nearest.columns();
+    let distance = distances.iter().copied().reduce(choose)?;
+    let mut best: Option<Candidate> = None;
+    for (&other, &content) in distances.iter().zip(contents) {
+        if other == distance {
+            let candidate = Candidate { distance, content };
+            if best.is_none_or(|best| is_better(&candidate, &best)) {
+                best = Some(candidate);
+            }
+        }
+    }
+    best
+}
+
+/// The closest of the photons of the same surface, and the sums of those; without the farthest of all, if it is given.
+#[inline(always)]
+fn sum<'a>(
+    nearest: &NearestPhotons,
+    farthest: Option<Candidate>,
+    reflection: &'a PartialReflection,
+) -> Option<(Candidate, Sums<'a>)> {
+    let (_, contents) = nearest.columns();
+    let mut sums = Sums::new(reflection);
+    if !reflection.has_lobe() && are_all_of(reflection.normal(), contents) {
+        // What is alone is the farthest.
+        if farthest.is_some() && contents.len() < 2 {
+            return None;
+        }
+        sums.power.add_powers(contents);
+        if let Some(farthest) = farthest {
+            sums.power.subtract_power(farthest.content);
+        }
+        let closest = extreme(nearest, u32::min, |candidate, other| candidate.order() < other.order())?;
+        return Some((closest, sums));
+    }
     let mut same_surface = SameSurface::new(reflection.normal());
     // Of several that are equal to the farthest one is left out.
-    let is_excluded = |candidate| excluded.is_some_and(|excluded| ptr::eq(excluded, candidate));
-    let counted = candidates
-        .iter()
-        .filter(|&candidate| !is_excluded(candidate) && same_surface.holds(candidate.normal()));
-    let mut closest: Option<&Candidate> = None;
-    let mut sums = Sums::new(reflection);
-    for candidate in counted {
-        if closest.is_none_or(|closest| candidate.order() < closest.order()) {
-            closest = Some(candidate);
+    let mut excluded = farthest;
+    let mut closest: Option<Candidate> = None;
+    for candidate in nearest.candidates() {
+        if excluded == Some(candidate) {
+            excluded = None;
+        } else if same_surface.holds(candidate.normal()) {
+            if closest.is_none_or(|closest| candidate.order() < closest.order()) {
+                closest = Some(candidate);
+            }
+            sums.add(&candidate);
         }
-        sums.add(candidate);
     }
-    let Some(closest) = closest else { return Vec3::ZERO };
-    let fraction = (closest.disc() as f32 + 1.0) * (1.0 / (FULL_DISC as f32 + 1.0));
-    let least = MIN_RADIUS_SHARE * crate::scene::magnitude(&[position]);
-    let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
-    sums.reflected() * (1.0 / area)
+    Some((closest?, sums))
 }
+
+/// Whether all photons have a normal of this code.
+#[inline(always)]
+fn are_all_of(normal: u8, contents: &[u64]) -> bool {
+    let differ =
+        contents.iter().fold(0, |differ, content| differ | content ^ (u64::from(normal) << NORMAL_SHIFT));
+    differ & 0xff << NORMAL_SHIFT == 0
+}
+
+/// Where a normal's code is in what a photon carries.
+const NORMAL_SHIFT: u32 = 50;
 
 /// The photons' power, and the lobe's share of it.
 struct Sums<'a> {

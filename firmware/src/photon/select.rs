@@ -6,9 +6,8 @@
 //! narrows, as with many candidates at one distance, they are parted by pivots (Hoare 1961), and after
 //! a bounded number of those by one bit after another of what orders them. Nothing of the result depends on the way.
 
-use core::cell::Cell;
-
-use super::Candidate;
+use super::candidates::{Candidate, CandidateCells, Candidates};
+use crate::simd::{Isa, LANES};
 
 /// Guesses of the two distances.
 const GUESSES: u32 = 4;
@@ -19,26 +18,33 @@ const PIVOTS: u32 = 16;
 /// So few are sorted by insertion.
 const FEW: usize = 16;
 
-/// Moves the first `count` candidates, in their order, to the front, and returns the last of these. What lies behind
-/// is no longer of use. `None`, and no change, if there are none or fewer than `count`.
-pub fn select(candidates: &mut [Candidate], count: usize) -> Option<Candidate> {
-    if count == 0 || candidates.len() < count {
+/// Moves the first `count` of `length` candidates, in their order, to the front, and returns the last of these. What lies
+/// behind is no longer of use. `None`, and no change, if there are none or fewer than `count`. Room behind them is used.
+#[inline(always)]
+pub(super) fn select(
+    isa: impl Isa,
+    mut candidates: Candidates,
+    length: usize,
+    count: usize,
+) -> Option<Candidate> {
+    if count == 0 || length < count {
         return None;
     }
-    match guess(candidates, count) {
-        Some([low, high]) => keep(candidates, count, low, high),
-        None => part(Cell::from_mut(candidates).as_slice_of_cells(), count - 1),
+    match guess(candidates.distances.get(..length)?, count) {
+        Some([low, high]) => keep(isa, candidates, length, count, low, high),
+        None => part(candidates.first(length)?.cells(), count - 1),
     }
 }
 
 /// The bits of two distances: the `count`-th is at the first or beyond it, and nearer than the second, as few others are.
-fn guess(candidates: &[Candidate], count: usize) -> Option<[u32; 2]> {
-    let farthest = candidates.iter().map(|candidate| candidate.distance).max()?;
-    let (wanted, slack) = (count as f32, candidates.len() as f32 / 40.0);
-    let step = f32::from_bits(farthest) / candidates.len() as f32;
+#[inline(always)]
+fn guess(distances: &[u32], count: usize) -> Option<[u32; 2]> {
+    let farthest = distances.iter().copied().max()?;
+    let (wanted, slack) = (count as f32, distances.len() as f32 / 40.0);
+    let step = f32::from_bits(farthest) / distances.len() as f32;
     let [mut low, mut high] = [(wanted - slack).max(0.0) * step, (wanted + slack) * step];
     for _ in 0..GUESSES {
-        let [nearer_than_low, nearer_than_high] = count_nearer(candidates, low.to_bits(), high.to_bits());
+        let [nearer_than_low, nearer_than_high] = count_nearer(distances, low.to_bits(), high.to_bits());
         if count <= nearer_than_low {
             high = low;
             low *= ((wanted - slack) / nearer_than_low as f32).max(0.0);
@@ -57,44 +63,134 @@ fn guess(candidates: &[Candidate], count: usize) -> Option<[u32; 2]> {
     None
 }
 
-fn count_nearer(candidates: &[Candidate], low: u32, high: u32) -> [usize; 2] {
+#[inline(always)]
+fn count_nearer(distances: &[u32], low: u32, high: u32) -> [usize; 2] {
     let mut nearer = [0_u32; 2];
-    for candidate in candidates {
+    for &distance in distances {
         let [than_low, than_high] = &mut nearer;
-        *than_low += u32::from(candidate.distance < low);
-        *than_high += u32::from(candidate.distance < high);
+        *than_low += u32::from(distance < low);
+        *than_high += u32::from(distance < high);
     }
     nearer.map(|count| count as usize)
 }
 
 /// Selects by two distances that [`guess`] returned.
-fn keep(candidates: &mut [Candidate], count: usize, low: u32, high: u32) -> Option<Candidate> {
-    let cells = Cell::from_mut(candidates).as_slice_of_cells();
-    let mut between = [Candidate { distance: 0, power: 0, rest: 0 }; BETWEEN];
-    let between = Cell::from_mut(&mut between[..]).as_slice_of_cells();
-    let (mut kept, mut aside) = (0, 0);
-    for cell in cells {
-        // Written in any case, and counted if it is to stay: no branch on what cannot be foreseen.
-        let candidate = cell.get();
-        if let Some(target) = cells.get(kept) {
-            target.set(candidate);
-        }
-        kept += usize::from(candidate.distance < low);
-        if let Some(target) = between.get(aside) {
-            target.set(candidate);
-        }
-        aside += usize::from((low..high).contains(&candidate.distance));
+#[inline(always)]
+fn keep(
+    isa: impl Isa,
+    candidates: Candidates,
+    length: usize,
+    count: usize,
+    low: u32,
+    high: u32,
+) -> Option<Candidate> {
+    let Candidates { distances, contents } = candidates;
+    let mut aside = Aside { distances: [0; BETWEEN + LANES], contents: [0; BETWEEN + LANES], count: 0 };
+    let (mut kept, mut first) = (0, 0);
+    // What is kept is written where all has been read.
+    while let Some(&lanes) = distances.get(first..).and_then(<[u32]>::first_chunk).filter(|_| first < length)
+    {
+        let &carried = contents.get(first..)?.first_chunk()?;
+        let there = first_lanes(length - first);
+        let nearer = isa.below(&lanes, low) & there;
+        isa.pack(nearer, &lanes, distances.get_mut(kept..)?.first_chunk_mut()?);
+        isa.pack_long(nearer, &carried, contents.get_mut(kept..)?.first_chunk_mut()?);
+        kept += nearer.count_ones() as usize;
+        aside.pack(isa, isa.below(&lanes, high) & there & !nearer, &lanes, &carried)?;
+        first += LANES;
     }
-    let added = between.get(..aside)?;
-    let last = part(added, count - kept - 1)?;
-    for (target, candidate) in cells.get(kept..count)?.iter().zip(added) {
-        target.set(candidate.get());
+    let all = Candidates { distances, contents }.cells();
+    for index in first..length {
+        let candidate = all.get(index)?;
+        if candidate.distance < low {
+            all.set(kept, candidate);
+            kept += 1;
+        } else if candidate.distance < high {
+            aside.push(candidate)?;
+        }
+    }
+    let last = aside.select(isa, count - kept - 1)?;
+    let chosen = aside.distances.iter().zip(&aside.contents);
+    for (index, (&distance, &content)) in (kept..count).zip(chosen) {
+        all.set(index, Candidate { distance, content });
     }
     Some(last)
 }
 
+/// So many lanes, at least one, or all.
+#[inline(always)]
+fn first_lanes(count: usize) -> u32 {
+    u32::MAX >> (u32::BITS - count.min(LANES) as u32)
+}
+
+/// Candidates set aside, and room for those that are tested at once.
+struct Aside {
+    distances: [u32; BETWEEN + LANES],
+    contents: [u64; BETWEEN + LANES],
+    count: usize,
+}
+
+impl Aside {
+    #[inline(always)]
+    fn pack(
+        &mut self,
+        isa: impl Isa,
+        mask: u32,
+        distances: &[u32; LANES],
+        contents: &[u64; LANES],
+    ) -> Option<()> {
+        isa.pack(mask, distances, self.distances.get_mut(self.count..)?.first_chunk_mut()?);
+        isa.pack_long(mask, contents, self.contents.get_mut(self.count..)?.first_chunk_mut()?);
+        self.count += mask.count_ones() as usize;
+        Some(())
+    }
+
+    #[inline(always)]
+    fn push(&mut self, candidate: Candidate) -> Option<()> {
+        *self.distances.get_mut(self.count)? = candidate.distance;
+        *self.contents.get_mut(self.count)? = candidate.content;
+        self.count += 1;
+        Some(())
+    }
+
+    /// Moves the first `place` + 1 to the front, and returns the last of these.
+    #[inline(always)]
+    fn select(&mut self, isa: impl Isa, place: usize) -> Option<Candidate> {
+        let Some(index) = self.only_one_at(place) else {
+            let Self { distances, contents, count } = self;
+            return part(Candidates { distances, contents }.first(*count)?.cells(), place);
+        };
+        let last = Candidate { distance: *self.distances.get(index)?, content: *self.contents.get(index)? };
+        let all = core::mem::take(&mut self.count);
+        for first in (0..all).step_by(LANES) {
+            let &distances = self.distances.get(first..)?.first_chunk()?;
+            let &contents = self.contents.get(first..)?.first_chunk()?;
+            // No overflow: it is the distance of a candidate that is nearer than another.
+            let nearer = isa.below(&distances, last.distance + 1);
+            self.pack(isa, nearer & first_lanes(all - first), &distances, &contents)?;
+        }
+        Some(last)
+    }
+
+    /// Where the candidate is that `place` others are nearer than; `None` if there are several at one distance.
+    #[inline(always)]
+    fn only_one_at(&self, place: usize) -> Option<usize> {
+        let all: &[u32; BETWEEN] = self.distances.first_chunk()?;
+        let mut nearer = [0_u32; BETWEEN];
+        for other in self.distances.get(..self.count)? {
+            for (nearer, distance) in nearer.iter_mut().zip(all) {
+                *nearer += u32::from(other < distance);
+            }
+        }
+        let mut there = nearer.iter().take(self.count).enumerate();
+        let index = there.find(|&(_, &nearer)| nearer as usize == place).map(|(index, _)| index)?;
+        let is_another = there.any(|(_, &nearer)| nearer as usize == place);
+        (!is_another).then_some(index)
+    }
+}
+
 /// Moves the first `place` + 1 candidates to the front, and returns the last of these.
-fn part(mut cells: &[Cell<Candidate>], mut place: usize) -> Option<Candidate> {
+fn part(mut cells: CandidateCells, mut place: usize) -> Option<Candidate> {
     for _ in 0..PIVOTS {
         if cells.len() <= FEW {
             return sort(cells, place);
@@ -114,34 +210,33 @@ fn part(mut cells: &[Cell<Candidate>], mut place: usize) -> Option<Candidate> {
         let less = divide(cells, |candidate| candidate.key() >> bit & 1 == 0);
         (cells, place) = follow(cells, place, less)?;
     }
-    cells.get(place).map(Cell::get)
+    cells.get(place)
 }
 
 /// The part of `cells`, of which the first `less` come before the others, where `place` lies; and the place there.
-fn follow(cells: &[Cell<Candidate>], place: usize, less: usize) -> Option<(&[Cell<Candidate>], usize)> {
-    let (front, back) = cells.split_at_checked(less)?;
+fn follow(cells: CandidateCells, place: usize, less: usize) -> Option<(CandidateCells, usize)> {
+    let (front, back) = cells.split_at(less)?;
     Some(if place < less { (front, place) } else { (back, place - less) })
 }
 
 /// Moves the candidates that are told to come first to the front, and returns how many they are.
 #[inline(always)]
-fn divide(cells: &[Cell<Candidate>], is_first: impl Fn(&Candidate) -> bool) -> usize {
+fn divide(cells: CandidateCells, is_first: impl Fn(&Candidate) -> bool) -> usize {
     let mut count = 0;
-    for cell in cells {
-        let candidate = cell.get();
-        // It is there: no more are counted than were looked at.
-        if let Some(target) = cells.get(count) {
-            cell.set(target.get());
-            target.set(candidate);
+    for index in 0..cells.len() {
+        // Both are there: no more are counted than were looked at.
+        if let (Some(candidate), Some(other)) = (cells.get(index), cells.get(count)) {
+            cells.set(index, other);
+            cells.set(count, candidate);
+            count += usize::from(is_first(&candidate));
         }
-        count += usize::from(is_first(&candidate));
     }
     count
 }
 
 /// The median of three medians of three.
-fn pivot(cells: &[Cell<Candidate>]) -> Option<Candidate> {
-    let at = |ninth: usize| cells.get(cells.len() * ninth / 9).map(Cell::get);
+fn pivot(cells: CandidateCells) -> Option<Candidate> {
+    let at = |ninth: usize| cells.get(cells.len() * ninth / 9);
     let of_three = |ninth| Some(median(at(ninth)?, at(ninth + 1)?, at(ninth + 2)?));
     Some(median(of_three(0)?, of_three(3)?, of_three(6)?))
 }
@@ -155,17 +250,18 @@ fn median(a: Candidate, b: Candidate, c: Candidate) -> Candidate {
 }
 
 /// Sorts, and returns the one at a place.
-fn sort(cells: &[Cell<Candidate>], place: usize) -> Option<Candidate> {
-    for (sorted, cell) in cells.iter().enumerate() {
-        let (candidate, mut hole) = (cell.get(), cell);
-        for before in cells.get(..sorted)?.iter().rev() {
-            if before.get().key() <= candidate.key() {
+fn sort(cells: CandidateCells, place: usize) -> Option<Candidate> {
+    for sorted in 1..cells.len() {
+        let candidate = cells.get(sorted)?;
+        let mut hole = sorted;
+        while let Some(before) = hole.checked_sub(1).and_then(|before| cells.get(before)) {
+            if before.key() <= candidate.key() {
                 break;
             }
-            hole.set(before.get());
-            hole = before;
+            cells.set(hole, before);
+            hole -= 1;
         }
-        hole.set(candidate);
+        cells.set(hole, candidate);
     }
-    cells.get(place).map(Cell::get)
+    cells.get(place)
 }

@@ -4,13 +4,12 @@
 //! ([`super::direct`]).
 
 use glam::Vec3;
-use heapless::VecView;
 use photoncard_shared::message::Fault;
 
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, PartialReflection, Place};
 use crate::memory::{MemoryPort, Stage};
-use crate::photon::{Candidate, NearestPhotons, gather, reflected_radiance};
+use crate::photon::{Candidates, NearestPhotons, gather, reflected_radiance};
 use crate::scene::{Ray, closest_hit, read_surface};
 
 /// What the end of a final gather ray brings.
@@ -71,7 +70,7 @@ pub fn cast<M: MemoryPort>(
 pub fn gathered<M: MemoryPort>(
     context: &mut Context<M>,
     request: &GatherRequest,
-    candidates: &mut VecView<Candidate>,
+    candidates: Candidates,
 ) -> Result<Vec3, Fault> {
     context.memory.enter(Stage::Gather);
     let position = request.place.position(&context.scene.header.photon_grid).into();
@@ -84,7 +83,7 @@ pub fn gathered<M: MemoryPort>(
 pub(super) fn nearest_photons<'a, M: MemoryPort>(
     context: &mut Context<M>,
     position: Vec3,
-    candidates: &'a mut VecView<Candidate>,
+    candidates: Candidates<'a>,
 ) -> Result<NearestPhotons<'a>, Fault> {
     let frame = context.frame;
     let mut nearest = NearestPhotons::new(candidates, frame.neighbors, frame.max_distance);
@@ -93,6 +92,6 @@ pub(super) fn nearest_photons<'a, M: MemoryPort>(
     context.counters.photons_tested += tested as u64;
     context.counters.photons_taken += nearest.taken() as u64;
     context.counters.photons_selected += nearest.selected() as u64;
-    context.counters.photons_found += nearest.candidates().len() as u64;
+    context.counters.photons_found += nearest.len() as u64;
     Ok(nearest)
 }

@@ -1,7 +1,6 @@
 //! Gather points: where final gather rays start, what they are for and how they are spread.
 
 use glam::Vec3;
-use heapless::VecView;
 use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{Fault, Sampling};
 
@@ -9,7 +8,7 @@ use super::Context;
 use super::final_gather::nearest_photons;
 use crate::importance::{DirectionTable, IncidentFlux, Reflector};
 use crate::memory::{MemoryPort, Stage};
-use crate::photon::Candidate;
+use crate::photon::Candidates;
 use crate::sampler::Pattern;
 use crate::scene::{Reflection, Surface};
 use crate::vector::max_component;
@@ -79,7 +78,7 @@ impl GatherPoint {
     pub fn choose_directions<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
-        candidates: &mut VecView<Candidate>,
+        candidates: Candidates,
     ) -> Result<(), Fault> {
         if self.rays == 0 {
             return Ok(());

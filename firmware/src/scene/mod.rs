@@ -4,9 +4,10 @@ mod bvh;
 mod emitter;
 mod material;
 mod seen;
+mod slabs;
 mod triangle;
 
-pub use bvh::{Hit, closest_hit, is_occluded};
+pub use bvh::{AnyHit, ClosestHit, Hit, closest_hit, is_occluded};
 pub use emitter::{EmitterSample, emitter_density, sample_emitter};
 pub use material::{Reflection, Surface, read_surface};
 pub(crate) use material::{lobe_power, mirror};
@@ -21,6 +22,7 @@ use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::message::{Fault, FaultCode};
 
 use crate::memory::MemoryPort;
+use crate::simd::Isa;
 
 /// A ray: the points `origin + t direction` with `t` in (0, `max_distance`).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +82,15 @@ impl SceneImage {
         let fault = Fault { code: FaultCode::Record, detail: index };
         let (line, slot) = self.header.section(kind).locate::<1>(index).ok_or(fault)?;
         read_slot(memory, kind.structure(), line, slot, used).ok_or(fault)?
+    }
+
+    /// Has line `index` of a section whose records are whole lines brought near, as it may be read soon.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, isa: impl Isa, memory: &impl MemoryPort, kind: SectionKind, index: u32) {
+        let line = self.header.section(kind).locate::<1>(index);
+        if let Some(line) = line.and_then(|(line, _)| memory.near(line)) {
+            isa.prefetch(line);
+        }
     }
 }
 

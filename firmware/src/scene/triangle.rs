@@ -5,15 +5,19 @@
 //! `f64`, in which the products are exact.
 
 use glam::Vec3;
+use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, TRIANGLE_LANES};
 
 use super::Ray;
+use crate::simd::Isa;
+use crate::vector::{max, min};
 
 /// A ray made ready for many triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct RayFrame {
-    origin: Vec3,
     /// The axes: the greatest component of the direction is the last.
     axes: [usize; 3],
+    /// Coordinates of the origin on these.
+    origin: [f32; 3],
     shear: [f32; 3],
 }
 
@@ -27,11 +31,11 @@ pub struct Intersection {
 }
 
 #[inline(always)]
-fn component(v: Vec3, axis: usize) -> f32 {
+fn component([x, y, z]: [f32; 3], axis: usize) -> f32 {
     match axis {
-        0 => v.x,
-        1 => v.y,
-        _ => v.z,
+        0 => x,
+        1 => y,
+        _ => z,
     }
 }
 
@@ -48,30 +52,78 @@ impl RayFrame {
             2
         };
         let axes = [(last + 1) % 3, (last + 2) % 3, last];
-        let along = component(ray.direction, last);
-        let shear = [
-            component(ray.direction, axes[0]) / along,
-            component(ray.direction, axes[1]) / along,
-            1.0 / along,
-        ];
-        Self { origin: ray.origin, axes, shear }
+        let [x, y, z] = axes;
+        let on_axes = |v: Vec3| {
+            let v = v.to_array();
+            [component(v, x), component(v, y), component(v, z)]
+        };
+        let [x, y, z] = on_axes(ray.direction);
+        Self { axes, origin: on_axes(ray.origin), shear: [x / z, y / z, 1.0 / z] }
     }
 
-    /// The corner relative to the origin, sheared; and its depth before scaling.
+    /// The corner with these coordinates on the axes, relative to the origin and sheared; and its depth before scaling.
     #[inline(always)]
-    fn shear(&self, vertex: [f32; 3]) -> ([f32; 2], f32) {
-        let relative = Vec3::from_array(vertex) - self.origin;
-        let depth = component(relative, self.axes[2]);
-        let x = component(relative, self.axes[0]) - self.shear[0] * depth;
-        let y = component(relative, self.axes[1]) - self.shear[1] * depth;
-        ([x, y], depth)
+    fn shear(&self, [x, y, z]: [f32; 3]) -> ([f32; 2], f32) {
+        let [origin_x, origin_y, origin_z] = self.origin;
+        let [shear_x, shear_y, _] = self.shear;
+        let depth = z - origin_z;
+        ([x - origin_x - shear_x * depth, y - origin_y - shear_y * depth], depth)
+    }
+
+    /// The triangles of a leaf that the line of the ray may meet, behind its origin too: all that [`Self::intersect_slot`]
+    /// finds, and few others: a bit for each.
+    #[inline(always)]
+    pub(super) fn may_meet(&self, isa: impl Isa, leaf: BvhLeaf) -> u32 {
+        let [x, y, z] = self.axes;
+        let corner =
+            |corner| [leaf.coordinates(corner, x), leaf.coordinates(corner, y), leaf.coordinates(corner, z)];
+        let [a, b, c] = [corner(0), corner(1), corner(2)];
+        let mut may_meet = [0; TRIANGLE_LANES];
+        for lane in 0..isa.lanes(LEAF_TRIANGLES).min(TRIANGLE_LANES) {
+            let sheared = |[x, y, z]: &[[f32; TRIANGLE_LANES]; 3]| {
+                let at = |lanes: &[f32; TRIANGLE_LANES]| lanes.get(lane).copied().unwrap_or(0.0);
+                self.shear([at(x), at(y), at(z)]).0
+            };
+            let [u, v, w] = edges(sheared(&a), sheared(&b), sheared(&c));
+            // Where one may be zero the signs are not yet known.
+            let misses = (min(min(u, v), w) < 0.0) & (max(max(u, v), w) > 0.0) & (u * v * w != 0.0);
+            if let Some(may_meet) = may_meet.get_mut(lane) {
+                *may_meet = if misses { 0 } else { 1 };
+            }
+        }
+        let [first, second, third, _] = may_meet;
+        first | second << 1 | third << 2
     }
 
     /// Where the ray meets a triangle, from either side, at a distance in (0, `max_distance`].
     #[inline(always)]
     pub fn intersect(&self, vertices: &[[f32; 3]; 3], max_distance: f32) -> Option<Intersection> {
-        let [(a, a_depth), (b, b_depth), (c, c_depth)] = vertices.map(|vertex| self.shear(vertex));
-        let mut edges = [cross(c, b), cross(a, c), cross(b, a)];
+        let [x, y, z] = self.axes;
+        let on_axes = |vertex| [component(vertex, x), component(vertex, y), component(vertex, z)];
+        let [a, b, c] = *vertices;
+        self.intersect_on_axes([on_axes(a), on_axes(b), on_axes(c)], max_distance)
+    }
+
+    /// The same of a triangle of a leaf.
+    #[inline(always)]
+    pub(super) fn intersect_slot(
+        &self,
+        leaf: BvhLeaf,
+        slot: usize,
+        max_distance: f32,
+    ) -> Option<Intersection> {
+        let [x, y, z] = self.axes;
+        let corner = |corner| {
+            let on_axis = |axis| leaf.coordinate(slot, corner, axis);
+            [on_axis(x), on_axis(y), on_axis(z)]
+        };
+        self.intersect_on_axes([corner(0), corner(1), corner(2)], max_distance)
+    }
+
+    #[inline(always)]
+    fn intersect_on_axes(&self, [a, b, c]: [[f32; 3]; 3], max_distance: f32) -> Option<Intersection> {
+        let [(a, a_depth), (b, b_depth), (c, c_depth)] = [self.shear(a), self.shear(b), self.shear(c)];
+        let mut edges = edges(a, b, c);
         if edges.contains(&0.0) {
             edges = [cross_exact(c, b), cross_exact(a, c), cross_exact(b, a)];
         }
@@ -82,11 +134,18 @@ impl RayFrame {
         if negative && positive || determinant == 0.0 {
             return None;
         }
+        let [.., scale] = self.shear;
         let inverse = 1.0 / determinant;
-        let distance = (u * a_depth + v * b_depth + w * c_depth) * self.shear[2] * inverse;
+        let distance = (u * a_depth + v * b_depth + w * c_depth) * scale * inverse;
         let inside = distance > 0.0 && distance <= max_distance;
         inside.then_some(Intersection { distance, barycentric: [u * inverse, v * inverse, w * inverse] })
     }
+}
+
+/// The edge functions at the origin, each opposite to a corner.
+#[inline(always)]
+fn edges(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> [f32; 3] {
+    [cross(c, b), cross(a, c), cross(b, a)]
 }
 
 #[inline(always)]

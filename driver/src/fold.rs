@@ -1,0 +1,126 @@
+//! Binary trees folded into wide nodes so that a descent costs the least, and numbered as in a card image (Ylitie, Karras,
+//! Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, section 3.1).
+
+use std::collections::VecDeque;
+
+use photoncard_shared::layout::{Links, NODE_CHILDREN};
+
+/// A part of a binary tree: what it is as a leaf, if it can be one, and its two parts, if it has them.
+pub(crate) struct Tree<L, B> {
+    bounds: B,
+    leaf: Option<L>,
+    parts: Option<Box<[Self; 2]>>,
+    fold: Fold,
+}
+
+/// How a subtree is folded into wide nodes at the least cost.
+struct Fold {
+    /// The expected cost of a descent in the subtree as at most `i + 1` children of one node.
+    costs: [f32; NODE_CHILDREN],
+    /// Of those, the children that the first part makes; none if the subtree is one child.
+    first: [u8; NODE_CHILDREN],
+}
+
+impl<L, B: Copy> Tree<L, B> {
+    /// A leaf, which it costs so much to visit.
+    pub(crate) fn leaf(leaf: L, bounds: B, cost: f32) -> Self {
+        let fold = Fold { costs: [cost; NODE_CHILDREN], first: [0; NODE_CHILDREN] };
+        Self { bounds, leaf: Some(leaf), parts: None, fold }
+    }
+
+    /// Of two parts, which cost `node` to visit as a node of their own; if they may as well be a leaf, that and what it costs.
+    pub(crate) fn node(parts: [Self; 2], bounds: B, node: f32, leaf: Option<(L, f32)>) -> Self {
+        let mut costs = [f32::INFINITY; NODE_CHILDREN];
+        let mut first = [0; NODE_CHILDREN];
+        let [below, above] = parts.each_ref().map(|part| part.fold.costs);
+        for both in 2..=NODE_CHILDREN {
+            for below_children in 1..both {
+                let cost = below[below_children - 1] + above[both - below_children - 1];
+                if cost < costs[both - 1] {
+                    (costs[both - 1], first[both - 1]) = (cost, below_children as u8);
+                }
+            }
+        }
+        // As a node of its own it may be split in another way than among the children of its parent.
+        let opened = first[NODE_CHILDREN - 1];
+        let as_one = leaf.as_ref().map_or(node + costs[NODE_CHILDREN - 1], |(_, cost)| *cost);
+        for (cost, first) in costs.iter_mut().zip(&mut first).take(NODE_CHILDREN - 1) {
+            if as_one <= *cost {
+                (*cost, *first) = (as_one, 0);
+            }
+        }
+        // The last is never asked for but for a node of its own.
+        first[NODE_CHILDREN - 1] = opened;
+        let leaf = leaf.map(|(leaf, _)| leaf);
+        Self { bounds, leaf, parts: Some(Box::new(parts)), fold: Fold { costs, first } }
+    }
+
+    /// What a leaf of both of two parts would be.
+    pub(crate) fn as_leaf(&self) -> Option<&L> {
+        self.leaf.as_ref()
+    }
+
+    /// Adds the subtree to a node, as at most so many children.
+    fn unfold(self, most: usize, children: &mut Vec<Self>) {
+        let first = self.fold.first[most - 1] as usize;
+        match self.parts {
+            Some(parts) if first > 0 => {
+                for (part, most) in parts.into_iter().zip([first, most - first]) {
+                    part.unfold(most, children);
+                }
+            }
+            parts => children.push(Self { parts, ..self }),
+        }
+    }
+}
+
+/// A node, where `B` tells where its children are.
+pub(crate) struct WideNode<B> {
+    pub(crate) children: Vec<B>,
+    pub(crate) links: Links,
+}
+
+/// A folded tree.
+pub(crate) struct Folded<L, B> {
+    /// Nodes in the order of their parents, the root first.
+    pub(crate) nodes: Vec<WideNode<B>>,
+    /// Leaves, those of a node one after the other.
+    pub(crate) leaves: Vec<L>,
+    /// The entries of a stack that a descent may need.
+    pub(crate) stack: usize,
+}
+
+impl<L, B: Copy> Folded<L, B> {
+    /// Folds a tree. Its root is a node, if only of one leaf.
+    pub(crate) fn new(tree: Tree<L, B>) -> Self {
+        let mut folded = Self { nodes: Vec::new(), leaves: Vec::new(), stack: 1 };
+        let mut root = Vec::with_capacity(NODE_CHILDREN);
+        tree.unfold(NODE_CHILDREN, &mut root);
+        // Children of nodes to come, and the entries of a stack below them.
+        let mut waiting = VecDeque::from([(root, 0)]);
+        while let Some((mut children, above)) = waiting.pop_front() {
+            // Stable: what is near in space stays near.
+            children.sort_by_key(|child| child.leaf.is_none());
+            // The node is taken off before its children are put on.
+            let below = above + children.len() - 1;
+            folded.stack = folded.stack.max(below + 1);
+            let first_leaf = folded.leaves.len();
+            let first_node = (folded.nodes.len() + 1 + waiting.len()) as u32;
+            let bounds = children.iter().map(|child| child.bounds).collect();
+            for child in children {
+                match child {
+                    Tree { leaf: Some(leaf), .. } => folded.leaves.push(leaf),
+                    node => {
+                        let mut children = Vec::with_capacity(NODE_CHILDREN);
+                        node.unfold(NODE_CHILDREN, &mut children);
+                        waiting.push_back((children, below));
+                    }
+                }
+            }
+            let leaves = (folded.leaves.len() - first_leaf) as u32;
+            let links = Links { leaves, first_leaf: first_leaf as u32, first_node };
+            folded.nodes.push(WideNode { children: bounds, links });
+        }
+        folded
+    }
+}

@@ -1,0 +1,123 @@
+//! What a processor can do with sixteen numbers at once, chosen when the program runs.
+//!
+//! A [`Kernel`] is written once, as loops over [`LANES`] lanes in which each lane does what the others do. It is compiled
+//! for each [`Isa`] that the processor may have: the loops become vector instructions, and what loops cannot tell, to
+//! compare and to pack lanes, is a method of the `Isa`. Every lane rounds as a single number does and nothing is
+//! contracted, so all give the same bits; [`Portable`] is the twin that every processor has.
+
+#[cfg(target_arch = "x86_64")]
+#[expect(
+    unsafe_code,
+    reason = "instructions that only some processors have are called when they are known to be there"
+)]
+mod x86;
+
+use photoncard_shared::address::Line;
+
+/// Numbers that are computed at once.
+pub const LANES: usize = 16;
+
+/// Instructions of a processor. A value of a type is the proof that the processor has them.
+pub trait Isa: Copy {
+    /// How many lanes to compute if `used` are asked for: all, where they cost no more.
+    fn lanes(self, used: usize) -> usize;
+
+    /// A bit for every lane that is below a bound.
+    fn below(self, values: &[u32; LANES], bound: u32) -> u32;
+
+    /// Moves the lanes of a mask to the front of `packed`, in their order. What lies behind is of no use.
+    fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]);
+
+    /// The same of twice as long numbers.
+    fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]);
+
+    /// Has a line brought near, if the processor can, as it may be read soon.
+    #[inline(always)]
+    fn prefetch(self, _: &Line) {}
+}
+
+/// What is compiled for every [`Isa`].
+pub trait Kernel {
+    /// What it returns.
+    type Output;
+
+    /// Does it. To be inlined always, as must be all that it calls, or it is compiled for [`Portable`] whatever `isa` is.
+    fn run(self, isa: impl Isa) -> Self::Output;
+}
+
+/// Runs a kernel with the best instructions that the processor has.
+#[inline(always)]
+pub fn run<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    return x86::run(kernel);
+    #[cfg(not(target_arch = "x86_64"))]
+    kernel.run(Portable)
+}
+
+/// The instructions to choose from, for tests that all give the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Those of every processor.
+    Portable,
+    /// Those of x86-64 with AVX2.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    /// Those of x86-64 with AVX-512.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Level {
+    /// All that there are.
+    #[cfg(target_arch = "x86_64")]
+    pub const ALL: &[Self] = &[Self::Portable, Self::Avx2, Self::Avx512];
+    /// All that there are.
+    #[cfg(not(target_arch = "x86_64"))]
+    pub const ALL: &[Self] = &[Self::Portable];
+
+    /// Runs a kernel with these; `None` if the processor does not have them.
+    pub fn run<K: Kernel>(self, kernel: K) -> Option<K::Output> {
+        match self {
+            Self::Portable => Some(kernel.run(Portable)),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => x86::run_with_avx2(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => x86::run_with_avx512(kernel),
+        }
+    }
+}
+
+/// What every processor has.
+#[derive(Clone, Copy, Debug)]
+pub struct Portable;
+
+impl Isa for Portable {
+    #[inline(always)]
+    fn lanes(self, used: usize) -> usize {
+        used.min(LANES)
+    }
+
+    #[inline(always)]
+    fn below(self, values: &[u32; LANES], bound: u32) -> u32 {
+        (0..).zip(values).fold(0, |mask, (lane, &value)| mask | u32::from(value < bound) << lane)
+    }
+
+    #[inline(always)]
+    fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]) {
+        pack(mask, values, packed);
+    }
+
+    #[inline(always)]
+    fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]) {
+        pack(mask, values, packed);
+    }
+}
+
+#[inline(always)]
+fn pack<T: Copy>(mut mask: u32, values: &[T; LANES], packed: &mut [T; LANES]) {
+    for target in packed {
+        let Some(value) = values.get(mask.trailing_zeros() as usize) else { break };
+        *target = *value;
+        mask &= mask - 1;
+    }
+}

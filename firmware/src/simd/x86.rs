@@ -1,0 +1,160 @@
+//! Instructions of x86-64.
+
+use core::arch::x86_64::{
+    _MM_HINT_T0, _mm_prefetch, _mm512_cmplt_epu32_mask, _mm512_loadu_si512, _mm512_maskz_compress_epi32,
+    _mm512_maskz_compress_epi64, _mm512_set1_epi32, _mm512_storeu_si512,
+};
+
+use photoncard_shared::address::Line;
+
+use super::{Isa, Kernel, LANES, Portable};
+
+cpufeatures::new!(
+    has_avx512, "avx512f", "avx512bw", "avx512dq", "avx512vl", "avx2", "bmi1", "bmi2", "popcnt"
+);
+cpufeatures::new!(has_avx2, "avx2", "bmi1", "bmi2", "popcnt");
+
+/// Sixteen lanes in one register.
+#[derive(Clone, Copy)]
+struct Avx512(());
+
+/// Eight lanes in one register.
+#[derive(Clone, Copy)]
+struct Avx2(());
+
+impl Avx512 {
+    #[inline(always)]
+    fn detect() -> Option<Self> {
+        has_avx512::get().then_some(Self(()))
+    }
+
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,popcnt")]
+    fn compile<K: Kernel>(self, kernel: K) -> K::Output {
+        kernel.run(self)
+    }
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: there is an `Avx512` only where the processor has its instructions.
+        unsafe { self.compile(kernel) }
+    }
+}
+
+impl Avx2 {
+    #[inline(always)]
+    fn detect() -> Option<Self> {
+        has_avx2::get().then_some(Self(()))
+    }
+
+    #[target_feature(enable = "avx2,bmi1,bmi2,popcnt")]
+    fn compile<K: Kernel>(self, kernel: K) -> K::Output {
+        kernel.run(self)
+    }
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: there is an `Avx2` only where the processor has its instructions.
+        unsafe { self.compile(kernel) }
+    }
+}
+
+#[inline(always)]
+pub(super) fn run<K: Kernel>(kernel: K) -> K::Output {
+    match (Avx512::detect(), Avx2::detect()) {
+        (Some(isa), _) => isa.run(kernel),
+        (None, Some(isa)) => isa.run(kernel),
+        (None, None) => kernel.run(Portable),
+    }
+}
+
+pub(super) fn run_with_avx2<K: Kernel>(kernel: K) -> Option<K::Output> {
+    Avx2::detect().map(|isa| isa.run(kernel))
+}
+
+pub(super) fn run_with_avx512<K: Kernel>(kernel: K) -> Option<K::Output> {
+    Avx512::detect().map(|isa| isa.run(kernel))
+}
+
+/// Bytes that the processor fetches at once.
+const CACHE_LINE_BYTES: usize = 64;
+
+#[inline(always)]
+fn prefetch(line: &Line) {
+    for part in line.0.chunks(CACHE_LINE_BYTES) {
+        // SAFETY: every processor of this kind has the instruction, which changes nothing that a program can see.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(part.as_ptr().cast()) };
+    }
+}
+
+impl Isa for Avx512 {
+    #[inline(always)]
+    fn lanes(self, _: usize) -> usize {
+        LANES
+    }
+
+    #[inline(always)]
+    fn below(self, values: &[u32; LANES], bound: u32) -> u32 {
+        // SAFETY: the instructions are there, and sixteen numbers of four bytes to read.
+        unsafe {
+            let values = _mm512_loadu_si512(values.as_ptr().cast());
+            u32::from(_mm512_cmplt_epu32_mask(values, _mm512_set1_epi32(bound.cast_signed())))
+        }
+    }
+
+    #[inline(always)]
+    fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]) {
+        // SAFETY: the instructions are there, and sixteen numbers of four bytes to read and to write.
+        unsafe {
+            let values = _mm512_loadu_si512(values.as_ptr().cast());
+            let front = _mm512_maskz_compress_epi32(mask as u16, values);
+            _mm512_storeu_si512(packed.as_mut_ptr().cast(), front);
+        }
+    }
+
+    #[inline(always)]
+    fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]) {
+        let [lower, upper] = [mask as u8, (mask >> 8) as u8];
+        // SAFETY: the instructions are there, and sixteen numbers of eight bytes to read and to write: the second
+        // eight are written after at most eight of the first.
+        unsafe {
+            let first = _mm512_loadu_si512(values.as_ptr().cast());
+            let second = _mm512_loadu_si512(values.as_ptr().add(8).cast());
+            let target = packed.as_mut_ptr();
+            _mm512_storeu_si512(target.cast(), _mm512_maskz_compress_epi64(lower, first));
+            let target = target.add(lower.count_ones() as usize);
+            _mm512_storeu_si512(target.cast(), _mm512_maskz_compress_epi64(upper, second));
+        }
+    }
+
+    #[inline(always)]
+    fn prefetch(self, line: &Line) {
+        prefetch(line);
+    }
+}
+
+impl Isa for Avx2 {
+    #[inline(always)]
+    fn lanes(self, _: usize) -> usize {
+        LANES
+    }
+
+    #[inline(always)]
+    fn below(self, values: &[u32; LANES], bound: u32) -> u32 {
+        Portable.below(values, bound)
+    }
+
+    #[inline(always)]
+    fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]) {
+        Portable.pack(mask, values, packed);
+    }
+
+    #[inline(always)]
+    fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]) {
+        Portable.pack_long(mask, values, packed);
+    }
+
+    #[inline(always)]
+    fn prefetch(self, line: &Line) {
+        prefetch(line);
+    }
+}

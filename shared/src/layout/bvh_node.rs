@@ -1,0 +1,237 @@
+//! Inner nodes of the bounding volume hierarchy: the boxes of sixteen children, in one line.
+//!
+//! Boxes lie on a grid of their own, eight bits each way, whose unit is a power of two on every axis (Ylitie, Karras, Laine
+//! 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*): a child's is never less than what it
+//! holds, and larger by [`MARGIN`] at least, for what a ray caster rounds.
+
+use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides};
+use super::{read_vector, write_f32};
+use crate::address::LINE_BYTES;
+
+/// An inner node, one line: a [`WideNode`] whose sides are in units from a corner, and
+///
+/// | bytes | what |
+/// |---|---|
+/// | 0..12 | x, y, z of the corner, metres |
+/// | 22..25 | the units on x, y, z: exponents as in an `f32` |
+#[derive(Clone, Copy)]
+pub struct BvhNode<'a>(pub &'a [u8; LINE_BYTES]);
+
+const UNITS: usize = 22;
+/// How much larger than what it holds a box is at least, on both sides, in units.
+const MARGIN: f64 = 1.0 / 4096.0;
+/// The exponent of the least unit: far from the least number, so that products with a unit are exact.
+const LEAST_UNIT: u8 = 32;
+const EXPONENT_SHIFT: u32 = 23;
+
+/// A box around some triangles, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeBox {
+    /// The least coordinates.
+    pub lower: [f32; 3],
+    /// The greatest coordinates.
+    pub upper: [f32; 3],
+}
+
+/// One axis of the boxes of a node: a side of child `i` is at `corner + unit * lower[i]`, the other one at
+/// `corner + unit * upper[i]`.
+#[derive(Clone, Copy)]
+pub struct BvhAxis<'a> {
+    /// From where on sides are told, metres.
+    pub corner: f32,
+    /// Their unit, metres.
+    pub unit: f32,
+    /// Of each child, and of what is no child.
+    pub lower: &'a [u8; NODE_CHILDREN],
+    /// The same.
+    pub upper: &'a [u8; NODE_CHILDREN],
+}
+
+impl<'a> BvhNode<'a> {
+    /// The boxes of the children, by axis.
+    #[inline(always)]
+    pub fn axes(&self) -> [BvhAxis<'a>; 3] {
+        let node = WideNode(self.0);
+        let [x, y, z] = read_vector(self.0, 0);
+        let axis = |axis: usize, corner: f32| {
+            let [lower, upper] = node.sides(axis);
+            let unit = f32::from_bits(u32::from(node.byte(UNITS + axis)) << EXPONENT_SHIFT);
+            BvhAxis { corner, unit, lower, upper }
+        };
+        [axis(0, x), axis(1, y), axis(2, z)]
+    }
+
+    /// The box of a child.
+    pub fn bounds(&self, child: usize) -> Option<NodeBox> {
+        let [x, y, z] = self.axes().map(|axis| axis.sides(child));
+        let sides = [x?, y?, z?];
+        let side = |which: fn([f64; 2]) -> f64| sides.map(|sides| which(sides) as f32);
+        Some(NodeBox { lower: side(|[lower, _]| lower), upper: side(|[_, upper]| upper) })
+    }
+
+    /// The line of a node; `None` if there is no child or too many, or a box is not finite.
+    pub fn encode(children: &[NodeBox], links: Links) -> Option<[u8; LINE_BYTES]> {
+        let around = children.iter().copied().reduce(NodeBox::union)?;
+        let mut line = [0; LINE_BYTES];
+        write_links(&mut line, children.len(), links)?;
+        for axis in 0..3 {
+            let [lower, upper] = around.sides(axis)?;
+            let grid = Grid::around(lower, upper)?;
+            write_f32(&mut line, 4 * axis, grid.corner);
+            *line.get_mut(UNITS + axis)? = grid.exponent;
+            for (child, bounds) in children.iter().enumerate() {
+                let [lower, upper] = bounds.sides(axis)?;
+                write_sides(&mut line, axis, child, [grid.below(lower)?, grid.above(upper)?])?;
+            }
+        }
+        Some(line)
+    }
+}
+
+/// The grid of a node on one axis.
+struct Grid {
+    corner: f32,
+    exponent: u8,
+}
+
+impl Grid {
+    /// The finest that holds an interval.
+    fn around(lower: f32, upper: f32) -> Option<Self> {
+        if !lower.is_finite() || !upper.is_finite() {
+            return None;
+        }
+        let span = (f64::from(upper) - f64::from(lower)) / 255.0;
+        let least = ((span as f32).to_bits() >> EXPONENT_SHIFT) as u8;
+        (least.max(LEAST_UNIT)..u8::MAX).find_map(|exponent| {
+            let mut grid = Self { corner: lower, exponent };
+            grid.corner = (f64::from(lower) - MARGIN * grid.unit()) as f32;
+            if grid.below(lower).is_none() {
+                grid.corner = grid.corner.next_down();
+            }
+            grid.below(lower).and(grid.above(upper)).map(|_| grid)
+        })
+    }
+
+    fn unit(&self) -> f64 {
+        f64::from(f32::from_bits(u32::from(self.exponent) << EXPONENT_SHIFT))
+    }
+
+    fn units(&self, place: f32) -> f64 {
+        (f64::from(place) - f64::from(self.corner)) / self.unit()
+    }
+
+    /// The last line of the grid below a place.
+    fn below(&self, place: f32) -> Option<u8> {
+        let units = self.units(place) - MARGIN;
+        // Rounds down.
+        (0.0..=255.0).contains(&units).then_some(units as u8)
+    }
+
+    /// The first line of the grid above a place.
+    fn above(&self, place: f32) -> Option<u8> {
+        let units = self.units(place) + MARGIN;
+        let line = units as u64;
+        u8::try_from(if (line as f64) < units { line.checked_add(1)? } else { line }).ok()
+    }
+}
+
+impl NodeBox {
+    /// The least box around two.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        let mut union = self;
+        for (lower, other) in union.lower.iter_mut().zip(other.lower) {
+            *lower = lower.min(other);
+        }
+        for (upper, other) in union.upper.iter_mut().zip(other.upper) {
+            *upper = upper.max(other);
+        }
+        union
+    }
+
+    fn sides(&self, axis: usize) -> Option<[f32; 2]> {
+        Some([*self.lower.get(axis)?, *self.upper.get(axis)?])
+    }
+}
+
+impl BvhAxis<'_> {
+    /// The sides of a child's box, metres.
+    pub fn sides(&self, child: usize) -> Option<[f64; 2]> {
+        let [lower, upper] = [*self.lower.get(child)?, *self.upper.get(child)?];
+        Some([lower, upper].map(|side| f64::from(self.corner) + f64::from(side) * f64::from(self.unit)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::layout::tests::random;
+
+    const LINKS: Links = Links { leaves: 1, first_leaf: 100, first_node: 200 };
+
+    /// Boxes of about `size` around `center`; some of them flat, some of them points.
+    fn boxes(seed: u64, center: f32, size: f32) -> Vec<NodeBox> {
+        let mut next = random(seed);
+        let count = 1 + next() as usize % NODE_CHILDREN;
+        let mut point = || {
+            let mut coordinate = || center + ((next() >> 40) as f32 / 16_777_216.0 - 0.5) * size;
+            let corner = [coordinate(), coordinate(), center];
+            NodeBox { lower: corner, upper: corner }
+        };
+        (0..count).map(|child| if child % 4 == 3 { point() } else { point().union(point()) }).collect()
+    }
+
+    #[test]
+    fn a_childs_box_holds_it_and_little_more() {
+        for size in [0.0, 1e-30, 1e-6, 1.0, 77.7, 1e6, 1e30] {
+            for center in [0.0, 1e-3, -1.0, 1000.0, -1e7, 1e30] {
+                for seed in 1..40 {
+                    let boxes = boxes(seed, center, size);
+                    let line = BvhNode::encode(&boxes, LINKS).expect("fits");
+                    for (child, given) in boxes.iter().enumerate() {
+                        for (axis, coded) in BvhNode(&line).axes().iter().enumerate() {
+                            let [lower, upper] = coded.sides(child).expect("a child");
+                            let margin = MARGIN * f64::from(coded.unit);
+                            let [below, above] =
+                                [f64::from(given.lower[axis]) - lower, upper - f64::from(given.upper[axis])];
+                            assert!(below >= margin && above >= margin, "{below} {above} of {coded:?}");
+                            let most = (1.0 + 2.0 * MARGIN) * f64::from(coded.unit);
+                            assert!(below <= most && above <= most, "{below} {above} of {coded:?}");
+                        }
+                    }
+                    check_units(&line, &boxes);
+                }
+            }
+        }
+    }
+
+    /// A unit is no more than twice as long as 255 of them need to be, but where a corner cannot be told as finely.
+    fn check_units(line: &[u8; LINE_BYTES], boxes: &[NodeBox]) {
+        let around = boxes.iter().copied().reduce(NodeBox::union).expect("a child");
+        for (axis, coded) in BvhNode(line).axes().iter().enumerate() {
+            let [lower, upper] = around.sides(axis).expect("an axis");
+            let finest = (f64::from(upper) - f64::from(lower)) / 254.0;
+            let told = f64::from(lower) - f64::from(lower.next_down());
+            assert!(f64::from(coded.unit) <= 2.0 * finest + told.max(1e-28), "{coded:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused() {
+        let nowhere = NodeBox { lower: [f32::NAN; 3], upper: [1.0; 3] };
+        let everywhere = NodeBox { lower: [f32::NEG_INFINITY; 3], upper: [f32::INFINITY; 3] };
+        assert!(BvhNode::encode(&[nowhere], LINKS).is_none());
+        assert!(BvhNode::encode(&[everywhere], LINKS).is_none());
+        assert!(BvhNode::encode(&[], LINKS).is_none());
+    }
+
+    impl core::fmt::Debug for BvhAxis<'_> {
+        fn fmt(&self, formatter: &mut core::fmt::Formatter) -> core::fmt::Result {
+            write!(formatter, "corner {:e}, unit {:e}", self.corner, self.unit)
+        }
+    }
+}

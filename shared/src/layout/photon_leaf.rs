@@ -1,0 +1,252 @@
+//! Leaves of the photon map: some photons of one place, in one line.
+//!
+//! Nothing is lost against [`super::Photon`]: positions lie on a grid in either layout, and a leaf tells them by sixteen
+//! bits each from its own corner. Coordinates of one axis lie side by side, so that one instruction reads them all.
+
+use super::photon_grid::{GRID_BITS, GRID_MASK};
+use crate::address::LINE_BYTES;
+
+/// Some photons, one line.
+///
+/// | bytes | what |
+/// |---|---|
+/// | 0..8 | bits 0-2 which axes vary, 3-6 the number of photons, then the corner's grid coordinates x, y, z |
+/// | 8.. | for each axis that varies, from the corner on, two bytes a photon |
+/// | to 128 | contents, 8 bytes each, the first photon's at the end of the line |
+///
+/// A corner's coordinate takes 20 bits, or 17 where the axis varies: a multiple of 8 then. At least one axis is said to
+/// vary. Contents are the last 8 bytes of [`super::Photon`], without an axis.
+#[derive(Clone, Copy)]
+pub struct PhotonLeaf<'a> {
+    line: &'a [u8; LINE_BYTES],
+    axes: [LeafAxis; 3],
+    photons: u32,
+}
+
+/// One axis of a leaf.
+#[derive(Clone, Copy)]
+struct LeafAxis {
+    corner: u32,
+    /// The byte of the first photon's coordinate.
+    first: u32,
+    /// What of the bytes there is a coordinate: nothing if the axis does not vary.
+    mask: u16,
+}
+
+/// One axis of a leaf's photons: the grid coordinate of photon `i` is `corner + (offsets[i] & mask)`.
+#[derive(Clone, Copy)]
+pub struct LeafCoordinates<'a> {
+    /// What is added to each offset.
+    pub corner: u32,
+    /// Of each photon, and of what comes behind the last; little-endian.
+    pub offsets: &'a [[u8; 2]; LEAF_LANES],
+    /// What of an offset counts.
+    pub mask: u16,
+}
+
+/// Bytes of what a photon carries besides its position.
+pub const PHOTON_CONTENT_BYTES: usize = 8;
+/// Photons that a leaf may have.
+pub const LEAF_PHOTONS: usize = 12;
+/// Coordinates that are read at once.
+pub const LEAF_LANES: usize = 16;
+
+const HEADER_BYTES: usize = 8;
+const AXES_BITS: u32 = 3;
+const COUNT_BITS: u32 = 4;
+/// Lower bits that the corner does without where an axis varies.
+const CORNER_ROUNDING: u32 = 3;
+const _: () = assert!(HEADER_BYTES + 2 * 2 * LEAF_PHOTONS + 2 * LEAF_LANES <= LINE_BYTES);
+
+/// Photons that a leaf has room for if so many axes vary.
+pub const fn leaf_capacity(axes: usize) -> usize {
+    let axes = if axes < 1 { 1 } else { axes };
+    (LINE_BYTES - HEADER_BYTES) / (PHOTON_CONTENT_BYTES + 2 * axes)
+}
+
+impl<'a> PhotonLeaf<'a> {
+    /// Reads a leaf's header.
+    #[inline(always)]
+    pub fn read(line: &'a [u8; LINE_BYTES]) -> Self {
+        let header = line.first_chunk().map_or(0, |&bytes| u64::from_le_bytes(bytes));
+        // More are in unsound images only.
+        let photons = ((header >> AXES_BITS) as u32 & ((1 << COUNT_BITS) - 1)).min(LEAF_PHOTONS as u32);
+        let mut bit = AXES_BITS + COUNT_BITS;
+        let mut first = HEADER_BYTES as u32;
+        let axes = [0, 1, 2].map(|axis| {
+            let varies = (header >> axis) as u32 & 1;
+            let rounding = varies * CORNER_ROUNDING;
+            let bits = GRID_BITS - rounding;
+            let corner = ((header >> bit) as u32 & (GRID_MASK >> rounding)) << rounding;
+            let read = LeafAxis { corner, first, mask: (varies as u16).wrapping_neg() };
+            bit += bits;
+            first += varies * 2 * photons;
+            read
+        });
+        Self { line, axes, photons }
+    }
+
+    /// Number of photons, at most [`LEAF_PHOTONS`].
+    #[inline(always)]
+    pub fn photons(&self) -> u32 {
+        self.photons
+    }
+
+    /// The coordinates of all photons, by axis.
+    #[inline(always)]
+    pub fn coordinates(&self) -> [LeafCoordinates<'a>; 3] {
+        const NONE: &[[u8; 2]; LEAF_LANES] = &[[0; 2]; LEAF_LANES];
+        self.axes.map(|LeafAxis { corner, first, mask }| {
+            // They are there: three axes of the greatest number of photons end before the line does.
+            let bytes = self.line.get(first as usize..).unwrap_or_default();
+            LeafCoordinates { corner, offsets: bytes.as_chunks().0.first_chunk().unwrap_or(NONE), mask }
+        })
+    }
+
+    /// The grid point of photon `index`.
+    #[inline(always)]
+    pub fn point(&self, index: u32) -> [u32; 3] {
+        self.coordinates().map(|axis| axis.coordinate(index))
+    }
+
+    /// What the photons carry: the first photon's last.
+    #[inline(always)]
+    pub fn contents(&self) -> &'a [[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] {
+        const NONE: &[[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] = &[[0; PHOTON_CONTENT_BYTES]; LEAF_LANES];
+        self.line.as_chunks().0.first_chunk().unwrap_or(NONE)
+    }
+
+    /// What photon `index` carries.
+    #[inline(always)]
+    pub fn content(&self, index: u32) -> [u8; PHOTON_CONTENT_BYTES] {
+        self.contents().iter().nth_back(index as usize).copied().unwrap_or_default()
+    }
+
+    /// The line of some photons; `None` if it cannot hold them, or there is none.
+    pub fn encode(photons: &[([u32; 3], [u8; PHOTON_CONTENT_BYTES])]) -> Option<[u8; LINE_BYTES]> {
+        let [lower, upper] = extent(photons)?;
+        let mut varies = [0, 1, 2].map(|axis: usize| lower.get(axis) != upper.get(axis));
+        if varies == [false; 3] {
+            varies = [true, false, false];
+        }
+        let axes = varies.into_iter().filter(|&varies| varies).count();
+        if photons.len() > leaf_capacity(axes) {
+            return None;
+        }
+        let mut line = [0; LINE_BYTES];
+        let mut header = (photons.len() as u64) << AXES_BITS;
+        let (mut bit, mut first) = (AXES_BITS + COUNT_BITS, HEADER_BYTES);
+        for (axis, ((varies, lower), upper)) in varies.into_iter().zip(lower).zip(upper).enumerate() {
+            let rounding = if varies { CORNER_ROUNDING } else { 0 };
+            let corner = lower >> rounding;
+            header |= u64::from(varies) << axis | u64::from(corner) << bit;
+            bit += GRID_BITS - rounding;
+            if varies {
+                u16::try_from(upper - (corner << rounding)).ok()?;
+                let slots = line.get_mut(first..)?.as_chunks_mut().0;
+                for (slot, (point, _)) in slots.iter_mut().zip(photons) {
+                    *slot = ((point.get(axis)? - (corner << rounding)) as u16).to_le_bytes();
+                }
+                first += 2 * photons.len();
+            }
+        }
+        *line.first_chunk_mut()? = header.to_le_bytes();
+        for (slot, (_, content)) in line.as_chunks_mut().0.iter_mut().rev().zip(photons) {
+            *slot = *content;
+        }
+        Some(line)
+    }
+}
+
+impl LeafCoordinates<'_> {
+    #[inline(always)]
+    fn coordinate(&self, index: u32) -> u32 {
+        let offset = self.offsets.get(index as usize).copied().unwrap_or_default();
+        self.corner + u32::from(u16::from_le_bytes(offset) & self.mask)
+    }
+}
+
+/// The least and the greatest coordinates of some grid points; `None` without points.
+fn extent(photons: &[([u32; 3], [u8; PHOTON_CONTENT_BYTES])]) -> Option<[[u32; 3]; 2]> {
+    let (first, _) = photons.first()?;
+    let (mut lower, mut upper) = (*first, *first);
+    for (point, _) in photons {
+        for ((lower, upper), coordinate) in lower.iter_mut().zip(&mut upper).zip(point) {
+            *lower = (*lower).min(*coordinate);
+            *upper = (*upper).max(*coordinate);
+        }
+    }
+    Some([lower, upper])
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::layout::tests::random;
+
+    type Placed = ([u32; 3], [u8; PHOTON_CONTENT_BYTES]);
+
+    fn photons(seed: u64, count: usize, widths: [u32; 3]) -> Vec<Placed> {
+        let mut next = random(seed);
+        let corner = widths.map(|width| next() as u32 & (GRID_MASK >> 1) & !((1 << width) - 1));
+        (0..count)
+            .map(|_| {
+                let point = [0, 1, 2].map(|axis| corner[axis] + (next() as u32 & ((1 << widths[axis]) - 1)));
+                (point, next().to_le_bytes())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_leaf_gives_back_its_photons_to_the_last_bit() {
+        for widths in [[0, 0, 0], [14, 0, 15], [15, 15, 0], [11, 12, 13], [16, 16, 16], [1, 16, 0], [0, 0, 9]]
+        {
+            for count in 1..=LEAF_PHOTONS {
+                for seed in 0..20 {
+                    let photons = photons(seed, count, widths);
+                    let Some(line) = PhotonLeaf::encode(&photons) else { continue };
+                    let leaf = PhotonLeaf::read(&line);
+                    assert_eq!(leaf.photons(), count as u32);
+                    for (index, photon) in (0..).zip(&photons) {
+                        assert_eq!((leaf.point(index), leaf.content(index)), *photon, "{widths:?} {count}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_holds_ten_photons_of_a_wall_eight_of_any_surface_and_twelve_of_an_edge() {
+        for (widths, most) in [([15, 0, 15], 10), ([12, 13, 14], 8), ([0, 16, 0], 12), ([0, 0, 0], 12)] {
+            assert!(PhotonLeaf::encode(&photons(3, most, widths)).is_some(), "{widths:?}");
+            assert!(PhotonLeaf::encode(&photons(3, most + 1, widths)).is_none(), "{widths:?}");
+            let axes = widths.iter().filter(|&&width| width > 0).count();
+            assert_eq!(leaf_capacity(axes), most);
+        }
+    }
+
+    #[test]
+    fn photons_too_far_from_each_other_are_refused_and_one_never_is() {
+        let photon = |coordinate| ([coordinate, 5, 5], [7; 8]);
+        assert!(PhotonLeaf::encode(&[photon(8), photon(8 + 0xffff)]).is_some());
+        assert!(PhotonLeaf::encode(&[photon(8), photon(8 + 0x1_0000)]).is_none());
+        assert!(PhotonLeaf::encode(&[([GRID_MASK; 3], [7; 8])]).is_some());
+        assert!(PhotonLeaf::encode(&[]).is_none());
+    }
+
+    #[test]
+    fn whatever_a_line_holds_reading_it_ends() {
+        let mut next = random(2);
+        for _ in 0..2000 {
+            let line: [u8; LINE_BYTES] = core::array::from_fn(|_| next() as u8);
+            let leaf = PhotonLeaf::read(&line);
+            for index in 0..leaf.photons() {
+                core::hint::black_box((leaf.point(index), leaf.content(index)));
+            }
+        }
+    }
+}

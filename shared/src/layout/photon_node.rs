@@ -1,0 +1,177 @@
+//! Inner nodes of the photon map: the boxes of sixteen children, in one line.
+//!
+//! Boxes lie on a grid of their own, eight bits each way, within the box of the node: a child's is never less than what it
+//! holds. Coordinates of one side of all children lie side by side, so that one instruction reads them all.
+
+use super::photon_grid::GRID_MASK;
+use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides};
+use super::{read_u32, write_u32};
+use crate::address::LINE_BYTES;
+
+/// An inner node, one line: a [`WideNode`] whose sides are in units from a corner, and
+///
+/// | bytes | what |
+/// |---|---|
+/// | 0..12 | x, y, z of the corner: bits 0-23 the grid coordinate, 24-31 the exponent of the unit of boxes on this axis |
+#[derive(Clone, Copy)]
+pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
+
+const COORDINATE_BITS: u32 = 24;
+/// The greatest exponent: that of a box as large as the grid.
+const MOST_EXPONENT: u32 = 13;
+
+/// A box on the photons' grid: the least and the greatest coordinates, both in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GridBox {
+    /// The least coordinates.
+    pub lower: [u32; 3],
+    /// The greatest coordinates.
+    pub upper: [u32; 3],
+}
+
+/// One axis of the boxes of a node: a side of child `i` is at `corner + (lower[i] << exponent)`, the other one at
+/// `corner + (upper[i] << exponent)`.
+#[derive(Clone, Copy)]
+pub struct NodeCoordinates<'a> {
+    /// The grid coordinate from which on sides are told.
+    pub corner: u32,
+    /// The logarithm of their unit.
+    pub exponent: u32,
+    /// Of each child, and of what is no child.
+    pub lower: &'a [u8; NODE_CHILDREN],
+    /// The same.
+    pub upper: &'a [u8; NODE_CHILDREN],
+}
+
+impl<'a> PhotonNode<'a> {
+    /// The boxes of the children, by axis.
+    #[inline(always)]
+    pub fn coordinates(&self) -> [NodeCoordinates<'a>; 3] {
+        [0, 1, 2].map(|axis| {
+            let corner = read_u32(self.0, 4 * axis);
+            let [lower, upper] = WideNode(self.0).sides(axis);
+            NodeCoordinates {
+                corner: corner & GRID_MASK,
+                exponent: (corner >> COORDINATE_BITS).min(MOST_EXPONENT),
+                lower,
+                upper,
+            }
+        })
+    }
+
+    /// The line of a node; `None` if there is no child or too many.
+    pub fn encode(children: &[GridBox], links: Links) -> Option<[u8; LINE_BYTES]> {
+        let around = children.iter().copied().reduce(GridBox::union)?;
+        let mut line = [0; LINE_BYTES];
+        write_links(&mut line, children.len(), links)?;
+        for axis in 0..3 {
+            let side = |of: &[u32; 3]| of.get(axis).copied().unwrap_or(0);
+            let corner = side(&around.lower);
+            let exponent =
+                (side(&around.upper) - corner).checked_ilog2().map_or(0, |bits| (bits + 1).saturating_sub(8));
+            // Of a side that is rounded up the last unit may not do.
+            let exponent = if (side(&around.upper) - corner).div_ceil(1 << exponent) > 255 {
+                exponent + 1
+            } else {
+                exponent
+            };
+            write_u32(&mut line, 4 * axis, corner | exponent << COORDINATE_BITS);
+            for (child, bounds) in children.iter().enumerate() {
+                let lower = ((side(&bounds.lower) - corner) >> exponent) as u8;
+                let upper = u8::try_from((side(&bounds.upper) - corner).div_ceil(1 << exponent)).ok()?;
+                write_sides(&mut line, axis, child, [lower, upper])?;
+            }
+        }
+        Some(line)
+    }
+}
+
+impl GridBox {
+    /// The least box around a point.
+    pub const fn of(point: [u32; 3]) -> Self {
+        Self { lower: point, upper: point }
+    }
+
+    /// The least box around two.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        let mut union = self;
+        for (lower, other) in union.lower.iter_mut().zip(other.lower) {
+            *lower = (*lower).min(other);
+        }
+        for (upper, other) in union.upper.iter_mut().zip(other.upper) {
+            *upper = (*upper).max(other);
+        }
+        union
+    }
+
+    /// Whether all of another box lies in this one.
+    pub fn contains(&self, other: &Self) -> bool {
+        self.union(*other) == *self
+    }
+}
+
+impl NodeCoordinates<'_> {
+    /// The sides of a child's box.
+    pub fn sides(&self, child: usize) -> Option<[u32; 2]> {
+        let [lower, upper] = [*self.lower.get(child)?, *self.upper.get(child)?];
+        Some([lower, upper].map(|side| self.corner + (u32::from(side) << self.exponent)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::layout::tests::random;
+
+    const LINKS: Links = Links { leaves: 1, first_leaf: 100, first_node: 200 };
+
+    fn boxes(seed: u64, count: usize, bits: u32) -> Vec<GridBox> {
+        let mut next = random(seed);
+        let corner: [u32; 3] = core::array::from_fn(|_| next() as u32 & GRID_MASK & !((1 << bits) - 1));
+        let mut point = || corner.map(|corner| corner | next() as u32 & ((1 << bits) - 1));
+        (0..count).map(|_| GridBox::of(point()).union(GridBox::of(point()))).collect()
+    }
+
+    #[test]
+    fn a_childs_box_holds_it_and_little_more() {
+        for bits in 0..=20 {
+            for count in 1..=NODE_CHILDREN {
+                let boxes = boxes(count as u64, count, bits);
+                let line = PhotonNode::encode(&boxes, LINKS).expect("fits");
+                let node = PhotonNode(&line);
+                for (child, given) in boxes.iter().enumerate() {
+                    let sides = node.coordinates().map(|axis| axis.sides(child).expect("a child"));
+                    let read = GridBox {
+                        lower: sides.map(|[lower, _]| lower),
+                        upper: sides.map(|[_, upper]| upper),
+                    };
+                    assert!(read.contains(given), "{read:?} {given:?}");
+                    let unit = 1 << bits.saturating_sub(7);
+                    let more =
+                        |a: [u32; 3], b: [u32; 3]| a.into_iter().zip(b).any(|(a, b)| a.abs_diff(b) >= unit);
+                    assert!(
+                        !more(read.lower, given.lower) && !more(read.upper, given.upper),
+                        "{read:?} {given:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn whatever_a_line_holds_reading_it_ends() {
+        let mut next = random(2);
+        for _ in 0..2000 {
+            let line: [u8; LINE_BYTES] = core::array::from_fn(|_| next() as u8);
+            let node = PhotonNode(&line);
+            for child in 0..NODE_CHILDREN {
+                core::hint::black_box(node.coordinates().map(|axis| axis.sides(child)));
+            }
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! What inner nodes of both trees of a card image have in common: up to sixteen children, leaves before nodes, each kind
+//! numbered one after the other.
+
+use super::{read_u32, write_u32};
+use crate::address::LINE_BYTES;
+
+/// Children that a node may have.
+pub const NODE_CHILDREN: usize = 16;
+const FIRST_LEAF: usize = 12;
+const FIRST_NODE: usize = 16;
+const LEAVES: usize = 20;
+const CHILDREN: usize = 21;
+/// Where the sides of the children's boxes begin: sixteen bytes each for lower x, y, z, upper x, y, z.
+const SIDES: usize = 32;
+const _: () = assert!(SIDES + 6 * NODE_CHILDREN == LINE_BYTES);
+
+/// What a node holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Child {
+    /// A leaf, by its index in the image.
+    Leaf(u32),
+    /// A node, by its index in the image.
+    Node(u32),
+}
+
+/// The children of an inner node.
+///
+/// | bytes | what |
+/// |---|---|
+/// | 12..16 | index of the first child that is a leaf |
+/// | 16..20 | index of the first child that is a node |
+/// | 20, 21 | children that are leaves, which come first; all children |
+/// | 32..128 | sixteen bytes each: lower x, y, z, upper x, y, z of all children |
+#[derive(Clone, Copy)]
+pub struct WideNode<'a>(pub &'a [u8; LINE_BYTES]);
+
+/// Where the children of a node are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Links {
+    /// Children that are leaves, before those that are nodes.
+    pub leaves: u32,
+    /// Index of the first leaf.
+    pub first_leaf: u32,
+    /// Index of the first node.
+    pub first_node: u32,
+}
+
+impl<'a> WideNode<'a> {
+    /// Number of children, at most [`NODE_CHILDREN`].
+    #[inline(always)]
+    pub fn children(&self) -> u32 {
+        u32::from(self.byte(CHILDREN)).min(NODE_CHILDREN as u32)
+    }
+
+    /// Where they are.
+    #[inline(always)]
+    pub fn links(&self) -> Links {
+        Links {
+            leaves: u32::from(self.byte(LEAVES)),
+            first_leaf: read_u32(self.0, FIRST_LEAF),
+            first_node: read_u32(self.0, FIRST_NODE),
+        }
+    }
+
+    /// The lower and the upper sides of all children on an axis, in the units of the node.
+    #[inline(always)]
+    pub(super) fn sides(&self, axis: usize) -> [&'a [u8; NODE_CHILDREN]; 2] {
+        const NONE: &[u8; NODE_CHILDREN] = &[0; NODE_CHILDREN];
+        let side = |side: usize| {
+            let bytes = self.0.get(SIDES + NODE_CHILDREN * side..).unwrap_or_default();
+            bytes.first_chunk().unwrap_or(NONE)
+        };
+        [side(axis), side(3 + axis)]
+    }
+
+    #[inline(always)]
+    pub(super) fn byte(&self, index: usize) -> u8 {
+        self.0.get(index).copied().unwrap_or(0)
+    }
+}
+
+impl Links {
+    /// Child `index`.
+    #[inline(always)]
+    pub fn child(&self, index: u32) -> Child {
+        // Wraps in unsound images only.
+        if index < self.leaves {
+            Child::Leaf(self.first_leaf.wrapping_add(index))
+        } else {
+            Child::Node(self.first_node.wrapping_add(index - self.leaves))
+        }
+    }
+}
+
+/// Writes where the children of a node are; `None` if there is no child or too many.
+pub(super) fn write_links(line: &mut [u8; LINE_BYTES], children: usize, links: Links) -> Option<()> {
+    if children == 0 || children > NODE_CHILDREN || links.leaves as usize > children {
+        return None;
+    }
+    write_u32(line, FIRST_LEAF, links.first_leaf);
+    write_u32(line, FIRST_NODE, links.first_node);
+    *line.get_mut(LEAVES)? = links.leaves as u8;
+    *line.get_mut(CHILDREN)? = children as u8;
+    Some(())
+}
+
+/// Writes the sides of a child's box on an axis.
+pub(super) fn write_sides(
+    line: &mut [u8; LINE_BYTES],
+    axis: usize,
+    child: usize,
+    [lower, upper]: [u8; 2],
+) -> Option<()> {
+    let at = SIDES + NODE_CHILDREN * axis + child;
+    *line.get_mut(at)? = lower;
+    *line.get_mut(at + 3 * NODE_CHILDREN)? = upper;
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn leaves_come_before_nodes() {
+        let mut line = [0; LINE_BYTES];
+        let links = Links { leaves: 2, first_leaf: 100, first_node: 200 };
+        assert!(write_links(&mut line, 5, links).is_some());
+        let node = WideNode(&line);
+        assert_eq!(node.children(), 5);
+        use Child::{Leaf, Node};
+        let children = [Leaf(100), Leaf(101), Node(200), Node(201), Node(202)];
+        assert!((0..).zip(children).all(|(index, child)| node.links().child(index) == child));
+        assert!(write_links(&mut line, 17, links).is_none());
+        assert!(write_links(&mut line, 1, links).is_none());
+        assert!(write_links(&mut line, 0, Links { leaves: 0, ..links }).is_none());
+    }
+}

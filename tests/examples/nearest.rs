@@ -1,0 +1,150 @@
+//! Measures the search for the nearest photons by itself: a million on the faces of a cube.
+//!
+//! `cargo run --release -p photoncard-tests --example nearest -- [--write FOLDER] [--repeat N]`
+//!
+//! Prints searches a second of one thread, in a random order of queries and along a Hilbert curve, and the sum of the
+//! squared distances found. `--write` leaves points and queries as little-endian `f32`, for others to do the same work:
+//! `tests/peers/nearest.sh`.
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use glam::Vec3;
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::pack::{CardImage, PackedScene};
+use photoncard_driver::photon::{Arrival, PhotonMap};
+use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather};
+use photoncard_firmware::sampler::hash;
+use photoncard_tests::{camera, lambertian, room, scene};
+
+const POINTS: u32 = 1_000_000;
+const QUERIES: u32 = 100_000;
+const NEIGHBORS: u32 = 100;
+const MAX_DISTANCE: f32 = 0.025;
+/// Points of which one lies in a cluster.
+const CLUSTER_SHARE: u32 = 5;
+const CLUSTER_RADIUS: f32 = 0.05;
+
+fn random(index: u32, dimension: u32) -> f32 {
+    (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
+}
+
+/// A point on a face of the cube of side 1 around the origin; of some, near the middle of one of two faces.
+fn point(index: u32) -> [f32; 3] {
+    let in_cluster = index.is_multiple_of(CLUSTER_SHARE);
+    let face = hash(index ^ 0x5555) % if in_cluster { 2 } else { 6 };
+    let [u, v] = if in_cluster {
+        let (radius, angle) =
+            (CLUSTER_RADIUS * random(index, 1).sqrt(), random(index, 2) * std::f32::consts::TAU);
+        [0.5 + radius * angle.cos(), 0.5 + radius * angle.sin()]
+    } else {
+        [random(index, 1), random(index, 2)]
+    };
+    let side = if face.is_multiple_of(2) { 0.0 } else { 1.0 };
+    let place = match face / 2 {
+        0 => [side, u, v],
+        1 => [u, side, v],
+        _ => [u, v, side],
+    };
+    place.map(|coordinate| coordinate - 0.5)
+}
+
+fn image(points: impl Iterator<Item = [f32; 3]>) -> (CardImage, Vec<[f32; 3]>) {
+    let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
+    let arrivals: Vec<Arrival> = (0..)
+        .zip(points)
+        .map(|(index, position)| {
+            let direction = (hash(index) as u16).to_le_bytes();
+            Arrival { position, power: [1.0; 3], direction, normal: 0, direct: false }
+        })
+        .collect();
+    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+    let map = PhotonMap::new(&arrivals, packed.photon_grid());
+    let positions = map.photons().iter().map(|photon| photon.position).collect();
+    let image = packed.with_photons(&map).expect("fits");
+    (image.with_photons_in_leaves(MAX_DISTANCE).expect("fits"), positions)
+}
+
+/// Interleaves the Hilbert curve's cells: Skilling 2004, *Programming the Hilbert curve*.
+fn hilbert(place: [f32; 3]) -> u64 {
+    const BITS: u32 = 16;
+    let mut axes =
+        place.map(|coordinate| ((coordinate + 0.5).clamp(0.0, 0.999_999) * (1 << BITS) as f32) as u32);
+    for bit in (1..BITS).rev() {
+        let (one, lower) = (1 << bit, (1 << bit) - 1);
+        for axis in 0..3 {
+            if axes[axis] & one != 0 {
+                axes[0] ^= lower;
+            } else {
+                let exchanged = (axes[0] ^ axes[axis]) & lower;
+                axes[0] ^= exchanged;
+                axes[axis] ^= exchanged;
+            }
+        }
+    }
+    axes[1] ^= axes[0];
+    axes[2] ^= axes[1];
+    let gray = (1..BITS).filter(|bit| axes[2] >> bit & 1 != 0).fold(0, |gray, bit| gray ^ ((1 << bit) - 1));
+    let axes = axes.map(|axis| axis ^ gray);
+    (0..BITS)
+        .rev()
+        .fold(0, |code, bit| axes.iter().fold(code, |code, axis| code << 1 | u64::from(axis >> bit & 1)))
+}
+
+fn search_all(image: &CardImage, queries: &[[f32; 3]]) -> (u64, f64) {
+    let (scene, mut memory) = image.view();
+    let mut buffer = CandidateBuffer::<528>::new();
+    let (mut tested, mut sum) = (0, 0.0);
+    for &query in queries {
+        let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, MAX_DISTANCE);
+        tested += u64::from(gather(&scene, &mut memory, query.into(), &mut nearest).expect("sound"));
+        sum += nearest.candidates().map(|candidate| f64::from(candidate.distance_squared())).sum::<f64>();
+    }
+    (tested, sum)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut folder: Option<PathBuf> = None;
+    let mut repeat = 5;
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let value = arguments.next().ok_or_else(|| format!("{argument} needs a value"))?;
+        match argument.as_str() {
+            "--write" => folder = Some(value.into()),
+            "--repeat" => repeat = value.parse()?,
+            other => return Err(format!("{other} is not known").into()),
+        }
+    }
+    let (image, points) = image((0..POINTS).map(point));
+    let random: Vec<[f32; 3]> = (0..QUERIES).map(|i| points[(hash(i) % POINTS) as usize]).collect();
+    let mut along_curve = random.clone();
+    along_curve.sort_by_key(|&query| hilbert(query));
+    if let Some(folder) = folder {
+        let write = |name: &str, places: &[[f32; 3]]| {
+            let bytes: Vec<u8> = places.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+            std::fs::write(folder.join(name), bytes)
+        };
+        write("points", &points)?;
+        write("random", &random)?;
+        write("hilbert", &along_curve)?;
+    }
+    for (name, queries) in [("random", &random), ("hilbert", &along_curve)] {
+        let mut seconds = Vec::new();
+        let mut found = (0, 0.0);
+        for _ in 0..repeat {
+            let start = Instant::now();
+            found = search_all(&image, queries);
+            seconds.push(start.elapsed().as_secs_f64());
+        }
+        seconds.sort_by(f64::total_cmp);
+        let median = seconds[seconds.len() / 2];
+        println!(
+            "photoncard {name}: {:.0} searches a second, {:.0} photons tested each; sum {:.9}",
+            f64::from(QUERIES) / median,
+            found.0 as f64 / f64::from(QUERIES),
+            found.1
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,175 @@
+//! The ray caster finds what brute force finds, the same bits on every processor, and loses no ray at an edge.
+
+use glam::Vec3;
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::scene::{Triangle, gltf};
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::sampler::hash;
+use photoncard_firmware::scene::{
+    AnyHit, ClosestHit, Hit, Ray, RayFrame, SceneImage, closest_hit, is_occluded,
+};
+use photoncard_firmware::simd::Level;
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES};
+use photoncard_tests::{camera, lambertian, scene};
+
+fn packed(triangles: Vec<Triangle>) -> PackedScene {
+    let scene = scene(triangles, vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
+    PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs")
+}
+
+/// A number from 0 to 1 that looks random.
+fn random(index: u32, dimension: u32) -> f32 {
+    (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
+}
+
+fn random_point(index: u32, dimension: u32) -> Vec3 {
+    Vec3::from([0, 1, 2].map(|axis| random(index, dimension + axis))) * 2.0 - 1.0
+}
+
+/// A closed surface: a sphere with dents, of `2 rings^2` triangles about.
+fn dented_sphere(center: Vec3, radius: f32, rings: u32) -> Vec<Triangle> {
+    let segments = 2 * rings;
+    let point = |ring: u32, segment: u32| {
+        let polar = core::f32::consts::PI * ring as f32 / rings as f32;
+        let around = core::f32::consts::TAU * (segment % segments) as f32 / segments as f32;
+        // The poles are one point each, and the last segment ends at the first.
+        let (sine, cosine) = match ring {
+            0 => (0.0, 1.0),
+            _ if ring == rings => (0.0, -1.0),
+            _ => polar.sin_cos(),
+        };
+        let dent = 0.8 + 0.2 * random(ring * segments + segment % segments, 0);
+        let dent = if ring == 0 || ring == rings { 1.0 } else { dent };
+        center + Vec3::new(sine * around.cos(), cosine, sine * around.sin()) * (radius * dent)
+    };
+    let mut triangles = Vec::new();
+    for (ring, segment) in (0..rings).flat_map(|ring| (0..segments).map(move |segment| (ring, segment))) {
+        let [a, b] = [point(ring, segment), point(ring, segment + 1)];
+        let [c, d] = [point(ring + 1, segment + 1), point(ring + 1, segment)];
+        if ring > 0 {
+            triangles.push(Triangle { vertices: [a, b, c], material: 0 });
+        }
+        if ring + 1 < rings {
+            triangles.push(Triangle { vertices: [a, c, d], material: 0 });
+        }
+    }
+    triangles
+}
+
+/// Boards that cross each other at right angles, flat in an axis each.
+fn boards() -> Vec<Triangle> {
+    (0..40)
+        .flat_map(|i| {
+            let [u, v] = [Vec3::AXES[i % 3], Vec3::AXES[(i + 1) % 3]];
+            let corner = (random_point(i as u32, 50) * 4.0).round() * 0.25;
+            photoncard_tests::quad([corner, corner + u, corner + u + v, corner + v], 0)
+        })
+        .collect()
+}
+
+/// Rays at random, along axes, in the planes of triangles, at corners and edges, and from far away.
+fn rays(triangles: &[Triangle], count: u32) -> Vec<Ray> {
+    let unit = |v: Vec3| v.normalize_or(Vec3::X);
+    (0..count)
+        .map(|i| {
+            let [a, b, c] = triangles[hash(i) as usize % triangles.len()].vertices;
+            let size = a.distance(b) + b.distance(c);
+            let origin = a + random_point(i, 10) * size * 4.0;
+            let (origin, target) = match i % 8 {
+                0 => (origin, origin + random_point(i, 20)),
+                1 => (origin, origin + Vec3::AXES[i as usize / 8 % 3] * (random(i, 1) - 0.5)),
+                2 => (origin, a),
+                3 => (origin, a.lerp(b, random(i, 2))),
+                4 => (c + (c - a) * 3.0, a.lerp(b, random(i, 2))),
+                5 => (a + random_point(i, 10) * size * 1000.0, a.lerp(b, random(i, 2)).lerp(c, random(i, 3))),
+                6 => (a, b),
+                _ => (Vec3::new(a.x, origin.y, origin.z), a),
+            };
+            let max_distance = if i % 5 == 0 { size * random(i, 4) * 10.0 } else { f32::INFINITY };
+            Ray { max_distance, ..Ray::new(origin, unit(target - origin)) }
+        })
+        .collect()
+}
+
+/// The first triangle of all, by distance and then by index.
+fn brute_force(image: &SceneImage, memory: &mut Lines, ray: &Ray) -> Option<Hit> {
+    let frame = RayFrame::new(ray);
+    let mut nearest: Option<Hit> = None;
+    for leaf in 0..image.header.section(SectionKind::Triangles).records {
+        let line = image.line(memory, SectionKind::Triangles, leaf, 0..LINE_BYTES as u32).expect("sound");
+        for slot in 0..LEAF_TRIANGLES {
+            let triangle = BvhLeaf(line).triangle(slot);
+            let until = nearest.map_or(ray.max_distance, |hit| hit.intersection.distance);
+            if let Some(intersection) = frame.intersect(&triangle.vertices, until)
+                && nearest.is_none_or(|hit| intersection.distance < hit.intersection.distance)
+            {
+                nearest = Some(Hit { intersection, triangle, index: leaf * 3 + slot as u32 });
+            }
+        }
+    }
+    nearest
+}
+
+#[test]
+fn every_processor_finds_what_brute_force_finds() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf");
+    let cornell = gltf::load(path.as_ref()).expect("a shipped scene loads").triangles;
+    let cornell = cornell.into_iter().map(|triangle| Triangle { material: 0, ..triangle }).collect();
+    let far = Vec3::new(1000.0, -3000.0, 0.1);
+    let scenes = [
+        cornell,
+        boards(),
+        dented_sphere(Vec3::ZERO, 1.0, 12),
+        dented_sphere(far, 1.0, 12),
+        dented_sphere(Vec3::ZERO, 1e-6, 9),
+        dented_sphere(Vec3::ZERO, 1e6, 9),
+        dented_sphere(Vec3::ZERO, 1.0, 2),
+    ];
+    for (number, triangles) in scenes.into_iter().enumerate() {
+        let rays = rays(&triangles, 4000);
+        let packed = packed(triangles);
+        let (image, mut memory) = packed.view();
+        let mut hits = 0;
+        for ray in &rays {
+            let expected = brute_force(&image, &mut memory, ray);
+            hits += u32::from(expected.is_some());
+            assert_eq!(closest_hit(&image, &mut memory, ray).unwrap(), expected, "{ray:?} in scene {number}");
+            for level in Level::ALL {
+                let closest = level.run(ClosestHit { scene: &image, memory: &mut memory, ray });
+                assert!(
+                    closest.is_none_or(|hit| hit == Ok(expected)),
+                    "{level:?}: {ray:?} in scene {number}"
+                );
+                let any = level.run(AnyHit { scene: &image, memory: &mut memory, ray });
+                assert!(any.is_none_or(|any| any == Ok(expected.is_some())), "{level:?}: {ray:?}");
+            }
+        }
+        assert!(hits > 1000 && hits < 3900, "{hits} of scene {number}");
+    }
+}
+
+#[test]
+fn no_ray_leaves_a_closed_surface() {
+    for (center, radius) in [(Vec3::ZERO, 1.0), (Vec3::new(70.0, -900.0, 3.3), 1.0), (Vec3::ONE, 1e5)] {
+        let triangles = dented_sphere(center, radius, 24);
+        let packed = packed(triangles.clone());
+        let (image, mut memory) = packed.view();
+        for (i, triangle) in (0..).zip(triangles.iter().cycle().take(60_000)) {
+            let [a, b, _] = triangle.vertices;
+            let origin = center + random_point(i, 10) * (0.3 * radius);
+            // At a corner, at an edge, or near one.
+            let target = match i % 4 {
+                0 => a,
+                1 => a.midpoint(b),
+                2 => a.lerp(b, random(i, 1)),
+                _ => a.lerp(b, random(i, 1)) + random_point(i, 20) * (1e-6 * radius),
+            };
+            let ray = Ray::new(origin, (target - origin).normalize());
+            assert!(closest_hit(&image, &mut memory, &ray).unwrap().is_some(), "{ray:?} leaves");
+            assert!(is_occluded(&image, &mut memory, &ray).unwrap(), "{ray:?} leaves");
+        }
+    }
+}
