@@ -21,13 +21,15 @@ pub(super) struct StoredPoint {
     pub(super) directions: DirectionTable,
     /// Of pixels: what the rays are for; none if there is no surface.
     purpose: Option<Purpose>,
+    /// Of pixels: whether there are rays to cast. Most pixels have none where irradiance is interpolated.
+    has_rays: bool,
 }
 
 const _: () = assert!(size_of::<StoredPoint>() == 48);
 
 impl StoredPoint {
     pub(super) const NOTHING: Self =
-        Self { seen: Seen::NOWHERE, directions: DirectionTable::COSINE, purpose: None };
+        Self { seen: Seen::NOWHERE, directions: DirectionTable::COSINE, purpose: None, has_rays: false };
 
     /// The gather point of a sample of a pixel.
     #[inline(always)]
@@ -85,7 +87,12 @@ impl<
             let purpose = self.light_at_once(context, index, at, place, &surface);
             let mut point = pixel_point(context.frame, at, surface, purpose);
             point.choose_directions(context, self.gathers.candidates.view())?;
-            stored = StoredPoint { seen, directions: point.directions, purpose: Some(purpose) };
+            stored = StoredPoint {
+                seen,
+                directions: point.directions,
+                purpose: Some(purpose),
+                has_rays: point.rays > 0,
+            };
         }
         if let Some(slot) = self.points.get_mut(index) {
             *slot = stored;
@@ -139,7 +146,7 @@ impl<
         let Self { points, sums, gathers, position, .. } = self;
         let frame = context.frame;
         context.memory.enter(MemoryStage::GatherRay);
-        if let Some(stored) = points.get(index)
+        if let Some(stored) = points.get(index).filter(|stored| stored.has_rays)
             && let Some(point) = stored.restore(context, at)?
         {
             let share = 1.0 / frame.samples as f32;
