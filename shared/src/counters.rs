@@ -57,6 +57,13 @@ impl Counters {
         most_waiting: 0,
     };
 
+    /// Rays of any kind and gathers, together.
+    #[inline(always)]
+    pub fn rays_and_gathers(&self) -> u64 {
+        let rays = [self.eye_rays, self.shadow_rays, self.gather_rays, self.survey_rays];
+        rays.into_iter().fold(self.gathers, u64::wrapping_add)
+    }
+
     /// Adds another chip's counts.
     pub fn add(&mut self, other: &Self) {
         self.eye_rays = self.eye_rays.saturating_add(other.eye_rays);

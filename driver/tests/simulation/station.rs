@@ -11,6 +11,8 @@ use crate::world::{Fixture, Memory};
 
 /// Virtual time of a step.
 const STEP: Duration = Duration::from_micros(100);
+/// Turns of a chip for one step of its work: bytes go over a line in the meantime.
+const TURNS_OF_CHIP: usize = 8;
 
 /// How a card is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +88,8 @@ impl<'a> Station<'a> {
                 let sent = self.to_host.push(self.card.outgoing(), bytes, &run.faults, random);
                 self.card.sent(sent);
             }
-            _ => self.card.work(),
+            _ if random.below(TURNS_OF_CHIP) == 0 => self.card.work(),
+            _ => {}
         }
     }
 

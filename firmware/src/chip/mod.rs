@@ -70,6 +70,11 @@ pub struct Chip<
 /// Blocks that wait: a tile is halved at most so often.
 const MOST_BLOCKS: usize = 32;
 
+/// Rays and gathers after which a step ends.
+const WORK_OF_STEP: u64 = 16;
+/// Pieces of one step at the most: some cast no ray.
+const PIECES_PER_STEP: u32 = 64;
+
 /// What a step has led to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
@@ -145,12 +150,28 @@ impl<
             && self.blocks.push(Block::whole(tile.width, tile.height)).is_ok()
     }
 
-    /// Does the next piece of the tile: one stage of one pixel or record, in the stages of gather rays one direction
-    /// bin of it, in the survey one cell of the lattice or one ray, or some of the gathers that wait.
+    /// Does the next pieces of the tile, until some rays are cast or gathers done: little enough for a card to look at its
+    /// link after each step, and enough for the look to cost little.
     ///
     /// # Errors
     /// If the image is not sound.
     pub fn step<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<Progress, Fault> {
+        let done = context.counters.rays_and_gathers();
+        for _ in 0..PIECES_PER_STEP {
+            if self.piece(context)? == Progress::Complete {
+                return Ok(Progress::Complete);
+            }
+            if context.counters.rays_and_gathers().wrapping_sub(done) >= WORK_OF_STEP {
+                break;
+            }
+        }
+        Ok(Progress::Busy)
+    }
+
+    /// Does the next piece of the tile: one stage of one pixel or record, in the stages of gather rays one direction
+    /// bin of it, in the survey one cell of the lattice or one ray, or some of the gathers that wait.
+    #[inline(always)]
+    fn piece<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<Progress, Fault> {
         let stage = self.position.stage;
         let must_be_empty = matches!(stage, Stage::Done | Stage::RecordSums);
         let must_drain = self.gathers.is_full(context.frame) || must_be_empty && !self.gathers.is_empty();
