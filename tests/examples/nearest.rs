@@ -14,6 +14,7 @@ use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{Arrival, PhotonMap};
+use photoncard_firmware::gather::Place;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather};
 use photoncard_firmware::sampler::hash;
 use photoncard_tests::{camera, lambertian, room, scene};
@@ -66,32 +67,6 @@ fn image(points: impl Iterator<Item = [f32; 3]>) -> (CardImage, Vec<[f32; 3]>) {
     (image.with_photons_in_leaves(MAX_DISTANCE).expect("fits"), positions)
 }
 
-/// Interleaves the Hilbert curve's cells: Skilling 2004, *Programming the Hilbert curve*.
-fn hilbert(place: [f32; 3]) -> u64 {
-    const BITS: u32 = 16;
-    let mut axes =
-        place.map(|coordinate| ((coordinate + 0.5).clamp(0.0, 0.999_999) * (1 << BITS) as f32) as u32);
-    for bit in (1..BITS).rev() {
-        let (one, lower) = (1 << bit, (1 << bit) - 1);
-        for axis in 0..3 {
-            if axes[axis] & one != 0 {
-                axes[0] ^= lower;
-            } else {
-                let exchanged = (axes[0] ^ axes[axis]) & lower;
-                axes[0] ^= exchanged;
-                axes[axis] ^= exchanged;
-            }
-        }
-    }
-    axes[1] ^= axes[0];
-    axes[2] ^= axes[1];
-    let gray = (1..BITS).filter(|bit| axes[2] >> bit & 1 != 0).fold(0, |gray, bit| gray ^ ((1 << bit) - 1));
-    let axes = axes.map(|axis| axis ^ gray);
-    (0..BITS)
-        .rev()
-        .fold(0, |code, bit| axes.iter().fold(code, |code, axis| code << 1 | u64::from(axis >> bit & 1)))
-}
-
 fn search_all(image: &CardImage, queries: &[[f32; 3]]) -> (u64, f64) {
     let (scene, mut memory) = image.view();
     let mut buffer = CandidateBuffer::<528>::new();
@@ -119,7 +94,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (image, points) = image((0..POINTS).map(point));
     let random: Vec<[f32; 3]> = (0..QUERIES).map(|i| points[(hash(i) % POINTS) as usize]).collect();
     let mut along_curve = random.clone();
-    along_curve.sort_by_key(|&query| hilbert(query));
+    // What tells a place is its number along the curve.
+    let grid = image.view().0.header.photon_grid;
+    along_curve.sort_by_key(|&query| Place::new(&grid, query));
     if let Some(folder) = folder {
         let write = |name: &str, places: &[[f32; 3]]| {
             let bytes: Vec<u8> = places.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
