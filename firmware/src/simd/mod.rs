@@ -121,3 +121,51 @@ fn pack<T: Copy>(mut mask: u32, values: &[T; LANES], packed: &mut [T; LANES]) {
         mask &= mask - 1;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// What an [`Isa`] does of its own, for one mask.
+    struct All {
+        mask: u32,
+        bound: u32,
+        values: [u32; LANES],
+    }
+
+    impl Kernel for All {
+        type Output = (u32, Vec<u32>, Vec<u64>);
+
+        #[inline(always)]
+        fn run(self, isa: impl Isa) -> Self::Output {
+            let long = self.values.map(|value| u64::from(value) << 32 | u64::from(!value));
+            let mut packed = ([0; LANES], [0; LANES]);
+            isa.pack(self.mask, &self.values, &mut packed.0);
+            isa.pack_long(self.mask, &long, &mut packed.1);
+            let count = self.mask.count_ones() as usize;
+            (isa.below(&self.values, self.bound), packed.0[..count].to_vec(), packed.1[..count].to_vec())
+        }
+    }
+
+    #[test]
+    fn all_instructions_compare_and_pack_alike() {
+        for mask in 0..1 << LANES {
+            let values = core::array::from_fn(|lane| crate::sampler::hash(mask ^ (lane as u32) << 20));
+            let bound = match mask % 4 {
+                0 => values[mask as usize % LANES],
+                1 => u32::MAX,
+                2 => 0,
+                _ => crate::sampler::hash(mask),
+            };
+            let mut results = Level::ALL.iter().filter_map(|level| level.run(All { mask, bound, values }));
+            let (below, packed, long) = results.next().expect("what every processor has");
+            assert!((0..LANES).all(|lane| (below >> lane & 1 != 0) == (values[lane] < bound)));
+            assert!(
+                packed.iter().eq((0..LANES).filter(|lane| mask >> lane & 1 != 0).map(|lane| &values[lane]))
+            );
+            assert!(results.all(|result| result == (below, packed.clone(), long.clone())), "{mask:b}");
+        }
+    }
+}

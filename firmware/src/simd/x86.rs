@@ -1,8 +1,11 @@
 //! Instructions of x86-64.
+#![cfg_attr(not(test), expect(clippy::indexing_slicing, reason = "the tables have an entry for every index"))]
 
 use core::arch::x86_64::{
-    _MM_HINT_T0, _mm_prefetch, _mm512_cmplt_epu32_mask, _mm512_loadu_si512, _mm512_maskz_compress_epi32,
-    _mm512_maskz_compress_epi64, _mm512_set1_epi32, _mm512_storeu_si512,
+    __m256i, _MM_HINT_T0, _mm_cvtsi64_si128, _mm_prefetch, _mm256_castsi256_ps, _mm256_cmpgt_epi32,
+    _mm256_cvtepu8_epi32, _mm256_loadu_si256, _mm256_movemask_ps, _mm256_permutevar8x32_epi32,
+    _mm256_set1_epi32, _mm256_storeu_si256, _mm256_xor_si256, _mm512_cmplt_epu32_mask, _mm512_loadu_si512,
+    _mm512_maskz_compress_epi32, _mm512_maskz_compress_epi64, _mm512_set1_epi32, _mm512_storeu_si512,
 };
 
 use photoncard_shared::address::Line;
@@ -132,6 +135,46 @@ impl Isa for Avx512 {
     }
 }
 
+/// For every mask of eight lanes, those of it, the first first.
+const LANES_OF: [[u8; 8]; 256] = {
+    let mut lanes_of = [[0; 8]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut lane, mut count) = (0, 0);
+        while lane < 8 {
+            if mask >> lane & 1 != 0 {
+                lanes_of[mask][count] = lane;
+                count += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    lanes_of
+};
+
+/// The same for four lanes that are twice as long.
+const LONG_LANES_OF: [[u8; 8]; 16] = {
+    let mut lanes_of = [[0; 8]; 16];
+    let mut mask = 0;
+    while mask < 16 {
+        let (mut lane, mut count) = (0, 0);
+        while lane < 4 {
+            if mask >> lane & 1 != 0 {
+                lanes_of[mask][count] = 2 * lane;
+                lanes_of[mask][count + 1] = 2 * lane + 1;
+                count += 2;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    lanes_of
+};
+
+/// The sign of a number, by which an unsigned comparison is a signed one.
+const SIGN: u32 = 1 << 31;
+
 impl Isa for Avx2 {
     #[inline(always)]
     fn lanes(self, _: usize) -> usize {
@@ -140,21 +183,65 @@ impl Isa for Avx2 {
 
     #[inline(always)]
     fn below(self, values: &[u32; LANES], bound: u32) -> u32 {
-        Portable.below(values, bound)
+        let (halves, _) = values.as_chunks::<8>();
+        // SAFETY: the instructions are there, and eight numbers of four bytes to read.
+        let below = |half: &[u32; 8]| unsafe {
+            let values = _mm256_loadu_si256(half.as_ptr().cast());
+            let values = _mm256_xor_si256(values, _mm256_set1_epi32(SIGN.cast_signed()));
+            let is_below = _mm256_cmpgt_epi32(_mm256_set1_epi32((bound ^ SIGN).cast_signed()), values);
+            _mm256_movemask_ps(_mm256_castsi256_ps(is_below)).cast_unsigned()
+        };
+        halves.iter().rev().fold(0, |mask, half| mask << 8 | below(half))
     }
 
     #[inline(always)]
     fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]) {
-        Portable.pack(mask, values, packed);
+        let mut target = packed.as_mut_ptr();
+        let mut mask = mask;
+        for half in values.as_chunks::<8>().0 {
+            let lanes = mask as u8;
+            mask >>= 8;
+            // SAFETY: the instructions are there, eight numbers to read, and as many to write: the second eight are written
+            // after at most eight of the first.
+            unsafe {
+                let order = order(&LANES_OF[usize::from(lanes)]);
+                let values = _mm256_loadu_si256(half.as_ptr().cast());
+                _mm256_storeu_si256(target.cast(), _mm256_permutevar8x32_epi32(values, order));
+                target = target.add(lanes.count_ones() as usize);
+            }
+        }
     }
 
     #[inline(always)]
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]) {
-        Portable.pack_long(mask, values, packed);
+        let mut target = packed.as_mut_ptr();
+        let mut mask = mask;
+        for quarter in values.as_chunks::<4>().0 {
+            let lanes = mask & 15;
+            mask >>= 4;
+            // SAFETY: the instructions are there, four numbers to read, and as many to write: before the last four at most
+            // twelve are.
+            unsafe {
+                let order = order(&LONG_LANES_OF[lanes as usize]);
+                let values = _mm256_loadu_si256(quarter.as_ptr().cast());
+                _mm256_storeu_si256(target.cast(), _mm256_permutevar8x32_epi32(values, order));
+                target = target.add(lanes.count_ones() as usize);
+            }
+        }
     }
 
     #[inline(always)]
     fn prefetch(self, line: &Line) {
         prefetch(line);
     }
+}
+
+/// Which lanes to take, from a byte each.
+///
+/// # Safety
+/// The processor must have AVX2.
+#[inline]
+#[target_feature(enable = "avx2")]
+unsafe fn order(lanes: &[u8; 8]) -> __m256i {
+    _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(i64::from_le_bytes(*lanes)))
 }
