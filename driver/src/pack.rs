@@ -13,15 +13,26 @@ use photoncard_shared::image::{Header, SECTIONS, Section, SectionKind};
 use photoncard_shared::layout::{
     self, BvhNode, NodeBox, Photon, PhotonGrid, Record, WideNode, power_of_two_above,
 };
+use photoncard_shared::message::Radiance;
 
 use crate::bvh::{self, HierarchyError};
 use crate::emitter::Emitters;
+use crate::photon::irradiance::PHOTONS_OF_A_POINT;
 use crate::photon::leaves::{PhotonLines, Placed};
 use crate::photon::{PhotonLayout, PhotonMap};
 use crate::scene::{Material, Scene};
 
 /// Photons of a line of leaves, the inner nodes' lines counted in, about.
 const PHOTONS_OF_A_LEAF: usize = 9;
+
+/// The sections of the photon map, irradiance points among them.
+const PHOTON_SECTIONS: [SectionKind; 5] = [
+    SectionKind::Photons,
+    SectionKind::PhotonNodes,
+    SectionKind::PhotonLeaves,
+    SectionKind::IrradianceNodes,
+    SectionKind::IrradianceLeaves,
+];
 
 /// Why a scene does not fit a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
@@ -132,7 +143,8 @@ impl PackedScene {
         self.lines.len() as u64 * LINE_BYTES as u64
     }
 
-    /// Checks that an image of this scene may fit a card's memory with so many photons: in leaves as they are about.
+    /// Checks that an image of this scene may fit a card's memory with so many photons: in leaves as they are about, and
+    /// with irradiance points if radiance is precomputed.
     ///
     /// # Errors
     /// If not; the error says what to lower.
@@ -140,6 +152,7 @@ impl PackedScene {
         &self,
         photons: usize,
         layout: PhotonLayout,
+        radiance: Radiance,
         budget: &Budget,
     ) -> Result<(), PackError> {
         let per_line = match layout {
@@ -147,13 +160,23 @@ impl PackedScene {
             // With the inner nodes; what does not fit after all is found when the map is there.
             PhotonLayout::Lines => PHOTONS_OF_A_LEAF,
         };
-        let photon_bytes = (photons.div_ceil(per_line) * LINE_BYTES) as u64;
+        let points_per_line =
+            (radiance == Radiance::Precomputed).then_some(PHOTONS_OF_A_LEAF * PHOTONS_OF_A_POINT);
+        let lines = |photons: usize| {
+            photons.div_ceil(per_line) + points_per_line.map_or(0, |per_line| photons.div_ceil(per_line))
+        };
+        let photon_bytes = (lines(photons) * LINE_BYTES) as u64;
         let needed = self.bytes() + photon_bytes;
         let available = budget.dram_bytes as u64;
         if needed <= available {
             return Ok(());
         }
-        let room = available.saturating_sub(self.bytes()) / LINE_BYTES as u64 * per_line as u64;
+        let free = available.saturating_sub(self.bytes()) / LINE_BYTES as u64;
+        let room = match points_per_line {
+            None => free * per_line as u64,
+            // Both last lines may be short.
+            Some(points) => free.saturating_sub(1) * (per_line * points) as u64 / (per_line + points) as u64,
+        };
         let remedy = if room > 0 {
             format!("lower --photons to {room} or less, or use a card with more memory")
         } else {
@@ -237,6 +260,24 @@ impl CardImage {
         Ok(Self { lines: scene.lines })
     }
 
+    /// The same image with irradiance points.
+    ///
+    /// # Errors
+    /// If there are more lines than an address can tell.
+    pub(crate) fn with_irradiance(self, points: PhotonLines) -> Result<Self, PackError> {
+        let (SceneImage { header }, _) = self.view();
+        let mut scene = PackedScene {
+            lines: self.lines,
+            sections: header.sections,
+            radiance_unit: header.radiance_unit,
+            emitter_density: header.emitter_density,
+        };
+        scene.append(SectionKind::IrradianceNodes, points.nodes.into_iter())?;
+        scene.append(SectionKind::IrradianceLeaves, points.leaves.into_iter())?;
+        scene.lines[0] = scene.header(header.photon_power_unit, header.photon_grid).to_line();
+        Ok(Self { lines: scene.lines })
+    }
+
     /// Checks that the image fits a card's memory.
     ///
     /// # Errors
@@ -247,10 +288,13 @@ impl CardImage {
             return Ok(());
         }
         let (SceneImage { header }, _) = self.view();
-        let lines = |kind| header.section(kind).records as u64 * LINE_BYTES as u64;
+        let lines = |kind: SectionKind| {
+            let lines = header.section(kind).records.div_ceil(kind.records_per_line());
+            u64::from(lines) * LINE_BYTES as u64
+        };
         Err(PackError::Dram {
             needed,
-            photons: lines(SectionKind::PhotonNodes) + lines(SectionKind::PhotonLeaves),
+            photons: PHOTON_SECTIONS.into_iter().map(lines).sum(),
             available,
             remedy: "lower --photons, or use a card with more memory".into(),
         })

@@ -12,10 +12,10 @@ use photoncard_shared::budget::{
     Budget, MICRO, MOST_BINS, MOST_GATHER_RAYS, REFERENCE, TechniqueMemory, gather_candidates,
 };
 use photoncard_shared::counters::Counters;
-use photoncard_shared::image::LAYOUT_VERSION;
+use photoncard_shared::image::{Header, LAYOUT_VERSION, SectionKind};
 use photoncard_shared::message::{
     self, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXEL_BYTES, PIXELS_PER_REPLY,
-    PROTOCOL_VERSION, Reply, Tile,
+    PROTOCOL_VERSION, Radiance, Reply, Tile,
 };
 use photoncard_shared::transport::Transport;
 
@@ -229,10 +229,8 @@ impl<
                 Ok(None)
             }
             Command::BeginFrame(frame) => {
-                if self.image.scene().is_none() || self.is_at_work() {
-                    return Err(OUT_OF_ORDER);
-                }
-                check_frame(budget, &frame)?;
+                let scene = self.image.scene().filter(|_| !self.is_at_work()).ok_or(OUT_OF_ORDER)?;
+                check_frame(budget, &scene.header, &frame)?;
                 self.frame = Some(frame);
                 Ok(Some(Reply::FrameAccepted))
             }
@@ -363,8 +361,8 @@ fn hello(budget: &Budget, written_lines: u32, memory_use: Option<MemoryUse>) -> 
     }
 }
 
-/// Compares a frame's parameters with the budget; the fault's detail is the parameter's index.
-fn check_frame(budget: &Budget, frame: &FrameParameters) -> Result<(), Fault> {
+/// Compares a frame's parameters with the budget and the image; the fault's detail is the parameter's index.
+fn check_frame(budget: &Budget, header: &Header, frame: &FrameParameters) -> Result<(), Fault> {
     let camera = &frame.camera;
     let camera = [camera.origin, camera.forward, camera.right, camera.up];
     let within = |value: u32, most: u32| (1..=most).contains(&value);
@@ -383,11 +381,18 @@ fn check_frame(budget: &Budget, frame: &FrameParameters) -> Result<(), Fault> {
         within(frame.bins, MOST_BINS),
         true,
         frame.queue >= 1,
+        frame.radiance == Radiance::Density || has_irradiance(header),
     ];
     match checks.iter().position(|&holds| !holds) {
         Some(index) => Err(Fault { code: FaultCode::Parameter, detail: index as u32 }),
         None => Ok(()),
     }
+}
+
+/// Whether an image has irradiance points, or no photons that they could be of.
+fn has_irradiance(header: &Header) -> bool {
+    let holds = |kind| header.section(kind).records > 0;
+    holds(SectionKind::IrradianceLeaves) || !holds(SectionKind::Photons) && !holds(SectionKind::PhotonLeaves)
 }
 
 /// The least error that interpolated irradiance may be allowed: what is below asks for more than rounding gives.

@@ -10,7 +10,7 @@ use photoncard_driver::film::Window;
 use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::photon::PhotonLayout;
-use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, RenderSettings, Sampling};
+use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
 use crate::study::StudyArguments;
@@ -147,6 +147,9 @@ pub(crate) struct RenderOptions {
     /// What the directions of gather rays are chosen by; it never changes what the picture converges to
     #[arg(long, default_value = "combined")]
     sampling: SamplingOption,
+    /// What tells the radiance of a Lambertian surface at the end of a gather ray; one with a Phong lobe is always by density
+    #[arg(long, default_value = "density")]
+    radiance: RadianceOption,
     /// Gather the indirect light of Lambertian surfaces at some places and interpolate between them
     #[arg(long, default_value = "off")]
     irradiance_cache: Switch,
@@ -269,6 +272,25 @@ impl SamplingOption {
     }
 }
 
+/// What tells the radiance at the end of a gather ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum RadianceOption {
+    /// The density of the photons nearest to it
+    Density,
+    /// The irradiance that the host has estimated at the nearest photon of the surface: several times faster, with a little more
+    /// blur; the image is about twice as large
+    Precomputed,
+}
+
+impl RadianceOption {
+    fn radiance(self) -> Radiance {
+        match self {
+            Self::Density => Radiance::Density,
+            Self::Precomputed => Radiance::Precomputed,
+        }
+    }
+}
+
 /// Layouts of the photon map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum PhotonMapOption {
@@ -327,6 +349,7 @@ impl RenderOptions {
             samples: self.spp,
             tile: self.tile,
             sampling: self.sampling.sampling(),
+            radiance: self.radiance.radiance(),
             irradiance_error: (self.irradiance_cache == Switch::On && self.gather_rays > 0)
                 .then_some(self.ic_error),
             order: self.order.gather_order(),
@@ -350,6 +373,11 @@ impl RenderOptions {
     /// The name of the sampling.
     pub(crate) fn sampling_name(&self) -> Option<String> {
         self.sampling.to_possible_value().map(|value| value.get_name().to_owned())
+    }
+
+    /// What tells radiance, as it was given.
+    pub(crate) fn radiance_name(&self) -> Option<String> {
+        self.radiance.to_possible_value().map(|value| value.get_name().to_owned())
     }
 
     /// The type of the picture's samples.

@@ -152,5 +152,6 @@ fn provenance(
         "spp": settings.samples,
         "sampling": options.sampling_name(),
         "ic_error": settings.irradiance_error,
+        "radiance": options.radiance_name(),
     })
 }

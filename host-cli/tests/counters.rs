@@ -23,7 +23,7 @@ fn sum(statistics: &Value, part: &str, names: &[&str], key: &str) -> u64 {
 }
 
 fn check_sums(statistics: &Value) {
-    let photon_map = ["photon_nodes", "photons"];
+    let photon_map = ["photon_nodes", "photons", "irradiance_nodes", "irradiance_points"];
     let scene = ["nodes", "triangles", "materials", "emitters"];
     let stages = ["eye", "survey", "table", "shadow", "gather_ray", "gather"];
     for key in KEYS {
@@ -65,9 +65,11 @@ fn counters_add_up_and_change_no_picture() {
         ("jensen", "photon=1536/128/4,scene=75K/128/4", &["--photon-map", "jensen"]),
         ("curve", "unified=32K/128/256", &["--order", "hilbert"]),
         ("records", "unified=8K/128/1", &["--irradiance-cache", "on"]),
+        ("precomputed", "photon=8K/128/4,scene=8K/128/4", &["--radiance", "precomputed"]),
     ] {
         let outcome = render(name, &[&["--cache", caches], options].concat());
-        assert!(name == "records" || room.read(&format!("{name}.exr")) == room.read("plain.exr"), "{name}");
+        let is_another = ["records", "precomputed"].contains(&name);
+        assert!(is_another != (room.read(&format!("{name}.exr")) == room.read("plain.exr")), "{name}");
         let told: Vec<_> = outcome.stderr.lines().filter(|line| line.contains("DRAM")).collect();
         assert_eq!(told.len(), 3, "{}", outcome.stderr);
         let statistics = statistics(&room, &format!("{name}.json"));
@@ -76,6 +78,7 @@ fn counters_add_up_and_change_no_picture() {
         let is_counted = |part: &str| count(&statistics, part, "requests") > 0;
         assert_eq!(is_counted("structures/photon_nodes"), name != "jensen");
         assert_eq!(is_counted("stages/survey"), name == "records");
+        assert_eq!(is_counted("structures/irradiance_points"), name == "precomputed");
     }
 }
 

@@ -46,10 +46,14 @@ pub enum Structure {
     PhotonNodes = 5,
     /// Photons.
     Photons = 6,
+    /// Inner nodes above irradiance points.
+    IrradianceNodes = 7,
+    /// Irradiance points.
+    IrradiancePoints = 8,
 }
 
 /// Number of structures.
-pub const STRUCTURES: usize = 7;
+pub const STRUCTURES: usize = 9;
 
 impl Structure {
     /// All structures, in order.
@@ -61,11 +65,13 @@ impl Structure {
         Self::Emitters,
         Self::PhotonNodes,
         Self::Photons,
+        Self::IrradianceNodes,
+        Self::IrradiancePoints,
     ];
 
-    /// Whether it belongs to the photon map, and not to the scene.
+    /// Whether it belongs to the photon map, irradiance points among it, and not to the scene.
     #[inline(always)]
     pub const fn is_photon_map(self) -> bool {
-        matches!(self, Self::PhotonNodes | Self::Photons)
+        matches!(self, Self::PhotonNodes | Self::Photons | Self::IrradianceNodes | Self::IrradiancePoints)
     }
 }

@@ -31,6 +31,10 @@ pub struct Counters {
     pub photons_selected: u64,
     /// Photons that the searches returned.
     pub photons_found: u64,
+    /// Searches for the nearest irradiance point.
+    pub lookups: u64,
+    /// Irradiance points whose distance was computed.
+    pub points_tested: u64,
     /// Times that waiting gathers were taken out of the queue.
     pub drains: u64,
     /// The most gathers that waited at once, on any chip.
@@ -53,15 +57,17 @@ impl Counters {
         photons_taken: 0,
         photons_selected: 0,
         photons_found: 0,
+        lookups: 0,
+        points_tested: 0,
         drains: 0,
         most_waiting: 0,
     };
 
-    /// Rays of any kind and gathers, together.
+    /// Rays of any kind, gathers and lookups of irradiance, together.
     #[inline(always)]
     pub fn rays_and_gathers(&self) -> u64 {
         let rays = [self.eye_rays, self.shadow_rays, self.gather_rays, self.survey_rays];
-        rays.into_iter().fold(self.gathers, u64::wrapping_add)
+        rays.into_iter().fold(self.gathers.wrapping_add(self.lookups), u64::wrapping_add)
     }
 
     /// Adds another chip's counts.
@@ -79,6 +85,8 @@ impl Counters {
         self.photons_taken = self.photons_taken.saturating_add(other.photons_taken);
         self.photons_selected = self.photons_selected.saturating_add(other.photons_selected);
         self.photons_found = self.photons_found.saturating_add(other.photons_found);
+        self.lookups = self.lookups.saturating_add(other.lookups);
+        self.points_tested = self.points_tested.saturating_add(other.points_tested);
         self.drains = self.drains.saturating_add(other.drains);
         self.most_waiting = self.most_waiting.max(other.most_waiting);
     }

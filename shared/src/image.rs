@@ -5,7 +5,7 @@
 //! zero bytes.
 //!
 //! The photon map has one of two layouts, and the sections of the other are empty: [`SectionKind::Photons`], or
-//! [`SectionKind::PhotonNodes`] and [`SectionKind::PhotonLeaves`].
+//! [`SectionKind::PhotonNodes`] and [`SectionKind::PhotonLeaves`]. Irradiance points have sections of their own, or none.
 
 use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
 use crate::layout::{Emitter, Material, Photon, PhotonGrid, Record};
@@ -13,7 +13,7 @@ use crate::layout::{Emitter, Material, Photon, PhotonGrid, Record};
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// The version of everything in this module and in [`crate::layout`].
-pub const LAYOUT_VERSION: u16 = 4;
+pub const LAYOUT_VERSION: u16 = 5;
 /// Emitter thresholds in one line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
@@ -37,10 +37,14 @@ pub enum SectionKind {
     PhotonNodes = 6,
     /// [`crate::layout::PhotonLeaf`]s.
     PhotonLeaves = 7,
+    /// [`crate::layout::PhotonNode`]s above irradiance points, the root first.
+    IrradianceNodes = 8,
+    /// [`crate::layout::PhotonLeaf`]s that hold [`crate::layout::IrradiancePoint`]s in the place of photons' contents.
+    IrradianceLeaves = 9,
 }
 
 /// Number of sections.
-pub const SECTIONS: usize = 8;
+pub const SECTIONS: usize = 10;
 
 impl SectionKind {
     /// All sections, in order.
@@ -53,6 +57,8 @@ impl SectionKind {
         Self::Photons,
         Self::PhotonNodes,
         Self::PhotonLeaves,
+        Self::IrradianceNodes,
+        Self::IrradianceLeaves,
     ];
 
     /// Records that one line holds.
@@ -62,7 +68,12 @@ impl SectionKind {
             Self::Emitters => Emitter::PER_LINE as u32,
             Self::EmitterThresholds => THRESHOLDS_PER_LINE,
             Self::Photons => Photon::PER_LINE as u32,
-            Self::Nodes | Self::Triangles | Self::PhotonNodes | Self::PhotonLeaves => 1,
+            Self::Nodes
+            | Self::Triangles
+            | Self::PhotonNodes
+            | Self::PhotonLeaves
+            | Self::IrradianceNodes
+            | Self::IrradianceLeaves => 1,
         }
     }
 
@@ -76,6 +87,8 @@ impl SectionKind {
             Self::Emitters | Self::EmitterThresholds => Structure::Emitters,
             Self::PhotonNodes => Structure::PhotonNodes,
             Self::Photons | Self::PhotonLeaves => Structure::Photons,
+            Self::IrradianceNodes => Structure::IrradianceNodes,
+            Self::IrradianceLeaves => Structure::IrradiancePoints,
         }
     }
 }

@@ -5,6 +5,7 @@
 //! | [`Photon`] | 20 | 6 |
 //! | [`PhotonNode`] | 128 | 1 |
 //! | [`PhotonLeaf`] | 128 | 1 |
+//! | [`PhotonLeaf`] of [`IrradiancePoint`]s | 128 | 1 |
 //! | [`BvhNode`] | 128 | 1 |
 //! | [`BvhLeaf`], up to three triangles | 128 | 1 |
 //! | [`Material`] | 64 | 2 |
@@ -19,6 +20,7 @@ use crate::address::LINE_BYTES;
 mod bvh_leaf;
 mod bvh_node;
 mod direction;
+mod irradiance_point;
 mod photon;
 mod photon_grid;
 mod photon_leaf;
@@ -29,6 +31,7 @@ mod wide_node;
 pub use bvh_leaf::{BvhLeaf, LEAF_TRIANGLES, TRIANGLE_LANES, Triangle};
 pub use bvh_node::{BvhAxis, BvhNode, NodeBox};
 pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
+pub use irradiance_point::IrradiancePoint;
 pub use photon::{FULL_DISC, Photon, Rgbe};
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};
 pub use photon_leaf::{

@@ -20,7 +20,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// The version of this module, of [`crate::transport`] and of [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 6;
+pub const PROTOCOL_VERSION: u16 = 7;
 
 /// Lines that one [`Command::WriteLines`] may carry.
 pub const LINES_PER_WRITE: usize = 8;
@@ -88,6 +88,8 @@ pub struct FrameParameters {
     pub drain: Drain,
     /// Gathers that wait at most, at least 1; a chip takes what it has room for.
     pub queue: u32,
+    /// What tells the radiance at the end of a gather ray.
+    pub radiance: Radiance,
 }
 
 /// What the directions of final gather rays are chosen by. The expectation of the picture is the same.
@@ -102,6 +104,17 @@ pub enum Sampling {
     Product,
     /// The mean of both.
     Mixture,
+}
+
+/// What tells the radiance of a surface at the end of a gather ray.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Radiance {
+    /// The density of the photons nearest to it.
+    #[default]
+    Density,
+    /// Of a Lambertian surface the nearest irradiance point, which the image must have (Christensen 1999, *Faster photon map
+    /// global illumination*); of one with a Phong lobe the density of photons.
+    Precomputed,
 }
 
 /// When gathers are done, and in which order. The picture is the same.
@@ -257,7 +270,7 @@ pub enum FaultCode {
     ImageChecksum,
     /// The image's header is not sound; detail: the image's layout version for a wrong version, else 0.
     ImageHeader,
-    /// A frame parameter is outside the budget or not a number; detail: its index in [`FrameParameters`].
+    /// A frame parameter is outside the budget, not a number, or asks for what the image does not have; detail: its index in [`FrameParameters`].
     Parameter,
     /// A tile is empty, outside the picture or above the budget; detail: its number.
     Tile,

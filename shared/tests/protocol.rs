@@ -204,7 +204,7 @@ fn opcodes_are_pinned() {
 /// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
 #[test]
 fn golden_structures() {
-    assert_eq!(PROTOCOL_VERSION, 6);
+    assert_eq!(PROTOCOL_VERSION, 7);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,
@@ -248,10 +248,12 @@ fn golden_structures() {
         bins: 8,
         drain: Drain::Sort,
         queue: 300,
+        radiance: Radiance::Precomputed,
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero].concat();
-    let bytes = [&[5, 1, 2][..], &camera, &[3, 4, 5, 6, 7], &one, &[2, 1], &one, &[8, 2, 0xac, 2]].concat();
+    let bytes =
+        [&[5, 1, 2][..], &camera, &[3, 4, 5, 6, 7], &one, &[2, 1], &one, &[8, 2, 0xac, 2, 1]].concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);
 
     let counters = Counters {
@@ -268,10 +270,12 @@ fn golden_structures() {
         photons_taken: 11,
         photons_selected: 12,
         photons_found: 13,
-        drains: 14,
+        lookups: 14,
+        points_tested: 15,
+        drains: 16,
         most_waiting: 300,
     };
-    let bytes = [5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 0xac, 2];
+    let bytes = [5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 0xac, 2];
     assert_eq!(encoded(&Reply::TileDone { tile: 16, counters }), bytes);
 }
 

@@ -24,7 +24,7 @@ use photoncard_firmware::scene::{Ray, closest_hit, is_occluded, read_surface};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::Photon;
-use photoncard_shared::message::Tile;
+use photoncard_shared::message::{Radiance, Tile};
 
 fn main() {
     divan::main();
@@ -66,6 +66,7 @@ fn map(scene: &Scene, photons: usize) -> MappedImage {
         neighbors: NEIGHBORS,
         max_distance: None,
         layout: PhotonLayout::Jensen,
+        radiance: Radiance::Density,
     };
     map_photons(packed, &settings, &|_| true).expect("maps")
 }

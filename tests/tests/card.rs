@@ -11,7 +11,7 @@ use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{BvhNode, Links, NodeBox};
 use photoncard_shared::message::{
-    CHUNK_LINES, Command, FaultCode, FrameParameters, MemoryUse, PROTOCOL_VERSION, Tile,
+    CHUNK_LINES, Command, FaultCode, FrameParameters, MemoryUse, PROTOCOL_VERSION, Radiance, Tile,
 };
 use photoncard_tests::wire::{Answer, Wire};
 use photoncard_tests::{camera, lambertian, room, scene, with_room_for_a_card};
@@ -87,6 +87,8 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
             FrameParameters { gather_rays: MICRO.gather_rays + 1, ..frame() },
             FrameParameters { neighbors: MICRO.neighbors + 1, ..frame() },
             FrameParameters { max_distance: f32::NAN, ..frame() },
+            // The image has photons and no irradiance points.
+            FrameParameters { radiance: Radiance::Precomputed, ..frame() },
         ];
         for bad in bad_frames {
             assert_eq!(wire.say(&Command::BeginFrame(bad)), [Answer::Fault(FaultCode::Parameter)], "{bad:?}");

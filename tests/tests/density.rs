@@ -4,6 +4,7 @@ use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
+use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::{Material, Scene};
 use photoncard_firmware::gather::PartialReflection;
 use photoncard_firmware::photon::{CandidateBuffer, Estimate, NearestPhotons, gather};
@@ -29,6 +30,7 @@ impl Map {
             neighbors: NEIGHBORS,
             max_distance: None,
             layout: PhotonLayout::Jensen,
+            radiance: Radiance::Density,
         };
         let MappedImage { image, max_distance, .. } = map_photons(packed, &settings, &|_| true).unwrap();
         Self { image, max_distance }

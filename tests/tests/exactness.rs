@@ -2,7 +2,7 @@
 
 use photoncard_driver::film::{Film, PixelValue, Window};
 use photoncard_driver::photon::PhotonLayout;
-use photoncard_driver::render::{CardAddress, RenderSettings, Sampling, Unobserved, render};
+use photoncard_driver::render::{CardAddress, Radiance, RenderSettings, Sampling, Unobserved, render};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_shared::budget::{MICRO, REFERENCE};
@@ -91,9 +91,14 @@ fn variants() -> Vec<RenderSettings> {
 
 /// Checks all variants with a sampling, without and with records of irradiance.
 fn check_variants(sampling: Sampling) {
+    check_variants_of(&RenderSettings { sampling, ..settings() });
+}
+
+/// Checks all variants with the sampling and the radiance of some settings.
+fn check_variants_of(&RenderSettings { sampling, radiance, .. }: &RenderSettings) {
     let scene = glossy();
     for (irradiance_error, samples) in [(None, 2), (Some(0.025), 1), (Some(0.025), 2)] {
-        let with = |settings| RenderSettings { sampling, irradiance_error, samples, ..settings };
+        let with = |settings| RenderSettings { sampling, radiance, irradiance_error, samples, ..settings };
         let expected = bits(&render_or_panic(&scene, &with(settings())).film);
         for variant in variants() {
             let variant = with(variant);
@@ -121,6 +126,11 @@ fn nor_do_they_with_rays_by_the_product() {
 #[test]
 fn nor_do_they_with_rays_by_the_mixture() {
     check_variants(Sampling::Mixture);
+}
+
+#[test]
+fn nor_do_they_with_precomputed_irradiance() {
+    check_variants_of(&RenderSettings { radiance: Radiance::Precomputed, ..settings() });
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Known radiance: a closed room of albedo rho whose walls emit L shows L / (1 - rho) everywhere.
 
 use glam::Vec3;
-use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::render::{CardAddress, Radiance, RenderSettings};
 use photoncard_driver::scene::{Material, Scene};
 use photoncard_tests::{camera, lambertian, mean, radiances, render_or_panic, room, scene};
 
@@ -26,8 +26,11 @@ fn settings() -> RenderSettings {
 
 /// Checks the mean over the picture, and over each of its 8x8 blocks.
 fn check(scene: &Scene, expected: f64, tolerance: f64) {
-    let settings = settings();
-    let film = render_or_panic(scene, &settings).film;
+    check_with(scene, &settings(), expected, tolerance);
+}
+
+fn check_with(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64) {
+    let film = render_or_panic(scene, settings).film;
     let all = radiances(&film);
     let error = mean(&all) / expected - 1.0;
     assert!(error.abs() < 0.5 * tolerance, "mean is off by {error}");
@@ -45,6 +48,15 @@ fn check(scene: &Scene, expected: f64, tolerance: f64) {
 fn a_diffuse_furnace_glows_evenly() {
     for albedo in [0.2, 0.5, 0.8] {
         check(&furnace(lambertian("wall", albedo)), EMISSION as f64 / (1.0 - albedo as f64), 0.02);
+    }
+}
+
+#[test]
+fn nor_does_it_flicker_by_precomputed_irradiance() {
+    let settings = RenderSettings { radiance: Radiance::Precomputed, ..settings() };
+    for albedo in [0.2, 0.8] {
+        let expected = EMISSION as f64 / (1.0 - albedo as f64);
+        check_with(&furnace(lambertian("wall", albedo)), &settings, expected, 0.02);
     }
 }
 

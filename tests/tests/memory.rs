@@ -5,7 +5,7 @@ use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::{MappedImage, PhotonLayout, map_photons};
-use photoncard_driver::render::{MemoryStatistics, ReadStatistics, RenderSettings, Statistics};
+use photoncard_driver::render::{MemoryStatistics, Radiance, ReadStatistics, RenderSettings, Statistics};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::{GatherOrder, tiles};
 use photoncard_firmware::chip::ReferenceChip;
@@ -243,10 +243,14 @@ fn what_is_counted_does_not_depend_on_how_tiles_are_dealt() {
 
 #[test]
 fn counts_are_of_whole_records_and_whole_lines() {
-    for (photon_layout, irradiance_error) in [(PhotonLayout::Jensen, None), (PhotonLayout::Lines, Some(0.05))]
-    {
-        let settings =
-            RenderSettings { photon_layout, irradiance_error, caches: Some(caches(SPLIT)), ..settings() };
+    for (photon_layout, irradiance_error, radiance) in [
+        (PhotonLayout::Jensen, None, Radiance::Density),
+        (PhotonLayout::Lines, Some(0.05), Radiance::Density),
+        (PhotonLayout::Jensen, None, Radiance::Precomputed),
+        (PhotonLayout::Lines, None, Radiance::Precomputed),
+    ] {
+        let caches = Some(caches(SPLIT));
+        let settings = RenderSettings { photon_layout, irradiance_error, radiance, caches, ..settings() };
         let (memory, statistics) = measured(&settings);
         let structures = &memory.structures;
         let is_jensen = photon_layout == PhotonLayout::Jensen;
@@ -257,6 +261,8 @@ fn counts_are_of_whole_records_and_whole_lines() {
             (structures.materials, Material::BYTES),
             (structures.photon_nodes, LINE_BYTES),
             (structures.photons, of_photon),
+            (structures.irradiance_nodes, LINE_BYTES),
+            (structures.irradiance_points, LINE_BYTES),
         ] {
             assert_eq!(reads.raw_bytes, reads.requests * record as u64, "{record}");
         }
@@ -267,6 +273,8 @@ fn counts_are_of_whole_records_and_whole_lines() {
             structures.emitters,
             structures.photon_nodes,
             structures.photons,
+            structures.irradiance_nodes,
+            structures.irradiance_points,
         ];
         for reads in all {
             assert_eq!(reads.line_hits + reads.line_misses, reads.requests);
@@ -282,5 +290,11 @@ fn counts_are_of_whole_records_and_whole_lines() {
         assert!(structures.nodes.requests > 0 && structures.triangles.requests > 0);
         assert_eq!(structures.photons.requests == statistics.photons_tested, is_jensen);
         assert_eq!(structures.photon_nodes.requests == 0, is_jensen);
+        let is_precomputed = radiance == Radiance::Precomputed;
+        for reads in [structures.irradiance_nodes, structures.irradiance_points] {
+            assert_eq!(reads.requests > 0, is_precomputed);
+        }
+        assert_eq!(statistics.lookups > 0, is_precomputed);
+        assert!(statistics.points_tested >= structures.irradiance_points.requests);
     }
 }

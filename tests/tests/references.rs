@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use photoncard_driver::exr::{RgbImage, read_rgb};
 use photoncard_driver::film::Film;
-use photoncard_driver::render::{RenderSettings, Sampling};
+use photoncard_driver::render::{Radiance, RenderSettings, Sampling};
 use photoncard_driver::scene::gltf;
 use photoncard_tests::render_or_panic;
 
@@ -52,13 +52,20 @@ fn compare(film: &Film, reference: &RgbImage) {
     assert!(high < 0.05, "the 95th percentile of the blocks is off by {high}");
 }
 
-/// Checks a scene as it is rendered by default, and with all that saves gathers.
+/// Checks a scene as it is rendered by default, with all that saves gathers, and with precomputed irradiance.
 fn check(scene: &str, reference: &str) {
-    check_with(scene, reference, Sampling::Reflection, None);
-    check_with(scene, reference, Sampling::Product, Some(0.025));
+    check_with(scene, reference, Sampling::Reflection, None, Radiance::Density);
+    check_with(scene, reference, Sampling::Product, Some(0.025), Radiance::Density);
+    check_with(scene, reference, Sampling::Product, None, Radiance::Precomputed);
 }
 
-fn check_with(scene: &str, reference: &str, sampling: Sampling, irradiance_error: Option<f32>) {
+fn check_with(
+    scene: &str,
+    reference: &str,
+    sampling: Sampling,
+    irradiance_error: Option<f32>,
+    radiance: Radiance,
+) {
     let scene = gltf::load(&path("../scenes").join(scene)).expect("a shipped scene loads");
     let settings = RenderSettings {
         width: 64,
@@ -68,6 +75,7 @@ fn check_with(scene: &str, reference: &str, sampling: Sampling, irradiance_error
         samples: 16,
         sampling,
         irradiance_error,
+        radiance,
         cards: vec!["emulated:2".parse().unwrap()],
         ..RenderSettings::default()
     };

@@ -7,6 +7,7 @@
 mod disc;
 mod emit;
 mod error;
+pub(crate) mod irradiance;
 pub(crate) mod leaves;
 mod map;
 mod trace;
@@ -14,7 +15,9 @@ mod trace;
 use std::time::{Duration, Instant};
 
 pub use error::PhotonError;
+pub use irradiance::precompute_irradiance;
 pub use map::PhotonMap;
+use photoncard_shared::message::Radiance;
 pub use trace::{Arrival, PhotonPass, trace};
 
 use self::disc::{automatic_max_distance, measure_discs};
@@ -36,6 +39,8 @@ pub struct PhotonSettings {
     pub max_distance: Option<f32>,
     /// How the map is laid out.
     pub layout: PhotonLayout,
+    /// What gathers tell radiance by: irradiance points are made if they ask for them.
+    pub radiance: Radiance,
 }
 
 /// How the photon map is laid out in card memory. What a gather finds is the same.
@@ -87,6 +92,10 @@ pub fn map_photons(
     measure_discs(&mut image, settings.neighbors, max_distance, &|| progress(settings.photons))?;
     if settings.layout == PhotonLayout::Lines {
         image = image.with_photons_in_leaves(max_distance)?;
+    }
+    if settings.radiance == Radiance::Precomputed {
+        let go_on = || progress(settings.photons);
+        image = precompute_irradiance(image, settings.neighbors, max_distance, &go_on)?;
     }
     Ok(MappedImage { image, max_distance, paths: pass.paths, tracing })
 }

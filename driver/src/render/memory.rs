@@ -53,6 +53,10 @@ pub struct StructureReads {
     pub photon_nodes: ReadStatistics,
     /// Photons.
     pub photons: ReadStatistics,
+    /// Inner nodes above irradiance points.
+    pub irradiance_nodes: ReadStatistics,
+    /// Irradiance points.
+    pub irradiance_points: ReadStatistics,
 }
 
 /// Reads by stage of the chip's work.
@@ -89,6 +93,8 @@ impl MemoryStatistics {
                 emitters: structure(Structure::Emitters),
                 photon_nodes: structure(Structure::PhotonNodes),
                 photons: structure(Structure::Photons),
+                irradiance_nodes: structure(Structure::IrradianceNodes),
+                irradiance_points: structure(Structure::IrradiancePoints),
             },
             stages: StageReads {
                 eye: stage(Stage::Eye),

@@ -16,7 +16,7 @@ pub use error::RenderError;
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use photoncard_shared::budget::MOST_BINS;
 pub use photoncard_shared::message::MemoryUse;
-pub use photoncard_shared::message::Sampling;
+pub use photoncard_shared::message::{Radiance, Sampling};
 pub use settings::{LEAST_IRRADIANCE_ERROR, RenderSettings};
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
@@ -204,7 +204,7 @@ fn prepare(
     let packed = PackedScene::new(scene, &Emitters::new(scene))?;
     let budgets: Vec<Budget> = budgets.collect();
     for budget in &budgets {
-        packed.check_budget(settings.photons, settings.photon_layout, budget)?;
+        packed.check_budget(settings.photons, settings.photon_layout, settings.radiance, budget)?;
     }
     let total = settings.photons as u64;
     let progress = |stored: usize| {
@@ -254,6 +254,8 @@ fn statistics(
         photons_taken: counters.photons_taken,
         photons_selected: counters.photons_selected,
         photons_found: counters.photons_found,
+        lookups: counters.lookups,
+        points_tested: counters.points_tested,
         drains: counters.drains,
         most_waiting: counters.most_waiting,
         flops: Flops::new(counters, frame),

@@ -8,7 +8,7 @@ use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::{Budget, MOST_BINS};
 use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{self, FrameParameters, Sampling};
+use photoncard_shared::message::{self, FrameParameters, Radiance, Sampling};
 use serde_json::{Value, json};
 
 use super::{CardAddress, RenderError, cards};
@@ -53,6 +53,8 @@ pub struct RenderSettings {
     pub sampling: Sampling,
     /// The relative error that interpolated irradiance may have; `None` to interpolate none.
     pub irradiance_error: Option<f32>,
+    /// What tells the radiance at the ends of gather rays.
+    pub radiance: Radiance,
     /// Order of the photon gathers.
     pub order: GatherOrder,
     /// Direction bins of the gather rays, where the order has any; `None` for the default.
@@ -91,6 +93,7 @@ impl Default for RenderSettings {
             tile: 16,
             sampling: Sampling::Product,
             irradiance_error: None,
+            radiance: Radiance::Density,
             order: GatherOrder::Sort,
             bins: None,
             queue: None,
@@ -129,6 +132,7 @@ impl RenderSettings {
             "spp": self.samples,
             "sampling": format!("{:?}", self.sampling),
             "irradiance-cache": self.irradiance_error,
+            "radiance": format!("{:?}", self.radiance),
         })
     }
 
@@ -256,6 +260,7 @@ impl RenderSettings {
             neighbors: self.neighbors,
             max_distance: self.max_distance,
             layout: self.photon_layout,
+            radiance: self.radiance,
         }
     }
 
@@ -276,6 +281,7 @@ impl RenderSettings {
             bins: if self.order.has_bins() { self.bins.unwrap_or(DEFAULT_BINS) } else { 1 },
             drain: self.order.drain(),
             queue: self.queue.unwrap_or(u32::MAX),
+            radiance: self.radiance,
         }
     }
 

@@ -44,6 +44,10 @@ pub struct Statistics {
     pub photons_selected: u64,
     /// Photons that the searches returned.
     pub photons_found: u64,
+    /// Searches for the nearest irradiance point.
+    pub lookups: u64,
+    /// Irradiance points whose distance was computed.
+    pub points_tested: u64,
     /// Times that waiting gathers were taken out of a chip's queue.
     pub drains: u64,
     /// The most gathers that waited at once, on any chip.

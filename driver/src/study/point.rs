@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::sample::SampleRate;
 use crate::emulator::memory_model::CacheSettings;
 use crate::photon::PhotonLayout;
-use crate::render::{RenderSettings, Sampling};
+use crate::render::{Radiance, RenderSettings, Sampling};
 use crate::scheduler::GatherOrder;
 
 /// Something to measure of a scene.
@@ -88,6 +88,7 @@ impl Point {
             neighbors: settings.neighbors,
             max_distance: settings.max_distance,
             layout: settings.photon_layout,
+            radiance: settings.radiance,
         }
     }
 }
@@ -105,6 +106,7 @@ pub struct ImageKey {
     neighbors: u32,
     max_distance: Option<f32>,
     layout: PhotonLayout,
+    radiance: Radiance,
 }
 
 /// All settings but the cards: a point is always measured on reference chips.
@@ -125,6 +127,7 @@ fn settings(settings: &RenderSettings) -> Value {
         "tile": settings.tile,
         "sampling": sampling_name(settings.sampling),
         "ic_error": settings.irradiance_error,
+        "radiance": radiance_name(settings.radiance),
         "order": order_name(settings.order),
         "bins": settings.bins,
         "queue": settings.queue,
@@ -140,6 +143,14 @@ pub(super) fn order_name(order: GatherOrder) -> &'static str {
         GatherOrder::Hash => "hash",
         GatherOrder::Sort => "sort",
         GatherOrder::Hilbert => "hilbert",
+    }
+}
+
+/// What tells radiance, as the command line writes it.
+pub(super) fn radiance_name(radiance: Radiance) -> &'static str {
+    match radiance {
+        Radiance::Density => "density",
+        Radiance::Precomputed => "precomputed",
     }
 }
 

@@ -1,9 +1,9 @@
 //! How far pixels are from what many more gather rays give.
 //!
-//! Only the sampling, the number of gather rays and the irradiance cache change pixels; the order of the gathers, the
+//! Only the sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels; the order of the gathers, the
 //! tiles, the layout of the photon map and the caches do not.
 
-use photoncard_shared::message::{Sampling, Tile};
+use photoncard_shared::message::{Radiance, Sampling, Tile};
 use serde::{Deserialize, Serialize};
 
 use super::measure::Bench;
@@ -35,7 +35,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Renders some tiles with so many gather rays by the combined sampling, without the irradiance cache. Eye rays and
+    /// Renders some tiles with so many gather rays by the combined sampling, without the irradiance cache and with radiance by density. Eye rays and
     /// the places that shadow rays go to are those of `settings`.
     ///
     /// # Errors
@@ -69,6 +69,7 @@ impl Reference {
             gather_rays: rays,
             sampling: Sampling::Product,
             irradiance_error: None,
+            radiance: Radiance::Density,
             ..comparable(settings)
         }
     }

@@ -42,6 +42,13 @@ impl PartialReflection {
         }
     }
 
+    /// A white diffuser that tells irradiance: what it is multiplied with is one. `normal` is its surface normal's code.
+    pub fn diffuser(normal: u8) -> Self {
+        // One is a power of two: nothing is rounded.
+        let diffuse = Rgbe::encode([1.0; 3], 0);
+        Self { diffuse, lobe: Rgbe::default(), mirror: [0; 2], exponent: [0; 2], normal }
+    }
+
     /// What the photons' power is multiplied with, whatever their directions.
     #[inline(always)]
     pub fn diffuse(&self) -> Vec3 {

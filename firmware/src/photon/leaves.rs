@@ -8,7 +8,7 @@ use photoncard_shared::layout::{
 };
 use photoncard_shared::message::Fault;
 
-use super::NearestPhotons;
+use super::collector::Collector;
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::simd::{Isa, LANES};
@@ -16,7 +16,8 @@ use crate::wide_tree::{BEYOND, Descent, Order, Stack};
 
 const _: () = assert!(LEAF_LANES == LANES);
 
-/// Searches the photons nearest to `position` into `nearest`. Returns the number of photons tested.
+/// Searches what the leaves of a tree hold nearest to `position` into `nearest`; `sections` are the tree's nodes and leaves.
+/// Returns the number of photons tested.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -24,14 +25,15 @@ const _: () = assert!(LEAF_LANES == LANES);
 pub(super) fn gather(
     isa: impl Isa,
     scene: &SceneImage,
+    [nodes, leaves]: [SectionKind; 2],
     memory: &mut impl MemoryPort,
     position: Vec3,
-    nearest: &mut NearestPhotons,
+    nearest: &mut impl Collector,
 ) -> Result<u32, Fault> {
     let query = position.to_array();
     let grid = &scene.header.photon_grid;
     let mut stack = Stack::<{ PHOTON_STACK + LANES }>::new();
-    let mut descent = Descent::new(scene, SectionKind::PhotonNodes, SectionKind::PhotonLeaves, &mut stack);
+    let mut descent = Descent::new(scene, nodes, leaves, &mut stack);
     let mut tested = 0;
     while let Some(part) = descent.next(nearest.limit().to_bits())? {
         match part {
@@ -87,7 +89,7 @@ fn test_leaf(
     grid: &PhotonGrid,
     leaf: PhotonLeaf,
     query: [f32; 3],
-    nearest: &mut NearestPhotons,
+    nearest: &mut impl Collector,
 ) -> u32 {
     let photons = leaf.photons();
     let [x, y, z] = leaf.coordinates();

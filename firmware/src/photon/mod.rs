@@ -1,6 +1,8 @@
 //! The photon map: the k photons nearest to a point, and the radiance that they reflect.
 
 mod candidates;
+mod collector;
+mod irradiance;
 mod kdtree;
 mod leaves;
 mod nearest;
@@ -12,6 +14,7 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::message::Fault;
 
 pub use candidates::{Candidate, CandidateBuffer, Candidates};
+pub use irradiance::{FoundIrradiance, PointSearch, nearest_irradiance};
 pub use nearest::NearestPhotons;
 pub use radiance::{Estimate, MIN_NORMAL_COSINE, SameSurface, reflected_radiance};
 
@@ -53,7 +56,8 @@ impl<M: MemoryPort> Kernel for Search<'_, '_, M> {
     fn run(self, isa: impl Isa) -> Self::Output {
         let Self { scene, memory, position, nearest } = self;
         let tested = if scene.header.section(SectionKind::PhotonLeaves).records > 0 {
-            leaves::gather(isa, scene, memory, position, nearest)?
+            let sections = [SectionKind::PhotonNodes, SectionKind::PhotonLeaves];
+            leaves::gather(isa, scene, sections, memory, position, nearest)?
         } else {
             kdtree::gather(isa, scene, memory, position, nearest)?
         };

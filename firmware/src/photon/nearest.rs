@@ -5,6 +5,7 @@
 //! independent of the order of the stream: equal distances are told apart by what the photons carry.
 
 use super::candidates::{Candidate, Candidates};
+use super::collector::Collector;
 use super::select::select;
 use crate::simd::{Isa, LANES};
 
@@ -54,32 +55,6 @@ impl<'a> NearestPhotons<'a> {
     pub(super) fn insert(&mut self, isa: impl Isa, candidate: Candidate) {
         self.candidates.set(self.length, candidate);
         self.length += 1;
-        if self.length >= self.full {
-            self.select(isa);
-        }
-    }
-
-    /// Takes those of the first `count` candidates that are not beyond the limit: the bits of their squared distances,
-    /// and what they carry.
-    #[inline(always)]
-    pub(super) fn insert_lanes(
-        &mut self,
-        isa: impl Isa,
-        count: u32,
-        distances: &[u32; LANES],
-        contents: &[u64; LANES],
-    ) {
-        // No overflow: the bits of an infinite limit are not the greatest.
-        let mask = isa.below(distances, self.limit.to_bits() + 1) & !(u32::MAX << count);
-        let Candidates { distances: all_distances, contents: all_contents } = &mut self.candidates;
-        // There is room: a selection leaves more free than are tested at once.
-        let free = all_distances.get_mut(self.length..).and_then(<[u32]>::first_chunk_mut);
-        let Some(free) = free else { return };
-        isa.pack(mask, distances, free);
-        let free = all_contents.get_mut(self.length..).and_then(<[u64]>::first_chunk_mut);
-        let Some(free) = free else { return };
-        isa.pack_long(mask, contents, free);
-        self.length += mask.count_ones() as usize;
         if self.length >= self.full {
             self.select(isa);
         }
@@ -149,5 +124,30 @@ impl<'a> NearestPhotons<'a> {
     #[inline(always)]
     pub fn max_distance_squared(&self) -> f32 {
         self.max_distance_squared
+    }
+}
+
+impl Collector for NearestPhotons<'_> {
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.limit
+    }
+
+    #[inline(always)]
+    fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]) {
+        // No overflow: the bits of an infinite limit are not the greatest.
+        let mask = isa.below(distances, self.limit.to_bits() + 1) & !(u32::MAX << count);
+        let Candidates { distances: all_distances, contents: all_contents } = &mut self.candidates;
+        // There is room: a selection leaves more free than are tested at once.
+        let free = all_distances.get_mut(self.length..).and_then(<[u32]>::first_chunk_mut);
+        let Some(free) = free else { return };
+        isa.pack(mask, distances, free);
+        let free = all_contents.get_mut(self.length..).and_then(<[u64]>::first_chunk_mut);
+        let Some(free) = free else { return };
+        isa.pack_long(mask, contents, free);
+        self.length += mask.count_ones() as usize;
+        if self.length >= self.full {
+            self.select(isa);
+        }
     }
 }

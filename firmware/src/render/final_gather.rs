@@ -4,12 +4,12 @@
 //! ([`super::direct`]).
 
 use glam::Vec3;
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, Radiance};
 
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, PartialReflection, Place};
 use crate::memory::{MemoryPort, Stage};
-use crate::photon::{Candidates, NearestPhotons, gather, reflected_radiance};
+use crate::photon::{Candidates, NearestPhotons, gather, nearest_irradiance, reflected_radiance};
 use crate::scene::{Ray, closest_hit, read_surface};
 
 /// What the end of a final gather ray brings.
@@ -74,8 +74,22 @@ pub fn gathered<M: MemoryPort>(
 ) -> Result<Vec3, Fault> {
     context.memory.enter(Stage::Gather);
     let position = request.place.position(&context.scene.header.photon_grid).into();
+    // Irradiance does not tell where the light came from, which a lobe asks for.
+    if context.frame.radiance == Radiance::Precomputed && !request.reflection.has_lobe() {
+        return Ok(request.reflection.diffuse() * irradiance(context, position, request.reflection.normal())?);
+    }
     let nearest = nearest_photons(context, position, candidates)?;
     Ok(reflected_radiance(&nearest, position, &request.reflection))
+}
+
+/// The precomputed irradiance of a surface near a place, photon power units a square metre; zero where none is known.
+#[inline(always)]
+fn irradiance<M: MemoryPort>(context: &mut Context<M>, position: Vec3, normal: u8) -> Result<Vec3, Fault> {
+    let max_distance = context.frame.max_distance;
+    let found = nearest_irradiance(context.scene, context.memory, position, normal, max_distance)?;
+    context.counters.lookups += 1;
+    context.counters.points_tested += u64::from(found.tested);
+    Ok(found.irradiance)
 }
 
 /// The frame's number of photons nearest to a place.

@@ -3,10 +3,10 @@
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{PhotonMap, trace};
+use photoncard_driver::photon::{PhotonMap, precompute_irradiance, trace};
 use photoncard_driver::render::RenderSettings;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::message::{Command, Drain, FrameParameters, Sampling, Tile};
+use photoncard_shared::message::{Command, Drain, FaultCode, FrameParameters, Radiance, Sampling, Tile};
 
 use super::{Random, Target, bound, mutation};
 use crate::wire::{Answer, Wire};
@@ -22,7 +22,7 @@ pub(super) struct Image {
     seeds: Vec<Vec<u8>>,
 }
 
-/// A lit room with a few photons, in both layouts of the photon map.
+/// A lit room with a few photons, in both layouts of the photon map, and irradiance points.
 fn images() -> [CardImage; 2] {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;
@@ -37,6 +37,7 @@ fn images() -> [CardImage; 2] {
         packed.with_photons(&map).expect("the map is packed")
     };
     [image(), image().with_photons_in_leaves(0.5).expect("the map is packed in leaves")]
+        .map(|image| precompute_irradiance(image, 20, 0.5, &|| true).expect("the irradiance is packed"))
 }
 
 /// The frame that a byte chooses: every technique.
@@ -54,6 +55,7 @@ fn frame(choice: u8) -> FrameParameters {
         bins: if is_set(4) { 8 } else { 1 },
         drain: [Drain::Immediate, Drain::Hash, Drain::Sort, Drain::Sort][usize::from(choice >> 5 & 3)],
         queue: if is_set(7) { 3 } else { 64 },
+        radiance: if choice >> 5 & 3 == 3 { Radiance::Precomputed } else { Radiance::Density },
         ..settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5)
     }
 }
@@ -71,9 +73,9 @@ fn edit(image: &mut Vec<u8>, seeds: &[Vec<u8>], random: &mut Random) {
     if lines == 0 {
         return;
     }
-    // The words of a line, of the header some of the time: the sections are in its first half.
+    // The words of a line, of the header some of the time: all but the first are numbers.
     let place = match random.below(4) {
-        0 => 12 + 4 * random.below(25),
+        0 => 12 + 4 * random.below(29),
         1 => LINE_BYTES * random.below(lines) + random.below(LINE_BYTES),
         _ => LINE_BYTES * random.below(lines) + 4 * random.below(LINE_BYTES / 4),
     };
@@ -129,7 +131,14 @@ impl Target for Image {
             Some(Answer::Fault(_)) => return false,
             other => panic!("loading ends in {other:?}"),
         }
-        assert_eq!(wire.say(&Command::BeginFrame(frame(choice))), [Answer::FrameAccepted]);
+        match wire.say(&Command::BeginFrame(frame(choice)))[..] {
+            [Answer::FrameAccepted] => {}
+            // The image may have lost its irradiance points.
+            [Answer::Fault(FaultCode::Parameter)] if frame(choice).radiance == Radiance::Precomputed => {
+                return false;
+            }
+            ref other => panic!("the frame begins with {other:?}"),
+        }
         let answers = wire.say(&Command::RenderTile(TILE));
         match answers.last() {
             Some(&Answer::TileDone(id)) => {

@@ -4,7 +4,8 @@ use photoncard_shared::budget::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::message::{
-    self, Camera, Command, Drain, Fault, FaultCode, FrameParameters, MemoryUse, Reply, Sampling, Tile,
+    self, Camera, Command, Drain, Fault, FaultCode, FrameParameters, MemoryUse, Radiance, Reply, Sampling,
+    Tile,
 };
 
 use super::{Random, Target, bound, mutation};
@@ -37,6 +38,7 @@ pub(super) fn frame() -> FrameParameters {
         bins: 64,
         drain: Drain::Sort,
         queue: 1024,
+        radiance: Radiance::Precomputed,
     }
 }
 

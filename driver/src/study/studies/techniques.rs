@@ -9,7 +9,7 @@ use super::present::{
     GIGA, cell, columns, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
 };
 use crate::photon::PhotonLayout;
-use crate::render::{RenderSettings, Sampling};
+use crate::render::{Radiance, RenderSettings, Sampling};
 use crate::scheduler::GatherOrder;
 
 /// A combination of techniques.
@@ -19,6 +19,7 @@ struct Technique {
     sampling: Sampling,
     /// The error that the irradiance cache allows; `None` without it.
     irradiance_error: Option<f32>,
+    radiance: Radiance,
     layout: PhotonLayout,
     tile: u32,
 }
@@ -30,6 +31,7 @@ const NAIVE: Technique = Technique {
     order: GatherOrder::Naive,
     sampling: Sampling::Reflection,
     irradiance_error: None,
+    radiance: Radiance::Density,
     layout: PhotonLayout::Jensen,
     tile: TILE,
 };
@@ -38,13 +40,14 @@ const ALL: Technique = Technique {
     order: GatherOrder::Sort,
     sampling: Sampling::Product,
     irradiance_error: Some(IRRADIANCE_ERROR),
+    radiance: Radiance::Density,
     layout: PhotonLayout::Jensen,
     tile: WIDEST_TILE,
 };
 const ALL_IN_LINES: Technique =
     Technique { name: "all techniques, lines", layout: PhotonLayout::Lines, ..ALL };
 /// The irradiance cache needs square tiles: rows share few records.
-const TECHNIQUES: [Technique; 9] = [
+const TECHNIQUES: [Technique; 11] = [
     NAIVE,
     Technique { name: "sort", order: GatherOrder::Sort, ..NAIVE },
     Technique {
@@ -62,9 +65,22 @@ const TECHNIQUES: [Technique; 9] = [
         tile: WIDEST_TILE,
         ..NAIVE
     },
+    Technique {
+        name: "sort, lines, largest tiles, precomputed irradiance",
+        order: GatherOrder::Sort,
+        radiance: Radiance::Precomputed,
+        layout: PhotonLayout::Lines,
+        tile: WIDEST_TILE,
+        ..NAIVE
+    },
     ALL,
     ALL_IN_LINES,
     Technique { name: "all techniques, lines, cache error 0.1", irradiance_error: Some(0.1), ..ALL_IN_LINES },
+    Technique {
+        name: "all techniques, lines, precomputed irradiance",
+        radiance: Radiance::Precomputed,
+        ..ALL_IN_LINES
+    },
 ];
 
 impl Technique {
@@ -73,6 +89,7 @@ impl Technique {
             gather_rays,
             sampling: self.sampling,
             irradiance_error: self.irradiance_error,
+            radiance: self.radiance,
             photon_layout: self.layout,
             tile: self.tile,
             ..scale.settings(self.order)
@@ -98,7 +115,7 @@ impl Technique {
 
     /// Whether its pixels are not those of the naive render.
     fn changes_pixels(&self) -> bool {
-        self.irradiance_error.is_some() || self.sampling != NAIVE.sampling
+        self.irradiance_error.is_some() || self.sampling != NAIVE.sampling || self.radiance != NAIVE.radiance
     }
 
     /// Gather rays that it is measured with, from few to many.
@@ -177,7 +194,7 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
             "Quality is the root of the mean square error of pixels over all three channels, over their mean, against the \
              same eye rays with {} gather rays by combined sampling and no irradiance cache, in {} tiles of 16x16 pixels; \
              pixels that show an emitter or nothing are left out. Shadow rays are as many and go to the same places, so part \
-             of their noise is in both and does not count. Only sampling, rays and the irradiance cache change pixels. The \
+             of their noise is in both and does not count. Only sampling, rays, the irradiance cache and precomputed irradiance change pixels. The \
              bytes at equal quality lie on a line through the logarithms of error and bytes, between the numbers of rays \
              that were rendered.",
             scale.reference_rays, scale.quality_tiles

@@ -1,0 +1,129 @@
+//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): at every fourth photon the chip's own
+//! density estimate, of a white diffuser there, is stored in the image. A gather takes that of the nearest point of its surface.
+//!
+//! At a photon a density estimate is too high by one photon, its own. But to come from any place to the nearest of some points
+//! is to know that none is on the way, which is one less: of photons that lie at random the mean is right.
+
+use glam::Vec3;
+use photoncard_firmware::gather::{PartialReflection, Place};
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather, reflected_radiance};
+use photoncard_firmware::scene::SceneImage;
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::budget::{REFERENCE, gather_candidates};
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{IrradiancePoint, PHOTON_CONTENT_BYTES, Photon, PhotonLeaf, Record};
+use photoncard_shared::message::Fault;
+use rayon::prelude::*;
+
+use super::PhotonError;
+use super::leaves::{PhotonLines, Placed};
+use crate::pack::CardImage;
+
+/// Of so many photons of one surface that follow each other along a curve, the first has an irradiance point.
+pub(crate) const PHOTONS_OF_A_POINT: usize = 4;
+/// So has one that is farther from the last than this share of a gather's greatest distance: where photons are few, light
+/// would be lost between points.
+const FARTHEST_POINT: f32 = 0.5;
+/// Points that one task does; `go_on` is asked before each.
+const POINTS_OF_A_TASK: usize = 256;
+
+/// A grid point and the code of a surface normal.
+type SurfacePoint = ([u32; 3], u8);
+
+/// Adds irradiance points to an image with photons, for gathers of `neighbors` photons within `max_distance`, metres: the same
+/// for the same photons, whatever the layout of their map. `go_on` is asked now and then.
+///
+/// # Errors
+/// If the image is not sound or grows too large, or `go_on` says no.
+pub fn precompute_irradiance(
+    image: CardImage,
+    neighbors: u32,
+    max_distance: f32,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Result<CardImage, PhotonError> {
+    let places = surface_points(&image, max_distance)?;
+    let points: Result<Vec<Vec<Placed>>, PhotonError> = places
+        .par_chunks(POINTS_OF_A_TASK)
+        .map_init(
+            || Estimator::new(&image, neighbors, max_distance),
+            |estimator, places| {
+                if !go_on() {
+                    return Err(PhotonError::Stopped);
+                }
+                let points: Result<Vec<Placed>, Fault> =
+                    places.iter().map(|&place| estimator.point(place)).collect();
+                Ok(points?)
+            },
+        )
+        .collect();
+    let cell = image.view().0.header.photon_grid.cell;
+    // About as far as the nearest point lies.
+    let distance = max_distance * (PHOTONS_OF_A_POINT as f32 / neighbors as f32).sqrt();
+    let lines = PhotonLines::new(&mut points?.concat(), f64::from(distance / cell));
+    Ok(image.with_irradiance(lines)?)
+}
+
+/// The chip's density estimate, with its buffer.
+struct Estimator<'a> {
+    scene: SceneImage,
+    memory: Lines<'a>,
+    buffer: Box<CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>>,
+    neighbors: u32,
+    max_distance: f32,
+}
+
+impl<'a> Estimator<'a> {
+    fn new(image: &'a CardImage, neighbors: u32, max_distance: f32) -> Self {
+        let (scene, memory) = image.view();
+        Self { scene, memory, buffer: Box::default(), neighbors, max_distance }
+    }
+
+    fn point(&mut self, (point, normal): SurfacePoint) -> Result<Placed, Fault> {
+        let position: Vec3 = self.scene.header.photon_grid.position(point).into();
+        let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
+        gather(&self.scene, &mut self.memory, position, &mut nearest)?;
+        let diffuser = PartialReflection::diffuser(normal);
+        let irradiance = reflected_radiance(&nearest, position, &diffuser).to_array();
+        Ok((point, IrradiancePoint { irradiance, normal }.to_content()))
+    }
+}
+
+/// Where points are to be, and on surfaces of which normals: of the places of photons, each of which counts once.
+fn surface_points(image: &CardImage, max_distance: f32) -> Result<Vec<SurfacePoint>, Fault> {
+    let (scene, mut memory) = image.view();
+    let grid = scene.header.photon_grid;
+    let mut points = Vec::new();
+    let mut add = |point, content: [u8; PHOTON_CONTENT_BYTES]| {
+        let [.., low, high] = content;
+        points.push((point, Photon::normal_of_flags(u16::from_le_bytes([low, high]))));
+    };
+    for index in 0..scene.header.section(SectionKind::Photons).records {
+        const PER_LINE: u32 = Photon::PER_LINE as u32;
+        let record = scene.record::<{ Photon::BYTES }, PER_LINE>(&mut memory, SectionKind::Photons, index)?;
+        add(grid.nearest(Photon::position(record)), Photon::content(record));
+    }
+    for index in 0..scene.header.section(SectionKind::PhotonLeaves).records {
+        let line = scene.line(&mut memory, SectionKind::PhotonLeaves, index, 0..LINE_BYTES as u32)?;
+        let leaf = PhotonLeaf::read(line);
+        (0..leaf.photons()).for_each(|photon| add(leaf.point(photon), leaf.content(photon)));
+    }
+    // Along a curve: neighbours have most of their photons in common.
+    points.par_sort_by_cached_key(|&(point, normal)| (normal, Place::new(&grid, grid.position(point))));
+    points.dedup();
+    let surfaces = points.chunk_by(|(_, normal), (_, other)| normal == other);
+    let groups = surfaces.flat_map(|surface| surface.chunks(PHOTONS_OF_A_POINT));
+    let place = |(point, _): SurfacePoint| Vec3::from(grid.position(point));
+    let farthest = FARTHEST_POINT * max_distance;
+    let mut chosen: Vec<SurfacePoint> = Vec::new();
+    for group in groups {
+        let first = chosen.len();
+        for &point in group {
+            let last = chosen.get(first..).and_then(<[SurfacePoint]>::last);
+            if last.is_none_or(|&last| place(last).distance(place(point)) > farthest) {
+                chosen.push(point);
+            }
+        }
+    }
+    Ok(chosen)
+}
