@@ -17,7 +17,6 @@ use photoncard_shared::message::Radiance;
 
 use crate::bvh::{self, HierarchyError};
 use crate::emitter::Emitters;
-use crate::photon::irradiance::PHOTONS_OF_A_POINT;
 use crate::photon::leaves::{PhotonLines, Placed};
 use crate::photon::{PhotonLayout, PhotonMap};
 use crate::scene::{Material, Scene};
@@ -160,8 +159,7 @@ impl PackedScene {
             // With the inner nodes; what does not fit after all is found when the map is there.
             PhotonLayout::Lines => PHOTONS_OF_A_LEAF,
         };
-        let points_per_line =
-            (radiance == Radiance::Precomputed).then_some(PHOTONS_OF_A_LEAF * PHOTONS_OF_A_POINT);
+        let points_per_line = (radiance == Radiance::Precomputed).then_some(PHOTONS_OF_A_LEAF);
         let lines = |photons: usize| {
             photons.div_ceil(per_line) + points_per_line.map_or(0, |per_line| photons.div_ceil(per_line))
         };

@@ -7,7 +7,7 @@
 //! |---|---|
 //! | [`memory`] | 128-byte lines of card DRAM |
 //! | [`scene`] | bounding volume hierarchy, triangles, materials, emitters, read from those lines |
-//! | [`photon`] | the k nearest photons and the radiance they reflect |
+//! | [`photon`] | the k nearest photons and the radiance they reflect; the nearest of precomputed irradiance |
 //! | [`sampler`] | stratified random numbers from (pixel, sample, dimension) |
 //! | [`gather`] | photon gathers that wait, and in which order they are done |
 //! | [`importance`] | which way a final gather ray goes |

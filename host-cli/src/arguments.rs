@@ -277,8 +277,7 @@ impl SamplingOption {
 enum RadianceOption {
     /// The density of the photons nearest to it
     Density,
-    /// The irradiance that the host has estimated at the nearest photon of the surface: several times faster, with a little more
-    /// blur; the image is about twice as large
+    /// An approximation: the irradiance that the host has estimated at the nearest photon of the surface
     Precomputed,
 }
 

@@ -1,4 +1,4 @@
-//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): at every fourth photon the chip's own
+//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): at every photon the chip's own
 //! density estimate, of a white diffuser there, is stored in the image. A gather takes that of the nearest point of its surface.
 //!
 //! At a photon a density estimate is too high by one photon, its own. But to come from any place to the nearest of some points
@@ -20,11 +20,6 @@ use super::PhotonError;
 use super::leaves::{PhotonLines, Placed};
 use crate::pack::CardImage;
 
-/// Of so many photons of one surface that follow each other along a curve, the first has an irradiance point.
-pub(crate) const PHOTONS_OF_A_POINT: usize = 4;
-/// So has one that is farther from the last than this share of a gather's greatest distance: where photons are few, light
-/// would be lost between points.
-const FARTHEST_POINT: f32 = 0.5;
 /// Points that one task does; `go_on` is asked before each.
 const POINTS_OF_A_TASK: usize = 256;
 
@@ -42,7 +37,7 @@ pub fn precompute_irradiance(
     max_distance: f32,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<CardImage, PhotonError> {
-    let places = surface_points(&image, max_distance)?;
+    let places = surface_points(&image)?;
     let points: Result<Vec<Vec<Placed>>, PhotonError> = places
         .par_chunks(POINTS_OF_A_TASK)
         .map_init(
@@ -58,8 +53,8 @@ pub fn precompute_irradiance(
         )
         .collect();
     let cell = image.view().0.header.photon_grid.cell;
-    // About as far as the nearest point lies.
-    let distance = max_distance * (PHOTONS_OF_A_POINT as f32 / neighbors as f32).sqrt();
+    // About as far as the nearest of the photons of a gather lies.
+    let distance = max_distance / (neighbors as f32).sqrt();
     let lines = PhotonLines::new(&mut points?.concat(), f64::from(distance / cell));
     Ok(image.with_irradiance(lines)?)
 }
@@ -89,8 +84,8 @@ impl<'a> Estimator<'a> {
     }
 }
 
-/// Where points are to be, and on surfaces of which normals: of the places of photons, each of which counts once.
-fn surface_points(image: &CardImage, max_distance: f32) -> Result<Vec<SurfacePoint>, Fault> {
+/// Where photons lie, and on surfaces of which normals, each place once; along a curve through each surface.
+fn surface_points(image: &CardImage) -> Result<Vec<SurfacePoint>, Fault> {
     let (scene, mut memory) = image.view();
     let grid = scene.header.photon_grid;
     let mut points = Vec::new();
@@ -111,19 +106,5 @@ fn surface_points(image: &CardImage, max_distance: f32) -> Result<Vec<SurfacePoi
     // Along a curve: neighbours have most of their photons in common.
     points.par_sort_by_cached_key(|&(point, normal)| (normal, Place::new(&grid, grid.position(point))));
     points.dedup();
-    let surfaces = points.chunk_by(|(_, normal), (_, other)| normal == other);
-    let groups = surfaces.flat_map(|surface| surface.chunks(PHOTONS_OF_A_POINT));
-    let place = |(point, _): SurfacePoint| Vec3::from(grid.position(point));
-    let farthest = FARTHEST_POINT * max_distance;
-    let mut chosen: Vec<SurfacePoint> = Vec::new();
-    for group in groups {
-        let first = chosen.len();
-        for &point in group {
-            let last = chosen.get(first..).and_then(<[SurfacePoint]>::last);
-            if last.is_none_or(|&last| place(last).distance(place(point)) > farthest) {
-                chosen.push(point);
-            }
-        }
-    }
-    Ok(chosen)
+    Ok(points)
 }

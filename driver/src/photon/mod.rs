@@ -7,7 +7,7 @@
 mod disc;
 mod emit;
 mod error;
-pub(crate) mod irradiance;
+mod irradiance;
 pub(crate) mod leaves;
 mod map;
 mod trace;

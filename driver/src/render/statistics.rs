@@ -52,7 +52,8 @@ pub struct Statistics {
     pub drains: u64,
     /// The most gathers that waited at once, on any chip.
     pub most_waiting: u64,
-    /// Floating-point operations that the cost model of `docs/scaling.md` counts for the work.
+    /// Floating-point operations that the cost model of `docs/scaling.md` counts for the work; it has no lookups of
+    /// irradiance, and counts none.
     pub flops: Flops,
     /// Bytes of the card image.
     pub image_bytes: u64,

@@ -85,6 +85,7 @@ struct NearestPoint {
 impl NearestPoint {
     #[inline(always)]
     fn irradiance(&self) -> Vec3 {
+        // A candidate has lost two bits of the normal, which has been looked at.
         let read = |point: Candidate| IrradiancePoint::read(point.content.to_le_bytes()).irradiance.into();
         self.nearest.map_or(Vec3::ZERO, read)
     }
@@ -104,7 +105,7 @@ impl Collector for NearestPoint {
             let lane = mask.trailing_zeros() as usize;
             mask &= mask - 1;
             let (Some(&distance), Some(&content)) = (distances.get(lane), contents.get(lane)) else { break };
-            let point = Candidate { distance, content };
+            let point = Candidate::new(f32::from_bits(distance), content.to_le_bytes());
             if self.nearest.is_none_or(|nearest| point.order() < nearest.order())
                 && self.surface.holds(IrradiancePoint::normal_of(content))
             {

@@ -1,4 +1,4 @@
-//! The photon map: the k photons nearest to a point, and the radiance that they reflect.
+//! The photon map: the k photons nearest to a point, and the radiance that they reflect; or the irradiance that was estimated near it.
 
 mod candidates;
 mod collector;
