@@ -182,8 +182,20 @@ impl<
         Ok(())
     }
 
-    /// Gather rays of the present bin and pixel.
+    /// Goes on to the next pixel of the present row that has rays, or to the row's last one: where irradiance is interpolated
+    /// few pixels have any, and they are looked for in every direction bin.
+    fn skip_pixels_without_rays(&mut self) {
+        let [column, row] = self.block.pixel(self.position.index);
+        let first = (row * self.tile.width + column) as usize;
+        let left = (self.block.x + self.block.width).saturating_sub(column) as usize;
+        let rest = self.points.get(first..first + left).unwrap_or_default();
+        let skipped = rest.iter().position(|stored| stored.rays.number() > 0);
+        self.position.index += skipped.unwrap_or(left.saturating_sub(1)) as u32;
+    }
+
+    /// Gather rays of the present bin and of the next pixel of the row that has any.
     pub(super) fn cast_for_pixel<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+        self.skip_pixels_without_rays();
         let (index, at) = self.present();
         let Self { points, sums, gathers, position, .. } = self;
         let frame = context.frame;
