@@ -12,10 +12,11 @@ use std::path::PathBuf;
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{Arrival, PhotonMap};
+use photoncard_driver::photon::Photons;
 use photoncard_firmware::gather::Place;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather};
 use photoncard_firmware::sampler::hash;
+use photoncard_shared::layout::{FULL_DISC, Photon, Rgbe};
 use photoncard_tests::{camera, lambertian, room, scene};
 use rustix::time::{ClockId, clock_gettime};
 
@@ -59,18 +60,19 @@ fn point(index: u32) -> [f32; 3] {
 
 fn image(points: impl Iterator<Item = [f32; 3]>) -> (CardImage, Vec<[f32; 3]>) {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
-    let arrivals: Vec<Arrival> = (0..)
-        .zip(points)
-        .map(|(index, position)| {
-            let direction = (hash(index) as u16).to_le_bytes();
-            Arrival { position, power: [1.0; 3], direction, normal: 0, direct: false }
-        })
-        .collect();
+    let photons = (0..).zip(points).map(|(index, position)| Photon {
+        position,
+        power: Rgbe::encode([1.0; 3], hash(index)),
+        direction: (hash(index) as u16).to_le_bytes(),
+        axis: 0,
+        normal: 0,
+        disc: FULL_DISC,
+        direct: false,
+    });
     let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
-    let map = PhotonMap::new(&arrivals, packed.photon_grid());
-    let positions = map.photons().iter().map(|photon| photon.position).collect();
-    let image = packed.with_photons(&map).expect("fits");
-    (image.with_photons_in_leaves(MAX_DISTANCE).expect("fits"), positions)
+    let photons = Photons::new(packed.photon_grid(), 1.0, photons);
+    let positions = photons.iter().map(|photon| photon.position).collect();
+    (packed.with_photons(photons, NEIGHBORS).expect("fits"), positions)
 }
 
 fn search_all(image: &CardImage, queries: &[[f32; 3]]) -> (u64, f64) {
