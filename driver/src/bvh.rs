@@ -7,7 +7,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::BVH_STACK;
-use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, NodeBox};
+use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, MOST_MATERIALS, NodeBox};
 
 use crate::fold::{Folded, Tree};
 use crate::scene::Triangle;
@@ -38,12 +38,18 @@ pub enum HierarchyError {
         /// Triangles of the scene.
         triangles: usize,
     },
+    /// More materials than can be told apart.
+    #[error("a triangle is of material {material}; a card can tell {MOST_MATERIALS} apart")]
+    TooManyMaterials {
+        /// The index of one.
+        material: u32,
+    },
     /// A corner that is not finite.
     #[error("a triangle has a corner that is not a finite place")]
     NotFinite,
 }
 
-/// Each may have a leaf of its own, and its index is three times that of the leaf.
+/// Each may have a leaf of its own, and its index is that of the leaf times the triangles that may be there.
 const MOST_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 
 /// The cost of a visit of a leaf, of which that of a node is 1.
@@ -57,15 +63,18 @@ pub fn build(triangles: &[Triangle]) -> Result<Hierarchy, HierarchyError> {
     if triangles.len() > MOST_TRIANGLES {
         return Err(HierarchyError::TooMany { triangles: triangles.len() });
     }
+    if let Some(triangle) = triangles.iter().find(|triangle| triangle.material >= MOST_MATERIALS) {
+        return Err(HierarchyError::TooManyMaterials { material: triangle.material });
+    }
     let boxes: Vec<Aabb> = triangles.iter().map(bounding_box).collect();
     // Leaves are made when the tree is folded.
     let parameters = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::slow_build() };
     let binary = build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
-    let mut folded = Folded::new(tree(&binary));
+    let mut folded = Folded::new(tree(&binary, triangles));
     if folded.stack > BVH_STACK {
         // Halves of halves are not the best of trees, but no deeper than their number asks for.
         let mut indices: Vec<u32> = (0..triangles.len() as u32).collect();
-        folded = Folded::new(halves(&mut indices, &boxes));
+        folded = Folded::new(halves(&mut indices, &boxes, triangles));
     }
     let Folded { nodes, leaves, stack } = folded;
     if stack > BVH_STACK {
@@ -74,9 +83,7 @@ pub fn build(triangles: &[Triangle]) -> Result<Hierarchy, HierarchyError> {
     let nodes = nodes.iter().map(|node| BvhNode::encode(&node.children, node.links));
     let nodes = nodes.collect::<Option<_>>().ok_or(HierarchyError::NotFinite)?;
     let leaves = leaves.into_iter().map(|indices| {
-        let records: Vec<layout::Triangle> =
-            indices.iter().map(|&index| record(&triangles[index as usize])).collect();
-        BvhLeaf::encode(&records).unwrap_or_else(|| unreachable!("a leaf of {} triangles", records.len()))
+        encode(&indices, triangles).unwrap_or_else(|| unreachable!("a leaf of {} triangles", indices.len()))
     });
     Ok(Hierarchy { nodes, leaves: leaves.collect() })
 }
@@ -91,11 +98,18 @@ fn record(triangle: &Triangle) -> layout::Triangle {
     layout::Triangle { vertices, material: triangle.material }
 }
 
+/// The line of the leaf of some triangles, if it holds them.
+fn encode(indices: &[u32], triangles: &[Triangle]) -> Option<[u8; LINE_BYTES]> {
+    let records: heapless::Vec<_, LEAF_TRIANGLES> =
+        indices.iter().map(|&index| record(&triangles[index as usize])).collect();
+    BvhLeaf::encode(&records)
+}
+
 /// The indices of the triangles of a leaf, in order.
 type Indices = heapless::Vec<u32, LEAF_TRIANGLES>;
 
-/// A tree that may be folded. Whatever has few enough triangles may be one leaf.
-fn tree(binary: &Bvh2) -> Tree<Indices, NodeBox> {
+/// A tree that may be folded. Whatever a leaf has room for may be one.
+fn tree(binary: &Bvh2, triangles: &[Triangle]) -> Tree<Indices, NodeBox> {
     // Parents before children.
     let mut order = vec![0];
     let mut next = 0;
@@ -118,7 +132,7 @@ fn tree(binary: &Bvh2) -> Tree<Indices, NodeBox> {
             Tree::leaf(indices.collect(), bounds, LEAF_COST * area)
         } else {
             let parts = [first, first + 1].map(|part| trees[part].take().unwrap_or_else(missing));
-            let leaf = both(&parts).map(|leaf| (leaf, LEAF_COST * area));
+            let leaf = both(&parts, triangles).map(|leaf| (leaf, LEAF_COST * area));
             Tree::node(parts, bounds, area, leaf)
         });
     }
@@ -126,28 +140,31 @@ fn tree(binary: &Bvh2) -> Tree<Indices, NodeBox> {
 }
 
 /// A tree of parts of as many triangles each.
-fn halves(indices: &mut [u32], boxes: &[Aabb]) -> Tree<Indices, NodeBox> {
+fn halves(indices: &mut [u32], boxes: &[Aabb], triangles: &[Triangle]) -> Tree<Indices, NodeBox> {
     let bounds = indices.iter().fold(Aabb::empty(), |bounds, &index| bounds.union(&boxes[index as usize]));
     let area = bounds.half_area();
     let node_box = NodeBox { lower: bounds.min.to_array(), upper: bounds.max.to_array() };
-    if let Ok(leaf) = Indices::from_slice(indices) {
+    if let Ok(leaf) = Indices::from_slice(indices)
+        && encode(&leaf, triangles).is_some()
+    {
         return Tree::leaf(leaf, node_box, LEAF_COST * area);
     }
     let axis = bounds.diagonal().max_position();
     let (middle, center) = (indices.len() / 2, |index: u32| boxes[index as usize].center()[axis]);
     indices.select_nth_unstable_by(middle, |&a, &b| center(a).total_cmp(&center(b)).then(a.cmp(&b)));
     let (below, above) = indices.split_at_mut(middle);
-    Tree::node([halves(below, boxes), halves(above, boxes)], node_box, area, None)
+    let parts = [below, above].map(|part| halves(part, boxes, triangles));
+    Tree::node(parts, node_box, area, None)
 }
 
 /// The triangles of two parts, if one leaf holds them.
-fn both(parts: &[Tree<Indices, NodeBox>; 2]) -> Option<Indices> {
+fn both(parts: &[Tree<Indices, NodeBox>; 2], triangles: &[Triangle]) -> Option<Indices> {
     let mut indices = Indices::new();
     for part in parts {
         indices.extend_from_slice(part.as_leaf()?).ok()?;
     }
     indices.sort_unstable();
-    Some(indices)
+    encode(&indices, triangles).is_some().then_some(indices)
 }
 
 #[cfg(test)]
@@ -170,7 +187,7 @@ mod tests {
         let node = match child {
             Child::Leaf(leaf) => {
                 let leaf = BvhLeaf(&hierarchy.leaves[leaf as usize]);
-                let mut indices: Vec<u32> = (0..LEAF_TRIANGLES)
+                let mut indices: Vec<u32> = (0..leaf.triangles() as usize)
                     .map(|slot| {
                         let triangle = leaf.triangle(slot);
                         let corners = triangle.vertices.map(|v| NodeBox { lower: v, upper: v });
@@ -178,10 +195,7 @@ mod tests {
                         triangle.material
                     })
                     .collect();
-                // A leaf that is not full repeats its first.
-                indices.sort_unstable();
-                indices.dedup();
-                found.extend(indices);
+                found.append(&mut indices);
                 return;
             }
             Child::Node(node) => &hierarchy.nodes[node as usize],
@@ -212,6 +226,6 @@ mod tests {
     fn triangles_in_one_place_are_no_trouble() {
         let [triangle] = triangles(1)[..] else { unreachable!() };
         let hierarchy = build(&vec![triangle; 5000]).expect("builds");
-        assert!(hierarchy.leaves.len() >= 5000 / 3);
+        assert!((5000 / LEAF_TRIANGLES..5000 / 3).contains(&hierarchy.leaves.len()));
     }
 }

@@ -61,6 +61,16 @@ impl Emitters {
         if self.power > 0.0 { (std::f64::consts::PI / self.power) as f32 } else { 0.0 }
     }
 
+    /// Watts in the strongest channel of the strongest photon, as if it were the only one.
+    pub fn strongest_emission(&self) -> f32 {
+        let emission = |emitter: &Emitter| {
+            let sides = if emitter.flags & DOUBLE_SIDED != 0 { 2.0 } else { 1.0 };
+            let radiance = emitter.emission.into_iter().fold(0.0, f32::max);
+            radiance * (std::f32::consts::PI * sides / emitter.density)
+        };
+        self.records.iter().map(emission).filter(|watts| watts.is_finite()).fold(0.0, f32::max)
+    }
+
     /// Emitted power, watts, mean of the channels.
     pub fn power(&self) -> f64 {
         self.power

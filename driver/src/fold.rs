@@ -5,34 +5,35 @@ use std::collections::VecDeque;
 
 use photoncard_shared::layout::{Links, NODE_CHILDREN};
 
-/// A part of a binary tree: what it is as a leaf, if it can be one, and its two parts, if it has them.
+/// A part of a binary tree, and what it costs to descend in it folded at the least cost.
 pub(crate) struct Tree<L, B> {
+    part: Part<L, B>,
+    /// The expected cost of a descent in the part as at most `i + 1` children of one node.
+    costs: [f32; NODE_CHILDREN],
+}
+
+/// A part of a binary tree without its costs, which only what is above it asks for: what it is as a leaf, if it can be one,
+/// and its two parts, if it has them.
+struct Part<L, B> {
     bounds: B,
     leaf: Option<L>,
     parts: Option<Box<[Self; 2]>>,
-    fold: Fold,
-}
-
-/// How a subtree is folded into wide nodes at the least cost.
-struct Fold {
-    /// The expected cost of a descent in the subtree as at most `i + 1` children of one node.
-    costs: [f32; NODE_CHILDREN],
-    /// Of those, the children that the first part makes; none if the subtree is one child.
+    /// If it is to be at most `i + 1` children of a node, those that its first part makes; none if it is one child.
     first: [u8; NODE_CHILDREN],
 }
 
 impl<L, B: Copy> Tree<L, B> {
     /// A leaf, which it costs so much to visit.
     pub(crate) fn leaf(leaf: L, bounds: B, cost: f32) -> Self {
-        let fold = Fold { costs: [cost; NODE_CHILDREN], first: [0; NODE_CHILDREN] };
-        Self { bounds, leaf: Some(leaf), parts: None, fold }
+        let part = Part { bounds, leaf: Some(leaf), parts: None, first: [0; NODE_CHILDREN] };
+        Self { part, costs: [cost; NODE_CHILDREN] }
     }
 
     /// Of two parts, which cost `node` to visit as a node of their own; if they may as well be a leaf, that and what it costs.
     pub(crate) fn node(parts: [Self; 2], bounds: B, node: f32, leaf: Option<(L, f32)>) -> Self {
         let mut costs = [f32::INFINITY; NODE_CHILDREN];
         let mut first = [0; NODE_CHILDREN];
-        let [below, above] = parts.each_ref().map(|part| part.fold.costs);
+        let [below, above] = parts.each_ref().map(|tree| tree.costs);
         for both in 2..=NODE_CHILDREN {
             for below_children in 1..both {
                 let cost = below[below_children - 1] + above[both - below_children - 1];
@@ -52,17 +53,20 @@ impl<L, B: Copy> Tree<L, B> {
         // The last is never asked for but for a node of its own.
         first[NODE_CHILDREN - 1] = opened;
         let leaf = leaf.map(|(leaf, _)| leaf);
-        Self { bounds, leaf, parts: Some(Box::new(parts)), fold: Fold { costs, first } }
+        let parts = Some(Box::new(parts.map(|tree| tree.part)));
+        Self { part: Part { bounds, leaf, parts, first }, costs }
     }
 
     /// What a leaf of both of two parts would be.
     pub(crate) fn as_leaf(&self) -> Option<&L> {
-        self.leaf.as_ref()
+        self.part.leaf.as_ref()
     }
+}
 
-    /// Adds the subtree to a node, as at most so many children.
+impl<L, B: Copy> Part<L, B> {
+    /// Adds the part to a node, as at most so many children.
     fn unfold(self, most: usize, children: &mut Vec<Self>) {
-        let first = self.fold.first[most - 1] as usize;
+        let first = self.first[most - 1] as usize;
         match self.parts {
             Some(parts) if first > 0 => {
                 for (part, most) in parts.into_iter().zip([first, most - first]) {
@@ -94,11 +98,11 @@ impl<L, B: Copy> Folded<L, B> {
     /// Folds a tree. Its root is a node, if only of one leaf.
     pub(crate) fn new(tree: Tree<L, B>) -> Self {
         let mut folded = Self { nodes: Vec::new(), leaves: Vec::new(), stack: 1 };
-        let mut root = Vec::with_capacity(NODE_CHILDREN);
-        tree.unfold(NODE_CHILDREN, &mut root);
-        // Children of nodes to come, and the entries of a stack below them.
-        let mut waiting = VecDeque::from([(root, 0)]);
-        while let Some((mut children, above)) = waiting.pop_front() {
+        // Nodes to come, and the entries of a stack below them.
+        let mut waiting = VecDeque::from([(tree.part, 0)]);
+        while let Some((node, above)) = waiting.pop_front() {
+            let mut children = Vec::with_capacity(NODE_CHILDREN);
+            node.unfold(NODE_CHILDREN, &mut children);
             // Stable: what is near in space stays near.
             children.sort_by_key(|child| child.leaf.is_none());
             // The node is taken off before its children are put on.
@@ -109,12 +113,8 @@ impl<L, B: Copy> Folded<L, B> {
             let bounds = children.iter().map(|child| child.bounds).collect();
             for child in children {
                 match child {
-                    Tree { leaf: Some(leaf), .. } => folded.leaves.push(leaf),
-                    node => {
-                        let mut children = Vec::with_capacity(NODE_CHILDREN);
-                        node.unfold(NODE_CHILDREN, &mut children);
-                        waiting.push_back((children, below));
-                    }
+                    Part { leaf: Some(leaf), .. } => folded.leaves.push(leaf),
+                    node => waiting.push_back((node, below)),
                 }
             }
             let leaves = (folded.leaves.len() - first_leaf) as u32;

@@ -11,14 +11,16 @@ use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::budget::Budget;
 use photoncard_shared::image::{Header, SECTIONS, Section, SectionKind};
 use photoncard_shared::layout::{
-    self, BvhNode, NodeBox, Photon, PhotonGrid, Record, WideNode, power_of_two_above,
+    self, BvhNode, NodeBox, Photon, PhotonGrid, PhotonLeaf, Record, WideNode, power_of_two_above,
 };
 use photoncard_shared::message::Radiance;
 
 use crate::bvh::{self, HierarchyError};
 use crate::emitter::Emitters;
-use crate::photon::leaves::{PhotonLines, Placed};
-use crate::photon::{PhotonLayout, PhotonMap};
+use crate::photon::leaves::PhotonTree;
+use crate::photon::map::{balance, for_each_in_heap};
+use crate::photon::stored::StoredPhoton;
+use crate::photon::{PhotonLayout, Photons, search_radius};
 use crate::scene::{Material, Scene};
 
 /// Photons of a line of leaves, the inner nodes' lines counted in, about.
@@ -70,6 +72,7 @@ pub struct PackedScene {
     sections: [Section; SECTIONS],
     radiance_unit: f32,
     emitter_density: f32,
+    strongest_emission: f32,
 }
 
 /// A complete card image.
@@ -90,6 +93,7 @@ impl PackedScene {
             sections: [Section::default(); SECTIONS],
             radiance_unit: radiance_unit(scene, emitters),
             emitter_density: emitters.density_per_radiance(),
+            strongest_emission: emitters.strongest_emission(),
         };
         packed.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
         packed.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
@@ -105,12 +109,7 @@ impl PackedScene {
         kind: SectionKind,
         records: impl ExactSizeIterator<Item = [u8; N]>,
     ) -> Result<(), PackError> {
-        let bytes = (self.lines.len() + records.len()) as u64 * LINE_BYTES as u64;
-        let count = |n: usize| u32::try_from(n).map_err(|_| PackError::TooLarge { bytes });
-        self.sections[kind as usize] =
-            Section { first_line: count(self.lines.len())?, records: count(records.len())? };
-        self.lines.extend(pack_lines(records));
-        count(self.lines.len()).map(drop)
+        append(&mut self.lines, &mut self.sections, kind, records)
     }
 
     fn header(&self, photon_power_unit: f32, photon_grid: PhotonGrid) -> Header {
@@ -135,6 +134,11 @@ impl PackedScene {
         let (scene, mut memory) = self.view();
         root_box(&scene, &mut memory)
             .map_or(PhotonGrid::UNIT, |NodeBox { lower, upper }| PhotonGrid::around(lower, upper))
+    }
+
+    /// Watts in the strongest channel of the strongest photon that the emitters send, as if it were the only one.
+    pub(crate) fn strongest_emission(&self) -> f32 {
+        self.strongest_emission
     }
 
     /// Bytes of the scene's lines.
@@ -186,13 +190,18 @@ impl PackedScene {
         Err(PackError::Dram { needed, photons: photon_bytes, available, remedy })
     }
 
-    /// Adds the photon map: a left-balanced tree.
+    /// Adds the photon map, in leaves, for searches of about so many neighbours.
     ///
     /// # Errors
-    /// If there are more photons than an address can tell.
-    pub fn with_photons(mut self, map: &PhotonMap) -> Result<CardImage, PackError> {
-        self.append(SectionKind::Photons, map.records())?;
-        self.lines[0] = self.header(map.power_unit(), map.grid()).to_line();
+    /// If there are more lines than an address can tell.
+    pub fn with_photons(mut self, photons: Photons, neighbors: u32) -> Result<CardImage, PackError> {
+        let radius = search_radius(&photons, neighbors);
+        let Photons { mut list, grid, power_unit } = photons;
+        if let Some(tree) = PhotonTree::new(&mut list, radius) {
+            self.append(SectionKind::PhotonNodes, tree.nodes())?;
+            self.append(SectionKind::PhotonLeaves, tree.leaves())?;
+        }
+        self.lines[0] = self.header(power_unit, grid).to_line();
         Ok(CardImage { lines: self.lines })
     }
 }
@@ -201,11 +210,6 @@ impl CardImage {
     /// All lines, the header first.
     pub fn lines(&self) -> &[Line] {
         &self.lines
-    }
-
-    /// All lines, to be changed in place.
-    pub(crate) fn lines_mut(&mut self) -> &mut [Line] {
-        &mut self.lines
     }
 
     /// The image as a chip sees it.
@@ -223,57 +227,78 @@ impl CardImage {
             .map_or(1.0, |NodeBox { lower, upper }| Vec3::from(upper).distance(Vec3::from(lower)))
     }
 
-    /// The same image with its photons in leaves, for searches of about `radius` metres. It finds the same photons.
+    /// The same image with its photons in a left-balanced tree instead of leaves. It finds the same photons.
     ///
     /// # Errors
     /// If there are more lines than an address can tell.
-    pub fn with_photons_in_leaves(self, radius: f32) -> Result<Self, PackError> {
-        let (SceneImage { header }, _) = self.view();
-        let section = header.section(SectionKind::Photons);
-        let records = self.lines[section.first_line as usize..]
-            .iter()
-            .flat_map(|line| line.0.as_chunks::<{ Photon::BYTES }>().0)
-            .take(section.records as usize);
-        let grid = header.photon_grid;
-        let mut photons: Vec<Placed> = records
-            .map(|record| {
-                let photon = Photon { axis: 0, ..Photon::read(record) };
-                (grid.nearest(photon.position), Photon::content(&photon.to_bytes()))
-            })
-            .collect();
-        let map = PhotonLines::new(&mut photons, f64::from(radius) / f64::from(grid.cell));
+    pub fn with_photon_tree(self) -> Result<Self, PackError> {
+        let (SceneImage { mut header }, _) = self.view();
+        let mut photons = self.stored_photons();
         let mut lines = self.lines;
-        // The photons are the last section.
-        lines.truncate(section.first_line as usize);
-        let mut scene = PackedScene {
-            lines,
-            sections: header.sections,
-            radiance_unit: header.radiance_unit,
-            emitter_density: header.emitter_density,
-        };
-        scene.sections[SectionKind::Photons as usize] = Section::default();
-        scene.append(SectionKind::PhotonNodes, map.nodes.into_iter())?;
-        scene.append(SectionKind::PhotonLeaves, map.leaves.into_iter())?;
-        scene.lines[0] = scene.header(header.photon_power_unit, grid).to_line();
-        Ok(Self { lines: scene.lines })
+        // The photons are the last sections.
+        for kind in [SectionKind::PhotonLeaves, SectionKind::PhotonNodes] {
+            let section = std::mem::take(&mut header.sections[kind as usize]);
+            if section.records > 0 {
+                lines.truncate(section.first_line as usize);
+            }
+        }
+        let first_line = lines.len();
+        let all_lines = first_line + photons.len().div_ceil(Photon::PER_LINE);
+        let too_large = |_| PackError::TooLarge { bytes: all_lines as u64 * LINE_BYTES as u64 };
+        header.lines = u32::try_from(all_lines).map_err(too_large)?;
+        // No more photons than lines of leaves could hold.
+        let records = photons.len() as u32;
+        header.sections[SectionKind::Photons as usize] = Section { first_line: first_line as u32, records };
+        balance(&mut photons);
+        lines.reserve_exact(all_lines - first_line);
+        lines.resize(all_lines, Line::ZERO);
+        for_each_in_heap(&photons, &mut |place, photon| {
+            let line = &mut lines[first_line + place / Photon::PER_LINE];
+            if let Some(record) = line.record_mut(place % Photon::PER_LINE) {
+                *record = photon.record(&header.photon_grid);
+            }
+        });
+        lines[0] = header.to_line();
+        Ok(Self { lines })
+    }
+
+    /// The photons of the leaves.
+    fn stored_photons(&self) -> Vec<StoredPhoton> {
+        let leaves = || self.leaf_lines().iter().map(|line| PhotonLeaf::read(&line.0));
+        let mut photons = Vec::with_capacity(leaves().map(|leaf| leaf.photons() as usize).sum());
+        for leaf in leaves() {
+            photons.extend((0..leaf.photons()).map(|i| StoredPhoton::at(leaf.point(i), leaf.content(i))));
+        }
+        photons
+    }
+
+    /// The lines of the photon map's leaves.
+    pub(crate) fn leaf_lines(&self) -> &[Line] {
+        let (SceneImage { header }, _) = self.view();
+        let section = header.section(SectionKind::PhotonLeaves);
+        &self.lines[section.first_line as usize..][..section.records as usize]
+    }
+
+    /// The same, to be changed in place.
+    pub(crate) fn leaf_lines_mut(&mut self) -> &mut [Line] {
+        let (SceneImage { header }, _) = self.view();
+        let section = header.section(SectionKind::PhotonLeaves);
+        &mut self.lines[section.first_line as usize..][..section.records as usize]
     }
 
     /// The same image with irradiance points.
     ///
     /// # Errors
     /// If there are more lines than an address can tell.
-    pub(crate) fn with_irradiance(self, points: PhotonLines) -> Result<Self, PackError> {
-        let (SceneImage { header }, _) = self.view();
-        let mut scene = PackedScene {
-            lines: self.lines,
-            sections: header.sections,
-            radiance_unit: header.radiance_unit,
-            emitter_density: header.emitter_density,
-        };
-        scene.append(SectionKind::IrradianceNodes, points.nodes.into_iter())?;
-        scene.append(SectionKind::IrradianceLeaves, points.leaves.into_iter())?;
-        scene.lines[0] = scene.header(header.photon_power_unit, header.photon_grid).to_line();
-        Ok(Self { lines: scene.lines })
+    pub(crate) fn with_irradiance(self, points: &PhotonTree) -> Result<Self, PackError> {
+        let (SceneImage { mut header }, _) = self.view();
+        let mut lines = self.lines;
+        append(&mut lines, &mut header.sections, SectionKind::IrradianceNodes, points.nodes())?;
+        append(&mut lines, &mut header.sections, SectionKind::IrradianceLeaves, points.leaves())?;
+        // `append` has checked that the number of lines fits.
+        header.lines = lines.len() as u32;
+        lines[0] = header.to_line();
+        Ok(Self { lines })
     }
 
     /// Checks that the image fits a card's memory.
@@ -302,6 +327,22 @@ impl CardImage {
     pub fn bytes(&self) -> u64 {
         self.lines.len() as u64 * LINE_BYTES as u64
     }
+}
+
+/// Appends a section to the lines of an image.
+fn append<const N: usize>(
+    lines: &mut Vec<Line>,
+    sections: &mut [Section; SECTIONS],
+    kind: SectionKind,
+    records: impl ExactSizeIterator<Item = [u8; N]>,
+) -> Result<(), PackError> {
+    let bytes = (lines.len() + records.len()) as u64 * LINE_BYTES as u64;
+    let count = |n: usize| u32::try_from(n).map_err(|_| PackError::TooLarge { bytes });
+    sections[kind as usize] = Section { first_line: count(lines.len())?, records: count(records.len())? };
+    // Exactly: an image is most of what the host holds.
+    lines.reserve_exact(records.len().div_ceil(LINE_BYTES / N));
+    lines.extend(pack_lines(records));
+    count(lines.len()).map(drop)
 }
 
 /// The box around a scene, and little more.

@@ -61,7 +61,16 @@ impl Pattern {
         hash(self.0.wrapping_add(salt) ^ index.wrapping_mul(0x9e37_79b9))
     }
 
-    /// Point `index` of `count`, in [0, 1) x [0, 1); `index` below `count`, `count` below 2^16.
+    /// Which of `count * samples` points is point `index` of a sample's `count`: each sample has one point of every run of
+    /// `samples` neighbours, chosen anew from run to run, and all samples together have every point once. With one sample
+    /// it is `index`.
+    #[inline(always)]
+    pub fn index_in_all(self, index: u32, sample: u32, samples: u32) -> u32 {
+        let samples = samples.max(1);
+        index * samples + permute(sample, samples, self.bits(index, 0x7a3d_95e7))
+    }
+
+    /// Point `index` of `count`, in [0, 1) x [0, 1); `index` below `count`, `count` at most 2^20.
     #[inline(always)]
     pub fn point(self, index: u32, count: u32) -> [f32; 2] {
         let cell = Cell::new(index, count);
@@ -151,6 +160,8 @@ fn below_one(x: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use std::vec;
+
     use super::*;
 
     const COUNTS: [u32; 9] = [1, 2, 3, 7, 8, 16, 100, 200, 211];
@@ -205,6 +216,24 @@ mod tests {
             assert!(u.abs() < bound && v.abs() < bound && uv.abs() < bound, "{count} {moments:?}");
             assert!((uu - 1.0 / 12.0).abs() < 0.01, "{count} {moments:?}");
         }
+    }
+
+    #[test]
+    fn the_samples_of_a_pixel_share_its_points() {
+        for (count, samples) in [(1, 16), (3, 5), (8, 1), (64, 4)] {
+            let pattern = Pattern::new(7, 1, 2, 0, Dimension::Emitter);
+            let mut takers = vec![None; (count * samples) as usize];
+            for sample in 0..samples {
+                for index in 0..count {
+                    let point = pattern.index_in_all(index, sample, samples);
+                    assert_eq!(point / samples, index, "one of each run");
+                    assert_eq!(takers[point as usize].replace(sample), None);
+                }
+            }
+            assert!(takers.iter().all(Option::is_some));
+        }
+        let first = |index| Pattern::new(7, 1, 2, 0, Dimension::Emitter).index_in_all(index, 0, 16) % 16;
+        assert!((1..64).any(|index| first(index) != first(0)), "the runs are not taken alike");
     }
 
     #[test]

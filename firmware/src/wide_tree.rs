@@ -148,13 +148,12 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
 #[inline(always)]
 fn parts(isa: impl Isa, node: WideNode, distances: &[u32; LANES]) -> [u64; LANES] {
     let Links { leaves, first_leaf, first_node } = node.links();
+    // They wrap, and leaves are taken for nodes, in unsound images only.
+    let [leaf, node_of] = [first_leaf | LEAF, first_node.wrapping_sub(leaves)];
     let mut parts = [0; LANES];
     for lane in 0..isa.lanes(node.children() as usize) {
         let index = lane as u32;
-        // Wraps in unsound images only.
-        let leaf = first_leaf.wrapping_add(index) | LEAF;
-        let node = first_node.wrapping_add(index.wrapping_sub(leaves)) & !LEAF;
-        let child = if index < leaves { leaf } else { node };
+        let child = index.wrapping_add(if index < leaves { leaf } else { node_of });
         if let (Some(part), Some(&distance)) = (parts.get_mut(lane), distances.get(lane)) {
             *part = u64::from(distance) << 32 | u64::from(child);
         }

@@ -7,7 +7,7 @@
 //! | [`PhotonLeaf`] | 128 | 1 |
 //! | [`PhotonLeaf`] of [`IrradiancePoint`]s | 128 | 1 |
 //! | [`BvhNode`] | 128 | 1 |
-//! | [`BvhLeaf`], up to three triangles | 128 | 1 |
+//! | [`BvhLeaf`], up to eight triangles | 128 | 1 |
 //! | [`Material`] | 64 | 2 |
 //! | [`Emitter`] | 64 | 2 |
 //! | emitter threshold | 4 | 32 |
@@ -28,7 +28,7 @@ mod photon_node;
 mod scene;
 mod wide_node;
 
-pub use bvh_leaf::{BvhLeaf, LEAF_TRIANGLES, TRIANGLE_LANES, Triangle};
+pub use bvh_leaf::{BvhLeaf, LEAF_TRIANGLES, MOST_MATERIALS, Triangle, VERTEX_LANES};
 pub use bvh_node::{BvhAxis, BvhNode, NodeBox};
 pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
 pub use irradiance_point::IrradiancePoint;

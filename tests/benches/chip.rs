@@ -40,32 +40,30 @@ struct Prepared {
     max_distance: f32,
 }
 
-static CORNELL: LazyLock<Prepared> = LazyLock::new(|| prepare("cornell.gltf"));
-static CORNELL_IN_LEAVES: LazyLock<CardImage> = LazyLock::new(|| {
-    let image = prepare("cornell.gltf").image;
-    image.with_photons_in_leaves(CORNELL.max_distance).expect("packs")
-});
-static ATRIUM: LazyLock<Prepared> = LazyLock::new(|| prepare("atrium.glb"));
+static CORNELL: LazyLock<Prepared> = LazyLock::new(|| prepare("cornell.gltf", PhotonLayout::Jensen));
+static CORNELL_IN_LEAVES: LazyLock<CardImage> =
+    LazyLock::new(|| prepare("cornell.gltf", PhotonLayout::Lines).image);
+static ATRIUM: LazyLock<Prepared> = LazyLock::new(|| prepare("atrium.glb", PhotonLayout::Jensen));
 
 fn load(name: &str) -> Scene {
     let path = format!("{}/../scenes/{name}", env!("CARGO_MANIFEST_DIR"));
     gltf::load(path.as_ref()).expect("a shipped scene loads")
 }
 
-fn prepare(name: &str) -> Prepared {
+fn prepare(name: &str, layout: PhotonLayout) -> Prepared {
     let scene = load(name);
-    let MappedImage { image, max_distance, .. } = map(&scene, PHOTONS);
+    let MappedImage { image, max_distance, .. } = map(&scene, PHOTONS, layout);
     Prepared { scene, image, max_distance }
 }
 
-fn map(scene: &Scene, photons: usize) -> MappedImage {
+fn map(scene: &Scene, photons: usize, layout: PhotonLayout) -> MappedImage {
     let packed = PackedScene::new(scene, &Emitters::new(scene)).expect("packs");
     let settings = PhotonSettings {
         seed: 0,
         photons,
         neighbors: NEIGHBORS,
         max_distance: None,
-        layout: PhotonLayout::Jensen,
+        layout,
         radiance: Radiance::Density,
     };
     map_photons(packed, &settings, &|_| true).expect("maps")
@@ -188,5 +186,7 @@ fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
 #[divan::bench(sample_count = 3)]
 fn map_of_a_million_photons(bencher: Bencher) {
     let scene = load("cornell.gltf");
-    bencher.counter(ItemsCount::new(1_000_000_usize)).bench_local(|| map(&scene, 1_000_000).image.bytes());
+    bencher
+        .counter(ItemsCount::new(1_000_000_usize))
+        .bench_local(|| map(&scene, 1_000_000, PhotonLayout::Lines).image.bytes());
 }

@@ -115,11 +115,11 @@ fn what_is_written_is_read_and_not_what_was_cached() {
     for value in 1..4 {
         for structure in [Structure::Photons, Structure::Nodes] {
             for first in [0, 5] {
-                memory.write(LineAddress(first), 2).unwrap().fill(Line([value; LINE_BYTES]));
+                memory.write(LineAddress(first), &[[value; LINE_BYTES]; 2]).unwrap();
                 let read = memory.read(structure, LineAddress(first + 1), 0..128).unwrap();
                 assert_eq!(read.0, [value; LINE_BYTES]);
             }
         }
     }
-    assert!(memory.write(LineAddress(7), 2).is_none());
+    assert!(memory.write(LineAddress(7), &[[0; LINE_BYTES]; 2]).is_none());
 }

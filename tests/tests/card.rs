@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{PhotonMap, trace};
+use photoncard_driver::photon::trace;
 use photoncard_driver::render::RenderSettings;
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::MICRO;
@@ -26,8 +26,8 @@ fn image() -> CardImage {
     let scene =
         scene(room([0, 0, 0, 1, 0, 0]), vec![lambertian("wall", 0.5), lamp], camera(Vec3::ZERO, Vec3::NEG_Z));
     let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
-    let map = PhotonMap::new(&trace(&packed, 0, 500, &|_| true).unwrap().arrivals, packed.photon_grid());
-    packed.with_photons(&map).unwrap()
+    let photons = trace(&packed, 0, 500, &|_| true).unwrap().photons;
+    packed.with_photons(photons, 20).unwrap()
 }
 
 fn frame() -> FrameParameters {

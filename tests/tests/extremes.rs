@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::photon::{PhotonMap, trace};
+use photoncard_driver::photon::trace;
 use photoncard_driver::render::{RenderSettings, Unobserved, render};
 use photoncard_driver::scene::{Material, Scene, Triangle, gltf};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
@@ -107,11 +107,10 @@ fn the_stored_power_of_coloured_light_is_right_in_every_channel() {
     let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
     for photons in [50_000, 70_000] {
         let pass = trace(&packed, 0, photons, &|_| true).unwrap();
-        let map = PhotonMap::new(&pass.arrivals, packed.photon_grid());
         for channel in 0..3 {
-            let stored: f64 = map.photons().iter().map(|photon| photon.power.decode()[channel] as f64).sum();
+            let stored: f64 = pass.photons.iter().map(|photon| photon.power.decode()[channel] as f64).sum();
             let emitted = std::f64::consts::PI * 4.0 * emission[channel] as f64;
-            let error = stored * map.power_unit() as f64 / (emitted / 0.5) - 1.0;
+            let error = stored * pass.photons.power_unit() as f64 / (emitted / 0.5) - 1.0;
             assert!(error.abs() < 0.015, "{photons} photons, channel {channel}: off by {error}");
         }
     }

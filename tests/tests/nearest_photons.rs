@@ -3,31 +3,30 @@
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{Arrival, PhotonMap};
+use photoncard_driver::photon::Photons;
 use photoncard_firmware::photon::{Candidate, CandidateBuffer, NearestPhotons, Search};
 use photoncard_firmware::simd::Level;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::Photon;
+use photoncard_shared::layout::{FULL_DISC, Photon, Rgbe};
 use photoncard_tests::{camera, lambertian, room, scene};
 use proptest::prelude::*;
 
 /// An image of an empty room with a photon at every place, in either layout. Photons of one place differ in what they carry.
 fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
-    let arrivals: Vec<Arrival> = (0_u16..)
-        .zip(places)
-        .map(|(index, &position)| Arrival {
-            position,
-            power: [1.0; 3],
-            direction: (index / 3).to_le_bytes(),
-            normal: 0,
-            direct: false,
-        })
-        .collect();
+    let photons = (0_u16..).zip(places).map(|(index, &position)| Photon {
+        position,
+        power: Rgbe::encode([1.0; 3], u32::from(index)),
+        direction: (index / 3).to_le_bytes(),
+        axis: 0,
+        normal: 0,
+        disc: FULL_DISC,
+        direct: false,
+    });
     let packed = || PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
-    let map = PhotonMap::new(&arrivals, packed().photon_grid());
-    let image = || packed().with_photons(&map).unwrap();
-    [image(), image().with_photons_in_leaves(0.1).unwrap()]
+    let photons = Photons::new(packed().photon_grid(), 1.0, photons);
+    let image = || packed().with_photons(photons.clone(), 100).unwrap();
+    [image().with_photon_tree().unwrap(), image()]
 }
 
 /// What tells a photon from another, as far as it matters.

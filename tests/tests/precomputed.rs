@@ -6,7 +6,7 @@ use core::f32::consts::PI;
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{Arrival, PhotonMap, precompute_irradiance};
+use photoncard_driver::photon::{Photons, precompute_irradiance};
 use photoncard_firmware::photon::{
     Candidate, CandidateBuffer, FoundIrradiance, MIN_NORMAL_COSINE, NearestPhotons, PointSearch, gather,
 };
@@ -15,7 +15,7 @@ use photoncard_firmware::simd::Level;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    IrradiancePoint, PHOTON_CONTENT_BYTES, PhotonLeaf, decode_normal, encode_normal,
+    FULL_DISC, IrradiancePoint, PHOTON_CONTENT_BYTES, Photon, PhotonLeaf, Rgbe, decode_normal, encode_normal,
 };
 use photoncard_tests::{camera, lambertian, room, scene};
 use proptest::prelude::*;
@@ -26,20 +26,19 @@ type Placed = ([f32; 3], u8);
 /// An image of an empty room with photons of power 1, in either layout, and irradiance points.
 fn images(photons: &[Placed], neighbors: u32, max_distance: f32) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
-    let arrivals: Vec<Arrival> = photons
-        .iter()
-        .map(|&(position, normal)| Arrival {
-            position,
-            power: [1.0, 0.5, 0.25],
-            direction: [0; 2],
-            normal,
-            direct: false,
-        })
-        .collect();
+    let photons = photons.iter().map(|&(position, normal)| Photon {
+        position,
+        power: Rgbe::encode([1.0, 0.5, 0.25], 0),
+        direction: [0; 2],
+        axis: 0,
+        normal,
+        disc: FULL_DISC,
+        direct: false,
+    });
     let packed = || PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
-    let map = PhotonMap::new(&arrivals, packed().photon_grid());
-    let image = || packed().with_photons(&map).unwrap();
-    [image(), image().with_photons_in_leaves(0.1).unwrap()]
+    let photons = Photons::new(packed().photon_grid(), 1.0, photons);
+    let image = || packed().with_photons(photons.clone(), neighbors).unwrap();
+    [image().with_photon_tree().unwrap(), image()]
         .map(|image| precompute_irradiance(image, neighbors, max_distance, &|| true).unwrap())
 }
 

@@ -100,13 +100,14 @@ fn brute_force(image: &SceneImage, memory: &mut Lines, ray: &Ray) -> Option<Hit>
     let mut nearest: Option<Hit> = None;
     for leaf in 0..image.header.section(SectionKind::Triangles).records {
         let line = image.line(memory, SectionKind::Triangles, leaf, 0..LINE_BYTES as u32).expect("sound");
-        for slot in 0..LEAF_TRIANGLES {
+        for slot in 0..BvhLeaf(line).triangles() as usize {
             let triangle = BvhLeaf(line).triangle(slot);
             let until = nearest.map_or(ray.max_distance, |hit| hit.intersection.distance);
             if let Some(intersection) = frame.intersect(&triangle.vertices, until)
                 && nearest.is_none_or(|hit| intersection.distance < hit.intersection.distance)
             {
-                nearest = Some(Hit { intersection, triangle, index: leaf * 3 + slot as u32 });
+                nearest =
+                    Some(Hit { intersection, triangle, index: leaf * LEAF_TRIANGLES as u32 + slot as u32 });
             }
         }
     }

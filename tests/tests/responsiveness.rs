@@ -8,12 +8,12 @@ use std::time::Duration;
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::photon::{PhotonMap, trace};
+use photoncard_driver::photon::trace;
 use photoncard_driver::render::RenderSettings;
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::memory::{CardMemory, MemoryPort};
 use photoncard_firmware::serve::serve;
-use photoncard_shared::address::{Line, LineAddress, Structure};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::budget::MICRO;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::image::LAYOUT_VERSION;
@@ -44,7 +44,7 @@ impl CardMemory for CountingMemory<'_> {
         self.lines.get(first.0 as usize..(first.0 + count) as usize)
     }
 
-    fn write(&mut self, _: LineAddress, _: u32) -> Option<&mut [Line]> {
+    fn write(&mut self, _: LineAddress, _: &[[u8; LINE_BYTES]]) -> Option<()> {
         None
     }
 }
@@ -98,8 +98,8 @@ fn most_reads(frame: &FrameParameters) -> u64 {
     let walls = room([0, 0, 0, 1, 0, 0]);
     let scene = scene(walls, vec![lambertian("wall", 0.5), lamp], camera(Vec3::ZERO, Vec3::NEG_Z));
     let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
-    let map = PhotonMap::new(&trace(&packed, 0, 500, &|_| true).unwrap().arrivals, packed.photon_grid());
-    let lines = packed.with_photons(&map).unwrap().lines().to_vec();
+    let photons = trace(&packed, 0, 500, &|_| true).unwrap().photons;
+    let lines = packed.with_photons(photons, 20).unwrap().lines().to_vec();
     let reads = Cell::new(0);
     let commands = VecDeque::from([
         Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION },

@@ -1,24 +1,24 @@
 //! Emulated cards: the firmware on threads of this process, one chip a thread, each on a loopback link.
 
 pub mod direct;
+mod dram;
 pub mod memory_model;
 pub mod trace;
 pub mod whole_frame;
 
-use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard, REFERENCE_SRAM_BYTES, ReferenceCard};
 use photoncard_firmware::chip::{MicroChip, ReferenceChip, sram_bytes, tag_bytes};
-use photoncard_firmware::memory::{CardMemory, MemoryPort};
+use photoncard_firmware::memory::CardMemory;
 use photoncard_firmware::serve::serve;
-use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::budget::{Budget, MICRO, REFERENCE, TechniqueMemory};
 use photoncard_shared::link::Port;
-use photoncard_shared::message::{Fault, FaultCode};
 
+use self::dram::EmulatedDram;
+pub use self::dram::SharedImage;
 use self::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use self::trace::{TraceFile, Traced};
 use crate::link::{LoopbackPort, loopback};
@@ -96,18 +96,19 @@ pub struct EmulatedCard {
 }
 
 impl EmulatedCard {
-    /// Starts a card; without a model its memory costs nothing and tells nothing.
+    /// Starts a card; without a model its memory costs nothing and tells nothing. Of an image that is loaded into it the
+    /// lines may be those of `shared`.
     ///
     /// # Errors
     /// If the system has no thread for it.
-    pub fn start(kind: ChipKind, model: Option<MemoryModel>) -> std::io::Result<Self> {
+    pub fn start(kind: ChipKind, model: Option<MemoryModel>, shared: SharedImage) -> std::io::Result<Self> {
         let (host, mut card) = loopback(LINK_CAPACITY);
         let trace = model.as_ref().and_then(|model| model.trace.as_ref());
         let trace_has_failed = trace.map(TraceFile::has_failed);
         let thread = std::thread::Builder::new()
             .name("chip".into())
             .stack_size(THREAD_STACK)
-            .spawn(move || run(kind, model, &mut card))?;
+            .spawn(move || run(kind, model, shared, &mut card))?;
         Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed })
     }
 
@@ -157,16 +158,18 @@ pub fn serve_card(kind: ChipKind, mut port: impl Port + Send) -> std::io::Result
         let thread = std::thread::Builder::new()
             .name("chip".into())
             .stack_size(THREAD_STACK)
-            .spawn_scoped(scope, || run(kind, None, &mut port))?;
+            .spawn_scoped(scope, || run(kind, None, SharedImage::default(), &mut port))?;
         thread.join().map(drop).or_else(|panic| std::panic::resume_unwind(panic))
     })
 }
 
-fn run(kind: ChipKind, model: Option<MemoryModel>, port: &mut impl Port) -> Option<MemoryRecord> {
-    let dram = GrowingMemory::new(match kind {
-        ChipKind::Reference => REFERENCE.dram_bytes,
-        ChipKind::Micro => MICRO.dram_bytes,
-    });
+fn run(
+    kind: ChipKind,
+    model: Option<MemoryModel>,
+    shared: SharedImage,
+    port: &mut impl Port,
+) -> Option<MemoryRecord> {
+    let dram = EmulatedDram::new(kind.budget().dram_bytes, shared);
     match model {
         None => serve_on(kind, dram, port, |_| None),
         Some(MemoryModel { caches, trace }) => {
@@ -198,44 +201,5 @@ fn serve_on<M: CardMemory, R>(
             let _ = serve(&mut *card, port);
             end(card.memory())
         }
-    }
-}
-
-/// Card DRAM that takes host memory only for the lines that are written.
-struct GrowingMemory {
-    lines: Vec<Line>,
-    limit: u32,
-}
-
-impl GrowingMemory {
-    fn new(bytes: u32) -> Self {
-        Self { lines: Vec::new(), limit: bytes / LINE_BYTES as u32 }
-    }
-}
-
-impl MemoryPort for GrowingMemory {
-    #[inline(always)]
-    fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
-        let fault = Fault { code: FaultCode::LineRange, detail: address.0 };
-        self.lines.get(address.0 as usize).ok_or(fault)
-    }
-}
-
-impl CardMemory for GrowingMemory {
-    fn lines(&self) -> u32 {
-        self.limit
-    }
-
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
-        let end = first.0.checked_add(count)?;
-        self.lines.get(first.0 as usize..end as usize)
-    }
-
-    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
-        let end = first.0.checked_add(count).filter(|&end| end <= self.limit)?;
-        if self.lines.len() < end as usize {
-            self.lines.resize(end as usize, Line::ZERO);
-        }
-        self.lines.get_mut(first.0 as usize..end as usize)
     }
 }

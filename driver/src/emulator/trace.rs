@@ -148,8 +148,8 @@ impl<M: CardMemory> CardMemory for Traced<M> {
         self.memory.stored(first, count)
     }
 
-    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
-        self.memory.write(first, count)
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(first, lines)
     }
 }
 

@@ -47,12 +47,37 @@ impl PathRandom {
         })
     }
 
-    /// A point of the unit square for a bounce, and a number in [0, 1) for its survival.
-    pub(super) fn bounce(self, bounce: u32) -> ([f32; 2], f32) {
+    /// The random numbers of a bounce.
+    pub(super) fn bounce(self, bounce: u32) -> BounceRandom {
         let path = hash(hash(self.seed ^ 0x2c1b_3c6d).wrapping_add(self.path as u32));
-        let key = hash(hash(path.wrapping_add((self.path >> 32) as u32)).wrapping_add(bounce));
-        let number = |index: u32| unit_interval(hash(key.wrapping_add(index.wrapping_mul(0x9e37_79b9))));
-        ([number(1), number(2)], number(3))
+        BounceRandom { key: hash(hash(path.wrapping_add((self.path >> 32) as u32)).wrapping_add(bounce)) }
+    }
+}
+
+/// The random numbers of one bounce.
+#[derive(Clone, Copy)]
+pub(super) struct BounceRandom {
+    key: u32,
+}
+
+impl BounceRandom {
+    fn bits(self, index: u32) -> u32 {
+        hash(self.key.wrapping_add(index.wrapping_mul(0x9e37_79b9)))
+    }
+
+    /// A point of the unit square, for the direction.
+    pub(super) fn point(self) -> [f32; 2] {
+        [1, 2].map(|index| unit_interval(self.bits(index)))
+    }
+
+    /// A number in [0, 1), for the survival.
+    pub(super) fn survival(self) -> f32 {
+        unit_interval(self.bits(3))
+    }
+
+    /// Bits for the rounding of the power.
+    pub(super) fn dither(self) -> u32 {
+        self.bits(4)
     }
 }
 

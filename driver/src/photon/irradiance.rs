@@ -17,7 +17,8 @@ use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
 use super::PhotonError;
-use super::leaves::{PhotonLines, Placed};
+use super::leaves::PhotonTree;
+use super::stored::StoredPhoton;
 use crate::pack::CardImage;
 
 /// Points that one task does; `go_on` is asked before each.
@@ -38,7 +39,7 @@ pub fn precompute_irradiance(
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<CardImage, PhotonError> {
     let places = surface_points(&image)?;
-    let points: Result<Vec<Vec<Placed>>, PhotonError> = places
+    let points: Result<Vec<Vec<StoredPhoton>>, PhotonError> = places
         .par_chunks(POINTS_OF_A_TASK)
         .map_init(
             || Estimator::new(&image, neighbors, max_distance),
@@ -46,7 +47,7 @@ pub fn precompute_irradiance(
                 if !go_on() {
                     return Err(PhotonError::Stopped);
                 }
-                let points: Result<Vec<Placed>, Fault> =
+                let points: Result<Vec<StoredPhoton>, Fault> =
                     places.iter().map(|&place| estimator.point(place)).collect();
                 Ok(points?)
             },
@@ -55,8 +56,11 @@ pub fn precompute_irradiance(
     let cell = image.view().0.header.photon_grid.cell;
     // About as far as the nearest of the photons of a gather lies.
     let distance = max_distance / (neighbors as f32).sqrt();
-    let lines = PhotonLines::new(&mut points?.concat(), f64::from(distance / cell));
-    Ok(image.with_irradiance(lines)?)
+    let mut points = points?.concat();
+    match PhotonTree::new(&mut points, f64::from(distance / cell)) {
+        Some(tree) => Ok(image.with_irradiance(&tree)?),
+        None => Ok(image),
+    }
 }
 
 /// The chip's density estimate, with its buffer.
@@ -74,13 +78,13 @@ impl<'a> Estimator<'a> {
         Self { scene, memory, buffer: Box::default(), neighbors, max_distance }
     }
 
-    fn point(&mut self, (point, normal): SurfacePoint) -> Result<Placed, Fault> {
+    fn point(&mut self, (point, normal): SurfacePoint) -> Result<StoredPhoton, Fault> {
         let position: Vec3 = self.scene.header.photon_grid.position(point).into();
         let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
         gather(&self.scene, &mut self.memory, position, &mut nearest)?;
         let diffuser = PartialReflection::diffuser(normal);
         let irradiance = reflected_radiance(&nearest, position, &diffuser).to_array();
-        Ok((point, IrradiancePoint { irradiance, normal }.to_content()))
+        Ok(StoredPhoton::at(point, IrradiancePoint { irradiance, normal }.to_content()))
     }
 }
 

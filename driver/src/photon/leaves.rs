@@ -6,84 +6,96 @@
 //! are kept to whole leaves, so that lines are full. The binary tree is then folded into wide nodes so that a search
 //! reads the fewest of them, by the same measure.
 
+use std::num::NonZeroU8;
+
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::PHOTON_STACK;
-use photoncard_shared::layout::{
-    GridBox, LEAF_PHOTONS, PHOTON_CONTENT_BYTES, PhotonLeaf, PhotonNode, leaf_capacity,
-};
+use photoncard_shared::layout::{GridBox, LEAF_PHOTONS, PhotonLeaf, PhotonNode, leaf_capacity};
 
+use super::stored::StoredPhoton;
 use crate::fold::{Folded, Tree};
-
-/// A photon's grid point, and what else it carries.
-pub(crate) type Placed = ([u32; 3], [u8; PHOTON_CONTENT_BYTES]);
-type LineBytes = [u8; LINE_BYTES];
 
 /// Below this number of photons a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
-/// Intervals of a side between which planes are tried.
+/// Intervals of a side between which planes are tried, at the most and at the least.
 const INTERVALS: usize = 32;
+const LEAST_INTERVALS: usize = 8;
+/// Photons that tell where planes are tried: of more, some are as good.
+const SAMPLED: usize = 4096;
 /// Photons from which on a part of space is expected to end in leaves of one surface.
 const MANY: usize = 64;
 /// Levels of a binary tree from which on it is halved.
 const MOST_SKEWED: usize = 40;
 
-/// The lines of both sections.
-#[derive(Debug, Default)]
-pub(crate) struct PhotonLines {
-    pub(crate) nodes: Vec<LineBytes>,
-    pub(crate) leaves: Vec<LineBytes>,
+/// The photons of a leaf, in the order of the tree.
+#[derive(Clone, Copy)]
+struct Run {
+    first: u32,
+    count: NonZeroU8,
 }
 
-/// A part of the tree: a leaf's line.
-type PhotonTree = Tree<Box<LineBytes>, Extent>;
+/// A tree of photons, to be written in lines.
+pub(crate) struct PhotonTree<'a> {
+    photons: &'a [StoredPhoton],
+    folded: Folded<Run, Extent>,
+}
 
-impl PhotonLines {
-    /// Of photons in any order, for searches of about `radius` cells: the same lines for the same photons in the same
-    /// order, whatever the threads.
-    pub(crate) fn new(photons: &mut [Placed], radius: f64) -> Self {
-        if photons.is_empty() {
-            return Self::default();
-        }
-        let mut folded = Folded::new(build(photons, radius, 0));
+impl<'a> PhotonTree<'a> {
+    /// Of photons in any order, for searches of about `radius` cells: the same tree for the same photons in the same
+    /// order, whatever the threads. `None` without photons.
+    pub(crate) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
+        let mut folded = Folded::new(build(photons, 0, radius, 0)?);
         if folded.stack > PHOTON_STACK {
             // Halves of halves are not the best of trees, but no deeper than their number asks for.
-            folded = Folded::new(build(photons, radius, MOST_SKEWED));
+            folded = Folded::new(build(photons, 0, radius, MOST_SKEWED)?);
         }
-        let nodes = folded.nodes.into_iter().map(|node| {
+        Some(Self { photons, folded })
+    }
+
+    /// The lines of the nodes.
+    pub(crate) fn nodes(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
+        self.folded.nodes.iter().map(|node| {
             let boxes: Vec<GridBox> = node.children.iter().map(|extent| extent.0).collect();
             PhotonNode::encode(&boxes, node.links)
                 .unwrap_or_else(|| unreachable!("a node of {} children", boxes.len()))
-        });
-        Self { nodes: nodes.collect(), leaves: folded.leaves.into_iter().map(|line| *line).collect() }
+        })
+    }
+
+    /// The lines of the leaves.
+    pub(crate) fn leaves(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
+        self.folded.leaves.iter().map(|run| {
+            let photons = self.photons.iter().skip(run.first as usize).take(run.count.get().into());
+            let placed: heapless::Vec<_, LEAF_PHOTONS> =
+                photons.map(|photon| (photon.point(), photon.content())).collect();
+            PhotonLeaf::encode(&placed).unwrap_or_else(|| unreachable!("a leaf of {} photons", placed.len()))
+        })
     }
 }
 
-fn build(photons: &mut [Placed], radius: f64, depth: usize) -> PhotonTree {
-    let extent = Extent::new(photons);
-    if photons.len() <= LEAF_PHOTONS
-        && let Some(line) = PhotonLeaf::encode(photons)
-    {
-        return Tree::leaf(Box::new(line), extent, 0.0);
+/// The tree of the photons from number `first` on; `None` if there is none.
+fn build(photons: &mut [StoredPhoton], first: u32, radius: f64, depth: usize) -> Option<Tree<Run, Extent>> {
+    if photons.is_empty() {
+        return None;
     }
-    let (axis, count) = if depth < MOST_SKEWED {
+    let extent = Extent::new(photons);
+    let count = u8::try_from(photons.len()).ok().and_then(NonZeroU8::new);
+    if let Some(count) = count
+        && PhotonLeaf::fits(&extent.0, photons.len())
+    {
+        return Some(Tree::leaf(Run { first, count }, extent, 0.0));
+    }
+    let (axis, middle) = if depth < MOST_SKEWED {
         extent.split(photons, radius)
     } else {
         (extent.longest(), photons.len() / 2)
     };
-    let (below, ..) = photons.select_nth_unstable_by_key(count, |(point, content)| {
-        let [x, y, z] = *point;
-        (point[axis], x, y, z, *content)
-    });
-    let middle = below.len();
+    photons.select_nth_unstable_by_key(middle, |photon| (photon.coordinate(axis), *photon));
     let (below, above) = photons.split_at_mut(middle);
-    let children = if below.len().max(above.len()) > SEQUENTIAL {
-        let (below, above) =
-            rayon::join(|| build(below, radius, depth + 1), || build(above, radius, depth + 1));
-        [below, above]
-    } else {
-        [build(below, radius, depth + 1), build(above, radius, depth + 1)]
-    };
-    Tree::node(children, extent, extent.chance(radius) as f32, None)
+    let is_large = below.len().max(above.len()) > SEQUENTIAL;
+    let mut below = || build(below, first, radius, depth + 1);
+    let mut above = || build(above, first + middle as u32, radius, depth + 1);
+    let (below, above) = if is_large { rayon::join(below, above) } else { (below(), above()) };
+    Some(Tree::node([below?, above?], extent, extent.chance(radius) as f32, None))
 }
 
 /// The box of some photons.
@@ -91,11 +103,11 @@ fn build(photons: &mut [Placed], radius: f64, depth: usize) -> PhotonTree {
 struct Extent(GridBox);
 
 impl Extent {
-    fn new(photons: &[Placed]) -> Self {
+    fn new(photons: &[StoredPhoton]) -> Self {
         let mut extent = GridBox { lower: [u32::MAX; 3], upper: [0; 3] };
-        for (point, _) in photons {
+        for photon in photons {
             let sides = extent.lower.iter_mut().zip(&mut extent.upper);
-            for ((lower, upper), &coordinate) in sides.zip(point) {
+            for ((lower, upper), coordinate) in sides.zip(photon.point()) {
                 *lower = coordinate.min(*lower);
                 *upper = coordinate.max(*upper);
             }
@@ -125,7 +137,7 @@ impl Extent {
     }
 
     /// The axis to split on, and how many photons go below the plane: a whole number of leaves, if there is more than one.
-    fn split(&self, photons: &[Placed], radius: f64) -> (usize, usize) {
+    fn split(&self, photons: &[StoredPhoton], radius: f64) -> (usize, usize) {
         let (axis, below) = self.cheapest(photons, radius);
         let count = photons.len();
         let leaf = self.leaf_photons(count);
@@ -137,31 +149,35 @@ impl Extent {
     }
 
     /// The plane of least cost by the voxel volume heuristic: its axis, and the photons below it.
-    fn cheapest(&self, photons: &[Placed], radius: f64) -> (usize, usize) {
+    fn cheapest(&self, photons: &[StoredPhoton], radius: f64) -> (usize, usize) {
         let mut cheapest = (f64::INFINITY, self.longest(), photons.len() / 2);
+        let intervals = (photons.len() / 4).clamp(LEAST_INTERVALS, INTERVALS);
+        let step = (photons.len() / SAMPLED).max(1);
+        let sampled = photons.len().div_ceil(step);
         for axis in (0..3).filter(|&axis| self.side(axis) > 0) {
+            let side = f64::from(self.side(axis));
+            // Intervals for each cell, times 2^32.
+            let scale = ((intervals as u64) << 32) / (u64::from(self.side(axis)) + 1);
             let mut counts = [0_usize; INTERVALS];
-            let interval = |point: u32| {
-                (u64::from(point - self.0.lower[axis]) * INTERVALS as u64 / (u64::from(self.side(axis)) + 1))
-                    as usize
-            };
-            photons.iter().for_each(|(point, _)| counts[interval(point[axis])] += 1);
+            for photon in photons.iter().step_by(step) {
+                let cells = u64::from(photon.coordinate(axis) - self.0.lower[axis]);
+                counts[((cells * scale) >> 32) as usize] += 1;
+            }
+            let across: f64 =
+                (0..3).filter(|&a| a != axis).map(|a| f64::from(self.side(a)) + 2.0 * radius).product();
             let mut below = 0;
-            for (plane, count) in (1..INTERVALS).zip(counts) {
+            for (plane, count) in (1..intervals).zip(counts) {
                 below += count;
-                let share = plane as f64 / INTERVALS as f64;
-                let part = |share: f64| {
-                    let side = |a| f64::from(self.side(a)) * if a == axis { share } else { 1.0 };
-                    chance([0, 1, 2].map(side), radius)
-                };
-                let above = photons.len() - below;
+                let above = sampled - below;
+                let share = plane as f64 / intervals as f64;
+                let part = |share: f64| across * (share * side + 2.0 * radius);
                 let cost = part(share) * below as f64 + part(1.0 - share) * above as f64;
                 if cost < cheapest.0 && below > 0 && above > 0 {
-                    cheapest = (cost, axis, below);
+                    cheapest = (cost, axis, below * step);
                 }
             }
         }
-        (cheapest.1, cheapest.2)
+        (cheapest.1, cheapest.2.min(photons.len() - 1))
     }
 }
 
@@ -173,9 +189,27 @@ fn chance(sides: [f64; 3], radius: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use photoncard_firmware::sampler::hash;
-    use photoncard_shared::layout::{Child, WideNode};
+    use photoncard_shared::layout::{Child, PHOTON_CONTENT_BYTES, WideNode};
 
     use super::*;
+
+    /// A photon's grid point, and what else it carries.
+    type Placed = ([u32; 3], [u8; PHOTON_CONTENT_BYTES]);
+
+    /// The lines of both sections.
+    struct PhotonLines {
+        nodes: Vec<[u8; LINE_BYTES]>,
+        leaves: Vec<[u8; LINE_BYTES]>,
+    }
+
+    impl PhotonLines {
+        fn new(photons: &[Placed], radius: f64) -> Self {
+            let mut stored: Vec<_> =
+                photons.iter().map(|(point, content)| StoredPhoton::at(*point, *content)).collect();
+            let tree = PhotonTree::new(&mut stored, radius).expect("there are photons");
+            Self { nodes: tree.nodes().collect(), leaves: tree.leaves().collect() }
+        }
+    }
 
     /// Photons on the walls of a box: each carries its number.
     fn photons(count: u32, bits: u32) -> Vec<Placed> {
@@ -216,7 +250,7 @@ mod tests {
     fn every_photon_is_in_one_leaf_and_in_the_boxes_of_every_node_above_it() {
         for (count, bits) in [(1, 20), (10, 20), (15, 20), (1000, 20), (1000, 2), (30_000, 20), (5000, 0)] {
             let mut sorted = photons(count, bits);
-            let lines = PhotonLines::new(&mut sorted.clone(), 1000.0);
+            let lines = PhotonLines::new(&sorted, 1000.0);
             let everything = GridBox { lower: [0; 3], upper: [u32::MAX; 3] };
             let mut found = Vec::new();
             let stack = walk(&lines, Child::Node(0), everything, &mut found);
@@ -230,7 +264,7 @@ mod tests {
     #[test]
     fn lines_are_mostly_full() {
         let count = 100_000;
-        let lines = PhotonLines::new(&mut photons(count, 20), 10_000.0);
+        let lines = PhotonLines::new(&photons(count, 20), 10_000.0);
         let photons = f64::from(count) / lines.leaves.len() as f64;
         let children = (lines.leaves.len() + lines.nodes.len() - 1) as f64 / lines.nodes.len() as f64;
         println!("{photons} photons a leaf, {children} children a node");

@@ -9,18 +9,24 @@ mod emit;
 mod error;
 mod irradiance;
 pub(crate) mod leaves;
-mod map;
+pub(crate) mod map;
+mod search;
+pub(crate) mod stored;
+mod surroundings;
 mod trace;
 
 use std::time::{Duration, Instant};
 
 pub use error::PhotonError;
 pub use irradiance::precompute_irradiance;
-pub use map::PhotonMap;
-use photoncard_shared::message::Radiance;
-pub use trace::{Arrival, PhotonPass, trace};
+pub(crate) use search::search_radius;
+pub use stored::Photons;
+pub use trace::{PhotonPass, trace};
 
-use self::disc::{automatic_max_distance, measure_discs};
+use photoncard_shared::message::Radiance;
+
+use self::disc::measure_discs;
+use self::search::automatic_max_distance;
 use crate::pack::{CardImage, PackedScene};
 
 /// A gather looks at least so many cells of the grid far, so that the grid does not show.
@@ -61,8 +67,21 @@ pub struct MappedImage {
     pub max_distance: f32,
     /// Paths that were traced from the lights.
     pub paths: u64,
-    /// How long the tracing took.
+    /// How long it took.
+    pub times: PhotonTimes,
+}
+
+/// How long each step of the photon pass took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PhotonTimes {
+    /// Tracing photons.
     pub tracing: Duration,
+    /// Building the tree and writing its lines.
+    pub building: Duration,
+    /// Measuring how far gathers look, and the disc fractions.
+    pub measuring: Duration,
+    /// Estimating irradiance at photons, if it is precomputed.
+    pub estimating: Duration,
 }
 
 /// Traces photons in a packed scene and completes its image with their map. `progress` is told how many photons are
@@ -75,27 +94,64 @@ pub fn map_photons(
     settings: &PhotonSettings,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<MappedImage, PhotonError> {
+    let mut times = PhotonTimes::default();
     let start = Instant::now();
-    let pass = trace(&packed, settings.seed, settings.photons, progress)?;
-    let tracing = start.elapsed();
-    let map = PhotonMap::new(&pass.arrivals, packed.photon_grid());
-    let mut image = packed.with_photons(&map)?;
+    let PhotonPass { photons, paths } = trace(&packed, settings.seed, settings.photons, progress)?;
+    times.tracing = start.elapsed();
+    let start = Instant::now();
+    let cell = photons.grid.cell;
+    let mut image = packed.with_photons(photons, settings.neighbors)?;
+    times.building = start.elapsed();
+    let start = Instant::now();
     let max_distance = match settings.max_distance {
         // Farther than the scene is wide is as good as that wide.
         Some(distance) => distance.min(image.diagonal()),
         None => automatic_max_distance(&image, settings.neighbors)?,
     };
-    let cell = map.grid().cell;
     if max_distance < LEAST_CELLS * cell {
         return Err(PhotonError::TooWide { cell, max_distance });
     }
     measure_discs(&mut image, settings.neighbors, max_distance, &|| progress(settings.photons))?;
-    if settings.layout == PhotonLayout::Lines {
-        image = image.with_photons_in_leaves(max_distance)?;
+    times.measuring = start.elapsed();
+    if settings.layout == PhotonLayout::Jensen {
+        let start = Instant::now();
+        image = image.with_photon_tree()?;
+        times.building += start.elapsed();
     }
     if settings.radiance == Radiance::Precomputed {
+        let start = Instant::now();
         let go_on = || progress(settings.photons);
         image = precompute_irradiance(image, settings.neighbors, max_distance, &go_on)?;
+        times.estimating = start.elapsed();
     }
-    Ok(MappedImage { image, max_distance, paths: pass.paths, tracing })
+    Ok(MappedImage { image, max_distance, paths, times })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::emitter::Emitters;
+    use crate::scene::gltf;
+
+    #[test]
+    fn an_image_is_the_same_on_any_number_of_threads() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf");
+        let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
+        for layout in [PhotonLayout::Lines, PhotonLayout::Jensen] {
+            let settings = PhotonSettings {
+                seed: 3,
+                photons: 60_000,
+                neighbors: 50,
+                max_distance: None,
+                layout,
+                radiance: Radiance::Precomputed,
+            };
+            let images = [1, 2, 5].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+                pool.install(|| map_photons(packed, &settings, &|_| true)).expect("maps").image
+            });
+            assert!(images.iter().all(|image| image.lines() == images[0].lines()), "{layout:?}");
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! The cards of a render: reached, greeted, and put to work together.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -15,7 +16,8 @@ use super::open_card::OpenCard;
 use super::{Observer, RenderError, RenderSettings, Unobserved};
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
-use crate::emulator::{ChipKind, MemoryModel};
+use crate::emulator::{ChipKind, MemoryModel, SharedImage};
+use crate::pack::CardImage;
 use crate::session::{Job, LinkBytes, Picture, Session, SessionError};
 
 /// The number of emulated reference chips at some addresses.
@@ -64,6 +66,7 @@ pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
 pub(super) struct Cards {
     cards: Vec<Connected>,
     start: Instant,
+    shared: SharedImage,
 }
 
 pub(super) struct Connected {
@@ -89,7 +92,7 @@ pub struct CardInfo {
 /// If it cannot be started or reached, or does not answer as it should.
 pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
     let nothing = Picture::empty()?;
-    let card = OpenCard::open(0, address, None, None)?;
+    let card = OpenCard::open(0, address, None, &SharedImage::default(), None)?;
     let connected = greet(card, &nothing, Instant::now(), &Unobserved)?;
     let Connected { session, budget, .. } = connected;
     Ok(CardInfo { build: session.build().to_owned(), budget, memory_use: session.memory_use() })
@@ -101,7 +104,7 @@ pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
 /// If it cannot be started or reached, or does not answer as it should.
 pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, RenderError> {
     let nothing = Picture::empty()?;
-    let mut card = OpenCard::open(0, address, None, None)?;
+    let mut card = OpenCard::open(0, address, None, &SharedImage::default(), None)?;
     let mut answers = Vec::with_capacity(count);
     for _ in 0..count {
         let start = Instant::now();
@@ -135,6 +138,7 @@ impl Cards {
         observer: &dyn Observer,
     ) -> Result<Self, RenderError> {
         let start = Instant::now();
+        let shared = SharedImage::default();
         let nothing = Picture::empty()?;
         let RenderSettings { cards: addresses, faults, .. } = settings;
         let caches = settings.modelled_caches();
@@ -146,10 +150,15 @@ impl Cards {
             .enumerate()
             .map(|(index, address)| {
                 let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
-                greet(OpenCard::open(index, address, model, *faults)?, &nothing, start, observer)
+                greet(OpenCard::open(index, address, model, &shared, *faults)?, &nothing, start, observer)
             })
             .collect();
-        Ok(Self { cards: cards?, start })
+        Ok(Self { cards: cards?, start, shared })
+    }
+
+    /// Tells emulated cards of the image that they will be loaded with, so that they need not copy it.
+    pub(super) fn share(&self, image: Arc<CardImage>) {
+        self.shared.give(image);
     }
 
     /// What each card can hold.

@@ -20,6 +20,7 @@ pub use photoncard_shared::message::{Radiance, Sampling};
 pub use settings::{LEAST_IRRADIANCE_ERROR, RenderSettings};
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use photoncard_shared::budget::{Budget, REFERENCE};
@@ -31,9 +32,9 @@ use crate::emitter::Emitters;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 use crate::film::Film;
-use crate::pack::PackedScene;
+use crate::pack::{CardImage, PackedScene};
 use crate::partial::PartialRender;
-use crate::photon::{MappedImage, map_photons};
+use crate::photon::{MappedImage, PhotonTimes, map_photons};
 use crate::scene::{Camera, Scene};
 use crate::scheduler::{GatherOrder, Scheduler, tiles};
 use crate::session::{Job, Picture, SessionError};
@@ -125,6 +126,7 @@ pub fn render(
     }
     let mut times = Times::default();
     let prepared = prepare(scene, settings, cards.budgets(), &mut times, observer)?;
+    cards.share(prepared.image.clone());
     let frame = settings.frame(camera, prepared.max_distance);
     let picture = Picture::new(Scheduler::new(all), film, partial);
     let job = Job {
@@ -193,15 +195,25 @@ fn begin_partial(
     Ok(partial)
 }
 
+/// What is to be loaded into the cards.
+struct Prepared {
+    image: Arc<CardImage>,
+    /// Greatest distance of a gather, metres.
+    max_distance: f32,
+    /// Paths that were traced for its photons.
+    paths: u64,
+}
+
 fn prepare(
     scene: &Scene,
     settings: &RenderSettings,
     budgets: impl Iterator<Item = Budget>,
     times: &mut Times,
     observer: &dyn Observer,
-) -> Result<MappedImage, RenderError> {
+) -> Result<Prepared, RenderError> {
     let start = Instant::now();
     let packed = PackedScene::new(scene, &Emitters::new(scene))?;
+    times.hierarchy = start.elapsed().as_secs_f64();
     let budgets: Vec<Budget> = budgets.collect();
     for budget in &budgets {
         packed.check_budget(settings.photons, settings.photon_layout, settings.radiance, budget)?;
@@ -218,15 +230,20 @@ fn prepare(
     for budget in &budgets {
         mapped.image.check_budget(budget)?;
     }
-    times.photons = mapped.tracing.as_secs_f64();
+    let PhotonTimes { tracing, building, measuring, estimating } = mapped.times;
+    times.photons = tracing.as_secs_f64();
     times.pack = start.elapsed().as_secs_f64() - times.photons;
-    Ok(mapped)
+    times.photon_map = building.as_secs_f64();
+    times.discs = measuring.as_secs_f64();
+    times.irradiance = estimating.as_secs_f64();
+    let MappedImage { image, max_distance, paths, .. } = mapped;
+    Ok(Prepared { image: Arc::new(image), max_distance, paths })
 }
 
 fn statistics(
     settings: &RenderSettings,
     frame: &FrameParameters,
-    prepared: &MappedImage,
+    prepared: &Prepared,
     outcome: &cards::Outcome,
     time_s: Times,
 ) -> Statistics {

@@ -8,7 +8,7 @@ use super::RenderError;
 use super::address::CardAddress;
 use super::card_thread::Shared;
 use super::reopening::reopen;
-use crate::emulator::{ChipKind, EmulatedCard, MemoryModel, MemoryRecord};
+use crate::emulator::{ChipKind, EmulatedCard, MemoryModel, MemoryRecord, SharedImage};
 use crate::link::{FaultInjector, LineFaults, LinkError, connect_tcp, connect_unix, open_serial};
 
 /// A card that can be talked to.
@@ -30,16 +30,17 @@ enum Place {
 
 impl OpenCard {
     /// Starts or reaches the card at an address, the first if it has many. One that is emulated may have a model of its
-    /// memory.
+    /// memory, and shares an image with the host.
     pub(super) fn open(
         index: usize,
         address: &CardAddress,
         model: Option<MemoryModel>,
+        shared: &SharedImage,
         faults: Option<LineFaults>,
     ) -> Result<Self, RenderError> {
         let place = match reach(address) {
             Err(kind) => {
-                let card = EmulatedCard::start(kind, model);
+                let card = EmulatedCard::start(kind, model, shared.clone());
                 Place::Emulated(card.map_err(|source| RenderError::Start { card: index, source })?)
             }
             Ok(port) => {

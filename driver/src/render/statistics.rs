@@ -76,6 +76,14 @@ pub struct Times {
     pub photons: f64,
     /// Building hierarchy, photon map and card image.
     pub pack: f64,
+    /// Of these, the hierarchy and the other parts of the scene.
+    pub hierarchy: f64,
+    /// Of these, the photon map.
+    pub photon_map: f64,
+    /// Of these, how far gathers look, and how much of the discs around photons is surface.
+    pub discs: f64,
+    /// Of these, irradiance at photons, if it is precomputed.
+    pub irradiance: f64,
     /// Loading the slowest card.
     pub load: f64,
     /// Rendering, after the last card was loaded.

@@ -12,8 +12,8 @@ use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
 use photoncard_driver::scheduler::{Scheduler, tiles};
 use photoncard_driver::session::{Job, Picture};
 use photoncard_firmware::card::MicroCard;
-use photoncard_firmware::memory::{CardMemory, MemoryPort};
-use photoncard_shared::address::{Line, LineAddress, Structure};
+use photoncard_firmware::memory::{CardMemory, MemoryPort, copy_lines};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::budget::MICRO;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters};
@@ -87,8 +87,9 @@ impl CardMemory for Memory {
         self.lines.get(first.0 as usize..first.0 as usize + count as usize)
     }
 
-    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
-        self.lines.get_mut(first.0 as usize..first.0 as usize + count as usize)
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        copy_lines(lines, self.lines.get_mut(first.0 as usize..first.0 as usize + lines.len())?);
+        Some(())
     }
 }
 

@@ -62,10 +62,7 @@ impl Loader {
         let count = u32::try_from(lines.len()).map_err(|_| fault)?;
         let end =
             first.checked_add(count).filter(|&end| end <= self.lines && rest.is_empty()).ok_or(fault)?;
-        let target = memory.write(LineAddress(first), count).ok_or(fault)?;
-        for (line, bytes) in target.iter_mut().zip(lines) {
-            line.0 = *bytes;
-        }
+        memory.write(LineAddress(first), lines).ok_or(fault)?;
         Ok(end)
     }
 

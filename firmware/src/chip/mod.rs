@@ -181,7 +181,6 @@ impl<
         }
         match stage {
             Stage::Survey => self.survey(context)?,
-            Stage::Mark => self.mark(context)?,
             Stage::RecordPoints => self.choose_record_point(context)?,
             Stage::RecordRays => self.cast_for_record(context)?,
             Stage::RecordSums => self.end_records(context),

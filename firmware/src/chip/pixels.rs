@@ -1,6 +1,9 @@
 //! The stages of a block's pixels, sample by sample.
 
+use core::ops::Range;
+
 use glam::Vec3;
+use photoncard_shared::budget::MOST_GATHER_RAYS;
 use photoncard_shared::message::{Fault, FrameParameters};
 
 use super::position::Stage;
@@ -19,17 +22,51 @@ pub(super) struct StoredPoint {
     /// Of pixels: where on which triangle.
     seen: Seen,
     pub(super) directions: DirectionTable,
-    /// Of pixels: what the rays are for; none if there is no surface.
-    purpose: Option<Purpose>,
-    /// Of pixels: whether there are rays to cast. Most pixels have none where irradiance is interpolated.
-    has_rays: bool,
+    /// Of pixels: how many rays there are to cast, and what for.
+    rays: StoredRays,
 }
 
 const _: () = assert!(size_of::<StoredPoint>() == 48);
 
+/// The number of a pixel's rays, none in most where irradiance is interpolated; and whether they are for the lobe alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct StoredRays(u16);
+
+const _: () = assert!(MOST_GATHER_RAYS < StoredRays::OF_LOBE as u32);
+
+impl StoredRays {
+    const OF_LOBE: u16 = 1 << 15;
+    /// There is no surface.
+    const NOWHERE: Self = Self(u16::MAX);
+
+    fn new(point: &GatherPoint) -> Self {
+        let of_lobe = if point.purpose == Purpose::Lobe { Self::OF_LOBE } else { 0 };
+        Self(point.rays as u16 | of_lobe)
+    }
+
+    #[inline(always)]
+    fn number(self) -> u32 {
+        if self == Self::NOWHERE { 0 } else { u32::from(self.0 & !Self::OF_LOBE) }
+    }
+
+    #[inline(always)]
+    fn purpose(self) -> Purpose {
+        if self.0 & Self::OF_LOBE != 0 { Purpose::Lobe } else { Purpose::Sample }
+    }
+}
+
 impl StoredPoint {
     pub(super) const NOTHING: Self =
-        Self { seen: Seen::NOWHERE, directions: DirectionTable::COSINE, purpose: None, has_rays: false };
+        Self { seen: Seen::NOWHERE, directions: DirectionTable::COSINE, rays: StoredRays::NOWHERE };
+
+    /// The rays of a direction bin: known before the surface is read again.
+    #[inline(always)]
+    fn rays_of_bin(&self, frame: &FrameParameters, at: PixelSample, bin: u32) -> Range<u32> {
+        match self.rays.number() {
+            0 => 0..0,
+            rays => self.directions.rays(pattern(frame, at), rays, bin, frame.bins),
+        }
+    }
 
     /// The gather point of a sample of a pixel.
     #[inline(always)]
@@ -38,19 +75,29 @@ impl StoredPoint {
         context: &mut Context<M>,
         at: PixelSample,
     ) -> Result<Option<GatherPoint>, Fault> {
-        let Some(purpose) = self.purpose else { return Ok(None) };
+        if self.rays == StoredRays::NOWHERE {
+            return Ok(None);
+        }
         let place = eye::place(context, at);
-        let surface = eye::surface(context, place, &self.seen)?;
-        let mut point = pixel_point(context.frame, at, surface, purpose);
-        point.directions = self.directions;
-        Ok(Some(point))
+        Ok(Some(GatherPoint {
+            surface: eye::surface(context, place, &self.seen)?,
+            pattern: pattern(context.frame, at),
+            rays: self.rays.number(),
+            directions: self.directions,
+            purpose: self.rays.purpose(),
+        }))
     }
 }
 
-/// The gather point of a sample, its directions not yet chosen.
+/// Where the random numbers of a sample's gather rays come from.
 #[inline(always)]
+fn pattern(frame: &FrameParameters, at: PixelSample) -> Pattern {
+    Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather)
+}
+
+/// The gather point of a sample, its directions not yet chosen.
 fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpose: Purpose) -> GatherPoint {
-    let pattern = Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather);
+    let pattern = pattern(frame, at);
     // With the cache the rays of Lambertian surfaces are those of a record, and of a pixel; without it those of a sample.
     let is_of_pixel = allowed_error(frame).is_some() && surface.reflection.has_lambertian();
     let rays = if is_of_pixel { frame.gather_rays.div_ceil(frame.samples.max(1)) } else { frame.gather_rays };
@@ -87,12 +134,7 @@ impl<
             let purpose = self.light_at_once(context, index, at, place, &surface);
             let mut point = pixel_point(context.frame, at, surface, purpose);
             point.choose_directions(context, self.gathers.candidates.view())?;
-            stored = StoredPoint {
-                seen,
-                directions: point.directions,
-                purpose: Some(purpose),
-                has_rays: point.rays > 0,
-            };
+            stored = StoredPoint { seen, directions: point.directions, rays: StoredRays::new(&point) };
         }
         if let Some(slot) = self.points.get_mut(index) {
             *slot = stored;
@@ -140,17 +182,30 @@ impl<
         Ok(())
     }
 
-    /// Gather rays of the present bin and pixel.
+    /// Goes on to the next pixel of the present row that has rays, or to the row's last one: where irradiance is interpolated
+    /// few pixels have any, and they are looked for in every direction bin.
+    fn skip_pixels_without_rays(&mut self) {
+        let [column, row] = self.block.pixel(self.position.index);
+        let first = (row * self.tile.width + column) as usize;
+        let left = (self.block.x + self.block.width).saturating_sub(column) as usize;
+        let rest = self.points.get(first..first + left).unwrap_or_default();
+        let skipped = rest.iter().position(|stored| stored.rays.number() > 0);
+        self.position.index += skipped.unwrap_or(left.saturating_sub(1)) as u32;
+    }
+
+    /// Gather rays of the present bin and of the next pixel of the row that has any.
     pub(super) fn cast_for_pixel<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
+        self.skip_pixels_without_rays();
         let (index, at) = self.present();
         let Self { points, sums, gathers, position, .. } = self;
         let frame = context.frame;
         context.memory.enter(MemoryStage::GatherRay);
-        if let Some(stored) = points.get(index).filter(|stored| stored.has_rays)
+        let stored = points.get(index).copied().unwrap_or(StoredPoint::NOTHING);
+        let of_bin = stored.rays_of_bin(frame, at, position.bin);
+        if !of_bin.is_empty()
             && let Some(point) = stored.restore(context, at)?
         {
             let share = 1.0 / frame.samples as f32;
-            let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, frame.bins);
             let (rays, is_last) = position.next_rays(of_bin);
             for ray in rays {
                 // A tile has at most TILE_PIXELS pixels, which 16 bits tell apart.

@@ -51,8 +51,6 @@ impl Block {
 pub(super) enum Stage {
     /// Which irradiance records there are, level by level of the lattice.
     Survey,
-    /// Which of them the block's samples use, pixel by pixel, sample by sample.
-    Mark,
     /// Where the rays of the next records start, of as many as are gathered at once.
     RecordPoints,
     /// Their gather rays, bin by bin.

@@ -4,9 +4,9 @@ use photoncard_shared::message::Fault;
 
 use super::position::{Position, Stage};
 use super::{Chip, MOST_BLOCKS, allowed_error};
-use crate::irradiance_cache::{Full, SeenSample, Window};
+use crate::irradiance_cache::{Full, Window};
 use crate::memory::MemoryPort;
-use crate::render::{Context, GatherPoint, eye, final_gather};
+use crate::render::{Context, GatherPoint, final_gather};
 
 impl<
     const TILE_PIXELS: usize,
@@ -54,27 +54,9 @@ impl<
             return Ok(());
         };
         match self.cache.survey(context, &self.window(), allowed)? {
-            Ok(true) => self.position = Position::at(Stage::Mark),
+            Ok(true) => self.begin_gather(),
             Ok(false) => {}
             Err(Full) => self.divide_block(),
-        }
-        Ok(())
-    }
-
-    /// The records that one sample of one pixel uses.
-    pub(super) fn mark<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let Some(allowed) = allowed_error(context.frame) else {
-            self.do_without_records();
-            return Ok(());
-        };
-        let (_, at) = self.present();
-        let place = eye::place(context, at);
-        let surface = eye::see(context, place)?;
-        if let Some(surface) = surface.filter(|surface| surface.reflection.has_lambertian()) {
-            self.cache.want(&SeenSample { pixel: [at.x, at.y], place, surface: &surface }, allowed);
-        }
-        if self.position.next_index(self.block.pixels()) && self.position.next_sample(context.frame.samples) {
-            self.begin_gather();
         }
         Ok(())
     }

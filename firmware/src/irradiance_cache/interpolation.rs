@@ -85,21 +85,6 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         (weights.iter().sum::<f32>() >= LEAST_WEIGHT).then_some(Weights { cell, weights })
     }
 
-    /// Wants the records that a sample uses.
-    pub fn want(&mut self, sample: &SeenSample, allowed: f32) {
-        let Some(Weights { cell, weights }) = self.weights(sample, allowed) else { return };
-        for (corner, weight) in cell.corners().iter().zip(weights) {
-            if weight <= 0.0 {
-                continue;
-            }
-            if let Some(Some(record)) = self.records.get_mut(corner)
-                && let Content::Surveyed(distances) = record.content
-            {
-                record.content = Content::Wanted(distances);
-            }
-        }
-    }
-
     /// The indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample has to gather its own.
     pub fn interpolate(&self, sample: &SeenSample, allowed: f32) -> Option<Vec3> {
         let Weights { cell, weights } = self.weights(sample, allowed)?;

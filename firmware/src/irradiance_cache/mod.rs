@@ -12,8 +12,8 @@
 //!   that a division would add, is within the allowed error of all four corner records.
 //! - A sample interpolates the up to four corner records of its undivided cell that are valid at the surface it sees,
 //!   with weights that are continuous across cells of one size. Where none is, it casts gather rays of its own.
-//! - The records that some sample uses are gathered, and no others: their gradients' coefficients are known from the
-//!   survey, so their gathers may be reordered like any.
+//! - All records are gathered. Their gradients' coefficients are known from the survey, so their gathers may be reordered
+//!   like any. Hardly any is of no use: each is a corner of an undivided cell.
 //!
 //! A tile therefore computes what another tile would, and no seam shows. The records of a tile that do not fit in the
 //! cache make the chip render it in smaller blocks: more records are computed twice, and no pixel changes.
@@ -57,7 +57,7 @@ pub struct IrradianceCache<const RECORDS: usize, const GATHERED: usize> {
     roots: Vec<(LatticePoint, u32), MOST_ROOTS>,
     survey: Survey,
     gathered: Vec<GatheredRecord, GATHERED>,
-    /// Records before this one are not wanted or already gathered.
+    /// Records before this one are gathered.
     next: usize,
 }
 
@@ -127,12 +127,12 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         self.next = 0;
     }
 
-    /// Chooses the next records that are wanted and not yet gathered, `most` of them. Returns how many.
+    /// Chooses the next records that are not yet gathered, `most` of them. Returns how many.
     pub fn begin_gather(&mut self, most: usize) -> u32 {
         self.gathered.clear();
         while self.gathered.len() < most.min(GATHERED) {
             let Some((_, record)) = self.records.get_index(self.next) else { break };
-            if let Some(Record { content: Content::Wanted(_), .. }) = record {
+            if let Some(Record { content: Content::Surveyed(_), .. }) = record {
                 let gathered = GatheredRecord {
                     record: self.next,
                     coefficients: [[0; 2]; CELLS],
@@ -166,7 +166,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
     pub fn set_point(&mut self, index: u32, point: &GatherPoint) {
         let Some(gathered) = self.gathered.get_mut(index as usize) else { return };
         let record = self.records.get_index(gathered.record).and_then(|(_, record)| record.as_ref());
-        if let Some(Record { content: Content::Wanted(distances), .. }) = record {
+        if let Some(Record { content: Content::Surveyed(distances), .. }) = record {
             gathered.coefficients = coefficients(point, distances).map(|cell| cell.map(upper_half));
         }
     }

@@ -14,8 +14,6 @@ pub(super) enum Content {
     Surveying([u16; CELLS]),
     /// The distances of what is around.
     Surveyed(Distances),
-    /// The same, and some sample of the block needs more.
-    Wanted(Distances),
     /// What was gathered.
     Gathered(Irradiance),
 }

@@ -72,9 +72,9 @@ impl<M: CardMemory> CardMemory for Counted<M> {
         self.memory.stored(first, count)
     }
 
-    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
-        let lines = self.memory.write(first, count)?;
-        self.traffic.written_bytes += count as u64 * LINE_BYTES as u64;
-        Some(lines)
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(first, lines)?;
+        self.traffic.written_bytes += lines.len() as u64 * LINE_BYTES as u64;
+        Some(())
     }
 }

@@ -2,10 +2,10 @@
 
 use core::ops::Range;
 
-use photoncard_shared::address::{Line, LineAddress, Structure};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
-use super::{CardMemory, MemoryPort, outside};
+use super::{CardMemory, MemoryPort, copy_lines, outside};
 
 /// DRAM that the processor can address.
 pub struct Dram<'a> {
@@ -57,8 +57,9 @@ impl CardMemory for Dram<'_> {
         self.lines.get(first..first.checked_add(count as usize)?)
     }
 
-    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         let first = first.0 as usize;
-        self.lines.get_mut(first..first.checked_add(count as usize)?)
+        copy_lines(lines, self.lines.get_mut(first..first.checked_add(lines.len())?)?);
+        Some(())
     }
 }

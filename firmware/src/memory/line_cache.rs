@@ -287,9 +287,9 @@ where
         self.memory.stored(first, count)
     }
 
-    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]> {
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         // Lines are written while an image is loaded, between tiles: nothing held may outlive it.
         self.begin_tile();
-        self.memory.write(first, count)
+        self.memory.write(first, lines)
     }
 }

@@ -13,7 +13,7 @@ use core::ops::Range;
 pub use counted::Counted;
 pub use dram::{Dram, Lines};
 pub use line_cache::{CacheEntry, CacheShape, LineCache, LineCaches, SetIndex, ShapeError};
-use photoncard_shared::address::{Line, LineAddress, Structure};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::{Fault, FaultCode};
 pub use traffic::{Reads, STAGES, Stage, Traffic};
 
@@ -53,8 +53,15 @@ pub trait CardMemory: MemoryPort {
     /// `count` lines from `first` on, past all caches and counts; `None` if they are not all there.
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]>;
 
-    /// The bytes of `count` lines from `first` on, to be written; `None` if they are not all there.
-    fn write(&mut self, first: LineAddress, count: u32) -> Option<&mut [Line]>;
+    /// Writes lines from `first` on; `None`, and nothing is written, if they are not all there.
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()>;
+}
+
+/// Copies lines into those of a memory, of which there are as many.
+pub fn copy_lines(from: &[[u8; LINE_BYTES]], to: &mut [Line]) {
+    for (line, bytes) in to.iter_mut().zip(from) {
+        line.0 = *bytes;
+    }
 }
 
 /// The fault of a line outside the memory.

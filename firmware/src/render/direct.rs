@@ -9,6 +9,9 @@
 //! between the two are made for that: with the cosine's density in place of the record's own, which a sample could not
 //! know, with the shadow rays of all samples of a pixel, and by the power heuristic, as the noise of a record shows as
 //! a blotch: light of small emitters is left to shadow rays, that of a sky to records.
+//!
+//! The points on emitters are stratified over all samples of a pixel, as places in the pixel are: many samples with a shadow
+//! ray or two each are as good as one with many.
 
 use core::f32::consts::FRAC_1_PI;
 
@@ -40,10 +43,11 @@ pub fn reflected<M: MemoryPort>(
     }
     context.memory.enter(Stage::Shadow);
     let frame = context.frame;
-    let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, pixel.sample, Dimension::Emitter);
+    let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, 0, Dimension::Emitter);
+    let points = frame.shadow_rays * frame.samples.max(1);
     let mut sum = Vec3::ZERO;
     for index in 0..frame.shadow_rays {
-        let place = pattern.point(index, frame.shadow_rays);
+        let place = pattern.point(pattern.index_in_all(index, pixel.sample, frame.samples), points);
         let Some(target) = sample_emitter(context.scene, context.memory, place)? else {
             return Ok(Vec3::ZERO);
         };

@@ -1,4 +1,4 @@
-//! The ray caster: descent in a hierarchy of sixteen-wide nodes and leaves of three triangles, one line each.
+//! The ray caster: descent in a hierarchy of sixteen-wide nodes and leaves of some triangles, one line each.
 
 use core::ops::ControlFlow;
 
@@ -131,7 +131,9 @@ fn descend(
                 while may_meet != 0 {
                     let slot = may_meet.trailing_zeros() as usize;
                     may_meet &= may_meet - 1;
-                    let Some(intersection) = frame.intersect_slot(line, slot, until) else { continue };
+                    let Some(intersection) = frame.intersect_slot(line, slot, until) else {
+                        continue;
+                    };
                     let index = leaf.wrapping_mul(LEAF_TRIANGLES as u32).wrapping_add(slot as u32);
                     match visit(intersection, line, slot, index) {
                         ControlFlow::Continue(distance) => until = distance,

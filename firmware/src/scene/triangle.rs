@@ -5,11 +5,13 @@
 //! `f64`, in which the products are exact.
 
 use glam::Vec3;
-use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, TRIANGLE_LANES};
+use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, VERTEX_LANES};
 
 use super::Ray;
-use crate::simd::Isa;
+use crate::simd::{HALF_LANES, Isa, LANES};
 use crate::vector::{max, min};
+
+const _: () = assert!(LEAF_TRIANGLES == HALF_LANES && VERTEX_LANES <= LANES);
 
 /// A ray made ready for many triangles.
 #[derive(Clone, Copy, Debug)]
@@ -70,29 +72,35 @@ impl RayFrame {
         ([x - origin_x - shear_x * depth, y - origin_y - shear_y * depth], depth)
     }
 
-    /// The triangles of a leaf that the line of the ray may meet, behind its origin too: all that [`Self::intersect_slot`]
-    /// finds, and few others: a bit for each.
+    /// The triangles of a leaf that the line of the ray may meet, behind its origin too: all that
+    /// [`Self::intersect_slot`] finds, and few others: a bit for each.
     #[inline(always)]
     pub(super) fn may_meet(&self, isa: impl Isa, leaf: BvhLeaf) -> u32 {
-        let [x, y, z] = self.axes;
-        let corner =
-            |corner| [leaf.coordinates(corner, x), leaf.coordinates(corner, y), leaf.coordinates(corner, z)];
-        let [a, b, c] = [corner(0), corner(1), corner(2)];
-        let mut may_meet = [0; TRIANGLE_LANES];
-        for lane in 0..isa.lanes(LEAF_TRIANGLES).min(TRIANGLE_LANES) {
-            let sheared = |[x, y, z]: &[[f32; TRIANGLE_LANES]; 3]| {
-                let at = |lanes: &[f32; TRIANGLE_LANES]| lanes.get(lane).copied().unwrap_or(0.0);
-                self.shear([at(x), at(y), at(z)]).0
-            };
-            let [u, v, w] = edges(sheared(&a), sheared(&b), sheared(&c));
-            // Where one may be zero the signs are not yet known.
-            let misses = (min(min(u, v), w) < 0.0) & (max(max(u, v), w) > 0.0) & (u * v * w != 0.0);
-            if let Some(may_meet) = may_meet.get_mut(lane) {
-                *may_meet = if misses { 0 } else { 1 };
+        let [x, y, z] = self.axes.map(|axis| leaf.coordinates(axis));
+        let mut sheared = [[0.0; LANES]; 2];
+        let [across, up] = &mut sheared;
+        for lane in 0..isa.lanes(leaf.vertices() as usize).min(VERTEX_LANES) {
+            let at = |coordinates: &[f32; VERTEX_LANES]| coordinates.get(lane).copied().unwrap_or(0.0);
+            let ([u, v], _) = self.shear([at(&x), at(&y), at(&z)]);
+            if let (Some(across), Some(up)) = (across.get_mut(lane), up.get_mut(lane)) {
+                (*across, *up) = (u, v);
             }
         }
-        let [first, second, third, _] = may_meet;
-        first | second << 1 | third << 2
+        let [a, b, c] = [0, 1, 2].map(|corner| leaf.corners(corner));
+        let [a, b, c] = [permute(isa, &sheared, &a), permute(isa, &sheared, &b), permute(isa, &sheared, &c)];
+        let mut misses = [0; LANES];
+        for lane in 0..isa.lanes(leaf.triangles() as usize).min(LEAF_TRIANGLES) {
+            let at = |[x, y]: &[[f32; LEAF_TRIANGLES]; 2]| {
+                [x.get(lane).copied().unwrap_or(0.0), y.get(lane).copied().unwrap_or(0.0)]
+            };
+            let [u, v, w] = edges(at(&a), at(&b), at(&c));
+            // Where one may be zero the signs are not yet known.
+            let is_missed = (min(min(u, v), w) < 0.0) & (max(max(u, v), w) > 0.0) & (u * v * w != 0.0);
+            if let Some(misses) = misses.get_mut(lane) {
+                *misses = u32::from(is_missed);
+            }
+        }
+        isa.below(&misses, 1) & !(u32::MAX << leaf.triangles())
     }
 
     /// Where the ray meets a triangle, from either side, at a distance in (0, `max_distance`].
@@ -113,11 +121,10 @@ impl RayFrame {
         max_distance: f32,
     ) -> Option<Intersection> {
         let [x, y, z] = self.axes;
-        let corner = |corner| {
-            let on_axis = |axis| leaf.coordinate(slot, corner, axis);
-            [on_axis(x), on_axis(y), on_axis(z)]
-        };
-        self.intersect_on_axes([corner(0), corner(1), corner(2)], max_distance)
+        let [a, b, c] = leaf.vertices_of(slot);
+        let on_axes =
+            |vertex| [leaf.coordinate(vertex, x), leaf.coordinate(vertex, y), leaf.coordinate(vertex, z)];
+        self.intersect_on_axes([on_axes(a), on_axes(b), on_axes(c)], max_distance)
     }
 
     #[inline(always)]
@@ -140,6 +147,16 @@ impl RayFrame {
         let inside = distance > 0.0 && distance <= max_distance;
         inside.then_some(Intersection { distance, barycentric: [u * inverse, v * inverse, w * inverse] })
     }
+}
+
+/// The coordinates of a corner of each triangle, from those of the vertices.
+#[inline(always)]
+fn permute(
+    isa: impl Isa,
+    [x, y]: &[[f32; LANES]; 2],
+    vertices: &[u32; LEAF_TRIANGLES],
+) -> [[f32; LEAF_TRIANGLES]; 2] {
+    [isa.permute(x, vertices), isa.permute(y, vertices)]
 }
 
 /// The edge functions at the origin, each opposite to a corner.

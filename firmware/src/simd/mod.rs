@@ -16,6 +16,8 @@ use photoncard_shared::address::Line;
 
 /// Numbers that are computed at once.
 pub const LANES: usize = 16;
+/// Half as many.
+pub const HALF_LANES: usize = LANES / 2;
 
 /// Instructions of a processor. A value of a type is the proof that the processor has them.
 pub trait Isa: Copy {
@@ -30,6 +32,9 @@ pub trait Isa: Copy {
 
     /// The same of twice as long numbers.
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]);
+
+    /// The values with these indices, of which the lower four bits count.
+    fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES];
 
     /// Has a line brought near, if the processor can, as it may be read soon.
     #[inline(always)]
@@ -111,6 +116,11 @@ impl Isa for Portable {
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]) {
         pack(mask, values, packed);
     }
+
+    #[inline(always)]
+    fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES] {
+        indices.map(|index| values.get(index as usize % LANES).copied().unwrap_or(0.0))
+    }
 }
 
 #[inline(always)]
@@ -136,7 +146,7 @@ mod tests {
     }
 
     impl Kernel for All {
-        type Output = (u32, Vec<u32>, Vec<u64>);
+        type Output = (u32, Vec<u32>, Vec<u64>, Vec<u32>);
 
         #[inline(always)]
         fn run(self, isa: impl Isa) -> Self::Output {
@@ -145,12 +155,20 @@ mod tests {
             isa.pack(self.mask, &self.values, &mut packed.0);
             isa.pack_long(self.mask, &long, &mut packed.1);
             let count = self.mask.count_ones() as usize;
-            (isa.below(&self.values, self.bound), packed.0[..count].to_vec(), packed.1[..count].to_vec())
+            let indices = core::array::from_fn(|lane| self.values[lane] >> (self.mask % 29));
+            let permuted = isa.permute(&self.values.map(f32::from_bits), &indices);
+            let permuted = permuted.iter().map(|value| value.to_bits()).collect();
+            (
+                isa.below(&self.values, self.bound),
+                packed.0[..count].to_vec(),
+                packed.1[..count].to_vec(),
+                permuted,
+            )
         }
     }
 
     #[test]
-    fn all_instructions_compare_and_pack_alike() {
+    fn all_instructions_compare_pack_and_permute_alike() {
         for mask in 0..1 << LANES {
             let values = core::array::from_fn(|lane| crate::sampler::hash(mask ^ (lane as u32) << 20));
             let bound = match mask % 4 {
@@ -160,12 +178,13 @@ mod tests {
                 _ => crate::sampler::hash(mask),
             };
             let mut results = Level::ALL.iter().filter_map(|level| level.run(All { mask, bound, values }));
-            let (below, packed, long) = results.next().expect("what every processor has");
+            let (below, packed, long, permuted) = results.next().expect("what every processor has");
             assert!((0..LANES).all(|lane| (below >> lane & 1 != 0) == (values[lane] < bound)));
             assert!(
                 packed.iter().eq((0..LANES).filter(|lane| mask >> lane & 1 != 0).map(|lane| &values[lane]))
             );
-            assert!(results.all(|result| result == (below, packed.clone(), long.clone())), "{mask:b}");
+            let expected = (below, packed, long, permuted);
+            assert!(results.all(|result| result == expected), "{mask:b}");
         }
     }
 }

@@ -2,15 +2,17 @@
 #![cfg_attr(not(test), expect(clippy::indexing_slicing, reason = "the tables have an entry for every index"))]
 
 use core::arch::x86_64::{
-    __m256i, _MM_HINT_T0, _mm_cvtsi64_si128, _mm_prefetch, _mm256_castsi256_ps, _mm256_cmpgt_epi32,
-    _mm256_cvtepu8_epi32, _mm256_loadu_si256, _mm256_movemask_ps, _mm256_permutevar8x32_epi32,
-    _mm256_set1_epi32, _mm256_storeu_si256, _mm256_xor_si256, _mm512_cmplt_epu32_mask, _mm512_loadu_si512,
-    _mm512_maskz_compress_epi32, _mm512_maskz_compress_epi64, _mm512_set1_epi32, _mm512_storeu_si512,
+    __m256i, _MM_HINT_T0, _mm_cvtsi64_si128, _mm_prefetch, _mm256_blendv_ps, _mm256_castsi256_ps,
+    _mm256_cmpgt_epi32, _mm256_cvtepu8_epi32, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_movemask_ps,
+    _mm256_permutevar8x32_epi32, _mm256_permutevar8x32_ps, _mm256_permutex2var_ps, _mm256_set1_epi32,
+    _mm256_slli_epi32, _mm256_storeu_ps, _mm256_storeu_si256, _mm256_xor_si256, _mm512_cmplt_epu32_mask,
+    _mm512_loadu_si512, _mm512_maskz_compress_epi32, _mm512_maskz_compress_epi64, _mm512_set1_epi32,
+    _mm512_storeu_si512,
 };
 
 use photoncard_shared::address::Line;
 
-use super::{Isa, Kernel, LANES, Portable};
+use super::{HALF_LANES, Isa, Kernel, LANES, Portable};
 
 cpufeatures::new!(
     has_avx512, "avx512f", "avx512bw", "avx512dq", "avx512vl", "avx2", "bmi1", "bmi2", "popcnt"
@@ -130,6 +132,19 @@ impl Isa for Avx512 {
     }
 
     #[inline(always)]
+    fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES] {
+        let mut permuted = [0.0; HALF_LANES];
+        // SAFETY: the instructions are there, sixteen numbers and eight indices to read, and eight numbers to write.
+        unsafe {
+            let indices = _mm256_loadu_si256(indices.as_ptr().cast());
+            let lower = _mm256_loadu_ps(values.as_ptr());
+            let upper = _mm256_loadu_ps(values.as_ptr().add(HALF_LANES));
+            _mm256_storeu_ps(permuted.as_mut_ptr(), _mm256_permutex2var_ps(lower, indices, upper));
+        }
+        permuted
+    }
+
+    #[inline(always)]
     fn prefetch(self, line: &Line) {
         prefetch(line);
     }
@@ -228,6 +243,21 @@ impl Isa for Avx2 {
                 target = target.add(lanes.count_ones() as usize);
             }
         }
+    }
+
+    #[inline(always)]
+    fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES] {
+        let mut permuted = [0.0; HALF_LANES];
+        // SAFETY: the instructions are there, sixteen numbers and eight indices to read, and eight numbers to write.
+        unsafe {
+            let indices = _mm256_loadu_si256(indices.as_ptr().cast());
+            let half = |first: *const f32| _mm256_permutevar8x32_ps(_mm256_loadu_ps(first), indices);
+            let [lower, upper] = [half(values.as_ptr()), half(values.as_ptr().add(HALF_LANES))];
+            // The fourth bit of an index, as a sign, tells the upper half.
+            let is_upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(indices));
+            _mm256_storeu_ps(permuted.as_mut_ptr(), _mm256_blendv_ps(lower, upper, is_upper));
+        }
+        permuted
     }
 
     #[inline(always)]

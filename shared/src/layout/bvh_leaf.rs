@@ -1,22 +1,39 @@
-//! Leaves of the bounding volume hierarchy: up to three triangles in one line, to be tested at once.
+//! Leaves of the bounding volume hierarchy: some triangles of one place in one line, to be tested at once.
+//!
+//! A corner that triangles share is there once: of a mesh a line holds eight triangles, of triangles that touch nowhere three.
 
 use super::{read_f32, read_u32, write_f32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// Triangles of a leaf. The index of a triangle is this many times its leaf's and its slot in there.
-pub const LEAF_TRIANGLES: usize = 3;
-const CORNER_BYTES: usize = 12 * LEAF_TRIANGLES;
-const COORDINATE_BYTES: usize = 4 * LEAF_TRIANGLES;
-const MATERIALS: usize = 3 * CORNER_BYTES;
-/// Lanes that a leaf's coordinates are read into: as many as a register has, one more than there are triangles.
-pub const TRIANGLE_LANES: usize = 4;
+/// Triangles that a leaf may have. The index of a triangle is this many times its leaf's and its slot in there.
+pub const LEAF_TRIANGLES: usize = 8;
+/// Vertices that they may have.
+const LEAF_VERTICES: usize = 9;
+/// Lanes that coordinates are read into, of which the first nine are vertices': whole registers.
+pub const VERTEX_LANES: usize = 12;
 
-/// A leaf, one line. One of fewer than three triangles has its first several times.
+const COORDINATE_BYTES: usize = 4 * LEAF_VERTICES;
+const CORNERS: usize = 3 * COORDINATE_BYTES;
+const MATERIALS: usize = CORNERS + 12;
+const MATERIAL_BYTES: usize = 3;
+/// Materials that the triangles of a leaf may have.
+const LEAF_MATERIALS: usize = 2;
+const SECOND_MATERIAL: usize = MATERIALS + MATERIAL_BYTES * LEAF_MATERIALS;
+const COUNTS: usize = SECOND_MATERIAL + 1;
+const _: () = assert!(COUNTS + 1 == LINE_BYTES && 2 * COORDINATE_BYTES + 4 * VERTEX_LANES <= LINE_BYTES);
+
+/// The indices of materials end here.
+pub const MOST_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES);
+
+/// A leaf, one line.
 ///
 /// | bytes | what |
 /// |---|---|
-/// | 0..108 | first corners: three x, three y, three z, metres; then second and third corners |
-/// | 108..120 | three indices of materials |
+/// | 0..108 | nine x, nine y, nine z of vertices, metres |
+/// | 108..120 | the vertices of the first corners, four bits a triangle; of the second; of the third |
+/// | 120..126 | the indices of two materials |
+/// | 126 | a bit for each triangle that is of the second material |
+/// | 127 | bits 0-3 the number of triangles, 4-7 that of vertices |
 #[derive(Clone, Copy)]
 pub struct BvhLeaf<'a>(pub &'a [u8; LINE_BYTES]);
 
@@ -25,80 +42,209 @@ pub struct BvhLeaf<'a>(pub &'a [u8; LINE_BYTES]);
 pub struct Triangle {
     /// Corners, metres.
     pub vertices: [[f32; 3]; 3],
-    /// Index of the material.
+    /// Index of the material, below [`MOST_MATERIALS`].
     pub material: u32,
 }
 
 impl BvhLeaf<'_> {
-    /// A coordinate of a corner of all triangles; the last lane is none's.
+    /// Number of triangles, at most [`LEAF_TRIANGLES`].
     #[inline(always)]
-    pub fn coordinates(&self, corner: usize, axis: usize) -> [f32; TRIANGLE_LANES] {
-        let first = CORNER_BYTES * corner + COORDINATE_BYTES * axis;
-        let bytes: Option<&[u8; 4 * TRIANGLE_LANES]> = self.0.get(first..).and_then(<[u8]>::first_chunk);
-        bytes.map_or([0.0; TRIANGLE_LANES], |bytes| core::array::from_fn(|lane| read_f32(bytes, 4 * lane)))
+    pub fn triangles(&self) -> u32 {
+        u32::from(self.byte(COUNTS) & 15).min(LEAF_TRIANGLES as u32)
     }
 
-    /// A coordinate of a corner of triangle `slot`, below [`LEAF_TRIANGLES`].
+    /// Number of vertices, at most nine.
     #[inline(always)]
-    pub fn coordinate(&self, slot: usize, corner: usize, axis: usize) -> f32 {
-        read_f32(self.0, CORNER_BYTES * corner + COORDINATE_BYTES * axis + 4 * slot)
+    pub fn vertices(&self) -> u32 {
+        u32::from(self.byte(COUNTS) >> 4).min(LEAF_VERTICES as u32)
+    }
+
+    /// A coordinate of all vertices; what is behind the last is none's.
+    #[inline(always)]
+    pub fn coordinates(&self, axis: usize) -> [f32; VERTEX_LANES] {
+        let bytes: Option<&[u8; 4 * VERTEX_LANES]> =
+            self.0.get(COORDINATE_BYTES * axis..).and_then(<[u8]>::first_chunk);
+        bytes.map_or([0.0; VERTEX_LANES], |bytes| core::array::from_fn(|lane| read_f32(bytes, 4 * lane)))
+    }
+
+    /// The vertices that are a corner of each triangle. Those that are none, and 15 at most, are in unsound images only.
+    #[inline(always)]
+    pub fn corners(&self, corner: usize) -> [u32; LEAF_TRIANGLES] {
+        let vertices = read_u32(self.0, CORNERS + 4 * corner);
+        core::array::from_fn(|slot| vertices >> (4 * slot) & 15)
+    }
+
+    /// The vertices that are the corners of triangle `slot`, below [`LEAF_TRIANGLES`].
+    #[inline(always)]
+    pub fn vertices_of(&self, slot: usize) -> [usize; 3] {
+        [0, 1, 2].map(|corner| {
+            let vertex = read_u32(self.0, CORNERS + 4 * corner) >> (4 * (slot % LEAF_TRIANGLES)) & 15;
+            // More are in unsound images only.
+            (vertex as usize).min(LEAF_VERTICES - 1)
+        })
+    }
+
+    /// A coordinate of a vertex.
+    #[inline(always)]
+    pub fn coordinate(&self, vertex: usize, axis: usize) -> f32 {
+        read_f32(self.0, COORDINATE_BYTES * axis + 4 * vertex)
     }
 
     /// Triangle `slot`, below [`LEAF_TRIANGLES`].
     #[inline(always)]
     pub fn triangle(&self, slot: usize) -> Triangle {
-        let vertex = |corner| [0, 1, 2].map(|axis| self.coordinate(slot, corner, axis));
-        Triangle {
-            vertices: [vertex(0), vertex(1), vertex(2)],
-            material: read_u32(self.0, MATERIALS + 4 * slot),
-        }
+        let is_second = self.byte(SECOND_MATERIAL) >> (slot % LEAF_TRIANGLES) & 1;
+        let at = MATERIALS + MATERIAL_BYTES * usize::from(is_second);
+        let [low, middle, high] = [0, 1, 2].map(|byte| u32::from(self.byte(at + byte)));
+        let vertex = |vertex| [0, 1, 2].map(|axis| self.coordinate(vertex, axis));
+        Triangle { vertices: self.vertices_of(slot).map(vertex), material: low | middle << 8 | high << 16 }
     }
 
-    /// The line of some triangles; `None` if there are none or too many.
+    #[inline(always)]
+    fn byte(&self, index: usize) -> u8 {
+        self.0.get(index).copied().unwrap_or(0)
+    }
+
+    /// The line of some triangles; `None` if there are none, or it does not hold them: too many triangles, vertices or
+    /// materials, or one beyond [`MOST_MATERIALS`].
     pub fn encode(triangles: &[Triangle]) -> Option<[u8; LINE_BYTES]> {
-        let first = triangles.first()?;
-        if triangles.len() > LEAF_TRIANGLES {
+        if triangles.is_empty() || triangles.len() > LEAF_TRIANGLES {
             return None;
         }
         let mut line = [0; LINE_BYTES];
-        for slot in 0..LEAF_TRIANGLES {
-            let Triangle { vertices, material } = triangles.get(slot).unwrap_or(first);
-            for (corner, vertex) in vertices.iter().enumerate() {
-                for (axis, &coordinate) in vertex.iter().enumerate() {
-                    let at = CORNER_BYTES * corner + COORDINATE_BYTES * axis + 4 * slot;
-                    write_f32(&mut line, at, coordinate);
-                }
+        let mut vertices = Distinct::<[u32; 3], LEAF_VERTICES>::new();
+        let mut materials = Distinct::<u32, LEAF_MATERIALS>::new();
+        for (slot, triangle) in triangles.iter().enumerate() {
+            for (corner, vertex) in triangle.vertices.iter().enumerate() {
+                // By bits: what a ray meets does not depend on the order of a scene's triangles.
+                let vertex = vertices.index(vertex.map(f32::to_bits))?;
+                let at = CORNERS + 4 * corner;
+                let before = read_u32(&line, at);
+                write_u32(&mut line, at, before | (vertex as u32) << (4 * slot));
             }
-            write_u32(&mut line, MATERIALS + 4 * slot, *material);
+            if triangle.material >= MOST_MATERIALS {
+                return None;
+            }
+            *line.get_mut(SECOND_MATERIAL)? |= (materials.index(triangle.material)? << slot) as u8;
         }
+        for (index, vertex) in vertices.items().enumerate() {
+            for (axis, coordinate) in vertex.into_iter().enumerate() {
+                write_f32(&mut line, COORDINATE_BYTES * axis + 4 * index, f32::from_bits(coordinate));
+            }
+        }
+        for (index, material) in materials.items().enumerate() {
+            let [low, middle, high, _] = material.to_le_bytes();
+            let slot = line.get_mut(MATERIALS + MATERIAL_BYTES * index..)?.first_chunk_mut()?;
+            *slot = [low, middle, high];
+        }
+        *line.get_mut(COUNTS)? = triangles.len() as u8 | (vertices.count as u8) << 4;
         Some(line)
+    }
+}
+
+/// A few different items, in the order in which they came.
+struct Distinct<T, const MOST: usize> {
+    items: [Option<T>; MOST],
+    count: usize,
+}
+
+impl<T: Copy + PartialEq, const MOST: usize> Distinct<T, MOST> {
+    fn new() -> Self {
+        Self { items: [None; MOST], count: 0 }
+    }
+
+    /// The index of an item, which is added if it is new; `None` if there is no room for it.
+    fn index(&mut self, item: T) -> Option<usize> {
+        let index = self.items().position(|other| other == item).unwrap_or(self.count);
+        *self.items.get_mut(index)? = Some(item);
+        self.count = self.count.max(index + 1);
+        Some(index)
+    }
+
+    fn items(&self) -> impl Iterator<Item = T> {
+        self.items.iter().copied().flatten()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    extern crate std;
 
-    fn triangle(number: usize) -> Triangle {
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::layout::tests::random;
+
+    fn apart(number: usize) -> Triangle {
         let coordinate = |corner: usize, axis: usize| (100 * number + 10 * corner + axis) as f32;
         let vertices = [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| coordinate(corner, axis)));
-        Triangle { vertices, material: 70_000 + number as u32 }
+        Triangle { vertices, material: 70_000 + number as u32 % 2 }
+    }
+
+    /// The triangles of two by two squares.
+    fn mesh() -> Vec<Triangle> {
+        let vertex = |x: u32, y: u32| [x as f32, y as f32, (x * y) as f32];
+        let square = |x, y| {
+            let [a, b, c, d] = [vertex(x, y), vertex(x + 1, y), vertex(x + 1, y + 1), vertex(x, y + 1)];
+            [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices, material: x })
+        };
+        [square(0, 0), square(1, 0), square(0, 1), square(1, 1)].concat()
+    }
+
+    #[track_caller]
+    fn survive(triangles: &[Triangle]) {
+        let line = BvhLeaf::encode(triangles).expect("fits");
+        let leaf = BvhLeaf(&line);
+        assert_eq!(leaf.triangles() as usize, triangles.len());
+        for (slot, triangle) in triangles.iter().enumerate() {
+            assert_eq!(leaf.triangle(slot), *triangle);
+            let vertex = |corner| {
+                let index = leaf.corners(corner)[slot];
+                assert!(index < leaf.vertices());
+                [0, 1, 2].map(|axis| leaf.coordinates(axis)[index as usize])
+            };
+            assert_eq!([vertex(0), vertex(1), vertex(2)], triangle.vertices);
+        }
     }
 
     #[test]
     fn triangles_survive_their_leaf() {
-        let triangles = [1, 2, 3].map(triangle);
-        for count in 1..=LEAF_TRIANGLES {
-            let line = BvhLeaf::encode(&triangles[..count]).expect("fits");
-            for slot in 0..LEAF_TRIANGLES {
-                let expected = triangles[if slot < count { slot } else { 0 }];
-                assert_eq!(BvhLeaf(&line).triangle(slot), expected);
-                let lane = |corner, axis| BvhLeaf(&line).coordinates(corner, axis)[slot];
-                let vertices = [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| lane(corner, axis)));
-                assert_eq!(vertices, expected.vertices);
+        let triangles = [1, 2, 3].map(apart);
+        for count in 1..=triangles.len() {
+            survive(&triangles[..count]);
+        }
+        let mesh = mesh();
+        for count in 1..=mesh.len() {
+            survive(&mesh[..count]);
+        }
+    }
+
+    #[test]
+    fn a_leaf_holds_eight_triangles_of_a_mesh_and_three_of_none() {
+        assert!(BvhLeaf::encode(&mesh()).is_some());
+        assert!(BvhLeaf::encode(&[mesh(), mesh()[..1].to_vec()].concat()).is_none());
+        assert!(BvhLeaf::encode(&[1, 2, 3, 4].map(apart)).is_none());
+        assert!(BvhLeaf::encode(&[]).is_none());
+    }
+
+    #[test]
+    fn a_leaf_tells_two_materials_of_sixteen_million_apart() {
+        let of = |material| Triangle { material, ..apart(1) };
+        survive(&[of(MOST_MATERIALS - 1), of(0), of(MOST_MATERIALS - 1)]);
+        assert!(BvhLeaf::encode(&[of(0), of(1), of(2)]).is_none());
+        assert!(BvhLeaf::encode(&[of(MOST_MATERIALS)]).is_none());
+    }
+
+    #[test]
+    fn whatever_a_line_holds_reading_it_ends() {
+        let mut next = random(4);
+        for _ in 0..2000 {
+            let line: [u8; LINE_BYTES] = core::array::from_fn(|_| next() as u8);
+            let leaf = BvhLeaf(&line);
+            assert!(leaf.triangles() as usize <= LEAF_TRIANGLES && leaf.vertices() as usize <= LEAF_VERTICES);
+            for slot in 0..16 {
+                core::hint::black_box(leaf.triangle(slot));
             }
         }
-        assert!(BvhLeaf::encode(&[]).is_none());
-        assert!(BvhLeaf::encode(&[triangles[0]; 4]).is_none());
     }
 }

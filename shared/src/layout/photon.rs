@@ -89,6 +89,15 @@ impl Photon {
         [a, b, c, d, e, f, g, h]
     }
 
+    /// What a photon carries, with another disc fraction.
+    #[must_use]
+    pub fn content_with_disc(content: [u8; PHOTON_CONTENT_BYTES], disc: u8) -> [u8; PHOTON_CONTENT_BYTES] {
+        let [a, b, c, d, e, f, low, high] = content;
+        let flags = u16::from_le_bytes([low, high]) & !((FULL_DISC as u16) << 10);
+        let [low, high] = (flags | (disc.min(FULL_DISC) as u16) << 10).to_le_bytes();
+        [a, b, c, d, e, f, low, high]
+    }
+
     /// The surface normal's code in the flags.
     #[inline(always)]
     pub fn normal_of_flags(flags: u16) -> u8 {

@@ -3,7 +3,9 @@
 //! Nothing is lost against [`super::Photon`]: positions lie on a grid in either layout, and a leaf tells them by sixteen
 //! bits each from its own corner. Coordinates of one axis lie side by side, so that one instruction reads them all.
 
+use super::Photon;
 use super::photon_grid::{GRID_BITS, GRID_MASK};
+use super::photon_node::GridBox;
 use crate::address::LINE_BYTES;
 
 /// Some photons, one line.
@@ -122,27 +124,41 @@ impl<'a> PhotonLeaf<'a> {
         self.contents().iter().nth_back(index as usize).copied().unwrap_or_default()
     }
 
+    /// Which axes of a leaf vary if its photons have this box: at least one.
+    fn varying(bounds: &GridBox) -> [bool; 3] {
+        let ([a, b, c], [x, y, z]) = (bounds.lower, bounds.upper);
+        let varies = [a != x, b != y, c != z];
+        if varies == [false; 3] { [true, false, false] } else { varies }
+    }
+
+    /// Whether a line holds so many photons that have this box.
+    pub fn fits(bounds: &GridBox, photons: usize) -> bool {
+        let varies = Self::varying(bounds);
+        let axes = varies.into_iter().filter(|&varies| varies).count();
+        let mut sides = varies.into_iter().zip(bounds.lower).zip(bounds.upper);
+        let is_near = |((varies, lower), upper): ((bool, u32), u32)| {
+            !varies || upper - (lower >> CORNER_ROUNDING << CORNER_ROUNDING) <= u32::from(u16::MAX)
+        };
+        photons > 0 && photons <= leaf_capacity(axes) && sides.all(is_near)
+    }
+
     /// The line of some photons; `None` if it cannot hold them, or there is none.
     pub fn encode(photons: &[([u32; 3], [u8; PHOTON_CONTENT_BYTES])]) -> Option<[u8; LINE_BYTES]> {
-        let [lower, upper] = extent(photons)?;
-        let mut varies = [0, 1, 2].map(|axis: usize| lower.get(axis) != upper.get(axis));
-        if varies == [false; 3] {
-            varies = [true, false, false];
-        }
-        let axes = varies.into_iter().filter(|&varies| varies).count();
-        if photons.len() > leaf_capacity(axes) {
+        let bounds = photons.iter().map(|(point, _)| GridBox::of(*point)).reduce(GridBox::union)?;
+        if !Self::fits(&bounds, photons.len()) {
             return None;
         }
+        let lower = bounds.lower;
+        let varies = Self::varying(&bounds);
         let mut line = [0; LINE_BYTES];
         let mut header = (photons.len() as u64) << AXES_BITS;
         let (mut bit, mut first) = (AXES_BITS + COUNT_BITS, HEADER_BYTES);
-        for (axis, ((varies, lower), upper)) in varies.into_iter().zip(lower).zip(upper).enumerate() {
+        for (axis, (varies, lower)) in varies.into_iter().zip(lower).enumerate() {
             let rounding = if varies { CORNER_ROUNDING } else { 0 };
             let corner = lower >> rounding;
             header |= u64::from(varies) << axis | u64::from(corner) << bit;
             bit += GRID_BITS - rounding;
             if varies {
-                u16::try_from(upper - (corner << rounding)).ok()?;
                 let slots = line.get_mut(first..)?.as_chunks_mut().0;
                 for (slot, (point, _)) in slots.iter_mut().zip(photons) {
                     *slot = ((point.get(axis)? - (corner << rounding)) as u16).to_le_bytes();
@@ -156,6 +172,16 @@ impl<'a> PhotonLeaf<'a> {
         }
         Some(line)
     }
+
+    /// Changes the disc fraction of photon `index` in its line; nothing if there is none.
+    pub fn set_disc(line: &mut [u8; LINE_BYTES], index: u32, disc: u8) {
+        if index >= PhotonLeaf::read(line).photons() {
+            return;
+        }
+        if let Some(content) = line.as_chunks_mut().0.iter_mut().nth_back(index as usize) {
+            *content = Photon::content_with_disc(*content, disc);
+        }
+    }
 }
 
 impl LeafCoordinates<'_> {
@@ -164,19 +190,6 @@ impl LeafCoordinates<'_> {
         let offset = self.offsets.get(index as usize).copied().unwrap_or_default();
         self.corner + u32::from(u16::from_le_bytes(offset) & self.mask)
     }
-}
-
-/// The least and the greatest coordinates of some grid points; `None` without points.
-fn extent(photons: &[([u32; 3], [u8; PHOTON_CONTENT_BYTES])]) -> Option<[[u32; 3]; 2]> {
-    let (first, _) = photons.first()?;
-    let (mut lower, mut upper) = (*first, *first);
-    for (point, _) in photons {
-        for ((lower, upper), coordinate) in lower.iter_mut().zip(&mut upper).zip(point) {
-            *lower = (*lower).min(*coordinate);
-            *upper = (*upper).max(*coordinate);
-        }
-    }
-    Some([lower, upper])
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{PhotonMap, precompute_irradiance, trace};
+use photoncard_driver::photon::{precompute_irradiance, trace};
 use photoncard_driver::render::RenderSettings;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::message::{Command, Drain, FaultCode, FrameParameters, Radiance, Sampling, Tile};
@@ -33,10 +33,9 @@ fn images() -> [CardImage; 2] {
     let image = || {
         let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("the room is packed");
         let pass = trace(&packed, 0, 300, &|_| true).expect("the room is lit");
-        let map = PhotonMap::new(&pass.arrivals, packed.photon_grid());
-        packed.with_photons(&map).expect("the map is packed")
+        packed.with_photons(pass.photons, 20).expect("the map is packed")
     };
-    [image(), image().with_photons_in_leaves(0.5).expect("the map is packed in leaves")]
+    [image().with_photon_tree().expect("the map is packed as a tree"), image()]
         .map(|image| precompute_irradiance(image, 20, 0.5, &|| true).expect("the irradiance is packed"))
 }
 

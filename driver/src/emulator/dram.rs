@@ -1,0 +1,191 @@
+//! The DRAM of an emulated card, which takes as little of the host's memory as it can.
+//!
+//! A host and its emulated cards live in one process, and each card's DRAM holds the same image. A card still gets it line by
+//! line over its link; but as long as what is written is, byte for byte, what stands in the host's image at that place, the
+//! card keeps no copy and reads the host's. From the first line on that differs it has lines of its own: what a card holds is
+//! always what was written.
+
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+use photoncard_firmware::memory::{CardMemory, MemoryPort, copy_lines};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::message::{Fault, FaultCode};
+
+use crate::pack::CardImage;
+
+/// The host's image, once there is one.
+#[derive(Clone, Default)]
+pub struct SharedImage(Arc<OnceLock<Arc<CardImage>>>);
+
+impl SharedImage {
+    /// Gives the image to the cards that share it; the first one stays.
+    pub fn give(&self, image: Arc<CardImage>) {
+        // Cards that write another have lines of their own.
+        let _ = self.0.set(image);
+    }
+}
+
+/// DRAM that takes host memory only for the lines that are written, and of those none for what the host has anyway.
+pub(super) struct EmulatedDram {
+    lines: Stored,
+    limit: u32,
+    shared: SharedImage,
+}
+
+/// The lines from the first to the last that was written.
+enum Stored {
+    Own(Vec<Line>),
+    /// The first so many of an image.
+    Shared(Arc<CardImage>, usize),
+}
+
+impl EmulatedDram {
+    pub(super) fn new(bytes: u32, shared: SharedImage) -> Self {
+        Self { lines: Stored::Own(Vec::new()), limit: bytes / LINE_BYTES as u32, shared }
+    }
+
+    #[inline(always)]
+    fn get(&self, address: LineAddress) -> Option<&Line> {
+        match &self.lines {
+            Stored::Own(lines) => lines.get(address.0 as usize),
+            Stored::Shared(image, written) => image.lines().get(..*written)?.get(address.0 as usize),
+        }
+    }
+
+    fn all(&self) -> &[Line] {
+        match &self.lines {
+            Stored::Own(lines) => lines,
+            Stored::Shared(image, written) => &image.lines()[..*written],
+        }
+    }
+
+    /// Takes lines that are the shared image's, those before them being there; returns whether they are.
+    fn share(&mut self, first: usize, lines: &[[u8; LINE_BYTES]]) -> bool {
+        if matches!(&self.lines, Stored::Own(own) if own.is_empty())
+            && let Some(image) = self.shared.0.get()
+        {
+            self.lines = Stored::Shared(image.clone(), 0);
+        }
+        let Stored::Shared(image, written) = &mut self.lines else { return false };
+        let end = first + lines.len();
+        let is_same = |image: &[Line]| image.iter().zip(lines).all(|(line, bytes)| line.0 == *bytes);
+        let shares = first <= *written && image.lines().get(first..end).is_some_and(is_same);
+        if shares {
+            *written = end.max(*written);
+        }
+        shares
+    }
+}
+
+impl MemoryPort for EmulatedDram {
+    #[inline(always)]
+    fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
+        self.get(address).ok_or(Fault { code: FaultCode::LineRange, detail: address.0 })
+    }
+}
+
+impl CardMemory for EmulatedDram {
+    fn lines(&self) -> u32 {
+        self.limit
+    }
+
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        let end = first.0.checked_add(count)?;
+        self.all().get(first.0 as usize..end as usize)
+    }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        let first = first.0 as usize;
+        let end = first.checked_add(lines.len()).filter(|&end| end <= self.limit as usize)?;
+        if self.share(first, lines) {
+            return Some(());
+        }
+        if let Stored::Shared(..) = self.lines {
+            self.lines = Stored::Own(self.all().to_vec());
+        }
+        let Stored::Own(own) = &mut self.lines else { return None };
+        if own.len() < end {
+            own.resize(end, Line::ZERO);
+        }
+        copy_lines(lines, own.get_mut(first..end)?);
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_shared::layout::PhotonGrid;
+
+    use super::*;
+    use crate::emitter::Emitters;
+    use crate::pack::PackedScene;
+    use crate::photon::Photons;
+    use crate::scene::gltf;
+
+    fn image() -> Arc<CardImage> {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
+        let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
+        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+        Arc::new(packed.with_photons(Photons::new(PhotonGrid::UNIT, 1.0, []), 1).expect("packs"))
+    }
+
+    fn is_shared(dram: &EmulatedDram) -> bool {
+        matches!(dram.lines, Stored::Shared(..))
+    }
+
+    /// Writes lines to a DRAM that shares an image and to one that does not, and compares what they hold.
+    fn write(drams: &mut [EmulatedDram; 2], first: usize, lines: &[[u8; LINE_BYTES]]) {
+        let address = LineAddress(first as u32);
+        for dram in drams.iter_mut() {
+            assert_eq!(dram.write(address, lines), Some(()));
+        }
+        let [shared, own] = drams;
+        assert!(shared.all() == own.all());
+        for line in 0..own.all().len() as u32 + 2 {
+            let line = LineAddress(line);
+            let read = |dram: &mut EmulatedDram| dram.read(Structure::Header, line, 0..1).copied();
+            assert!(read(shared) == read(own));
+            assert!(shared.stored(line, 2) == own.stored(line, 2));
+        }
+    }
+
+    #[test]
+    fn a_card_shares_what_is_the_same_and_holds_what_was_written() {
+        let image = image();
+        let bytes: Vec<[u8; LINE_BYTES]> = image.lines().iter().map(|line| line.0).collect();
+        let shared = SharedImage::default();
+        shared.give(image);
+        let mut other = bytes.clone();
+        other[3][7] ^= 1;
+        // What is written, and whether it is shared after it.
+        type Step<'a> = (usize, &'a [[u8; LINE_BYTES]], bool);
+        let runs: [&[Step]; 5] = [
+            &[(0, &bytes, true), (2, &bytes[2..4], true)],
+            &[
+                (0, &bytes[..2], true),
+                (2, &bytes[2..5], true),
+                (1, &bytes[1..3], true),
+                (5, &bytes[5..], true),
+            ],
+            &[(0, &bytes[..5], true), (3, &other[3..4], false), (3, &bytes[3..4], false)],
+            &[(0, &bytes[..2], true), (3, &bytes[3..4], false), (2, &bytes[2..3], false)],
+            &[(1, &bytes[1..2], false), (0, &other, false)],
+        ];
+        for run in runs {
+            let new = |shared: &SharedImage| EmulatedDram::new(1 << 20, shared.clone());
+            let mut drams = [new(&shared), new(&SharedImage::default())];
+            for &(first, lines, is_shared_then) in run {
+                write(&mut drams, first, lines);
+                assert_eq!([is_shared(&drams[0]), is_shared(&drams[1])], [is_shared_then, false]);
+            }
+        }
+    }
+
+    #[test]
+    fn lines_outside_are_refused() {
+        let mut dram = EmulatedDram::new(2 * LINE_BYTES as u32, SharedImage::default());
+        assert_eq!(dram.write(LineAddress(1), &[[1; LINE_BYTES]; 2]), None);
+        assert!(dram.stored(LineAddress(0), 1).is_none());
+    }
+}

@@ -1,0 +1,119 @@
+//! Searches of the photon map on the host: how far gathers look.
+
+use glam::Vec3;
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather};
+use photoncard_firmware::scene::SceneImage;
+use photoncard_shared::budget::{REFERENCE, gather_candidates};
+use photoncard_shared::layout::PhotonLeaf;
+use photoncard_shared::message::Fault;
+use rayon::prelude::*;
+
+use super::stored::{Photons, StoredPhoton};
+use crate::pack::CardImage;
+
+/// Leaves from which the automatic greatest distance is estimated, a photon of each.
+const SAMPLED_LEAVES: usize = 2048;
+/// Share of the sampled photons whose k-th neighbour lies within the automatic greatest distance.
+const COVERED_SHARE: f64 = 0.95;
+
+type Buffer = CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>;
+
+/// A search of the photon map, with its buffer.
+pub(super) struct Searcher<'a> {
+    pub(super) scene: SceneImage,
+    pub(super) memory: Lines<'a>,
+    buffer: Box<Buffer>,
+    neighbors: u32,
+    max_distance: f32,
+}
+
+impl<'a> Searcher<'a> {
+    pub(super) fn new(image: &'a CardImage, neighbors: u32, max_distance: f32) -> Self {
+        let (scene, memory) = image.view();
+        Self { scene, memory, buffer: Box::default(), neighbors, max_distance }
+    }
+
+    /// The greatest distance of gathers, metres.
+    pub(super) fn max_distance(&self) -> f32 {
+        self.max_distance
+    }
+
+    /// The radius of a gather at `position`, metres: the distance of the k-th photon, or the greatest distance.
+    pub(super) fn radius(&mut self, position: Vec3) -> Result<f32, Fault> {
+        let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
+        gather(&self.scene, &mut self.memory, position, &mut nearest)?;
+        if !nearest.is_full() {
+            return Ok(self.max_distance);
+        }
+        let farthest = nearest.candidates().map(|candidate| candidate.distance_squared()).fold(0.0, f32::max);
+        Ok(farthest.sqrt())
+    }
+}
+
+/// The greatest distance of gathers that the photons' density suggests, metres: that within which 95 % of the photons
+/// have `neighbors` others.
+///
+/// # Errors
+/// If the image is not sound.
+pub(super) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
+    let leaves = image.leaf_lines();
+    let grid = image.view().0.header.photon_grid;
+    let unlimited = f32::MAX.sqrt() * 0.5;
+    let distances: Result<Vec<f32>, Fault> = leaves
+        .par_iter()
+        .step_by(leaves.len().div_ceil(SAMPLED_LEAVES).max(1))
+        .enumerate()
+        .map_init(
+            || Searcher::new(image, neighbors, unlimited),
+            |searcher, (sample, line)| {
+                let leaf = PhotonLeaf::read(&line.0);
+                let photon = leaf.point(sample as u32 % leaf.photons().max(1));
+                searcher.radius(grid.position(photon).into())
+            },
+        )
+        .collect();
+    let mut distances = distances?;
+    // Fewer photons than neighbours: no distance is short of any.
+    distances.retain(|&distance| distance < unlimited);
+    distances.sort_by(f32::total_cmp);
+    let place = (distances.len() as f64 * COVERED_SHARE) as usize;
+    let covered = distances.get(place.min(distances.len().saturating_sub(1))).copied();
+    Ok(covered.unwrap_or_else(|| image.diagonal()).max(f32::MIN_POSITIVE.sqrt()))
+}
+
+/// Photons around which [`search_radius`] looks.
+const SAMPLED_PHOTONS: usize = 64;
+/// Photons among which it looks, if they are enough.
+const SAMPLED_NEIGHBORS: usize = 1 << 16;
+/// Neighbours that it looks for, at the least.
+const LEAST_NEIGHBORS: usize = 4;
+
+/// The radius of a typical search for so many neighbours, cells of the photons' grid. It is estimated before there is any
+/// tree to search: in a part of the photons for as small a part of the neighbours.
+pub(crate) fn search_radius(photons: &Photons, neighbors: u32) -> f64 {
+    let all = &photons.list;
+    let neighbors = neighbors as usize;
+    let step = (all.len() / SAMPLED_NEIGHBORS).min(neighbors / LEAST_NEIGHBORS).max(1);
+    let rank = (neighbors / step).max(1);
+    let squared_distance = |a: StoredPhoton, b: StoredPhoton| {
+        let sides = [0, 1, 2].map(|axis| u64::from(a.coordinate(axis).abs_diff(b.coordinate(axis))));
+        sides.into_iter().map(|side| side * side).sum::<u64>()
+    };
+    let mut radii: Vec<u64> = all
+        .par_iter()
+        .step_by((all.len() / SAMPLED_PHOTONS).max(1))
+        .map(|photon| {
+            let others = all.iter().step_by(step);
+            let mut distances: Vec<u64> = others.map(|other| squared_distance(*photon, *other)).collect();
+            let farthest = distances.len() - 1;
+            *distances.select_nth_unstable(rank.min(farthest)).1
+        })
+        .collect();
+    let middle = radii.len() / 2;
+    if radii.is_empty() {
+        return 0.0;
+    }
+    let typical = *radii.select_nth_unstable(middle).1;
+    (typical as f64 * neighbors as f64 / (rank * step) as f64).sqrt()
+}

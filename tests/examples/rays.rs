@@ -1,0 +1,128 @@
+//! Measures the ray caster by itself: incoherent rays from surfaces that a camera sees, by the cosine.
+//!
+//! `cargo run --release -p photoncard-tests --example rays -- SCENE [--write FOLDER] [--rays N] [--repeat N]`
+//!
+//! Prints rays a second of one thread, to the first triangle and to any, how many rays meet one, the sum of the distances, and
+//! the lines that a ray reads. `--write` leaves triangles and rays as little-endian `f32`, for others to do the same work:
+//! `tests/peers/rays.sh`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use photoncard_driver::emitter::Emitters;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::scene::{Scene, gltf};
+use photoncard_firmware::importance::sample_reflection;
+use photoncard_firmware::memory::{Counted, Lines, MemoryPort};
+use photoncard_firmware::sampler::hash;
+use photoncard_firmware::scene::{Ray, SceneImage, closest_hit, is_occluded, read_surface};
+use photoncard_shared::address::Structure;
+use photoncard_shared::image::SectionKind;
+use rustix::time::{ClockId, clock_gettime};
+
+/// What this thread has taken of its processor, seconds: others' work does not count.
+fn cpu_seconds() -> f64 {
+    let taken = clock_gettime(ClockId::ThreadCPUTime);
+    taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9
+}
+
+fn random(index: u32, dimension: u32) -> f32 {
+    (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
+}
+
+/// Rays that leave what the camera sees in directions of the reflection.
+fn bounces(scene: &Scene, packed: &PackedScene, count: u32) -> Vec<Ray> {
+    let (image, mut memory) = packed.view();
+    let camera = scene.camera(None).expect("a scene has a camera");
+    let mut bounce = |i: u32| {
+        let direction =
+            camera.forward + camera.right * (random(i, 1) - 0.5) + camera.up * (random(i, 2) - 0.5);
+        let eye = Ray::new(camera.origin, direction.normalize());
+        let hit = closest_hit(&image, &mut memory, &eye).expect("sound")?;
+        let surface = read_surface(&image, &mut memory, &eye, &hit).expect("sound");
+        let sampled = sample_reflection(&surface, [random(i, 3), random(i, 4)])?;
+        Some(Ray::new(surface.offset_origin(), sampled.direction))
+    };
+    // Four of five of the shipped scenes' rays bounce; none do where the camera sees nothing.
+    (0..count * 10).filter_map(&mut bounce).take(count as usize).collect()
+}
+
+/// How many rays meet a triangle, and the sum of their distances.
+fn cast_all(image: &SceneImage, memory: &mut impl MemoryPort, rays: &[Ray], is_any: bool) -> (usize, f64) {
+    let (mut hits, mut sum) = (0, 0.0);
+    for ray in rays {
+        if is_any {
+            hits += usize::from(is_occluded(image, memory, ray).expect("sound"));
+        } else if let Some(hit) = closest_hit(image, memory, ray).expect("sound") {
+            hits += 1;
+            sum += f64::from(hit.intersection.distance);
+        }
+    }
+    (hits, sum)
+}
+
+/// Nodes and leaves that a ray reads, on average.
+fn lines_of_a_ray(image: &SceneImage, memory: Lines, rays: &[Ray], is_any: bool) -> [f64; 2] {
+    let mut counted = Counted::new(memory);
+    cast_all(image, &mut counted, rays, is_any);
+    [Structure::Nodes, Structure::Triangles].map(|structure| {
+        counted.traffic().sum(|_, of| of == structure).requests as f64 / rays.len().max(1) as f64
+    })
+}
+
+fn write(folder: &Path, scene: &Scene, rays: &[Ray]) -> std::io::Result<()> {
+    let write = |name: &str, vectors: &mut dyn Iterator<Item = [f32; 3]>| {
+        let bytes: Vec<u8> = vectors.flatten().flat_map(f32::to_le_bytes).collect();
+        std::fs::write(folder.join(name), bytes)
+    };
+    let corners = scene.triangles.iter().flat_map(|triangle| triangle.vertices);
+    write("triangles", &mut corners.map(|corner| corner.to_array()))?;
+    write("rays", &mut rays.iter().flat_map(|ray| [ray.origin.to_array(), ray.direction.to_array()]))
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let path = arguments.next().ok_or("usage: rays SCENE [--write FOLDER] [--rays N] [--repeat N]")?;
+    let (mut folder, mut count, mut repeat): (Option<PathBuf>, u32, usize) = (None, 200_000, 5);
+    while let Some(argument) = arguments.next() {
+        let value = arguments.next().ok_or_else(|| format!("{argument} needs a value"))?;
+        match argument.as_str() {
+            "--write" => folder = Some(value.into()),
+            "--rays" => count = value.parse()?,
+            "--repeat" => repeat = value.parse()?,
+            other => return Err(format!("{other} is not known").into()),
+        }
+    }
+    let scene = gltf::load(path.as_ref())?;
+    let packed = PackedScene::new(&scene, &Emitters::new(&scene))?;
+    let rays = bounces(&scene, &packed, count);
+    if let Some(folder) = folder {
+        write(&folder, &scene, &rays)?;
+    }
+    let (image, mut memory) = packed.view();
+    println!(
+        "photoncard {path}: {} triangles in {} leaves, {} nodes",
+        scene.triangles.len(),
+        image.header.section(SectionKind::Triangles).records,
+        image.header.section(SectionKind::Nodes).records
+    );
+    for (name, is_any) in [("closest", false), ("any", true)] {
+        let mut seconds = Vec::new();
+        let mut met = (0, 0.0);
+        for _ in 0..repeat {
+            let start = cpu_seconds();
+            met = cast_all(&image, &mut memory, &rays, is_any);
+            seconds.push(cpu_seconds() - start);
+        }
+        seconds.sort_by(f64::total_cmp);
+        let [nodes, leaves] = lines_of_a_ray(&image, memory, &rays, is_any);
+        println!(
+            "photoncard {name}: {:.0} rays a second; {} of {} meet a triangle, sum {:.3}; {nodes:.2} nodes, {leaves:.2} leaves",
+            rays.len() as f64 / seconds.get(repeat / 2).ok_or("nothing to repeat")?,
+            met.0,
+            rays.len(),
+            met.1
+        );
+    }
+    Ok(())
+}
