@@ -157,8 +157,9 @@ fn what_is_no_cache_is_refused_with_what_is() {
 fn a_trace_that_cannot_be_written_ends_the_render() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
-    let options = ["-o", "a.exr", "--trace", "a.din.zst", "--card", "emulated:1", "--size", "64x64"];
-    let limited = "ulimit -f 8; trap '' XFSZ; exec \"$0\" \"$@\"";
+    let small = ["--size", "16x16", "--gather-rays", "64"];
+    let options = [&["-o", "a.exr", "--trace", "a.din.zst", "--card", "emulated:1"][..], &small].concat();
+    let limited = "ulimit -f 32; trap '' XFSZ; exec \"$0\" \"$@\"";
     let program = room.command().get_program().to_owned();
     let mut shell = std::process::Command::new("sh");
     shell.current_dir(room.path("")).args(["-c", limited]).arg(program);
