@@ -16,7 +16,7 @@ command -v g++ >/dev/null && [ -e /usr/include/embree3/rtcore.h ] || {
 }
 cargo build --release --quiet -p photoncard-tests --example rays
 g++ -O3 -o "$folder/embree" tests/peers/embree/rays.cpp -lembree3
-"$target/release/examples/rays" "$scene" --write "$folder" --repeat 1 | head -1
+"$target/release/examples/rays" "$scene" --write "$folder" --repeat 1 | sed -n 1p
 for _ in $(seq "$rounds"); do
     "$target/release/examples/rays" "$scene" --repeat 3 | tail -n +2
     "$folder/embree" "$folder" 3 fast
