@@ -116,8 +116,16 @@ pub const KD_TREE_LEVELS: usize = 27;
 /// Entries of the stack of a search in a photon map of leaves: a host makes no tree that needs more.
 pub const PHOTON_STACK: usize = 160;
 
-/// Candidates that a gather of `neighbors` photons has room for: those before it selects the nearest of them, and those
-/// that are tested at once.
+/// Candidates from which on a gather of `neighbors` photons selects the nearest of them. The fewer, the sooner it looks less far,
+/// and the more often it selects.
+pub const fn selected_candidates(neighbors: u32) -> usize {
+    const LEAST_BEYOND: usize = 32;
+    let beyond = neighbors as usize * 3 / 5;
+    neighbors as usize + if beyond < LEAST_BEYOND { LEAST_BEYOND } else { beyond }
+}
+
+/// Candidates that a gather of `neighbors` photons has room for: those from which it selects, and those that are tested at
+/// once.
 pub const fn gather_candidates(neighbors: u32) -> usize {
-    2 * neighbors as usize + LEAF_LANES
+    selected_candidates(neighbors) + LEAF_LANES
 }

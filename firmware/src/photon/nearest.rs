@@ -1,8 +1,10 @@
 //! The k nearest of a stream of candidates.
 //!
-//! Instead of a heap, which reorders itself for every candidate, candidates collect in a buffer of twice k; when it is
+//! Instead of a heap, which reorders itself for every candidate, candidates collect in a buffer of more than k; when it is
 //! full, the k nearest are selected in linear time and the search radius shrinks to the k-th. The result is a set,
 //! independent of the order of the stream: equal distances are told apart by what the photons carry.
+
+use photoncard_shared::budget::selected_candidates;
 
 use super::candidates::{Candidate, Candidates};
 use super::collector::Collector;
@@ -30,7 +32,8 @@ impl<'a> NearestPhotons<'a> {
     pub fn new(candidates: Candidates<'a>, neighbors: u32, max_distance: f32) -> Self {
         let room = candidates.capacity().saturating_sub(LANES);
         let neighbors = (neighbors as usize).clamp(1, room.saturating_sub(1).max(1));
-        let full = (2 * neighbors).min(room);
+        // No cut: it is what was given in 32 bits, or less.
+        let full = selected_candidates(neighbors as u32).min(room);
         let limit = max_distance * max_distance;
         Self {
             candidates,
