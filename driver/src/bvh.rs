@@ -44,8 +44,8 @@ pub enum HierarchyError {
         /// The index of one.
         material: u32,
     },
-    /// A corner that is not finite.
-    #[error("a triangle has a corner that is not a finite place")]
+    /// A corner that is not finite, or so far away that the area around the scene is not.
+    #[error("a triangle has a corner that is not a finite place, or too far away")]
     NotFinite,
 }
 
@@ -67,6 +67,12 @@ pub fn build(triangles: &[Triangle]) -> Result<Hierarchy, HierarchyError> {
         return Err(HierarchyError::TooManyMaterials { material: triangle.material });
     }
     let boxes: Vec<Aabb> = triangles.iter().map(bounding_box).collect();
+    // Of corners that are no numbers minima and maxima tell nothing.
+    let is_finite = triangles.iter().flat_map(|triangle| triangle.vertices).all(glam::Vec3::is_finite);
+    let around = boxes.iter().fold(Aabb::empty(), |around, bounds| around.union(bounds));
+    if !is_finite || !around.half_area().is_finite() {
+        return Err(HierarchyError::NotFinite);
+    }
     // Leaves are made when the tree is folded.
     let parameters = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::slow_build() };
     let binary = build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
@@ -219,6 +225,45 @@ mod tests {
             walk(&hierarchy, Child::Node(0), everywhere, &mut found);
             found.sort_unstable();
             assert!(found.into_iter().eq(0..count), "{count} triangles");
+        }
+    }
+
+    #[test]
+    fn every_triangle_of_a_mesh_is_in_one_leaf_whatever_its_material() {
+        let vertex = |x: u32, y: u32| Vec3::new(x as f32, (x * 7 % 5 + y * 3 % 4) as f32 * 0.1, y as f32);
+        let squares = (0..40_u32).flat_map(|x| (0..40_u32).map(move |y| (x, y)));
+        for materials in 1..=4 {
+            let mesh: Vec<Triangle> = squares
+                .clone()
+                .flat_map(|(x, y)| {
+                    let [a, b] = [vertex(x, y), vertex(x + 1, y)];
+                    let [c, d] = [vertex(x + 1, y + 1), vertex(x, y + 1)];
+                    [[a, b, c], [a, c, d]]
+                        .map(|vertices| Triangle { vertices, material: hash(x + y) % materials })
+                })
+                .collect();
+            let hierarchy = build(&mesh).expect("builds");
+            let bits = |triangle: layout::Triangle| {
+                (triangle.vertices.map(|vertex| vertex.map(f32::to_bits)), triangle.material)
+            };
+            let leaves = hierarchy.leaves.iter().map(BvhLeaf);
+            let mut found: Vec<_> = leaves
+                .flat_map(|leaf| (0..leaf.triangles() as usize).map(move |slot| bits(leaf.triangle(slot))))
+                .collect();
+            let mut expected: Vec<_> = mesh.iter().map(|triangle| bits(record(triangle))).collect();
+            found.sort_unstable();
+            expected.sort_unstable();
+            assert!(found == expected, "{materials} materials");
+            assert!(materials > 1 || hierarchy.leaves.len() < mesh.len() * 2 / 5, "{}", hierarchy.leaves.len());
+        }
+    }
+
+    #[test]
+    fn what_is_no_place_is_refused() {
+        for coordinate in [f32::NAN, f32::INFINITY, 1e30] {
+            let mut triangles = triangles(20);
+            triangles[7].vertices[1] = Vec3::splat(coordinate);
+            assert!(matches!(build(&triangles), Err(HierarchyError::NotFinite)), "{coordinate}");
         }
     }
 

@@ -227,16 +227,20 @@ impl CardImage {
             .map_or(1.0, |NodeBox { lower, upper }| Vec3::from(upper).distance(Vec3::from(lower)))
     }
 
-    /// The same image with its photons in a left-balanced tree instead of leaves. It finds the same photons.
+    /// The same image with its photons in a left-balanced tree instead of leaves, and without irradiance points. It finds the
+    /// same photons.
     ///
     /// # Errors
     /// If there are more lines than an address can tell.
     pub fn with_photon_tree(self) -> Result<Self, PackError> {
         let (SceneImage { mut header }, _) = self.view();
         let mut photons = self.stored_photons();
+        if photons.is_empty() {
+            return Ok(self);
+        }
         let mut lines = self.lines;
-        // The photons are the last sections.
-        for kind in [SectionKind::PhotonLeaves, SectionKind::PhotonNodes] {
+        // The last sections, the last first.
+        for kind in PHOTON_SECTIONS.into_iter().rev() {
             let section = std::mem::take(&mut header.sections[kind as usize]);
             if section.records > 0 {
                 lines.truncate(section.first_line as usize);

@@ -20,7 +20,11 @@ done
 }
 export DRJIT_LIBLLVM_PATH PYTHONDONTWRITEBYTECODE=1
 
-[ -x "$environment/bin/python" ] || python3 -m venv "$environment"
+python3 -c 'import sys, ensurepip; sys.exit(sys.version_info < (3, 11))' || {
+    echo "$0: Mitsuba's environment needs Python 3.11 or later with venv: apt-get install python3-venv" >&2
+    exit 1
+}
+[ -x "$environment/bin/pip" ] || python3 -m venv --clear "$environment"
 "$environment/bin/pip" install --quiet --disable-pip-version-check -r tests/peers/mitsuba/requirements.txt
 cargo build --release --quiet -p photoncard
 exec "$environment/bin/python" tests/peers/mitsuba/pictures.py --photoncard "$target/release/photoncard" \

@@ -86,15 +86,17 @@ pub(super) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Resul
 const SAMPLED_PHOTONS: usize = 64;
 /// Photons among which it looks, if they are enough.
 const SAMPLED_NEIGHBORS: usize = 1 << 16;
-/// Neighbours that it looks for, at the least.
+/// Neighbours that it looks for, at the least, if the photons are not too many for that.
 const LEAST_NEIGHBORS: usize = 4;
+/// Photons of which one is as good as all, however few neighbours are looked for.
+const LEAST_STEP: usize = 32;
 
 /// The radius of a typical search for so many neighbours, cells of the photons' grid. It is estimated before there is any
 /// tree to search: in a part of the photons for as small a part of the neighbours.
 pub(crate) fn search_radius(photons: &Photons, neighbors: u32) -> f64 {
     let all = &photons.list;
     let neighbors = neighbors as usize;
-    let step = (all.len() / SAMPLED_NEIGHBORS).min(neighbors / LEAST_NEIGHBORS).max(1);
+    let step = (all.len() / SAMPLED_NEIGHBORS).min((neighbors / LEAST_NEIGHBORS).max(LEAST_STEP)).max(1);
     let rank = (neighbors / step).max(1);
     let squared_distance = |a: StoredPhoton, b: StoredPhoton| {
         let sides = [0, 1, 2].map(|axis| u64::from(a.coordinate(axis).abs_diff(b.coordinate(axis))));

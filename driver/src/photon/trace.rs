@@ -40,7 +40,7 @@ pub fn trace(
     count: usize,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<PhotonPass, PhotonError> {
-    // No photon is stronger than it was emitted.
+    // Hardly any photon is stronger than it was emitted: at a Phong lobe, twice at the most.
     let path_unit = power_of_two_above(packed.strongest_emission().into());
     let tracer = Tracer { scene: packed.view().0, grid: packed.photon_grid(), path_unit, seed };
     let mut list: Vec<StoredPhoton> = Vec::with_capacity(count);

@@ -32,7 +32,7 @@ const _: () = assert!(size_of::<StoredPoint>() == 48);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct StoredRays(u16);
 
-const _: () = assert!(MOST_GATHER_RAYS < StoredRays::OF_LOBE as u32);
+const _: () = assert!(MOST_GATHER_RAYS < StoredRays::OF_LOBE as u32 - 1);
 
 impl StoredRays {
     const OF_LOBE: u16 = 1 << 15;

@@ -67,11 +67,12 @@ impl BvhLeaf<'_> {
         bytes.map_or([0.0; VERTEX_LANES], |bytes| core::array::from_fn(|lane| read_f32(bytes, 4 * lane)))
     }
 
-    /// The vertices that are a corner of each triangle. Those that are none, and 15 at most, are in unsound images only.
+    /// The vertices that are a corner of each triangle: of nine, whatever their number is.
     #[inline(always)]
     pub fn corners(&self, corner: usize) -> [u32; LEAF_TRIANGLES] {
         let vertices = read_u32(self.0, CORNERS + 4 * corner);
-        core::array::from_fn(|slot| vertices >> (4 * slot) & 15)
+        // More are in unsound images only.
+        core::array::from_fn(|slot| (vertices >> (4 * slot) & 15).min(LEAF_VERTICES as u32 - 1))
     }
 
     /// The vertices that are the corners of triangle `slot`, below [`LEAF_TRIANGLES`].

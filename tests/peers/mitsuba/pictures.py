@@ -108,8 +108,11 @@ class Renderers:
             first, second = (self.folder / half for half in halves)
             # Each half is off by its noise, their difference by both, and their mean by half of that.
             rmse = self.difference(comparison, first, second)["pixels"]["rmse"] / 2.0
-            run([sys.executable, HERE / "mean.py", path, first, second])
             note.write_text(json.dumps({"spp": 2 * comparison.reference_spp, "rmse": rmse}))
+            # Under its name when it is whole: what is there is not made again.
+            unfinished = path.with_suffix(".unfinished.exr")
+            run([sys.executable, HERE / "mean.py", unfinished, first, second])
+            unfinished.replace(path)
         return path, json.loads(note.read_text()) if note.exists() else None
 
 
