@@ -4,12 +4,14 @@
 //! gather needs to know beyond the photons, its greatest distance and the disc fractions, depends on the number of
 //! neighbours as well.
 
+mod chords;
 mod disc;
 mod emit;
 mod error;
 pub(crate) mod leaves;
 pub(crate) mod map;
 mod search;
+mod sides;
 pub(crate) mod stored;
 mod surroundings;
 mod trace;
