@@ -254,7 +254,11 @@ mod tests {
             found.sort_unstable();
             expected.sort_unstable();
             assert!(found == expected, "{materials} materials");
-            assert!(materials > 1 || hierarchy.leaves.len() < mesh.len() * 2 / 5, "{}", hierarchy.leaves.len());
+            assert!(
+                materials > 1 || hierarchy.leaves.len() < mesh.len() * 2 / 5,
+                "{}",
+                hierarchy.leaves.len()
+            );
         }
     }
 

@@ -13,7 +13,7 @@ use crate::layout::{Emitter, Material, Photon, PhotonGrid, Record};
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// The version of everything in this module and in [`crate::layout`].
-pub const LAYOUT_VERSION: u16 = 6;
+pub const LAYOUT_VERSION: u16 = 7;
 /// Emitter thresholds in one line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 

@@ -32,7 +32,7 @@ pub use bvh_leaf::{BvhLeaf, LEAF_TRIANGLES, MOST_MATERIALS, Triangle, VERTEX_LAN
 pub use bvh_node::{BvhAxis, BvhNode, NodeBox};
 pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
 pub use irradiance_point::IrradiancePoint;
-pub use photon::{FULL_DISC, Photon, Rgbe};
+pub use photon::{DISC_CODES, FULL_DISC, Photon, Rgbe, disc_fraction, encode_disc};
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};
 pub use photon_leaf::{
     LEAF_LANES, LEAF_PHOTONS, LeafCoordinates, PHOTON_CONTENT_BYTES, PhotonLeaf, leaf_capacity,

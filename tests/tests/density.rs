@@ -5,7 +5,7 @@ use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::Radiance;
-use photoncard_driver::scene::{Material, Scene};
+use photoncard_driver::scene::{Material, Scene, Triangle};
 use photoncard_firmware::gather::PartialReflection;
 use photoncard_firmware::photon::{CandidateBuffer, Estimate, NearestPhotons, gather};
 use photoncard_firmware::scene::{Reflection, Surface};
@@ -70,8 +70,28 @@ impl Map {
 
 /// In a furnace of walls that emit 1, every place reflects rho / (1 - rho): here 1.
 fn furnace() -> Scene {
-    let wall = Material { emission: Vec3::ONE, ..lambertian("wall", ALBEDO) };
-    scene(room([0; 6]), vec![wall], camera(Vec3::ZERO, Vec3::NEG_Z))
+    cluttered_furnace(Vec::new(), glowing())
+}
+
+fn glowing() -> Material {
+    Material { emission: Vec3::ONE, ..lambertian("wall", ALBEDO) }
+}
+
+/// The same with other things in it, of one material.
+fn cluttered_furnace(things: Vec<Triangle>, finish: Material) -> Scene {
+    let mut triangles = room([0; 6]);
+    triangles.extend(things.into_iter().map(|triangle| Triangle { material: 1, ..triangle }));
+    scene(triangles, vec![glowing(), finish], camera(Vec3::ZERO, Vec3::NEG_Z))
+}
+
+/// A closed box of this size from its lower corner.
+fn closed_box(lower: Vec3, size: Vec3) -> impl Iterator<Item = Triangle> {
+    room([0; 6]).into_iter().map(move |mut triangle| {
+        triangle.vertices = triangle.vertices.map(|corner| lower + size * (0.5 + 0.5 * corner));
+        // The front of a room's wall faces inwards.
+        triangle.vertices.reverse();
+        triangle
+    })
 }
 
 #[test]
@@ -101,6 +121,59 @@ fn the_mean_radiance_around_a_corner_is_that_of_the_wall() {
     }
     let mean = sum / 80.0;
     assert!((mean - 1.0).abs() < 0.04, "around the corners it is {mean}");
+}
+
+/// Shelves whose distance is less than a gather's radius: a search finds the photons of several. Boards have one side that
+/// reflects, sheets two.
+#[test]
+fn the_radiance_of_shelves_above_one_another_is_that_of_the_wall() {
+    let top = |shelf: u32| -0.5 + 0.02 * shelf as f32;
+    let boards = (0..12).flat_map(|shelf| {
+        closed_box(Vec3::new(-0.25, top(shelf) - 0.005, -0.25), Vec3::new(0.5, 0.005, 0.5))
+    });
+    let sheets = (0..12).flat_map(|shelf| {
+        let corner = |x: f32, z: f32| Vec3::new(x, top(shelf), z);
+        quad([corner(-0.25, 0.25), corner(0.25, 0.25), corner(0.25, -0.25), corner(-0.25, -0.25)], 0)
+    });
+    let sheet = Material { double_sided: true, ..glowing() };
+    for (shelves, finish) in [(boards.collect(), glowing()), (sheets.collect(), sheet)] {
+        let map = Map::new(&cluttered_furnace(shelves, finish), 300_000);
+        let (mut within, mut edge) = (0.0, 0.0);
+        for shelf in 2..10 {
+            let y = top(shelf);
+            let along = |z: f32| map.mean_along(Vec3::new(-0.2, y, z), Vec3::new(0.2, y, z), Vec3::Y) / 8.0;
+            within += along(0.1 - 0.03 * shelf as f32);
+            edge += along(0.24);
+        }
+        assert!((within - 1.0).abs() < 0.05, "on the shelves it is {within}");
+        assert!((edge - 1.0).abs() < 0.06, "at their edge it is {edge}");
+    }
+}
+
+/// Bars narrower than a gather's radius, right above a floor, as far apart as they are wide: a search on the floor finds
+/// their tops, and one on a top the floor. What closes them may be double-sided: within them it is dark.
+#[test]
+fn the_radiance_of_bars_and_of_the_floor_between_them_is_that_of_the_wall() {
+    let bars = (0..40).flat_map(|bar| {
+        closed_box(Vec3::new(-0.4 + 0.02 * bar as f32, -0.998, -0.4), Vec3::new(0.01, 0.015, 0.8))
+    });
+    let bars: Vec<Triangle> = bars.collect();
+    // What reflects all is as bright as the furnace.
+    let white = Material { double_sided: true, ..lambertian("white", 1.0) };
+    for finish in [glowing(), white] {
+        let map = Map::new(&cluttered_furnace(bars.clone(), finish), 300_000);
+        let (mut top, mut floor) = (0.0, 0.0);
+        for bar in 10..30 {
+            let x = -0.395 + 0.02 * bar as f32;
+            let along = |x: f32, y: f32| {
+                map.mean_along(Vec3::new(x, y, -0.35), Vec3::new(x, y, 0.35), Vec3::Y) / 20.0
+            };
+            top += along(x, -0.983);
+            floor += along(x + 0.01, -1.0);
+        }
+        assert!((top - 1.0).abs() < 0.05, "on the bars it is {top}");
+        assert!((floor - 1.0).abs() < 0.05, "on the floor it is {floor}");
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! gather needs to know beyond the photons, its greatest distance and the disc fractions, depends on the number of
 //! neighbours as well.
 
+mod chords;
 mod disc;
 mod emit;
 mod error;
@@ -11,6 +12,7 @@ mod irradiance;
 pub(crate) mod leaves;
 pub(crate) mod map;
 mod search;
+mod sides;
 pub(crate) mod stored;
 mod surroundings;
 mod trace;

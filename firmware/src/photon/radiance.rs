@@ -7,16 +7,17 @@
 //!   estimate of a Poisson density, also where fewer than k lie within the greatest distance and r is that distance.
 //! - Photons of another surface do not count: their surface normals differ. That leaves out photons on the other side
 //!   of a thin wall, and those on the other wall of a corner.
-//! - `c` is the part of the disc that is surface at all, without which every edge and corner darkens. The host measures
-//!   it around each photon, for that photon's own distance to its k-th neighbour; the nearest photon of the same
-//!   surface tells it here. At the distance of the nearest of k photons, about r / sqrt(k), c has hardly changed.
+//! - `c` is the area of all surface whose photons the search finds and the sum takes, in units of the disc's: without it
+//!   every edge and corner darkens, and stacked surfaces glow. The host measures it around each photon, for about that
+//!   photon's own distance to its k-th neighbour; the nearest photon of the same surface tells it here. At the distance of
+//!   the nearest of k photons, about r / sqrt(k), c has hardly changed.
 //!
 //! What is left is the estimate's blur: the radiance is a mean over the disc.
 
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_shared::layout::{FULL_DISC, decode_normal};
+use photoncard_shared::layout::{decode_normal, disc_fraction};
 
 use super::{Candidate, NearestPhotons};
 use crate::fixed_point::ColourSum;
@@ -61,7 +62,7 @@ impl Kernel for Estimate<'_, '_> {
             (nearest.max_distance_squared(), None)
         };
         let Some((closest, sums)) = sum(nearest, farthest, reflection) else { return Vec3::ZERO };
-        let fraction = (closest.disc() as f32 + 1.0) * (1.0 / (FULL_DISC as f32 + 1.0));
+        let fraction = disc_fraction(closest.disc());
         let least = MIN_RADIUS_SHARE * crate::scene::magnitude(&[position]);
         let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
         sums.reflected() * (1.0 / area)

@@ -11,9 +11,9 @@ use super::{PHOTON_CONTENT_BYTES, Record, read_vector, write_vector};
 /// | 16..18 | direction towards where the photon came from, [`super::encode_direction`] |
 /// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-14 disc fraction, 15 direct |
 ///
-/// The *disc fraction* is how much of the flat disc around the photon, of its gather's radius, is surface that the
-/// photon's own surface continues to: `(code + 1) / 32`. A gather divides by that part of the disc's area, which keeps
-/// the density estimate right at edges and in corners.
+/// The *disc fraction* is the area of all open surface that a gather around the photon takes for the photon's own, in the
+/// units of the area of a flat disc of the gather's radius: 1 on a plain wall, less at edges and in corners, more where
+/// surfaces are stacked. A gather divides by that part of the disc's area. Its code is that of [`disc_fraction`].
 ///
 /// A *direct* photon came straight from an emitter: it counts like any other where a final gather ray ends, but says
 /// nothing of where indirect light comes from.
@@ -29,14 +29,56 @@ pub struct Photon {
     pub axis: u8,
     /// Octahedral code of the surface normal, on the side the photon arrived at.
     pub normal: u8,
-    /// Code of the disc fraction, 0 to [`FULL_DISC`].
+    /// Code of the disc fraction, below [`DISC_CODES`].
     pub disc: u8,
     /// Whether it came straight from an emitter.
     pub direct: bool,
 }
 
-/// The disc fraction's code of a whole disc.
-pub const FULL_DISC: u8 = 31;
+/// Codes of the disc fraction.
+pub const DISC_CODES: usize = 1 << 5;
+/// The disc fraction's code of a whole disc: 1.
+pub const FULL_DISC: u8 = 22;
+
+const DISC_MASK: u8 = DISC_CODES as u8 - 1;
+const DISC_SHIFT: u32 = 10;
+/// From one code's fraction to the next: nine steps are a factor of four.
+const DISC_STEP: f64 = 1.166_529_039_576_120_8;
+const DISC_FRACTIONS: [f32; DISC_CODES] = disc_fractions();
+
+/// The steps are equal factors, so that rounding is in proportion, from 0.034 to 4.
+#[expect(clippy::indexing_slicing, reason = "computed when it is compiled")]
+const fn disc_fractions() -> [f32; DISC_CODES] {
+    let mut fractions = [1.0; DISC_CODES];
+    let (mut code, mut above, mut below) = (0, 1.0, 1.0);
+    while code < DISC_CODES {
+        if FULL_DISC as usize + code < DISC_CODES {
+            fractions[FULL_DISC as usize + code] = above as f32;
+        }
+        if code <= FULL_DISC as usize {
+            fractions[FULL_DISC as usize - code] = below as f32;
+        }
+        (above, below) = (above * DISC_STEP, below / DISC_STEP);
+        code += 1;
+    }
+    fractions
+}
+
+/// The disc fraction of a code, of which the lower five bits count.
+#[inline(always)]
+pub fn disc_fraction(code: u8) -> f32 {
+    DISC_FRACTIONS.get((code & DISC_MASK) as usize).copied().unwrap_or(1.0)
+}
+
+/// A code of a disc fraction: one of the two next to it, of which `dither`, in [0, 1), chooses so that the mean of the
+/// reciprocals over all dithers, by which gathers multiply, is the fraction's. What is beyond the last codes takes those.
+pub fn encode_disc(fraction: f32, dither: f32) -> u8 {
+    let upper = DISC_FRACTIONS.partition_point(|&other| other < fraction).min(DISC_CODES - 1) as u8;
+    let lower = upper.saturating_sub(1);
+    let [at, lower_at, upper_at] = [fraction, disc_fraction(lower), disc_fraction(upper)].map(f32::recip);
+    // Of a fraction below the first both are that one, and of one beyond the last the share is negative.
+    if at - upper_at > dither * (lower_at - upper_at) { lower } else { upper }
+}
 
 impl Record for Photon {
     const BYTES: usize = 20;
@@ -93,8 +135,8 @@ impl Photon {
     #[must_use]
     pub fn content_with_disc(content: [u8; PHOTON_CONTENT_BYTES], disc: u8) -> [u8; PHOTON_CONTENT_BYTES] {
         let [a, b, c, d, e, f, low, high] = content;
-        let flags = u16::from_le_bytes([low, high]) & !((FULL_DISC as u16) << 10);
-        let [low, high] = (flags | (disc.min(FULL_DISC) as u16) << 10).to_le_bytes();
+        let flags = u16::from_le_bytes([low, high]) & !((DISC_MASK as u16) << DISC_SHIFT);
+        let [low, high] = (flags | ((disc & DISC_MASK) as u16) << DISC_SHIFT).to_le_bytes();
         [a, b, c, d, e, f, low, high]
     }
 
@@ -107,7 +149,7 @@ impl Photon {
     /// The disc fraction's code in the flags.
     #[inline(always)]
     pub fn disc_of_flags(flags: u16) -> u8 {
-        (flags >> 10 & FULL_DISC as u16) as u8
+        (flags >> DISC_SHIFT) as u8 & DISC_MASK
     }
 
     /// Whether the photon came straight from an emitter.
@@ -124,7 +166,7 @@ impl Photon {
         bytes[16..18].copy_from_slice(&self.direction);
         let flags = (self.axis & 3) as u16
             | (self.normal as u16) << 2
-            | (self.disc.min(FULL_DISC) as u16) << 10
+            | ((self.disc & DISC_MASK) as u16) << DISC_SHIFT
             | (self.direct as u16) << 15;
         bytes[18..20].copy_from_slice(&flags.to_le_bytes());
         bytes
@@ -196,6 +238,31 @@ mod tests {
             direct: true,
         };
         assert_eq!(Photon::read(&photon.to_bytes()), photon);
+    }
+
+    #[test]
+    fn disc_fractions_reach_from_a_thirtieth_to_four_and_a_whole_disc_is_one() {
+        assert_eq!(disc_fraction(FULL_DISC), 1.0);
+        assert!(disc_fraction(0) < 0.034 && (disc_fraction(DISC_MASK) - 4.0).abs() < 1e-6);
+        for code in 0..DISC_MASK {
+            let ratio = disc_fraction(code + 1) / disc_fraction(code);
+            assert!((ratio - DISC_STEP as f32).abs() < 1e-6, "{ratio}");
+        }
+    }
+
+    #[test]
+    fn the_mean_reciprocal_of_dithered_disc_fractions_is_right() {
+        let dithers = || (0..1000).map(|i| (i as f32 + 0.5) / 1000.0);
+        for fraction in [0.034, 0.1, 0.25, 0.51, 0.999, 1.0, 1.01, 1.7, 3.99] {
+            let mean = dithers().map(|d| 1.0 / disc_fraction(encode_disc(fraction, d))).sum::<f32>() / 1000.0;
+            assert!((mean * fraction - 1.0).abs() < 1e-3, "{fraction}: {mean}");
+        }
+        for dither in dithers() {
+            assert_eq!(encode_disc(1.0, dither), FULL_DISC);
+            assert_eq!(encode_disc(0.0, dither), 0);
+            assert_eq!(encode_disc(0.03, dither), 0);
+            assert_eq!(encode_disc(100.0, dither), DISC_MASK);
+        }
     }
 
     #[test]

@@ -1,0 +1,180 @@
+//! What the sides of all triangles are to photons: where they are stored, by which normal, and what bounds a solid.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+use photoncard_firmware::scene::SceneImage;
+use photoncard_shared::address::Line;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{BvhLeaf, DOUBLE_SIDED, LEAF_TRIANGLES, Material, Record, encode_normal};
+use photoncard_shared::message::{Fault, FaultCode};
+use rayon::prelude::*;
+
+use crate::pack::CardImage;
+
+/// The two sides of a triangle.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Sides {
+    /// Of the front and of the back: the code of its normal if it reflects, so that photons are stored there.
+    normals: [Option<u8>; 2],
+    /// Whether the back is the inside of something. The back of a double-sided sheet is as open as its front.
+    pub(super) is_solid: bool,
+}
+
+impl Sides {
+    /// The code of the normal on a side where photons are stored.
+    #[inline(always)]
+    pub(super) fn normal(&self, is_front: bool) -> Option<u8> {
+        self.normals[usize::from(!is_front)]
+    }
+}
+
+/// The sides of all triangles of an image.
+pub(super) struct SideTable {
+    sides: Vec<Sides>,
+}
+
+/// What of a material counts here.
+#[derive(Clone, Copy)]
+struct Finish {
+    reflects: bool,
+    emits: bool,
+    is_double_sided: bool,
+}
+
+impl SideTable {
+    /// # Errors
+    /// If the image is not sound.
+    pub(super) fn new(image: &CardImage) -> Result<Self, Fault> {
+        let (scene, mut memory) = image.view();
+        let materials = scene.header.section(SectionKind::Materials).records;
+        let finishes: Result<Vec<Finish>, Fault> = (0..materials)
+            .map(|index| {
+                let bytes = scene.record::<{ Material::BYTES }, { Material::PER_LINE as u32 }>(
+                    &mut memory,
+                    SectionKind::Materials,
+                    index,
+                )?;
+                let Material { diffuse, specular, emission, flags, .. } = Material::read(bytes);
+                Ok(Finish {
+                    reflects: diffuse.into_iter().chain(specular).any(|albedo| albedo > 0.0),
+                    emits: emission.into_iter().any(|radiance| radiance > 0.0),
+                    is_double_sided: flags & DOUBLE_SIDED != 0,
+                })
+            })
+            .collect();
+        let finishes = finishes?;
+        let leaves = leaf_lines(image, &scene);
+        let mut sides = vec![Sides::default(); leaves.len() * LEAF_TRIANGLES];
+        sides.par_chunks_mut(LEAF_TRIANGLES).zip(leaves).try_for_each(|(sides, line)| {
+            let leaf = BvhLeaf(&line.0);
+            for (slot, sides) in sides.iter_mut().enumerate().take(leaf.triangles() as usize) {
+                let triangle = leaf.triangle(slot);
+                let missing = Fault { code: FaultCode::Record, detail: triangle.material };
+                let finish = finishes.get(triangle.material as usize).ok_or(missing)?;
+                *sides = Sides::of(triangle.vertices, *finish);
+            }
+            Ok(())
+        })?;
+        let mut table = Self { sides };
+        if finishes.iter().any(|finish| finish.is_double_sided) {
+            table.find_closed_sheets(leaves, &finishes);
+        }
+        Ok(table)
+    }
+
+    /// The sides of a triangle; none reflects if there is no such triangle.
+    #[inline(always)]
+    pub(super) fn of(&self, triangle: u32) -> Sides {
+        self.sides.get(triangle as usize).copied().unwrap_or_default()
+    }
+
+    /// Double-sided triangles are the surface of something solid where they close it: no light gets into it, unless they
+    /// emit it themselves. They do if each edge is shared with one other that runs along it the other way.
+    fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
+        let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
+        let mut is_open = Vec::new();
+        for (leaf, line) in leaves.iter().enumerate() {
+            let leaf_triangles = BvhLeaf(&line.0);
+            for slot in 0..leaf_triangles.triangles() as usize {
+                let index = leaf * LEAF_TRIANGLES + slot;
+                if !self.sides[index].is_solid {
+                    // A sum with zero makes one zero of both.
+                    let bits = |vertex: [f32; 3]| vertex.map(|coordinate| (coordinate + 0.0).to_bits());
+                    let triangle = leaf_triangles.triangle(slot);
+                    sheets.push((index, triangle.vertices.map(bits)));
+                    is_open.push(finishes.get(triangle.material as usize).is_none_or(|finish| finish.emits));
+                }
+            }
+        }
+        let mut edges: HashMap<[[u32; 3]; 2], Vec<usize>> = HashMap::new();
+        for (sheet, (_, vertices)) in sheets.iter().enumerate() {
+            for edge in edges_of(*vertices) {
+                edges.entry(edge).or_default().push(sheet);
+            }
+        }
+        let mut meshes = Components::new(sheets.len());
+        for ([from, to], along) in &edges {
+            match (along.as_slice(), edges.get(&[*to, *from]).map(Vec::as_slice)) {
+                ([one], Some([other])) => meshes.join(*one, *other),
+                _ => along.iter().for_each(|sheet| is_open[*sheet] = true),
+            }
+        }
+        let mut is_mesh_open = vec![false; sheets.len()];
+        for sheet in (0..sheets.len()).filter(|sheet| is_open[*sheet]) {
+            is_mesh_open[meshes.root(sheet)] = true;
+        }
+        for (sheet, (index, _)) in sheets.iter().enumerate() {
+            self.sides[*index].is_solid = !is_mesh_open[meshes.root(sheet)];
+        }
+    }
+}
+
+impl Sides {
+    fn of(vertices: [[f32; 3]; 3], finish: Finish) -> Self {
+        let [a, b, c] = vertices.map(Vec3::from);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let code = |normal: Vec3, reflects: bool| reflects.then(|| encode_normal(normal.to_array()));
+        let Finish { reflects, is_double_sided, .. } = finish;
+        Self {
+            normals: [code(normal, reflects), code(-normal, reflects && is_double_sided)],
+            is_solid: !is_double_sided,
+        }
+    }
+}
+
+fn leaf_lines<'a>(image: &'a CardImage, scene: &SceneImage) -> &'a [Line] {
+    let section = scene.header.section(SectionKind::Triangles);
+    image
+        .lines()
+        .get(section.first_line as usize..)
+        .map_or(&[], |lines| lines.get(..section.records as usize).unwrap_or(lines))
+}
+
+fn edges_of<T: Copy>([a, b, c]: [T; 3]) -> [[T; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+/// Things that are joined to others: a forest of disjoint sets.
+struct Components {
+    parents: Vec<usize>,
+}
+
+impl Components {
+    fn new(count: usize) -> Self {
+        Self { parents: (0..count).collect() }
+    }
+
+    fn root(&mut self, mut item: usize) -> usize {
+        while self.parents[item] != item {
+            self.parents[item] = self.parents[self.parents[item]];
+            item = self.parents[item];
+        }
+        item
+    }
+
+    fn join(&mut self, one: usize, other: usize) {
+        let (one, other) = (self.root(one), self.root(other));
+        self.parents[one] = other;
+    }
+}
