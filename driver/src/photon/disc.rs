@@ -20,10 +20,11 @@ use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
 use super::PhotonError;
+use super::ball::Ball;
 use super::chords::{Chords, Crossing, Crossings, FractionWithin, OpenSurfaces};
 use super::search::Searcher;
 use super::sides::SideTable;
-use super::surroundings::{Ball, ChordFrame, PlainWall, Surroundings};
+use super::surroundings::{ChordFrame, PlainWall, Surroundings};
 use crate::pack::CardImage;
 
 /// Leaves that one task measures.

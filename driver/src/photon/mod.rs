@@ -4,14 +4,17 @@
 //! gather needs to know beyond the photons, its greatest distance and the disc fractions, depends on the number of
 //! neighbours as well.
 
+mod ball;
 mod chords;
 mod disc;
 mod emit;
 mod error;
 mod irradiance;
+mod lane_vectors;
 pub(crate) mod leaves;
 pub(crate) mod map;
 mod search;
+mod shadows;
 mod sides;
 pub(crate) mod stored;
 mod surroundings;

@@ -8,12 +8,13 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_firmware::simd::{Isa, Kernel, LANES, run};
-use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{BvhAxis, BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, VERTEX_LANES, WideNode};
-use photoncard_shared::message::{Fault, FaultCode};
+use photoncard_shared::layout::Child;
+use photoncard_shared::message::Fault;
 
-use super::chords::{BATCHES, Batch, Chords, Crossing, Crossings, Lane};
+use super::ball::{Ball, for_each_near};
+use super::chords::{Chords, Crossings};
+use super::lane_vectors::{LaneVector, at, cross, dot, greatest, least, minus, set};
+use super::shadows::CrossAll;
 use super::sides::SideTable;
 
 /// Triangles that are tested one by one; of more, a descent for each ray finds the few that matter.
@@ -25,15 +26,13 @@ const MOST_PLAIN: usize = 24;
 /// Triangles of a plane have normals that differ by less: to a thousandth of the radius at its end.
 const LEAST_PLAIN_COSINE: f32 = 1.0 - 5e-7;
 
-type LaneVector = [Lane; 3];
-
 /// Sixteen triangles. Of what is no triangle the corners coincide: nothing meets it.
-struct Block {
-    corners: [LaneVector; 3],
+pub(super) struct Block {
+    pub(super) corners: [LaneVector; 3],
     /// Indices in the image.
-    indices: [u32; LANES],
+    pub(super) indices: [u32; LANES],
     /// A bit for each whose back is the inside of something.
-    are_solid: u32,
+    pub(super) are_solid: u32,
 }
 
 /// The triangles in a ball.
@@ -44,41 +43,6 @@ pub(super) struct Surroundings {
     centre: Vec3,
     radius: f32,
     stack: Vec<Child>,
-}
-
-/// A ball to look into, metres.
-#[derive(Clone, Copy)]
-pub(super) struct Ball {
-    pub(super) centre: Vec3,
-    pub(super) radius: f32,
-}
-
-impl Ball {
-    /// The vertices of a leaf in its coordinates.
-    #[inline(always)]
-    fn vertices(&self, leaf: &BvhLeaf) -> [Vec3; VERTEX_LANES] {
-        let scale = self.radius.recip();
-        let centre = self.centre.to_array();
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| {
-            let mut coordinates = leaf.coordinates(axis);
-            for coordinate in &mut coordinates {
-                *coordinate = (*coordinate - centre[axis]) * scale;
-            }
-            coordinates
-        });
-        std::array::from_fn(|vertex| Vec3::new(x[vertex], y[vertex], z[vertex]))
-    }
-}
-
-/// Whether a triangle may be within 1 of the origin, and has an area.
-#[inline(always)]
-fn is_near(corners: &[Vec3; 3]) -> bool {
-    let [a, b, c] = *corners;
-    let (lower, upper) = (a.min(b).min(c), a.max(b).max(c));
-    let outside = lower.max(-upper).max(Vec3::ZERO);
-    let normal = (b - a).cross(c - a);
-    let (size, distance) = (normal.length_squared(), normal.dot(a));
-    outside.length_squared() <= 1.0 && size > 0.0 && distance * distance <= size
 }
 
 /// A frame along a normal, and a point that is inside of nothing; coordinates are those of a ball.
@@ -229,130 +193,6 @@ fn covers(triangles: &[[Vec3; 3]], normal: Vec3) -> bool {
         && all_edges().all(|(a, b)| is_far((a, b)) || all_edges().filter(|edge| *edge == (b, a)).count() == 1)
 }
 
-/// Visits all triangles that may be in a ball, with their index in the image and their corners in its coordinates, until one
-/// is not wanted. Returns whether all were.
-#[inline(always)]
-fn for_each_near(
-    scene: &SceneImage,
-    memory: Lines,
-    ball: Ball,
-    stack: &mut Vec<Child>,
-    visit: &mut impl FnMut(u32, &[Vec3; 3]) -> bool,
-) -> Result<bool, Fault> {
-    let Ball { centre, radius } = ball;
-    stack.clear();
-    stack.push(Child::Node(0));
-    // A part of a sound tree is visited once.
-    let parts = [SectionKind::Nodes, SectionKind::Triangles].map(|kind| scene.header.section(kind).records);
-    let mut visits_left = u64::from(parts[0]) + u64::from(parts[1]);
-    while let Some(part) = stack.pop() {
-        let cycle = Fault { code: FaultCode::Depth, detail: 0 };
-        visits_left = visits_left.checked_sub(1).ok_or(cycle)?;
-        match part {
-            Child::Node(node) => {
-                let line = line(scene, memory, SectionKind::Nodes, node)?;
-                let mut near = run(NearChildren { node: BvhNode(line), centre, radius });
-                let links = WideNode(line).links();
-                while near != 0 {
-                    stack.push(links.child(near.trailing_zeros()));
-                    near &= near - 1;
-                }
-            }
-            Child::Leaf(leaf) => {
-                let line = BvhLeaf(line(scene, memory, SectionKind::Triangles, leaf)?);
-                let vertices = ball.vertices(&line);
-                for slot in 0..line.triangles() {
-                    let corners = line.vertices_of(slot as usize).map(|vertex| vertices[vertex]);
-                    let index = leaf.saturating_mul(LEAF_TRIANGLES as u32) + slot;
-                    if is_near(&corners) && !visit(index, &corners) {
-                        return Ok(false);
-                    }
-                }
-            }
-        }
-    }
-    Ok(true)
-}
-
-fn line<'a>(
-    scene: &SceneImage,
-    memory: Lines<'a>,
-    kind: SectionKind,
-    index: u32,
-) -> Result<&'a [u8; LINE_BYTES], Fault> {
-    let fault = Fault { code: FaultCode::Record, detail: index };
-    let (address, _) = scene.header.section(kind).locate::<1>(index).ok_or(fault)?;
-    memory.0.get(address.0 as usize).map(|line| &line.0).ok_or(fault)
-}
-
-fn set(lanes: &mut LaneVector, lane: usize, vector: Vec3) {
-    for (lanes, component) in lanes.iter_mut().zip(vector.to_array()) {
-        lanes[lane] = component;
-    }
-}
-
-/// A bit for every child of a node that may be in a ball.
-struct NearChildren<'a> {
-    node: BvhNode<'a>,
-    centre: Vec3,
-    radius: f32,
-}
-
-impl Kernel for NearChildren<'_> {
-    type Output = u32;
-
-    #[inline(always)]
-    fn run(self, isa: impl Isa) -> u32 {
-        let Self { node, centre, radius } = self;
-        let [x, y, z] = node.axes();
-        let [p, q, r] = centre.to_array();
-        // Boxes are larger than what they hold by more than this rounds.
-        let limit = (radius * radius).to_bits();
-        let mut distances = [0; LANES];
-        for (lane, distance) in distances.iter_mut().enumerate() {
-            let outside = |axis: &BvhAxis, place: f32| {
-                let below = axis.corner + axis.unit * f32::from(axis.lower[lane]) - place;
-                let above = place - (axis.corner + axis.unit * f32::from(axis.upper[lane]));
-                let outside = if below > above { below } else { above };
-                if outside > 0.0 { outside } else { 0.0 }
-            };
-            let [x, y, z] = [outside(&x, p), outside(&y, q), outside(&z, r)];
-            *distance = (x * x + y * y + z * z).to_bits();
-        }
-        isa.below(&distances, limit.saturating_add(1)) & !(u32::MAX << WideNode(node.0).children())
-    }
-}
-
-#[inline(always)]
-fn at(vector: &LaneVector, lane: usize) -> [f32; 3] {
-    [vector[0][lane], vector[1][lane], vector[2][lane]]
-}
-
-#[inline(always)]
-fn minus([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> [f32; 3] {
-    [a - x, b - y, c - z]
-}
-
-#[inline(always)]
-fn dot([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> f32 {
-    a * x + b * y + c * z
-}
-
-#[inline(always)]
-fn cross([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> [f32; 3] {
-    [b * z - c * y, c * x - a * z, a * y - b * x]
-}
-
-#[inline(always)]
-fn least(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn greatest(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
 /// A triangle as seen from a point: the planes through the point and its edges, and six times the volume of both.
 ///
 /// Of two triangles that share an edge the planes are opposite to the last bit: no ray passes between them.
@@ -396,231 +236,5 @@ impl Kernel for FirstOnWay<'_> {
             }
         }
         first.0.is_finite().then_some(first)
-    }
-}
-
-struct CrossAll<'a> {
-    blocks: &'a [Block],
-    frame: &'a ChordFrame,
-    chords: &'a Chords,
-    crossings: &'a mut Crossings,
-}
-
-impl Kernel for CrossAll<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self, isa: impl Isa) {
-        let Self { blocks, frame, chords, crossings } = self;
-        let mut shadows = Shadows::NONE;
-        for block in blocks {
-            shadows.cast(block, frame);
-            for (number, batch) in chords.batches.iter().enumerate() {
-                let mut near = shadows.near(isa, batch);
-                while near != 0 {
-                    let triangle = near.trailing_zeros() as usize;
-                    near &= near - 1;
-                    shadows.cross(isa, triangle, block.indices[triangle], (number, batch), crossings);
-                }
-            }
-            let mut cut = shadows.cut(isa, frame.open.z) & block.are_solid;
-            while cut != 0 {
-                let triangle = cut.trailing_zeros() as usize;
-                cut &= cut - 1;
-                let corners = shadows.corners.each_ref().map(|corner| Vec3::from(at(corner, triangle)));
-                if let Some(cut) = Cut::new(corners, frame.open) {
-                    cut.count(chords, frame.open, &mut crossings.depths);
-                }
-            }
-        }
-    }
-}
-
-/// Sixteen triangles along the axes of a frame, and their shadows across the chords.
-struct Shadows {
-    corners: [LaneVector; 3],
-    /// Of each edge the line `x a + y b + c`, positive inside.
-    edges: [LaneVector; 3],
-    /// The height `x a + y b + c`.
-    heights: LaneVector,
-    slopes: Lane,
-    /// 1 where the front is up, else 0.
-    is_front: Lane,
-    /// Infinite for what is met by no chord, else 0.
-    steep: Lane,
-    lower: [Lane; 2],
-    upper: [Lane; 2],
-}
-
-/// Triangles that chords pass at a cosine below this are met by none.
-const LEAST_COSINE: f32 = 1e-4;
-
-impl Shadows {
-    const NONE: Self = Self {
-        corners: [[[0.0; LANES]; 3]; 3],
-        edges: [[[0.0; LANES]; 3]; 3],
-        heights: [[0.0; LANES]; 3],
-        slopes: [0.0; LANES],
-        is_front: [0.0; LANES],
-        steep: [0.0; LANES],
-        lower: [[0.0; LANES]; 2],
-        upper: [[0.0; LANES]; 2],
-    };
-
-    /// Short loops over lanes, each of which becomes a few vector instructions.
-    #[inline(always)]
-    fn cast(&mut self, block: &Block, frame: &ChordFrame) {
-        for corner in 0..3 {
-            let [x, y, z] = &block.corners[corner];
-            for (axis, direction) in frame.axes.iter().enumerate() {
-                let [a, b, c] = direction.to_array();
-                let target = &mut self.corners[corner][axis];
-                for lane in 0..LANES {
-                    target[lane] = a * x[lane] + b * y[lane] + c * z[lane];
-                }
-            }
-        }
-        self.cast_planes();
-        for edge in 0..3 {
-            let ([x, y, _], [p, q, _]) = (&self.corners[edge], &self.corners[(edge + 1) % 3]);
-            let [a, b, c] = &mut self.edges[edge];
-            for lane in 0..LANES {
-                // Opposite to the last bit for the two triangles of an edge, and so is the sign: the same lines.
-                let sign = if self.is_front[lane] != 0.0 { 1.0 } else { -1.0 };
-                a[lane] = (y[lane] - q[lane]) * sign;
-                b[lane] = (p[lane] - x[lane]) * sign;
-                c[lane] = (x[lane] * q[lane] - y[lane] * p[lane]) * sign;
-            }
-        }
-        for axis in 0..2 {
-            let [a, b, c] = [0, 1, 2].map(|corner: usize| &self.corners[corner][axis]);
-            let (lower, upper) = (&mut self.lower[axis], &mut self.upper[axis]);
-            for lane in 0..LANES {
-                lower[lane] = least(least(a[lane], b[lane]), c[lane]) + self.steep[lane];
-                upper[lane] = greatest(greatest(a[lane], b[lane]), c[lane]);
-            }
-        }
-    }
-
-    /// The triangles' planes.
-    #[inline(always)]
-    fn cast_planes(&mut self) {
-        let [a, b, c] = &self.corners;
-        let [x, y, z] = &mut self.heights;
-        for lane in 0..LANES {
-            let a = at(a, lane);
-            let (u, v) = (minus(at(b, lane), a), minus(at(c, lane), a));
-            let [p, q, r] = cross(u, v);
-            let size = p * p + q * q + r * r;
-            (x[lane], y[lane]) = (-p / r, -q / r);
-            z[lane] = a[2] + (a[0] * p + a[1] * q) / r;
-            self.slopes[lane] = size.sqrt() / r.abs();
-            self.is_front[lane] = if r > 0.0 { 1.0 } else { 0.0 };
-            let is_steep = r * r <= LEAST_COSINE * LEAST_COSINE * size;
-            self.steep[lane] = if is_steep { f32::INFINITY } else { 0.0 };
-        }
-    }
-
-    /// A bit for each triangle that chords of a batch may meet.
-    #[inline(always)]
-    fn near(&self, isa: impl Isa, batch: &Batch) -> u32 {
-        let mut apart = [0; LANES];
-        for (lane, apart) in apart.iter_mut().enumerate() {
-            let is_apart = |axis: usize| {
-                (self.lower[axis][lane] > batch.upper[axis]) | (self.upper[axis][lane] < batch.lower[axis])
-            };
-            *apart = if is_apart(0) | is_apart(1) { 1 } else { 0 };
-        }
-        isa.below(&apart, 1)
-    }
-
-    /// A bit for each triangle that the plane at a height cuts.
-    #[inline(always)]
-    fn cut(&self, isa: impl Isa, height: f32) -> u32 {
-        let mut apart = [0; LANES];
-        for (lane, apart) in apart.iter_mut().enumerate() {
-            let [a, b, c] = [0, 1, 2].map(|corner: usize| self.corners[corner][2][lane] < height);
-            *apart = if (a == b) & (b == c) { 1 } else { 0 };
-        }
-        isa.below(&apart, 1)
-    }
-
-    /// Where the chords of a batch pass through a triangle within the ball.
-    #[inline(always)]
-    fn cross(
-        &self,
-        isa: impl Isa,
-        triangle: usize,
-        index: u32,
-        (number, batch): (usize, &Batch),
-        crossings: &mut Crossings,
-    ) {
-        let edges = [0, 1, 2].map(|edge: usize| at(&self.edges[edge], triangle));
-        // Of two triangles that share an edge, one has the points on it.
-        let bounds = edges.map(|[a, b, _]| {
-            let has_points = (a > 0.0) | ((a == 0.0) & (b > 0.0));
-            if has_points { -f32::MIN_POSITIVE } else { 0.0 }
-        });
-        let [a, b, c] = at(&self.heights, triangle);
-        let mut heights = [0.0; LANES];
-        let mut misses = [0; LANES];
-        for lane in 0..LANES {
-            let (x, y) = (batch.x[lane], batch.y[lane]);
-            let beyond =
-                |edge: usize| x * edges[edge][0] + y * edges[edge][1] + edges[edge][2] > bounds[edge];
-            let height = x * a + y * b + c;
-            heights[lane] = height;
-            let is_near = x * x + y * y + height * height <= 1.0;
-            misses[lane] = if beyond(0) & beyond(1) & beyond(2) & is_near { 0 } else { 1 };
-        }
-        let mut met = isa.below(&misses, 1);
-        while met != 0 {
-            let lane = met.trailing_zeros() as usize;
-            met &= met - 1;
-            let (is_front, slope) = (self.is_front[triangle] != 0.0, self.slopes[triangle]);
-            crossings.list.push(Crossing::new(number * LANES + lane, heights[lane], is_front, index, slope));
-        }
-    }
-}
-
-/// Where the plane at the height of an open point cuts a triangle: a line from `start` to `end`, relative to that point, with
-/// the front on its left.
-struct Cut {
-    start: [f32; 2],
-    end: [f32; 2],
-}
-
-impl Cut {
-    #[inline(always)]
-    fn new(corners: [Vec3; 3], open: Vec3) -> Option<Self> {
-        let [a, b, c] = corners.map(|corner| corner - open);
-        let (mut start, mut end) = (None, None);
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            if (from.z < 0.0) == (to.z < 0.0) {
-                continue;
-            }
-            let part = from.z / (from.z - to.z);
-            let place = [from.x + (to.x - from.x) * part, from.y + (to.y - from.y) * part];
-            *if from.z < 0.0 { &mut start } else { &mut end } = Some(place);
-        }
-        Some(Self { start: start?, end: end? })
-    }
-
-    /// Counts it for each chord whose way from the open point crosses it: one more where it enters by the front.
-    #[inline(always)]
-    fn count(&self, chords: &Chords, open: Vec3, depths: &mut [[i32; LANES]; BATCHES]) {
-        let ([a, b], [c, d]) = (self.start, self.end);
-        let at_open = a * d - b * c;
-        let change = if at_open > 0.0 { 1 } else { -1 };
-        for (batch, depths) in chords.batches.iter().zip(depths) {
-            for (lane, depth) in depths.iter_mut().enumerate() {
-                let (x, y) = (batch.x[lane] - open.x, batch.y[lane] - open.y);
-                let (start, end) = (x * b - y * a, x * d - y * c);
-                let at_chord = start - end + at_open;
-                let is_between = (start >= 0.0) != (end >= 0.0);
-                let is_beyond = (at_chord > 0.0) != (at_open > 0.0);
-                *depth += if is_between & is_beyond { change } else { 0 };
-            }
-        }
     }
 }
