@@ -101,7 +101,7 @@ fn bounding_box(triangle: &Triangle) -> Aabb {
 
 fn record(triangle: &Triangle) -> layout::Triangle {
     let vertices = triangle.vertices.map(|vertex| vertex.to_array());
-    layout::Triangle { vertices, material: triangle.material }
+    layout::Triangle { vertices, material: triangle.material, cut_out: false }
 }
 
 /// The line of the leaf of some triangles, if it holds them.

@@ -9,7 +9,7 @@ use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::budget::Budget;
-use photoncard_shared::image::{Header, SECTIONS, Section, SectionKind};
+use photoncard_shared::image::{HEADER_LINES, Header, SECTIONS, Section, SectionKind};
 use photoncard_shared::layout::{
     self, BvhNode, NodeBox, Photon, PhotonGrid, PhotonLeaf, Record, WideNode, power_of_two_above,
 };
@@ -88,8 +88,8 @@ impl PackedScene {
     pub fn new(scene: &Scene, emitters: &Emitters) -> Result<Self, PackError> {
         let hierarchy = bvh::build(&scene.triangles)?;
         let mut packed = Self {
-            // Line 0 is the header's.
-            lines: vec![Line::ZERO],
+            // The first are the header's.
+            lines: vec![Line::ZERO; HEADER_LINES],
             sections: [Section::default(); SECTIONS],
             radiance_unit: radiance_unit(scene, emitters),
             emitter_density: emitters.density_per_radiance(),
@@ -117,6 +117,7 @@ impl PackedScene {
             // `append` has checked that the number of lines fits.
             lines: self.lines.len() as u32,
             photon_power_unit,
+            caustic_power_unit: 1.0,
             radiance_unit: self.radiance_unit,
             emitter_density: self.emitter_density,
             photon_grid,
@@ -201,7 +202,8 @@ impl PackedScene {
             self.append(SectionKind::PhotonNodes, tree.nodes())?;
             self.append(SectionKind::PhotonLeaves, tree.leaves())?;
         }
-        self.lines[0] = self.header(power_unit, grid).to_line();
+        let header = self.header(power_unit, grid).to_lines();
+        self.lines[..HEADER_LINES].copy_from_slice(&header);
         Ok(CardImage { lines: self.lines })
     }
 }
@@ -215,8 +217,8 @@ impl CardImage {
     /// The image as a chip sees it.
     pub fn view(&self) -> (SceneImage, Lines<'_>) {
         // `with_photons` wrote this header.
-        let header =
-            Header::read(&self.lines[0]).unwrap_or_else(|error| unreachable!("own header: {error:?}"));
+        let head = self.lines.first_chunk().unwrap_or_else(|| unreachable!("it begins with a header"));
+        let header = Header::read(head).unwrap_or_else(|error| unreachable!("own header: {error:?}"));
         (SceneImage { header }, Lines(&self.lines))
     }
 
@@ -262,7 +264,7 @@ impl CardImage {
                 *record = photon.record(&header.photon_grid);
             }
         });
-        lines[0] = header.to_line();
+        lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
         Ok(Self { lines })
     }
 
@@ -301,7 +303,7 @@ impl CardImage {
         append(&mut lines, &mut header.sections, SectionKind::IrradianceLeaves, points.leaves())?;
         // `append` has checked that the number of lines fits.
         header.lines = lines.len() as u32;
-        lines[0] = header.to_line();
+        lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
         Ok(Self { lines })
     }
 
@@ -372,11 +374,15 @@ fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl It
 
 fn material_record(material: &Material) -> [u8; layout::Material::BYTES] {
     layout::Material {
-        diffuse: material.diffuse.to_array(),
-        specular: material.specular.to_array(),
-        exponent: material.exponent,
+        reflectance: layout::Reflectance::Phong {
+            diffuse: material.diffuse.to_array(),
+            specular: material.specular.to_array(),
+            exponent: material.exponent,
+        },
         emission: material.emission.to_array(),
         flags: if material.double_sided { layout::DOUBLE_SIDED } else { 0 },
+        cutoff: 0.0,
+        textures: [layout::NO_TEXTURE; 3],
     }
     .to_bytes()
 }

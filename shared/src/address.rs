@@ -50,10 +50,18 @@ pub enum Structure {
     IrradianceNodes = 7,
     /// Irradiance points.
     IrradiancePoints = 8,
+    /// Inner nodes above the photons of caustics.
+    CausticNodes = 9,
+    /// Photons of caustics.
+    CausticPhotons = 10,
+    /// Normals, texture coordinates and colours of triangles' corners.
+    Attributes = 11,
+    /// How textures lie on surfaces, and their texels.
+    Textures = 12,
 }
 
 /// Number of structures.
-pub const STRUCTURES: usize = 9;
+pub const STRUCTURES: usize = 13;
 
 impl Structure {
     /// All structures, in order.
@@ -67,11 +75,23 @@ impl Structure {
         Self::Photons,
         Self::IrradianceNodes,
         Self::IrradiancePoints,
+        Self::CausticNodes,
+        Self::CausticPhotons,
+        Self::Attributes,
+        Self::Textures,
     ];
 
-    /// Whether it belongs to the photon map, irradiance points among it, and not to the scene.
+    /// Whether it belongs to the photon maps, irradiance points among them, and not to the scene.
     #[inline(always)]
     pub const fn is_photon_map(self) -> bool {
-        matches!(self, Self::PhotonNodes | Self::Photons | Self::IrradianceNodes | Self::IrradiancePoints)
+        matches!(
+            self,
+            Self::PhotonNodes
+                | Self::Photons
+                | Self::IrradianceNodes
+                | Self::IrradiancePoints
+                | Self::CausticNodes
+                | Self::CausticPhotons
+        )
     }
 }

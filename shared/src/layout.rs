@@ -8,7 +8,11 @@
 //! | [`PhotonLeaf`] of [`IrradiancePoint`]s | 128 | 1 |
 //! | [`BvhNode`] | 128 | 1 |
 //! | [`BvhLeaf`], up to eight triangles | 128 | 1 |
+//! | [`Attributes`] | 64 | 2 |
+//! | where a leaf's [`Attributes`] are | 4 | 32 |
 //! | [`Material`] | 64 | 2 |
+//! | [`Texture`] | 40 | 3 |
+//! | texel | 4 | 32 |
 //! | [`Emitter`] | 64 | 2 |
 //! | emitter threshold | 4 | 32 |
 //!
@@ -17,28 +21,34 @@
 
 use crate::address::LINE_BYTES;
 
+mod attributes;
 mod bvh_leaf;
 mod bvh_node;
 mod direction;
+mod emitter;
 mod irradiance_point;
+mod material;
 mod photon;
 mod photon_grid;
 mod photon_leaf;
 mod photon_node;
-mod scene;
+mod texture;
 mod wide_node;
 
+pub use attributes::{Attributes, LeafAttributes, NO_ATTRIBUTES};
 pub use bvh_leaf::{BvhLeaf, LEAF_TRIANGLES, MOST_MATERIALS, Triangle, VERTEX_LANES};
 pub use bvh_node::{BvhAxis, BvhNode, NodeBox};
 pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
+pub use emitter::Emitter;
 pub use irradiance_point::IrradiancePoint;
+pub use material::{DOUBLE_SIDED, Material, NO_TEXTURE, Reflectance, THIN_WALLED};
 pub use photon::{DISC_CODES, FULL_DISC, Photon, Rgbe, disc_fraction, encode_disc};
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};
 pub use photon_leaf::{
     LEAF_LANES, LEAF_PHOTONS, LeafCoordinates, PHOTON_CONTENT_BYTES, PhotonLeaf, leaf_capacity,
 };
 pub use photon_node::{GridBox, NodeCoordinates, PhotonNode};
-pub use scene::{DOUBLE_SIDED, Emitter, Material};
+pub use texture::{TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat, Texture, Wrap};
 pub use wide_node::{Child, Links, NODE_CHILDREN, WideNode};
 
 /// A record of fixed size in card memory.

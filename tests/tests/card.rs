@@ -113,7 +113,8 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
 /// A copy of the image with another root node: one of so many children, each of them everywhere.
 fn with_root(image: &CardImage, children: usize, links: Links) -> Vec<Line> {
     let mut lines = image.lines().to_vec();
-    let root = Header::read(&lines[0]).unwrap().section(SectionKind::Nodes).first_line as usize;
+    let root =
+        Header::read(lines.first_chunk().unwrap()).unwrap().section(SectionKind::Nodes).first_line as usize;
     let everywhere = NodeBox { lower: [-9.0; 3], upper: [9.0; 3] };
     lines[root] = Line(BvhNode::encode(&vec![everywhere; children], links).unwrap());
     lines

@@ -6,7 +6,9 @@ use glam::Vec3;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::Line;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{BvhLeaf, DOUBLE_SIDED, LEAF_TRIANGLES, Material, Record, encode_normal};
+use photoncard_shared::layout::{
+    BvhLeaf, DOUBLE_SIDED, LEAF_TRIANGLES, Material, Record, Reflectance, encode_normal,
+};
 use photoncard_shared::message::{Fault, FaultCode};
 use rayon::prelude::*;
 
@@ -38,8 +40,21 @@ pub(super) struct SideTable {
 #[derive(Clone, Copy)]
 struct Finish {
     reflects: bool,
+    is_glass: bool,
     emits: bool,
     is_double_sided: bool,
+}
+
+/// Whether photons are stored on surfaces of a reflectance: they are not where all that is reflected is so perfectly specularly.
+fn keeps_photons(reflectance: &Reflectance) -> bool {
+    let any = |colour: &[f32; 3]| colour.iter().any(|albedo| *albedo > 0.0);
+    match reflectance {
+        Reflectance::Phong { diffuse, specular, .. } => any(diffuse) || any(specular),
+        Reflectance::MetallicRoughness { base, dielectric, metallic, roughness } => {
+            any(base) && (*metallic < 1.0 || *roughness > 0.0) || any(dielectric) && *roughness > 0.0
+        }
+        Reflectance::Glass { base, transmission, .. } => any(base) && *transmission < 1.0,
+    }
 }
 
 impl SideTable {
@@ -55,9 +70,10 @@ impl SideTable {
                     SectionKind::Materials,
                     index,
                 )?;
-                let Material { diffuse, specular, emission, flags, .. } = Material::read(bytes);
+                let Material { reflectance, emission, flags, .. } = Material::read(bytes);
                 Ok(Finish {
-                    reflects: diffuse.into_iter().chain(specular).any(|albedo| albedo > 0.0),
+                    reflects: keeps_photons(&reflectance),
+                    is_glass: matches!(reflectance, Reflectance::Glass { .. }),
                     emits: emission.into_iter().any(|radiance| radiance > 0.0),
                     is_double_sided: flags & DOUBLE_SIDED != 0,
                 })
@@ -103,7 +119,8 @@ impl SideTable {
                     let bits = |vertex: [f32; 3]| vertex.map(|coordinate| (coordinate + 0.0).to_bits());
                     let triangle = leaf_triangles.triangle(slot);
                     sheets.push((index, triangle.vertices.map(bits)));
-                    is_open.push(finishes.get(triangle.material as usize).is_none_or(|finish| finish.emits));
+                    let finish = finishes.get(triangle.material as usize);
+                    is_open.push(finish.is_none_or(|finish| finish.emits || finish.is_glass));
                 }
             }
         }
@@ -135,10 +152,10 @@ impl Sides {
         let [a, b, c] = vertices.map(Vec3::from);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let code = |normal: Vec3, reflects: bool| reflects.then(|| encode_normal(normal.to_array()));
-        let Finish { reflects, is_double_sided, .. } = finish;
+        let Finish { reflects, is_glass, is_double_sided, .. } = finish;
         Self {
             normals: [code(normal, reflects), code(-normal, reflects && is_double_sided)],
-            is_solid: !is_double_sided,
+            is_solid: !is_double_sided && !is_glass,
         }
     }
 }

@@ -57,6 +57,14 @@ pub struct StructureReads {
     pub irradiance_nodes: ReadStatistics,
     /// Irradiance points.
     pub irradiance_points: ReadStatistics,
+    /// Inner nodes above the photons of caustics.
+    pub caustic_nodes: ReadStatistics,
+    /// Photons of caustics.
+    pub caustic_photons: ReadStatistics,
+    /// Normals, texture coordinates and colours of triangles' corners.
+    pub attributes: ReadStatistics,
+    /// Textures and their texels.
+    pub textures: ReadStatistics,
 }
 
 /// Reads by stage of the chip's work.
@@ -95,6 +103,10 @@ impl MemoryStatistics {
                 photons: structure(Structure::Photons),
                 irradiance_nodes: structure(Structure::IrradianceNodes),
                 irradiance_points: structure(Structure::IrradiancePoints),
+                caustic_nodes: structure(Structure::CausticNodes),
+                caustic_photons: structure(Structure::CausticPhotons),
+                attributes: structure(Structure::Attributes),
+                textures: structure(Structure::Textures),
             },
             stages: StageReads {
                 eye: stage(Stage::Eye),

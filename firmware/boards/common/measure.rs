@@ -39,7 +39,7 @@ impl GatherOutlet for Nowhere {
 /// Renders the tile. The frame's parameters lie in the line behind the image, after their length. Returns what was counted;
 /// `None` if the memory holds anything else.
 pub(crate) fn render(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option<Counters> {
-    let scene = SceneImage { header: Header::read(lines.first()?).ok()? };
+    let scene = SceneImage { header: Header::read(lines.first_chunk()?).ok()? };
     let (&length, bytes) = lines.get(scene.header.lines as usize)?.0.split_first()?;
     let mut frame: FrameParameters = message::decode(bytes.get(..length.into())?)?;
     if work == Work::Eye {

@@ -2,7 +2,7 @@
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::checksum::{ImageChecksum, image_checksum};
-use photoncard_shared::image::{Header, HeaderError};
+use photoncard_shared::image::{HEADER_LINES, Header, HeaderError};
 use photoncard_shared::message::{CHECKSUMS_PER_REPLY, CHUNK_LINES, Fault, FaultCode};
 
 use super::OUT_OF_ORDER;
@@ -93,9 +93,12 @@ impl Check {
             return Err(Fault { code: FaultCode::ImageChecksum, detail: found as u32 });
         }
         memory.enter(Stage::Begin);
-        let line = memory.read(Structure::Header, LineAddress(0), 0..LINE_BYTES as u32)?;
+        let mut head = [Line::ZERO; HEADER_LINES];
+        for (address, line) in (0..).map(LineAddress).zip(&mut head) {
+            *line = *memory.read(Structure::Header, address, 0..LINE_BYTES as u32)?;
+        }
         let unsound = |detail: u32| Fault { code: FaultCode::ImageHeader, detail };
-        let header = Header::read(line).map_err(|error| match error {
+        let header = Header::read(&head).map_err(|error| match error {
             HeaderError::Version(version) => unsound(version as u32),
             _ => unsound(0),
         })?;

@@ -5,7 +5,7 @@ use core::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{DOUBLE_SIDED, Material, Record, Triangle};
+use photoncard_shared::layout::{DOUBLE_SIDED, Material, Record, Reflectance, Triangle};
 use photoncard_shared::message::Fault;
 
 use super::{Hit, Ray, SceneImage, magnitude, offset_origin};
@@ -146,10 +146,11 @@ pub(super) fn surface_of(
     let is_front = front_normal.dot(ray.direction) < 0.0;
     let double_sided = material.flags & DOUBLE_SIDED != 0;
     let visible = is_front || double_sided;
-    let reflection = Reflection {
-        diffuse: material.diffuse.into(),
-        specular: material.specular.into(),
-        exponent: material.exponent,
+    let reflection = match material.reflectance {
+        Reflectance::Phong { diffuse, specular, exponent } => {
+            Reflection { diffuse: diffuse.into(), specular: specular.into(), exponent }
+        }
+        _ => Reflection::BLACK,
     };
     Ok(Surface {
         // From the corners and not along the ray: the rounding is then that of the corners.

@@ -23,7 +23,9 @@ const COUNTS: usize = SECOND_MATERIAL + 1;
 const _: () = assert!(COUNTS + 1 == LINE_BYTES && 2 * COORDINATE_BYTES + 4 * VERTEX_LANES <= LINE_BYTES);
 
 /// The indices of materials end here.
-pub const MOST_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES);
+pub const MOST_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES - 1);
+/// In the place of a leaf for a material: its triangles may have cut-outs.
+const CUT_OUT: u32 = MOST_MATERIALS;
 
 /// A leaf, one line.
 ///
@@ -31,7 +33,7 @@ pub const MOST_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES);
 /// |---|---|
 /// | 0..108 | nine x, nine y, nine z of vertices, metres |
 /// | 108..120 | the vertices of the first corners, four bits a triangle; of the second; of the third |
-/// | 120..126 | the indices of two materials |
+/// | 120..126 | the indices of two materials, the upper bit set if their triangles may have cut-outs |
 /// | 126 | a bit for each triangle that is of the second material |
 /// | 127 | bits 0-3 the number of triangles, 4-7 that of vertices |
 #[derive(Clone, Copy)]
@@ -44,6 +46,8 @@ pub struct Triangle {
     pub vertices: [[f32; 3]; 3],
     /// Index of the material, below [`MOST_MATERIALS`].
     pub material: u32,
+    /// Whether the alpha of a texture or of the corners may cut something out of it.
+    pub cut_out: bool,
 }
 
 impl BvhLeaf<'_> {
@@ -98,7 +102,12 @@ impl BvhLeaf<'_> {
         let at = MATERIALS + MATERIAL_BYTES * usize::from(is_second);
         let [low, middle, high] = [0, 1, 2].map(|byte| u32::from(self.byte(at + byte)));
         let vertex = |vertex| [0, 1, 2].map(|axis| self.coordinate(vertex, axis));
-        Triangle { vertices: self.vertices_of(slot).map(vertex), material: low | middle << 8 | high << 16 }
+        let material = low | middle << 8 | high << 16;
+        Triangle {
+            vertices: self.vertices_of(slot).map(vertex),
+            material: material & !CUT_OUT,
+            cut_out: material & CUT_OUT != 0,
+        }
     }
 
     #[inline(always)]
@@ -126,7 +135,8 @@ impl BvhLeaf<'_> {
             if triangle.material >= MOST_MATERIALS {
                 return None;
             }
-            *line.get_mut(SECOND_MATERIAL)? |= (materials.index(triangle.material)? << slot) as u8;
+            let material = triangle.material | if triangle.cut_out { CUT_OUT } else { 0 };
+            *line.get_mut(SECOND_MATERIAL)? |= (materials.index(material)? << slot) as u8;
         }
         for (index, vertex) in vertices.items().enumerate() {
             for (axis, coordinate) in vertex.into_iter().enumerate() {
@@ -179,7 +189,7 @@ mod tests {
     fn apart(number: usize) -> Triangle {
         let coordinate = |corner: usize, axis: usize| (100 * number + 10 * corner + axis) as f32;
         let vertices = [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| coordinate(corner, axis)));
-        Triangle { vertices, material: 70_000 + number as u32 % 2 }
+        Triangle { vertices, material: 70_000 + number as u32 % 2, cut_out: number.is_multiple_of(2) }
     }
 
     /// The triangles of two by two squares.
@@ -187,7 +197,7 @@ mod tests {
         let vertex = |x: u32, y: u32| [x as f32, y as f32, (x * y) as f32];
         let square = |x, y| {
             let [a, b, c, d] = [vertex(x, y), vertex(x + 1, y), vertex(x + 1, y + 1), vertex(x, y + 1)];
-            [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices, material: x })
+            [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices, material: x, cut_out: false })
         };
         [square(0, 0), square(1, 0), square(0, 1), square(1, 1)].concat()
     }
@@ -229,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leaf_tells_two_materials_of_sixteen_million_apart() {
+    fn a_leaf_tells_two_materials_of_eight_million_apart() {
         let of = |material| Triangle { material, ..apart(1) };
         survive(&[of(MOST_MATERIALS - 1), of(0), of(MOST_MATERIALS - 1)]);
         assert!(BvhLeaf::encode(&[of(0), of(1), of(2)]).is_none());

@@ -1,0 +1,154 @@
+//! Materials: how a surface reflects, transmits and emits.
+
+use super::{Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
+
+/// In [`Material::flags`] and [`super::Emitter::flags`]: the back does what the front does.
+pub const DOUBLE_SIDED: u32 = 1;
+/// In [`Material::flags`], of [`Reflectance::Glass`]: the surface is a thin wall, through which light goes straight on.
+pub const THIN_WALLED: u32 = 2;
+
+const KIND_SHIFT: u32 = 4;
+const METALLIC_ROUGHNESS: u32 = 1;
+const GLASS: u32 = 2;
+
+/// In the place of a texture's index: there is none.
+pub const NO_TEXTURE: u16 = u16::MAX;
+
+/// A material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// How it reflects and transmits.
+    pub reflectance: Reflectance,
+    /// Emitted radiance, W/(sr m^2); the emissive texture multiplies it.
+    pub emission: [f32; 3],
+    /// [`DOUBLE_SIDED`], [`THIN_WALLED`] or 0.
+    pub flags: u32,
+    /// Of triangles with cut-outs: where the alpha of the base texture and of the corners is below this, there is nothing.
+    pub cutoff: f32,
+    /// Indices of the textures of base colour or diffuse albedo, of roughness (green) and metalness (blue), and of emission.
+    pub textures: [u16; 3],
+}
+
+/// What a material's colours and numbers mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reflectance {
+    /// Lambertian with one Phong lobe.
+    Phong {
+        /// Lambertian albedo; the base texture multiplies it.
+        diffuse: [f32; 3],
+        /// Albedo of the Phong lobe.
+        specular: [f32; 3],
+        /// Exponent of the Phong lobe.
+        exponent: f32,
+    },
+    /// glTF's metallic-roughness.
+    MetallicRoughness {
+        /// Albedo of the dielectric, reflectance of the metal; the base texture multiplies it.
+        base: [f32; 3],
+        /// Reflectance of the dielectric at normal incidence.
+        dielectric: [f32; 3],
+        /// Share of metal, 0 to 1.
+        metallic: f32,
+        /// Roughness, 0 to 1: perfectly specular at 0.
+        roughness: f32,
+    },
+    /// A smooth dielectric that light goes through.
+    Glass {
+        /// Colour of what goes through; the base texture multiplies it.
+        base: [f32; 3],
+        /// Absorption coefficient inside, 1/m.
+        absorption: [f32; 3],
+        /// Share of what is not reflected that goes through; the rest is reflected by a Lambertian surface of the base
+        /// colour.
+        transmission: f32,
+        /// Index of refraction.
+        ior: f32,
+    },
+}
+
+impl Record for Material {
+    const BYTES: usize = 64;
+}
+
+impl Material {
+    /// Reads a record.
+    #[inline(always)]
+    pub fn read(bytes: &[u8; Self::BYTES]) -> Self {
+        let kind = read_u32(bytes, 44);
+        let [first, second] = [read_vector(bytes, 0), read_vector(bytes, 12)];
+        let [a, b] = [read_f32(bytes, 24), read_f32(bytes, 28)];
+        let textures = [read_u32(bytes, 52), read_u32(bytes, 56)];
+        Self {
+            reflectance: match kind >> KIND_SHIFT {
+                METALLIC_ROUGHNESS => Reflectance::MetallicRoughness {
+                    base: first,
+                    dielectric: second,
+                    metallic: a,
+                    roughness: b,
+                },
+                GLASS => Reflectance::Glass { base: first, absorption: second, transmission: a, ior: b },
+                _ => Reflectance::Phong { diffuse: first, specular: second, exponent: a },
+            },
+            emission: read_vector(bytes, 32),
+            flags: kind & (DOUBLE_SIDED | THIN_WALLED),
+            cutoff: read_f32(bytes, 48),
+            textures: [textures[0] as u16, (textures[0] >> 16) as u16, textures[1] as u16],
+        }
+    }
+
+    /// The record's bytes.
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        let (kind, first, second, a, b) = match self.reflectance {
+            Reflectance::Phong { diffuse, specular, exponent } => (0, diffuse, specular, exponent, 0.0),
+            Reflectance::MetallicRoughness { base, dielectric, metallic, roughness } => {
+                (METALLIC_ROUGHNESS, base, dielectric, metallic, roughness)
+            }
+            Reflectance::Glass { base, absorption, transmission, ior } => {
+                (GLASS, base, absorption, transmission, ior)
+            }
+        };
+        write_vector(&mut bytes, 0, first);
+        write_vector(&mut bytes, 12, second);
+        write_f32(&mut bytes, 24, a);
+        write_f32(&mut bytes, 28, b);
+        write_vector(&mut bytes, 32, self.emission);
+        write_u32(&mut bytes, 44, self.flags | kind << KIND_SHIFT);
+        write_f32(&mut bytes, 48, self.cutoff);
+        let [base, metallic_roughness, emissive] = self.textures.map(u32::from);
+        write_u32(&mut bytes, 52, base | metallic_roughness << 16);
+        write_u32(&mut bytes, 56, emissive);
+        bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn materials_of_every_kind_survive_their_bytes() {
+        let [first, second] = [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]];
+        for reflectance in [
+            Reflectance::Phong { diffuse: first, specular: second, exponent: 32.0 },
+            Reflectance::MetallicRoughness {
+                base: first,
+                dielectric: second,
+                metallic: 0.25,
+                roughness: 0.75,
+            },
+            Reflectance::Glass { base: first, absorption: second, transmission: 0.9, ior: 1.5 },
+        ] {
+            for flags in [0, DOUBLE_SIDED, THIN_WALLED, DOUBLE_SIDED | THIN_WALLED] {
+                let material = Material {
+                    reflectance,
+                    emission: [18.0, 14.0, 6.5],
+                    flags,
+                    cutoff: 0.5,
+                    textures: [3, NO_TEXTURE, 70],
+                };
+                assert_eq!(Material::read(&material.to_bytes()), material);
+            }
+        }
+    }
+}

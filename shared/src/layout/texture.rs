@@ -1,0 +1,177 @@
+//! Textures: how an image lies on surfaces, and where its texels are.
+
+use super::{Record, read_f32, read_u32, write_f32, write_u32};
+use crate::address::LINE_BYTES;
+
+/// Texels of one line: a tile of the image, in rows, so that neighbours share a line.
+pub const TEXELS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
+/// Columns of a tile.
+pub const TILE_WIDTH: u32 = 8;
+/// Rows of a tile.
+pub const TILE_HEIGHT: u32 = TEXELS_PER_LINE / TILE_WIDTH;
+
+/// A texture. Tiles are in rows, and those of the right and lower border are whole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Texture {
+    /// The first line of its texels, counted in their section.
+    pub first_line: u32,
+    /// Texels in a row and rows: 1 to 65535.
+    pub size: [u16; 2],
+    /// What is beyond its edges, to the sides, and above and below.
+    pub wrap: [Wrap; 2],
+    /// Whether the nearest texel is taken, and not a mean of four.
+    pub nearest: bool,
+    /// Which of a triangle's two sets of texture coordinates it lies by.
+    pub set: u32,
+    /// What texels are.
+    pub format: TexelFormat,
+    /// Rows of the matrix that coordinates are multiplied with.
+    pub matrix: [[f32; 2]; 2],
+    /// What is added to them then.
+    pub offset: [f32; 2],
+}
+
+/// What is beyond the edge of a texture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The texture again.
+    #[default]
+    Repeat,
+    /// The texture mirrored.
+    Mirror,
+    /// The texel at the edge.
+    Clamp,
+}
+
+/// What four bytes of a texel are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TexelFormat {
+    /// Red, green and blue by the sRGB transfer function, linear alpha.
+    Srgb,
+    /// Red, green, blue and alpha, linear.
+    Linear,
+    /// Nine bits each of red, green and blue, five of a shared exponent, as OpenGL's `RGB9_E5`; alpha is 1.
+    SharedExponent,
+}
+
+impl Record for Texture {
+    const BYTES: usize = 40;
+}
+
+const WRAP_BITS: u32 = 2;
+const NEAREST: u32 = 1 << 4;
+const SECOND_SET: u32 = 1 << 5;
+const FORMAT_SHIFT: u32 = 6;
+
+impl Texture {
+    /// Reads a record.
+    #[inline(always)]
+    pub fn read(bytes: &[u8; Self::BYTES]) -> Self {
+        let size = read_u32(bytes, 4);
+        let flags = read_u32(bytes, 8);
+        let wrap = |axis: u32| match flags >> (WRAP_BITS * axis) & 3 {
+            0 => Wrap::Repeat,
+            1 => Wrap::Mirror,
+            _ => Wrap::Clamp,
+        };
+        let number = |index: usize| read_f32(bytes, 12 + 4 * index);
+        Self {
+            first_line: read_u32(bytes, 0),
+            // None is empty in a sound image.
+            size: [(size as u16).max(1), ((size >> 16) as u16).max(1)],
+            wrap: [wrap(0), wrap(1)],
+            nearest: flags & NEAREST != 0,
+            set: u32::from(flags & SECOND_SET != 0),
+            format: match flags >> FORMAT_SHIFT & 3 {
+                0 => TexelFormat::Srgb,
+                1 => TexelFormat::Linear,
+                _ => TexelFormat::SharedExponent,
+            },
+            matrix: [[number(0), number(1)], [number(2), number(3)]],
+            offset: [number(4), number(5)],
+        }
+    }
+
+    /// The record's bytes.
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        let [width, height] = self.size.map(u32::from);
+        let [across, down] = self.wrap.map(|wrap| wrap as u32);
+        let flags = across
+            | down << WRAP_BITS
+            | if self.nearest { NEAREST } else { 0 }
+            | if self.set == 1 { SECOND_SET } else { 0 }
+            | (self.format as u32) << FORMAT_SHIFT;
+        write_u32(&mut bytes, 0, self.first_line);
+        write_u32(&mut bytes, 4, width | height << 16);
+        write_u32(&mut bytes, 8, flags);
+        let numbers = self.matrix.as_flattened().iter().chain(&self.offset);
+        for (index, number) in numbers.enumerate() {
+            write_f32(&mut bytes, 12 + 4 * index, *number);
+        }
+        bytes
+    }
+
+    /// Lines of its texels.
+    pub fn lines(&self) -> u32 {
+        let [width, height] = self.size.map(u32::from);
+        width.div_ceil(TILE_WIDTH) * height.div_ceil(TILE_HEIGHT)
+    }
+
+    /// The line of a texel, counted in the section, and its place in there.
+    #[inline(always)]
+    pub fn locate(&self, column: u32, row: u32) -> (u32, usize) {
+        let tiles_across = u32::from(self.size[0]).div_ceil(TILE_WIDTH);
+        let tile = (row / TILE_HEIGHT).wrapping_mul(tiles_across).wrapping_add(column / TILE_WIDTH);
+        let place = row % TILE_HEIGHT * TILE_WIDTH + column % TILE_WIDTH;
+        (self.first_line.wrapping_add(tile), place as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    fn texture() -> Texture {
+        Texture {
+            first_line: 70_000,
+            size: [13, 6],
+            wrap: [Wrap::Mirror, Wrap::Clamp],
+            nearest: true,
+            set: 1,
+            format: TexelFormat::Linear,
+            matrix: [[0.5, -1.0], [2.0, 0.25]],
+            offset: [-3.0, 7.5],
+        }
+    }
+
+    #[test]
+    fn textures_survive_their_bytes() {
+        let plain = Texture { wrap: [Wrap::Repeat; 2], nearest: false, set: 0, ..texture() };
+        for format in [TexelFormat::Srgb, TexelFormat::Linear, TexelFormat::SharedExponent] {
+            for texture in [texture(), plain] {
+                let texture = Texture { format, ..texture };
+                assert_eq!(Texture::read(&texture.to_bytes()), texture);
+            }
+        }
+    }
+
+    #[test]
+    fn every_texel_has_a_place_of_its_own_in_the_textures_lines() {
+        let texture = texture();
+        let mut places = BTreeSet::new();
+        for row in 0..6 {
+            for column in 0..13 {
+                let (line, place) = texture.locate(column, row);
+                assert!(
+                    (70_000..70_000 + texture.lines()).contains(&line) && place < TEXELS_PER_LINE as usize
+                );
+                assert!(places.insert((line, place)));
+            }
+        }
+    }
+}
