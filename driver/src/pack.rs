@@ -94,6 +94,7 @@ pub struct PackedScene {
     radiance_unit: f32,
     emitter_density: f32,
     strongest_emission: f32,
+    keeps_photons: bool,
 }
 
 /// A complete card image.
@@ -119,6 +120,7 @@ impl PackedScene {
             radiance_unit: radiance_unit(scene, emitters),
             emitter_density: emitters.density_per_radiance(),
             strongest_emission: emitters.strongest_emission(),
+            keeps_photons: scene.keeps_photons(),
         };
         packed.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
         packed.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
@@ -184,6 +186,11 @@ impl PackedScene {
     /// Watts in the strongest channel of the strongest photon that the emitters send, as if it were the only one.
     pub(crate) fn strongest_emission(&self) -> f32 {
         self.strongest_emission
+    }
+
+    /// Whether there is any surface that photons are stored at.
+    pub(crate) fn keeps_photons(&self) -> bool {
+        self.keeps_photons
     }
 
     /// Bytes of the scene's lines.
