@@ -185,7 +185,7 @@ mod tests {
         let random = |i: u32, k: u32| (hash(hash(i).wrapping_add(k)) >> 8) as f32 / 16_777_216.0;
         let point = |i: u32, k: u32| Vec3::new(random(i, k), random(i, k + 1), random(i, k + 2));
         let corners = |i: u32| [0, 3, 6].map(|k| point(i, 9) + 0.1 * point(i, k));
-        (0..count).map(|i| Triangle { vertices: corners(i), material: i }).collect()
+        (0..count).map(|i| Triangle::new(corners(i), i)).collect()
     }
 
     /// The triangles below a child, each within the boxes that the nodes above give.
@@ -238,8 +238,7 @@ mod tests {
                 .flat_map(|(x, y)| {
                     let [a, b] = [vertex(x, y), vertex(x + 1, y)];
                     let [c, d] = [vertex(x + 1, y + 1), vertex(x, y + 1)];
-                    [[a, b, c], [a, c, d]]
-                        .map(|vertices| Triangle { vertices, material: hash(x + y) % materials })
+                    [[a, b, c], [a, c, d]].map(|vertices| Triangle::new(vertices, hash(x + y) % materials))
                 })
                 .collect();
             let hierarchy = build(&mesh).expect("builds");

@@ -225,18 +225,15 @@ pub enum SceneError {
     },
 
     /// Nothing emits light.
-    #[error("{origin}: the scene has no light")]
+    #[error("the scene has no light")]
     #[diagnostic(
         code(scene::no_light),
         help(
             "give a material of at least one triangle an emissiveFactor above 0 (and KHR_materials_emissive_strength \
-             for its radiance); lights of KHR_lights_punctual are not supported"
+             for its radiance), place a light of KHR_lights_punctual, or add an environment"
         )
     )]
-    NoLight {
-        /// The scene's file, or `the scene`.
-        origin: String,
-    },
+    NoLight,
 
     /// The scene has no camera of this name.
     #[error("the scene has no camera '{name}'")]

@@ -21,7 +21,7 @@ use crate::photon::leaves::PhotonTree;
 use crate::photon::map::{balance, for_each_in_heap};
 use crate::photon::stored::StoredPhoton;
 use crate::photon::{PhotonLayout, Photons, search_radius};
-use crate::scene::{Material, Scene};
+use crate::scene::{Material, Reflection, Scene};
 
 /// Photons of a line of leaves, the inner nodes' lines counted in, about.
 const PHOTONS_OF_A_LEAF: usize = 9;
@@ -373,11 +373,15 @@ fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl It
 }
 
 fn material_record(material: &Material) -> [u8; layout::Material::BYTES] {
+    let (diffuse, specular, exponent) = match material.reflection {
+        Reflection::Phong { diffuse, specular, exponent } => (diffuse, specular, exponent),
+        Reflection::MetallicRoughness { base_colour, .. } => (base_colour, Vec3::ZERO, 0.0),
+    };
     layout::Material {
         reflectance: layout::Reflectance::Phong {
-            diffuse: material.diffuse.to_array(),
-            specular: material.specular.to_array(),
-            exponent: material.exponent,
+            diffuse: diffuse.to_array(),
+            specular: specular.to_array(),
+            exponent,
         },
         emission: material.emission.to_array(),
         flags: if material.double_sided { layout::DOUBLE_SIDED } else { 0 },

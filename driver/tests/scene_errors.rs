@@ -5,9 +5,10 @@ mod scene_support;
 use std::fs;
 use std::path::Path;
 
+use glam::Vec3;
 use miette::Diagnostic;
 use photoncard_driver::error::SceneError;
-use photoncard_driver::scene::gltf;
+use photoncard_driver::scene::{Environment, Scene, gltf};
 use scene_support::{glb, load_bytes, load_changed, load_with, triangle_bytes, triangle_json};
 use serde_json::{Value, json};
 
@@ -238,11 +239,18 @@ fn hierarchies_that_are_no_trees() {
 #[test]
 fn scenes_without_light_or_geometry() {
     refused(&[
-        (&["no light"], |json| json["materials"][0]["emissiveFactor"] = json!([0, 0, 0])),
         (&["no triangles"], |json| json["scenes"][0]["nodes"] = json!([1])),
         (&["no triangles"], |json| json["meshes"][0]["primitives"][0]["mode"] = json!(5)),
         (&["all 1 triangles have zero area"], |json| json["nodes"][0]["scale"] = json!([1, 0, 1])),
     ]);
+}
+
+#[test]
+fn a_scene_without_light_loads_and_is_then_refused() {
+    let dark = load_changed(|json| json["materials"][0]["emissiveFactor"] = json!([0, 0, 0])).unwrap();
+    check(&dark.check_light().unwrap_err(), &["no light"]);
+    let lit = Scene { environment: Some(Environment::constant(Vec3::ONE)), ..dark };
+    assert!(lit.check_light().is_ok());
 }
 
 #[test]

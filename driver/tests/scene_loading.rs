@@ -6,7 +6,7 @@ use std::fs;
 
 use glam::Vec3;
 use photoncard_driver::error::SceneError;
-use photoncard_driver::scene::{Scene, gltf};
+use photoncard_driver::scene::{Material, Reflection, Scene, gltf};
 use scene_support::{glb, load_bytes, load_changed, load_with, triangle_bytes, triangle_json};
 use serde_json::{Value, json};
 
@@ -24,8 +24,8 @@ fn a_triangle_is_loaded_as_stated() {
     assert_eq!(scene.bounds(), (Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)));
     let material = &scene.materials[0];
     assert_eq!(material.name, "lamp");
-    assert_eq!(material.diffuse, Vec3::new(0.1, 0.2, 0.3));
-    assert_eq!(material.specular, Vec3::ZERO);
+    let diffuse = Vec3::new(0.1, 0.2, 0.3);
+    assert_eq!(material.reflection, Reflection::Phong { diffuse, specular: Vec3::ZERO, exponent: 0.0 });
     assert_eq!(material.emission, Vec3::new(4.0, 2.0, 1.0));
     assert!(!material.double_sided);
     let camera = scene.camera(None).unwrap();
@@ -210,12 +210,14 @@ fn a_stated_phong_lobe_is_taken() {
     })
     .unwrap();
     let material = &scene.materials[0];
-    assert_eq!((material.specular, material.exponent), (Vec3::new(0.1, 0.2, 0.3), 32.0));
+    let Reflection::Phong { specular, exponent, .. } = material.reflection else { panic!("{material:?}") };
+    assert_eq!((specular, exponent), (Vec3::new(0.1, 0.2, 0.3), 32.0));
     assert!(material.double_sided);
     assert!(scene.notices.is_empty(), "{:?}", scene.notices);
     for extras in [json!("text"), json!([1, 2]), json!({"photoncard": {}}), json!(null)] {
         let scene = load_changed(|json| json["materials"][0]["extras"] = extras).unwrap();
-        assert_eq!(scene.materials[0].specular, Vec3::ZERO);
+        let reflection = scene.materials[0].reflection;
+        assert!(matches!(reflection, Reflection::Phong { specular: Vec3::ZERO, .. }), "{reflection:?}");
     }
 }
 
@@ -228,7 +230,7 @@ fn a_primitive_without_a_material_is_white_and_one_sided() {
     })
     .unwrap();
     let material = &scene.materials[scene.triangles[1].material as usize];
-    assert_eq!((material.diffuse, material.emission), (Vec3::ONE, Vec3::ZERO));
+    assert_eq!(material, &Material::lambertian("default", Vec3::ONE));
     assert!(!material.double_sided);
     assert_eq!(scene.notices.len(), 1);
 }
@@ -283,10 +285,7 @@ fn cameras_are_found_by_name_and_have_unit_axes() {
 #[test]
 fn what_is_not_used_is_named_once() {
     type Change = fn(&mut Value);
-    let cases: [(&str, &str, Change); 13] = [
-        ("metallic-roughness", "'lamp'", |json| {
-            json["materials"][0]["extensions"]["KHR_materials_specular"] = json!({"specularFactor": 0.5});
-        }),
+    let cases: [(&str, &str, Change); 11] = [
         ("textures", "'lamp'", |json| {
             json["textures"] = json!([{"source": 0}]);
             json["images"] = json!([{"uri": "absent.png"}]);
@@ -320,11 +319,6 @@ fn what_is_not_used_is_named_once() {
             json["extensions"] =
                 json!({"KHR_lights_punctual": {"lights": [{"name": "sun", "type": "directional"}]}});
             json["nodes"][0]["extensions"] = json!({"KHR_lights_punctual": {"light": 0}});
-        }),
-        ("KHR_materials_transmission", "'lamp'", |json| {
-            json["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_materials_transmission"));
-            json["materials"][0]["extensions"]["KHR_materials_transmission"] =
-                json!({"transmissionFactor": 1.0});
         }),
         ("KHR_mesh_quantization", "KHR_mesh_quantization", |json| {
             json["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_mesh_quantization"));

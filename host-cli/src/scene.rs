@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use photoncard_driver::scene::Reflection;
 use photoncard_driver::scene::gltf::load;
 
 use crate::console::print;
@@ -23,10 +24,7 @@ pub(crate) fn info(path: &Path) -> Result<(), Failure> {
         ));
     }
     for material in &scene.materials {
-        let mut parts = vec![format!("diffuse {}", material.diffuse)];
-        if material.specular.max_element() > 0.0 {
-            parts.push(format!("specular {} exponent {}", material.specular, material.exponent));
-        }
+        let mut parts = reflection(&material.reflection);
         if material.emission.max_element() > 0.0 {
             parts.push(format!("emission {} W/(sr m^2)", material.emission));
         }
@@ -39,4 +37,29 @@ pub(crate) fn info(path: &Path) -> Result<(), Failure> {
         lines.push(format!("ignored    {notice}"));
     }
     print(&(lines.join("\n") + "\n"))
+}
+
+fn reflection(reflection: &Reflection) -> Vec<String> {
+    match reflection {
+        Reflection::Phong { diffuse, specular, exponent } => {
+            let mut parts = vec![format!("diffuse {diffuse}")];
+            if specular.max_element() > 0.0 {
+                parts.push(format!("specular {specular} exponent {exponent}"));
+            }
+            parts
+        }
+        Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
+            let mut parts = vec![format!(
+                "base colour {base_colour}, metallic {metallic}, roughness {roughness}, dielectric {dielectric}"
+            )];
+            if let Some(transmission) = transmission {
+                let kind = if transmission.is_volume { "volume" } else { "thin wall" };
+                parts.push(format!(
+                    "transmission {} through a {kind}, ior {}, absorption {} / m",
+                    transmission.factor, transmission.ior, transmission.absorption
+                ));
+            }
+            parts
+        }
+    }
 }

@@ -13,20 +13,13 @@ use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
 
 /// A white Lambertian, one-sided material of some albedo that does not emit.
 pub fn lambertian(name: &str, albedo: f32) -> Material {
-    Material {
-        name: name.into(),
-        diffuse: Vec3::splat(albedo),
-        specular: Vec3::ZERO,
-        exponent: 0.0,
-        emission: Vec3::ZERO,
-        double_sided: false,
-    }
+    Material::lambertian(name, Vec3::splat(albedo))
 }
 
 /// The two triangles of a quadrilateral with corners in counter-clockwise order, seen from its front.
 pub fn quad(corners: [Vec3; 4], material: u32) -> [Triangle; 2] {
     let [a, b, c, d] = corners;
-    [Triangle { vertices: [a, b, c], material }, Triangle { vertices: [a, c, d], material }]
+    [Triangle::new([a, b, c], material), Triangle::new([a, c, d], material)]
 }
 
 /// The six inner walls of the cube from -1 to 1, each of its own material: -x, +x, -y, +y, -z, +z.

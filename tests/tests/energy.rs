@@ -39,7 +39,7 @@ fn a_closed_room_stores_the_emitted_power_over_one_minus_the_albedo() {
     let emission = Vec3::new(3.0, 2.0, 0.5);
     // Nothing is stored where nothing is reflected: a thousandth stands for black.
     for albedo in [[0.001; 3], [0.2; 3], [0.5; 3], [0.8; 3], [0.7, 0.3, 0.1]] {
-        let walls = Material { diffuse: albedo.into(), ..lambertian("wall", 0.0) };
+        let walls = Material::lambertian("wall", albedo.into());
         let stored = stored_power(&pass(&lit_room(walls, emission), 3));
         for channel in 0..3 {
             let expected = LAMP * emission[channel] as f64 / (1.0 - albedo[channel] as f64);

@@ -121,7 +121,7 @@ fn box_and_far_triangle(distance: f32) -> Scene {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
     let mut scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
     let corner = Vec3::splat(distance);
-    scene.triangles.push(Triangle { vertices: [corner, corner + Vec3::X, corner + Vec3::Y], material: 0 });
+    scene.triangles.push(Triangle::new([corner, corner + Vec3::X, corner + Vec3::Y], 0));
     scene
 }
 

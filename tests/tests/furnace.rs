@@ -74,7 +74,7 @@ fn a_phong_wall_in_a_diffuse_furnace_shows_its_directional_albedo() {
         1,
     ));
     let walls = Material { emission: Vec3::splat(EMISSION), ..lambertian("wall", 0.5) };
-    let phong = Material { specular: Vec3::splat(specular), exponent, ..lambertian("phong", diffuse) };
+    let phong = Material::phong("phong", Vec3::splat(diffuse), Vec3::splat(specular), exponent);
     for angle in [0.0_f32, 0.6, 1.1] {
         let origin = Vec3::new(0.5 * angle.sin(), 0.0, 0.5 * angle.cos());
         let mut view = camera(origin, -origin);
@@ -110,7 +110,7 @@ fn lobe_albedo(specular: f64, exponent: f64, angle: f64) -> f64 {
 #[test]
 fn a_phong_furnace_shows_what_a_path_tracer_finds() {
     let (diffuse, specular, exponent) = (0.25, 0.35, 12.0);
-    let material = Material { specular: Vec3::splat(specular), exponent, ..lambertian("wall", diffuse) };
+    let material = Material::phong("wall", Vec3::splat(diffuse), Vec3::splat(specular), exponent);
     let scene = furnace(material);
     let film = render_or_panic(&scene, &settings()).film;
     let oracle =

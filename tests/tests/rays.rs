@@ -50,10 +50,10 @@ fn dented_sphere(center: Vec3, radius: f32, rings: u32) -> Vec<Triangle> {
         let [a, b] = [point(ring, segment), point(ring, segment + 1)];
         let [c, d] = [point(ring + 1, segment + 1), point(ring + 1, segment)];
         if ring > 0 {
-            triangles.push(Triangle { vertices: [a, b, c], material: 0 });
+            triangles.push(Triangle::new([a, b, c], 0));
         }
         if ring + 1 < rings {
-            triangles.push(Triangle { vertices: [a, c, d], material: 0 });
+            triangles.push(Triangle::new([a, c, d], 0));
         }
     }
     triangles

@@ -1,14 +1,86 @@
-//! The ranges a material's values must keep, however they were stated.
+//! Materials, and the ranges that their values must keep, however they were stated.
 
 use glam::Vec3;
-
-use super::Material;
 
 /// How far above 1 the sum of the two albedos may lie: they are often written in three digits.
 const SUM_TOLERANCE: f32 = 1e-4;
 
 /// The largest exponent: the lobe is then under a degree wide, and a mirror to the photons.
 pub const MAX_EXPONENT: f32 = 10_000.0;
+
+/// Radiances that an emitter may have, W/(sr m^2): their products and squares stay within single precision.
+const EMISSION: std::ops::RangeInclusive<f32> = 1e-20..=1e20;
+
+/// How a surface reflects, transmits and emits, and which of it is there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// The name in the file, or `material N`.
+    pub name: String,
+    /// How it reflects and transmits.
+    pub reflection: Reflection,
+    /// Radiance emitted from the front, W/(sr m^2). The emissive texture multiplies it.
+    pub emission: Vec3,
+    /// Whether the back reflects and emits as the front does. A one-sided back is black.
+    pub double_sided: bool,
+    /// Alpha below which the surface is not there (`alphaMode` `MASK`); alpha is `alpha` times the base texture's times
+    /// the corners'.
+    pub alpha_cutoff: Option<f32>,
+    /// Alpha of the base colour factor, 0 to 1.
+    pub alpha: f32,
+    /// The texture whose colour multiplies the base colour or the diffuse albedo, and whose alpha multiplies `alpha`; sRGB.
+    /// As those of the other textures, an index into [`Scene::textures`](super::Scene::textures).
+    pub base_texture: Option<u32>,
+    /// The texture whose green multiplies the roughness, and whose blue multiplies the metalness; linear.
+    pub metallic_roughness_texture: Option<u32>,
+    /// The texture that multiplies the emission; sRGB.
+    pub emissive_texture: Option<u32>,
+}
+
+/// How a surface reflects and transmits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reflection {
+    /// A Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2 pi) max(0, cos
+    /// alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`, or, without the lobe, by
+    /// `KHR_materials_specular` with the factor 0.
+    Phong {
+        /// Lambertian albedo, 0 to 1.
+        diffuse: Vec3,
+        /// Albedo of the Phong lobe, 0 to 1.
+        specular: Vec3,
+        /// Exponent of the Phong lobe, at least 0.
+        exponent: f32,
+    },
+    /// The metallic-roughness reflection of glTF 2.0 (appendix B).
+    MetallicRoughness {
+        /// Base colour, 0 to 1: the albedo of the dielectric part, and the reflectance at normal incidence of metal.
+        base_colour: Vec3,
+        /// The share of metal, 0 to 1.
+        metallic: f32,
+        /// Perceptual roughness, 0 to 1: the square root of the width alpha of the distribution of microfacets.
+        roughness: f32,
+        /// Reflectance at normal incidence of the dielectric part: `((ior - 1) / (ior + 1))^2` times the colour (the product at
+        /// most 1) and the factor of `KHR_materials_specular`.
+        dielectric: Vec3,
+        /// What light passes the surface; `None` for opaque ones.
+        transmission: Option<Transmission>,
+    },
+}
+
+/// How light passes a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transmission {
+    /// The share of the dielectric part's light that is transmitted instead of scattered, 0 to 1
+    /// (`KHR_materials_transmission`).
+    pub factor: f32,
+    /// Index of refraction, at least 1 (`KHR_materials_ior`; 1.5 without).
+    pub ior: f32,
+    /// Whether the surface bounds a volume (`KHR_materials_volume` with a thickness above 0), at which light is
+    /// refracted. Without one the surface is a thin wall, which light passes straight on.
+    pub is_volume: bool,
+    /// Absorption coefficient, 1/m: `-ln(attenuationColor) / attenuationDistance`; zero without a volume. The scale of nodes
+    /// does not change it.
+    pub absorption: Vec3,
+}
 
 /// A value of a material that is out of its range.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,73 +93,164 @@ pub(super) struct OutOfRange {
     pub(super) remedy: &'static str,
 }
 
-/// A value of a material that can be set.
+/// A value of a material that has a range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Property {
+    /// The diffuse albedo, or the base colour.
     Diffuse,
     Specular,
     Exponent,
     Emission,
-}
-
-impl Property {
-    pub(super) const ALL: [(&str, Self); 4] = [
-        ("diffuse", Self::Diffuse),
-        ("specular", Self::Specular),
-        ("exponent", Self::Exponent),
-        ("emission", Self::Emission),
-    ];
+    Metallic,
+    Roughness,
+    Dielectric,
+    Alpha,
+    AlphaCutoff,
+    Transmission,
+    Ior,
+    Absorption,
 }
 
 fn every(vector: Vec3, holds: impl Fn(f32) -> bool) -> bool {
     vector.to_array().into_iter().all(holds)
 }
 
-/// Radiances that an emitter may have, W/(sr m^2): their products and squares stay within single precision.
-const EMISSION: std::ops::RangeInclusive<f32> = 1e-20..=1e20;
+fn is_share(value: f32) -> bool {
+    (0.0..=1.0).contains(&value)
+}
+
+fn fault(property: Property, reason: String, remedy: &'static str) -> Result<(), OutOfRange> {
+    Err(OutOfRange { property, reason, remedy })
+}
 
 impl Material {
-    /// Checks that no value is negative, infinite or not a number, and that no more light leaves than arrives.
-    pub(super) fn check(&self) -> Result<(), OutOfRange> {
-        let fault = |property, reason: String, remedy| Err(OutOfRange { property, reason, remedy });
-        let albedo = |value: f32| (0.0..=1.0).contains(&value);
-        let Self { diffuse, specular, exponent, emission, .. } = self;
-        if !every(*diffuse, albedo) {
-            let reason = format!("the diffuse albedo is {diffuse}");
-            return fault(Property::Diffuse, reason, "albedos are 0 to 1 in each channel");
+    /// A one-sided material that does not emit, without textures.
+    pub fn new(name: impl Into<String>, reflection: Reflection) -> Self {
+        Self {
+            name: name.into(),
+            reflection,
+            emission: Vec3::ZERO,
+            double_sided: false,
+            alpha_cutoff: None,
+            alpha: 1.0,
+            base_texture: None,
+            metallic_roughness_texture: None,
+            emissive_texture: None,
         }
-        if !every(*specular, albedo) {
-            let reason = format!("the specular albedo is {specular}");
-            return fault(Property::Specular, reason, "albedos are 0 to 1 in each channel");
-        }
-        if !every(*diffuse + *specular, |sum| sum <= 1.0 + SUM_TOLERANCE) {
-            let reason = format!(
-                "the diffuse and the specular albedo add up to {}: more light leaves than arrives",
-                *diffuse + *specular
-            );
-            return fault(
-                Property::Specular,
-                reason,
-                "lower one of the two until no channel's sum exceeds 1",
-            );
-        }
-        if !(0.0..=MAX_EXPONENT).contains(exponent) {
-            let reason = format!("the Phong exponent is {exponent}");
-            return fault(Property::Exponent, reason, "the exponent is 0 to 10000");
-        }
-        if !every(*emission, |value| value == 0.0 || EMISSION.contains(&value)) {
-            let reason = format!("the emission is {emission}");
-            return fault(
-                Property::Emission,
-                reason,
-                "emission is a radiance of 0, or of 1e-20 to 1e20, in each channel",
-            );
-        }
-        Ok(())
+    }
+
+    /// A one-sided Lambertian material that does not emit.
+    pub fn lambertian(name: impl Into<String>, albedo: Vec3) -> Self {
+        Self::phong(name, albedo, Vec3::ZERO, 0.0)
+    }
+
+    /// A one-sided material of a Lambertian albedo and a Phong lobe that does not emit.
+    pub fn phong(name: impl Into<String>, diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
+        Self::new(name, Reflection::Phong { diffuse, specular, exponent })
     }
 
     /// Whether any channel emits.
     pub fn is_emissive(&self) -> bool {
         self.emission.max_element() > 0.0
+    }
+
+    /// The textures in use, as indices into [`Scene::textures`](super::Scene::textures).
+    pub fn textures(&self) -> impl Iterator<Item = u32> {
+        [self.base_texture, self.metallic_roughness_texture, self.emissive_texture].into_iter().flatten()
+    }
+
+    /// Checks that no value is negative, infinite or not a number, and that no more light leaves than arrives.
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        self.reflection.check()?;
+        let emission = self.emission;
+        if !every(emission, |value| value == 0.0 || EMISSION.contains(&value)) {
+            let remedy = "emission is a radiance of 0, or of 1e-20 to 1e20, in each channel";
+            return fault(Property::Emission, format!("the emission is {emission}"), remedy);
+        }
+        if !is_share(self.alpha) {
+            return fault(Property::Alpha, format!("the alpha is {}", self.alpha), "alpha is 0 to 1");
+        }
+        if let Some(cutoff) = self.alpha_cutoff.filter(|cutoff| !(*cutoff >= 0.0 && cutoff.is_finite())) {
+            let remedy = "the cutoff is 0 or more; 0.5 is common";
+            return fault(Property::AlphaCutoff, format!("the alpha cutoff is {cutoff}"), remedy);
+        }
+        Ok(())
+    }
+}
+
+impl Reflection {
+    fn check(&self) -> Result<(), OutOfRange> {
+        match *self {
+            Self::Phong { diffuse, specular, exponent } => check_phong(diffuse, specular, exponent),
+            Self::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
+                check_metallic_roughness(base_colour, metallic, roughness, dielectric)?;
+                transmission.map_or(Ok(()), |transmission| transmission.check())
+            }
+        }
+    }
+}
+
+fn check_phong(diffuse: Vec3, specular: Vec3, exponent: f32) -> Result<(), OutOfRange> {
+    const ALBEDO: &str = "albedos are 0 to 1 in each channel";
+    if !every(diffuse, is_share) {
+        return fault(Property::Diffuse, format!("the diffuse albedo is {diffuse}"), ALBEDO);
+    }
+    if !every(specular, is_share) {
+        return fault(Property::Specular, format!("the specular albedo is {specular}"), ALBEDO);
+    }
+    let sum = diffuse + specular;
+    if !every(sum, |sum| sum <= 1.0 + SUM_TOLERANCE) {
+        let reason =
+            format!("the diffuse and the specular albedo add up to {sum}: more light leaves than arrives");
+        let remedy = "lower one of the two until no channel's sum exceeds 1";
+        return fault(Property::Specular, reason, remedy);
+    }
+    if !(0.0..=MAX_EXPONENT).contains(&exponent) {
+        let reason = format!("the Phong exponent is {exponent}");
+        return fault(Property::Exponent, reason, "the exponent is 0 to 10000");
+    }
+    Ok(())
+}
+
+fn check_metallic_roughness(
+    base_colour: Vec3,
+    metallic: f32,
+    roughness: f32,
+    dielectric: Vec3,
+) -> Result<(), OutOfRange> {
+    if !every(base_colour, is_share) {
+        let reason = format!("the base colour is {base_colour}");
+        return fault(Property::Diffuse, reason, "base colours are 0 to 1 in each channel");
+    }
+    if !is_share(metallic) {
+        return fault(Property::Metallic, format!("the metalness is {metallic}"), "metalness is 0 to 1");
+    }
+    if !is_share(roughness) {
+        return fault(Property::Roughness, format!("the roughness is {roughness}"), "roughness is 0 to 1");
+    }
+    if !every(dielectric, is_share) {
+        let reason = format!("the reflectance at normal incidence is {dielectric}");
+        return fault(Property::Dielectric, reason, "the specular factor is 0 to 1, its colour 0 or more");
+    }
+    Ok(())
+}
+
+impl Transmission {
+    fn check(&self) -> Result<(), OutOfRange> {
+        let Self { factor, ior, absorption, .. } = *self;
+        if !is_share(factor) {
+            let reason = format!("the share of transmitted light is {factor}");
+            return fault(Property::Transmission, reason, "the transmission factor is 0 to 1");
+        }
+        if !(ior >= 1.0 && ior.is_finite()) {
+            let reason = format!("the index of refraction is {ior}");
+            return fault(Property::Ior, reason, "indices of refraction are 1 or more; glass has 1.5");
+        }
+        if !every(absorption, |value| value >= 0.0 && value.is_finite()) {
+            let reason = format!("the absorption coefficient is {absorption} / m");
+            let remedy = "the attenuation colour is 0 to 1 in each channel, the attenuation distance above 0";
+            return fault(Property::Absorption, reason, remedy);
+        }
+        Ok(())
     }
 }

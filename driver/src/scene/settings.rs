@@ -2,26 +2,59 @@
 
 use glam::Vec3;
 
-use super::material::Property;
-use super::{Material, Scene};
+use super::{Material, Reflection, Scene};
 use crate::error::SceneError;
 
 const FORM: &str = "write MATERIAL.PROPERTY=VALUE, for example floor.exponent=32 or lamp.emission=18,14,7; the \
-                    properties are diffuse, specular, emission and exponent";
+                    properties are diffuse, specular, exponent, metallic, roughness and emission";
 
 /// How many names an error proposes.
 const PROPOSED: usize = 5;
 
+/// A value that can be set.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Property {
+    Diffuse,
+    Specular,
+    Exponent,
+    Metallic,
+    Roughness,
+    Emission,
+}
+
+impl Property {
+    const ALL: [(&str, Self); 6] = [
+        ("diffuse", Self::Diffuse),
+        ("specular", Self::Specular),
+        ("exponent", Self::Exponent),
+        ("metallic", Self::Metallic),
+        ("roughness", Self::Roughness),
+        ("emission", Self::Emission),
+    ];
+
+    /// The name of a property that is one number.
+    fn as_number(self) -> Option<&'static str> {
+        match self {
+            Self::Exponent => Some("the exponent"),
+            Self::Metallic => Some("the metalness"),
+            Self::Roughness => Some("the roughness"),
+            Self::Diffuse | Self::Specular | Self::Emission => None,
+        }
+    }
+}
+
 impl Scene {
     /// Applies `MATERIAL.PROPERTY=VALUE` to every material of that name.
     ///
-    /// The property is `diffuse`, `specular` or `emission` with a value `r,g,b` or one number for all three, or
-    /// `exponent` with one number. The material's name may itself contain dots. Whether the scene still has a light
+    /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material) or `emission`
+    /// of any material, `specular` or `exponent` of one that states a Phong lobe or is Lambertian, or `metallic` or
+    /// `roughness` of a metallic-roughness one. Colours are `r,g,b` or one number for all three, the others one number. Textures
+    /// go on to multiply what they multiply. The material's name may itself contain dots. Whether the scene still has a light
     /// is for [`Scene::check_light`] to say once all settings are applied.
     ///
     /// # Errors
-    /// If the form is not kept, no material has that name, or the material would then be out of range; the scene
-    /// stays as it was.
+    /// If the form is not kept, no material has that name, it has no such property, or it would then be out of range; the
+    /// scene stays as it was.
     pub fn apply(&mut self, assignment: &str) -> Result<(), SceneError> {
         let fault = |reason: String, remedy| SceneError::Setting {
             assignment: assignment.to_owned(),
@@ -38,8 +71,8 @@ impl Scene {
             .ok_or_else(|| fault(format!("there is no property '{}'", property.trim()), FORM))?;
         let values =
             parse(value).ok_or_else(|| fault(format!("'{value}' is neither a number nor r,g,b"), FORM))?;
-        if property == Property::Exponent && values.len() != 1 {
-            return Err(form("the exponent is one number"));
+        if let Some(name) = property.as_number().filter(|_| values.len() != 1) {
+            return Err(form(&format!("{name} is one number")));
         }
         let selected: Vec<_> =
             (0..self.materials.len()).filter(|&index| self.materials[index].name == name).collect();
@@ -54,7 +87,7 @@ impl Scene {
         let mut changed = Vec::with_capacity(selected.len());
         for index in selected {
             let mut material = self.materials[index].clone();
-            material.set(property, &values);
+            material.set(property, &values).map_err(|(reason, remedy)| fault(reason.to_owned(), remedy))?;
             material.check().map_err(|out_of_range| fault(out_of_range.reason, out_of_range.remedy))?;
             changed.push((index, material));
         }
@@ -66,18 +99,37 @@ impl Scene {
 }
 
 impl Material {
-    fn set(&mut self, property: Property, values: &[f32]) {
-        let vector = match *values {
+    /// Sets a property, or says why there is none and what to do.
+    fn set(&mut self, property: Property, values: &[f32]) -> Result<(), (&'static str, &'static str)> {
+        let value = match *values {
             [red, green, blue] => Vec3::new(red, green, blue),
             [value, ..] => Vec3::splat(value),
-            [] => return,
+            [] => return Ok(()),
         };
-        match property {
-            Property::Diffuse => self.diffuse = vector,
-            Property::Specular => self.specular = vector,
-            Property::Emission => self.emission = vector,
-            Property::Exponent => self.exponent = vector.x,
+        match (property, &mut self.reflection) {
+            (Property::Emission, _) => self.emission = value,
+            (Property::Diffuse, Reflection::Phong { diffuse: target, .. })
+            | (Property::Diffuse, Reflection::MetallicRoughness { base_colour: target, .. })
+            | (Property::Specular, Reflection::Phong { specular: target, .. }) => *target = value,
+            (Property::Exponent, Reflection::Phong { exponent: target, .. })
+            | (Property::Metallic, Reflection::MetallicRoughness { metallic: target, .. })
+            | (Property::Roughness, Reflection::MetallicRoughness { roughness: target, .. }) => {
+                *target = value.x;
+            }
+            (Property::Specular | Property::Exponent, Reflection::MetallicRoughness { .. }) => {
+                return Err((
+                    "the material is a metallic-roughness one, which has no Phong lobe",
+                    "set metallic or roughness instead, or state a lobe in the material's extras in the file",
+                ));
+            }
+            (Property::Metallic | Property::Roughness, Reflection::Phong { .. }) => {
+                return Err((
+                    "the material is a Lambertian or Phong one, which has neither metalness nor roughness",
+                    "set specular or exponent instead, or take the Phong lobe or the specular factor of 0 out of the file",
+                ));
+            }
         }
+        Ok(())
     }
 }
 
@@ -119,16 +171,23 @@ mod tests {
     use super::*;
 
     fn scene() -> Scene {
-        let material = |name: &str| Material {
-            name: name.to_owned(),
-            diffuse: Vec3::splat(0.5),
-            specular: Vec3::ZERO,
-            exponent: 0.0,
-            emission: Vec3::ZERO,
-            double_sided: false,
-        };
-        let materials = ["floor", "wall.left", "a=b", "floor"].map(material).to_vec();
+        let material = |name: &str| Material::lambertian(name, Vec3::splat(0.5));
+        let mut materials = ["floor", "wall.left", "a=b", "floor"].map(material).to_vec();
+        materials.push(Material::new("metal", METAL));
         Scene { materials, ..Scene::default() }
+    }
+
+    const METAL: Reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::splat(0.9),
+        metallic: 1.0,
+        roughness: 0.5,
+        dielectric: Vec3::splat(0.04),
+        transmission: None,
+    };
+
+    fn exponent(material: &Material) -> f32 {
+        let Reflection::Phong { exponent, .. } = material.reflection else { panic!("{material:?}") };
+        exponent
     }
 
     #[test]
@@ -140,12 +199,24 @@ mod tests {
             scene.apply(assignment).unwrap();
         }
         for index in [0, 3] {
-            let floor = &scene.materials[index];
-            assert_eq!(floor.exponent, 32.0);
-            assert_eq!(floor.specular, Vec3::new(0.1, 0.2, 0.3));
-            assert_eq!((floor.diffuse, floor.emission), (Vec3::splat(0.25), Vec3::splat(5.0)));
+            let mut expected = Material::phong("floor", Vec3::splat(0.25), Vec3::new(0.1, 0.2, 0.3), 32.0);
+            expected.emission = Vec3::splat(5.0);
+            assert_eq!(scene.materials[index], expected);
         }
-        assert_eq!(scene.materials[1].exponent, 0.0);
+        assert_eq!(exponent(&scene.materials[1]), 0.0);
+    }
+
+    #[test]
+    fn a_metallic_roughness_material_has_properties_of_its_own() {
+        let mut scene = scene();
+        for assignment in ["metal.metallic=0.5", "metal.roughness=0.25", "metal.diffuse=0.1,0.2,0.3"] {
+            scene.apply(assignment).unwrap();
+        }
+        let reflection = scene.materials[4].reflection;
+        let Reflection::MetallicRoughness { base_colour, metallic, roughness, .. } = reflection else {
+            panic!("{reflection:?}")
+        };
+        assert_eq!((base_colour, metallic, roughness), (Vec3::new(0.1, 0.2, 0.3), 0.5, 0.25));
     }
 
     #[test]
@@ -153,7 +224,7 @@ mod tests {
         let mut scene = scene();
         scene.apply("wall.left.exponent=2").unwrap();
         scene.apply("a=b.exponent=3").unwrap();
-        assert_eq!((scene.materials[1].exponent, scene.materials[2].exponent), (2.0, 3.0));
+        assert_eq!([1, 2].map(|index| exponent(&scene.materials[index])), [2.0, 3.0]);
     }
 
     #[test]
@@ -187,6 +258,14 @@ mod tests {
             "floor.emission=-1",
             "floor.emission=inf",
             "floor.emission=1,,2",
+            "floor.metallic=1",
+            "floor.roughness=1",
+            "metal.specular=0.1",
+            "metal.exponent=4",
+            "metal.metallic=1.5",
+            "metal.roughness=-1",
+            "metal.roughness=0,0,0",
+            "metal.diffuse=2",
             ".exponent=1",
             "=",
         ] {
@@ -202,7 +281,7 @@ mod tests {
     #[test]
     fn materials_of_one_name_change_together() {
         let mut scene = scene();
-        scene.materials[3].diffuse = Vec3::ONE;
+        scene.materials[3] = Material::lambertian("floor", Vec3::ONE);
         let before = scene.materials.clone();
         assert!(scene.apply("floor.specular=0.3").is_err());
         assert_eq!(scene.materials, before);

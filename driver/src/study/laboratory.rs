@@ -205,6 +205,7 @@ impl<'a> Laboratory<'a> {
         for assignment in &point.assignments {
             scene.apply(assignment)?;
         }
+        scene.check_light()?;
         let packed = PackedScene::new(&scene, &Emitters::new(&scene)).map_err(RenderError::from)?;
         let settings = point.settings.photon_settings();
         let go_on = |_| !self.observer.is_stopped();

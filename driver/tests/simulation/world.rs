@@ -21,15 +21,12 @@ use photoncard_shared::message::{Fault, FaultCode, FrameParameters};
 /// A corner of floor and wall under a lamp.
 fn scene() -> Scene {
     let quad = |a: Vec3, u: Vec3, v: Vec3, material| {
-        [[a, a + u, a + u + v], [a, a + u + v, a + v]].map(|vertices| Triangle { vertices, material })
+        [[a, a + u, a + u + v], [a, a + u + v, a + v]].map(|vertices| Triangle::new(vertices, material))
     };
     let material = |diffuse: f32, emission: f32| Material {
-        name: "material".into(),
-        diffuse: Vec3::splat(diffuse),
-        specular: Vec3::ZERO,
-        exponent: 0.0,
         emission: Vec3::splat(emission),
         double_sided: true,
+        ..Material::lambertian("material", Vec3::splat(diffuse))
     };
     let quads = [
         quad(Vec3::new(-1.0, -1.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0, 0),

@@ -5,6 +5,7 @@ use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{precompute_irradiance, trace};
 use photoncard_driver::render::RenderSettings;
+use photoncard_driver::scene::Material;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::message::{Command, Drain, FaultCode, FrameParameters, Radiance, Sampling, Tile};
 
@@ -26,8 +27,7 @@ pub(super) struct Image {
 fn images() -> [CardImage; 2] {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;
-    let mut glossy = lambertian("glossy", 0.5);
-    (glossy.specular, glossy.exponent) = (Vec3::splat(0.25), 12.0);
+    let glossy = Material::phong("glossy", Vec3::splat(0.5), Vec3::splat(0.25), 12.0);
     let walls = room([0, 2, 0, 1, 0, 2]);
     let scene = scene(walls, vec![lambertian("wall", 0.5), lamp, glossy], camera(Vec3::ZERO, Vec3::NEG_Z));
     let image = || {

@@ -7,8 +7,8 @@ use serde::Deserialize;
 use super::document::Document;
 use super::notices::Notices;
 use crate::error::SceneError;
-use crate::scene::Material;
 use crate::scene::material::Property;
+use crate::scene::{Material, Reflection, Transmission};
 
 /// What `extras` may hold for this renderer; everything else in `extras` is other programs' business.
 #[derive(Deserialize)]
@@ -31,14 +31,7 @@ struct Phong {
 
 /// The material of primitives that state none: glTF's default.
 pub(super) fn default_material() -> Material {
-    Material {
-        name: "default".to_owned(),
-        diffuse: Vec3::ONE,
-        specular: Vec3::ZERO,
-        exponent: 0.0,
-        emission: Vec3::ZERO,
-        double_sided: false,
-    }
+    Material::lambertian("default", Vec3::ONE)
 }
 
 /// Every material of the file, in its order.
@@ -51,32 +44,39 @@ fn load_one(
     document: &Document,
     index: usize,
     source: &json::Material,
-    notices: &mut Notices,
+    _notices: &mut Notices,
 ) -> Result<Material, SceneError> {
     let name = source.name.clone().unwrap_or_else(|| format!("material {index}"));
     let [red, green, blue, _] = source.pbr_metallic_roughness.base_color_factor.0;
     let extensions = source.extensions.as_ref();
     let strength = extensions.and_then(|extensions| extensions.emissive_strength.as_ref());
     let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
-    let mut material = Material {
-        name,
-        diffuse: Vec3::new(red, green, blue),
-        specular: Vec3::ZERO,
-        exponent: 0.0,
-        emission: Vec3::from(source.emissive_factor.0) * strength,
-        double_sided: source.double_sided,
-    };
+    let base_colour = Vec3::new(red, green, blue);
     let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
     let is_lambertian = specular.is_some_and(|specular| specular.specular_factor.0 == 0.0);
-    if let Some(phong) = read_phong(document, index, source, &material.name)? {
-        material.specular = Vec3::from(phong.specular);
-        material.exponent = phong.exponent;
-    } else if !is_lambertian {
-        notices.metallic_roughness.push(material.name.clone());
-    }
+    let reflection = if let Some(phong) = read_phong(document, index, source, &name)? {
+        let (specular, exponent) = (Vec3::from(phong.specular), phong.exponent);
+        Reflection::Phong { diffuse: base_colour, specular, exponent }
+    } else if is_lambertian {
+        Reflection::Phong { diffuse: base_colour, specular: Vec3::ZERO, exponent: 0.0 }
+    } else {
+        metallic_roughness(source, base_colour)
+    };
+    let material = Material {
+        emission: Vec3::from(source.emissive_factor.0) * strength,
+        double_sided: source.double_sided,
+        ..Material::new(name, reflection)
+    };
     material.check().map_err(|fault| {
         let item = match fault.property {
-            Property::Diffuse => "pbrMetallicRoughness.baseColorFactor",
+            Property::Diffuse | Property::Alpha => "pbrMetallicRoughness.baseColorFactor",
+            Property::Metallic => "pbrMetallicRoughness.metallicFactor",
+            Property::Roughness => "pbrMetallicRoughness.roughnessFactor",
+            Property::Dielectric => "extensions.KHR_materials_specular",
+            Property::AlphaCutoff => "alphaCutoff",
+            Property::Transmission => "extensions.KHR_materials_transmission.transmissionFactor",
+            Property::Ior => "extensions.KHR_materials_ior.ior",
+            Property::Absorption => "extensions.KHR_materials_volume",
             Property::Specular => "extras.photoncard.phong.specular",
             Property::Exponent => "extras.photoncard.phong.exponent",
             Property::Emission => "emissiveFactor",
@@ -89,6 +89,49 @@ fn load_one(
         }
     })?;
     Ok(material)
+}
+
+/// The index of refraction of materials that state none.
+const IOR: f32 = 1.5;
+
+/// Beyond this, 1/m, nothing is seen through a film of atoms.
+const MOST_ABSORPTION: f32 = 1e12;
+
+/// glTF's reflection, with the extensions for dielectrics.
+fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection {
+    let pbr = &source.pbr_metallic_roughness;
+    let extensions = source.extensions.as_ref();
+    let ior = extensions.and_then(|extensions| extensions.ior.as_ref()).map_or(IOR, |ior| ior.ior.0);
+    // With an index of 0, which stands for an infinite one, this is 1, as KHR_materials_ior has it.
+    let amplitude = (ior - 1.0) / (ior + 1.0);
+    let normal_reflectance = amplitude * amplitude;
+    let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
+    let (factor, colour) = specular.map_or((1.0, Vec3::ONE), |specular| {
+        (specular.specular_factor.0, Vec3::from(specular.specular_color_factor.0))
+    });
+    Reflection::MetallicRoughness {
+        base_colour,
+        metallic: pbr.metallic_factor.0,
+        roughness: pbr.roughness_factor.0,
+        dielectric: (normal_reflectance * colour).min(Vec3::ONE) * factor,
+        // What reflects everything transmits nothing.
+        transmission: if ior == 0.0 { None } else { transmission(extensions, ior) },
+    }
+}
+
+fn transmission(extensions: Option<&json::extensions::material::Material>, ior: f32) -> Option<Transmission> {
+    let factor = extensions?.transmission.as_ref()?.transmission_factor.0;
+    let volume = extensions?.volume.as_ref().filter(|volume| volume.thickness_factor.0 > 0.0);
+    let absorption = volume.map_or(Vec3::ZERO, |volume| {
+        let distance = volume.attenuation_distance.0;
+        let coefficient = |colour: f32| match -libm::logf(colour) / distance {
+            // Black, or white without a distance.
+            infinite if infinite == f32::INFINITY => MOST_ABSORPTION,
+            coefficient => coefficient.min(MOST_ABSORPTION),
+        };
+        Vec3::from(volume.attenuation_color.0.map(coefficient))
+    });
+    (factor != 0.0).then_some(Transmission { factor, ior, is_volume: volume.is_some(), absorption })
 }
 
 fn read_phong(

@@ -132,7 +132,7 @@ impl<'a> MeshPlacer<'a> {
             if mirrored {
                 vertices.swap(1, 2);
             }
-            let placed = Triangle { vertices, material };
+            let placed = Triangle::new(vertices, material);
             if placed.area() > 0.0 {
                 scene.triangles.push(placed);
                 is_smooth = is_smooth || primitive.is_smooth(corners);

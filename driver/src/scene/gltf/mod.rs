@@ -35,8 +35,8 @@ const MAX_DEPTH: usize = 1024;
 /// What the file holds and the renderer does not use is named in [`Scene::notices`].
 ///
 /// # Errors
-/// If the file, or a buffer it refers to, cannot be read, breaks a rule of glTF, or holds nothing to render: no
-/// triangle with an area, or none that emits. The error names the place and the remedy.
+/// If the file, or a file it refers to, cannot be read, breaks a rule of glTF, or holds no triangle with an area. The
+/// error names the place and the remedy. Whether there is light is for [`Scene::check_light`] to say.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
     let document = Document::read(path)?;
     let buffers = buffers::load(&document)?;
@@ -50,9 +50,6 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
         (true, 0) => return Err(SceneError::NoGeometry { file: file() }),
         (true, skipped) => return Err(SceneError::OnlyZeroArea { file: file(), skipped }),
         _ => {}
-    }
-    if !scene.has_light() {
-        return Err(SceneError::NoLight { origin: path.display().to_string() });
     }
     if scene.cameras.is_empty() {
         scene.cameras.push(camera::frame(&scene));

@@ -17,8 +17,6 @@ const LISTED: usize = 8;
 /// What loading found; the rest is in the JSON.
 #[derive(Default)]
 pub(super) struct Notices {
-    /// Materials rendered as Lambertian although they reflect.
-    pub(super) metallic_roughness: Vec<String>,
     /// Indices of meshes whose normals are not those of their triangles.
     pub(super) smooth: BTreeSet<usize>,
     /// Orthographic cameras.
@@ -70,7 +68,6 @@ impl Notices {
                 sentences.push(format!("{sentence}: {}", list(kind, names)));
             }
         };
-        note("metallic-roughness reflection is rendered as Lambertian", "material", &self.metallic_roughness);
         note("textures are ignored, the factors alone count", "material", &materials(root, has_texture));
         let blended = materials(root, |material| material.alpha_mode != Checked::Valid(AlphaMode::Opaque));
         note("alpha is ignored, the surface is rendered opaque", "material", &blended);

@@ -1,0 +1,48 @@
+//! A checksum of a scene.
+
+use std::fmt::Write;
+
+use photoncard_shared::checksum::Checksum;
+
+use super::Scene;
+
+impl Scene {
+    /// A checksum of all that a render takes from the scene, as text.
+    pub fn checksum(&self) -> String {
+        let mut sum = Checksum::default();
+        for triangle in &self.triangles {
+            triangle.vertices.iter().for_each(|vertex| add(&mut sum, &vertex.to_array()));
+            sum.update(&triangle.material.to_le_bytes());
+            sum.update(&triangle.attributes.to_le_bytes());
+        }
+        for attributes in &self.attributes {
+            sum.update(&[u8::from(attributes.normals.is_some())]);
+            attributes.normals.iter().flatten().for_each(|normal| add(&mut sum, &normal.to_array()));
+            attributes.coordinates.iter().flatten().for_each(|place| add(&mut sum, &place.to_array()));
+            add(&mut sum, attributes.colours.as_flattened());
+        }
+        for image in &self.images {
+            sum.update(image.texels.as_flattened());
+        }
+        if let Some(environment) = &self.environment {
+            add(&mut sum, environment.texels.as_flattened());
+        }
+        sum.update(self.description().as_bytes());
+        format!("{:08x}", sum.value())
+    }
+
+    /// All but triangles and texels, as text. Floating-point numbers are written so that they read back the same.
+    fn description(&self) -> String {
+        let mut text = String::new();
+        let _ = write!(text, "{:?}{:?}{:?}{:?}", self.materials, self.cameras, self.textures, self.lights);
+        for image in &self.images {
+            let _ = write!(text, "{} {} {:?}", image.width, image.height, image.encoding);
+        }
+        let _ = write!(text, "{:?}", self.environment.as_ref().map(|map| (map.width, map.height)));
+        text
+    }
+}
+
+fn add(sum: &mut Checksum, values: &[f32]) {
+    values.iter().for_each(|value| sum.update(&value.to_le_bytes()));
+}
