@@ -382,6 +382,9 @@ fn check_frame(budget: &Budget, header: &Header, frame: &FrameParameters) -> Res
         true,
         frame.queue >= 1,
         frame.radiance == Radiance::Density || has_irradiance(header),
+        frame.caustic_neighbors == 0
+            || frame.caustic_neighbors >= 2 && within(frame.caustic_neighbors, budget.neighbors),
+        frame.caustic_max_distance.is_finite() && frame.caustic_max_distance >= 0.0,
     ];
     match checks.iter().position(|&holds| !holds) {
         Some(index) => Err(Fault { code: FaultCode::Parameter, detail: index as u32 }),

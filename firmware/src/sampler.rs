@@ -23,6 +23,8 @@ pub enum Dimension {
     Irradiance = 4,
     /// The directions of the rays that survey an irradiance record's surroundings.
     Survey = 5,
+    /// Which way an eye ray goes on at perfectly specular surfaces.
+    Specular = 6,
 }
 
 /// A pattern of points for one pixel, sample and dimension.
@@ -41,6 +43,12 @@ impl Pattern {
     #[inline(always)]
     pub fn dither(self, index: u32) -> u32 {
         self.bits(index, 0x2545_f491)
+    }
+
+    /// A random number in [0, 1) for a choice of the path that begins with point `index`.
+    #[inline(always)]
+    pub fn choice(self, index: u32, choice: u32) -> f32 {
+        unit_interval(hash(self.bits(index, 0x1656_67b1).wrapping_add(choice)))
     }
 
     /// Random bits for the place of a point in its stratum of a line.

@@ -104,6 +104,10 @@ impl TechniqueMemory {
 /// Final gather rays of one sample that any budget may allow.
 pub const MOST_GATHER_RAYS: u32 = 1 << 14;
 
+/// Perfectly specular surfaces that a path may meet: what would meet more is black. In a glass ball the eighth reflection inside
+/// carries less than a millionth.
+pub const SPECULAR_BOUNCES: u32 = 16;
+
 /// Direction bins that gather rays may be grouped in.
 pub const MOST_BINS: u32 = 256;
 

@@ -13,6 +13,12 @@ pub struct Counters {
     pub gather_rays: u64,
     /// Rays that survey the surroundings of irradiance records.
     pub survey_rays: u64,
+    /// Rays that left perfectly specular surfaces, on the way of any of these but shadow rays.
+    pub specular_rays: u64,
+    /// Paths that were lost: they met too many perfectly specular surfaces, or one that takes everything.
+    pub lost_paths: u64,
+    /// Searches for the nearest photons of caustics.
+    pub caustic_gathers: u64,
     /// Searches for the nearest photons.
     pub gathers: u64,
     /// Those of them that made a table of directions.
@@ -48,6 +54,9 @@ impl Counters {
         shadow_rays: 0,
         gather_rays: 0,
         survey_rays: 0,
+        specular_rays: 0,
+        lost_paths: 0,
+        caustic_gathers: 0,
         gathers: 0,
         tables: 0,
         records: 0,
@@ -66,8 +75,9 @@ impl Counters {
     /// Rays of any kind, gathers and lookups of irradiance, together.
     #[inline(always)]
     pub fn rays_and_gathers(&self) -> u64 {
-        let rays = [self.eye_rays, self.shadow_rays, self.gather_rays, self.survey_rays];
-        rays.into_iter().fold(self.gathers.wrapping_add(self.lookups), u64::wrapping_add)
+        let rays = [self.eye_rays, self.shadow_rays, self.gather_rays, self.survey_rays, self.specular_rays];
+        let searches = [self.gathers, self.caustic_gathers, self.lookups];
+        rays.into_iter().chain(searches).fold(0, u64::wrapping_add)
     }
 
     /// Adds another chip's counts.
@@ -76,6 +86,9 @@ impl Counters {
         self.shadow_rays = self.shadow_rays.saturating_add(other.shadow_rays);
         self.gather_rays = self.gather_rays.saturating_add(other.gather_rays);
         self.survey_rays = self.survey_rays.saturating_add(other.survey_rays);
+        self.specular_rays = self.specular_rays.saturating_add(other.specular_rays);
+        self.lost_paths = self.lost_paths.saturating_add(other.lost_paths);
+        self.caustic_gathers = self.caustic_gathers.saturating_add(other.caustic_gathers);
         self.gathers = self.gathers.saturating_add(other.gathers);
         self.tables = self.tables.saturating_add(other.tables);
         self.records = self.records.saturating_add(other.records);

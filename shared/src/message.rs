@@ -90,6 +90,11 @@ pub struct FrameParameters {
     pub queue: u32,
     /// What tells the radiance at the end of a gather ray.
     pub radiance: Radiance,
+    /// Photons of caustics that a gather looks for, at least 2; none without a caustic map: then gather rays bring the light of
+    /// emitters by way of perfectly specular surfaces.
+    pub caustic_neighbors: u32,
+    /// How far from its place such a gather looks, metres.
+    pub caustic_max_distance: f32,
 }
 
 /// What the directions of final gather rays are chosen by. The expectation of the picture is the same.

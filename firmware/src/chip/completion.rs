@@ -38,11 +38,11 @@ impl Completion {
         let samples = context.frame.samples;
         let end = samples.min(self.next.saturating_add(SAMPLES_PER_STEP));
         for sample in self.next..end {
-            let place = eye::place(context, PixelSample { x, y, sample });
-            let Some(surface) = eye::see(context, place)? else { continue };
+            let Some(view) = eye::view(context, PixelSample { x, y, sample })? else { continue };
+            let surface = &view.surface;
             self.albedo += surface.reflection.diffuse + surface.reflection.specular;
             self.normal += surface.normal;
-            self.depth += eye::depth(context, &surface);
+            self.depth += view.depth;
             self.surfaces += 1;
         }
         self.next = end;

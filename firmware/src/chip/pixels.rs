@@ -12,6 +12,7 @@ use crate::fixed_point::ColourSum;
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::SeenSample;
 use crate::memory::{MemoryPort, Stage as MemoryStage};
+use crate::render::eye::View;
 use crate::render::{Context, GatherPoint, PixelSample, Purpose, direct, eye, final_gather};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Seen, Surface};
@@ -19,7 +20,7 @@ use crate::scene::{Seen, Surface};
 /// What is kept of a gather point from one direction bin to the next, 48 bytes: the rest is read again.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredPoint {
-    /// Of pixels: where on which triangle.
+    /// Of pixels: where on which triangle; elsewhere if that is seen by way of perfectly specular surfaces.
     seen: Seen,
     pub(super) directions: DirectionTable,
     /// Of pixels: how many rays there are to cast, and what for.
@@ -78,9 +79,16 @@ impl StoredPoint {
         if self.rays == StoredRays::NOWHERE {
             return Ok(None);
         }
-        let place = eye::place(context, at);
+        let surface = if self.seen.is_elsewhere() {
+            // The way there is followed again.
+            let Some(view) = eye::view(context, at)? else { return Ok(None) };
+            view.surface
+        } else {
+            let place = eye::place(context, at);
+            eye::surface(context, place, &self.seen)?
+        };
         Ok(Some(GatherPoint {
-            surface: eye::surface(context, place, &self.seen)?,
+            surface,
             pattern: pattern(context.frame, at),
             rays: self.rays.number(),
             directions: self.directions,
@@ -127,14 +135,16 @@ impl<
     /// What the present pixel sees in the present sample, and what of that goes straight into the picture.
     pub(super) fn look<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
-        let place = eye::place(context, at);
         let mut stored = StoredPoint::NOTHING;
-        if let Some(seen) = eye::look(context, place)? {
-            let surface = eye::surface(context, place, &seen)?;
-            let purpose = self.light_at_once(context, index, at, place, &surface);
-            let mut point = pixel_point(context.frame, at, surface, purpose);
+        if let Some(view) = eye::view(context, at)? {
+            let purpose = self.light_at_once(context, index, at, &view);
+            let mut point = pixel_point(context.frame, at, view.surface, purpose);
             point.choose_directions(context, self.gathers.candidates.view())?;
-            stored = StoredPoint { seen, directions: point.directions, rays: StoredRays::new(&point) };
+            stored = StoredPoint {
+                seen: view.seen.unwrap_or(Seen::ELSEWHERE),
+                directions: point.directions,
+                rays: StoredRays::new(&point),
+            };
         }
         if let Some(slot) = self.points.get_mut(index) {
             *slot = stored;
@@ -151,13 +161,13 @@ impl<
         context: &mut Context<M>,
         index: usize,
         at: PixelSample,
-        place: [f32; 2],
-        surface: &Surface,
+        View { surface, seen, .. }: &View,
     ) -> Purpose {
         let frame = context.frame;
         let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
-        let sample = SeenSample { pixel: [at.x, at.y], place, surface };
-        let allowed = allowed_error(frame).filter(|_| is_lambertian);
+        let sample = SeenSample { pixel: [at.x, at.y], place: eye::place(context, at), surface };
+        // What is seen by way of other surfaces is not where the records are.
+        let allowed = allowed_error(frame).filter(|_| is_lambertian && seen.is_some());
         let interpolated = allowed.and_then(|allowed| self.cache.interpolate(&sample, allowed));
         context.counters.lambertian_samples += u64::from(is_lambertian);
         context.counters.interpolated_samples += u64::from(interpolated.is_some());

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::gradient::Distances;
 use crate::importance::CELLS;
-use crate::scene::{Reflection, Surface};
+use crate::scene::Surface;
 use crate::vector::{from_upper_half, max, tangents, upper_half};
 
 /// What a record knows of the light.
@@ -81,16 +81,7 @@ impl Record {
 
     /// A white Lambertian surface where the record is.
     pub(super) fn surface(&self) -> Surface {
-        Surface {
-            position: self.position,
-            normal: self.normal,
-            outgoing: self.normal,
-            reflection: Reflection { diffuse: Vec3::ONE, ..Reflection::BLACK },
-            emission: Vec3::ZERO,
-            double_sided: false,
-            distance: 0.0,
-            magnitude: self.magnitude,
-        }
+        Surface::white(self.position, self.normal, self.magnitude)
     }
 
     /// The error of the record at a place, for a radius of `radius`: the square of the distance over it, and how far

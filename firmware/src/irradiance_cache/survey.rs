@@ -183,7 +183,8 @@ fn new_record<M: MemoryPort>(
     allowed: f32,
 ) -> Result<Option<Record>, Fault> {
     let seen = eye::see(context, point.place())?;
-    let surface = seen.filter(|surface| surface.reflection.has_lambertian());
+    // What is seen by way of other surfaces is not where the lattice is.
+    let surface = seen.filter(|surface| surface.reflection.has_lambertian() && surface.specular.is_none());
     Ok(surface.map(|surface| {
         let least = LEAST_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
         Record::new(&surface, least)

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use photoncard_shared::message::Fault;
 
+use super::specular_path::{PathEnd, follow};
 use super::{Context, PixelSample};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
@@ -18,7 +19,45 @@ pub fn place<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     [x as f32 + jitter_x, y as f32 + jitter_y]
 }
 
-/// What is seen at a place of the picture.
+/// What a sample of a pixel sees.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// The surface, with all that the path there keeps of its light.
+    pub surface: Surface,
+    /// Where the eye ray itself met it; `None` if it is seen by way of perfectly specular surfaces.
+    pub seen: Option<Seen>,
+    /// How deep the eye ray went, along the view's axis, metres.
+    pub depth: f32,
+}
+
+/// Follows the eye ray of a sample, through perfectly specular surfaces too, to what it sees.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Option<View>, Fault> {
+    context.memory.enter(Stage::Eye);
+    context.counters.eye_rays += 1;
+    let ray = eye_ray(context, place(context, pixel));
+    let PixelSample { x, y, sample } = pixel;
+    let samples = context.frame.samples;
+    let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Specular);
+    // The first choice is stratified over all samples of a pixel.
+    let random = |bounce| match bounce {
+        0 => pattern.point(pattern.index_in_all(0, sample, samples), samples)[0],
+        _ => pattern.choice(sample, bounce),
+    };
+    let (path, end) = follow(context, ray, random)?;
+    let PathEnd::Surface(surface, seen) = end else { return Ok(None) };
+    let is_direct = path.bounces == 0 && surface.specular.is_none();
+    let along_axis = ray.direction.dot(context.frame.camera.forward.into());
+    Ok(Some(View {
+        depth: if is_direct { depth(context, &surface) } else { path.first_distance * along_axis },
+        surface: surface.dimmed(path.throughput),
+        seen: is_direct.then_some(seen),
+    }))
+}
+
+/// What the eye ray at a place of the picture meets.
 ///
 /// # Errors
 /// If the image is not sound.

@@ -6,11 +6,12 @@
 use glam::Vec3;
 use photoncard_shared::message::{Fault, Radiance};
 
+use super::specular_path::{PathEnd, follow};
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, PartialReflection, Place};
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, gather, nearest_irradiance, reflected_radiance};
-use crate::scene::{Ray, closest_hit, read_surface};
+use crate::scene::Ray;
 
 /// What the end of a final gather ray brings.
 #[derive(Clone, Copy, Debug)]
@@ -37,15 +38,25 @@ pub fn cast<M: MemoryPort>(
 ) -> Result<Option<GatherRayEnd>, Fault> {
     context.memory.enter(Stage::GatherRay);
     let sampled = point.directions.sample(&point.reflector(), point.pattern, index, point.rays);
-    let Some(sampled) = sampled else { return Ok(None) };
+    let Some(sampled) = sampled.filter(|sampled| point.surface.is_above(sampled.direction)) else {
+        return Ok(None);
+    };
     let ray = Ray::new(point.surface.offset_origin(), sampled.direction);
     context.counters.gather_rays += 1;
-    let Some(hit) = closest_hit(context.scene, context.memory, &ray)? else { return Ok(None) };
-    let met = read_surface(context.scene, context.memory, &ray, &hit)?;
-    let header = &context.scene.header;
+    let (path, end) = follow(context, ray, |bounce| point.pattern.choice(index, bounce))?;
     // The mean is taken here, so that the sum stays small.
-    let weight = sampled.weight * (share / point.rays as f32);
-    let emitted = direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density);
+    let weight = sampled.weight * path.throughput * (share / point.rays as f32);
+    let PathEnd::Surface(met, _) = end else { return Ok(None) };
+    let met = met.flat();
+    let emitted = if path.bounces == 0 {
+        direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density)
+    } else if context.frame.caustic_neighbors == 0 {
+        // Neither a shadow ray nor a photon of a caustic brings it.
+        met.emission
+    } else {
+        Vec3::ZERO
+    };
+    let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
         place: Place::new(&header.photon_grid, met.position.to_array()),
         reflection: PartialReflection::new(

@@ -4,6 +4,7 @@ pub mod direct;
 pub mod eye;
 pub mod final_gather;
 mod point;
+pub mod specular_path;
 
 pub use point::{GatherPoint, Purpose};
 

@@ -90,10 +90,10 @@ impl GatherPoint {
         } else {
             context.counters.tables += 1;
             context.memory.enter(Stage::Table);
-            let Surface { position, normal, .. } = self.surface;
+            let Surface { position, normal, geometric_normal, .. } = self.surface;
             let nearest = nearest_photons(context, position, candidates)?;
             let colour = reflector.reflection.diffuse + reflector.reflection.specular;
-            IncidentFlux::new(&nearest, normal, encode_normal(normal.to_array()), colour)
+            IncidentFlux::new(&nearest, normal, encode_normal(geometric_normal.to_array()), colour)
                 .table(sampling, &reflector)
         };
         Ok(())

@@ -8,6 +8,7 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, Triangle, WideNode};
 use photoncard_shared::message::Fault;
 
+use super::cut_out::is_there;
 use super::slabs::Slabs;
 use super::{Intersection, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
@@ -64,13 +65,13 @@ impl<M: MemoryPort> Kernel for ClosestHit<'_, M> {
     fn run(self, isa: impl Isa) -> Self::Output {
         let Self { scene, memory, ray } = self;
         let mut nearest: Option<Hit> = None;
-        descend(isa, scene, memory, ray, Order::NearestFirst, |intersection, leaf, slot, index| {
+        descend(isa, scene, memory, ray, Order::NearestFirst, |intersection, index, triangle| {
             let is_nearer = nearest.is_none_or(|hit| {
                 let distance = hit.intersection.distance;
                 intersection.distance < distance || intersection.distance == distance && index < hit.index
             });
             if is_nearer {
-                nearest = Some(Hit { intersection, triangle: leaf.triangle(slot), index });
+                nearest = Some(Hit { intersection, triangle: triangle(), index });
             }
             ControlFlow::Continue(nearest.map_or(ray.max_distance, |hit| hit.intersection.distance))
         })?;
@@ -95,7 +96,7 @@ impl<M: MemoryPort> Kernel for AnyHit<'_, M> {
     fn run(self, isa: impl Isa) -> Self::Output {
         let Self { scene, memory, ray } = self;
         let mut occluded = false;
-        descend(isa, scene, memory, ray, Order::Any, |_, _, _, _| {
+        descend(isa, scene, memory, ray, Order::Any, |_, _, _| {
             occluded = true;
             ControlFlow::Break(())
         })?;
@@ -103,8 +104,11 @@ impl<M: MemoryPort> Kernel for AnyHit<'_, M> {
     }
 }
 
-/// Calls `visit` for every triangle that the ray meets and that is not farther than `visit` last said, with its leaf, its
-/// slot in there and its index.
+/// Those triangles of a leaf that a ray meets unless it goes through a cut-out of theirs.
+type CutOuts = heapless::Vec<Hit, LEAF_TRIANGLES>;
+
+/// Calls `visit` for every triangle that the ray meets and that is not farther than `visit` last said, with its index, and
+/// with what reads it.
 #[inline(always)]
 fn descend(
     isa: impl Isa,
@@ -112,7 +116,7 @@ fn descend(
     memory: &mut impl MemoryPort,
     ray: &Ray,
     order: Order,
-    mut visit: impl FnMut(Intersection, BvhLeaf, usize, u32) -> ControlFlow<(), f32>,
+    mut visit: impl FnMut(Intersection, u32, &dyn Fn() -> Triangle) -> ControlFlow<(), f32>,
 ) -> Result<(), Fault> {
     let frame = RayFrame::new(ray);
     let slabs = Slabs::new(ray);
@@ -128,6 +132,7 @@ fn descend(
             Child::Leaf(leaf) => {
                 let line = BvhLeaf(descent.leaf(memory, leaf)?);
                 let mut may_meet = frame.may_meet(isa, line);
+                let mut with_cut_outs = CutOuts::new();
                 while may_meet != 0 {
                     let slot = may_meet.trailing_zeros() as usize;
                     may_meet &= may_meet - 1;
@@ -135,7 +140,23 @@ fn descend(
                         continue;
                     };
                     let index = leaf.wrapping_mul(LEAF_TRIANGLES as u32).wrapping_add(slot as u32);
-                    match visit(intersection, line, slot, index) {
+                    if line.is_cut_out(slot) {
+                        // Their textures are read when the line is done with.
+                        let _ =
+                            with_cut_outs.push(Hit { intersection, triangle: line.triangle(slot), index });
+                        continue;
+                    }
+                    match visit(intersection, index, &|| line.triangle(slot)) {
+                        ControlFlow::Continue(distance) => until = distance,
+                        ControlFlow::Break(()) => return Ok(()),
+                    }
+                }
+                for Hit { intersection, triangle, index } in with_cut_outs {
+                    let is_near = intersection.distance <= until;
+                    if !is_near || !is_there(scene, memory, &triangle, index, intersection.barycentric)? {
+                        continue;
+                    }
+                    match visit(intersection, index, &|| triangle) {
                         ControlFlow::Continue(distance) => until = distance,
                         ControlFlow::Break(()) => return Ok(()),
                     }

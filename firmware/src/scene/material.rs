@@ -4,44 +4,8 @@
 use core::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
-use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{DOUBLE_SIDED, Material, Record, Reflectance, Triangle};
-use photoncard_shared::message::Fault;
 
-use super::{Hit, Ray, SceneImage, magnitude, offset_origin};
-use crate::memory::MemoryPort;
-use crate::vector::{max_component, unit};
-
-const MATERIALS_PER_LINE: u32 = Material::PER_LINE as u32;
-
-/// The point where a ray meets a surface, on the side that it comes from.
-#[derive(Clone, Copy, Debug)]
-pub struct Surface {
-    /// The point, metres.
-    pub position: Vec3,
-    /// Unit geometric normal on the side of the ray's origin.
-    pub normal: Vec3,
-    /// Unit vector back along the ray.
-    pub outgoing: Vec3,
-    /// How this side reflects; black on the back of a one-sided surface.
-    pub reflection: Reflection,
-    /// Radiance that this side emits, W/(sr m^2).
-    pub emission: Vec3,
-    /// Whether the other side does the same.
-    pub double_sided: bool,
-    /// Distance along the ray, metres.
-    pub distance: f32,
-    /// The greatest coordinate that the point was computed from, metres: its rounding is in proportion.
-    pub magnitude: f32,
-}
-
-impl Surface {
-    /// A point just off the surface, from which a ray does not meet it again.
-    #[inline(always)]
-    pub fn offset_origin(&self) -> Vec3 {
-        offset_origin(self.position, self.normal, self.magnitude)
-    }
-}
+use crate::vector::max_component;
 
 /// A reflection function's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,59 +72,4 @@ pub(crate) fn lobe_power(cosine: f32, exponent: f32) -> f32 {
 #[inline(always)]
 pub(crate) fn mirror(direction: Vec3, normal: Vec3) -> Vec3 {
     normal * (2.0 * normal.dot(direction)) - direction
-}
-
-/// Reads what a ray finds where it meets a triangle.
-///
-/// # Errors
-/// If the triangle's material is not in the image.
-#[inline(always)]
-pub fn read_surface(
-    scene: &SceneImage,
-    memory: &mut impl MemoryPort,
-    ray: &Ray,
-    hit: &Hit,
-) -> Result<Surface, Fault> {
-    let Hit { intersection, triangle, .. } = hit;
-    surface_of(scene, memory, ray, triangle, intersection.barycentric, intersection.distance)
-}
-
-/// The surface of a triangle at a place on it.
-#[inline(always)]
-pub(super) fn surface_of(
-    scene: &SceneImage,
-    memory: &mut impl MemoryPort,
-    ray: &Ray,
-    triangle: &Triangle,
-    [u, v, w]: [f32; 3],
-    distance: f32,
-) -> Result<Surface, Fault> {
-    let bytes = scene.record::<{ Material::BYTES }, MATERIALS_PER_LINE>(
-        memory,
-        SectionKind::Materials,
-        triangle.material,
-    )?;
-    let material = Material::read(bytes);
-    let [a, b, c] = triangle.vertices.map(Vec3::from_array);
-    let front_normal = unit((b - a).cross(c - a));
-    let is_front = front_normal.dot(ray.direction) < 0.0;
-    let double_sided = material.flags & DOUBLE_SIDED != 0;
-    let visible = is_front || double_sided;
-    let reflection = match material.reflectance {
-        Reflectance::Phong { diffuse, specular, exponent } => {
-            Reflection { diffuse: diffuse.into(), specular: specular.into(), exponent }
-        }
-        _ => Reflection::BLACK,
-    };
-    Ok(Surface {
-        // From the corners and not along the ray: the rounding is then that of the corners.
-        position: a * u + b * v + c * w,
-        normal: if is_front { front_normal } else { -front_normal },
-        outgoing: -ray.direction,
-        reflection: if visible { reflection } else { Reflection::BLACK },
-        emission: if visible { material.emission.into() } else { Vec3::ZERO },
-        double_sided,
-        distance,
-        magnitude: magnitude(&[a, b, c, ray.origin]),
-    })
 }

@@ -1,17 +1,26 @@
 //! The scene in card memory: views that read its records line by line.
 
 mod bvh;
+mod corners;
+mod cut_out;
 mod emitter;
 mod material;
+mod metallic_roughness;
 mod seen;
 mod slabs;
+mod specular;
+mod surface;
+mod texture;
 mod triangle;
 
 pub use bvh::{AnyHit, ClosestHit, Hit, closest_hit, is_occluded};
 pub use emitter::{EmitterSample, emitter_density, sample_emitter};
-pub use material::{Reflection, Surface, read_surface};
+pub use material::Reflection;
 pub(crate) use material::{lobe_power, mirror};
 pub use seen::Seen;
+pub use specular::Specular;
+pub use surface::{Surface, read_surface};
+pub use texture::{read_texture, sample_texture};
 pub use triangle::{Intersection, RayFrame};
 
 use core::ops::Range;

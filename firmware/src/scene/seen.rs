@@ -3,7 +3,7 @@
 use photoncard_shared::message::Fault;
 
 use super::bvh::read_triangle;
-use super::material::surface_of;
+use super::surface::surface_of;
 use super::{Hit, Ray, SceneImage, Surface};
 use crate::memory::MemoryPort;
 
@@ -19,6 +19,14 @@ pub struct Seen {
 impl Seen {
     /// A place on no surface in particular.
     pub const NOWHERE: Self = Self { triangle: 0, weights: [0.0; 2] };
+    /// A place that is not kept here.
+    pub const ELSEWHERE: Self = Self { triangle: u32::MAX, ..Self::NOWHERE };
+
+    /// Whether the place is [`Self::ELSEWHERE`].
+    #[inline(always)]
+    pub fn is_elsewhere(&self) -> bool {
+        self.triangle == u32::MAX
+    }
 
     /// Where a ray met a triangle.
     pub fn new(hit: &Hit) -> Self {
@@ -39,6 +47,6 @@ impl Seen {
     ) -> Result<Surface, Fault> {
         let triangle = read_triangle(scene, memory, self.triangle)?;
         let [v, w] = self.weights;
-        surface_of(scene, memory, ray, &triangle, [1.0 - v - w, v, w], 0.0)
+        surface_of(scene, memory, ray, (self.triangle, &triangle), [1.0 - v - w, v, w], 0.0)
     }
 }

@@ -95,11 +95,23 @@ impl BvhLeaf<'_> {
         read_f32(self.0, COORDINATE_BYTES * axis + 4 * vertex)
     }
 
+    /// Where the material of a triangle is.
+    #[inline(always)]
+    fn material_of(&self, slot: usize) -> usize {
+        let is_second = self.byte(SECOND_MATERIAL) >> (slot % LEAF_TRIANGLES) & 1;
+        MATERIALS + MATERIAL_BYTES * usize::from(is_second)
+    }
+
+    /// Whether triangle `slot`, below [`LEAF_TRIANGLES`], may have cut-outs.
+    #[inline(always)]
+    pub fn is_cut_out(&self, slot: usize) -> bool {
+        self.byte(self.material_of(slot) + MATERIAL_BYTES - 1) & 0x80 != 0
+    }
+
     /// Triangle `slot`, below [`LEAF_TRIANGLES`].
     #[inline(always)]
     pub fn triangle(&self, slot: usize) -> Triangle {
-        let is_second = self.byte(SECOND_MATERIAL) >> (slot % LEAF_TRIANGLES) & 1;
-        let at = MATERIALS + MATERIAL_BYTES * usize::from(is_second);
+        let at = self.material_of(slot);
         let [low, middle, high] = [0, 1, 2].map(|byte| u32::from(self.byte(at + byte)));
         let vertex = |vertex| [0, 1, 2].map(|axis| self.coordinate(vertex, axis));
         let material = low | middle << 8 | high << 16;
@@ -209,6 +221,7 @@ mod tests {
         assert_eq!(leaf.triangles() as usize, triangles.len());
         for (slot, triangle) in triangles.iter().enumerate() {
             assert_eq!(leaf.triangle(slot), *triangle);
+            assert_eq!(leaf.is_cut_out(slot), triangle.cut_out);
             let vertex = |corner| {
                 let index = leaf.corners(corner)[slot];
                 assert!(index < leaf.vertices());

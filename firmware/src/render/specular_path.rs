@@ -1,0 +1,147 @@
+//! Paths through perfectly specular surfaces: mirrors, smooth coats, smooth glass.
+//!
+//! Where a ray meets such a surface one of its directions is taken at random, in proportion to what it carries: it is
+//! reflected, goes through, or stays for what the surface does besides. A path is that of one ray; many samples of a
+//! pixel take all of its ways. It ends, black, after [`SPECULAR_BOUNCES`].
+//!
+//! Absorption is by Beer and Lambert, of the glass that the path has entered last; glass in glass is not kept track of.
+
+use glam::Vec3;
+use photoncard_shared::budget::SPECULAR_BOUNCES;
+use photoncard_shared::message::Fault;
+
+use super::Context;
+use crate::memory::MemoryPort;
+use crate::scene::{Ray, Reflection, Seen, Surface, closest_hit, read_surface};
+use crate::vector::{max, max_component};
+
+/// A path on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct SpecularPath {
+    /// The present part of it.
+    pub ray: Ray,
+    /// What of light along the ray is brought to the path's origin, or the other way.
+    pub throughput: Vec3,
+    /// Specular surfaces behind.
+    pub bounces: u32,
+    /// How far the first of them was, metres.
+    pub first_distance: f32,
+    /// What is carried along it.
+    carried: Carried,
+    /// Absorption coefficient around the ray, 1/m.
+    absorption: Vec3,
+}
+
+/// What a path carries: across the surface of glass radiance changes with the square of the index of refraction, and power
+/// does not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Carried {
+    /// Radiance, against the way that the path is followed.
+    Radiance,
+    /// Power, as photons do.
+    Power,
+}
+
+/// How a path goes on at a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrival {
+    /// It ends there.
+    Ends,
+    /// It goes on along its new ray.
+    GoesOn,
+    /// It has met too many surfaces, or one that takes everything.
+    Lost,
+}
+
+/// Where a path has ended.
+#[derive(Clone, Copy, Debug)]
+pub enum PathEnd {
+    /// On a surface, and where that is.
+    Surface(Surface, Seen),
+    /// Nowhere: it left the scene.
+    Escaped,
+    /// It was lost on its way.
+    Lost,
+}
+
+impl SpecularPath {
+    /// A path along a ray.
+    #[inline(always)]
+    pub fn new(ray: Ray, carried: Carried) -> Self {
+        Self { ray, throughput: Vec3::ONE, bounces: 0, first_distance: 0.0, carried, absorption: Vec3::ZERO }
+    }
+
+    /// Arrives at a surface; `random` in [0, 1) says which way to go.
+    #[inline(always)]
+    pub fn arrive(&mut self, surface: &Surface, random: f32) -> Arrival {
+        if surface.specular.is_none() && self.absorption == Vec3::ZERO {
+            return Arrival::Ends;
+        }
+        self.arrive_at_specular(surface, random)
+    }
+
+    #[inline(never)]
+    fn arrive_at_specular(&mut self, surface: &Surface, random: f32) -> Arrival {
+        let inside = surface.absorption != Vec3::ZERO;
+        let absorption = if inside { surface.absorption } else { self.absorption };
+        self.throughput *= Vec3::from_array((absorption * -surface.distance).to_array().map(libm::expf));
+        if self.bounces == 0 {
+            self.first_distance = surface.distance;
+        }
+        let specular = &surface.specular;
+        if specular.is_none() {
+            return Arrival::Ends;
+        }
+        let Reflection { diffuse, specular: lobe, .. } = surface.reflection;
+        let [reflected, transmitted] = [specular.reflected, specular.transmitted].map(max_component);
+        let stays = max_component(diffuse + lobe);
+        let stays =
+            if max_component(surface.emission) > 0.0 { max(stays, reflected + transmitted) } else { stays };
+        let all = reflected + transmitted + stays;
+        let chosen = random * all;
+        if chosen < stays {
+            self.throughput *= all / stays;
+            return Arrival::Ends;
+        }
+        if all <= 0.0 || self.bounces >= SPECULAR_BOUNCES {
+            return Arrival::Lost;
+        }
+        self.bounces += 1;
+        if chosen < stays + reflected || transmitted <= 0.0 {
+            self.throughput *= specular.reflected * (all / reflected);
+            self.ray = Ray::new(surface.offset_origin(), surface.mirrored());
+        } else {
+            let scale = if self.carried == Carried::Radiance { specular.radiance_scale } else { 1.0 };
+            self.throughput *= specular.transmitted * (scale * all / transmitted);
+            self.ray = Ray::new(surface.offset_behind(), specular.behind);
+            self.absorption = specular.absorption;
+        }
+        Arrival::GoesOn
+    }
+}
+
+/// Follows a ray through perfectly specular surfaces to its end. `random` gives a number in [0, 1) for each bounce.
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(always)]
+pub fn follow<M: MemoryPort>(
+    context: &mut Context<M>,
+    ray: Ray,
+    random: impl Fn(u32) -> f32,
+) -> Result<(SpecularPath, PathEnd), Fault> {
+    let mut path = SpecularPath::new(ray, Carried::Radiance);
+    loop {
+        let hit = closest_hit(context.scene, context.memory, &path.ray)?;
+        let Some(hit) = hit else { return Ok((path, PathEnd::Escaped)) };
+        let surface = read_surface(context.scene, context.memory, &path.ray, &hit)?;
+        match path.arrive(&surface, random(path.bounces)) {
+            Arrival::Ends => return Ok((path, PathEnd::Surface(surface, Seen::new(&hit)))),
+            Arrival::Lost => {
+                context.counters.lost_paths += 1;
+                return Ok((path, PathEnd::Lost));
+            }
+            Arrival::GoesOn => context.counters.specular_rays += 1,
+        }
+    }
+}

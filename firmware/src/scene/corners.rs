@@ -1,0 +1,93 @@
+//! What the corners of a triangle have besides their places, interpolated between them.
+
+use glam::Vec3;
+use photoncard_shared::image::{LEAF_ATTRIBUTES_PER_LINE, SectionKind};
+use photoncard_shared::layout::{Attributes, LEAF_TRIANGLES, LeafAttributes, NO_TEXTURE, Record};
+use photoncard_shared::message::Fault;
+
+use super::SceneImage;
+use super::texture::{read_texture, sample_texture};
+use crate::memory::MemoryPort;
+use crate::vector::unit;
+
+const ATTRIBUTES_PER_LINE: u32 = Attributes::PER_LINE as u32;
+
+/// The corners of a triangle, seen from a place on it.
+pub(super) struct Corners {
+    leaf: LeafAttributes,
+    slot: u32,
+    attributes: Attributes,
+    weights: [f32; 3],
+}
+
+impl Corners {
+    /// Those of triangle `index`, whose corners have these weights; `None` if they have nothing besides their places.
+    pub(super) fn read(
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        index: u32,
+        weights: [f32; 3],
+    ) -> Result<Option<Self>, Fault> {
+        if scene.header.section(SectionKind::LeafAttributes).records == 0 {
+            return Ok(None);
+        }
+        let [leaf, slot] = [index / LEAF_TRIANGLES as u32, index % LEAF_TRIANGLES as u32];
+        let entry = scene.record::<4, LEAF_ATTRIBUTES_PER_LINE>(memory, SectionKind::LeafAttributes, leaf)?;
+        let Some(leaf) = LeafAttributes::read(u32::from_le_bytes(*entry)) else { return Ok(None) };
+        let attributes = Attributes::read(record(scene, memory, leaf.record(slot, 0))?);
+        Ok(Some(Self { leaf, slot, attributes, weights }))
+    }
+
+    /// The interpolated unit shading normal on the front's side; `None` if the triangle is flat.
+    pub(super) fn normal(&self) -> Option<Vec3> {
+        let normals = self.attributes.normals?;
+        let weighted = normals.into_iter().zip(self.weights);
+        Some(unit(weighted.map(|(normal, weight)| unit(normal.into()) * weight).sum()))
+    }
+
+    /// The interpolated linear colour.
+    pub(super) fn colour(&self) -> [f32; 4] {
+        let mut sum = [0.0; 4];
+        for (colour, weight) in self.attributes.colours.into_iter().zip(self.weights) {
+            sum.iter_mut().zip(colour).for_each(|(sum, channel)| *sum += channel * weight);
+        }
+        sum
+    }
+
+    /// The emitter that the triangle is.
+    pub(super) fn emitter(&self) -> Option<u32> {
+        self.attributes.emitter
+    }
+
+    /// What a texture holds here; white without one.
+    pub(super) fn texture(
+        &self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        index: u16,
+    ) -> Result<[f32; 4], Fault> {
+        if index == NO_TEXTURE {
+            return Ok([1.0; 4]);
+        }
+        let texture = read_texture(scene, memory, u32::from(index))?;
+        let corners = if texture.set == 1 && self.leaf.two_sets {
+            let bytes = record(scene, memory, self.leaf.record(self.slot, 1))?;
+            [0, 1, 2].map(|corner| Attributes::coordinate(bytes, corner))
+        } else {
+            self.attributes.coordinates
+        };
+        let mut place = [0.0; 2];
+        for (corner, weight) in corners.into_iter().zip(self.weights) {
+            place.iter_mut().zip(corner).for_each(|(sum, coordinate)| *sum += coordinate * weight);
+        }
+        sample_texture(scene, memory, &texture, place)
+    }
+}
+
+fn record<'m>(
+    scene: &SceneImage,
+    memory: &'m mut impl MemoryPort,
+    index: u32,
+) -> Result<&'m [u8; Attributes::BYTES], Fault> {
+    scene.record::<{ Attributes::BYTES }, ATTRIBUTES_PER_LINE>(memory, SectionKind::Attributes, index)
+}

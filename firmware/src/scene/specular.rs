@@ -1,0 +1,172 @@
+//! The perfectly specular part of a surface: what mirrors, smooth coats and smooth glass do with light.
+
+use glam::Vec3;
+
+use super::material::mirror;
+use crate::vector::{max, unit};
+
+/// What leaves a surface in one direction, or in two.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Specular {
+    /// The share that is reflected to the mirror direction.
+    pub reflected: Vec3,
+    /// The share that goes through.
+    pub transmitted: Vec3,
+    /// Where that goes: a unit vector behind the surface.
+    pub behind: Vec3,
+    /// Absorption coefficient of what is behind, 1/m.
+    pub absorption: Vec3,
+    /// Radiance in front over that behind, of light that comes through whole: the inverse square of the index of refraction.
+    pub radiance_scale: f32,
+}
+
+impl Specular {
+    /// Nothing is reflected perfectly specularly.
+    pub const NONE: Self = Self {
+        reflected: Vec3::ZERO,
+        transmitted: Vec3::ZERO,
+        behind: Vec3::ZERO,
+        absorption: Vec3::ZERO,
+        radiance_scale: 1.0,
+    };
+
+    /// A mirror.
+    pub(super) fn mirror(reflected: Vec3) -> Self {
+        Self { reflected, ..Self::NONE }
+    }
+
+    /// Whether there is none.
+    #[inline(always)]
+    pub fn is_none(&self) -> bool {
+        self.reflected == Vec3::ZERO && self.transmitted == Vec3::ZERO
+    }
+
+    /// The mirror direction of `outgoing` about a shading normal; if that is behind the surface, about its geometric one.
+    pub(crate) fn reflected_direction(outgoing: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
+        let direction = mirror(outgoing, normal);
+        if direction.dot(geometric_normal) > 0.0 { direction } else { mirror(outgoing, geometric_normal) }
+    }
+}
+
+/// A smooth dielectric at one place, textures applied.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Glass {
+    pub(super) base: Vec3,
+    pub(super) absorption: Vec3,
+    /// Share of what is not reflected that goes through.
+    pub(super) transmission: f32,
+    /// Index of refraction.
+    pub(super) ior: f32,
+    pub(super) is_thin: bool,
+}
+
+impl Glass {
+    /// What it does with light, and the albedo of its Lambertian part. Normals are on the side of `outgoing`, which is the
+    /// inside if `is_inside`.
+    pub(super) fn at(
+        &self,
+        outgoing: Vec3,
+        [normal, geometric_normal]: [Vec3; 2],
+        is_inside: bool,
+    ) -> (Vec3, Specular) {
+        let cosine = max(normal.dot(outgoing), 0.0);
+        let index = if is_inside && !self.is_thin { 1.0 / self.ior } else { self.ior };
+        let (reflectance, cosine_behind) = fresnel(cosine, index);
+        // Of a thin wall both faces reflect, again and again (Stokes 1862).
+        let reflectance = if self.is_thin { 2.0 * reflectance / (1.0 + reflectance) } else { reflectance };
+        let refracted = unit(normal * (cosine / index - cosine_behind) - outgoing * (1.0 / index));
+        let behind =
+            if self.is_thin || refracted.dot(geometric_normal) >= 0.0 { -outgoing } else { refracted };
+        let through = self.base * (1.0 - reflectance);
+        let specular = Specular {
+            reflected: Vec3::splat(reflectance),
+            transmitted: through * self.transmission,
+            behind,
+            absorption: if is_inside || self.is_thin { Vec3::ZERO } else { self.absorption },
+            radiance_scale: if self.is_thin { 1.0 } else { 1.0 / (index * index) },
+        };
+        (through * (1.0 - self.transmission), specular)
+    }
+}
+
+/// The share of unpolarised light that the surface of a dielectric reflects (Fresnel 1823), and the cosine of the
+/// refracted direction; `index` is the index of refraction behind over that in front. All is reflected, and the cosine is
+/// zero, where nothing can be refracted.
+fn fresnel(cosine: f32, index: f32) -> (f32, f32) {
+    let sine_squared = (1.0 - cosine * cosine) / (index * index);
+    let cosine_squared = 1.0 - sine_squared;
+    // Not `<`: an index that is no number refracts nothing.
+    if !(cosine_squared > 0.0) {
+        return (1.0, 0.0);
+    }
+    let behind = libm::sqrtf(cosine_squared);
+    let parallel = (index * cosine - behind) / (index * cosine + behind);
+    let perpendicular = (cosine - index * behind) / (cosine + index * behind);
+    (0.5 * (parallel * parallel + perpendicular * perpendicular), behind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GLASS: Glass = Glass {
+        base: Vec3::ONE,
+        absorption: Vec3::new(1.0, 2.0, 3.0),
+        transmission: 1.0,
+        ior: 1.5,
+        is_thin: false,
+    };
+
+    fn at(degrees: f32, is_inside: bool, glass: Glass) -> Specular {
+        let angle = degrees.to_radians();
+        let outgoing = Vec3::new(angle.sin(), angle.cos(), 0.0);
+        let (diffuse, specular) = glass.at(outgoing, [Vec3::Y; 2], is_inside);
+        assert_eq!(diffuse, Vec3::ZERO);
+        specular
+    }
+
+    #[test]
+    fn glass_reflects_as_fresnel_says() {
+        assert!((at(0.0, false, GLASS).reflected.x - 0.04).abs() < 1e-6);
+        assert!((at(0.0, true, GLASS).reflected.x - 0.04).abs() < 1e-6);
+        // At Brewster's angle the parallel part vanishes.
+        let brewster = 1.5_f32.atan().to_degrees();
+        assert!((at(brewster, false, GLASS).reflected.x - 0.073_964).abs() < 1e-5);
+        assert!((at(89.999, false, GLASS).reflected.x - 1.0).abs() < 1e-3);
+        assert_eq!(at(45.0, true, GLASS).reflected, Vec3::ONE);
+        assert_eq!(at(45.0, true, GLASS).transmitted, Vec3::ZERO);
+    }
+
+    #[test]
+    fn light_is_refracted_as_snell_says_and_back_again() {
+        for degrees in [0.0_f32, 10.0, 40.0, 80.0] {
+            let into = at(degrees, false, GLASS);
+            let sine = degrees.to_radians().sin();
+            assert!((into.behind.x + sine / 1.5).abs() < 1e-5 && into.behind.y < 0.0, "{into:?}");
+            let out = at((sine / 1.5).asin().to_degrees(), true, GLASS);
+            assert!((out.behind.x + sine).abs() < 1e-4, "{out:?}");
+            assert_eq!([into.absorption, out.absorption], [GLASS.absorption, Vec3::ZERO]);
+        }
+    }
+
+    #[test]
+    fn nothing_is_lost_at_clear_glass() {
+        for thin in [false, true] {
+            for degrees in [0.0, 30.0, 60.0, 89.0] {
+                let specular = at(degrees, false, Glass { is_thin: thin, ..GLASS });
+                assert!((specular.reflected + specular.transmitted - Vec3::ONE).abs().max_element() < 1e-6);
+                assert!(specular.behind.y < 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_thin_wall_lets_light_through_as_a_slab_does_and_does_not_bend_it() {
+        let wall = at(30.0, false, Glass { is_thin: true, ..GLASS });
+        let face = at(30.0, false, GLASS).reflected.x;
+        // The sum over all reflections inside the slab.
+        let slab: f32 = (0..20).map(|k| (1.0 - face) * (1.0 - face) * face.powi(2 * k)).sum();
+        assert!((wall.transmitted.x - slab).abs() < 1e-5);
+        assert!((wall.behind + Vec3::new(0.5, 30_f32.to_radians().cos(), 0.0)).length() < 1e-5);
+    }
+}

@@ -1,0 +1,246 @@
+//! Textures: texels of card memory, interpolated linearly between the four nearest.
+
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{Record, TexelFormat, Texture, Wrap};
+use photoncard_shared::message::{Fault, FaultCode};
+
+use super::SceneImage;
+use crate::memory::MemoryPort;
+use crate::vector::min;
+
+const TEXTURES_PER_LINE: u32 = Texture::PER_LINE as u32;
+
+/// Bytes of a texel.
+const TEXEL_BYTES: u32 = 4;
+
+/// Texture `index`.
+///
+/// # Errors
+/// If there is none.
+pub fn read_texture(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Result<Texture, Fault> {
+    let bytes =
+        scene.record::<{ Texture::BYTES }, TEXTURES_PER_LINE>(memory, SectionKind::Textures, index)?;
+    Ok(Texture::read(bytes))
+}
+
+/// What a texture holds at some coordinates: linear red, green, blue and alpha.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn sample_texture(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    texture: &Texture,
+    coordinates: [f32; 2],
+) -> Result<[f32; 4], Fault> {
+    let [u, v] = coordinates;
+    let [columns, rows] = texture.size;
+    let place = |axis: usize, size: u16, wrap: Wrap| {
+        let [[a, b], [c, d]] = texture.matrix;
+        let [x, y] = texture.offset;
+        Place::new(if axis == 0 { a * u + b * v + x } else { c * u + d * v + y }, size, wrap)
+    };
+    let [across, down] = texture.wrap;
+    let [across, down] = [place(0, columns, across), place(1, rows, down)];
+    if texture.nearest {
+        return texel(scene, memory, texture, [across.nearest(), down.nearest()]);
+    }
+    let mut sum = [0.0; 4];
+    for (row, row_weight) in down.texels() {
+        for (column, column_weight) in across.texels() {
+            let weight = row_weight * column_weight;
+            let texel = texel(scene, memory, texture, [column, row])?;
+            sum.iter_mut().zip(texel).for_each(|(sum, channel)| *sum += channel * weight);
+        }
+    }
+    Ok(sum)
+}
+
+/// A place along one axis of a texture, between the middles of two texels.
+struct Place {
+    /// The texels, the first before the second.
+    texels: [u32; 2],
+    /// How far it is from the middle of the first to that of the second.
+    fraction: f32,
+}
+
+impl Place {
+    fn new(coordinate: f32, size: u16, wrap: Wrap) -> Self {
+        let texels = u32::from(size.max(1));
+        // The period in texels; what is clamped has none.
+        let period = if wrap == Wrap::Mirror { 2 * texels } else { texels };
+        let turns = match wrap {
+            Wrap::Clamp => coordinate,
+            Wrap::Repeat => coordinate - libm::floorf(coordinate),
+            Wrap::Mirror => (coordinate * 0.5 - libm::floorf(coordinate * 0.5)) * 2.0,
+        };
+        let half_outside = 0.5 / texels as f32;
+        // What is no number becomes the first texel.
+        let turns = if turns > -half_outside { turns } else { -half_outside };
+        let turns = min(turns, period as f32 / texels as f32 + half_outside);
+        let at = turns * texels as f32 + 0.5;
+        // Counted from the texel before the first.
+        let first = at as u32;
+        let wrapped = |texel: u32| match wrap {
+            Wrap::Clamp => texel.saturating_sub(1).min(texels - 1),
+            Wrap::Repeat => (texel + texels - 1) % texels,
+            Wrap::Mirror => {
+                let texel = (texel + period - 1) % period;
+                texel.min(period - 1 - texel)
+            }
+        };
+        Self { texels: [wrapped(first), wrapped(first + 1)], fraction: at - first as f32 }
+    }
+
+    /// The two texels with their weights.
+    fn texels(&self) -> [(u32, f32); 2] {
+        let [first, second] = self.texels;
+        [(first, 1.0 - self.fraction), (second, self.fraction)]
+    }
+
+    fn nearest(&self) -> u32 {
+        let [first, second] = self.texels;
+        if self.fraction < 0.5 { first } else { second }
+    }
+}
+
+/// One texel, decoded.
+fn texel(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    texture: &Texture,
+    [column, row]: [u32; 2],
+) -> Result<[f32; 4], Fault> {
+    let (line, place) = texture.locate(column, row);
+    let first = place as u32 * TEXEL_BYTES;
+    let bytes: &[u8; LINE_BYTES] =
+        scene.line(memory, SectionKind::Texels, line, first..first + TEXEL_BYTES)?;
+    let texel = bytes.as_chunks().0.get(place);
+    let texel = *texel.ok_or(Fault { code: FaultCode::Record, detail: line })?;
+    Ok(decode(texture.format, texel))
+}
+
+fn decode(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
+    let linear = |channel: u8| f32::from(channel) * (1.0 / 255.0);
+    let [red, green, blue, alpha] = texel;
+    match format {
+        TexelFormat::Linear => texel.map(linear),
+        TexelFormat::Srgb => [srgb(red), srgb(green), srgb(blue), linear(alpha)],
+        TexelFormat::SharedExponent => {
+            let bits = u32::from_le_bytes(texel);
+            // 2^(exponent - 15 - 9), never subnormal.
+            let scale = f32::from_bits(((bits >> 27) + 127 - 24) << 23);
+            let mantissa = |channel: u32| (bits >> (9 * channel) & 0x1ff) as f32 * scale;
+            [mantissa(0), mantissa(1), mantissa(2), 1.0]
+        }
+    }
+}
+
+/// The linear value of an sRGB code (IEC 61966-2-1).
+fn srgb(code: u8) -> f32 {
+    SRGB.get(usize::from(code)).copied().unwrap_or(1.0)
+}
+
+static SRGB: [f32; 256] = srgb_table();
+
+#[expect(clippy::indexing_slicing, reason = "computed at compile time")]
+const fn srgb_table() -> [f32; 256] {
+    let mut table = [0.0; 256];
+    let mut code = 0;
+    while code < 256 {
+        let encoded = code as f64 / 255.0;
+        table[code] = if encoded <= 0.040_45 {
+            (encoded / 12.92) as f32
+        } else {
+            let base = (encoded + 0.055) / 1.055;
+            // base^2.4
+            (base * base * fifth_root(base * base)) as f32
+        };
+        code += 1;
+    }
+    table
+}
+
+/// The fifth root of a number in (0, 1], by Newton's method from above.
+const fn fifth_root(number: f64) -> f64 {
+    let mut root = 1.0;
+    let mut step = 0;
+    while step < 64 {
+        root = (4.0 * root + number / (root * root * root * root)) / 5.0;
+        step += 1;
+    }
+    root
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_codes_have_the_values_of_the_standard() {
+        for code in 0..=255_u8 {
+            let encoded = f64::from(code) / 255.0;
+            let expected =
+                if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) };
+            assert!((f64::from(srgb(code)) - expected).abs() < 1e-7, "{code}");
+        }
+    }
+
+    #[test]
+    fn shared_exponents_are_those_of_opengl() {
+        let bits = |red: u32, green: u32, blue: u32, exponent: u32| {
+            (red | green << 9 | blue << 18 | exponent << 27).to_le_bytes()
+        };
+        assert_eq!(decode(TexelFormat::SharedExponent, bits(256, 128, 0, 16)), [1.0, 0.5, 0.0, 1.0]);
+        assert_eq!(decode(TexelFormat::SharedExponent, bits(511, 1, 2, 31))[0], 65_408.0);
+        assert_eq!(decode(TexelFormat::SharedExponent, [0; 4]), [0.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[track_caller]
+    fn between(coordinate: f32, wrap: Wrap) -> [(u32, f32); 2] {
+        Place::new(coordinate, 4, wrap).texels()
+    }
+
+    #[test]
+    fn places_are_between_the_middles_of_texels() {
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            assert_eq!(between(0.5, wrap), [(1, 0.5), (2, 0.5)], "{wrap:?}");
+            assert_eq!(between(0.375, wrap)[0], (1, 1.0), "{wrap:?}");
+        }
+    }
+
+    #[test]
+    fn beyond_an_edge_is_what_the_wrap_says() {
+        assert_eq!(between(0.0, Wrap::Repeat), [(3, 0.5), (0, 0.5)]);
+        assert_eq!(between(1.0, Wrap::Repeat), [(3, 0.5), (0, 0.5)]);
+        assert_eq!(between(-0.25, Wrap::Repeat), [(2, 0.5), (3, 0.5)]);
+        assert_eq!(between(5.5, Wrap::Repeat), [(1, 0.5), (2, 0.5)]);
+        assert_eq!(between(0.0, Wrap::Mirror), [(0, 0.5), (0, 0.5)]);
+        assert_eq!(between(1.0, Wrap::Mirror), [(3, 0.5), (3, 0.5)]);
+        assert_eq!(between(1.25, Wrap::Mirror), [(3, 0.5), (2, 0.5)]);
+        assert_eq!(between(-0.25, Wrap::Mirror), [(1, 0.5), (0, 0.5)]);
+        assert_eq!(between(-7.0, Wrap::Clamp), [(0, 1.0), (0, 0.0)]);
+        assert_eq!(between(7.0, Wrap::Clamp)[0].0, 3);
+        assert_eq!(between(7.0, Wrap::Clamp)[1].0, 3);
+    }
+
+    #[test]
+    fn no_coordinate_leads_out_of_a_texture() {
+        let mut coordinates = std::vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-40, -1e-40];
+        coordinates.extend((0..20_000).map(|i| (i as f32 - 10_000.0) * 0.000_731));
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            for size in [1, 2, 3, 16_384, u16::MAX] {
+                for &coordinate in &coordinates {
+                    let place = Place::new(coordinate, size, wrap);
+                    assert!(place.texels.into_iter().all(|texel| texel < u32::from(size)));
+                    assert!(
+                        (0.0..=1.0).contains(&place.fraction),
+                        "{coordinate} {place_fraction}",
+                        place_fraction = place.fraction
+                    );
+                }
+            }
+        }
+    }
+}
