@@ -19,6 +19,17 @@ pub struct Hierarchy {
     pub nodes: Vec<[u8; LINE_BYTES]>,
     /// Leaves of triangles.
     pub leaves: Vec<[u8; LINE_BYTES]>,
+    /// The triangles of each leaf, by their index, in their order there.
+    pub leaf_triangles: Vec<LeafTriangles>,
+}
+
+/// The indices of the triangles of a leaf, in order.
+pub type LeafTriangles = heapless::Vec<u32, LEAF_TRIANGLES>;
+
+/// The triangles that a hierarchy is built of.
+struct Mesh<'a> {
+    triangles: &'a [Triangle],
+    cut_out: &'a [bool],
 }
 
 /// Why there is no hierarchy of these triangles.
@@ -55,11 +66,12 @@ const MOST_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 /// The cost of a visit of a leaf, of which that of a node is 1.
 const LEAF_COST: f32 = 1.0;
 
-/// Builds the hierarchy of some triangles, at least one. The same on every machine: obvhs runs on one thread.
+/// Builds the hierarchy of some triangles, at least one. The same on every machine: obvhs runs on one thread. `cut_out` says
+/// of each material whether its triangles may have cut-outs; those beyond its end have none.
 ///
 /// # Errors
 /// If the chip could not descend in it.
-pub fn build(triangles: &[Triangle]) -> Result<Hierarchy, HierarchyError> {
+pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, HierarchyError> {
     if triangles.len() > MOST_TRIANGLES {
         return Err(HierarchyError::TooMany { triangles: triangles.len() });
     }
@@ -76,11 +88,12 @@ pub fn build(triangles: &[Triangle]) -> Result<Hierarchy, HierarchyError> {
     // Leaves are made when the tree is folded.
     let parameters = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::slow_build() };
     let binary = build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
-    let mut folded = Folded::new(tree(&binary, triangles));
+    let mesh = &Mesh { triangles, cut_out };
+    let mut folded = Folded::new(tree(&binary, mesh));
     if folded.stack > BVH_STACK {
         // Halves of halves are not the best of trees, but no deeper than their number asks for.
         let mut indices: Vec<u32> = (0..triangles.len() as u32).collect();
-        folded = Folded::new(halves(&mut indices, &boxes, triangles));
+        folded = Folded::new(halves(&mut indices, &boxes, mesh));
     }
     let Folded { nodes, leaves, stack } = folded;
     if stack > BVH_STACK {
@@ -88,10 +101,10 @@ pub fn build(triangles: &[Triangle]) -> Result<Hierarchy, HierarchyError> {
     }
     let nodes = nodes.iter().map(|node| BvhNode::encode(&node.children, node.links));
     let nodes = nodes.collect::<Option<_>>().ok_or(HierarchyError::NotFinite)?;
-    let leaves = leaves.into_iter().map(|indices| {
-        encode(&indices, triangles).unwrap_or_else(|| unreachable!("a leaf of {} triangles", indices.len()))
+    let lines = leaves.iter().map(|indices| {
+        mesh.encode(indices).unwrap_or_else(|| unreachable!("a leaf of {} triangles", indices.len()))
     });
-    Ok(Hierarchy { nodes, leaves: leaves.collect() })
+    Ok(Hierarchy { nodes, leaves: lines.collect(), leaf_triangles: leaves })
 }
 
 fn bounding_box(triangle: &Triangle) -> Aabb {
@@ -99,23 +112,24 @@ fn bounding_box(triangle: &Triangle) -> Aabb {
     Aabb { min: a.min(b).min(c).into(), max: a.max(b).max(c).into() }
 }
 
-fn record(triangle: &Triangle) -> layout::Triangle {
-    let vertices = triangle.vertices.map(|vertex| vertex.to_array());
-    layout::Triangle { vertices, material: triangle.material, cut_out: false }
-}
+impl Mesh<'_> {
+    fn record(&self, triangle: &Triangle) -> layout::Triangle {
+        let vertices = triangle.vertices.map(|vertex| vertex.to_array());
+        let material = triangle.material;
+        let cut_out = self.cut_out.get(material as usize).copied().unwrap_or(false);
+        layout::Triangle { vertices, material, cut_out }
+    }
 
-/// The line of the leaf of some triangles, if it holds them.
-fn encode(indices: &[u32], triangles: &[Triangle]) -> Option<[u8; LINE_BYTES]> {
-    let records: heapless::Vec<_, LEAF_TRIANGLES> =
-        indices.iter().map(|&index| record(&triangles[index as usize])).collect();
-    BvhLeaf::encode(&records)
+    /// The line of the leaf of some triangles, if it holds them.
+    fn encode(&self, indices: &[u32]) -> Option<[u8; LINE_BYTES]> {
+        let records: heapless::Vec<_, LEAF_TRIANGLES> =
+            indices.iter().map(|&index| self.record(&self.triangles[index as usize])).collect();
+        BvhLeaf::encode(&records)
+    }
 }
-
-/// The indices of the triangles of a leaf, in order.
-type Indices = heapless::Vec<u32, LEAF_TRIANGLES>;
 
 /// A tree that may be folded. Whatever a leaf has room for may be one.
-fn tree(binary: &Bvh2, triangles: &[Triangle]) -> Tree<Indices, NodeBox> {
+fn tree(binary: &Bvh2, mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
     // Parents before children.
     let mut order = vec![0];
     let mut next = 0;
@@ -126,7 +140,7 @@ fn tree(binary: &Bvh2, triangles: &[Triangle]) -> Tree<Indices, NodeBox> {
         }
         next += 1;
     }
-    let mut trees: Vec<Option<Tree<Indices, NodeBox>>> = binary.nodes.iter().map(|_| None).collect();
+    let mut trees: Vec<Option<Tree<LeafTriangles, NodeBox>>> = binary.nodes.iter().map(|_| None).collect();
     let missing = || unreachable!("a part is made before its parent");
     for &index in order.iter().rev() {
         let node = &binary.nodes[index as usize];
@@ -138,7 +152,7 @@ fn tree(binary: &Bvh2, triangles: &[Triangle]) -> Tree<Indices, NodeBox> {
             Tree::leaf(indices.collect(), bounds, LEAF_COST * area)
         } else {
             let parts = [first, first + 1].map(|part| trees[part].take().unwrap_or_else(missing));
-            let leaf = both(&parts, triangles).map(|leaf| (leaf, LEAF_COST * area));
+            let leaf = both(&parts, mesh).map(|leaf| (leaf, LEAF_COST * area));
             Tree::node(parts, bounds, area, leaf)
         });
     }
@@ -146,12 +160,12 @@ fn tree(binary: &Bvh2, triangles: &[Triangle]) -> Tree<Indices, NodeBox> {
 }
 
 /// A tree of parts of as many triangles each.
-fn halves(indices: &mut [u32], boxes: &[Aabb], triangles: &[Triangle]) -> Tree<Indices, NodeBox> {
+fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
     let bounds = indices.iter().fold(Aabb::empty(), |bounds, &index| bounds.union(&boxes[index as usize]));
     let area = bounds.half_area();
     let node_box = NodeBox { lower: bounds.min.to_array(), upper: bounds.max.to_array() };
-    if let Ok(leaf) = Indices::from_slice(indices)
-        && encode(&leaf, triangles).is_some()
+    if let Ok(leaf) = LeafTriangles::from_slice(indices)
+        && mesh.encode(&leaf).is_some()
     {
         return Tree::leaf(leaf, node_box, LEAF_COST * area);
     }
@@ -159,18 +173,18 @@ fn halves(indices: &mut [u32], boxes: &[Aabb], triangles: &[Triangle]) -> Tree<I
     let (middle, center) = (indices.len() / 2, |index: u32| boxes[index as usize].center()[axis]);
     indices.select_nth_unstable_by(middle, |&a, &b| center(a).total_cmp(&center(b)).then(a.cmp(&b)));
     let (below, above) = indices.split_at_mut(middle);
-    let parts = [below, above].map(|part| halves(part, boxes, triangles));
+    let parts = [below, above].map(|part| halves(part, boxes, mesh));
     Tree::node(parts, node_box, area, None)
 }
 
 /// The triangles of two parts, if one leaf holds them.
-fn both(parts: &[Tree<Indices, NodeBox>; 2], triangles: &[Triangle]) -> Option<Indices> {
-    let mut indices = Indices::new();
+fn both(parts: &[Tree<LeafTriangles, NodeBox>; 2], mesh: &Mesh) -> Option<LeafTriangles> {
+    let mut indices = LeafTriangles::new();
     for part in parts {
         indices.extend_from_slice(part.as_leaf()?).ok()?;
     }
     indices.sort_unstable();
-    encode(&indices, triangles).is_some().then_some(indices)
+    mesh.encode(&indices).is_some().then_some(indices)
 }
 
 #[cfg(test)]
@@ -219,7 +233,7 @@ mod tests {
     #[test]
     fn every_triangle_is_in_one_leaf_and_in_its_boxes() {
         for count in [1, 2, 3, 4, 17, 1000, 20_000] {
-            let hierarchy = build(&triangles(count)).expect("builds");
+            let hierarchy = build(&triangles(count), &[]).expect("builds");
             let everywhere = NodeBox { lower: [-9.0; 3], upper: [9.0; 3] };
             let mut found = Vec::new();
             walk(&hierarchy, Child::Node(0), everywhere, &mut found);
@@ -241,7 +255,7 @@ mod tests {
                     [[a, b, c], [a, c, d]].map(|vertices| Triangle::new(vertices, hash(x + y) % materials))
                 })
                 .collect();
-            let hierarchy = build(&mesh).expect("builds");
+            let hierarchy = build(&mesh, &[]).expect("builds");
             let bits = |triangle: layout::Triangle| {
                 (triangle.vertices.map(|vertex| vertex.map(f32::to_bits)), triangle.material)
             };
@@ -249,7 +263,10 @@ mod tests {
             let mut found: Vec<_> = leaves
                 .flat_map(|leaf| (0..leaf.triangles() as usize).map(move |slot| bits(leaf.triangle(slot))))
                 .collect();
-            let mut expected: Vec<_> = mesh.iter().map(|triangle| bits(record(triangle))).collect();
+            let mut expected: Vec<_> = mesh
+                .iter()
+                .map(|triangle| bits(Mesh { triangles: &mesh, cut_out: &[] }.record(triangle)))
+                .collect();
             found.sort_unstable();
             expected.sort_unstable();
             assert!(found == expected, "{materials} materials");
@@ -266,14 +283,14 @@ mod tests {
         for coordinate in [f32::NAN, f32::INFINITY, 1e30] {
             let mut triangles = triangles(20);
             triangles[7].vertices[1] = Vec3::splat(coordinate);
-            assert!(matches!(build(&triangles), Err(HierarchyError::NotFinite)), "{coordinate}");
+            assert!(matches!(build(&triangles, &[]), Err(HierarchyError::NotFinite)), "{coordinate}");
         }
     }
 
     #[test]
     fn triangles_in_one_place_are_no_trouble() {
         let [triangle] = triangles(1)[..] else { unreachable!() };
-        let hierarchy = build(&vec![triangle; 5000]).expect("builds");
+        let hierarchy = build(&vec![triangle; 5000], &[]).expect("builds");
         assert!((5000 / LEAF_TRIANGLES..5000 / 3).contains(&hierarchy.leaves.len()));
     }
 }

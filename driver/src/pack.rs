@@ -21,19 +21,33 @@ use crate::photon::leaves::PhotonTree;
 use crate::photon::map::{balance, for_each_in_heap};
 use crate::photon::stored::StoredPhoton;
 use crate::photon::{PhotonLayout, Photons, search_radius};
-use crate::scene::{Material, Reflection, Scene};
+use crate::scene::Scene;
+
+mod corners;
+mod materials;
+mod textures;
+
+use self::corners::PackedCorners;
 
 /// Photons of a line of leaves, the inner nodes' lines counted in, about.
 const PHOTONS_OF_A_LEAF: usize = 9;
 
 /// The sections of the photon map, irradiance points among them.
-const PHOTON_SECTIONS: [SectionKind; 5] = [
+const PHOTON_SECTIONS: [SectionKind; 7] = [
     SectionKind::Photons,
     SectionKind::PhotonNodes,
     SectionKind::PhotonLeaves,
+    SectionKind::CausticNodes,
+    SectionKind::CausticLeaves,
     SectionKind::IrradianceNodes,
     SectionKind::IrradianceLeaves,
 ];
+
+/// Textures that materials can tell apart.
+const MOST_TEXTURES: usize = layout::NO_TEXTURE as usize;
+
+const CAUSTIC_SECTIONS: [SectionKind; 2] = [SectionKind::CausticNodes, SectionKind::CausticLeaves];
+const IRRADIANCE_SECTIONS: [SectionKind; 2] = [SectionKind::IrradianceNodes, SectionKind::IrradianceLeaves];
 
 /// Why a scene does not fit a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
@@ -48,6 +62,13 @@ pub enum PackError {
     TooLarge {
         /// Bytes of the image.
         bytes: u64,
+    },
+    /// More textures than a material can tell.
+    #[error("the scene has {textures} textures; a card tells {MOST_TEXTURES} apart")]
+    #[diagnostic(help("join textures of the same image and sampler, or split the scene"))]
+    TooManyTextures {
+        /// Textures of the scene.
+        textures: usize,
     },
     /// The image is larger than the card's memory.
     #[error(
@@ -86,7 +107,11 @@ impl PackedScene {
     /// # Errors
     /// If the geometry is too much for a chip.
     pub fn new(scene: &Scene, emitters: &Emitters) -> Result<Self, PackError> {
-        let hierarchy = bvh::build(&scene.triangles)?;
+        let cut_out: Vec<bool> =
+            scene.materials.iter().map(|material| material.alpha_cutoff.is_some()).collect();
+        let hierarchy = bvh::build(&scene.triangles, &cut_out)?;
+        let corners = PackedCorners::new(scene, &hierarchy.leaf_triangles);
+        let textures = textures::records(scene)?;
         let mut packed = Self {
             // The first are the header's.
             lines: vec![Line::ZERO; HEADER_LINES],
@@ -97,7 +122,11 @@ impl PackedScene {
         };
         packed.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
         packed.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
-        packed.append(SectionKind::Materials, scene.materials.iter().map(material_record))?;
+        packed.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
+        packed.append(SectionKind::Attributes, corners.records.iter().map(layout::Attributes::to_bytes))?;
+        packed.append(SectionKind::Materials, scene.materials.iter().map(materials::record))?;
+        packed.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
+        packed.append_lines(SectionKind::Texels, textures::lines(scene))?;
         packed.append(SectionKind::Emitters, emitters.records().iter().map(layout::Emitter::to_bytes))?;
         packed
             .append(SectionKind::EmitterThresholds, emitters.thresholds().iter().map(|t| t.to_le_bytes()))?;
@@ -110,6 +139,21 @@ impl PackedScene {
         records: impl ExactSizeIterator<Item = [u8; N]>,
     ) -> Result<(), PackError> {
         append(&mut self.lines, &mut self.sections, kind, records)
+    }
+
+    /// Appends whole lines, as they are made.
+    fn append_lines(
+        &mut self,
+        kind: SectionKind,
+        lines: impl Iterator<Item = Line>,
+    ) -> Result<(), PackError> {
+        let first = self.lines.len();
+        self.lines.extend(lines);
+        let too_large = |_| PackError::TooLarge { bytes: self.lines.len() as u64 * LINE_BYTES as u64 };
+        let [first_line, end] = [first, self.lines.len()].map(u32::try_from);
+        let first_line = first_line.map_err(too_large)?;
+        self.sections[kind as usize] = Section { first_line, records: end.map_err(too_large)? - first_line };
+        Ok(())
     }
 
     fn header(&self, photon_power_unit: f32, photon_grid: PhotonGrid) -> Header {
@@ -270,7 +314,8 @@ impl CardImage {
 
     /// The photons of the leaves.
     fn stored_photons(&self) -> Vec<StoredPhoton> {
-        let leaves = || self.leaf_lines().iter().map(|line| PhotonLeaf::read(&line.0));
+        let leaves =
+            || self.leaf_lines(SectionKind::PhotonLeaves).iter().map(|line| PhotonLeaf::read(&line.0));
         let mut photons = Vec::with_capacity(leaves().map(|leaf| leaf.photons() as usize).sum());
         for leaf in leaves() {
             photons.extend((0..leaf.photons()).map(|i| StoredPhoton::at(leaf.point(i), leaf.content(i))));
@@ -278,10 +323,10 @@ impl CardImage {
         photons
     }
 
-    /// The lines of the photon map's leaves.
-    pub(crate) fn leaf_lines(&self) -> &[Line] {
+    /// The lines of a section of leaves.
+    pub(crate) fn leaf_lines(&self, kind: SectionKind) -> &[Line] {
         let (SceneImage { header }, _) = self.view();
-        let section = header.section(SectionKind::PhotonLeaves);
+        let section = header.section(kind);
         &self.lines[section.first_line as usize..][..section.records as usize]
     }
 
@@ -292,15 +337,39 @@ impl CardImage {
         &mut self.lines[section.first_line as usize..][..section.records as usize]
     }
 
+    /// The same image with a caustic map, for searches of about so many neighbours.
+    ///
+    /// # Errors
+    /// If there are more lines than an address can tell.
+    pub(crate) fn with_caustics(self, photons: Photons, neighbors: u32) -> Result<Self, PackError> {
+        let (SceneImage { mut header }, _) = self.view();
+        header.caustic_power_unit = photons.power_unit();
+        let radius = search_radius(&photons, neighbors);
+        let Photons { mut list, .. } = photons;
+        self.with_trees(header, PhotonTree::new(&mut list, radius).as_ref(), CAUSTIC_SECTIONS)
+    }
+
     /// The same image with irradiance points.
     ///
     /// # Errors
     /// If there are more lines than an address can tell.
     pub(crate) fn with_irradiance(self, points: &PhotonTree) -> Result<Self, PackError> {
-        let (SceneImage { mut header }, _) = self.view();
+        let (SceneImage { header }, _) = self.view();
+        self.with_trees(header, Some(points), IRRADIANCE_SECTIONS)
+    }
+
+    /// The same image with another tree, or with none.
+    fn with_trees(
+        self,
+        mut header: Header,
+        tree: Option<&PhotonTree>,
+        [nodes, leaves]: [SectionKind; 2],
+    ) -> Result<Self, PackError> {
         let mut lines = self.lines;
-        append(&mut lines, &mut header.sections, SectionKind::IrradianceNodes, points.nodes())?;
-        append(&mut lines, &mut header.sections, SectionKind::IrradianceLeaves, points.leaves())?;
+        if let Some(tree) = tree {
+            append(&mut lines, &mut header.sections, nodes, tree.nodes())?;
+            append(&mut lines, &mut header.sections, leaves, tree.leaves())?;
+        }
         // `append` has checked that the number of lines fits.
         header.lines = lines.len() as u32;
         lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
@@ -370,25 +439,6 @@ fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl It
         }
         Some(line)
     })
-}
-
-fn material_record(material: &Material) -> [u8; layout::Material::BYTES] {
-    let (diffuse, specular, exponent) = match material.reflection {
-        Reflection::Phong { diffuse, specular, exponent } => (diffuse, specular, exponent),
-        Reflection::MetallicRoughness { base_colour, .. } => (base_colour, Vec3::ZERO, 0.0),
-    };
-    layout::Material {
-        reflectance: layout::Reflectance::Phong {
-            diffuse: diffuse.to_array(),
-            specular: specular.to_array(),
-            exponent,
-        },
-        emission: material.emission.to_array(),
-        flags: if material.double_sided { layout::DOUBLE_SIDED } else { 0 },
-        cutoff: 0.0,
-        textures: [layout::NO_TEXTURE; 3],
-    }
-    .to_bytes()
 }
 
 /// Fixed-point sums of radiance hold 23 bits above the unit and 40 below.

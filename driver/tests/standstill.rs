@@ -29,7 +29,7 @@ fn frame() -> FrameParameters {
         aspect: None,
     };
     RenderSettings { width: 4, height: 4, gather_rays: 100, samples: 10, ..RenderSettings::default() }
-        .frame(&camera, 1.0)
+        .frame(&camera, 1.0, None)
 }
 
 const IMAGE: [Line; 100] = [Line::ZERO; 100];

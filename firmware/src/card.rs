@@ -14,8 +14,8 @@ use photoncard_shared::budget::{
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::{Header, LAYOUT_VERSION, SectionKind};
 use photoncard_shared::message::{
-    self, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXEL_BYTES, PIXELS_PER_REPLY,
-    PROTOCOL_VERSION, Radiance, Reply, Tile,
+    self, CausticGather, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXEL_BYTES,
+    PIXELS_PER_REPLY, PROTOCOL_VERSION, Radiance, Reply, Tile,
 };
 use photoncard_shared::transport::Transport;
 
@@ -382,9 +382,10 @@ fn check_frame(budget: &Budget, header: &Header, frame: &FrameParameters) -> Res
         true,
         frame.queue >= 1,
         frame.radiance == Radiance::Density || has_irradiance(header),
-        frame.caustic_neighbors == 0
-            || frame.caustic_neighbors >= 2 && within(frame.caustic_neighbors, budget.neighbors),
-        frame.caustic_max_distance.is_finite() && frame.caustic_max_distance >= 0.0,
+        frame.caustics.is_none_or(|CausticGather { neighbors, max_distance }| {
+            let is_length = max_distance.is_finite() && max_distance > 0.0;
+            neighbors >= 2 && within(neighbors, budget.neighbors) && is_length
+        }),
     ];
     match checks.iter().position(|&holds| !holds) {
         Some(index) => Err(Fault { code: FaultCode::Parameter, detail: index as u32 }),

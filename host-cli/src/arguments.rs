@@ -129,6 +129,13 @@ pub(crate) struct RenderOptions {
     /// Photons that a gather looks for
     #[arg(long, default_value_t = 100, allow_negative_numbers = true)]
     neighbors: u32,
+    /// Photons of the caustic map: light that has met mirrors and glass alone [default: 200000 if anything in the scene is
+    /// perfectly specular]. With 0 gather rays bring that light, with more noise, and that of punctual lights is lost
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    caustic_photons: Option<usize>,
+    /// Photons that a gather of caustics looks for: fewer are sharper, more are smoother
+    #[arg(long, value_name = "K", default_value_t = 50, allow_negative_numbers = true)]
+    caustic_neighbors: u32,
     /// Greatest distance of a gather in metres, or auto: from the photons' density
     #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true)]
     max_distance: MaxDistance,
@@ -339,6 +346,8 @@ impl RenderOptions {
             photons: self.photons,
             photon_layout: self.photon_map.layout(),
             neighbors: self.neighbors,
+            caustic_photons: self.caustic_photons,
+            caustic_neighbors: self.caustic_neighbors,
             max_distance: match self.max_distance {
                 MaxDistance::Auto => None,
                 MaxDistance::Metres(distance) => Some(distance),

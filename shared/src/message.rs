@@ -20,7 +20,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// The version of this module, of [`crate::transport`] and of [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 7;
+pub const PROTOCOL_VERSION: u16 = 8;
 
 /// Lines that one [`Command::WriteLines`] may carry.
 pub const LINES_PER_WRITE: usize = 8;
@@ -90,11 +90,17 @@ pub struct FrameParameters {
     pub queue: u32,
     /// What tells the radiance at the end of a gather ray.
     pub radiance: Radiance,
-    /// Photons of caustics that a gather looks for, at least 2; none without a caustic map: then gather rays bring the light of
-    /// emitters by way of perfectly specular surfaces.
-    pub caustic_neighbors: u32,
-    /// How far from its place such a gather looks, metres.
-    pub caustic_max_distance: f32,
+    /// The gathers of caustics; without them gather rays bring the light of emitters by way of perfectly specular surfaces.
+    pub caustics: Option<CausticGather>,
+}
+
+/// What a gather of caustics looks for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CausticGather {
+    /// Photons, at least 2: the last only tells how far it looked.
+    pub neighbors: u32,
+    /// How far from its place it looks, metres.
+    pub max_distance: f32,
 }
 
 /// What the directions of final gather rays are chosen by. The expectation of the picture is the same.

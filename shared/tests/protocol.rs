@@ -249,11 +249,13 @@ fn golden_structures() {
         drain: Drain::Sort,
         queue: 300,
         radiance: Radiance::Precomputed,
+        caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero].concat();
     let bytes =
-        [&[5, 1, 2][..], &camera, &[3, 4, 5, 6, 7], &one, &[2, 1], &one, &[8, 2, 0xac, 2, 1]].concat();
+        [&[5, 1, 2][..], &camera, &[3, 4, 5, 6, 7], &one, &[2, 1], &one, &[8, 2, 0xac, 2, 1, 1, 50], &one]
+            .concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);
 
     let counters = Counters {
@@ -261,21 +263,24 @@ fn golden_structures() {
         shadow_rays: 2,
         gather_rays: 3,
         survey_rays: 4,
-        gathers: 5,
-        tables: 6,
-        records: 7,
-        lambertian_samples: 8,
-        interpolated_samples: 9,
-        photons_tested: 10,
-        photons_taken: 11,
-        photons_selected: 12,
-        photons_found: 13,
-        lookups: 14,
-        points_tested: 15,
-        drains: 16,
+        specular_rays: 5,
+        lost_paths: 6,
+        caustic_gathers: 7,
+        gathers: 8,
+        tables: 9,
+        records: 10,
+        lambertian_samples: 11,
+        interpolated_samples: 12,
+        photons_tested: 13,
+        photons_taken: 14,
+        photons_selected: 15,
+        photons_found: 16,
+        lookups: 17,
+        points_tested: 18,
+        drains: 19,
         most_waiting: 300,
     };
-    let bytes = [5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 0xac, 2];
+    let bytes = [5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 0xac, 2];
     assert_eq!(encoded(&Reply::TileDone { tile: 16, counters }), bytes);
 }
 

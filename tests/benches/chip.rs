@@ -17,7 +17,7 @@ use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::chip::{Progress, ReferenceChip};
 use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::MemoryPort;
-use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather};
+use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::render::Context;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{Ray, closest_hit, is_occluded, read_surface};
@@ -59,6 +59,8 @@ fn prepare(name: &str, layout: PhotonLayout) -> Prepared {
 fn map(scene: &Scene, photons: usize, layout: PhotonLayout) -> MappedImage {
     let packed = PackedScene::new(scene, &Emitters::new(scene)).expect("packs");
     let settings = PhotonSettings {
+        caustic_photons: 0,
+        caustic_neighbors: 50,
         seed: 0,
         photons,
         neighbors: NEIGHBORS,
@@ -111,7 +113,7 @@ fn gather_all(bencher: Bencher, image: &CardImage, shuffled: bool) {
         let mut found = 0;
         for &query in &queries {
             let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, CORNELL.max_distance);
-            gather(&scene, &mut memory, query, &mut nearest).expect("sound");
+            gather(&scene, &mut memory, PhotonMap::Indirect, query, &mut nearest).expect("sound");
             found += nearest.len();
         }
         found
@@ -169,7 +171,7 @@ fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
         _ => GatherOrder::Sort,
     };
     let settings = RenderSettings { order, ..RenderSettings::default() };
-    let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance);
+    let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance, None);
     let (scene, _) = CORNELL.image.view();
     let mut counters = Counters::ZERO;
     let mut context =

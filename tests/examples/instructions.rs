@@ -34,8 +34,8 @@ fn memory() -> Vec<u8> {
         irradiance_error: None,
         ..RenderSettings::default()
     };
-    let mapped = map_photons(packed, &settings.photon_settings(), &|_| true).expect("it is lit");
-    let frame = settings.frame(&scene.cameras[0], mapped.max_distance);
+    let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("it is lit");
+    let frame = settings.frame(&scene.cameras[0], mapped.max_distance, mapped.caustics);
     let frame = FrameParameters { drain: Drain::Immediate, ..frame };
     let mut behind = [0; LINE_BYTES];
     let (length, bytes) = behind.split_first_mut().expect("a line has bytes");

@@ -14,7 +14,7 @@ use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::Photons;
 use photoncard_firmware::gather::Place;
-use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather};
+use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::layout::{FULL_DISC, Photon, Rgbe};
 use photoncard_tests::{camera, lambertian, room, scene};
@@ -81,7 +81,9 @@ fn search_all(image: &CardImage, queries: &[[f32; 3]]) -> (u64, f64) {
     let (mut tested, mut sum) = (0, 0.0);
     for &query in queries {
         let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, MAX_DISTANCE);
-        tested += u64::from(gather(&scene, &mut memory, query.into(), &mut nearest).expect("sound"));
+        tested += u64::from(
+            gather(&scene, &mut memory, PhotonMap::Indirect, query.into(), &mut nearest).expect("sound"),
+        );
         sum += nearest.candidates().map(|candidate| f64::from(candidate.distance_squared())).sum::<f64>();
     }
     (tested, sum)

@@ -18,7 +18,7 @@ use photoncard_firmware::render::{Context, GatherPoint};
 use photoncard_firmware::sampler::{Dimension, Pattern};
 use photoncard_firmware::scene::Surface;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{FrameParameters, Sampling, Tile};
+use photoncard_shared::message::{CausticGather, FrameParameters, Sampling, Tile};
 use rayon::prelude::*;
 
 /// A scene with its card image.
@@ -26,6 +26,7 @@ pub struct MappedScene {
     scene: Scene,
     image: CardImage,
     max_distance: f32,
+    caustics: Option<CausticGather>,
 }
 
 /// The pixels of a frame's window, row by row, and what they took.
@@ -43,9 +44,9 @@ impl MappedScene {
     /// If the scene cannot be packed.
     pub fn new(scene: Scene, settings: &RenderSettings) -> Self {
         let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
-        let MappedImage { image, max_distance, .. } =
-            map_photons(packed, &settings.photon_settings(), &|_| true).expect("maps");
-        Self { scene, image, max_distance }
+        let MappedImage { image, max_distance, caustics, .. } =
+            map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("maps");
+        Self { scene, image, max_distance, caustics }
     }
 
     /// The window of a frame on reference chips of this process, one a thread.
@@ -54,8 +55,8 @@ impl MappedScene {
     /// If the image is not sound.
     pub fn frame(&self, settings: &RenderSettings) -> Frame {
         let window = settings.window();
-        let frame = settings
-            .frame(self.scene.camera(settings.camera.as_deref()).expect("a camera"), self.max_distance);
+        let camera = self.scene.camera(settings.camera.as_deref()).expect("a camera");
+        let frame = settings.frame(camera, self.max_distance, self.caustics);
         let tiles = tiles(window, settings.tile, settings.order);
         let pool = rayon::ThreadPoolBuilder::new().stack_size(16 << 20).build().expect("threads");
         let parts: Vec<(Tile, Vec<Vec3>, Counters)> = pool.install(|| {
@@ -95,7 +96,7 @@ impl<'a> IndirectLight<'a> {
     /// If the image is not sound.
     pub fn new(mapped: &'a MappedScene, settings: &RenderSettings, side: u32) -> Self {
         let camera = mapped.scene.camera(settings.camera.as_deref()).expect("a camera");
-        let frame = settings.frame(camera, mapped.max_distance);
+        let frame = settings.frame(camera, mapped.max_distance, mapped.caustics);
         let (scene, mut memory) = mapped.image.view();
         let mut counters = Counters::ZERO;
         let mut context = Context {

@@ -33,7 +33,7 @@ fn image() -> CardImage {
 fn frame() -> FrameParameters {
     let settings =
         RenderSettings { width: 8, height: 8, neighbors: 20, gather_rays: 4, ..RenderSettings::default() };
-    settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5)
+    settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None)
 }
 
 const TILE: Tile = Tile { id: 7, x: 0, y: 0, width: 8, height: 8 };

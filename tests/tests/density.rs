@@ -7,7 +7,7 @@ use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_p
 use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::{Material, Scene, Triangle};
 use photoncard_firmware::gather::PartialReflection;
-use photoncard_firmware::photon::{CandidateBuffer, Estimate, NearestPhotons, gather};
+use photoncard_firmware::photon::{CandidateBuffer, Estimate, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::scene::{Reflection, Surface};
 use photoncard_firmware::simd::Level;
 use photoncard_tests::{camera, lambertian, quad, room, scene};
@@ -25,6 +25,8 @@ impl Map {
     fn new(scene: &Scene, photons: usize) -> Self {
         let packed = PackedScene::new(scene, &Emitters::new(scene)).unwrap();
         let settings = PhotonSettings {
+            caustic_photons: 0,
+            caustic_neighbors: 50,
             seed: 1,
             photons,
             neighbors: NEIGHBORS,
@@ -41,16 +43,10 @@ impl Map {
         let (scene, mut memory) = self.image.view();
         let mut buffer = CandidateBuffer::<512>::new();
         let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, self.max_distance);
-        gather(&scene, &mut memory, position, &mut nearest).unwrap();
+        gather(&scene, &mut memory, PhotonMap::Indirect, position, &mut nearest).unwrap();
         let surface = Surface {
-            position,
-            normal,
-            outgoing: normal,
             reflection: Reflection { diffuse: Vec3::splat(ALBEDO), ..Reflection::BLACK },
-            emission: Vec3::ZERO,
-            double_sided: false,
-            distance: 1.0,
-            magnitude: 1.0,
+            ..Surface::white(position, normal, 1.0)
         };
         let reflection =
             PartialReflection::new(&surface, Vec3::splat(scene.header.photon_power_unit), 1 << 31);

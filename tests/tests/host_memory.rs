@@ -64,7 +64,7 @@ fn a_photon_takes_forty_bytes_at_the_most_and_cards_share_the_image() {
     let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
     let before = MEMORY.current_usage();
     MEMORY.reset_peak_usage();
-    let mapped = map_photons(packed, &settings(1).photon_settings(), &|_| true).expect("maps");
+    let mapped = map_photons(packed, &settings(1).photon_settings(&scene), &|_| true).expect("maps");
     let peak = MEMORY.peak_usage() - before;
     println!("{} bytes a photon at the most", peak as f64 / PHOTONS as f64);
     assert!(peak <= BYTES_A_PHOTON * PHOTONS, "{peak} bytes for {PHOTONS} photons");

@@ -56,8 +56,8 @@ impl Frame {
     fn new(settings: &RenderSettings) -> Self {
         let scene = glossy();
         let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
-        let mapped = map_photons(packed, &settings.photon_settings(), &|_| true).unwrap();
-        let frame = settings.frame(scene.camera(None).unwrap(), mapped.max_distance);
+        let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).unwrap();
+        let frame = settings.frame(scene.camera(None).unwrap(), mapped.max_distance, mapped.caustics);
         Self { mapped, frame, tiles: tiles(settings.window(), settings.tile, settings.order) }
     }
 

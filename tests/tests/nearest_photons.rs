@@ -38,7 +38,13 @@ fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> V
         let (scene, mut memory) = image.view();
         let mut buffer = CandidateBuffer::<512>::new();
         let mut nearest = NearestPhotons::new(buffer.view(), neighbors, max_distance);
-        let search = Search { scene: &scene, memory: &mut memory, position: query, nearest: &mut nearest };
+        let search = Search {
+            scene: &scene,
+            memory: &mut memory,
+            map: PhotonMap::Indirect,
+            position: query,
+            nearest: &mut nearest,
+        };
         let tested = level.run(search)?.unwrap();
         let mut all: Vec<Candidate> = nearest.candidates().collect();
         all.sort_unstable_by_key(Candidate::order);

@@ -127,7 +127,7 @@ fn a_card_looks_at_its_link_however_many_samples_a_pixel_has() {
             gather_rays: 2,
             ..RenderSettings::default()
         };
-        let frame = settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5);
+        let frame = settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None);
         let few = most_reads(&FrameParameters { samples: 64, ..frame });
         let many = most_reads(&FrameParameters { samples: MICRO.samples, ..frame });
         assert!(many <= 2 * few, "{many} lines at once, not {few}");

@@ -15,6 +15,7 @@ use photoncard_firmware::photon::MIN_NORMAL_COSINE;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{Ray, closest_hit, magnitude, offset_origin};
 use photoncard_firmware::simd::run;
+use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{FULL_DISC, LEAF_PHOTONS, Photon, PhotonLeaf, decode_normal, encode_disc};
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
@@ -52,7 +53,7 @@ pub(super) fn measure_discs(
     max_distance: f32,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), PhotonError> {
-    let leaves = image.leaf_lines().len();
+    let leaves = image.leaf_lines(SectionKind::PhotonLeaves).len();
     let sides = SideTable::new(image)?;
     let measured: Result<Vec<Vec<(usize, Codes)>>, PhotonError> = (0..leaves.div_ceil(LEAVES_PER_TASK))
         .into_par_iter()
@@ -134,7 +135,7 @@ impl<'a> Meter<'a> {
     fn measure_leaves(&mut self, first: usize, end: usize) -> Result<Vec<(usize, Codes)>, Fault> {
         let grid = self.searcher.scene.header.photon_grid;
         let mut measured = Vec::new();
-        for (index, line) in (first..end).zip(&self.image.leaf_lines()[first..end]) {
+        for (index, line) in (first..end).zip(&self.image.leaf_lines(SectionKind::PhotonLeaves)[first..end]) {
             let leaf = PhotonLeaf::read(&line.0);
             let photons: Places = (0..leaf.photons())
                 .map(|photon| {
@@ -407,7 +408,7 @@ mod tests {
             let mut meter = Meter::new(&image, &sides, 20, f32::MAX.sqrt() * 0.5);
             let grid = meter.searcher.scene.header.photon_grid;
             let (mut discs, mut cut, mut far, mut sums) = (0, 0, 0, [0.0; 2]);
-            for line in image.leaf_lines() {
+            for line in image.leaf_lines(SectionKind::PhotonLeaves) {
                 let leaf = PhotonLeaf::read(&line.0);
                 let [.., low, high] = leaf.content(0);
                 let normal = Photon::normal_of_flags(u16::from_le_bytes([low, high]));

@@ -7,10 +7,10 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{Ray, SceneImage, Surface, sample_emitter};
-use photoncard_firmware::{importance::sample_reflection, scene::Reflection};
 use photoncard_shared::message::Fault;
 
 /// A photon on its way.
@@ -75,6 +75,11 @@ impl BounceRandom {
         unit_interval(self.bits(3))
     }
 
+    /// A number in [0, 1), for the way on at a perfectly specular surface.
+    pub(super) fn choice(self) -> f32 {
+        unit_interval(self.bits(5))
+    }
+
     /// Bits for the rounding of the power.
     pub(super) fn dither(self) -> u32 {
         self.bits(4)
@@ -101,16 +106,7 @@ pub(super) fn emit(
     };
     let normal = if is_back { -sample.normal } else { sample.normal };
     // A white Lambertian surface reflects by the cosine, as the emitter emits.
-    let white = Surface {
-        position: sample.position,
-        normal,
-        outgoing: normal,
-        reflection: Reflection { diffuse: Vec3::ONE, ..Reflection::BLACK },
-        emission: sample.emission,
-        double_sided: false,
-        distance: 0.0,
-        magnitude: sample.magnitude,
-    };
+    let white = Surface::white(sample.position, normal, sample.magnitude);
     Ok(sample_reflection(&white, [c, d]).map(|sampled| Emission {
         ray: Ray::new(white.offset_origin(), sampled.direction),
         power: sample.emission * (PI * sides / sample.density),

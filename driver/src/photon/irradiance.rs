@@ -7,7 +7,7 @@
 use glam::Vec3;
 use photoncard_firmware::gather::{PartialReflection, Place};
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather, reflected_radiance};
+use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather, reflected_radiance};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::{REFERENCE, gather_candidates};
@@ -81,7 +81,7 @@ impl<'a> Estimator<'a> {
     fn point(&mut self, (point, normal): SurfacePoint) -> Result<StoredPhoton, Fault> {
         let position: Vec3 = self.scene.header.photon_grid.position(point).into();
         let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
-        gather(&self.scene, &mut self.memory, position, &mut nearest)?;
+        gather(&self.scene, &mut self.memory, PhotonMap::Indirect, position, &mut nearest)?;
         let diffuser = PartialReflection::diffuser(normal);
         let irradiance = reflected_radiance(&nearest, position, &diffuser).to_array();
         Ok(StoredPhoton::at(point, IrradiancePoint { irradiance, normal }.to_content()))

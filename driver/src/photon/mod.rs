@@ -26,12 +26,12 @@ pub use error::PhotonError;
 pub use irradiance::precompute_irradiance;
 pub(crate) use search::search_radius;
 pub use stored::Photons;
-pub use trace::{PhotonPass, trace};
+pub use trace::{PhotonPass, trace, trace_caustics};
 
-use photoncard_shared::message::Radiance;
+use photoncard_shared::message::{CausticGather, Radiance};
 
 use self::disc::measure_discs;
-use self::search::automatic_max_distance;
+use self::search::{automatic_max_distance, caustic_max_distance};
 use crate::pack::{CardImage, PackedScene};
 
 /// A gather looks at least so many cells of the grid far, so that the grid does not show.
@@ -48,6 +48,10 @@ pub struct PhotonSettings {
     pub neighbors: u32,
     /// Greatest distance of a gather, metres; `None` for the one that the photons' density suggests.
     pub max_distance: Option<f32>,
+    /// Photons of caustics to store; 0 for no caustic map.
+    pub caustic_photons: usize,
+    /// Photons that a gather of caustics will look for.
+    pub caustic_neighbors: u32,
     /// How the map is laid out.
     pub layout: PhotonLayout,
     /// What gathers tell radiance by: irradiance points are made if they ask for them.
@@ -70,6 +74,8 @@ pub struct MappedImage {
     pub image: CardImage,
     /// Greatest distance of a gather, metres.
     pub max_distance: f32,
+    /// The gathers of caustics, if there is a map of them.
+    pub caustics: Option<CausticGather>,
     /// Paths that were traced from the lights.
     pub paths: u64,
     /// How long it took.
@@ -102,6 +108,7 @@ pub fn map_photons(
     let mut times = PhotonTimes::default();
     let start = Instant::now();
     let PhotonPass { photons, paths } = trace(&packed, settings.seed, settings.photons, progress)?;
+    let caustic = caustics(&packed, settings, progress)?;
     times.tracing = start.elapsed();
     let start = Instant::now();
     let cell = photons.grid.cell;
@@ -123,13 +130,34 @@ pub fn map_photons(
         image = image.with_photon_tree()?;
         times.building += start.elapsed();
     }
+    let mut caustics = None;
+    if let Some(photons) = caustic {
+        let start = Instant::now();
+        image = image.with_caustics(photons, settings.caustic_neighbors)?;
+        let max_distance = caustic_max_distance(&image, settings.caustic_neighbors)?;
+        caustics = Some(CausticGather { neighbors: settings.caustic_neighbors, max_distance });
+        times.building += start.elapsed();
+    }
     if settings.radiance == Radiance::Precomputed {
         let start = Instant::now();
         let go_on = || progress(settings.photons);
         image = precompute_irradiance(image, settings.neighbors, max_distance, &go_on)?;
         times.estimating = start.elapsed();
     }
-    Ok(MappedImage { image, max_distance, paths, times })
+    Ok(MappedImage { image, max_distance, caustics, paths, times })
+}
+
+/// The photons of caustics, if any are asked for.
+fn caustics(
+    packed: &PackedScene,
+    settings: &PhotonSettings,
+    progress: &(dyn Fn(usize) -> bool + Sync),
+) -> Result<Option<Photons>, PhotonError> {
+    if settings.caustic_photons == 0 {
+        return Ok(None);
+    }
+    let go_on = || progress(settings.photons);
+    trace_caustics(packed, settings.seed, settings.caustic_photons, &go_on).map(Some)
 }
 
 #[cfg(test)]
@@ -144,6 +172,8 @@ mod tests {
         let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
         for layout in [PhotonLayout::Lines, PhotonLayout::Jensen] {
             let settings = PhotonSettings {
+                caustic_photons: 0,
+                caustic_neighbors: 50,
                 seed: 3,
                 photons: 60_000,
                 neighbors: 50,

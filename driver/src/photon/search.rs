@@ -2,9 +2,10 @@
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, gather};
+use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::budget::{REFERENCE, gather_candidates};
+use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::PhotonLeaf;
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
@@ -17,6 +18,9 @@ const SAMPLED_LEAVES: usize = 2048;
 /// Share of the sampled photons whose k-th neighbour lies within the automatic greatest distance.
 const COVERED_SHARE: f64 = 0.95;
 
+/// The same of the photons of caustics.
+const FOCUSED_SHARE: f64 = 0.8;
+
 type Buffer = CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>;
 
 /// A search of the photon map, with its buffer.
@@ -24,6 +28,7 @@ pub(super) struct Searcher<'a> {
     pub(super) scene: SceneImage,
     pub(super) memory: Lines<'a>,
     buffer: Box<Buffer>,
+    map: PhotonMap,
     neighbors: u32,
     max_distance: f32,
 }
@@ -31,7 +36,12 @@ pub(super) struct Searcher<'a> {
 impl<'a> Searcher<'a> {
     pub(super) fn new(image: &'a CardImage, neighbors: u32, max_distance: f32) -> Self {
         let (scene, memory) = image.view();
-        Self { scene, memory, buffer: Box::default(), neighbors, max_distance }
+        Self { scene, memory, buffer: Box::default(), map: PhotonMap::Indirect, neighbors, max_distance }
+    }
+
+    /// The same in another map.
+    fn of(self, map: PhotonMap) -> Self {
+        Self { map, ..self }
     }
 
     /// The greatest distance of gathers, metres.
@@ -42,7 +52,7 @@ impl<'a> Searcher<'a> {
     /// The radius of a gather at `position`, metres: the distance of the k-th photon, or the greatest distance.
     pub(super) fn radius(&mut self, position: Vec3) -> Result<f32, Fault> {
         let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
-        gather(&self.scene, &mut self.memory, position, &mut nearest)?;
+        gather(&self.scene, &mut self.memory, self.map, position, &mut nearest)?;
         if !nearest.is_full() {
             return Ok(self.max_distance);
         }
@@ -57,7 +67,24 @@ impl<'a> Searcher<'a> {
 /// # Errors
 /// If the image is not sound.
 pub(super) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
-    let leaves = image.leaf_lines();
+    distance_within(image, PhotonMap::Indirect, neighbors, COVERED_SHARE)
+}
+
+/// The same of gathers of caustics: that within which most of their photons have `neighbors` others. Those that have not are
+/// light that is spread so far that it is no caustic.
+///
+/// # Errors
+/// If the image is not sound.
+pub(super) fn caustic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
+    distance_within(image, PhotonMap::Caustics, neighbors, FOCUSED_SHARE)
+}
+
+/// The distance within which a share of the photons of a map have `neighbors` others.
+fn distance_within(image: &CardImage, map: PhotonMap, neighbors: u32, share: f64) -> Result<f32, Fault> {
+    let leaves = match map {
+        PhotonMap::Indirect => image.leaf_lines(SectionKind::PhotonLeaves),
+        PhotonMap::Caustics => image.leaf_lines(SectionKind::CausticLeaves),
+    };
     let grid = image.view().0.header.photon_grid;
     let unlimited = f32::MAX.sqrt() * 0.5;
     let distances: Result<Vec<f32>, Fault> = leaves
@@ -65,7 +92,7 @@ pub(super) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Resul
         .step_by(leaves.len().div_ceil(SAMPLED_LEAVES).max(1))
         .enumerate()
         .map_init(
-            || Searcher::new(image, neighbors, unlimited),
+            || Searcher::new(image, neighbors, unlimited).of(map),
             |searcher, (sample, line)| {
                 let leaf = PhotonLeaf::read(&line.0);
                 let photon = leaf.point(sample as u32 % leaf.photons().max(1));
@@ -77,7 +104,7 @@ pub(super) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Resul
     // Fewer photons than neighbours: no distance is short of any.
     distances.retain(|&distance| distance < unlimited);
     distances.sort_by(f32::total_cmp);
-    let place = (distances.len() as f64 * COVERED_SHARE) as usize;
+    let place = (distances.len() as f64 * share) as usize;
     let covered = distances.get(place.min(distances.len().saturating_sub(1))).copied();
     Ok(covered.unwrap_or_else(|| image.diagonal()).max(f32::MIN_POSITIVE.sqrt()))
 }

@@ -1,9 +1,10 @@
-//! Photon paths: Russian roulette on the albedo, every arrival at a reflecting surface stored.
+//! Photon paths: Russian roulette on the albedo, every arrival at a surface that is not perfectly specular stored.
 
 use glam::Vec3;
 use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::MemoryPort;
-use photoncard_firmware::scene::{Ray, SceneImage, closest_hit, read_surface};
+use photoncard_firmware::render::specular_path::{Arrival, Carried, SpecularPath};
+use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit, read_surface};
 use photoncard_shared::layout::{
     FULL_DISC, Photon, PhotonGrid, Rgbe, encode_direction, encode_normal, power_of_two_above,
 };
@@ -25,6 +26,8 @@ pub struct PhotonPass {
 
 /// Paths that may be traced before each photon stored; beyond them there must be a photon to every thousand paths.
 const FRUITLESS_PATHS: u64 = 1_000_000;
+/// Paths that may be traced for each photon of caustics, besides those.
+const MOST_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 100;
 /// Paths that one task traces.
 const PATHS_PER_TASK: u64 = 2048;
 /// A path with more bounces than this has met surfaces that lose nothing; it ends.
@@ -40,15 +43,50 @@ pub fn trace(
     count: usize,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<PhotonPass, PhotonError> {
+    let is_fruitless = |stored: usize, paths: u64| paths >= FRUITLESS_PATHS + 1_000 * stored as u64;
+    let traced = trace_while(packed, (seed, Purpose::Indirect), count, &|stored, paths| {
+        !is_fruitless(stored, paths) && progress(stored)
+    })?;
+    let stored = traced.photons.len();
+    if stored >= count {
+        return Ok(traced);
+    }
+    if is_fruitless(stored, traced.paths) {
+        return Err(PhotonError::Lost { stored, paths: traced.paths });
+    }
+    Err(PhotonError::Stopped)
+}
+
+/// Traces paths until `count` photons of caustics are stored, or so many paths have led to too few of them that what is left
+/// out is not to be seen. `go_on` is asked whether to go on.
+///
+/// # Errors
+/// If `go_on` says to stop.
+pub fn trace_caustics(
+    packed: &PackedScene,
+    seed: u32,
+    count: usize,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Photons, PhotonError> {
+    let most_paths = FRUITLESS_PATHS + MOST_PATHS_TO_A_CAUSTIC_PHOTON * count as u64;
+    let traced =
+        trace_while(packed, (seed, Purpose::Caustics), count, &|_, paths| paths < most_paths && go_on())?;
+    if go_on() { Ok(traced.photons) } else { Err(PhotonError::Stopped) }
+}
+
+/// Traces paths until `count` photons are stored, or `go_on`, told how many are and of how many paths, says to stop.
+fn trace_while(
+    packed: &PackedScene,
+    (seed, purpose): (u32, Purpose),
+    count: usize,
+    go_on: &dyn Fn(usize, u64) -> bool,
+) -> Result<PhotonPass, PhotonError> {
     // Hardly any photon is stronger than it was emitted: at a Phong lobe, twice at the most.
     let path_unit = power_of_two_above(packed.strongest_emission().into());
-    let tracer = Tracer { scene: packed.view().0, grid: packed.photon_grid(), path_unit, seed };
+    let tracer = Tracer { scene: packed.view().0, grid: packed.photon_grid(), path_unit, seed, purpose };
     let mut list: Vec<StoredPhoton> = Vec::with_capacity(count);
     let mut paths = 0_u64;
-    while list.len() < count {
-        if paths >= FRUITLESS_PATHS + 1_000 * list.len() as u64 {
-            return Err(PhotonError::Lost { stored: list.len(), paths });
-        }
+    while list.len() < count && go_on(list.len(), paths) {
         let tasks = next_tasks(count - list.len(), list.len(), paths);
         let round: Result<Vec<Traced>, Fault> = (0..tasks)
             .into_par_iter()
@@ -63,9 +101,6 @@ pub fn trace(
                 paths += traced.paths_until(missing);
                 list.extend_from_slice(traced.photons.get(..missing).unwrap_or(&traced.photons));
             }
-        }
-        if !progress(list.len()) {
-            return Err(PhotonError::Stopped);
         }
     }
     let power_unit = (path_unit / paths.max(1) as f32).max(f32::MIN_POSITIVE);
@@ -96,6 +131,15 @@ impl Traced {
     }
 }
 
+/// What photons are traced for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Purpose {
+    /// Every arrival at a surface that is not perfectly specular.
+    Indirect,
+    /// The first arrival there of paths that have met others before.
+    Caustics,
+}
+
 /// What all paths share.
 struct Tracer {
     scene: SceneImage,
@@ -103,6 +147,7 @@ struct Tracer {
     /// Watts of a path by itself that a photon power of 1 stands for.
     path_unit: f32,
     seed: u32,
+    purpose: Purpose,
 }
 
 impl Tracer {
@@ -125,34 +170,77 @@ impl Tracer {
         let scene = &self.scene;
         let random = PathRandom::new(self.seed, path);
         let Some(emission) = emit(scene, memory, random)? else { return Ok(()) };
-        let mut ray = emission.ray;
         let mut power = emission.power;
+        let mut path = SpecularPath::new(emission.ray, Carried::Power);
+        let mut is_direct = true;
         for bounce in 0..MOST_BOUNCES {
-            let Some(hit) = closest_hit(scene, memory, &ray)? else { break };
-            let surface = read_surface(scene, memory, &ray, &hit)?;
-            if surface.reflection.is_black() {
-                break;
-            }
             let random = random.bounce(bounce);
-            let photon = Photon {
-                position: surface.position.to_array(),
-                power: Rgbe::encode((power / self.path_unit).to_array(), random.dither()),
-                direction: encode_direction(surface.outgoing.to_array()),
-                axis: 0,
-                normal: encode_normal(surface.normal.to_array()),
-                disc: FULL_DISC,
-                direct: bounce == 0,
-            };
-            photons.push(StoredPhoton::new(&self.grid, &photon));
-            let Some(sampled) = sample_reflection(&surface, random.point()) else { break };
-            match survive(power, power * sampled.weight, random.survival()) {
-                Some(reflected) => power = reflected,
-                None => break,
+            let Some(hit) = closest_hit(scene, memory, &path.ray)? else { break };
+            let surface = read_surface(scene, memory, &path.ray, &hit)?;
+            let arrival = path.arrive(&surface, random.choice());
+            let arrived = std::mem::replace(&mut path.throughput, Vec3::ONE) * power;
+            match arrival {
+                Arrival::Lost => break,
+                Arrival::GoesOn => {
+                    let left = arrived * shading_share(&surface, path.ray.direction);
+                    match survive(power, left, random.survival()) {
+                        Some(left) => power = left,
+                        None => break,
+                    }
+                }
+                Arrival::Ends => {
+                    let surface = surface.flat();
+                    let is_caustic = is_direct && path.bounces > 0;
+                    if surface.reflection.is_black() || self.purpose == Purpose::Caustics && !is_caustic {
+                        break;
+                    }
+                    photons.push(self.stored(&surface, arrived, is_direct, random.dither()));
+                    if self.purpose == Purpose::Caustics {
+                        break;
+                    }
+                    let Some(sampled) = sample_reflection(&surface, random.point()) else { break };
+                    match survive(arrived, arrived * sampled.weight, random.survival()) {
+                        Some(reflected) => power = reflected,
+                        None => break,
+                    }
+                    is_direct = false;
+                    let ray = Ray::new(surface.offset_origin(), sampled.direction);
+                    path = SpecularPath::new(ray, Carried::Power);
+                }
             }
-            ray = Ray::new(surface.offset_origin(), sampled.direction);
         }
         Ok(())
     }
+
+    /// A photon that has arrived at a surface.
+    fn stored(&self, surface: &Surface, power: Vec3, direct: bool, dither: u32) -> StoredPhoton {
+        let photon = Photon {
+            position: surface.position.to_array(),
+            power: Rgbe::encode((power / self.path_unit).to_array(), dither),
+            direction: encode_direction(surface.outgoing.to_array()),
+            axis: 0,
+            normal: encode_normal(surface.normal.to_array()),
+            disc: FULL_DISC,
+            direct,
+        };
+        StoredPhoton::new(&self.grid, &photon)
+    }
+}
+
+/// The greatest share of [`shading_share`].
+const MOST_SHADING_SHARE: f32 = 4.0;
+
+/// What a photon's power is multiplied with where a smooth normal turns it: photons arrive and leave by the area of the
+/// triangle, light is reflected by that of the smooth surface (Veach 1997, *Robust Monte Carlo methods for light transport
+/// simulation*, section 5.3).
+fn shading_share(surface: &Surface, left: Vec3) -> f32 {
+    let Surface { normal, geometric_normal, outgoing: arrived, .. } = *surface;
+    if normal == geometric_normal {
+        return 1.0;
+    }
+    let cosines = |a: Vec3, b: Vec3| normal.dot(a).abs() * geometric_normal.dot(b).abs();
+    let share = cosines(arrived, left) / cosines(left, arrived);
+    if share < MOST_SHADING_SHARE { share } else { MOST_SHADING_SHARE }
 }
 
 /// Russian roulette: a photon goes on with the probability that its strongest channel keeps, and then carries the

@@ -82,6 +82,8 @@ pub struct StageReads {
     pub gather_ray: ReadStatistics,
     /// Photon gathers at the ends of final gather rays.
     pub gather: ReadStatistics,
+    /// Gathers of photons of caustics.
+    pub caustic: ReadStatistics,
 }
 
 impl MemoryStatistics {
@@ -115,6 +117,7 @@ impl MemoryStatistics {
                 shadow: stage(Stage::Shadow),
                 gather_ray: stage(Stage::GatherRay),
                 gather: stage(Stage::Gather),
+                caustic: stage(Stage::Caustic),
             },
             written_bytes: traffic.requested.written_bytes,
         }

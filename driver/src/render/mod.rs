@@ -17,7 +17,7 @@ pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use photoncard_shared::budget::MOST_BINS;
 pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Radiance, Sampling};
-pub use settings::{LEAST_IRRADIANCE_ERROR, RenderSettings};
+pub use settings::{DEFAULT_CAUSTIC_PHOTONS, LEAST_IRRADIANCE_ERROR, RenderSettings};
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
 use std::sync::Arc;
@@ -25,7 +25,7 @@ use std::time::Instant;
 
 use photoncard_shared::budget::{Budget, REFERENCE};
 use photoncard_shared::checksum::image_checksum;
-use photoncard_shared::message::FrameParameters;
+use photoncard_shared::message::{CausticGather, FrameParameters};
 
 use self::cards::{Cards, Outcome};
 use crate::emitter::Emitters;
@@ -127,7 +127,7 @@ pub fn render(
     let mut times = Times::default();
     let prepared = prepare(scene, settings, cards.budgets(), &mut times, observer)?;
     cards.share(prepared.image.clone());
-    let frame = settings.frame(camera, prepared.max_distance);
+    let frame = settings.frame(camera, prepared.max_distance, prepared.caustics);
     let picture = Picture::new(Scheduler::new(all), film, partial);
     let job = Job {
         image: prepared.image.lines(),
@@ -162,7 +162,7 @@ fn render_whole_frame(
     let partial = begin_partial(scene, settings, &mut film, observer)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, std::iter::once(REFERENCE), &mut times, observer)?;
-    let frame = settings.frame(camera, prepared.max_distance);
+    let frame = settings.frame(camera, prepared.max_distance, prepared.caustics);
     let tiles = tiles(settings.window(), settings.tile, settings.order);
     let progress = |done: u64, total: u64| {
         observer.progress(Phase::Tiles, done, total);
@@ -200,6 +200,8 @@ struct Prepared {
     image: Arc<CardImage>,
     /// Greatest distance of a gather, metres.
     max_distance: f32,
+    /// The gathers of caustics.
+    caustics: Option<CausticGather>,
     /// Paths that were traced for its photons.
     paths: u64,
 }
@@ -226,7 +228,7 @@ fn prepare(
         }
         !observer.is_stopped()
     };
-    let mapped = map_photons(packed, &settings.photon_settings(), &progress)?;
+    let mapped = map_photons(packed, &settings.photon_settings(scene), &progress)?;
     for budget in &budgets {
         mapped.image.check_budget(budget)?;
     }
@@ -236,8 +238,8 @@ fn prepare(
     times.photon_map = building.as_secs_f64();
     times.discs = measuring.as_secs_f64();
     times.irradiance = estimating.as_secs_f64();
-    let MappedImage { image, max_distance, paths, .. } = mapped;
-    Ok(Prepared { image: Arc::new(image), max_distance, paths })
+    let MappedImage { image, max_distance, caustics, paths, .. } = mapped;
+    Ok(Prepared { image: Arc::new(image), max_distance, caustics, paths })
 }
 
 fn statistics(
@@ -262,7 +264,10 @@ fn statistics(
             shadow: counters.shadow_rays,
             gather: counters.gather_rays,
             survey: counters.survey_rays,
+            specular: counters.specular_rays,
         },
+        lost_paths: counters.lost_paths,
+        caustic_gathers: counters.caustic_gathers,
         gathers: counters.gathers,
         tables: counters.tables,
         records: counters.records,

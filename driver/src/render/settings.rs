@@ -8,7 +8,7 @@ use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::{Budget, MOST_BINS};
 use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{self, FrameParameters, Radiance, Sampling};
+use photoncard_shared::message::{self, CausticGather, FrameParameters, Radiance, Sampling};
 use serde_json::{Value, json};
 
 use super::{CardAddress, RenderError, cards};
@@ -41,6 +41,11 @@ pub struct RenderSettings {
     pub neighbors: u32,
     /// Greatest distance of a gather, metres; `None` for the one that the photons' density suggests.
     pub max_distance: Option<f32>,
+    /// Photons in the caustic map; `None` for [`DEFAULT_CAUSTIC_PHOTONS`] if anything in the scene is perfectly specular, and
+    /// no map otherwise.
+    pub caustic_photons: Option<usize>,
+    /// Photons that a gather of caustics looks for.
+    pub caustic_neighbors: u32,
     /// Final gather rays a sample.
     pub gather_rays: u32,
     /// Shadow rays a sample.
@@ -87,6 +92,8 @@ impl Default for RenderSettings {
             photon_layout: PhotonLayout::default(),
             neighbors: 100,
             max_distance: None,
+            caustic_photons: None,
+            caustic_neighbors: 50,
             gather_rays: 100,
             shadow_rays: 8,
             samples: 1,
@@ -109,6 +116,9 @@ impl Default for RenderSettings {
 /// Direction bins: three to an entry of the table that directions are sampled by.
 const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 
+/// Photons of the caustic map of a scene with anything perfectly specular in it, unless others are asked for.
+pub const DEFAULT_CAUSTIC_PHOTONS: usize = 200_000;
+
 /// Photons that can be asked for.
 const MAX_PHOTONS: usize = 1 << 27;
 
@@ -127,6 +137,8 @@ impl RenderSettings {
             "photons": self.photons,
             "neighbors": self.neighbors,
             "max-distance": self.max_distance,
+            "caustic-photons": self.caustic_photons,
+            "caustic-neighbors": self.caustic_neighbors,
             "gather-rays": self.gather_rays,
             "shadow-rays": self.shadow_rays,
             "spp": self.samples,
@@ -161,6 +173,8 @@ impl RenderSettings {
         within("--size", self.width.max(self.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
         within("--photons", self.photons as u64, 1, MAX_PHOTONS as u64)?;
         within("--neighbors", self.neighbors as u64, 2, budget.neighbors as u64)?;
+        within("--caustic-photons", self.caustic_photons.unwrap_or(0) as u64, 0, MAX_PHOTONS as u64)?;
+        within("--caustic-neighbors", self.caustic_neighbors as u64, 2, budget.neighbors as u64)?;
         within("--gather-rays", self.gather_rays as u64, 0, budget.gather_rays as u64)?;
         within("--shadow-rays", self.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
         within("--spp", self.samples as u64, 1, budget.samples as u64)?;
@@ -252,9 +266,12 @@ impl RenderSettings {
         })
     }
 
-    /// What the photon map is to be.
-    pub fn photon_settings(&self) -> PhotonSettings {
+    /// What the photon maps of a scene are to be.
+    pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
+        let of_scene = || if scene.is_specular() { DEFAULT_CAUSTIC_PHOTONS } else { 0 };
         PhotonSettings {
+            caustic_photons: self.caustic_photons.unwrap_or_else(of_scene),
+            caustic_neighbors: self.caustic_neighbors,
             seed: self.seed,
             photons: self.photons,
             neighbors: self.neighbors,
@@ -265,7 +282,12 @@ impl RenderSettings {
     }
 
     /// The frame's parameters for a camera of the scene.
-    pub fn frame(&self, camera: &Camera, max_distance: f32) -> FrameParameters {
+    pub fn frame(
+        &self,
+        camera: &Camera,
+        max_distance: f32,
+        caustics: Option<CausticGather>,
+    ) -> FrameParameters {
         FrameParameters {
             width: self.width,
             height: self.height,
@@ -282,6 +304,7 @@ impl RenderSettings {
             drain: self.order.drain(),
             queue: self.queue.unwrap_or(u32::MAX),
             radiance: self.radiance,
+            caustics,
         }
     }
 

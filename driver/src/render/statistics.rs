@@ -28,6 +28,10 @@ pub struct Statistics {
     pub time_s: Times,
     /// Rays cast on the chips.
     pub rays: Rays,
+    /// Paths that met more perfectly specular surfaces than are followed, or one that takes everything: they bring nothing.
+    pub lost_paths: u64,
+    /// Searches of the caustic map.
+    pub caustic_gathers: u64,
     /// Searches of the photon map.
     pub gathers: u64,
     /// Those of them that made a table of directions.
@@ -103,6 +107,8 @@ pub struct Rays {
     pub gather: u64,
     /// Around irradiance records.
     pub survey: u64,
+    /// From perfectly specular surfaces, on the way of any of these but shadow rays.
+    pub specular: u64,
 }
 
 /// Floating-point operations of each unit of the chip, on all chips together.

@@ -154,6 +154,18 @@ impl Material {
         self.emission.max_element() > 0.0
     }
 
+    /// Whether it reflects or lets light through perfectly specularly: mirrors, smooth coats, glass.
+    pub fn is_specular(&self) -> bool {
+        match self.reflection {
+            Reflection::Phong { .. } => false,
+            Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
+                let transmits = transmission.is_some_and(|transmission| transmission.factor > 0.0);
+                let reflects = dielectric.max_element() > 0.0 || metallic * base_colour.max_element() > 0.0;
+                roughness == 0.0 && reflects || transmits && metallic < 1.0
+            }
+        }
+    }
+
     /// The textures in use, as indices into [`Scene::textures`](super::Scene::textures).
     pub fn textures(&self) -> impl Iterator<Item = u32> {
         [self.base_texture, self.metallic_roughness_texture, self.emissive_texture].into_iter().flatten()

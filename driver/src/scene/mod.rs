@@ -83,6 +83,14 @@ impl Scene {
             || self.triangles.iter().any(is_light)
     }
 
+    /// Whether any triangle reflects or lets light through perfectly specularly.
+    pub fn is_specular(&self) -> bool {
+        let is_specular = |triangle: &Triangle| {
+            self.materials.get(triangle.material as usize).is_some_and(Material::is_specular)
+        };
+        self.triangles.iter().any(is_specular)
+    }
+
     /// Checks that the scene has a light, once settings were applied and an environment was added.
     ///
     /// # Errors

@@ -207,7 +207,7 @@ impl<'a> Laboratory<'a> {
         }
         scene.check_light()?;
         let packed = PackedScene::new(&scene, &Emitters::new(&scene)).map_err(RenderError::from)?;
-        let settings = point.settings.photon_settings();
+        let settings = point.settings.photon_settings(&scene);
         let go_on = |_| !self.observer.is_stopped();
         let mapped = self.pool.install(|| map_photons(packed, &settings, &go_on));
         Ok(LastImage { key, scene, mapped: mapped.map_err(RenderError::from)?, reference: None })

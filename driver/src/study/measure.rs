@@ -138,7 +138,7 @@ impl Bench<'_> {
     /// If the scene has no such camera.
     pub fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
         let camera = self.scene.camera(settings.camera.as_deref())?;
-        Ok(settings.frame(camera, self.mapped.max_distance))
+        Ok(settings.frame(camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
     /// Renders tiles, each on a chip whose memory `model` makes anew.

@@ -102,8 +102,8 @@ impl Fixture {
     pub(crate) fn new() -> Self {
         let (scene, settings) = (scene(), settings());
         let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
-        let mapped = map_photons(packed, &settings.photon_settings(), &|_| true).unwrap();
-        let frame = settings.frame(&scene.cameras[0], mapped.max_distance);
+        let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).unwrap();
+        let frame = settings.frame(&scene.cameras[0], mapped.max_distance, mapped.caustics);
         let checksum = image_checksum(mapped.image.lines());
         Self { settings, mapped, checksum, frame }
     }

@@ -13,7 +13,7 @@ use crate::importance::DirectionTable;
 use crate::irradiance_cache::SeenSample;
 use crate::memory::{MemoryPort, Stage as MemoryStage};
 use crate::render::eye::View;
-use crate::render::{Context, GatherPoint, PixelSample, Purpose, direct, eye, final_gather};
+use crate::render::{Context, GatherPoint, PixelSample, Purpose, caustic, direct, eye, final_gather};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Seen, Surface};
 
@@ -176,7 +176,7 @@ impl<
         if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample }
     }
 
-    /// What shadow rays bring the present pixel.
+    /// What shadow rays and caustics bring the present pixel.
     pub(super) fn light_directly<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
         context.memory.enter(MemoryStage::Shadow);
@@ -185,6 +185,8 @@ impl<
         {
             let reflected = direct::reflected(context, at, &point)?;
             add_light(&mut self.sums, index as u16, reflected * sample_share(context));
+            let focused = caustic::reflected(context, &point, self.gathers.candidates.view())?;
+            add_light(&mut self.sums, index as u16, focused / context.frame.samples.max(1) as f32);
         }
         if self.position.next_index(self.block.pixels()) {
             self.position.stage = Stage::Rays;

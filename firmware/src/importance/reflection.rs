@@ -95,18 +95,13 @@ mod tests {
 
     fn surface(diffuse: f32, specular: f32, exponent: f32, outgoing: Vec3) -> Surface {
         Surface {
-            position: Vec3::ZERO,
-            normal: Vec3::Y,
             outgoing: outgoing.normalize(),
             reflection: Reflection {
                 diffuse: Vec3::splat(diffuse),
                 specular: Vec3::splat(specular),
                 exponent,
             },
-            emission: Vec3::ZERO,
-            double_sided: false,
-            distance: 1.0,
-            magnitude: 0.0,
+            ..Surface::white(Vec3::ZERO, Vec3::Y, 0.0)
         }
     }
 

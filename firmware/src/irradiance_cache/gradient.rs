@@ -110,20 +110,11 @@ mod tests {
     use super::*;
     use crate::irradiance_cache::record::{Irradiance, Record};
     use crate::sampler::{Dimension, Pattern};
-    use crate::scene::{Reflection, Surface, magnitude};
+    use crate::scene::{Surface, magnitude};
     use crate::vector::max;
 
     fn white(position: Vec3, normal: Vec3) -> Surface {
-        Surface {
-            position,
-            normal,
-            outgoing: normal,
-            reflection: Reflection { diffuse: Vec3::ONE, ..Reflection::BLACK },
-            emission: Vec3::ZERO,
-            double_sided: false,
-            distance: 1.0,
-            magnitude: magnitude(&[position]),
-        }
+        Surface::white(position, normal, magnitude(&[position]))
     }
 
     /// What a ray from `origin` meets at height 1: its distance, and a radiance that grows along x.

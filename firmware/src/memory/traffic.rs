@@ -20,15 +20,25 @@ pub enum Stage {
     GatherRay = 5,
     /// Photon gathers at the ends of final gather rays.
     Gather = 6,
+    /// Gathers of photons of caustics, where the eye sees them.
+    Caustic = 7,
 }
 
 /// Number of stages.
-pub const STAGES: usize = 7;
+pub const STAGES: usize = 8;
 
 impl Stage {
     /// All stages, in order.
-    pub const ALL: [Self; STAGES] =
-        [Self::Begin, Self::Eye, Self::Survey, Self::Table, Self::Shadow, Self::GatherRay, Self::Gather];
+    pub const ALL: [Self; STAGES] = [
+        Self::Begin,
+        Self::Eye,
+        Self::Survey,
+        Self::Table,
+        Self::Shadow,
+        Self::GatherRay,
+        Self::Gather,
+        Self::Caustic,
+    ];
 }
 
 /// Reads of one structure in one stage.

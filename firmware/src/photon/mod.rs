@@ -22,7 +22,27 @@ use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::simd::{self, Isa, Kernel};
 
-/// Searches the photons nearest to `position` into `nearest`, in whichever layout the map is: what is found is the same.
+/// One of the two photon maps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhotonMap {
+    /// Every arrival at a surface that is not perfectly specular.
+    Indirect,
+    /// Light that has met perfectly specular surfaces alone, and one at least.
+    Caustics,
+}
+
+impl PhotonMap {
+    /// Its nodes and leaves.
+    #[inline(always)]
+    fn sections(self) -> [SectionKind; 2] {
+        match self {
+            Self::Indirect => [SectionKind::PhotonNodes, SectionKind::PhotonLeaves],
+            Self::Caustics => [SectionKind::CausticNodes, SectionKind::CausticLeaves],
+        }
+    }
+}
+
+/// Searches the photons of a map nearest to `position` into `nearest`, in whichever layout the map is: what is found is the same.
 /// Returns the number of photons tested.
 ///
 /// # Errors
@@ -31,10 +51,11 @@ use crate::simd::{self, Isa, Kernel};
 pub fn gather(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
+    map: PhotonMap,
     position: Vec3,
     nearest: &mut NearestPhotons,
 ) -> Result<u32, Fault> {
-    simd::run(Search { scene, memory, position, nearest })
+    simd::run(Search { scene, memory, map, position, nearest })
 }
 
 /// What [`gather`] does, for any processor.
@@ -43,6 +64,8 @@ pub struct Search<'s, 'n, M> {
     pub scene: &'s SceneImage,
     /// Card memory.
     pub memory: &'s mut M,
+    /// Which map.
+    pub map: PhotonMap,
     /// Where to search, metres.
     pub position: Vec3,
     /// Where to put the photons.
@@ -54,10 +77,10 @@ impl<M: MemoryPort> Kernel for Search<'_, '_, M> {
 
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
-        let Self { scene, memory, position, nearest } = self;
-        let tested = if scene.header.section(SectionKind::PhotonLeaves).records > 0 {
-            let sections = [SectionKind::PhotonNodes, SectionKind::PhotonLeaves];
-            leaves::gather(isa, scene, sections, memory, position, nearest)?
+        let Self { scene, memory, map, position, nearest } = self;
+        let has_leaves = scene.header.section(SectionKind::PhotonLeaves).records > 0;
+        let tested = if map == PhotonMap::Caustics || has_leaves {
+            leaves::gather(isa, scene, map.sections(), memory, position, nearest)?
         } else {
             kdtree::gather(isa, scene, memory, position, nearest)?
         };

@@ -10,7 +10,7 @@ use super::specular_path::{PathEnd, follow};
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, PartialReflection, Place};
 use crate::memory::{MemoryPort, Stage};
-use crate::photon::{Candidates, NearestPhotons, gather, nearest_irradiance, reflected_radiance};
+use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
 use crate::scene::Ray;
 
 /// What the end of a final gather ray brings.
@@ -50,7 +50,7 @@ pub fn cast<M: MemoryPort>(
     let met = met.flat();
     let emitted = if path.bounces == 0 {
         direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density)
-    } else if context.frame.caustic_neighbors == 0 {
+    } else if context.frame.caustics.is_none() {
         // Neither a shadow ray nor a photon of a caustic brings it.
         met.emission
     } else {
@@ -112,7 +112,7 @@ pub(super) fn nearest_photons<'a, M: MemoryPort>(
 ) -> Result<NearestPhotons<'a>, Fault> {
     let frame = context.frame;
     let mut nearest = NearestPhotons::new(candidates, frame.neighbors, frame.max_distance);
-    let tested = gather(context.scene, context.memory, position, &mut nearest)?;
+    let tested = gather(context.scene, context.memory, PhotonMap::Indirect, position, &mut nearest)?;
     context.counters.gathers += 1;
     context.counters.photons_tested += tested as u64;
     context.counters.photons_taken += nearest.taken() as u64;

@@ -1,5 +1,6 @@
 //! The stages of a tile, each a function of one pixel or one ray.
 
+pub mod caustic;
 pub mod direct;
 pub mod eye;
 pub mod final_gather;

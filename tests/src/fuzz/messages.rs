@@ -4,8 +4,8 @@ use photoncard_shared::budget::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::message::{
-    self, Camera, Command, Drain, Fault, FaultCode, FrameParameters, MemoryUse, Radiance, Reply, Sampling,
-    Tile,
+    self, Camera, CausticGather, Command, Drain, Fault, FaultCode, FrameParameters, MemoryUse, Radiance,
+    Reply, Sampling, Tile,
 };
 
 use super::{Random, Target, bound, mutation};
@@ -39,6 +39,7 @@ pub(super) fn frame() -> FrameParameters {
         drain: Drain::Sort,
         queue: 1024,
         radiance: Radiance::Precomputed,
+        caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
     }
 }
 

@@ -1,0 +1,116 @@
+//! Materials as records of the card image.
+
+use glam::Vec3;
+use photoncard_shared::layout::{self, DOUBLE_SIDED, NO_TEXTURE, Record, Reflectance, THIN_WALLED};
+
+use crate::scene::{Material, Reflection, Transmission};
+
+/// The record of a material. Its textures are as many as the scene's, which `u16` tells apart.
+pub(super) fn record(material: &Material) -> [u8; layout::Material::BYTES] {
+    let transmission = transmission_of(&material.reflection);
+    let mut flags = if material.double_sided { DOUBLE_SIDED } else { 0 };
+    if transmission.is_some_and(|transmission| !transmission.is_volume) {
+        flags |= THIN_WALLED;
+    }
+    let texture =
+        |index: Option<u32>| index.and_then(|index| u16::try_from(index).ok()).unwrap_or(NO_TEXTURE);
+    layout::Material {
+        reflectance: reflectance(&material.reflection),
+        emission: material.emission.to_array(),
+        flags,
+        cutoff: cutoff(material),
+        textures: [
+            texture(material.base_texture),
+            texture(material.metallic_roughness_texture),
+            texture(material.emissive_texture),
+        ],
+    }
+    .to_bytes()
+}
+
+/// What the alpha of texture and corners must reach for the surface to be there: without the factor that both are
+/// multiplied with.
+fn cutoff(material: &Material) -> f32 {
+    match material.alpha_cutoff {
+        Some(cutoff) if cutoff > 0.0 => cutoff / material.alpha,
+        _ => 0.0,
+    }
+}
+
+/// The transmission of a surface that lets light through.
+fn transmission_of(reflection: &Reflection) -> Option<Transmission> {
+    match reflection {
+        Reflection::MetallicRoughness { transmission, metallic, .. } if *metallic < 1.0 => {
+            transmission.filter(|transmission| transmission.factor > 0.0)
+        }
+        _ => None,
+    }
+}
+
+fn reflectance(reflection: &Reflection) -> Reflectance {
+    match *reflection {
+        Reflection::Phong { diffuse, specular, exponent } => {
+            Reflectance::Phong { diffuse: diffuse.to_array(), specular: specular.to_array(), exponent }
+        }
+        Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, .. } => {
+            match transmission_of(reflection) {
+                // Metal among glass lets nothing through: that share is reflected by the base.
+                Some(Transmission { factor, ior, absorption, .. }) => Reflectance::Glass {
+                    base: base_colour.to_array(),
+                    absorption: absorption.max(Vec3::ZERO).to_array(),
+                    transmission: factor * (1.0 - metallic),
+                    ior,
+                },
+                None => Reflectance::MetallicRoughness {
+                    base: base_colour.to_array(),
+                    dielectric: dielectric.to_array(),
+                    metallic,
+                    roughness,
+                },
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(material: &Material) -> layout::Material {
+        layout::Material::read(&record(material))
+    }
+
+    #[test]
+    fn the_factor_of_alpha_goes_into_the_cutoff() {
+        let masked = |alpha, alpha_cutoff| {
+            read(&Material { alpha, alpha_cutoff, ..Material::lambertian("leaf", Vec3::ONE) }).cutoff
+        };
+        assert_eq!(masked(1.0, None), 0.0);
+        assert_eq!(masked(0.5, Some(0.25)), 0.5);
+        assert_eq!(masked(0.0, Some(0.0)), 0.0);
+        assert!(masked(0.0, Some(0.5)) > 1.0, "nothing is there");
+    }
+
+    #[test]
+    fn what_lets_light_through_is_glass_and_without_a_volume_a_thin_wall() {
+        let of = |transmission| {
+            read(&Material::new(
+                "window",
+                Reflection::MetallicRoughness {
+                    base_colour: Vec3::ONE,
+                    metallic: 0.0,
+                    roughness: 0.0,
+                    dielectric: Vec3::splat(0.04),
+                    transmission,
+                },
+            ))
+        };
+        let wall = Transmission { factor: 0.5, ior: 1.5, is_volume: false, absorption: Vec3::ZERO };
+        let window = of(Some(wall));
+        assert!(matches!(window.reflectance, Reflectance::Glass { transmission: 0.5, .. }));
+        assert_eq!(window.flags, THIN_WALLED);
+        assert_eq!(of(Some(Transmission { is_volume: true, ..wall })).flags, 0);
+        let opaque = of(Some(Transmission { factor: 0.0, ..wall }));
+        assert!(matches!(opaque.reflectance, Reflectance::MetallicRoughness { .. }));
+    }
+}

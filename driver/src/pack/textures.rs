@@ -1,0 +1,110 @@
+//! Textures as records and lines of texels of the card image.
+
+use photoncard_shared::address::Line;
+use photoncard_shared::layout::{self, TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat};
+
+use super::{MOST_TEXTURES, PackError};
+use crate::scene::{Encoding, Image, Scene, Wrap};
+
+/// The records of a scene's textures. Those of one image share its texels.
+///
+/// # Errors
+/// If they are more than materials can tell apart.
+pub(super) fn records(scene: &Scene) -> Result<Vec<layout::Texture>, PackError> {
+    if scene.textures.len() >= MOST_TEXTURES {
+        return Err(PackError::TooManyTextures { textures: scene.textures.len() });
+    }
+    let mut first_line = 0;
+    let bare: Vec<layout::Texture> = scene
+        .images
+        .iter()
+        .map(|image| {
+            let texture = layout::Texture { first_line, ..bare(image) };
+            // No overflow: lines are counted when they are appended, and an image has fewer than its texels.
+            first_line = first_line.wrapping_add(texture.lines());
+            texture
+        })
+        .collect();
+    let textures = scene.textures.iter().map(|texture| layout::Texture {
+        wrap: texture.wrap.map(wrap),
+        nearest: texture.nearest,
+        set: texture.set,
+        matrix: texture.matrix,
+        offset: texture.offset,
+        ..bare[texture.image as usize]
+    });
+    Ok(textures.collect())
+}
+
+/// The lines of all images' texels, one after the other.
+pub(super) fn lines(scene: &Scene) -> impl Iterator<Item = Line> {
+    scene.images.iter().flat_map(|image| {
+        let across = image.width.div_ceil(TILE_WIDTH);
+        (0..bare(image).lines())
+            .map(move |tile| line(image, [tile % across * TILE_WIDTH, tile / across * TILE_HEIGHT]))
+    })
+}
+
+/// The tile of an image that begins at a column and a row. Beyond the image's borders its last texels go on.
+fn line(image: &Image, [column, row]: [u32; 2]) -> Line {
+    let mut line = Line::ZERO;
+    for (place, bytes) in (0..TEXELS_PER_LINE).zip(line.0.as_chunks_mut().0) {
+        let x = (column + place % TILE_WIDTH).min(image.width - 1);
+        let y = (row + place / TILE_WIDTH).min(image.height - 1);
+        *bytes = image.texels[y as usize * image.width as usize + x as usize];
+    }
+    line
+}
+
+/// The texture of an image, with texels from line 0 on.
+fn bare(image: &Image) -> layout::Texture {
+    layout::Texture {
+        first_line: 0,
+        // The loader refuses what is larger.
+        size: [image.width, image.height].map(|side| side as u16),
+        wrap: [layout::Wrap::Repeat; 2],
+        nearest: false,
+        set: 0,
+        format: match image.encoding {
+            Encoding::Srgb => TexelFormat::Srgb,
+            Encoding::Linear => TexelFormat::Linear,
+        },
+        matrix: [[1.0, 0.0], [0.0, 1.0]],
+        offset: [0.0; 2],
+    }
+}
+
+fn wrap(wrap: Wrap) -> layout::Wrap {
+    match wrap {
+        Wrap::Repeat => layout::Wrap::Repeat,
+        Wrap::Mirror => layout::Wrap::Mirror,
+        Wrap::Clamp => layout::Wrap::Clamp,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Texture;
+
+    fn image(width: u32, height: u32) -> Image {
+        let texels = (0..width * height).map(|texel| texel.to_le_bytes()).collect();
+        Image { name: "counted".into(), width, height, texels, encoding: Encoding::Linear }
+    }
+
+    #[test]
+    fn every_texel_is_where_its_texture_says() {
+        let images = vec![image(13, 6), image(1, 1), image(8, 4), image(3, 70)];
+        let textures = [0, 3, 1, 2, 3].map(Texture::new).to_vec();
+        let scene = Scene { images, textures, ..Scene::default() };
+        let lines: Vec<Line> = lines(&scene).collect();
+        for (texture, record) in scene.textures.iter().zip(records(&scene).expect("few")) {
+            let Image { width, height, texels, .. } = &scene.images[texture.image as usize];
+            for (number, texel) in (0..).zip(texels) {
+                let (line, place) = record.locate(number % width, number / width);
+                assert_eq!(lines[line as usize].record::<4>(place), Some(texel));
+            }
+            assert_eq!(record.size.map(u32::from), [*width, *height]);
+        }
+    }
+}

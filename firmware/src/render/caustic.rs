@@ -1,0 +1,36 @@
+//! Caustics: light that has met perfectly specular surfaces alone, gathered from a photon map of its own where the eye sees it
+//! (Jensen 1996, *Global illumination using photon maps*).
+
+use glam::Vec3;
+use photoncard_shared::message::{CausticGather, Fault};
+
+use super::{Context, GatherPoint};
+use crate::gather::PartialReflection;
+use crate::memory::{MemoryPort, Stage};
+use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, reflected_radiance};
+
+/// Radiance that a point reflects of the light of caustics, in the image's radiance units.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn reflected<M: MemoryPort>(
+    context: &mut Context<M>,
+    point: &GatherPoint,
+    candidates: Candidates,
+) -> Result<Vec3, Fault> {
+    let frame = context.frame;
+    let Some(CausticGather { neighbors, max_distance }) = frame.caustics else { return Ok(Vec3::ZERO) };
+    if point.surface.reflection.is_black() {
+        return Ok(Vec3::ZERO);
+    }
+    context.memory.enter(Stage::Caustic);
+    context.counters.caustic_gathers += 1;
+    let position = point.surface.position;
+    let mut nearest = NearestPhotons::new(candidates, neighbors, max_distance);
+    gather(context.scene, context.memory, PhotonMap::Caustics, position, &mut nearest)?;
+    let header = &context.scene.header;
+    let unit = header.caustic_power_unit / header.radiance_unit;
+    let surface = point.surface.flat();
+    let reflection = PartialReflection::new(&surface, Vec3::splat(unit), point.pattern.dither(0));
+    Ok(reflected_radiance(&nearest, position, &reflection))
+}
