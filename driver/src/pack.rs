@@ -95,6 +95,7 @@ pub struct PackedScene {
     radiance_unit: f32,
     lights: image::Lights,
     sources: Sources,
+    keeps_photons: bool,
 }
 
 /// A complete card image.
@@ -122,6 +123,7 @@ impl PackedScene {
             radiance_unit: radiance_unit(scene, &lights),
             lights: lights.header(scene.textures.len() as u32),
             sources: Sources::new(scene, &lights),
+            keeps_photons: scene.keeps_photons(),
         };
         packed.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
         packed.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
@@ -191,6 +193,11 @@ impl PackedScene {
     /// Where photons come from.
     pub(crate) fn sources(&self) -> &Sources {
         &self.sources
+    }
+
+    /// Whether there is any surface that photons are stored at.
+    pub(crate) fn keeps_photons(&self) -> bool {
+        self.keeps_photons
     }
 
     /// Bytes of the scene's lines.

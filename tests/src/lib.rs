@@ -4,6 +4,7 @@
 pub mod fuzz;
 pub mod lru;
 pub mod mapped;
+pub mod shapes;
 pub mod wire;
 
 use glam::Vec3;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::Photons;
-use photoncard_firmware::photon::{Candidate, CandidateBuffer, NearestPhotons, Search};
+use photoncard_firmware::photon::{Candidate, CandidateBuffer, NearestPhotons, PhotonMap, Search};
 use photoncard_firmware::simd::Level;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{FULL_DISC, Photon, Rgbe};

@@ -7,7 +7,8 @@ use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{Photons, precompute_irradiance};
 use photoncard_firmware::photon::{
-    Candidate, CandidateBuffer, FoundIrradiance, MIN_NORMAL_COSINE, NearestPhotons, PointSearch, gather,
+    Candidate, CandidateBuffer, FoundIrradiance, MIN_NORMAL_COSINE, NearestPhotons, PhotonMap, PointSearch,
+    gather,
 };
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::simd::Level;
@@ -218,7 +219,7 @@ fn a_point_is_the_density_of_the_photons_around_it() {
     for (place, content) in points(&image).into_iter().step_by(7) {
         let mut buffer = CandidateBuffer::<128>::new();
         let mut nearest = NearestPhotons::new(buffer.view(), neighbors, 0.3);
-        gather(&scene, &mut memory, place, &mut nearest).unwrap();
+        gather(&scene, &mut memory, PhotonMap::Indirect, place, &mut nearest).unwrap();
         let mut all: Vec<Candidate> = nearest.candidates().collect();
         all.sort_unstable_by_key(Candidate::order);
         let farthest = all.pop().expect("there are thirty");

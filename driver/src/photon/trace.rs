@@ -34,7 +34,8 @@ const PATHS_PER_TASK: u64 = 2048;
 /// A path with more bounces than this has met surfaces that lose nothing; it ends.
 const MOST_BOUNCES: u32 = 512;
 
-/// Traces paths until `count` photons are stored. `progress` is told how many are, and says whether to go on.
+/// Traces paths until `count` photons are stored; none if no surface keeps any. `progress` is told how many are, and says
+/// whether to go on.
 ///
 /// # Errors
 /// If hardly any path meets a surface, or if `progress` says to stop.
@@ -44,6 +45,10 @@ pub fn trace(
     count: usize,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<PhotonPass, PhotonError> {
+    if !packed.keeps_photons() {
+        let photons = Photons { list: Vec::new(), grid: packed.photon_grid(), power_unit: 1.0 };
+        return Ok(PhotonPass { photons, paths: 0 });
+    }
     let is_fruitless = |stored: usize, paths: u64| paths >= FRUITLESS_PATHS + 1_000 * stored as u64;
     let traced = trace_while(packed, (seed, Purpose::Indirect), count, &|stored, paths| {
         !is_fruitless(stored, paths) && progress(stored)

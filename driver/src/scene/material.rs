@@ -166,6 +166,19 @@ impl Material {
         }
     }
 
+    /// Whether it reflects in another way than perfectly specularly: photons are stored where it does.
+    pub fn keeps_photons(&self) -> bool {
+        match self.reflection {
+            Reflection::Phong { diffuse, specular, .. } => (diffuse + specular).max_element() > 0.0,
+            Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
+                let is_opaque = transmission.is_none_or(|transmission| transmission.factor < 1.0);
+                let has_base = base_colour.max_element() > 0.0 && metallic < 1.0 && is_opaque;
+                let has_lobe = roughness > 0.0 && (dielectric + base_colour * metallic).max_element() > 0.0;
+                has_base || has_lobe
+            }
+        }
+    }
+
     /// The textures in use, as indices into [`Scene::textures`](super::Scene::textures).
     pub fn textures(&self) -> impl Iterator<Item = u32> {
         [self.base_texture, self.metallic_roughness_texture, self.emissive_texture].into_iter().flatten()

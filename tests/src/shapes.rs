@@ -1,0 +1,57 @@
+//! Shapes to put into scenes.
+
+use glam::{Vec2, Vec3};
+use photoncard_driver::scene::{Attributes, Scene, Triangle};
+
+use crate::{quad, room};
+
+/// The outside of a box.
+pub fn cuboid(centre: Vec3, half: Vec3, material: u32) -> Vec<Triangle> {
+    // The room's walls, turned to the outside.
+    let mut walls = room([material; 6]);
+    for Triangle { vertices, .. } in &mut walls {
+        vertices.swap(1, 2);
+        vertices.iter_mut().for_each(|vertex| *vertex = centre + *vertex * half);
+    }
+    walls
+}
+
+/// Adds a ball of `steps` by `2 steps` quadrilaterals, smooth by the normals of its corners, to a scene.
+pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, material: u32) {
+    let normal = |row: u32, column: u32| {
+        let pole = std::f32::consts::PI * row as f32 / steps as f32;
+        // The last column is the first, bit for bit.
+        let around = std::f32::consts::PI * (column % (2 * steps)) as f32 / steps as f32;
+        if row == 0 || row == steps {
+            return Vec3::Y * pole.cos();
+        }
+        Vec3::new(pole.sin() * around.cos(), pole.cos(), -pole.sin() * around.sin())
+    };
+    for row in 0..steps {
+        for column in 0..2 * steps {
+            let corners = [[row, column], [row + 1, column], [row + 1, column + 1], [row, column + 1]];
+            let [a, b, c, d] = corners.map(|[row, column]| normal(row, column));
+            for normals in [[a, b, c], [a, c, d]] {
+                let triangle = Triangle {
+                    attributes: scene.attributes.len() as u32,
+                    ..Triangle::new(normals.map(|normal| centre + normal * radius), material)
+                };
+                // Quadrilaterals at the poles are triangles.
+                if triangle.area() > 0.0 {
+                    scene.triangles.push(triangle);
+                    scene.attributes.push(Attributes { normals: Some(normals), ..Attributes::NONE });
+                }
+            }
+        }
+    }
+}
+
+/// Adds a quadrilateral, its corners counter-clockwise seen from its front, with texture coordinates of the first set at its
+/// corners, to a scene.
+pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f32; 2]; 4], material: u32) {
+    let [a, b, c, d] = coordinates.map(Vec2::from);
+    for (triangle, coordinates) in quad(corners, material).into_iter().zip([[a, b, c], [a, c, d]]) {
+        scene.triangles.push(Triangle { attributes: scene.attributes.len() as u32, ..triangle });
+        scene.attributes.push(Attributes { coordinates: [coordinates, [Vec2::ZERO; 3]], ..Attributes::NONE });
+    }
+}

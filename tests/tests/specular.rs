@@ -1,0 +1,181 @@
+//! Mirrors and glass of known radiance, on every path of light: what the eye sees in them, what gather rays bring through
+//! them, and the caustics that they cast.
+
+use glam::Vec3;
+use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::scene::{Material, Reflection, Scene, Transmission};
+use photoncard_tests::shapes::{add_ball, cuboid};
+use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
+
+const EMISSION: f32 = 1.0;
+const ALBEDO: f32 = 0.5;
+/// Of a closed room whose walls emit [`EMISSION`] and reflect [`ALBEDO`].
+const FURNACE: f64 = (EMISSION / (1.0 - ALBEDO)) as f64;
+
+fn settings() -> RenderSettings {
+    RenderSettings {
+        width: 48,
+        height: 48,
+        photons: 200_000,
+        gather_rays: 16,
+        samples: 8,
+        cards: vec!["emulated:2".parse::<CardAddress>().unwrap()],
+        ..RenderSettings::default()
+    }
+}
+
+fn mirror(reflectance: f32) -> Material {
+    let reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::splat(reflectance),
+        metallic: 1.0,
+        roughness: 0.0,
+        dielectric: Vec3::splat(0.04),
+        transmission: None,
+    };
+    Material::new("mirror", reflection)
+}
+
+fn glass(is_volume: bool, absorption: f32) -> Material {
+    let absorption = Vec3::splat(absorption);
+    let reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::ONE,
+        metallic: 0.0,
+        roughness: 0.0,
+        dielectric: Vec3::splat(0.04),
+        transmission: Some(Transmission { factor: 1.0, ior: 1.5, is_volume, absorption }),
+    };
+    Material::new("glass", reflection)
+}
+
+/// The share of light that a face of that glass reflects at normal incidence.
+const FACE: f64 = 0.04;
+
+fn wall() -> Material {
+    Material { emission: Vec3::splat(EMISSION), ..lambertian("wall", ALBEDO) }
+}
+
+/// A closed room of one radiance, with something in it.
+fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Scene {
+    let view = camera(Vec3::new(0.1, 0.05, 0.9), Vec3::new(-0.1, -0.05, -1.0));
+    let mut scene = scene(room([0; 6]), vec![wall(), thing], view);
+    add(&mut scene);
+    scene
+}
+
+/// Checks the mean over the picture, and that over each of its 8x8 blocks.
+fn shows(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64) {
+    let all = radiances(&render_or_panic(scene, settings).film);
+    let error = mean(&all) / expected - 1.0;
+    assert!(error.abs() < 0.4 * tolerance, "the mean is off by {error}");
+    for block in 0..36 {
+        let corner = block / 6 * 8 * 48 + block % 6 * 8;
+        let pixels: Vec<[f32; 3]> = (0..64).map(|i| all[(corner + i / 8 * 48 + i % 8) as usize]).collect();
+        let error = mean(&pixels) / expected - 1.0;
+        assert!(error.abs() < tolerance, "block {block} is off by {error}");
+    }
+}
+
+/// Whatever reflects or lets through all light is not to be seen in a room of one radiance, and the walls around it, that
+/// light comes to by way of it, are no darker and no brighter.
+#[test]
+fn nothing_that_loses_no_light_shows_in_a_furnace() {
+    let ball = |scene: &mut Scene| add_ball(scene, Vec3::new(-0.2, -0.1, 0.0), 0.4, 24, 1);
+    let block = |scene: &mut Scene| scene.triangles.extend(cuboid(Vec3::ZERO, Vec3::splat(0.35), 1));
+    shows(&furnace_with(mirror(1.0), block), &settings(), FURNACE, 0.03);
+    shows(&furnace_with(glass(true, 0.0), block), &settings(), FURNACE, 0.03);
+    shows(&furnace_with(mirror(1.0), ball), &settings(), FURNACE, 0.04);
+    shows(&furnace_with(glass(true, 0.0), ball), &settings(), FURNACE, 0.04);
+    // Gather rays bring what the caustic map would.
+    let without_map = RenderSettings { caustic_photons: Some(0), ..settings() };
+    shows(&furnace_with(glass(true, 0.0), ball), &without_map, FURNACE, 0.04);
+}
+
+/// A picture of one small part of what is in front of the camera, at the origin, from the distance 1.
+fn glance(triangles: Vec<photoncard_driver::scene::Triangle>, materials: Vec<Material>, from: Vec3) -> f64 {
+    let mut view = camera(from, -from);
+    view.vertical_fov = 0.02;
+    let scene = scene(triangles, materials, view);
+    let settings = RenderSettings { width: 16, height: 16, samples: 256, gather_rays: 0, ..settings() };
+    mean(&radiances(&render_or_panic(&scene, &settings).film))
+}
+
+/// A wall that emits, in the plane z = `z`, turned to +z; or to -z, if `sign` is -1.
+fn lamp(z: f32, sign: f32) -> [photoncard_driver::scene::Triangle; 2] {
+    let corner = |x: f32, y: f32| Vec3::new(x * sign, y, z);
+    quad([corner(-9., -9.), corner(9., -9.), corner(9., 9.), corner(-9., 9.)], 0)
+}
+
+fn black_lamp() -> Material {
+    Material { emission: Vec3::splat(EMISSION), ..lambertian("lamp", 0.0) }
+}
+
+#[test]
+fn a_slab_of_glass_lets_through_what_its_faces_and_its_absorption_leave() {
+    for (absorption, thickness) in [(0.0_f32, 0.1_f32), (3.0, 0.1), (3.0, 0.3)] {
+        let mut triangles = cuboid(Vec3::ZERO, Vec3::new(1.0, 1.0, 0.5 * thickness), 1);
+        triangles.extend(lamp(-2.0, 1.0));
+        let seen = glance(triangles, vec![black_lamp(), glass(true, absorption)], Vec3::Z);
+        let once = (-absorption as f64 * thickness as f64).exp();
+        let expected = (1.0 - FACE).powi(2) * once / (1.0 - (FACE * once).powi(2));
+        assert!((seen / expected - 1.0).abs() < 0.01, "{seen} instead of {expected}");
+    }
+}
+
+#[test]
+fn a_thin_wall_of_glass_is_a_slab_without_thickness() {
+    let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+    let pane = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 1);
+    for sign in [1.0, -1.0] {
+        let triangles = [pane, lamp(-2.0 * sign, sign)].concat();
+        let seen = glance(triangles, vec![black_lamp(), glass(false, 0.0)], Vec3::Z * sign);
+        let expected = (1.0 - FACE) / (1.0 + FACE);
+        assert!((seen / expected - 1.0).abs() < 0.01, "{seen} instead of {expected}");
+    }
+}
+
+#[test]
+fn a_mirror_shows_its_reflectance_at_the_angle_it_is_seen_at() {
+    for (reflectance, angle) in [(0.5_f32, 0.0_f32), (0.5, 1.2), (1.0, 0.7)] {
+        let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+        let pane = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 1);
+        let triangles = [pane, lamp(2.0, -1.0)].concat();
+        let from = Vec3::new(angle.sin(), 0.0, angle.cos());
+        let seen = glance(triangles, vec![black_lamp(), mirror(reflectance)], from);
+        let schlick = reflectance + (1.0 - reflectance) * (1.0 - angle.cos()).powi(5);
+        assert!((seen / schlick as f64 - 1.0).abs() < 0.01, "{seen} instead of {schlick}");
+    }
+}
+
+/// Seen from within glass a surface has the square of the index of refraction times the radiance that it shows outside.
+#[test]
+fn what_is_inside_of_glass_shows_its_radiance_over_the_square_of_the_index() {
+    let mut triangles = cuboid(Vec3::ZERO, Vec3::new(1.0, 1.0, 0.2), 1);
+    let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+    triangles.extend(quad([corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)], 0));
+    let seen = glance(triangles, vec![black_lamp(), glass(true, 0.0)], Vec3::Z);
+    let expected = (1.0 - FACE) / (1.5 * 1.5);
+    assert!((seen / expected - 1.0).abs() < 0.01, "{seen} instead of {expected}");
+}
+
+/// Light of a lamp behind a pane falls on a floor as a caustic alone: what the pane leaves of it.
+#[test]
+fn a_caustic_through_a_pane_is_the_lamp_dimmed() {
+    let square = |half: f32, y: f32, sign: f32, material: u32| {
+        let corner = |x: f32, z: f32| Vec3::new(x * half, y, -z * half * sign);
+        quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], material)
+    };
+    let floor = lambertian("floor", 0.8);
+    let look = |pane: bool| {
+        let mut triangles = [square(1.0, 0.0, 1.0, 1), square(0.5, 1.0, -1.0, 0)].concat();
+        if pane {
+            triangles.extend(square(4.0, 0.5, 1.0, 2));
+        }
+        let mut view = camera(Vec3::new(0.0, 0.3, 0.9), Vec3::new(0.0, -0.3, -0.9));
+        view.vertical_fov = 0.3;
+        let scene = scene(triangles, vec![black_lamp(), floor.clone(), glass(false, 0.0)], view);
+        mean(&radiances(&render_or_panic(&scene, &RenderSettings { gather_rays: 0, ..settings() }).film))
+    };
+    // Most light comes steeply: the pane leaves little less than at normal incidence.
+    let share = look(true) / look(false);
+    assert!((0.88..0.925).contains(&share), "{share}");
+}

@@ -1,0 +1,202 @@
+//! Textures, colours and normals of corners, and cut-outs, where what they must show is known.
+
+use glam::Vec3;
+use photoncard_driver::film::Film;
+use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::scene::{Encoding, Image, Material, Reflection, Scene, Texture, Wrap};
+use photoncard_tests::shapes::{add_ball, add_textured_quad};
+use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
+
+fn settings() -> RenderSettings {
+    RenderSettings {
+        width: 48,
+        height: 48,
+        photons: 100_000,
+        gather_rays: 32,
+        samples: 4,
+        cards: vec!["emulated:2".parse::<CardAddress>().unwrap()],
+        ..RenderSettings::default()
+    }
+}
+
+fn image(width: u32, encoding: Encoding, texels: Vec<[u8; 4]>) -> Image {
+    let height = texels.len() as u32 / width;
+    Image { name: "image".into(), width, height, texels, encoding }
+}
+
+fn with_texture(mut scene: Scene, image: Image, texture: Texture) -> Scene {
+    scene.images.push(image);
+    scene.textures.push(texture);
+    scene
+}
+
+/// A square of side 2 in the plane z = 0 that faces the camera and fills the picture, with texture coordinates of 0 to 1 from
+/// the upper left corner.
+fn canvas(material: Material) -> Scene {
+    let mut view = camera(Vec3::Z, Vec3::NEG_Z);
+    view.vertical_fov = std::f32::consts::FRAC_PI_2;
+    let mut scene = scene(Vec::new(), vec![material], view);
+    let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(x, y, 0.0));
+    add_textured_quad(&mut scene, corners, [[0., 1.], [1., 1.], [1., 0.], [0., 0.]], 0);
+    scene
+}
+
+fn film(scene: &Scene) -> Film {
+    render_or_panic(scene, &RenderSettings { gather_rays: 0, samples: 16, ..settings() }).film
+}
+
+fn glowing(texture: u32) -> Material {
+    let lamp = lambertian("screen", 0.0);
+    Material { emission: Vec3::new(2.0, 4.0, 8.0), emissive_texture: Some(texture), ..lamp }
+}
+
+#[test]
+fn an_emissive_texture_glows_texel_by_texel() {
+    let texels = vec![[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [188, 188, 188, 255]];
+    let nearest = Texture { nearest: true, ..Texture::new(0) };
+    let scene = with_texture(canvas(glowing(0)), image(2, Encoding::Srgb, texels), nearest);
+    let film = film(&scene);
+    let at = |x: usize, y: usize| film.pixels()[y * 48 + x].radiance;
+    let near = |found: [f32; 3], expected: [f32; 3]| {
+        assert!(found.into_iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3), "{found:?} {expected:?}");
+    };
+    near(at(10, 10), [2.0, 0.0, 0.0]);
+    near(at(37, 10), [0.0, 4.0, 0.0]);
+    near(at(10, 37), [0.0, 0.0, 8.0]);
+    // The code 188 is 0.5029 of white.
+    near(at(37, 37), [1.0058, 2.0116, 4.0232]);
+}
+
+#[test]
+fn between_two_texels_there_is_their_mean_of_light() {
+    let texels = vec![[0, 0, 0, 255], [255, 255, 255, 255]];
+    let clamped = Texture { wrap: [Wrap::Clamp; 2], ..Texture::new(0) };
+    let scene = with_texture(canvas(glowing(0)), image(2, Encoding::Srgb, texels), clamped);
+    let film = film(&scene);
+    let row: Vec<f32> = (0..48).map(|x| film.pixels()[24 * 48 + x].radiance[0]).collect();
+    for (x, &found) in row.iter().enumerate() {
+        let expected = 2.0 * ((x as f32 + 0.5) / 24.0 - 0.5).clamp(0.0, 1.0);
+        assert!((found - expected).abs() < 0.03, "{x}: {found} {expected}");
+    }
+    assert_eq!((row[0], row[47]), (0.0, 2.0));
+}
+
+/// A closed room whose walls reflect what a texture, colours of corners, or both say.
+fn furnace(albedo: f32, texel: u8, colour: f32) -> Scene {
+    let wall = Material {
+        emission: Vec3::ONE,
+        base_texture: Some(0),
+        ..Material::lambertian("wall", Vec3::splat(albedo))
+    };
+    let view = camera(Vec3::new(0.1, 0.05, 0.6), Vec3::new(-0.3, -0.2, -1.0));
+    let mut scene = scene(Vec::new(), vec![wall], view);
+    for pair in room([0; 6]).as_chunks::<2>().0 {
+        let [[a, b, c], [_, _, d]] = pair.map(|triangle| triangle.vertices);
+        add_textured_quad(&mut scene, [a, b, c, d], [[-1., 2.], [3., 2.], [3., -2.], [-1., -2.]], 0);
+    }
+    for attributes in &mut scene.attributes {
+        attributes.colours = [[colour, colour, colour, 1.0]; 3];
+    }
+    // Two texels that repeat, mirrored one way: one light, one dark, of a known mean nowhere but in the mean.
+    let repeated = Texture { wrap: [Wrap::Mirror, Wrap::Repeat], ..Texture::new(0) };
+    with_texture(scene, image(3, Encoding::Linear, vec![[texel; 4]; 6]), repeated)
+}
+
+#[test]
+fn a_textured_furnace_glows_evenly() {
+    for (albedo, texel, colour) in [(1.0, 128, 1.0), (0.8, 255, 0.5), (0.9, 204, 0.75)] {
+        let scene = furnace(albedo, texel, colour);
+        let reflected = f64::from(albedo) * f64::from(texel) / 255.0 * f64::from(colour);
+        let found = mean(&radiances(&render_or_panic(&scene, &settings()).film));
+        assert!((found * (1.0 - reflected) - 1.0).abs() < 0.01, "{found} with an albedo of {reflected}");
+    }
+}
+
+/// What a texture's green and blue say of roughness and metalness: metal of roughness 0.3 here, a dull dielectric there.
+#[test]
+fn roughness_and_metalness_follow_their_texture() {
+    let reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::new(0.8, 0.4, 0.2),
+        metallic: 1.0,
+        roughness: 1.0,
+        dielectric: Vec3::splat(0.04),
+        transmission: None,
+    };
+    let material = Material { metallic_roughness_texture: Some(0), ..Material::new("plate", reflection) };
+    let nearest = Texture { nearest: true, ..Texture::new(0) };
+    let texels = vec![[0, 77, 255, 255], [0, 255, 0, 255]];
+    let mut scene = with_texture(canvas(material), image(2, Encoding::Linear, texels), nearest);
+    scene.materials.push(Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) });
+    let corner = |x: f32, y: f32| Vec3::new(-x, y, 3.0);
+    scene.triangles.extend(quad([corner(-9., -9.), corner(9., -9.), corner(9., 9.), corner(-9., 9.)], 1));
+    let film = film(&scene);
+    let albedo = |x: usize| Vec3::from(film.pixels()[24 * 48 + x].albedo);
+    let metal = Vec3::new(0.8, 0.4, 0.2) * (20.0 / 21.0) + 1.0 / 21.0;
+    assert!((albedo(10) - metal).abs().max_element() < 1e-3, "{}", albedo(10));
+    let coat = 0.04 + 0.96 / 21.0;
+    let dull = Vec3::new(0.8, 0.4, 0.2) * (1.0 - coat) + coat;
+    assert!((albedo(37) - dull).abs().max_element() < 1e-3, "{}", albedo(37));
+}
+
+/// A lattice before a lamp: what is cut out lets eye rays, shadow rays, gather rays and photons through.
+#[test]
+fn where_alpha_cuts_out_there_is_nothing() {
+    let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
+    let lattice = Material {
+        alpha_cutoff: Some(0.5),
+        base_texture: Some(0),
+        double_sided: true,
+        ..lambertian("lattice", 0.0)
+    };
+    let sky = |alpha: [u8; 4]| {
+        let view = camera(Vec3::new(0.0, 0.5, 0.9), Vec3::new(0.0, -0.5, -0.9));
+        let materials = vec![lamp.clone(), lambertian("floor", 0.8), lattice.clone()];
+        let mut scene = scene(room([1, 1, 1, 0, 1, 1]), materials, view);
+        let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, z]| Vec3::new(x, 0.7, z));
+        add_textured_quad(&mut scene, corners, [[0., 0.], [8., 0.], [8., 8.], [0., 8.]], 2);
+        let texels = alpha.map(|alpha| [255, 255, 255, alpha]).to_vec();
+        let nearest = Texture { nearest: true, ..Texture::new(0) };
+        let scene = with_texture(scene, image(2, Encoding::Srgb, texels), nearest);
+        mean(&radiances(&render_or_panic(&scene, &RenderSettings { samples: 1, ..settings() }).film))
+    };
+    let [closed, open] = [[255; 4], [0; 4]].map(sky);
+    // Photons above it, on the walls, are gathered a little below as well.
+    assert!(closed < 0.01 * open, "{closed} of {open}");
+    let half = sky([0, 255, 255, 0]);
+    let bare = {
+        let view = camera(Vec3::new(0.0, 0.5, 0.9), Vec3::new(0.0, -0.5, -0.9));
+        let scene = scene(room([1, 1, 1, 0, 1, 1]), vec![lamp.clone(), lambertian("floor", 0.8)], view);
+        mean(&radiances(&render_or_panic(&scene, &RenderSettings { samples: 1, ..settings() }).film))
+    };
+    assert!((open / bare - 1.0).abs() < 0.01, "{open} {bare}");
+    assert!(half > 0.15 * open && half < 0.5 * open, "{half} of {open}");
+}
+
+/// The normals that the eye sees are those of the ball, however few its faces are.
+#[test]
+fn smooth_normals_are_interpolated_between_corners() {
+    let mut ball = scene(Vec::new(), vec![Material { emission: Vec3::ONE, ..lambertian("ball", 0.0) }], {
+        let mut view = camera(Vec3::new(0.0, 0.0, 4.0), Vec3::NEG_Z);
+        view.vertical_fov = 0.4;
+        view
+    });
+    add_ball(&mut ball, Vec3::ZERO, 1.0, 12, 0);
+    let mut worst = 0.0_f32;
+    let mut places = 0;
+    for (index, pixel) in film(&ball).pixels().iter().enumerate() {
+        let [x, y] = [index % 48, index / 48].map(|i| (i as f32 + 0.5) / 24.0 - 1.0);
+        // Towards the edge of the ball a facet lies far behind it.
+        if x * x + y * y > 0.4 {
+            continue;
+        }
+        places += 1;
+        let direction = Vec3::new(x * 0.2_f32.tan(), -y * 0.2_f32.tan(), -1.0).normalize();
+        // Where the ray meets the ball of radius 1.
+        let along = 4.0 * -direction.z;
+        let position =
+            Vec3::new(0.0, 0.0, 4.0) + direction * (along - (along * along - 15.0).max(0.0).sqrt());
+        worst = worst.max((Vec3::from(pixel.normal).normalize() - position).length());
+    }
+    // A facet's own normal is off by up to 0.13.
+    assert!(worst < 0.03 && places > 600, "{worst} at {places} places");
+}
