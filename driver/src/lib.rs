@@ -3,12 +3,12 @@
 
 pub mod bvh;
 pub mod difference;
-pub mod emitter;
 pub mod emulator;
 pub mod error;
 pub mod exr;
 pub mod film;
 mod fold;
+mod light;
 pub mod link;
 pub mod output;
 pub mod pack;

@@ -9,14 +9,15 @@ use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::budget::Budget;
-use photoncard_shared::image::{HEADER_LINES, Header, SECTIONS, Section, SectionKind};
+use photoncard_shared::image::{self, HEADER_LINES, Header, SECTIONS, Section, SectionKind};
 use photoncard_shared::layout::{
-    self, BvhNode, NodeBox, Photon, PhotonGrid, PhotonLeaf, Record, WideNode, power_of_two_above,
+    self, BvhNode, DistantLight, LEAF_TRIANGLES, NodeBox, Photon, PhotonGrid, PhotonLeaf, Record, WideNode,
+    power_of_two_above,
 };
 use photoncard_shared::message::Radiance;
 
-use crate::bvh::{self, HierarchyError};
-use crate::emitter::Emitters;
+use crate::bvh::{self, HierarchyError, LeafTriangles};
+use crate::light::{Lights, Sources};
 use crate::photon::leaves::PhotonTree;
 use crate::photon::map::{balance, for_each_in_heap};
 use crate::photon::stored::StoredPhoton;
@@ -92,8 +93,8 @@ pub struct PackedScene {
     lines: Vec<Line>,
     sections: [Section; SECTIONS],
     radiance_unit: f32,
-    emitter_density: f32,
-    strongest_emission: f32,
+    lights: image::Lights,
+    sources: Sources,
     keeps_photons: bool,
 }
 
@@ -103,23 +104,25 @@ pub struct CardImage {
 }
 
 impl PackedScene {
-    /// Packs geometry, materials and emitters.
+    /// Packs geometry, materials, textures and lights.
     ///
     /// # Errors
-    /// If the geometry is too much for a chip.
-    pub fn new(scene: &Scene, emitters: &Emitters) -> Result<Self, PackError> {
+    /// If the geometry is too much for a chip, or there are more textures or lights than it can tell apart.
+    pub fn new(scene: &Scene) -> Result<Self, PackError> {
+        let lights = Lights::new(scene);
         let cut_out: Vec<bool> =
             scene.materials.iter().map(|material| material.alpha_cutoff.is_some()).collect();
         let hierarchy = bvh::build(&scene.triangles, &cut_out)?;
-        let corners = PackedCorners::new(scene, &hierarchy.leaf_triangles);
-        let textures = textures::records(scene)?;
+        let corners = PackedCorners::new(scene, &lights, &hierarchy.leaf_triangles);
+        let textures = textures::records(scene, lights.environment())?;
+        let places = places_in_image(scene, &hierarchy.leaf_triangles);
         let mut packed = Self {
             // The first are the header's.
             lines: vec![Line::ZERO; HEADER_LINES],
             sections: [Section::default(); SECTIONS],
-            radiance_unit: radiance_unit(scene, emitters),
-            emitter_density: emitters.density_per_radiance(),
-            strongest_emission: emitters.strongest_emission(),
+            radiance_unit: radiance_unit(scene, &lights),
+            lights: lights.header(scene.textures.len() as u32),
+            sources: Sources::new(scene, &lights),
             keeps_photons: scene.keeps_photons(),
         };
         packed.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
@@ -128,10 +131,14 @@ impl PackedScene {
         packed.append(SectionKind::Attributes, corners.records.iter().map(layout::Attributes::to_bytes))?;
         packed.append(SectionKind::Materials, scene.materials.iter().map(materials::record))?;
         packed.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
-        packed.append_lines(SectionKind::Texels, textures::lines(scene))?;
-        packed.append(SectionKind::Emitters, emitters.records().iter().map(layout::Emitter::to_bytes))?;
+        packed.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;
+        let place = |triangle: usize| places.get(triangle).copied().unwrap_or(0);
+        packed.append(SectionKind::Emitters, lights.emitters(place).map(|emitter| emitter.to_bytes()))?;
+        packed.append(SectionKind::LightNodes, lights.nodes())?;
+        packed.append(SectionKind::DistantLights, lights.distant().iter().map(DistantLight::to_bytes))?;
+        let cells = lights.cell_thresholds();
         packed
-            .append(SectionKind::EmitterThresholds, emitters.thresholds().iter().map(|t| t.to_le_bytes()))?;
+            .append(SectionKind::EnvironmentCells, cells.iter().map(|threshold| threshold.to_le_bytes()))?;
         Ok(packed)
     }
 
@@ -165,8 +172,8 @@ impl PackedScene {
             photon_power_unit,
             caustic_power_unit: 1.0,
             radiance_unit: self.radiance_unit,
-            emitter_density: self.emitter_density,
             photon_grid,
+            lights: self.lights,
             sections: self.sections,
         }
     }
@@ -183,9 +190,9 @@ impl PackedScene {
             .map_or(PhotonGrid::UNIT, |NodeBox { lower, upper }| PhotonGrid::around(lower, upper))
     }
 
-    /// Watts in the strongest channel of the strongest photon that the emitters send, as if it were the only one.
-    pub(crate) fn strongest_emission(&self) -> f32 {
-        self.strongest_emission
+    /// Where photons come from.
+    pub(crate) fn sources(&self) -> &Sources {
+        &self.sources
     }
 
     /// Whether there is any surface that photons are stored at.
@@ -427,6 +434,18 @@ fn append<const N: usize>(
     count(lines.len()).map(drop)
 }
 
+/// Where each triangle of a scene is in the card image whose leaves hold these.
+fn places_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
+    let mut places = vec![0; scene.triangles.len()];
+    for (leaf, triangles) in leaves.iter().enumerate() {
+        for (slot, &triangle) in triangles.iter().enumerate() {
+            // The hierarchy has few enough.
+            places[triangle as usize] = (leaf * LEAF_TRIANGLES + slot) as u32;
+        }
+    }
+    places
+}
+
 /// The box around a scene, and little more.
 fn root_box(scene: &SceneImage, memory: &mut Lines) -> Option<NodeBox> {
     let line = scene.line(memory, SectionKind::Nodes, 0, 0..LINE_BYTES as u32).ok()?;
@@ -453,9 +472,9 @@ fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl It
 /// The unit is the radiance that all surfaces would have if the emitted power were spread over them, once reflected by
 /// white: a typical one. A much brighter emitter raises it, so that its own radiance is within 2^12 units: shadow rays next
 /// to it may bring a thousand times as much.
-fn radiance_unit(scene: &Scene, emitters: &Emitters) -> f32 {
+fn radiance_unit(scene: &Scene, lights: &Lights) -> f32 {
     let area: f64 = scene.triangles.iter().map(|triangle| triangle.area() as f64).sum();
-    let typical = emitters.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));
+    let typical = lights.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));
     let brightest = scene.materials.iter().map(|m| m.emission.max_element()).fold(0.0, f32::max) as f64;
     power_of_two_above(typical.max(brightest / (1 << 12) as f64))
 }

@@ -13,6 +13,7 @@ use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
+use crate::environment::EnvironmentOption;
 use crate::study::StudyArguments;
 
 /// Global illumination by photon mapping on small rendering chips.
@@ -117,6 +118,10 @@ pub(crate) struct RenderOptions {
     /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, emission or exponent; may be repeated
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
+    /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or OpenEXR (.exr) picture whose middle is -z and top is y;
+    /// or the same radiance from everywhere
+    #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]
+    pub(crate) environment: Option<EnvironmentOption>,
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     seed: u32,

@@ -9,6 +9,7 @@ mod card;
 mod console;
 mod diff;
 mod emulate;
+mod environment;
 mod failure;
 mod progress;
 mod render;

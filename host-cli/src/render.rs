@@ -14,6 +14,7 @@ use serde_json::json;
 
 use crate::arguments::RenderOptions;
 use crate::console::say;
+use crate::environment::EnvironmentOption;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
@@ -76,9 +77,12 @@ fn outputs(options: &RenderOptions) -> impl Iterator<Item = &Path> {
         .map(AsRef::as_ref)
 }
 
-/// Checks that no output replaces the scene or another output.
+/// Checks that no output replaces the scene, the environment or another output.
 fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
     let mut taken = vec![(options.scene.as_path(), "the scene")];
+    if let Some(EnvironmentOption::File(path)) = &options.environment {
+        taken.push((path, "the environment"));
+    }
     let partial = options.partial_path();
     for path in outputs(options).chain([partial.as_path()]) {
         let same = taken.iter().find(|(other, _)| output::is_same_file(path, other));
@@ -96,6 +100,9 @@ fn read_scene(options: &RenderOptions) -> Result<Scene, Failure> {
     let mut scene = load(&options.scene).map_err(Failure::input)?;
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
+    }
+    if let Some(environment) = &options.environment {
+        scene.environment = Some(environment.load()?);
     }
     scene.check_light().map_err(Failure::input)?;
     if !options.quiet {
@@ -142,6 +149,7 @@ fn provenance(
         "program": concat!("photoncard ", env!("CARGO_PKG_VERSION")),
         "scene": options.scene.file_name().map(|name| name.to_string_lossy()),
         "set": options.assignments,
+        "environment": options.environment.as_ref().map(EnvironmentOption::name),
         "camera": settings.camera,
         "seed": settings.seed,
         "photons": settings.photons,

@@ -40,7 +40,7 @@ pub enum Structure {
     Triangles = 2,
     /// Materials.
     Materials = 3,
-    /// Emitters, and the thresholds that choose one.
+    /// Lights, and what chooses one: the light tree and the environment's cells.
     Emitters = 4,
     /// Inner nodes of a photon map that has its photons in leaves.
     PhotonNodes = 5,

@@ -9,7 +9,7 @@
 //! none; so have textures, and what they lie on surfaces by.
 
 use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
-use crate::layout::{Attributes, Emitter, Material, Photon, PhotonGrid, Record, Texture};
+use crate::layout::{Attributes, DistantLight, Emitter, Material, Photon, PhotonGrid, Record, Texture};
 
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
@@ -19,7 +19,7 @@ pub const LAYOUT_VERSION: u16 = 8;
 pub const HEADER_LINES: usize = 2;
 /// Entries of [`SectionKind::LeafAttributes`] in one line.
 pub const LEAF_ATTRIBUTES_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
-/// Emitter thresholds in one line.
+/// Thresholds in one line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
 /// The sections of an image, in the order of the table and of the image.
@@ -42,26 +42,31 @@ pub enum SectionKind {
     Texels = 6,
     /// [`Emitter`]s.
     Emitters = 7,
-    /// One `u32` an emitter: the upper end of its share of the probabilities, of 2^32; the last is 2^32 - 1.
-    EmitterThresholds = 8,
+    /// [`crate::layout::LightNode`]s above the emitters, the root first.
+    LightNodes = 8,
+    /// [`DistantLight`]s.
+    DistantLights = 9,
+    /// `u32`s, of 2^32: the upper ends of the probabilities of the rows of the environment's cells; then, row after row, those of
+    /// the cells in the row. The last of each are 2^32 - 1.
+    EnvironmentCells = 10,
     /// [`Photon`]s, a left-balanced kd-tree: the children of `i` are `2 i + 1` and `2 i + 2`.
-    Photons = 9,
+    Photons = 11,
     /// [`crate::layout::PhotonNode`]s, the root first.
-    PhotonNodes = 10,
+    PhotonNodes = 12,
     /// [`crate::layout::PhotonLeaf`]s.
-    PhotonLeaves = 11,
+    PhotonLeaves = 13,
     /// [`crate::layout::PhotonNode`]s above the photons of caustics, the root first.
-    CausticNodes = 12,
+    CausticNodes = 14,
     /// [`crate::layout::PhotonLeaf`]s of caustics: what has met perfectly specular surfaces alone, and one at least.
-    CausticLeaves = 13,
+    CausticLeaves = 15,
     /// [`crate::layout::PhotonNode`]s above irradiance points, the root first.
-    IrradianceNodes = 14,
+    IrradianceNodes = 16,
     /// [`crate::layout::PhotonLeaf`]s that hold [`crate::layout::IrradiancePoint`]s in the place of photons' contents.
-    IrradianceLeaves = 15,
+    IrradianceLeaves = 17,
 }
 
 /// Number of sections.
-pub const SECTIONS: usize = 16;
+pub const SECTIONS: usize = 18;
 
 impl SectionKind {
     /// All sections, in order.
@@ -74,7 +79,9 @@ impl SectionKind {
         Self::Textures,
         Self::Texels,
         Self::Emitters,
-        Self::EmitterThresholds,
+        Self::LightNodes,
+        Self::DistantLights,
+        Self::EnvironmentCells,
         Self::Photons,
         Self::PhotonNodes,
         Self::PhotonLeaves,
@@ -92,11 +99,13 @@ impl SectionKind {
             Self::Materials => Material::PER_LINE as u32,
             Self::Textures => Texture::PER_LINE as u32,
             Self::Emitters => Emitter::PER_LINE as u32,
-            Self::EmitterThresholds => THRESHOLDS_PER_LINE,
+            Self::DistantLights => DistantLight::PER_LINE as u32,
+            Self::EnvironmentCells => THRESHOLDS_PER_LINE,
             Self::Photons => Photon::PER_LINE as u32,
             Self::Nodes
             | Self::Triangles
             | Self::Texels
+            | Self::LightNodes
             | Self::PhotonNodes
             | Self::PhotonLeaves
             | Self::CausticNodes
@@ -115,7 +124,9 @@ impl SectionKind {
             Self::LeafAttributes | Self::Attributes => Structure::Attributes,
             Self::Materials => Structure::Materials,
             Self::Textures | Self::Texels => Structure::Textures,
-            Self::Emitters | Self::EmitterThresholds => Structure::Emitters,
+            Self::Emitters | Self::LightNodes | Self::DistantLights | Self::EnvironmentCells => {
+                Structure::Emitters
+            }
             Self::PhotonNodes => Structure::PhotonNodes,
             Self::Photons | Self::PhotonLeaves => Structure::Photons,
             Self::CausticNodes => Structure::CausticNodes,
@@ -158,13 +169,47 @@ pub struct Header {
     pub caustic_power_unit: f32,
     /// Radiance that a fixed-point pixel sum of 1 stands for, W/(sr m^2): a power of two.
     pub radiance_unit: f32,
-    /// Probability density, 1/m^2, of a shadow ray's end on one side of an emitter, for each unit of its mean radiance:
-    /// pi over the power of all emitters. Zero without emitters.
-    pub emitter_density: f32,
     /// The grid that photons' positions are on.
     pub photon_grid: PhotonGrid,
+    /// How light samples are shared out, and the environment.
+    pub lights: Lights,
     /// Where the records lie, by [`SectionKind`].
     pub sections: [Section; SECTIONS],
+}
+
+/// How light samples are shared out between the kinds of lights, and the light from infinitely far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lights {
+    /// The probability that a light sample is of an emitter, one of those of the light tree.
+    pub emitters: f32,
+    /// That it is of the environment.
+    pub environment: f32,
+    /// That it is of a distant light.
+    pub distant: f32,
+    /// What a texel of the environment of 1 stands for, W/(sr m^2) of each channel.
+    pub radiance: [f32; 3],
+    /// The environment's texture; `None` without an environment.
+    pub texture: Option<u32>,
+    /// Columns and rows of the environment's cells, of equal angles: 1 to 65535.
+    pub cells: [u16; 2],
+}
+
+impl Lights {
+    /// No light at all.
+    pub const NONE: Self = Self {
+        emitters: 0.0,
+        environment: 0.0,
+        distant: 0.0,
+        radiance: [0.0; 3],
+        texture: None,
+        cells: [1; 2],
+    };
+
+    fn is_sound(&self) -> bool {
+        let shares = [self.emitters, self.environment, self.distant];
+        shares.into_iter().all(|share| (0.0..=1.0).contains(&share))
+            && self.radiance.into_iter().all(|radiance| radiance >= 0.0 && radiance.is_finite())
+    }
 }
 
 /// What is wrong with a header.
@@ -174,7 +219,7 @@ pub enum HeaderError {
     Magic,
     /// It was written for another layout version, the one given.
     Version(u16),
-    /// A unit is not a positive finite number, or the emitters' density not a finite one.
+    /// A unit is not a positive finite number, a probability not in 0 to 1, or the environment's radiance not a finite one.
     Unit,
     /// The section of this index reaches past the image's last line.
     Section(u8),
@@ -183,7 +228,11 @@ pub enum HeaderError {
 const PHOTON_GRID: usize = 32;
 const SECTION_TABLE: usize = 64;
 const HEADER_BYTES: usize = HEADER_LINES * LINE_BYTES;
-const _: () = assert!(SECTION_TABLE + 8 * SECTIONS <= HEADER_BYTES);
+/// At the end: the section table may grow towards it.
+const LIGHTS: usize = HEADER_BYTES - 32;
+const _: () = assert!(SECTION_TABLE + 8 * SECTIONS <= LIGHTS);
+/// In the place of the index of the environment's texture: there is none.
+const NO_ENVIRONMENT: u32 = u32::MAX;
 
 impl Header {
     /// The section of this kind.
@@ -203,12 +252,19 @@ impl Header {
         put(12, &self.lines.to_le_bytes());
         put(16, &self.photon_power_unit.to_le_bytes());
         put(20, &self.radiance_unit.to_le_bytes());
-        put(24, &self.emitter_density.to_le_bytes());
         put(28, &self.caustic_power_unit.to_le_bytes());
         for (axis, origin) in self.photon_grid.origin.iter().enumerate() {
             put(PHOTON_GRID + 4 * axis, &origin.to_le_bytes());
         }
         put(PHOTON_GRID + 12, &self.photon_grid.cell.to_le_bytes());
+        let Lights { emitters, environment, distant, radiance: [red, green, blue], texture, cells } =
+            self.lights;
+        for (index, number) in [emitters, environment, distant, red, green, blue].into_iter().enumerate() {
+            put(LIGHTS + 4 * index, &number.to_le_bytes());
+        }
+        put(LIGHTS + 24, &texture.unwrap_or(NO_ENVIRONMENT).to_le_bytes());
+        put(LIGHTS + 28, &cells[0].to_le_bytes());
+        put(LIGHTS + 30, &cells[1].to_le_bytes());
         for (index, section) in self.sections.iter().enumerate() {
             put(SECTION_TABLE + 8 * index, &section.first_line.to_le_bytes());
             put(SECTION_TABLE + 8 * index + 4, &section.records.to_le_bytes());
@@ -237,12 +293,12 @@ impl Header {
             lines: word(12),
             photon_power_unit: f32::from_bits(word(16)),
             radiance_unit: f32::from_bits(word(20)),
-            emitter_density: f32::from_bits(word(24)),
             caustic_power_unit: f32::from_bits(word(28)),
             photon_grid: PhotonGrid {
                 origin: core::array::from_fn(|axis| word(PHOTON_GRID + 4 * axis) as i32),
                 cell: f32::from_bits(word(PHOTON_GRID + 12)),
             },
+            lights: Self::read_lights(|index| word(LIGHTS + 4 * index)),
             sections: core::array::from_fn(|index| Section {
                 first_line: word(SECTION_TABLE + 8 * index),
                 records: word(SECTION_TABLE + 8 * index + 4),
@@ -252,12 +308,24 @@ impl Header {
         Ok(header)
     }
 
+    fn read_lights(word: impl Fn(usize) -> u32) -> Lights {
+        let number = |index: usize| f32::from_bits(word(index));
+        let (texture, cells) = (word(6), word(7));
+        Lights {
+            emitters: number(0),
+            environment: number(1),
+            distant: number(2),
+            radiance: [number(3), number(4), number(5)],
+            texture: (texture != NO_ENVIRONMENT).then_some(texture),
+            cells: [cells as u16, (cells >> 16) as u16].map(|cells| cells.max(1)),
+        }
+    }
+
     fn check(&self) -> Result<(), HeaderError> {
         let is_unit = |x: f32| x.is_normal() && x > 0.0;
-        let is_density = self.emitter_density.is_finite() && self.emitter_density >= 0.0;
         let units =
             [self.photon_power_unit, self.caustic_power_unit, self.radiance_unit, self.photon_grid.cell];
-        if !units.into_iter().all(is_unit) || !is_density {
+        if !units.into_iter().all(is_unit) || !self.lights.is_sound() {
             return Err(HeaderError::Unit);
         }
         for kind in SectionKind::ALL {
@@ -285,8 +353,15 @@ mod tests {
             photon_power_unit: 0.5,
             caustic_power_unit: 0.25,
             radiance_unit: 2.0,
-            emitter_density: 0.25,
             photon_grid,
+            lights: Lights {
+                emitters: 0.5,
+                environment: 0.125,
+                distant: 0.375,
+                radiance: [1.0, 2.0, 3.0],
+                texture: Some(7),
+                cells: [128, 64],
+            },
             sections,
         }
     }
@@ -294,6 +369,8 @@ mod tests {
     #[test]
     fn a_header_survives_its_line() {
         assert_eq!(Header::read(&header().to_lines()), Ok(header()));
+        let dark = Header { lights: Lights::NONE, ..header() };
+        assert_eq!(Header::read(&dark.to_lines()), Ok(dark));
     }
 
     #[test]
@@ -313,7 +390,7 @@ mod tests {
         assert_eq!(Header::read(&other), Err(HeaderError::Version(77)));
         let unitless = Header { radiance_unit: f32::NAN, ..header() };
         assert_eq!(Header::read(&unitless.to_lines()), Err(HeaderError::Unit));
-        let endless = Header { emitter_density: f32::INFINITY, ..header() };
-        assert_eq!(Header::read(&endless.to_lines()), Err(HeaderError::Unit));
+        let unlikely = Header { lights: Lights { distant: f32::INFINITY, ..Lights::NONE }, ..header() };
+        assert_eq!(Header::read(&unlikely.to_lines()), Err(HeaderError::Unit));
     }
 }

@@ -14,7 +14,9 @@
 //! | [`Texture`] | 40 | 3 |
 //! | texel | 4 | 32 |
 //! | [`Emitter`] | 64 | 2 |
-//! | emitter threshold | 4 | 32 |
+//! | [`LightNode`] | 128 | 1 |
+//! | [`DistantLight`] | 32 | 4 |
+//! | threshold of a cell of the environment | 4 | 32 |
 //!
 //! Colours and vectors are three `f32`; lengths are metres, powers watts per channel divided by the image's photon
 //! power unit, radiances W/(sr m^2).
@@ -25,8 +27,10 @@ mod attributes;
 mod bvh_leaf;
 mod bvh_node;
 mod direction;
+mod distant_light;
 mod emitter;
 mod irradiance_point;
+mod light_node;
 mod material;
 mod photon;
 mod photon_grid;
@@ -39,8 +43,10 @@ pub use attributes::{Attributes, LeafAttributes, NO_ATTRIBUTES};
 pub use bvh_leaf::{BvhLeaf, LEAF_TRIANGLES, MOST_MATERIALS, Triangle, VERTEX_LANES};
 pub use bvh_node::{BvhAxis, BvhNode, NodeBox};
 pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
-pub use emitter::Emitter;
+pub use distant_light::DistantLight;
+pub use emitter::{Emitter, EmitterKind};
 pub use irradiance_point::IrradiancePoint;
+pub use light_node::{LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode};
 pub use material::{DOUBLE_SIDED, Material, NO_TEXTURE, Reflectance, THIN_WALLED};
 pub use photon::{DISC_CODES, FULL_DISC, Photon, Rgbe, disc_fraction, encode_disc};
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};

@@ -7,7 +7,6 @@ use std::sync::LazyLock;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
@@ -57,7 +56,7 @@ fn prepare(name: &str, layout: PhotonLayout) -> Prepared {
 }
 
 fn map(scene: &Scene, photons: usize, layout: PhotonLayout) -> MappedImage {
-    let packed = PackedScene::new(scene, &Emitters::new(scene)).expect("packs");
+    let packed = PackedScene::new(scene).expect("packs");
     let settings = PhotonSettings {
         caustic_photons: 0,
         caustic_neighbors: 50,

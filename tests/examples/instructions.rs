@@ -4,7 +4,6 @@
 //! frame's parameters in the line behind it. `instructions render FILE WORK` does the work `Eye`, `Rays` or `Gathers` of one
 //! tile as a board does, in the function `measured`, and prints what it counted.
 
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::map_photons;
 use photoncard_driver::render::{RenderSettings, Sampling};
@@ -22,7 +21,7 @@ use measure::{Work, render};
 fn memory() -> Vec<u8> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
     let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("it is packed");
+    let packed = PackedScene::new(&scene).expect("it is packed");
     // One gather a ray, done at once.
     let settings = RenderSettings {
         width: 64,

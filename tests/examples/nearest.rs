@@ -10,7 +10,6 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::Photons;
 use photoncard_firmware::gather::Place;
@@ -69,7 +68,7 @@ fn image(points: impl Iterator<Item = [f32; 3]>) -> (CardImage, Vec<[f32; 3]>) {
         disc: FULL_DISC,
         direct: false,
     });
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+    let packed = PackedScene::new(&scene).expect("packs");
     let photons = Photons::new(packed.photon_grid(), 1.0, photons);
     let positions = photons.iter().map(|photon| photon.position).collect();
     (packed.with_photons(photons, NEIGHBORS).expect("fits"), positions)

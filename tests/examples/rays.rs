@@ -9,7 +9,6 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_firmware::importance::sample_reflection;
@@ -94,7 +93,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     let scene = gltf::load(path.as_ref())?;
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene))?;
+    let packed = PackedScene::new(&scene)?;
     let rays = bounces(&scene, &packed, count);
     if let Some(folder) = folder {
         write(&folder, &scene, &rays)?;

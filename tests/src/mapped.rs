@@ -2,7 +2,6 @@
 //! alone.
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::film::Window;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -43,7 +42,7 @@ impl MappedScene {
     /// # Panics
     /// If the scene cannot be packed.
     pub fn new(scene: Scene, settings: &RenderSettings) -> Self {
-        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+        let packed = PackedScene::new(&scene).expect("packs");
         let MappedImage { image, max_distance, caustics, .. } =
             map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("maps");
         Self { scene, image, max_distance, caustics }

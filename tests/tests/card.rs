@@ -1,7 +1,6 @@
 //! A card answers whatever a host says with a fault or with pixels, and renders the next good tile.
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::trace;
 use photoncard_driver::render::RenderSettings;
@@ -25,7 +24,7 @@ fn image() -> CardImage {
     lamp.emission = Vec3::ONE;
     let scene =
         scene(room([0, 0, 0, 1, 0, 0]), vec![lambertian("wall", 0.5), lamp], camera(Vec3::ZERO, Vec3::NEG_Z));
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+    let packed = PackedScene::new(&scene).unwrap();
     let photons = trace(&packed, 0, 500, &|_| true).unwrap().photons;
     packed.with_photons(photons, 20).unwrap()
 }

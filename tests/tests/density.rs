@@ -1,7 +1,6 @@
 //! The density estimate is right where the plain one is not: at edges, in corners and on thin walls.
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::Radiance;
@@ -23,7 +22,7 @@ struct Map {
 
 impl Map {
     fn new(scene: &Scene, photons: usize) -> Self {
-        let packed = PackedScene::new(scene, &Emitters::new(scene)).unwrap();
+        let packed = PackedScene::new(scene).unwrap();
         let settings = PhotonSettings {
             caustic_photons: 0,
             caustic_neighbors: 50,

@@ -1,7 +1,6 @@
 //! Energy balance of the photon pass: what is emitted arrives, and arrives again as often as it is reflected.
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::{PhotonPass, trace};
 use photoncard_driver::scene::{Material, Scene};
@@ -10,7 +9,7 @@ use photoncard_tests::{camera, lambertian, quad, room, scene};
 const PHOTONS: usize = 400_000;
 
 fn pass(scene: &Scene, seed: u32) -> PhotonPass {
-    let packed = PackedScene::new(scene, &Emitters::new(scene)).unwrap();
+    let packed = PackedScene::new(scene).unwrap();
     trace(&packed, seed, PHOTONS, &|_| true).unwrap()
 }
 
@@ -85,7 +84,7 @@ fn form_factor(a: f64, b: f64, distance: f64) -> f64 {
 #[test]
 fn exactly_the_asked_number_is_stored_and_the_same_on_any_threads() {
     let scene = lit_room(lambertian("wall", 0.5), Vec3::ONE);
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+    let packed = PackedScene::new(&scene).unwrap();
     for count in [1, 17, 10_001] {
         let passes: Vec<PhotonPass> = [1, 2, 5]
             .into_iter()

@@ -1,7 +1,6 @@
 //! Scenes and settings at the ends of their ranges: large, tilted, dazzling, strongly coloured, with rays of one kind alone.
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
 use photoncard_driver::render::{RenderSettings, Unobserved, render};
@@ -104,7 +103,7 @@ fn the_stored_power_of_coloured_light_is_right_in_every_channel() {
         vec![lambertian("wall", 0.5), emitting("lamp", 0.5, emission)],
         camera(Vec3::ZERO, Vec3::NEG_Z),
     );
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+    let packed = PackedScene::new(&scene).unwrap();
     for photons in [50_000, 70_000] {
         let pass = trace(&packed, 0, photons, &|_| true).unwrap();
         for channel in 0..3 {

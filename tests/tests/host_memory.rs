@@ -3,7 +3,6 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use peak_alloc::PeakAlloc;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::map_photons;
 use photoncard_driver::render::{Observer, Phase, RenderSettings, render};
@@ -61,7 +60,7 @@ fn rendering(scene: &Scene, chips: usize) -> (usize, usize) {
 #[test]
 fn a_photon_takes_forty_bytes_at_the_most_and_cards_share_the_image() {
     let scene = cornell();
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+    let packed = PackedScene::new(&scene).expect("packs");
     let before = MEMORY.current_usage();
     MEMORY.reset_peak_usage();
     let mapped = map_photons(packed, &settings(1).photon_settings(&scene), &|_| true).expect("maps");

@@ -1,6 +1,5 @@
 //! The model of a chip's memory: it counts what is read and what its caches miss, and it changes no picture.
 
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use photoncard_driver::pack::PackedScene;
@@ -55,7 +54,7 @@ struct Frame {
 impl Frame {
     fn new(settings: &RenderSettings) -> Self {
         let scene = glossy();
-        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+        let packed = PackedScene::new(&scene).unwrap();
         let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).unwrap();
         let frame = settings.frame(scene.camera(None).unwrap(), mapped.max_distance, mapped.caustics);
         Self { mapped, frame, tiles: tiles(settings.window(), settings.tile, settings.order) }

@@ -1,7 +1,6 @@
 //! The k nearest photons of either layout are those of brute force, whatever the photons.
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::Photons;
 use photoncard_firmware::photon::{Candidate, CandidateBuffer, NearestPhotons, PhotonMap, Search};
@@ -23,7 +22,7 @@ fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
         disc: FULL_DISC,
         direct: false,
     });
-    let packed = || PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+    let packed = || PackedScene::new(&scene).unwrap();
     let photons = Photons::new(packed().photon_grid(), 1.0, photons);
     let image = || packed().with_photons(photons.clone(), 100).unwrap();
     [image().with_photon_tree().unwrap(), image()]

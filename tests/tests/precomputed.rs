@@ -4,7 +4,6 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{Photons, precompute_irradiance};
 use photoncard_firmware::photon::{
@@ -36,7 +35,7 @@ fn images(photons: &[Placed], neighbors: u32, max_distance: f32) -> [CardImage; 
         disc: FULL_DISC,
         direct: false,
     });
-    let packed = || PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+    let packed = || PackedScene::new(&scene).unwrap();
     let photons = Photons::new(packed().photon_grid(), 1.0, photons);
     let image = || packed().with_photons(photons.clone(), neighbors).unwrap();
     [image().with_photon_tree().unwrap(), image()]

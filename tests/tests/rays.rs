@@ -1,7 +1,6 @@
 //! The ray caster finds what brute force finds, the same bits on every processor, and loses no ray at an edge.
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::scene::{Triangle, gltf};
 use photoncard_firmware::memory::Lines;
@@ -17,7 +16,7 @@ use photoncard_tests::{camera, lambertian, scene};
 
 fn packed(triangles: Vec<Triangle>) -> PackedScene {
     let scene = scene(triangles, vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
-    PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs")
+    PackedScene::new(&scene).expect("packs")
 }
 
 /// A number from 0 to 1 that looks random.

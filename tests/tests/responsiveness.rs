@@ -6,7 +6,6 @@ use std::ops::Range;
 use std::time::Duration;
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
 use photoncard_driver::render::RenderSettings;
@@ -97,7 +96,7 @@ fn most_reads(frame: &FrameParameters) -> u64 {
     lamp.emission = Vec3::ONE;
     let walls = room([0, 0, 0, 1, 0, 0]);
     let scene = scene(walls, vec![lambertian("wall", 0.5), lamp], camera(Vec3::ZERO, Vec3::NEG_Z));
-    let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+    let packed = PackedScene::new(&scene).unwrap();
     let photons = trace(&packed, 0, 500, &|_| true).unwrap().photons;
     let lines = packed.with_photons(photons, 20).unwrap().lines().to_vec();
     let reads = Cell::new(0);

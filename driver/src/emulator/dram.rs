@@ -118,7 +118,6 @@ mod tests {
     use photoncard_shared::layout::PhotonGrid;
 
     use super::*;
-    use crate::emitter::Emitters;
     use crate::pack::PackedScene;
     use crate::photon::Photons;
     use crate::scene::gltf;
@@ -126,7 +125,7 @@ mod tests {
     fn image() -> Arc<CardImage> {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
         let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
-        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+        let packed = PackedScene::new(&scene).expect("packs");
         Arc::new(packed.with_photons(Photons::new(PhotonGrid::UNIT, 1.0, []), 1).expect("packs"))
     }
 

@@ -3,6 +3,7 @@
 use photoncard_shared::layout::{self, LeafAttributes};
 
 use crate::bvh::LeafTriangles;
+use crate::light::Lights;
 use crate::scene::{Attributes, NO_ATTRIBUTES, Scene};
 
 /// The attributes of the triangles of all leaves. Leaves whose triangles have none have no records.
@@ -15,10 +16,10 @@ pub(super) struct PackedCorners {
 
 impl PackedCorners {
     /// Those of a scene whose triangles are in these leaves.
-    pub(super) fn new(scene: &Scene, leaves: &[LeafTriangles]) -> Self {
+    pub(super) fn new(scene: &Scene, lights: &Lights, leaves: &[LeafTriangles]) -> Self {
         let mut packed = Self { leaves: Vec::with_capacity(leaves.len()), records: Vec::new() };
         for leaf in leaves {
-            let entry = packed.append(scene, leaf);
+            let entry = packed.append(scene, lights, leaf);
             packed.leaves.push(entry);
         }
         if packed.records.is_empty() {
@@ -28,31 +29,35 @@ impl PackedCorners {
     }
 
     /// Appends the records of a leaf. Returns its entry.
-    fn append(&mut self, scene: &Scene, leaf: &LeafTriangles) -> u32 {
+    fn append(&mut self, scene: &Scene, lights: &Lights, leaf: &LeafTriangles) -> u32 {
         let triangles = || leaf.iter().map(|&index| &scene.triangles[index as usize]);
         let materials = || triangles().map(|triangle| &scene.materials[triangle.material as usize]);
         let has_corners = triangles().any(|triangle| triangle.attributes != NO_ATTRIBUTES);
-        if !has_corners && !materials().any(|material| material.alpha_cutoff.is_some()) {
+        let has_cut_outs = materials().any(|material| material.alpha_cutoff.is_some());
+        let has_emitters = leaf.iter().any(|&index| lights.of_triangle(index).is_some());
+        if !has_corners && !has_cut_outs && !has_emitters {
             return layout::NO_ATTRIBUTES;
         }
         let is_of_second_set = |texture: u32| scene.textures[texture as usize].set == 1;
         let two_sets = materials().any(|material| material.textures().any(is_of_second_set));
         // A record takes half a line, and lines are fewer than 2^32: the upper bit is free.
         let first = self.records.len() as u32;
-        for triangle in triangles() {
+        for &index in leaf {
+            let triangle = &scene.triangles[index as usize];
+            let emitter = lights.of_triangle(index);
             let attributes = scene.attributes.get(triangle.attributes as usize).unwrap_or(&Attributes::NONE);
-            self.records.extend((0..1 + usize::from(two_sets)).map(|set| record(attributes, set)));
+            self.records.extend((0..1 + usize::from(two_sets)).map(|set| record(attributes, set, emitter)));
         }
         LeafAttributes { first, two_sets }.to_entry()
     }
 }
 
-/// The record of some attributes with one set of texture coordinates.
-fn record(attributes: &Attributes, set: usize) -> layout::Attributes {
+/// The record of some attributes with one set of texture coordinates, of a triangle that may be an emitter.
+fn record(attributes: &Attributes, set: usize, emitter: Option<u32>) -> layout::Attributes {
     layout::Attributes {
         normals: attributes.normals.map(|normals| normals.map(|normal| normal.to_array())),
         coordinates: attributes.coordinates[set].map(|coordinates| coordinates.to_array()),
         colours: attributes.colours,
-        emitter: None,
+        emitter,
     }
 }

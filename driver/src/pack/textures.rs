@@ -4,13 +4,17 @@ use photoncard_shared::address::Line;
 use photoncard_shared::layout::{self, TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat};
 
 use super::{MOST_TEXTURES, PackError};
+use crate::light::EnvironmentMap;
 use crate::scene::{Encoding, Image, Scene, Wrap};
 
-/// The records of a scene's textures. Those of one image share its texels.
+/// The records of a scene's textures, the environment's last. Those of one image share its texels.
 ///
 /// # Errors
 /// If they are more than materials can tell apart.
-pub(super) fn records(scene: &Scene) -> Result<Vec<layout::Texture>, PackError> {
+pub(super) fn records(
+    scene: &Scene,
+    environment: Option<&EnvironmentMap>,
+) -> Result<Vec<layout::Texture>, PackError> {
     if scene.textures.len() >= MOST_TEXTURES {
         return Err(PackError::TooManyTextures { textures: scene.textures.len() });
     }
@@ -33,27 +37,34 @@ pub(super) fn records(scene: &Scene) -> Result<Vec<layout::Texture>, PackError> 
         offset: texture.offset,
         ..bare[texture.image as usize]
     });
-    Ok(textures.collect())
+    Ok(textures.chain(environment.map(|map| map.texture(first_line))).collect())
 }
 
-/// The lines of all images' texels, one after the other.
-pub(super) fn lines(scene: &Scene) -> impl Iterator<Item = Line> {
-    scene.images.iter().flat_map(|image| {
-        let across = image.width.div_ceil(TILE_WIDTH);
-        (0..bare(image).lines())
-            .map(move |tile| line(image, [tile % across * TILE_WIDTH, tile / across * TILE_HEIGHT]))
+/// The lines of all images' texels, one after the other, the environment's last.
+pub(super) fn lines(scene: &Scene, environment: Option<&EnvironmentMap>) -> impl Iterator<Item = Line> {
+    let of_images = scene.images.iter().flat_map(|image| {
+        tiles(bare(image), |x, y| image.texels[y as usize * image.width as usize + x as usize])
+    });
+    let of_environment =
+        environment.into_iter().flat_map(|map| tiles(map.texture(0), |x, y| map.texel(x, y)));
+    of_images.chain(of_environment)
+}
+
+/// The lines of a texture whose texels are told by column and row.
+fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl Iterator<Item = Line> {
+    let [width, height] = texture.size.map(u32::from);
+    let across = width.div_ceil(TILE_WIDTH);
+    (0..texture.lines()).map(move |tile| {
+        let [column, row] = [tile % across * TILE_WIDTH, tile / across * TILE_HEIGHT];
+        let mut line = Line::ZERO;
+        for (place, bytes) in (0..TEXELS_PER_LINE).zip(line.0.as_chunks_mut().0) {
+            // Beyond the borders the last texels go on.
+            let x = (column + place % TILE_WIDTH).min(width - 1);
+            let y = (row + place / TILE_WIDTH).min(height - 1);
+            *bytes = texel(x, y);
+        }
+        line
     })
-}
-
-/// The tile of an image that begins at a column and a row. Beyond the image's borders its last texels go on.
-fn line(image: &Image, [column, row]: [u32; 2]) -> Line {
-    let mut line = Line::ZERO;
-    for (place, bytes) in (0..TEXELS_PER_LINE).zip(line.0.as_chunks_mut().0) {
-        let x = (column + place % TILE_WIDTH).min(image.width - 1);
-        let y = (row + place / TILE_WIDTH).min(image.height - 1);
-        *bytes = image.texels[y as usize * image.width as usize + x as usize];
-    }
-    line
 }
 
 /// The texture of an image, with texels from line 0 on.
@@ -97,8 +108,8 @@ mod tests {
         let images = vec![image(13, 6), image(1, 1), image(8, 4), image(3, 70)];
         let textures = [0, 3, 1, 2, 3].map(Texture::new).to_vec();
         let scene = Scene { images, textures, ..Scene::default() };
-        let lines: Vec<Line> = lines(&scene).collect();
-        for (texture, record) in scene.textures.iter().zip(records(&scene).expect("few")) {
+        let lines: Vec<Line> = lines(&scene, None).collect();
+        for (texture, record) in scene.textures.iter().zip(records(&scene, None).expect("few")) {
             let Image { width, height, texels, .. } = &scene.images[texture.image as usize];
             for (number, texel) in (0..).zip(texels) {
                 let (line, place) = record.locate(number % width, number / width);

@@ -390,7 +390,6 @@ fn codes(fractions: &[f32; LEAF_PHOTONS], leaf: usize) -> Codes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::emitter::Emitters;
     use crate::pack::PackedScene;
     use crate::photon::trace;
     use crate::scene::gltf;
@@ -401,7 +400,7 @@ mod tests {
         for (name, photons) in [("cornell.gltf", 3000), ("atrium.glb", 10_000)] {
             let path = format!("{}/../scenes/{name}", env!("CARGO_MANIFEST_DIR"));
             let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
-            let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+            let packed = PackedScene::new(&scene).expect("packs");
             let photons = trace(&packed, 1, photons, &|_| true).expect("it is lit").photons;
             let image = packed.with_photons(photons, 20).expect("packs");
             let sides = SideTable::new(&image).expect("sound");

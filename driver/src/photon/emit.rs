@@ -10,8 +10,14 @@ use glam::Vec3;
 use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, SceneImage, Surface, sample_emitter};
+use photoncard_firmware::scene::light::{
+    EmitterPoint, emitter_point, environment_direction, environment_radiance, falloff, read_emitter,
+};
+use photoncard_firmware::scene::{Ray, SceneImage, Surface};
+use photoncard_shared::layout::EmitterKind;
 use photoncard_shared::message::Fault;
+
+use crate::light::{Source, Sources};
 
 /// A photon on its way.
 #[derive(Clone, Copy, Debug)]
@@ -38,12 +44,11 @@ impl PathRandom {
         Self { seed, path }
     }
 
-    /// The low-discrepancy point of the emission.
-    fn emission(self) -> [f32; 4] {
+    /// The low-discrepancy point of the emission, each number of 2^64.
+    fn emission(self) -> [u64; 4] {
         std::array::from_fn(|dimension| {
             let shift = (hash(self.seed ^ hash(dimension as u32 + 1)) as u64) << 32;
-            let bits = RECURRENCE[dimension].wrapping_mul(self.path + 1).wrapping_add(shift);
-            unit_interval((bits >> 32) as u32)
+            RECURRENCE[dimension].wrapping_mul(self.path + 1).wrapping_add(shift)
         })
     }
 
@@ -86,29 +91,136 @@ impl BounceRandom {
     }
 }
 
+fn unit_of_bits(bits: u64) -> f32 {
+    unit_interval((bits >> 32) as u32)
+}
+
 fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 / 16_777_216.0
 }
 
-/// The start of a path: an emitter by its power, a point by area, a direction by the cosine; both sides of a
-/// double-sided emitter. `None` without emitters.
+/// The start of a path: a source by its power, a place and a direction. `None` where it is not worth following, and without lights.
 pub(super) fn emit(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
+    sources: &Sources,
     random: PathRandom,
 ) -> Result<Option<Emission>, Fault> {
-    let [a, b, c, d] = random.emission();
-    let Some(sample) = sample_emitter(scene, memory, [a, b])? else { return Ok(None) };
-    let (sides, is_back, c) = if sample.double_sided {
+    let [first, b, c, d] = random.emission();
+    let [b, c, d] = [b, c, d].map(unit_of_bits);
+    let Some(chosen) = sources.choose(first) else { return Ok(None) };
+    let emission = match chosen.source {
+        Source::Emitter(index) => from_emitter(scene, memory, index, [chosen.rest, b, c, d])?,
+        Source::Distant { direction, irradiance } => Some(from_afar(sources, direction, irradiance, [c, d])),
+        Source::Cell { across: [left, width], cosines: [upper, lower], solid_angle } => {
+            let cosine = (upper + (lower - upper) * b).clamp(-1.0, 1.0);
+            let towards = environment_direction(left + width * chosen.rest, cosine);
+            let irradiance = environment_radiance(scene, memory, towards)? * solid_angle;
+            Some(from_afar(sources, -towards, irradiance, [c, d]))
+        }
+    };
+    let emission =
+        emission.map(|emission| Emission { power: emission.power / chosen.probability, ..emission });
+    // Another random number than those of the bounces, which are fewer.
+    Ok(emission.and_then(|emission| roulette(emission, sources.power, random.bounce(u32::MAX).survival())))
+}
+
+/// Russian roulette where an emitter is darker than its mean, as one with a texture is in places: photons that are
+/// of one power make less noise than strong and weak ones.
+fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emission> {
+    let probability = (f64::from(emission.power.element_sum()) / (3.0 * mean_power)) as f32;
+    // What differs by rounding is left as it is.
+    if probability > 0.99 {
+        return Some(emission);
+    }
+    (roulette < probability).then(|| Emission { power: emission.power / probability, ..emission })
+}
+
+/// What comes from an emitter, as if it were the only source.
+fn from_emitter(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    index: u32,
+    [a, b, c, d]: [f32; 4],
+) -> Result<Option<Emission>, Fault> {
+    let emitter = read_emitter(scene, memory, index)?;
+    let intensity = Vec3::from(emitter.emission);
+    Ok(match emitter.kind {
+        EmitterKind::Triangle { vertices, double_sided, .. } => {
+            let point = emitter_point(scene, memory, &emitter, [a, b])?;
+            point.and_then(|point| from_triangle(&point, vertices, double_sided, [c, d]))
+        }
+        EmitterKind::Point { position } => {
+            let (direction, solid_angle) = in_cone(Vec3::Z, -1.0, [c, d]);
+            Some(Emission { ray: Ray::new(position.into(), direction), power: intensity * solid_angle })
+        }
+        EmitterKind::Spot { position, direction, scale, offset } => {
+            let outer_cosine = (-offset / scale).clamp(-1.0, 1.0);
+            let axis = Vec3::from(direction);
+            let (direction, solid_angle) = in_cone(axis, outer_cosine, [c, d]);
+            let power = intensity * (solid_angle * falloff(axis.dot(direction), scale, offset));
+            Some(Emission { ray: Ray::new(position.into(), direction), power })
+        }
+    })
+}
+
+/// What comes from a point on a triangle, by the cosine; from both sides of a double-sided one.
+fn from_triangle(
+    point: &EmitterPoint,
+    vertices: [[f32; 3]; 3],
+    double_sided: bool,
+    [c, d]: [f32; 2],
+) -> Option<Emission> {
+    let (sides, is_back, c) = if double_sided {
         (2.0, c >= 0.5, if c >= 0.5 { 2.0 * c - 1.0 } else { 2.0 * c })
     } else {
         (1.0, false, c)
     };
-    let normal = if is_back { -sample.normal } else { sample.normal };
+    let normal = if is_back { -point.normal } else { point.normal };
+    let [p, q, r] = vertices.map(Vec3::from);
+    let area = 0.5 * (q - p).cross(r - p).length();
     // A white Lambertian surface reflects by the cosine, as the emitter emits.
-    let white = Surface::white(sample.position, normal, sample.magnitude);
-    Ok(sample_reflection(&white, [c, d]).map(|sampled| Emission {
+    let white = Surface::white(point.position, normal, point.magnitude);
+    sample_reflection(&white, [c, d]).map(|sampled| Emission {
         ray: Ray::new(white.offset_origin(), sampled.direction),
-        power: sample.emission * (PI * sides / sample.density),
-    }))
+        power: point.emission * (PI * sides * area),
+    })
+}
+
+/// What comes from infinitely far this way, with the irradiance of a surface that faces it: through the faces of the box around the
+/// scene that face it, each by the area that it shows.
+fn from_afar(sources: &Sources, direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
+    let [lower, upper] = sources.bounds;
+    let size = upper - lower;
+    let shown = direction.abs() * Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y);
+    let area = shown.element_sum();
+    let mut number = c * area;
+    let mut axis = 2;
+    for candidate in 0..2 {
+        if number < shown[candidate] {
+            axis = candidate;
+            break;
+        }
+        number -= shown[candidate];
+    }
+    let across = if shown[axis] > 0.0 { (number / shown[axis]).clamp(0.0, 1.0) } else { 0.5 };
+    let mut place = [across, d, across];
+    place[axis] = if direction[axis] < 0.0 { 1.0 } else { 0.0 };
+    place[(axis + 1) % 3] = across;
+    place[(axis + 2) % 3] = d;
+    let origin = lower + size * Vec3::from(place);
+    Emission { ray: Ray::new(origin, direction), power: irradiance * area }
+}
+
+/// A direction within a cone about an axis, evenly by solid angle, and that of the cone, sr.
+fn in_cone(axis: Vec3, least_cosine: f32, [c, d]: [f32; 2]) -> (Vec3, f32) {
+    // From 1 down, so that it is exact in a narrow cone.
+    let height = 1.0 - least_cosine;
+    let fall = height * c;
+    let sine = libm::sqrtf((fall * (2.0 - fall)).max(0.0));
+    let angle = 2.0 * PI * d;
+    let (tangent, bitangent) = axis.any_orthonormal_pair();
+    let direction =
+        axis * (1.0 - fall) + tangent * (sine * libm::cosf(angle)) + bitangent * (sine * libm::sinf(angle));
+    (direction.normalize(), 2.0 * PI * height)
 }

@@ -163,7 +163,6 @@ fn caustics(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::emitter::Emitters;
     use crate::scene::gltf;
 
     #[test]
@@ -183,7 +182,7 @@ mod tests {
             };
             let images = [1, 2, 5].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-                let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("packs");
+                let packed = PackedScene::new(&scene).expect("packs");
                 pool.install(|| map_photons(packed, &settings, &|_| true)).expect("maps").image
             });
             assert!(images.iter().all(|image| image.lines() == images[0].lines()), "{layout:?}");

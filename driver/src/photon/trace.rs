@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::PhotonError;
 use super::emit::{PathRandom, emit};
 use super::stored::{Photons, StoredPhoton};
+use crate::light::Sources;
 use crate::pack::PackedScene;
 
 /// The result of the photon pass.
@@ -87,8 +88,10 @@ fn trace_while(
     go_on: &dyn Fn(usize, u64) -> bool,
 ) -> Result<PhotonPass, PhotonError> {
     // Hardly any photon is stronger than it was emitted: at a Phong lobe, twice at the most.
-    let path_unit = power_of_two_above(packed.strongest_emission().into());
-    let tracer = Tracer { scene: packed.view().0, grid: packed.photon_grid(), path_unit, seed, purpose };
+    let sources = packed.sources();
+    let path_unit = power_of_two_above(sources.strongest.into());
+    let (scene, grid) = (packed.view().0, packed.photon_grid());
+    let tracer = Tracer { scene, sources, grid, path_unit, seed, purpose };
     let mut list: Vec<StoredPhoton> = Vec::with_capacity(count);
     let mut paths = 0_u64;
     while list.len() < count && go_on(list.len(), paths) {
@@ -146,8 +149,9 @@ enum Purpose {
 }
 
 /// What all paths share.
-struct Tracer {
+struct Tracer<'s> {
     scene: SceneImage,
+    sources: &'s Sources,
     grid: PhotonGrid,
     /// Watts of a path by itself that a photon power of 1 stands for.
     path_unit: f32,
@@ -155,7 +159,7 @@ struct Tracer {
     purpose: Purpose,
 }
 
-impl Tracer {
+impl Tracer<'_> {
     /// Follows the paths of a task.
     fn trace(&self, memory: &mut impl MemoryPort, first: u64) -> Result<Traced, Fault> {
         let mut traced = Traced { photons: Vec::new(), ends: Vec::with_capacity(PATHS_PER_TASK as usize) };
@@ -174,7 +178,7 @@ impl Tracer {
     ) -> Result<(), Fault> {
         let scene = &self.scene;
         let random = PathRandom::new(self.seed, path);
-        let Some(emission) = emit(scene, memory, random)? else { return Ok(()) };
+        let Some(emission) = emit(scene, memory, self.sources, random)? else { return Ok(()) };
         let mut power = emission.power;
         let mut path = SpecularPath::new(emission.ray, Carried::Power);
         let mut is_direct = true;

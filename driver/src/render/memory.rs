@@ -47,7 +47,7 @@ pub struct StructureReads {
     pub triangles: ReadStatistics,
     /// Materials.
     pub materials: ReadStatistics,
-    /// Emitters, and the thresholds that choose one.
+    /// Lights, and what chooses one: the light tree and the environment's cells.
     pub emitters: ReadStatistics,
     /// Inner nodes of a photon map that has its photons in leaves.
     pub photon_nodes: ReadStatistics,

@@ -28,7 +28,6 @@ use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{CausticGather, FrameParameters};
 
 use self::cards::{Cards, Outcome};
-use crate::emitter::Emitters;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 use crate::film::Film;
@@ -214,7 +213,7 @@ fn prepare(
     observer: &dyn Observer,
 ) -> Result<Prepared, RenderError> {
     let start = Instant::now();
-    let packed = PackedScene::new(scene, &Emitters::new(scene))?;
+    let packed = PackedScene::new(scene)?;
     times.hierarchy = start.elapsed().as_secs_f64();
     let budgets: Vec<Budget> = budgets.collect();
     for budget in &budgets {

@@ -11,7 +11,6 @@ use super::measure::{Bench, Measurement};
 use super::point::{ImageKey, Point, Task};
 use super::quality::{Quality, Reference};
 use super::store::PointStore;
-use crate::emitter::Emitters;
 use crate::emulator::THREAD_STACK;
 use crate::pack::PackedScene;
 use crate::photon::{MappedImage, map_photons};
@@ -206,7 +205,7 @@ impl<'a> Laboratory<'a> {
             scene.apply(assignment)?;
         }
         scene.check_light()?;
-        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).map_err(RenderError::from)?;
+        let packed = PackedScene::new(&scene).map_err(RenderError::from)?;
         let settings = point.settings.photon_settings(&scene);
         let go_on = |_| !self.observer.is_stopped();
         let mapped = self.pool.install(|| map_photons(packed, &settings, &go_on));

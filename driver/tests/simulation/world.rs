@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::film::Film;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::{MappedImage, map_photons};
@@ -101,7 +100,7 @@ pub(crate) struct Fixture {
 impl Fixture {
     pub(crate) fn new() -> Self {
         let (scene, settings) = (scene(), settings());
-        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).unwrap();
+        let packed = PackedScene::new(&scene).unwrap();
         let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).unwrap();
         let frame = settings.frame(&scene.cameras[0], mapped.max_distance, mapped.caustics);
         let checksum = image_checksum(mapped.image.lines());

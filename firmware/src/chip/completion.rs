@@ -38,7 +38,8 @@ impl Completion {
         let samples = context.frame.samples;
         let end = samples.min(self.next.saturating_add(SAMPLES_PER_STEP));
         for sample in self.next..end {
-            let Some(view) = eye::view(context, PixelSample { x, y, sample })? else { continue };
+            let sight = eye::view(context, PixelSample { x, y, sample })?;
+            let Some(view) = sight.surface() else { continue };
             let surface = &view.surface;
             self.albedo += surface.reflection.diffuse + surface.reflection.specular;
             self.normal += surface.normal;

@@ -12,7 +12,7 @@ use crate::fixed_point::ColourSum;
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::SeenSample;
 use crate::memory::{MemoryPort, Stage as MemoryStage};
-use crate::render::eye::View;
+use crate::render::eye::{Sight, View};
 use crate::render::{Context, GatherPoint, PixelSample, Purpose, caustic, direct, eye, final_gather};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Seen, Surface};
@@ -81,7 +81,7 @@ impl StoredPoint {
         }
         let surface = if self.seen.is_elsewhere() {
             // The way there is followed again.
-            let Some(view) = eye::view(context, at)? else { return Ok(None) };
+            let Some(view) = eye::view(context, at)?.surface() else { return Ok(None) };
             view.surface
         } else {
             let place = eye::place(context, at);
@@ -136,15 +136,20 @@ impl<
     pub(super) fn look<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
         let mut stored = StoredPoint::NOTHING;
-        if let Some(view) = eye::view(context, at)? {
-            let purpose = self.light_at_once(context, index, at, &view);
-            let mut point = pixel_point(context.frame, at, view.surface, purpose);
-            point.choose_directions(context, self.gathers.candidates.view())?;
-            stored = StoredPoint {
-                seen: view.seen.unwrap_or(Seen::ELSEWHERE),
-                directions: point.directions,
-                rays: StoredRays::new(&point),
-            };
+        match eye::view(context, at)? {
+            Sight::Background(radiance) => {
+                add_light(&mut self.sums, index as u16, radiance * sample_share(context));
+            }
+            Sight::Surface(view) => {
+                let purpose = self.light_at_once(context, index, at, &view);
+                let mut point = pixel_point(context.frame, at, view.surface, purpose);
+                point.choose_directions(context, self.gathers.candidates.view())?;
+                stored = StoredPoint {
+                    seen: view.seen.unwrap_or(Seen::ELSEWHERE),
+                    directions: point.directions,
+                    rays: StoredRays::new(&point),
+                };
+            }
         }
         if let Some(slot) = self.points.get_mut(index) {
             *slot = stored;

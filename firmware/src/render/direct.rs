@@ -1,4 +1,4 @@
-//! Direct light: shadow rays to points on emitters, weighted against the final gather rays that meet an emitter.
+//! Direct light: shadow rays to lights ([`crate::scene::light`]), weighted against the final gather rays that meet one.
 //!
 //! Shadow rays alone are noisy where an emitter is near, as their contribution grows with the inverse square of its
 //! distance; gather rays alone where it is small. Both are there in any case, and the balance heuristic (Veach, Guibas
@@ -10,7 +10,9 @@
 //! know, with the shadow rays of all samples of a pixel, and by the power heuristic, as the noise of a record shows as
 //! a blotch: light of small emitters is left to shadow rays, that of a sky to records.
 //!
-//! The points on emitters are stratified over all samples of a pixel, as places in the pixel are: many samples with a shadow
+//! Lights without extent, points and distant ones, are met by no ray, and left to shadow rays alone.
+//!
+//! The samples of lights are stratified over all samples of a pixel, as places in the pixel are: many samples with a shadow
 //! ray or two each are as good as one with many.
 
 use core::f32::consts::FRAC_1_PI;
@@ -21,15 +23,16 @@ use photoncard_shared::message::Fault;
 use super::{Context, GatherPoint, PixelSample, Purpose};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
-use crate::scene::{
-    EmitterSample, Ray, Surface, emitter_density, is_occluded, offset_origin, sample_emitter,
+use crate::scene::light::{
+    LightSample, Receiver, emitter_density, environment_density, environment_radiance, sample_light,
 };
+use crate::scene::{Ray, Surface, is_occluded};
 use crate::vector::max_component;
 
 /// A shadow ray ends this share short of its target, for the rounding of its length.
 const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
 
-/// Radiance, W/(sr m^2), that a point reflects of the light that emitters send it directly: the shadow rays' share.
+/// Radiance, W/(sr m^2), that a point reflects of the light that comes straight from lights: the shadow rays' share.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -45,39 +48,29 @@ pub fn reflected<M: MemoryPort>(
     let frame = context.frame;
     let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, 0, Dimension::Emitter);
     let points = frame.shadow_rays * frame.samples.max(1);
+    let receiver = Receiver::new(&point.surface);
     let mut sum = Vec3::ZERO;
     for index in 0..frame.shadow_rays {
-        let place = pattern.point(pattern.index_in_all(index, pixel.sample, frame.samples), points);
-        let Some(target) = sample_emitter(context.scene, context.memory, place)? else {
-            return Ok(Vec3::ZERO);
-        };
-        sum += from_emitter(context, point, &target)?;
+        let index = pattern.index_in_all(index, pixel.sample, frame.samples);
+        let (place, dither) = (pattern.point(index, points), pattern.dither(index));
+        let light = sample_light(context.scene, context.memory, &receiver, place, dither)?;
+        if let Some(light) = light {
+            sum += from_light(context, point, receiver.origin, &light)?;
+        }
     }
     Ok(sum / frame.shadow_rays as f32)
 }
 
-/// What one point on an emitter adds, over its probability density.
-fn from_emitter<M: MemoryPort>(
+/// What one sample of the lights adds.
+fn from_light<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
-    target: &EmitterSample,
+    origin: Vec3,
+    light: &LightSample,
 ) -> Result<Vec3, Fault> {
     let surface = &point.surface;
-    let origin = surface.offset_origin();
-    let away = origin - target.position;
-    let is_front = target.normal.dot(away) > 0.0;
-    if !is_front && !target.double_sided {
-        return Ok(Vec3::ZERO);
-    }
-    let emitting_normal = if is_front { target.normal } else { -target.normal };
-    let way = offset_origin(target.position, emitting_normal, target.magnitude) - origin;
-    let distance_squared = way.length_squared();
-    let distance = libm::sqrtf(distance_squared);
-    let direction = way / distance;
-    let cosine = surface.normal.dot(direction);
-    let emitter_cosine = -emitting_normal.dot(direction);
-    // Not `<= 0`: a zero distance makes both NaN.
-    if !(cosine > 0.0 && emitter_cosine > 0.0) {
+    let LightSample { direction, distance, irradiance, density } = *light;
+    if !surface.is_above(direction) || max_component(irradiance) <= 0.0 {
         return Ok(Vec3::ZERO);
     }
     context.counters.shadow_rays += 1;
@@ -85,46 +78,87 @@ fn from_emitter<M: MemoryPort>(
     if is_occluded(context.scene, context.memory, &ray)? {
         return Ok(Vec3::ZERO);
     }
-    let geometry = cosine * emitter_cosine / (distance_squared * target.density);
-    let area_density = emitter_density(context.scene, target.emission, target.double_sided);
-    let density = area_density * distance_squared / emitter_cosine;
+    let cosine = surface.normal.dot(direction);
     let reflector = point.reflector();
-    let weight = balance(
-        (context.frame.shadow_rays, density),
-        (point.rays, point.directions.density(&reflector, direction)),
-    );
+    // What has no extent is found by light samples alone.
+    let weight = density.map_or(1.0, |density| {
+        let by_gather_rays = (point.rays, point.directions.density(&reflector, direction));
+        balance((context.frame.shadow_rays, density), by_gather_rays)
+    });
     let shared = reflector.reflection.evaluate(surface.normal, surface.outgoing, direction);
     let mut reflected = shared * weight;
     if point.purpose == Purpose::Lobe {
-        let by_records = power(shadow_rays_for_records(context, density), rays_of_record(context, cosine));
-        reflected += surface.reflection.lambertian() * by_records;
+        let weight = density.map_or(1.0, |density| {
+            power(shadow_rays_for_records(context, density), rays_of_record(context, cosine))
+        });
+        reflected += surface.reflection.lambertian() * weight;
     }
-    Ok(reflected * target.emission * geometry)
+    Ok(reflected * irradiance * cosine)
 }
 
 /// The radiance that a gather ray of a point brings straight from an emitter that it has met, with its weight against
 /// the shadow rays. `gather_density` is the ray's own probability density, 1/sr.
+///
+/// # Errors
+/// If the image is not sound.
 #[inline(always)]
-pub fn seen_by_gather_ray<M>(
-    context: &Context<M>,
+pub fn seen_by_gather_ray<M: MemoryPort>(
+    context: &mut Context<M>,
     point: &GatherPoint,
     ray: &Ray,
     met: &Surface,
     gather_density: f32,
-) -> Vec3 {
+) -> Result<Vec3, Fault> {
     if max_component(met.emission) <= 0.0 {
-        return Vec3::ZERO;
+        return Ok(Vec3::ZERO);
     }
-    let emitter_cosine = -met.normal.dot(ray.direction);
-    let area_density = emitter_density(context.scene, met.emission, met.double_sided);
-    let density = area_density * (met.distance * met.distance) / emitter_cosine;
-    let weight = if point.purpose == Purpose::Record {
-        let cosine = point.surface.normal.dot(ray.direction);
+    // Light samples are of emitters alone: what is too dark to be one is met by gather rays only.
+    let density = match met.emitter {
+        Some(emitter) => {
+            let receiver = Receiver::new(&point.surface);
+            let cosine = -met.geometric_normal.dot(ray.direction);
+            let met_at = (met.distance, cosine);
+            emitter_density(context.scene, context.memory, &receiver, emitter, met_at)?
+        }
+        None => 0.0,
+    };
+    Ok(met.emission * weight_of_gather_ray(context, point, ray.direction, gather_density, density))
+}
+
+/// The radiance that a gather ray of a point brings from the environment, as it meets nothing, with its weight against the shadow
+/// rays. `gather_density` is the ray's own probability density, 1/sr.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn escaped<M: MemoryPort>(
+    context: &mut Context<M>,
+    point: &GatherPoint,
+    direction: Vec3,
+    gather_density: f32,
+) -> Result<Vec3, Fault> {
+    let radiance = environment_radiance(context.scene, context.memory, direction)?;
+    if max_component(radiance) <= 0.0 {
+        return Ok(Vec3::ZERO);
+    }
+    let density = environment_density(context.scene, context.memory, direction)?;
+    Ok(radiance * weight_of_gather_ray(context, point, direction, gather_density, density))
+}
+
+/// The weight of a gather ray against light samples that take its direction with `density`, 1/sr.
+#[inline(always)]
+fn weight_of_gather_ray<M>(
+    context: &Context<M>,
+    point: &GatherPoint,
+    direction: Vec3,
+    gather_density: f32,
+    density: f32,
+) -> f32 {
+    if point.purpose == Purpose::Record {
+        let cosine = point.surface.normal.dot(direction);
         power(rays_of_record(context, cosine), shadow_rays_for_records(context, density))
     } else {
         balance((point.rays, gather_density), (context.frame.shadow_rays, density))
-    };
-    met.emission * weight
+    }
 }
 
 /// The rays of a record, and the density of one as its samples see it, 1/sr.

@@ -7,6 +7,7 @@ use super::specular_path::{PathEnd, follow};
 use super::{Context, PixelSample};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
+use crate::scene::light::environment_radiance;
 use crate::scene::{Ray, Seen, Surface, closest_hit};
 use crate::vector::unit;
 
@@ -30,11 +31,30 @@ pub struct View {
     pub depth: f32,
 }
 
+/// What the eye ray of a sample comes to.
+#[derive(Clone, Copy, Debug)]
+pub enum Sight {
+    /// A surface.
+    Surface(View),
+    /// The environment, of this radiance, W/(sr m^2); zero without one.
+    Background(Vec3),
+}
+
+impl Sight {
+    /// The surface, if it is one.
+    pub fn surface(self) -> Option<View> {
+        match self {
+            Self::Surface(view) => Some(view),
+            Self::Background(_) => None,
+        }
+    }
+}
+
 /// Follows the eye ray of a sample, through perfectly specular surfaces too, to what it sees.
 ///
 /// # Errors
 /// If the image is not sound.
-pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Option<View>, Fault> {
+pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Sight, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
     let ray = eye_ray(context, place(context, pixel));
@@ -47,10 +67,17 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
         _ => pattern.choice(sample, bounce),
     };
     let (path, end) = follow(context, ray, random)?;
-    let PathEnd::Surface(surface, seen) = end else { return Ok(None) };
+    let (surface, seen) = match end {
+        PathEnd::Surface(surface, seen) => (surface, seen),
+        PathEnd::Escaped => {
+            let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
+            return Ok(Sight::Background(radiance * path.throughput));
+        }
+        PathEnd::Lost => return Ok(Sight::Background(Vec3::ZERO)),
+    };
     let is_direct = path.bounces == 0 && surface.specular.is_none();
     let along_axis = ray.direction.dot(context.frame.camera.forward.into());
-    Ok(Some(View {
+    Ok(Sight::Surface(View {
         depth: if is_direct { depth(context, &surface) } else { path.first_distance * along_axis },
         surface: surface.dimmed(path.throughput),
         seen: is_direct.then_some(seen),

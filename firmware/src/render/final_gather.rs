@@ -12,6 +12,7 @@ use crate::gather::{GatherRequest, PartialReflection, Place};
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
 use crate::scene::Ray;
+use crate::scene::light::environment_radiance;
 
 /// What the end of a final gather ray brings.
 #[derive(Clone, Copy, Debug)]
@@ -46,15 +47,26 @@ pub fn cast<M: MemoryPort>(
     let (path, end) = follow(context, ray, |bounce| point.pattern.choice(index, bounce))?;
     // The mean is taken here, so that the sum stays small.
     let weight = sampled.weight * path.throughput * (share / point.rays as f32);
-    let PathEnd::Surface(met, _) = end else { return Ok(None) };
-    let met = met.flat();
+    // What has come through specular surfaces is brought neither by shadow rays nor, without them, by photons of caustics.
+    let beyond_specular = if context.frame.caustics.is_none() { 1.0 } else { 0.0 };
+    let unit = 1.0 / context.scene.header.radiance_unit;
+    let met = match end {
+        PathEnd::Surface(met, _) => met.flat(),
+        PathEnd::Escaped if context.scene.header.lights.texture.is_some() => {
+            let emitted = if path.bounces == 0 {
+                direct::escaped(context, point, path.ray.direction, sampled.density)?
+            } else {
+                environment_radiance(context.scene, context.memory, path.ray.direction)? * beyond_specular
+            };
+            let direct = emitted * weight * unit;
+            return Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }));
+        }
+        PathEnd::Escaped | PathEnd::Lost => return Ok(None),
+    };
     let emitted = if path.bounces == 0 {
-        direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density)
-    } else if context.frame.caustics.is_none() {
-        // Neither a shadow ray nor a photon of a caustic brings it.
-        met.emission
+        direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density)?
     } else {
-        Vec3::ZERO
+        met.emission * beyond_specular
     };
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
@@ -67,11 +79,7 @@ pub fn cast<M: MemoryPort>(
         target,
         cell: sampled.cell,
     });
-    Ok(Some(GatherRayEnd {
-        cell: sampled.cell,
-        direct: emitted * weight * (1.0 / header.radiance_unit),
-        request,
-    }))
+    Ok(Some(GatherRayEnd { cell: sampled.cell, direct: emitted * weight * unit, request }))
 }
 
 /// Does a gather: what it adds to its target, in the image's radiance units.

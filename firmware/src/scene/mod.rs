@@ -3,7 +3,7 @@
 mod bvh;
 mod corners;
 mod cut_out;
-mod emitter;
+pub mod light;
 mod material;
 mod metallic_roughness;
 mod seen;
@@ -14,7 +14,6 @@ mod texture;
 mod triangle;
 
 pub use bvh::{AnyHit, ClosestHit, Hit, closest_hit, is_occluded};
-pub use emitter::{EmitterSample, emitter_density, sample_emitter};
 pub use material::Reflection;
 pub(crate) use material::{lobe_power, mirror};
 pub use seen::Seen;

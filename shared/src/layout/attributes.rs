@@ -125,7 +125,7 @@ const STEPS: f32 = 65534.0;
 
 /// The code of a unit vector: projected on the octahedron, its lower half folded out (Cigolle et al. 2014, *A survey of
 /// efficient representations for independent unit vectors*).
-fn encode_octahedral([x, y, z]: [f32; 3]) -> u32 {
+pub(super) fn encode_octahedral([x, y, z]: [f32; 3]) -> u32 {
     let sum = (abs(x) + abs(y) + abs(z)).max(f32::MIN_POSITIVE);
     let [u, v] = [x / sum, y / sum];
     let [u, v] = if z < 0.0 { fold([u, v]) } else { [u, v] };
@@ -135,7 +135,7 @@ fn encode_octahedral([x, y, z]: [f32; 3]) -> u32 {
 
 /// A vector along the unit vector of a code, of a length between 0.57 and 1.
 #[inline(always)]
-fn decode_octahedral(code: u32) -> [f32; 3] {
+pub(super) fn decode_octahedral(code: u32) -> [f32; 3] {
     let [u, v] = [code & 0xffff, code >> 16].map(|a| a as f32 * (2.0 / STEPS) - 1.0);
     let z = 1.0 - abs(u) - abs(v);
     let [x, y] = if z < 0.0 { fold([u, v]) } else { [u, v] };

@@ -1,45 +1,128 @@
-//! Emitters.
+//! Emitters: what a light sample is taken of once a descent in the light tree has come to it.
 
-use super::{Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
+use super::{DOUBLE_SIDED, Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
-/// An emissive triangle: a Lambertian area light.
+/// A light of finite extent or at a finite place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Emitter {
-    /// Corners, metres.
-    pub vertices: [[f32; 3]; 3],
-    /// Emitted radiance, W/(sr m^2).
+    /// Where it is, and how its light spreads.
+    pub kind: EmitterKind,
+    /// Of a triangle the radiance that it emits, W/(sr m^2), which an emissive texture multiplies; of a point or a spot
+    /// the intensity, W/sr.
     pub emission: [f32; 3],
-    /// Probability density of a shadow ray's end on this triangle, 1/m^2: the probability of the emitter over its area.
-    pub density: f32,
-    /// [`super::DOUBLE_SIDED`] or 0.
-    pub flags: u32,
+    /// The way to it from the root of the light tree: of each node the number of the child, two bits, the root's in the
+    /// lowest.
+    pub trail: u32,
+}
+
+/// Where an emitter is, and how its light spreads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EmitterKind {
+    /// A Lambertian area light.
+    Triangle {
+        /// Corners, metres.
+        vertices: [[f32; 3]; 3],
+        /// Whether the back emits as the front does.
+        double_sided: bool,
+        /// Index of the triangle in the image.
+        triangle: u32,
+        /// Index of its material.
+        material: u32,
+        /// Whether it is not of the same emission all over: a texture of its material tells it, or cut-outs.
+        varies: bool,
+    },
+    /// A point that emits to all sides alike.
+    Point {
+        /// The place, metres.
+        position: [f32; 3],
+    },
+    /// A point that emits into a cone: the intensity times `clamp(cos * scale + offset, 0, 1)^2` for the cosine of the angle to
+    /// the axis (`KHR_lights_punctual`).
+    Spot {
+        /// The place, metres.
+        position: [f32; 3],
+        /// Unit vector of the axis, the way light goes.
+        direction: [f32; 3],
+        /// See above.
+        scale: f32,
+        /// See above.
+        offset: f32,
+    },
 }
 
 impl Record for Emitter {
     const BYTES: usize = 64;
 }
 
+const EMISSION: usize = 36;
+const FLAGS: usize = 48;
+const TRAIL: usize = 52;
+const TRIANGLE: usize = 56;
+const MATERIAL: usize = 60;
+
+const VARIES: u32 = 1 << 1;
+const KIND_SHIFT: u32 = 4;
+const POINT: u32 = 1;
+const SPOT: u32 = 2;
+
 impl Emitter {
     /// Reads a record.
     #[inline(always)]
     pub fn read(bytes: &[u8; Self::BYTES]) -> Self {
-        Self {
-            vertices: [read_vector(bytes, 0), read_vector(bytes, 12), read_vector(bytes, 24)],
-            emission: read_vector(bytes, 36),
-            density: read_f32(bytes, 48),
-            flags: read_u32(bytes, 52),
-        }
+        let flags = read_u32(bytes, FLAGS);
+        let [first, second] = [read_vector(bytes, 0), read_vector(bytes, 12)];
+        let kind = match flags >> KIND_SHIFT {
+            POINT => EmitterKind::Point { position: first },
+            SPOT => EmitterKind::Spot {
+                position: first,
+                direction: second,
+                scale: read_f32(bytes, 24),
+                offset: read_f32(bytes, 28),
+            },
+            _ => EmitterKind::Triangle {
+                vertices: [first, second, read_vector(bytes, 24)],
+                double_sided: flags & DOUBLE_SIDED != 0,
+                triangle: read_u32(bytes, TRIANGLE),
+                material: read_u32(bytes, MATERIAL),
+                varies: flags & VARIES != 0,
+            },
+        };
+        Self { kind, emission: read_vector(bytes, EMISSION), trail: read_u32(bytes, TRAIL) }
+    }
+
+    /// The way to it in the light tree alone.
+    #[inline(always)]
+    pub fn trail(bytes: &[u8; Self::BYTES]) -> u32 {
+        read_u32(bytes, TRAIL)
     }
 
     /// The record's bytes.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
         let mut bytes = [0; Self::BYTES];
-        for (corner, vertex) in self.vertices.into_iter().enumerate() {
-            write_vector(&mut bytes, 12 * corner, vertex);
-        }
-        write_vector(&mut bytes, 36, self.emission);
-        write_f32(&mut bytes, 48, self.density);
-        write_u32(&mut bytes, 52, self.flags);
+        let flags = match self.kind {
+            EmitterKind::Triangle { vertices, double_sided, triangle, material, varies } => {
+                for (corner, vertex) in vertices.into_iter().enumerate() {
+                    write_vector(&mut bytes, 12 * corner, vertex);
+                }
+                write_u32(&mut bytes, TRIANGLE, triangle);
+                write_u32(&mut bytes, MATERIAL, material);
+                (if double_sided { DOUBLE_SIDED } else { 0 }) | if varies { VARIES } else { 0 }
+            }
+            EmitterKind::Point { position } => {
+                write_vector(&mut bytes, 0, position);
+                POINT << KIND_SHIFT
+            }
+            EmitterKind::Spot { position, direction, scale, offset } => {
+                write_vector(&mut bytes, 0, position);
+                write_vector(&mut bytes, 12, direction);
+                write_f32(&mut bytes, 24, scale);
+                write_f32(&mut bytes, 28, offset);
+                SPOT << KIND_SHIFT
+            }
+        };
+        write_vector(&mut bytes, EMISSION, self.emission);
+        write_u32(&mut bytes, FLAGS, flags);
+        write_u32(&mut bytes, TRAIL, self.trail);
         bytes
     }
 }
@@ -47,12 +130,28 @@ impl Emitter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::DOUBLE_SIDED;
 
     #[test]
     fn emitters_survive_their_bytes() {
         let vertices = [[1.0, 2.0, 3.0], [-4.0, 5.5, 6.0], [7.0, -8.0, 9.25]];
-        let emitter = Emitter { vertices, emission: [1.0, 2.0, 3.0], density: 0.75, flags: DOUBLE_SIDED };
-        assert_eq!(Emitter::read(&emitter.to_bytes()), emitter);
+        let triangle = |double_sided: bool, varies: bool| EmitterKind::Triangle {
+            vertices,
+            double_sided,
+            triangle: 800_000,
+            material: 7,
+            varies,
+        };
+        let [position, direction, _] = vertices;
+        let kinds = [
+            triangle(false, true),
+            triangle(true, false),
+            EmitterKind::Point { position },
+            EmitterKind::Spot { position, direction, scale: 3.0, offset: -0.5 },
+        ];
+        for kind in kinds {
+            let emitter = Emitter { kind, emission: [1.0, 2.0, 3.0], trail: 0x89ab_cdef };
+            assert_eq!(Emitter::read(&emitter.to_bytes()), emitter);
+            assert_eq!(Emitter::trail(&emitter.to_bytes()), emitter.trail);
+        }
     }
 }

@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::PathBuf;
 
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::scene::gltf;
 use tempfile::TempDir;
@@ -132,7 +131,7 @@ impl Target for Scenes {
             }
         };
         if scene.triangles.len() <= MOST_PACKED
-            && let Err(error) = PackedScene::new(&scene, &Emitters::new(&scene))
+            && let Err(error) = PackedScene::new(&scene)
         {
             let _ = error.to_string();
         }

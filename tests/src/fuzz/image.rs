@@ -1,7 +1,6 @@
 //! Card images: a card that loads one renders a tile of it, or answers a fault.
 
 use glam::Vec3;
-use photoncard_driver::emitter::Emitters;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::{precompute_irradiance, trace};
 use photoncard_driver::render::RenderSettings;
@@ -31,7 +30,7 @@ fn images() -> [CardImage; 2] {
     let walls = room([0, 2, 0, 1, 0, 2]);
     let scene = scene(walls, vec![lambertian("wall", 0.5), lamp, glossy], camera(Vec3::ZERO, Vec3::NEG_Z));
     let image = || {
-        let packed = PackedScene::new(&scene, &Emitters::new(&scene)).expect("the room is packed");
+        let packed = PackedScene::new(&scene).expect("the room is packed");
         let pass = trace(&packed, 0, 300, &|_| true).expect("the room is lit");
         packed.with_photons(pass.photons, 20).expect("the map is packed")
     };

@@ -1,0 +1,239 @@
+//! The environment for a card: texels that share an exponent, and the cells that its directions are chosen by.
+
+use std::f64::consts::PI;
+
+use photoncard_shared::layout::{self, TexelFormat, Wrap};
+use rayon::prelude::*;
+
+use super::thresholds::thresholds;
+use crate::scene::Environment;
+
+/// Columns of cells, at most.
+const MOST_COLUMNS: u32 = 128;
+/// Rows of cells, at most.
+const MOST_ROWS: u32 = 64;
+/// The part of the choices that is even over the sphere: a cell that hardly any light comes through is not missed.
+const EVEN: f64 = 1.0 / 64.0;
+/// What the brightest texel is at most once it is scaled, of the 65408 that texels can hold.
+const BRIGHTEST: f32 = 32768.0;
+
+/// An environment as a card has it.
+#[derive(Clone, Debug)]
+pub(crate) struct EnvironmentMap {
+    /// Texels of a row, and rows.
+    size: [u32; 2],
+    /// Texels, rows from the top.
+    texels: Vec<[u8; 4]>,
+    /// What a texel of 1 stands for, W/(sr m^2).
+    pub(crate) radiance: [f32; 3],
+    /// The cells.
+    pub(crate) cells: Cells,
+    /// Watts a square metre that arrive at a surface from all sides, mean of the channels: radiance over the sphere.
+    pub(crate) fluence: f64,
+    /// The greatest radiance of any channel, W/(sr m^2).
+    pub(crate) brightest: f32,
+}
+
+/// A grid of cells of equal angles, and how much light comes through each.
+#[derive(Clone, Debug)]
+pub(crate) struct Cells {
+    pub(crate) columns: u32,
+    pub(crate) rows: u32,
+    /// Mean radiance of the channels times solid angle, W/m^2, row after row; none of it zero.
+    pub(crate) weights: Vec<f64>,
+}
+
+impl EnvironmentMap {
+    /// That of an environment; `None` if no light comes from it.
+    pub(super) fn new(environment: &Environment) -> Option<Self> {
+        let brightest = environment.texels.as_flattened().iter().copied().fold(0.0, f32::max);
+        if !(brightest > 0.0 && brightest.is_finite()) {
+            return None;
+        }
+        let cells = Cells::new(environment);
+        let (texels, radiance) = match environment.texels[..] {
+            // Exactly.
+            [texel] => (vec![[1.0; 3]], texel),
+            _ => {
+                let scale = scale(brightest);
+                let scaled = environment.texels.iter().map(|texel| texel.map(|channel| channel / scale));
+                (scaled.collect(), [scale; 3])
+            }
+        };
+        Some(Self {
+            size: [environment.width, environment.height],
+            texels: texels.into_iter().map(shared_exponent).collect(),
+            radiance,
+            fluence: cells.weights.iter().sum(),
+            cells,
+            brightest,
+        })
+    }
+
+    /// The record of its texture, whose texels begin at a line of their section.
+    pub(crate) fn texture(&self, first_line: u32) -> layout::Texture {
+        layout::Texture {
+            first_line,
+            size: self.size.map(|side| side as u16),
+            wrap: [Wrap::Repeat, Wrap::Clamp],
+            nearest: false,
+            set: 0,
+            format: TexelFormat::SharedExponent,
+            matrix: [[1.0, 0.0], [0.0, 1.0]],
+            offset: [0.0; 2],
+        }
+    }
+
+    /// The texel at a column and a row.
+    pub(crate) fn texel(&self, column: u32, row: u32) -> [u8; 4] {
+        self.texels[row as usize * self.size[0] as usize + column as usize]
+    }
+}
+
+/// The power of two that texels are divided by, so that the brightest is near the greatest that they can hold.
+fn scale(brightest: f32) -> f32 {
+    // A division by a power of two is exact; that of a subnormal number need not be.
+    let exponent = libm::ilogbf(brightest / BRIGHTEST).clamp(-126, 126) + 1;
+    libm::ldexpf(1.0, exponent.clamp(-126, 127))
+}
+
+/// The nearest texel of nine bits a channel with a common exponent (OpenGL's `RGB9_E5`: `EXT_texture_shared_exponent`).
+fn shared_exponent(texel: [f32; 3]) -> [u8; 4] {
+    const GREATEST: f32 = 65408.0;
+    let [red, green, blue] = texel.map(|channel| channel.clamp(0.0, GREATEST));
+    let greatest = red.max(green).max(blue);
+    let exponent = if greatest > 0.0 { libm::ilogbf(greatest).max(-16) + 16 } else { 0 };
+    let mantissa = |channel: f32, exponent: i32| libm::ldexpf(channel, 24 - exponent).round() as u32;
+    // What rounds up to 512 takes the next exponent.
+    let exponent = if mantissa(greatest, exponent) > 511 { exponent + 1 } else { exponent };
+    let [red, green, blue] = [red, green, blue].map(|channel| mantissa(channel, exponent).min(511));
+    (red | green << 9 | blue << 18 | (exponent as u32) << 27).to_le_bytes()
+}
+
+impl Cells {
+    /// Those of an environment with some light.
+    fn new(environment: &Environment) -> Self {
+        let Environment { width, height, .. } = *environment;
+        let [columns, rows] = [width.min(MOST_COLUMNS), height.min(MOST_ROWS)];
+        // Two samples to a texel, each way, see every texel that interpolation brings into a cell.
+        let [across, down] = [width.div_ceil(columns), height.div_ceil(rows)].map(|texels| 2 * texels);
+        let mut weights: Vec<f64> = (0..rows)
+            .into_par_iter()
+            .flat_map_iter(|row| {
+                let height = solid_angle_of_row(row, rows) / f64::from(columns);
+                (0..columns).map(move |column| {
+                    let place = |cell: u32, cells: u32, sample: u32, samples: u32| {
+                        (f64::from(cell) + (f64::from(sample) + 0.5) / f64::from(samples)) / f64::from(cells)
+                    };
+                    let sum: f64 = (0..down)
+                        .flat_map(|j| (0..across).map(move |i| (i, j)))
+                        .map(|(i, j)| {
+                            let v = place(row, rows, j, down);
+                            luminance(environment, [place(column, columns, i, across), v])
+                        })
+                        .sum();
+                    sum / f64::from(across * down) * height
+                })
+            })
+            .collect();
+        let total: f64 = weights.iter().sum();
+        for (weight, index) in weights.iter_mut().zip(0..) {
+            let even = solid_angle_of_row(index / columns, rows) / (4.0 * PI * f64::from(columns));
+            *weight = *weight * (1.0 - EVEN) + total * EVEN * even;
+        }
+        Self { columns, rows, weights }
+    }
+
+    /// The thresholds of the rows, then those in each row.
+    pub(super) fn thresholds(&self) -> Vec<u32> {
+        let rows = self.weights.chunks(self.columns as usize);
+        let sums: Vec<f64> = rows.clone().map(|row| row.iter().sum()).collect();
+        let mut all = thresholds(&sums);
+        all.extend(rows.flat_map(thresholds));
+        all
+    }
+
+    /// Solid angle of a cell in a row, sr.
+    pub(crate) fn solid_angle(&self, row: u32) -> f64 {
+        solid_angle_of_row(row, self.rows) / f64::from(self.columns)
+    }
+}
+
+/// Solid angle of a row of cells, sr.
+fn solid_angle_of_row(row: u32, rows: u32) -> f64 {
+    let half = 0.5 * PI / f64::from(rows);
+    4.0 * PI * libm::sin(f64::from(2 * row + 1) * half) * libm::sin(half)
+}
+
+/// Mean of the channels at a place of the map, interpolated as a card does.
+fn luminance(environment: &Environment, [u, v]: [f64; 2]) -> f64 {
+    let [width, height] = [environment.width, environment.height].map(i64::from);
+    let [x, y] = [u * width as f64 - 0.5, v * height as f64 - 0.5];
+    let [column, row] = [x.floor(), y.floor()];
+    let texel = |column: i64, row: i64| {
+        let [column, row] = [column.rem_euclid(width), row.clamp(0, height - 1)];
+        let texel = environment.texels[(row * width + column) as usize];
+        texel.into_iter().map(f64::from).sum::<f64>() / 3.0
+    };
+    let [right, below] = [x - column, y - row];
+    let row_at = |row: i64| texel(column as i64, row) * (1.0 - right) + texel(column as i64 + 1, row) * right;
+    row_at(row as i64) * (1.0 - below) + row_at(row as i64 + 1) * below
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    fn decode(texel: [u8; 4]) -> [f32; 3] {
+        let bits = u32::from_le_bytes(texel);
+        [0, 9, 18].map(|shift| libm::ldexpf((bits >> shift & 511) as f32, (bits >> 27) as i32 - 24))
+    }
+
+    #[test]
+    fn texels_keep_eight_bits_of_their_greatest_channel() {
+        for value in [1e-7_f32, 1e-4, 0.3, 0.999, 1.0, 511.5, 1023.0, 40_000.0, 65_408.0] {
+            let [red, green, blue] = decode(shared_exponent([value, value * 0.25, 0.0]));
+            let step = (value / 256.0).max(1.0 / 16_777_216.0);
+            assert!((red - value).abs() <= 0.5 * step, "{value}: {red}");
+            assert!((green - value * 0.25).abs() <= 0.5 * step, "{value}: {green}");
+            assert_eq!(blue, 0.0);
+        }
+        assert_eq!(decode(shared_exponent([0.0; 3])), [0.0; 3]);
+    }
+
+    #[test]
+    fn texels_of_any_brightness_are_held() {
+        for brightest in [1e-30_f32, 1e-3, 1.0, 3e4, 1e20, f32::MAX] {
+            let scaled = brightest / scale(brightest);
+            assert!((1.0..=65_408.0).contains(&scaled) || brightest < 1e-29, "{brightest}: {scaled}");
+        }
+    }
+
+    #[test]
+    fn cells_weigh_what_comes_through_them() {
+        // A bright texel at the border of the map, whose light is spread over both sides.
+        let mut texels = vec![[0.0; 3]; 512 * 256];
+        texels[100 * 512] = [3.0, 6.0, 9.0];
+        let environment = Environment { width: 512, height: 256, texels };
+        let cells = Cells::new(&environment);
+        assert_eq!([cells.columns, cells.rows], [128, 64]);
+        let total: f64 = cells.weights.iter().sum();
+        let angle = PI * 100.5 / 256.0;
+        let expected = 6.0 * angle.sin() * (PI / 256.0) * (2.0 * PI / 512.0);
+        assert!((total / expected - 1.0).abs() < 0.05, "{total} {expected}");
+        let share = |column: usize| cells.weights[25 * 128 + column] / total;
+        assert!(share(0) > 0.5 && share(127) > 0.05, "{} {}", share(0), share(127));
+        assert!(cells.weights.iter().all(|&weight| weight > 0.0));
+    }
+
+    #[test]
+    fn a_constant_environment_is_one_cell_of_exact_radiance() {
+        let map = EnvironmentMap::new(&Environment::constant(Vec3::new(0.3, 0.2, 0.1))).expect("lit");
+        assert_eq!(map.radiance, [0.3, 0.2, 0.1]);
+        assert_eq!(decode(map.texel(0, 0)), [1.0; 3]);
+        assert!((map.fluence / (4.0 * PI * 0.2) - 1.0).abs() < 1e-6);
+        assert!(EnvironmentMap::new(&Environment::constant(Vec3::ZERO)).is_none());
+    }
+}

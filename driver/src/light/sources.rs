@@ -1,0 +1,194 @@
+//! Where photons come from: each source by its power.
+
+use glam::{DVec3, Vec3};
+use photoncard_firmware::scene::light::environment_direction;
+
+use super::shares::projected_area;
+use super::thresholds::thresholds;
+use super::{Lights, mean};
+use crate::scene::Scene;
+
+/// What a photon may come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Source {
+    /// The emitter of this index.
+    Emitter(u32),
+    /// A distant light.
+    Distant {
+        /// Unit vector, the way light goes.
+        direction: Vec3,
+        /// Irradiance of a surface that faces it, W/m^2.
+        irradiance: Vec3,
+    },
+    /// A cell of the environment, from column 0, row 0 at the upper left.
+    Cell {
+        /// How far from the left it begins, and how wide it is, of all the map.
+        across: [f32; 2],
+        /// Cosines of the angles to y of its upper and its lower border.
+        cosines: [f32; 2],
+        /// sr.
+        solid_angle: f32,
+    },
+}
+
+/// All sources, and how they are chosen.
+#[derive(Clone, Debug)]
+pub(crate) struct Sources {
+    list: Vec<Source>,
+    thresholds: Vec<u32>,
+    /// The box that light from infinitely far comes through: a little larger than the scene's.
+    pub(crate) bounds: [Vec3; 2],
+    /// Watts of all, mean of the channels.
+    pub(crate) power: f64,
+    /// Watts in the strongest channel of the strongest photon, as if it were the only one.
+    pub(crate) strongest: f32,
+}
+
+/// A source that was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ChosenSource {
+    pub(crate) source: Source,
+    pub(crate) probability: f32,
+    /// What is left of the number, in [0, 1).
+    pub(crate) rest: f32,
+}
+
+/// How much larger the box is than the scene's, of its greatest side and of its greatest coordinate.
+const MARGIN: f32 = 1e-4;
+
+impl Sources {
+    /// Those of a scene.
+    pub(crate) fn new(scene: &Scene, lights: &Lights) -> Self {
+        let bounds = enlarged(scene.bounds());
+        let size = (bounds[1] - bounds[0]).as_dvec3();
+        let mut all = AllSources::default();
+        for (index, emitter) in (0..).zip(&lights.emitters) {
+            all.add(Source::Emitter(index), emitter.bounds.power, emitter.strongest);
+        }
+        for light in &lights.distant {
+            let [direction, irradiance] = [light.direction, light.irradiance].map(Vec3::from);
+            let area = projected_area(size, direction.as_dvec3());
+            let strongest = f64::from(irradiance.max_element()) * area;
+            all.add(Source::Distant { direction, irradiance }, mean(irradiance) * area, strongest);
+        }
+        all.add_cells(lights, size);
+        let thresholds = thresholds(&all.powers);
+        let strongest = all.strongest.iter().enumerate().map(|(index, watts)| {
+            let (lower, upper) = share(&thresholds, index);
+            (watts * super::thresholds::ALL / f64::from(upper - lower).max(1.0)) as f32
+        });
+        Self {
+            strongest: strongest.filter(|watts| watts.is_finite()).fold(0.0, f32::max),
+            power: all.powers.iter().sum(),
+            list: all.list,
+            thresholds,
+            bounds,
+        }
+    }
+
+    /// The source that belongs to a number of 64 bits, of 2^64; `None` if there are none.
+    pub(crate) fn choose(&self, number: u64) -> Option<ChosenSource> {
+        let target = (number >> 32) as u32;
+        let index = self.thresholds.partition_point(|&threshold| threshold < target);
+        let source = *self.list.get(index)?;
+        let (lower, upper) = share(&self.thresholds, index);
+        let width = f64::from(upper - lower).max(1.0);
+        let into = number.saturating_sub(u64::from(lower) << 32) as f64 / super::thresholds::ALL;
+        Some(ChosenSource {
+            source,
+            probability: (width / super::thresholds::ALL) as f32,
+            rest: ((into / width) as f32).min(1.0 - f32::EPSILON / 2.0),
+        })
+    }
+}
+
+/// The ends of a share, of 2^32.
+fn share(thresholds: &[u32], index: usize) -> (u32, u32) {
+    let lower = index.checked_sub(1).map_or(0, |before| thresholds[before]);
+    (lower, thresholds[index])
+}
+
+fn enlarged((lower, upper): (Vec3, Vec3)) -> [Vec3; 2] {
+    let greatest = lower.abs().max(upper.abs()).max_element();
+    let margin = MARGIN * (upper - lower).max_element().max(0.1 * greatest).max(1e-30);
+    [lower - margin, upper + margin]
+}
+
+/// Sources with their powers.
+#[derive(Default)]
+struct AllSources {
+    list: Vec<Source>,
+    powers: Vec<f64>,
+    strongest: Vec<f64>,
+}
+
+impl AllSources {
+    fn add(&mut self, source: Source, power: f64, strongest: f64) {
+        self.list.push(source);
+        self.powers.push(power);
+        self.strongest.push(strongest);
+    }
+
+    /// Adds the cells of the environment.
+    fn add_cells(&mut self, lights: &Lights, size: DVec3) {
+        let Some(map) = lights.environment() else { return };
+        let cells = &map.cells;
+        for row in 0..cells.rows {
+            let border = |row: u32| libm::cos(std::f64::consts::PI * f64::from(row) / f64::from(cells.rows));
+            let [upper, lower] = [border(row), border(row + 1)];
+            for column in 0..cells.columns {
+                let width = 1.0 / cells.columns as f32;
+                let left = column as f32 * width;
+                let middle = environment_direction(left + 0.5 * width, (0.5 * (upper + lower)) as f32);
+                // A cell that is much of the sphere shows the box from many sides.
+                let area = if cells.columns < 8 || cells.rows < 8 {
+                    0.5 * (size.y * size.z + size.z * size.x + size.x * size.y)
+                } else {
+                    projected_area(size, middle.as_dvec3())
+                };
+                let weight = cells.weights[(row * cells.columns + column) as usize];
+                let solid_angle = cells.solid_angle(row);
+                let source = Source::Cell {
+                    across: [left, width],
+                    cosines: [upper as f32, lower as f32],
+                    solid_angle: solid_angle as f32,
+                };
+                let most_area = size.y * size.z + size.z * size.x + size.x * size.y;
+                let strongest = f64::from(map.brightest) * solid_angle * most_area;
+                self.add(source, weight * area, strongest);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Environment, PunctualKind, PunctualLight};
+
+    #[test]
+    fn numbers_find_each_source_by_its_power() {
+        let light = |intensity: f32| PunctualLight {
+            name: "lamp".into(),
+            kind: PunctualKind::Point { position: Vec3::ZERO },
+            intensity: Vec3::splat(intensity),
+        };
+        let scene = Scene {
+            lights: vec![light(1.0), light(3.0)],
+            environment: Some(Environment::constant(Vec3::ZERO)),
+            ..Scene::default()
+        };
+        let sources = Sources::new(&scene, &Lights::new(&scene));
+        assert!((sources.power / (16.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
+        let at = |number: f64| sources.choose((number * 2.0_f64.powi(64)) as u64).expect("there are some");
+        let first = at(0.2);
+        assert_eq!(first.source, Source::Emitter(0));
+        assert!((first.probability - 0.25).abs() < 1e-6 && (first.rest - 0.8).abs() < 1e-6, "{first:?}");
+        let second = at(0.4);
+        assert_eq!(second.source, Source::Emitter(1));
+        assert!((second.rest - 0.2).abs() < 1e-6, "{second:?}");
+        assert_eq!(at(0.999_999_999_9).source, Source::Emitter(1));
+        let dark = Scene::default();
+        assert!(Sources::new(&dark, &Lights::new(&dark)).choose(7).is_none());
+    }
+}

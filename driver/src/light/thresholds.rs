@@ -1,0 +1,43 @@
+//! Shares of 2^32, in proportion to weights.
+
+/// 2^32: all probabilities together.
+pub(super) const ALL: f64 = 4_294_967_296.0;
+
+/// Cumulated shares of 2^32. Each is at least 1, so that every one can be chosen; the last ends at 2^32 - 1. Without any weight
+/// all are alike.
+pub(crate) fn thresholds(weights: &[f64]) -> Vec<u32> {
+    let total: f64 = weights.iter().sum();
+    let spare = ALL - 1.0 - weights.len() as f64;
+    let mut sum = 0.0;
+    let mut thresholds: Vec<u32> = weights
+        .iter()
+        .zip(1_u32..)
+        .map(|(weight, index)| {
+            sum += weight;
+            let share = if total > 0.0 { sum / total } else { f64::from(index) / weights.len() as f64 };
+            ((share * spare) as u32).saturating_add(index)
+        })
+        .collect();
+    if let Some(last) = thresholds.last_mut() {
+        *last = u32::MAX;
+    }
+    thresholds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_follow_weights_and_none_is_empty() {
+        let thresholds = thresholds(&[1.0, 1e-30, 3.0]);
+        assert!((thresholds[0] as f64 / ALL - 0.25).abs() < 1e-8);
+        assert!(thresholds[1] > thresholds[0]);
+        assert_eq!(thresholds[2], u32::MAX);
+    }
+
+    #[test]
+    fn without_weight_all_are_alike() {
+        assert_eq!(thresholds(&[0.0; 4]).iter().map(|t| t >> 28).collect::<Vec<_>>(), [4, 8, 12, 15]);
+    }
+}

@@ -1,0 +1,229 @@
+//! Emitters: what comes from a triangle, a point or a spot that the light tree has chosen. A point on a triangle is chosen uniformly
+//! by area.
+
+use glam::Vec3;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{Emitter, EmitterKind, NO_TEXTURE, Record, Triangle};
+use photoncard_shared::message::Fault;
+
+use super::choice::Fraction;
+use super::tree::{select_emitter, selection_probability};
+use super::{LightSample, Receiver};
+use crate::memory::MemoryPort;
+use crate::scene::corners::Corners;
+use crate::scene::cut_out::is_there;
+use crate::scene::surface::read_material;
+use crate::scene::{SceneImage, magnitude, offset_origin};
+use crate::vector::{max, min, unit};
+
+const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
+
+/// A point on an emissive triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmitterPoint {
+    /// The point, metres.
+    pub position: Vec3,
+    /// Unit normal of the front.
+    pub normal: Vec3,
+    /// Radiance leaving the point, W/(sr m^2).
+    pub emission: Vec3,
+    /// The greatest coordinate of the triangle, metres.
+    pub magnitude: f32,
+}
+
+/// Emitter `index`.
+///
+/// # Errors
+/// If there is none.
+pub fn read_emitter(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Result<Emitter, Fault> {
+    let kind = SectionKind::Emitters;
+    let bytes = scene.record::<{ Emitter::BYTES }, EMITTERS_PER_LINE>(memory, kind, index)?;
+    Ok(Emitter::read(bytes))
+}
+
+/// The point of an emissive triangle that belongs to a point of the unit square, uniformly by area; `None` if the emitter is no
+/// triangle. Neighbours are near each other.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn emitter_point(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    emitter: &Emitter,
+    square: [f32; 2],
+) -> Result<Option<EmitterPoint>, Fault> {
+    let EmitterKind::Triangle { vertices, triangle, material, varies, .. } = emitter.kind else {
+        return Ok(None);
+    };
+    let [a, b, c] = vertices.map(Vec3::from_array);
+    let [p, q] = square_to_triangle(square);
+    let emission = if varies {
+        let place = (triangle, &Triangle { vertices, material, cut_out: true });
+        emission_at(scene, memory, emitter, place, [1.0 - p - q, p, q])?
+    } else {
+        emitter.emission.into()
+    };
+    Ok(Some(EmitterPoint {
+        position: a + (b - a) * p + (c - a) * q,
+        normal: unit((b - a).cross(c - a)),
+        emission,
+        magnitude: magnitude(&[a, b, c]),
+    }))
+}
+
+/// The radiance that leaves a triangle that is not the same all over, where its corners have these weights.
+fn emission_at(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    emitter: &Emitter,
+    (index, triangle): (u32, &Triangle),
+    weights: [f32; 3],
+) -> Result<Vec3, Fault> {
+    let material = read_material(scene, memory, triangle.material)?;
+    let emission = Vec3::from_array(emitter.emission);
+    if material.cutoff > 0.0 && !is_there(scene, memory, triangle, index, weights)? {
+        return Ok(Vec3::ZERO);
+    }
+    let [.., texture] = material.textures;
+    if texture == NO_TEXTURE {
+        return Ok(emission);
+    }
+    let Some(corners) = Corners::read(scene, memory, index, weights)? else { return Ok(emission) };
+    let [red, green, blue, _] = corners.texture(scene, memory, texture)?;
+    Ok(emission * Vec3::new(red, green, blue))
+}
+
+/// The probability density, 1/sr, with which a light sample for a place takes the direction in which an emissive triangle is met
+/// at this distance, metres, and at this cosine to its normal.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn emitter_density(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    receiver: &Receiver,
+    emitter: u32,
+    (distance, cosine): (f32, f32),
+) -> Result<f32, Fault> {
+    let probability = scene.header.lights.emitters * selection_probability(scene, memory, receiver, emitter)?;
+    let EmitterKind::Triangle { vertices, .. } = read_emitter(scene, memory, emitter)?.kind else {
+        return Ok(0.0);
+    };
+    Ok(probability * (distance * distance / (cosine * area(vertices))))
+}
+
+/// The point of an emitter that belongs to a point of the unit square; emitters have this share of all samples.
+pub(super) fn sample(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    receiver: &Receiver,
+    share: f32,
+    [across, down]: [Fraction; 2],
+) -> Result<Option<LightSample>, Fault> {
+    let Some(selection) = select_emitter(scene, memory, receiver, across)? else { return Ok(None) };
+    let emitter = read_emitter(scene, memory, selection.emitter)?;
+    let probability = share * selection.probability;
+    let intensity = Vec3::from_array(emitter.emission);
+    match emitter.kind {
+        EmitterKind::Triangle { vertices, double_sided, .. } => {
+            let square = [selection.rest.value(), down.value()];
+            let target = emitter_point(scene, memory, &emitter, square)?;
+            let density = probability / area(vertices);
+            Ok(target.and_then(|target| from_area(receiver, &target, double_sided, density)))
+        }
+        EmitterKind::Point { position } => {
+            Ok(from_point(receiver, position.into(), probability, |_| intensity))
+        }
+        EmitterKind::Spot { position, direction, scale, offset } => {
+            let axis = Vec3::from_array(direction);
+            let towards = |direction: Vec3| intensity * falloff(-axis.dot(direction), scale, offset);
+            Ok(from_point(receiver, position.into(), probability, towards))
+        }
+    }
+}
+
+/// The share of a spot's intensity at a cosine to its axis (`KHR_lights_punctual`).
+#[inline(always)]
+pub fn falloff(cosine: f32, scale: f32, offset: f32) -> f32 {
+    let linear = min(max(cosine * scale + offset, 0.0), 1.0);
+    linear * linear
+}
+
+/// What comes from a point on a triangle of this density, 1/m^2.
+fn from_area(
+    receiver: &Receiver,
+    target: &EmitterPoint,
+    double_sided: bool,
+    density: f32,
+) -> Option<LightSample> {
+    let is_front = target.normal.dot(receiver.origin - target.position) > 0.0;
+    if !is_front && !double_sided {
+        return None;
+    }
+    let normal = if is_front { target.normal } else { -target.normal };
+    let way = offset_origin(target.position, normal, target.magnitude) - receiver.origin;
+    let distance_squared = way.length_squared();
+    let distance = libm::sqrtf(distance_squared);
+    let direction = way / distance;
+    let cosine = -normal.dot(direction);
+    // Not `<= 0`: a zero distance makes it NaN.
+    if !(cosine > 0.0) {
+        return None;
+    }
+    let density = density * (distance_squared / cosine);
+    Some(LightSample { direction, distance, irradiance: target.emission / density, density: Some(density) })
+}
+
+/// What comes from a point whose intensity depends on the direction towards it.
+fn from_point(
+    receiver: &Receiver,
+    position: Vec3,
+    probability: f32,
+    intensity: impl FnOnce(Vec3) -> Vec3,
+) -> Option<LightSample> {
+    let way = position - receiver.origin;
+    let distance_squared = way.length_squared();
+    let distance = libm::sqrtf(distance_squared);
+    let direction = way / distance;
+    let irradiance = intensity(direction) / (probability * distance_squared);
+    // At the light itself there is no direction.
+    (distance > 0.0).then_some(LightSample { direction, distance, irradiance, density: None })
+}
+
+/// The area of a triangle, m^2.
+fn area(vertices: [[f32; 3]; 3]) -> f32 {
+    let [a, b, c] = vertices.map(Vec3::from_array);
+    0.5 * libm::sqrtf((b - a).cross(c - a).length_squared())
+}
+
+/// Maps the unit square on the triangle `p, q >= 0, p + q <= 1`, keeping areas (Heitz 2019, *A low-distortion map
+/// between triangle and square*).
+#[inline(always)]
+fn square_to_triangle([x, y]: [f32; 2]) -> [f32; 2] {
+    if y > x {
+        let p = x * 0.5;
+        [p, y - p]
+    } else {
+        let q = y * 0.5;
+        [x - q, q]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_square_fills_the_triangle_evenly() {
+        let mut mean = [0.0; 2];
+        for i in 0..100 {
+            for j in 0..100 {
+                let [p, q] = square_to_triangle([(i as f32 + 0.5) / 100.0, (j as f32 + 0.5) / 100.0]);
+                assert!(p >= 0.0 && q >= 0.0 && p + q <= 1.000_001);
+                mean[0] += p / 1e4;
+                mean[1] += q / 1e4;
+            }
+        }
+        assert!((mean[0] - 1.0 / 3.0).abs() < 1e-3 && (mean[1] - 1.0 / 3.0).abs() < 1e-3, "{mean:?}");
+    }
+}

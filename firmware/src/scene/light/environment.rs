@@ -1,0 +1,165 @@
+//! The environment: light from infinitely far, of an equirectangular map. A direction is chosen by a grid of cells of equal
+//! angles: first a row, then a column, by how much light comes through the cell, then evenly by solid angle in it.
+
+use core::f32::consts::{FRAC_1_PI, PI};
+
+use glam::Vec3;
+use photoncard_shared::image::{SectionKind, THRESHOLDS_PER_LINE};
+use photoncard_shared::message::Fault;
+
+use super::LightSample;
+use super::choice::{Fraction, choose, probability};
+use crate::memory::MemoryPort;
+use crate::scene::{SceneImage, read_texture, sample_texture};
+use crate::vector::{max, min};
+
+/// Where a direction is on the map: from the left and from the top, each 0 to 1. The middle is -z, the top y.
+pub fn environment_coordinates(direction: Vec3) -> [f32; 2] {
+    let Vec3 { x, y, z } = direction;
+    let across = libm::atan2f(x, -z) * (0.5 * FRAC_1_PI) + 0.5;
+    [across, libm::atan2f(libm::sqrtf(x * x + z * z), y) * FRAC_1_PI]
+}
+
+/// The unit vector at these columns of the map, 0 to 1 from the left, at a cosine of the angle to y.
+pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
+    let angle = 2.0 * PI * (across - 0.5);
+    let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
+    Vec3::new(sine * libm::sinf(angle), cosine, -sine * libm::cosf(angle))
+}
+
+/// Radiance that comes from a direction, W/(sr m^2); zero without an environment.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn environment_radiance(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    direction: Vec3,
+) -> Result<Vec3, Fault> {
+    let Some(index) = scene.header.lights.texture else { return Ok(Vec3::ZERO) };
+    let texture = read_texture(scene, memory, index)?;
+    let [red, green, blue, _] = sample_texture(scene, memory, &texture, environment_coordinates(direction))?;
+    Ok(Vec3::new(red, green, blue) * Vec3::from_array(scene.header.lights.radiance))
+}
+
+/// The probability density, 1/sr, with which a light sample takes a direction of the environment.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn environment_density(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    direction: Vec3,
+) -> Result<f32, Fault> {
+    let share = scene.header.lights.environment;
+    if share <= 0.0 {
+        return Ok(0.0);
+    }
+    let cells = Cells::new(scene);
+    let [across, down] = environment_coordinates(direction);
+    let row = cell_at(down, cells.rows);
+    let column = cell_at(across, cells.columns);
+    let of_row = probability(row, |row| cells.threshold(scene, memory, row))?;
+    let first = cells.first_of_row(row);
+    let of_column = probability(column, |column| cells.threshold(scene, memory, first.wrapping_add(column)))?;
+    Ok(cells.density(share, row, of_row * of_column))
+}
+
+/// The direction that belongs to a point of the unit square; the environment has this share of all samples.
+pub(super) fn sample(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    share: f32,
+    [across, down]: [Fraction; 2],
+) -> Result<LightSample, Fault> {
+    let cells = Cells::new(scene);
+    let row = choose(down, cells.rows, |row| cells.threshold(scene, memory, row))?;
+    let first = cells.first_of_row(row.index);
+    let column =
+        choose(across, cells.columns, |column| cells.threshold(scene, memory, first.wrapping_add(column)))?;
+    let across = (column.index as f32 + column.rest.value()) / cells.columns as f32;
+    let direction = environment_direction(across, cells.cosine(row.index, row.rest.value()));
+    let density = cells.density(share, row.index, row.probability * column.probability);
+    let radiance = environment_radiance(scene, memory, direction)?;
+    Ok(LightSample {
+        direction,
+        distance: f32::INFINITY,
+        irradiance: radiance / density,
+        density: Some(density),
+    })
+}
+
+/// The cell of a coordinate, 0 to 1.
+fn cell_at(coordinate: f32, cells: u32) -> u32 {
+    ((coordinate * cells as f32) as u32).min(cells - 1)
+}
+
+/// The grid of cells.
+struct Cells {
+    columns: u32,
+    rows: u32,
+}
+
+impl Cells {
+    fn new(scene: &SceneImage) -> Self {
+        let [columns, rows] = scene.header.lights.cells.map(|cells| u32::from(cells.max(1)));
+        Self { columns, rows }
+    }
+
+    /// Index of the first threshold of the cells of a row.
+    fn first_of_row(&self, row: u32) -> u32 {
+        self.rows.wrapping_add(row.wrapping_mul(self.columns))
+    }
+
+    fn threshold(&self, scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Result<u32, Fault> {
+        let kind = SectionKind::EnvironmentCells;
+        let bytes = scene.record::<4, THRESHOLDS_PER_LINE>(memory, kind, index)?;
+        Ok(u32::from_le_bytes(*bytes))
+    }
+
+    /// The cosine at a share of the solid angle of a row, from its upper border on.
+    fn cosine(&self, row: u32, share: f32) -> f32 {
+        let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
+        let [upper, lower] = [border(row), border(row + 1)];
+        min(max(upper + (lower - upper) * share, -1.0), 1.0)
+    }
+
+    /// Density of a direction in a cell of this probability, 1/sr.
+    fn density(&self, share: f32, row: u32, probability: f32) -> f32 {
+        // The difference of the borders' cosines, as a product.
+        let half = 0.5 * PI / self.rows as f32;
+        let height = 2.0 * libm::sinf((2 * row + 1) as f32 * half) * libm::sinf(half);
+        let solid_angle = 2.0 * PI / self.columns as f32 * height;
+        share * probability / solid_angle
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_and_coordinates_are_each_others_inverse() {
+        for column in 0..40 {
+            for row in 0..20 {
+                let (across, down) = ((column as f32 + 0.5) / 40.0, (row as f32 + 0.5) / 20.0);
+                let direction = environment_direction(across, libm::cosf(PI * down));
+                let [u, v] = environment_coordinates(direction);
+                assert!((u - across).abs() < 1e-6 && (v - down).abs() < 1e-6, "{across} {down}: {u} {v}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_middle_is_ahead_the_right_is_x_and_the_top_is_up() {
+        let near = |direction: Vec3, expected: [f32; 2]| {
+            let found = environment_coordinates(direction);
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{direction}: {found:?}");
+        };
+        near(Vec3::NEG_Z, [0.5, 0.5]);
+        near(Vec3::X, [0.75, 0.5]);
+        near(Vec3::NEG_X, [0.25, 0.5]);
+        assert_eq!(environment_coordinates(Vec3::Y)[1], 0.0);
+        assert_eq!(environment_coordinates(Vec3::NEG_Y)[1], 1.0);
+    }
+}

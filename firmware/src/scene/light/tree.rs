@@ -1,0 +1,296 @@
+//! The light tree: which emitter a shadow ray goes to (Conty Estevez, Kulla 2018, *Importance sampling of many lights with adaptive
+//! tree splitting*; the bounds are those of Pharr, Jakob, Humphreys 2023, *Physically Based Rendering*, section 12.6.3).
+//!
+//! A descent from the root takes one of up to four children at each node, by a bound of the light that may come from there: the
+//! power, times the greatest cosines at both ends that the child's sphere and cone of normals allow, over the squared distance.
+//! No distance is less than the sphere's radius: within it, a child is as a whole nearby. A small part of the choices is even, so that
+//! no emitter is missed that the bound thinks little of; a child from which nothing can come is left out.
+
+use glam::Vec3;
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{
+    Emitter, LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode, Record,
+};
+use photoncard_shared::message::{Fault, FaultCode};
+
+use super::Receiver;
+use super::choice::Fraction;
+use crate::memory::MemoryPort;
+use crate::scene::SceneImage;
+use crate::vector::{max, unit};
+
+const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
+const TRAIL_BITS: usize = 2;
+const _: () = assert!(1 << TRAIL_BITS == LIGHT_CHILDREN && TRAIL_BITS * LIGHT_TREE_LEVELS <= 32);
+
+/// The part of the choices at a node that is even.
+const EVEN: f32 = 1.0 / 64.0;
+/// A bound of a cosine below this means that nothing comes; it is less than 0 by more than what axes of cones are rounded.
+const BELOW_HORIZON: f32 = -1e-3;
+
+/// An emitter that was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Selection {
+    /// Its index.
+    pub emitter: u32,
+    /// How likely it was.
+    pub probability: f32,
+    /// What is left of the number.
+    pub rest: Fraction,
+}
+
+/// The emitter that belongs to a number, for a place; `None` if none can light it.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn select_emitter(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    receiver: &Receiver,
+    mut fraction: Fraction,
+) -> Result<Option<Selection>, Fault> {
+    let (mut node, mut probability) = (0, 1.0);
+    for _ in 0..LIGHT_TREE_LEVELS {
+        let children = read_node(scene, memory, node)?;
+        let Some((child, lower)) = Choice::new(&children, receiver).choose(fraction) else {
+            return Ok(None);
+        };
+        fraction = fraction.within(lower, child.probability);
+        probability *= child.probability;
+        match child.link {
+            LightLink::Node(next) => node = next,
+            LightLink::Emitter(emitter) => {
+                return Ok(Some(Selection { emitter, probability, rest: fraction }));
+            }
+        }
+    }
+    Err(Fault { code: FaultCode::Depth, detail: node })
+}
+
+/// The probability with which [`select_emitter`] chooses this emitter for a place; 0 if it cannot light it.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn selection_probability(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    receiver: &Receiver,
+    emitter: u32,
+) -> Result<f32, Fault> {
+    let kind = SectionKind::Emitters;
+    let bytes = scene.record::<{ Emitter::BYTES }, EMITTERS_PER_LINE>(memory, kind, emitter)?;
+    let mut trail = Emitter::trail(bytes);
+    let (mut node, mut probability) = (0, 1.0);
+    for _ in 0..LIGHT_TREE_LEVELS {
+        let children = read_node(scene, memory, node)?;
+        let next = trail as usize % LIGHT_CHILDREN;
+        trail >>= TRAIL_BITS;
+        let link = children.get(next).and_then(|child| child.map(|child| child.link));
+        let Some(child) = Choice::new(&children, receiver).option(next) else {
+            // Either nothing comes from there, or there is nothing.
+            return link.map(|_| 0.0).ok_or(Fault { code: FaultCode::Record, detail: emitter });
+        };
+        probability *= child.probability;
+        match child.link {
+            LightLink::Node(next) => node = next,
+            LightLink::Emitter(found) if found == emitter => return Ok(probability),
+            LightLink::Emitter(_) => break,
+        }
+    }
+    Err(Fault { code: FaultCode::Depth, detail: node })
+}
+
+type Children = [Option<LightChild>; LIGHT_CHILDREN];
+
+fn read_node(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Result<Children, Fault> {
+    let line = LightNode(scene.line(memory, SectionKind::LightNodes, index, 0..LINE_BYTES as u32)?);
+    Ok(core::array::from_fn(|child| line.child(child)))
+}
+
+/// The children of a node that light may come from.
+struct Choice {
+    options: [Option<Weighted>; LIGHT_CHILDREN],
+}
+
+/// A child, and how likely it is to be chosen.
+#[derive(Clone, Copy)]
+struct Weighted {
+    link: LightLink,
+    probability: f32,
+}
+
+impl Choice {
+    fn new(children: &Children, receiver: &Receiver) -> Self {
+        let bounds = children.map(|child| child.and_then(|child| Bound::new(&child, receiver)));
+        // In proportion to that of the nearest: squares of distances may have any magnitude.
+        let nearest = bounds.iter().flatten().map(|bound| bound.distance_squared);
+        let nearest = nearest.fold(f32::INFINITY, crate::vector::min);
+        let weights = bounds.map(|bound| bound.map_or(0.0, |bound| bound.weight(nearest)));
+        let total: f32 = weights.iter().sum();
+        let count = bounds.iter().flatten().count() as f32;
+        let mut options = [None; LIGHT_CHILDREN];
+        for ((option, child), (bound, weight)) in
+            options.iter_mut().zip(children).zip(bounds.iter().zip(weights))
+        {
+            let (Some(child), Some(_)) = (child, bound) else { continue };
+            let even = 1.0 / count;
+            // Not `<= 0`: of an unsound image the sum may be no number.
+            let probability = if total > 0.0 { weight / total * (1.0 - EVEN) + even * EVEN } else { even };
+            *option = Some(Weighted { link: child.link, probability });
+        }
+        Self { options }
+    }
+
+    fn option(&self, index: usize) -> Option<Weighted> {
+        self.options.get(index).copied().flatten()
+    }
+
+    /// The child in whose share the number falls, and where that share begins; `None` if there is none at all.
+    fn choose(&self, fraction: Fraction) -> Option<(Weighted, f32)> {
+        let mut chosen = None;
+        let mut lower = 0.0;
+        for option in self.options.into_iter().flatten() {
+            chosen = Some((option, lower));
+            lower += option.probability;
+            if fraction.value() < lower {
+                break;
+            }
+        }
+        chosen
+    }
+}
+
+/// A bound of the light that may come from a child.
+#[derive(Clone, Copy)]
+struct Bound {
+    /// The power, times the greatest cosines at both ends.
+    strength: f32,
+    /// Square of the distance, or of the sphere's radius if that is greater.
+    distance_squared: f32,
+}
+
+impl Bound {
+    /// `None` if nothing can come.
+    fn new(child: &LightChild, receiver: &Receiver) -> Option<Self> {
+        let way = Vec3::from_array(child.centre) - receiver.position;
+        let distance_squared = way.length_squared();
+        let radius_squared = child.radius * child.radius;
+        let share = max(child.share, 0.0);
+        if distance_squared <= radius_squared {
+            return Some(Self { strength: share, distance_squared: radius_squared });
+        }
+        let towards = unit(way);
+        let sphere = Angle::of_sine_squared(radius_squared / distance_squared);
+        let received = Angle::of_cosine(receiver.normal.dot(towards)).less(sphere).cosine;
+        let emitted = if child.cosine <= -1.0 {
+            1.0
+        } else {
+            let axis = unit(child.axis.into());
+            let cone = Angle::of_cosine(child.cosine);
+            Angle::of_cosine(-axis.dot(towards)).less(cone).less(sphere).cosine
+        };
+        if received < BELOW_HORIZON || emitted < BELOW_HORIZON {
+            return None;
+        }
+        Some(Self { strength: share * max(received, 0.0) * max(emitted, 0.0), distance_squared })
+    }
+
+    fn weight(&self, nearest: f32) -> f32 {
+        let nearness = if self.distance_squared > nearest { nearest / self.distance_squared } else { 1.0 };
+        self.strength * nearness
+    }
+}
+
+/// An angle, 0 to pi.
+#[derive(Clone, Copy)]
+struct Angle {
+    cosine: f32,
+    sine: f32,
+}
+
+impl Angle {
+    const ZERO: Self = Self { cosine: 1.0, sine: 0.0 };
+
+    fn of_cosine(cosine: f32) -> Self {
+        Self { cosine, sine: libm::sqrtf(max(1.0 - cosine * cosine, 0.0)) }
+    }
+
+    /// An angle of pi / 2 at the most.
+    fn of_sine_squared(squared: f32) -> Self {
+        Self { cosine: libm::sqrtf(max(1.0 - squared, 0.0)), sine: libm::sqrtf(squared) }
+    }
+
+    /// The angle less another one, or zero if that is greater.
+    fn less(self, other: Self) -> Self {
+        if self.cosine >= other.cosine {
+            return Self::ZERO;
+        }
+        Self {
+            cosine: self.cosine * other.cosine + self.sine * other.sine,
+            sine: self.sine * other.cosine - self.cosine * other.sine,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_subtracted_and_never_below_zero() {
+        let angle = |radians: f32| Angle::of_cosine(libm::cosf(radians));
+        for (a, b) in [(2.0, 0.5), (3.0, 2.9), (1.0, 1.5), (0.7, 0.0), (3.1, 0.2)] {
+            let found = angle(a).less(angle(b));
+            let expected = (a - b).max(0.0);
+            assert!((found.cosine - libm::cosf(expected)).abs() < 1e-5, "{a} - {b}");
+            assert!((found.sine - libm::sinf(expected)).abs() < 1e-5, "{a} - {b}");
+        }
+    }
+
+    fn child(centre: Vec3, radius: f32, axis: Vec3, cosine: f32) -> LightChild {
+        LightChild {
+            centre: centre.to_array(),
+            radius,
+            share: 1.0,
+            axis: axis.to_array(),
+            cosine,
+            link: LightLink::Emitter(0),
+        }
+    }
+
+    const FLOOR: Receiver = Receiver { position: Vec3::ZERO, normal: Vec3::Y, origin: Vec3::ZERO };
+
+    #[test]
+    fn what_cannot_light_a_place_is_left_out_and_nothing_else() {
+        let is_bounded = |child: LightChild| Bound::new(&child, &FLOOR).is_some();
+        let down = Vec3::NEG_Y;
+        assert!(is_bounded(child(2.0 * Vec3::Y, 0.1, down, 1.0)));
+        assert!(!is_bounded(child(2.0 * Vec3::Y, 0.1, Vec3::Y, 1.0)), "it shines away");
+        assert!(is_bounded(child(2.0 * Vec3::Y, 0.1, Vec3::Y, -1.0)), "it shines to all sides");
+        assert!(!is_bounded(child(-2.0 * Vec3::Y, 0.1, Vec3::Y, 1.0)), "it is below the horizon");
+        assert!(is_bounded(child(-2.0 * Vec3::Y, 2.1, Vec3::Y, 1.0)), "part of it may be above");
+        let level = Vec3::new(2.0, -0.05, 0.0);
+        assert!(is_bounded(child(level, 0.1, down, -1.0)), "its upper part is above the horizon");
+        assert!(!is_bounded(child(level, 0.01, down, -1.0)));
+    }
+
+    #[test]
+    fn probabilities_sum_to_one_and_numbers_find_them() {
+        let up =
+            |share: f32, x: f32| LightChild { share, ..child(Vec3::new(x, 1.0, 0.0), 0.1, Vec3::NEG_Y, 0.9) };
+        let children = [Some(up(0.25, 0.0)), None, Some(up(0.5, 40.0)), Some(up(1e-20, 3.0))];
+        let choice = Choice::new(&children, &FLOOR);
+        let options = [0, 1, 2, 3].map(|index| choice.option(index).map_or(0.0, |option| option.probability));
+        assert!((options.iter().sum::<f32>() - 1.0).abs() < 1e-6, "{options:?}");
+        assert!(options[0] > 0.9 && options[1] == 0.0 && options[2] > 0.005 && options[3] > 0.005);
+        let mut counts = [0.0; 4];
+        for step in 0..100_000 {
+            let fraction = Fraction::new((step as f32 + 0.5) / 100_000.0, step);
+            let (chosen, _) = choice.choose(fraction).unwrap();
+            let index = options.iter().position(|&option| option == chosen.probability).unwrap();
+            counts[index] += 1e-5;
+        }
+        assert!(options.iter().zip(counts).all(|(a, b)| (a - b).abs() < 1e-4), "{options:?} {counts:?}");
+    }
+}

@@ -1,0 +1,70 @@
+//! The environment of a render: `--environment`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use photoncard_driver::scene::Environment;
+
+use crate::failure::Failure;
+
+/// Light from infinitely far, as an option tells it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum EnvironmentOption {
+    /// The same radiance from everywhere, W/(sr m^2).
+    Constant([f32; 3]),
+    /// The map of a file.
+    File(PathBuf),
+}
+
+/// The greatest radiance of an environment, as of an emitter: squares of it stay within single precision.
+const BRIGHTEST: f32 = 1e20;
+
+impl FromStr for EnvironmentOption {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Result<Vec<f32>, _> = text.split(',').map(|number| number.trim().parse()).collect();
+        let Ok(numbers) = numbers else { return Ok(Self::File(text.into())) };
+        match numbers[..] {
+            [red, green, blue] if numbers.iter().all(|number| (0.0..=BRIGHTEST).contains(number)) => {
+                Ok(Self::Constant([red, green, blue]))
+            }
+            _ => Err(format!(
+                "an environment is a file, or a radiance R,G,B of 0 to {BRIGHTEST:e} each, such as 0.5,0.7,1"
+            )),
+        }
+    }
+}
+
+impl EnvironmentOption {
+    /// The environment itself.
+    pub(crate) fn load(&self) -> Result<Environment, Failure> {
+        match self {
+            Self::Constant(radiance) => Ok(Environment::constant((*radiance).into())),
+            Self::File(path) => Environment::load(path).map_err(Failure::input),
+        }
+    }
+
+    /// What the picture's provenance says of it.
+    pub(crate) fn name(&self) -> String {
+        match self {
+            Self::Constant([red, green, blue]) => format!("{red},{green},{blue}"),
+            Self::File(path) => path.file_name().map_or(String::new(), |name| name.to_string_lossy().into()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_numbers_are_a_radiance_and_a_text_is_a_file() {
+        let parsed = |text: &str| text.parse::<EnvironmentOption>();
+        assert_eq!(parsed("0.5, 1,2e3"), Ok(EnvironmentOption::Constant([0.5, 1.0, 2000.0])));
+        assert_eq!(parsed("sky.exr"), Ok(EnvironmentOption::File("sky.exr".into())));
+        for text in ["1", "1,2", "1,2,-3", "1,2,nan", "1,2,inf", "1,2,3,4"] {
+            assert!(parsed(text).is_err_and(|error| error.contains("R,G,B")), "{text}");
+        }
+    }
+}

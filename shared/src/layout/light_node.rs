@@ -1,0 +1,128 @@
+//! Nodes of the light tree: bounds of the emitters below each of four children, in one line.
+
+use super::attributes::{decode_octahedral, encode_octahedral};
+use super::{read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
+use crate::address::LINE_BYTES;
+
+/// Children of a node, at most.
+pub const LIGHT_CHILDREN: usize = 4;
+/// Levels of a light tree, at most: as many as an emitter's trail tells.
+pub const LIGHT_TREE_LEVELS: usize = 16;
+
+/// Bounds of the emitters below a child of a [`LightNode`].
+///
+/// | bytes of 32 | what |
+/// |---|---|
+/// | 0..12 | centre of a sphere around them, metres |
+/// | 12..16 | its radius, metres |
+/// | 16..20 | their power over that of the node |
+/// | 20..24 | axis of a cone around the normals that they emit about: octahedral, 16 bits an axis |
+/// | 24..28 | cosine of the cone's half angle |
+/// | 28..32 | a leaf's emitter, with the highest bit set, or a node; all bits are set where there is no child |
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightChild {
+    /// Centre of a sphere around them, metres.
+    pub centre: [f32; 3],
+    /// Its radius, metres.
+    pub radius: f32,
+    /// Their power over that of the node.
+    pub share: f32,
+    /// A vector along the axis of a cone around the normals that they emit about, of a length between 0.57 and 1.
+    pub axis: [f32; 3],
+    /// Cosine of the cone's half angle: -1 for all directions, as of points and of double-sided triangles.
+    pub cosine: f32,
+    /// What is below.
+    pub link: LightLink,
+}
+
+/// What is below a node of the light tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightLink {
+    /// The node of this index.
+    Node(u32),
+    /// The emitter of this index.
+    Emitter(u32),
+}
+
+/// A node of the light tree, one line.
+#[derive(Clone, Copy)]
+pub struct LightNode<'a>(pub &'a [u8; LINE_BYTES]);
+
+const CHILD_BYTES: usize = LINE_BYTES / LIGHT_CHILDREN;
+const NO_CHILD: u32 = u32::MAX;
+const LEAF: u32 = 1 << 31;
+
+impl LightNode<'_> {
+    /// A child.
+    #[inline(always)]
+    pub fn child(&self, index: usize) -> Option<LightChild> {
+        let bytes: &[u8; CHILD_BYTES] = self.0.as_chunks().0.get(index)?;
+        let link = match read_u32(bytes, 28) {
+            NO_CHILD => return None,
+            leaf if leaf & LEAF != 0 => LightLink::Emitter(leaf & !LEAF),
+            node => LightLink::Node(node),
+        };
+        Some(LightChild {
+            centre: read_vector(bytes, 0),
+            radius: read_f32(bytes, 12),
+            share: read_f32(bytes, 16),
+            axis: decode_octahedral(read_u32(bytes, 20)),
+            cosine: read_f32(bytes, 24),
+            link,
+        })
+    }
+
+    /// The line of a node.
+    pub fn encode(children: [Option<LightChild>; LIGHT_CHILDREN]) -> [u8; LINE_BYTES] {
+        let mut line = [0; LINE_BYTES];
+        for (index, child) in children.into_iter().enumerate() {
+            let at = CHILD_BYTES * index;
+            let Some(child) = child else {
+                write_u32(&mut line, at + 28, NO_CHILD);
+                continue;
+            };
+            write_vector(&mut line, at, child.centre);
+            write_f32(&mut line, at + 12, child.radius);
+            write_f32(&mut line, at + 16, child.share);
+            write_u32(&mut line, at + 20, encode_octahedral(child.axis));
+            write_f32(&mut line, at + 24, child.cosine);
+            write_u32(
+                &mut line,
+                at + 28,
+                match child.link {
+                    LightLink::Node(node) => node & !LEAF,
+                    LightLink::Emitter(emitter) => emitter | LEAF,
+                },
+            );
+        }
+        line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn children_survive_their_line() {
+        let child = |link: LightLink, axis: [f32; 3]| LightChild {
+            centre: [1.0, -2.0, 0.5],
+            radius: 0.75,
+            share: 0.25,
+            axis,
+            cosine: -1.0,
+            link,
+        };
+        let children = [
+            Some(child(LightLink::Node(77), [0.0, -1.0, 0.0])),
+            None,
+            Some(child(LightLink::Emitter(123_456), [1.0, 0.0, 0.0])),
+            None,
+        ];
+        let line = LightNode::encode(children);
+        for (index, child) in children.into_iter().enumerate() {
+            assert_eq!(LightNode(&line).child(index), child);
+        }
+        assert_eq!(LightNode(&line).child(LIGHT_CHILDREN), None);
+    }
+}
