@@ -2,7 +2,9 @@
 #![forbid(unsafe_code)]
 
 pub mod bvh;
+pub mod channel;
 pub mod difference;
+pub mod display;
 pub mod emitter;
 pub mod emulator;
 pub mod error;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use photoncard_driver::display::{DisplayAddress, DisplaySettings};
 use photoncard_driver::emulator::ChipKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::exr::SampleFormat;
@@ -196,6 +197,9 @@ pub(crate) struct RenderOptions {
     /// Write a tone-mapped PNG as well
     #[arg(long, value_name = "OUT.png")]
     pub(crate) preview: Option<PathBuf>,
+    /// Show tiles as they land, in tev or another viewer that speaks its protocol; port 14158 without one
+    #[arg(long, value_name = "HOST:PORT")]
+    display_server: Option<DisplayAddress>,
     /// Write what the render took, as JSON
     #[arg(long, value_name = "OUT.json")]
     pub(crate) stats: Option<PathBuf>,
@@ -359,7 +363,15 @@ impl RenderOptions {
             partial: Some(PartialSettings { path: self.partial_path(), resume: self.resume }),
             caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
             trace: self.trace.clone(),
+            display: self.display(),
         })
+    }
+
+    /// Where the picture is shown, by the name of its file.
+    fn display(&self) -> Option<DisplaySettings> {
+        let address = self.display_server.clone()?;
+        let image = self.output.file_name().unwrap_or(self.output.as_os_str());
+        Some(DisplaySettings { address, image: image.to_string_lossy().into_owned() })
     }
 
     /// Where finished tiles are kept until the picture is written.

@@ -12,6 +12,7 @@ use photoncard_shared::message::{self, FrameParameters, Radiance, Sampling};
 use serde_json::{Value, json};
 
 use super::{CardAddress, RenderError, cards};
+use crate::display::DisplaySettings;
 use crate::emulator::memory_model::CacheSettings;
 use crate::film::Window;
 use crate::link::LineFaults;
@@ -70,6 +71,8 @@ pub struct RenderSettings {
     /// Where finished tiles are kept until the picture is written; `None` to keep none. Not with the order `hilbert`, which has
     /// no finished tiles before the end.
     pub partial: Option<PartialSettings>,
+    /// Where tiles are shown as they land; `None` to show none.
+    pub display: Option<DisplaySettings>,
     /// The file that every read of the chip is written to. It takes one chip; without `caches` those of the default.
     pub trace: Option<PathBuf>,
 }
@@ -100,6 +103,7 @@ impl Default for RenderSettings {
             cards: vec![CardAddress::default()],
             faults: None,
             partial: None,
+            display: None,
             caches: None,
             trace: None,
         }
