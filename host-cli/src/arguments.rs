@@ -11,6 +11,7 @@ use photoncard_driver::film::Window;
 use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::photon::PhotonLayout;
+use photoncard_driver::preview::{ToneCurve, ToneMapping};
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
@@ -197,6 +198,19 @@ pub(crate) struct RenderOptions {
     /// Write a tone-mapped PNG as well
     #[arg(long, value_name = "OUT.png")]
     pub(crate) preview: Option<PathBuf>,
+    /// Exposure of that PNG in stops: radiance is doubled so often; or auto, which makes its log-average 0.18
+    #[arg(
+        long,
+        value_name = "EV",
+        requires = "preview",
+        default_value = "auto",
+        value_parser = exposure,
+        allow_negative_numbers = true
+    )]
+    exposure: Exposure,
+    /// What compresses the radiance of that PNG
+    #[arg(long = "tonemap", value_name = "CURVE", requires = "preview", default_value = "reinhard")]
+    tone_curve: ToneCurveOption,
     /// Show tiles as they land, in tev or another viewer that speaks its protocol; port 14158 without one
     #[arg(long, value_name = "HOST:PORT")]
     display_server: Option<DisplayAddress>,
@@ -324,6 +338,23 @@ enum SampleType {
     Float,
 }
 
+/// Tone curves of the PNG.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ToneCurveOption {
+    /// Nothing: what is above 1 is clipped
+    None,
+    /// Reinhard's extended curve of luminance, with the white point 4; it keeps hues
+    Reinhard,
+    /// Narkowicz' fit of the filmic curve of ACES, of each channel
+    Aces,
+}
+
+#[derive(Clone, Copy)]
+enum Exposure {
+    Auto,
+    Stops(f32),
+}
+
 #[derive(Clone, Copy)]
 enum MaxDistance {
     Auto,
@@ -391,6 +422,21 @@ impl RenderOptions {
         self.radiance.to_possible_value().map(|value| value.get_name().to_owned())
     }
 
+    /// How the PNG shows radiance.
+    pub(crate) fn tone_mapping(&self) -> ToneMapping {
+        ToneMapping {
+            exposure: match self.exposure {
+                Exposure::Auto => None,
+                Exposure::Stops(stops) => Some(stops),
+            },
+            curve: match self.tone_curve {
+                ToneCurveOption::None => ToneCurve::None,
+                ToneCurveOption::Reinhard => ToneCurve::Reinhard,
+                ToneCurveOption::Aces => ToneCurve::Aces,
+            },
+        }
+    }
+
     /// The type of the picture's samples.
     pub(crate) fn sample_format(&self) -> SampleFormat {
         match self.sample_type {
@@ -432,6 +478,14 @@ fn ic_error(text: &str) -> Result<f32, String> {
         _ => Err(format!(
             "an error is a share of the irradiance, {LEAST_IRRADIANCE_ERROR} to 1, such as 0.025"
         )),
+    }
+}
+
+fn exposure(text: &str) -> Result<Exposure, String> {
+    match text.parse() {
+        _ if text == "auto" => Ok(Exposure::Auto),
+        Ok(stops) if f32::is_finite(stops) => Ok(Exposure::Stops(stops)),
+        _ => Err("an exposure is a number of stops, such as -1.5, or auto".into()),
     }
 }
 

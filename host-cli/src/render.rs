@@ -122,7 +122,8 @@ fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Renderi
     exr::write(&options.output, &rendering.film, &provenance, options.sample_format())
         .map_err(|error| Failure::work_error(&error))?;
     if let Some(path) = &options.preview {
-        preview::write_png(path, &rendering.film, None).map_err(|error| Failure::work_error(&error))?;
+        preview::write_png(path, &rendering.film, options.tone_mapping())
+            .map_err(|error| Failure::work_error(&error))?;
     }
     if let Some(path) = &options.stats {
         let text = serde_json::to_string_pretty(&rendering.statistics)

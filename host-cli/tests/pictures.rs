@@ -11,6 +11,28 @@ fn picture(room: &Room, name: &str) -> RgbImage {
 }
 
 #[test]
+fn exposure_and_tone_curve_change_the_preview_alone() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let preview = |options: &[&str]| {
+        let options = [&["-o", "a.exr", "--preview", "a.png"], options].concat();
+        room.rendered("scene.gltf", &options);
+        (room.read("a.exr"), room.read("a.png"))
+    };
+    let (picture, plain) = preview(&[]);
+    assert_eq!((picture.clone(), plain.clone()), preview(&["--exposure=auto", "--tonemap=reinhard"]));
+    for option in ["--exposure=-2.5", "--tonemap=none", "--tonemap=aces"] {
+        let (same, other) = preview(&[option]);
+        assert_eq!(same, picture);
+        assert_ne!(other, plain, "{option}");
+    }
+    for options in [&["--exposure=inf", "--preview=a.png"] as &[_], &["--exposure=1"], &["--tonemap=aces"]] {
+        let outcome = room.render("scene.gltf", &[&["-o", "a.exr"], options].concat());
+        assert_eq!(outcome.status, Some(2), "{options:?}");
+    }
+}
+
+#[test]
 fn a_render_writes_picture_preview_and_statistics() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
