@@ -2,7 +2,6 @@
 #![forbid(unsafe_code)]
 
 pub mod bvh;
-pub mod channel;
 pub mod difference;
 pub mod display;
 pub mod emitter;
@@ -11,6 +10,7 @@ pub mod error;
 pub mod exr;
 pub mod film;
 mod fold;
+pub mod layer;
 pub mod link;
 pub mod output;
 pub mod pack;

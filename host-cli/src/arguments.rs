@@ -1,20 +1,20 @@
 //! The arguments of every command, and what they mean.
 
+mod picture;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use photoncard_driver::display::{DisplayAddress, DisplaySettings};
 use photoncard_driver::emulator::ChipKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
-use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
 use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::photon::PhotonLayout;
-use photoncard_driver::preview::{ToneCurve, ToneMapping};
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
+pub(crate) use self::picture::PictureOptions;
 use crate::study::StudyArguments;
 
 /// Global illumination by photon mapping on small rendering chips.
@@ -104,7 +104,7 @@ impl CardKind {
 pub(crate) struct RenderOptions {
     /// A glTF 2.0 file, .gltf or .glb
     pub(crate) scene: PathBuf,
-    /// The picture, an EXR file: linear RGB radiance with albedo, N and Z layers
+    /// The picture, an EXR file: linear RGB radiance and the layers of --aov
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: PathBuf,
     /// Width and height of the picture, pixels
@@ -143,9 +143,10 @@ pub(crate) struct RenderOptions {
     /// Samples a pixel
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     spp: u32,
-    /// Side of a tile, pixels
-    #[arg(long, default_value_t = 16, allow_negative_numbers = true)]
-    tile: u32,
+    /// Side of a tile, pixels [default: 16; 8 with direct, indirect, caustic or gathers in --aov, but on cards of the kind
+    /// emulated]
+    #[arg(long, allow_negative_numbers = true)]
+    tile: Option<u32>,
     /// What the directions of gather rays are chosen by; it never changes what the picture converges to
     #[arg(long, default_value = "combined")]
     sampling: SamplingOption,
@@ -192,28 +193,8 @@ pub(crate) struct RenderOptions {
     /// Threads of the host's own work [default: a thread a core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
-    /// Type of the picture's samples; depth is always float
-    #[arg(long, default_value = "float")]
-    sample_type: SampleType,
-    /// Write a tone-mapped PNG as well
-    #[arg(long, value_name = "OUT.png")]
-    pub(crate) preview: Option<PathBuf>,
-    /// Exposure of that PNG in stops: radiance is doubled so often; or auto, which makes its log-average 0.18
-    #[arg(
-        long,
-        value_name = "EV",
-        requires = "preview",
-        default_value = "auto",
-        value_parser = exposure,
-        allow_negative_numbers = true
-    )]
-    exposure: Exposure,
-    /// What compresses the radiance of that PNG
-    #[arg(long = "tonemap", value_name = "CURVE", requires = "preview", default_value = "reinhard")]
-    tone_curve: ToneCurveOption,
-    /// Show tiles as they land, in tev or another viewer that speaks its protocol; port 14158 without one
-    #[arg(long, value_name = "HOST:PORT")]
-    display_server: Option<DisplayAddress>,
+    #[command(flatten)]
+    pub(crate) picture: PictureOptions,
     /// Write what the render took, as JSON
     #[arg(long, value_name = "OUT.json")]
     pub(crate) stats: Option<PathBuf>,
@@ -332,29 +313,6 @@ enum Switch {
     Off,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum SampleType {
-    Half,
-    Float,
-}
-
-/// Tone curves of the PNG.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ToneCurveOption {
-    /// Nothing: what is above 1 is clipped
-    None,
-    /// Reinhard's extended curve of luminance, with the white point 4; it keeps hues
-    Reinhard,
-    /// Narkowicz' fit of the filmic curve of ACES, of each channel
-    Aces,
-}
-
-#[derive(Clone, Copy)]
-enum Exposure {
-    Auto,
-    Stops(f32),
-}
-
 #[derive(Clone, Copy)]
 enum MaxDistance {
     Auto,
@@ -365,6 +323,7 @@ impl RenderOptions {
     /// The settings that the options stand for; a text that says why not.
     pub(crate) fn settings(&self) -> Result<RenderSettings, String> {
         let emulated = || "emulated".parse();
+        let cards = if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() };
         Ok(RenderSettings {
             width: self.size.0,
             height: self.size.1,
@@ -381,7 +340,8 @@ impl RenderOptions {
             gather_rays: self.gather_rays,
             shadow_rays: self.shadow_rays,
             samples: self.spp,
-            tile: self.tile,
+            tile: self.tile.unwrap_or_else(|| RenderSettings::default_tile(&self.picture.aov, &cards)),
+            layers: self.picture.aov.clone(),
             sampling: self.sampling.sampling(),
             radiance: self.radiance.radiance(),
             irradiance_error: (self.irradiance_cache == Switch::On && self.gather_rays > 0)
@@ -389,20 +349,13 @@ impl RenderOptions {
             order: self.order.gather_order(),
             bins: self.bins,
             queue: self.queue,
-            cards: if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() },
+            cards,
             faults: self.faults,
             partial: Some(PartialSettings { path: self.partial_path(), resume: self.resume }),
             caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
             trace: self.trace.clone(),
-            display: self.display(),
+            display: self.picture.display(&self.output),
         })
-    }
-
-    /// Where the picture is shown, by the name of its file.
-    fn display(&self) -> Option<DisplaySettings> {
-        let address = self.display_server.clone()?;
-        let image = self.output.file_name().unwrap_or(self.output.as_os_str());
-        Some(DisplaySettings { address, image: image.to_string_lossy().into_owned() })
     }
 
     /// Where finished tiles are kept until the picture is written.
@@ -420,29 +373,6 @@ impl RenderOptions {
     /// What tells radiance, as it was given.
     pub(crate) fn radiance_name(&self) -> Option<String> {
         self.radiance.to_possible_value().map(|value| value.get_name().to_owned())
-    }
-
-    /// How the PNG shows radiance.
-    pub(crate) fn tone_mapping(&self) -> ToneMapping {
-        ToneMapping {
-            exposure: match self.exposure {
-                Exposure::Auto => None,
-                Exposure::Stops(stops) => Some(stops),
-            },
-            curve: match self.tone_curve {
-                ToneCurveOption::None => ToneCurve::None,
-                ToneCurveOption::Reinhard => ToneCurve::Reinhard,
-                ToneCurveOption::Aces => ToneCurve::Aces,
-            },
-        }
-    }
-
-    /// The type of the picture's samples.
-    pub(crate) fn sample_format(&self) -> SampleFormat {
-        match self.sample_type {
-            SampleType::Half => SampleFormat::Half,
-            SampleType::Float => SampleFormat::Float,
-        }
     }
 }
 
@@ -478,14 +408,6 @@ fn ic_error(text: &str) -> Result<f32, String> {
         _ => Err(format!(
             "an error is a share of the irradiance, {LEAST_IRRADIANCE_ERROR} to 1, such as 0.025"
         )),
-    }
-}
-
-fn exposure(text: &str) -> Result<Exposure, String> {
-    match text.parse() {
-        _ if text == "auto" => Ok(Exposure::Auto),
-        Ok(stops) if f32::is_finite(stops) => Ok(Exposure::Stops(stops)),
-        _ => Err("an exposure is a number of stops, such as -1.5, or auto".into()),
     }
 }
 

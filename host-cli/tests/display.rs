@@ -126,6 +126,7 @@ fn a_viewer_has_the_picture_of_the_file() {
         &["--size=20x12", "--tile=8"] as &[_],
         &["--size=20x12", "--tile=8", "--crop=3,17,2,11", "--order=naive"],
         &["--size=20x12", "--tile=8", "--order=hilbert"],
+        &["--size=20x12", "--tile=8", "--aov=all"],
     ] {
         let (address, viewing) = viewer();
         let address = address.to_string();
@@ -139,6 +140,7 @@ fn a_viewer_has_the_picture_of_the_file() {
             ("out.exr", picture.width, picture.height)
         );
         assert!(viewed.updates > 2);
+        assert_eq!(viewed.channels.len(), if options.contains(&"--aov=all") { 20 } else { 10 });
         for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
             assert_eq!(viewed.channels[channel], name);
             let pixels: Vec<f32> = picture.pixels.iter().map(|pixel| pixel[channel]).collect();

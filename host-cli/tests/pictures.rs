@@ -11,6 +11,36 @@ fn picture(room: &Room, name: &str) -> RgbImage {
 }
 
 #[test]
+fn layers_are_asked_for_by_name_and_leave_the_picture_as_it_is() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let of_options = |options: &[&str]| {
+        room.rendered("scene.gltf", &[&["-o", "a.exr"], options].concat());
+        (picture(&room, "a.exr"), room.read("a.exr"))
+    };
+    let (plain, bytes) = of_options(&[]);
+    assert_eq!(of_options(&["--aov=Z,N,albedo"]).1, bytes);
+    let mut sizes = vec![bytes.len()];
+    for list in ["all", "none", "direct,gathers"] {
+        for card in ["emulated:2", "emulated-micro:2"] {
+            let (same, other) = of_options(&["--aov", list, "--card", card]);
+            assert!(same == plain, "{list}");
+            sizes.push(other.len());
+        }
+    }
+    // What is asked for is in the file, and nothing else.
+    let [default, all, again, none, _, some, _] = sizes[..] else { panic!("{sizes:?}") };
+    assert!(all == again && all > default && none < some && none < default, "{sizes:?}");
+
+    let outcome = room.render("scene.gltf", &["-o", "b.exr", "--aov=all", "--tile=33", "--card=emulated:1"]);
+    assert_eq!(outcome.status, Some(2));
+    assert!(outcome.stderr.contains("32 or less") && outcome.stderr.contains("--aov"), "{}", outcome.stderr);
+    let outcome = room.render("scene.gltf", &["-o", "b.exr", "--aov=depth"]);
+    assert_eq!(outcome.status, Some(2));
+    assert!(outcome.stderr.contains("direct,indirect,caustic,albedo,N,Z,gathers"), "{}", outcome.stderr);
+}
+
+#[test]
 fn exposure_and_tone_curve_change_the_preview_alone() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());

@@ -10,8 +10,8 @@ use photoncard_shared::message::Tile;
 use super::packet::{create_image, update_image};
 use super::state::{SharedState, State};
 use super::{DisplayAddress, DisplayError};
-use crate::channel::Channel;
 use crate::film::{Film, Window};
+use crate::layer::Channel;
 
 /// How long a connection may take to be made.
 const CONNECT_WAIT: Duration = Duration::from_secs(2);
@@ -99,7 +99,7 @@ impl Display {
     pub(super) fn packet(&self, tile: &Tile, film: &Film) -> Vec<u8> {
         let Tile { x, y, width, height, .. } = *tile;
         let places = (y..y + height).flat_map(|row| (x..x + width).map(move |column| (column, row)));
-        let pixels = places.map(|(x, y)| film.pixel(x, y).copied().unwrap_or_default());
+        let pixels = places.map(|(x, y)| film.all_at(x, y).unwrap_or_default());
         let values =
             pixels.flat_map(|pixel| self.channels.iter().map(move |channel| (channel.value)(&pixel)));
         let shown =

@@ -8,8 +8,8 @@ use rustix::net::sockopt;
 
 use super::packet::create_image;
 use super::*;
-use crate::channel::COLOUR;
 use crate::film::{Film, PixelValue, Window};
+use crate::layer::Layers;
 
 /// A film of `tiles` tiles of 64 x 64 in a column, cropped out of a larger picture.
 fn film(tiles: u32) -> (Film, Vec<Tile>) {
@@ -56,7 +56,7 @@ fn every_tile_is_shown_though_few_have_room_to_wait() {
         thread::sleep(Duration::from_millis(200));
         packets(listener.accept().unwrap().0)
     });
-    let display = Display::with_room_for(100_000, &settings, film.window(), &COLOUR);
+    let display = Display::with_room_for(100_000, &settings, film.window(), Layers::colour());
     shown(&display, &film, &tiles);
     assert!(display.failure().is_none());
     let mut expected = vec![create_image("film", [64, 576], &["R", "G", "B"])];
@@ -70,7 +70,7 @@ fn a_display_that_never_reads_holds_nothing_up_for_long() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     sockopt::set_socket_recv_buffer_size(&listener, 4096).unwrap();
     let (film, tiles) = film(400);
-    let display = Display::open(&settings(&listener), film.window(), &COLOUR);
+    let display = Display::open(&settings(&listener), film.window(), Layers::colour());
     let took = shown(&display, &film, &tiles);
     assert!(took < Duration::from_secs(10), "{took:?}");
     assert!(matches!(display.failure(), Some(DisplayError::Slow { packets, .. }) if packets > 0));
@@ -88,7 +88,7 @@ fn a_display_that_goes_away_is_told_of_once() {
         let (mut stream, _) = listener.accept().unwrap();
         stream.read_exact(&mut [0; 100]).unwrap();
     });
-    let display = Display::open(&settings, film.window(), &COLOUR);
+    let display = Display::open(&settings, film.window(), Layers::colour());
     assert!(shown(&display, &film, &tiles) < Duration::from_secs(10));
     viewer.join().unwrap();
     assert!(matches!(display.failure(), Some(DisplayError::Gone { .. })));
@@ -99,7 +99,7 @@ fn a_display_that_goes_away_is_told_of_once() {
 fn a_display_that_is_not_there_is_told_of_once() {
     let settings = settings(&TcpListener::bind("127.0.0.1:0").unwrap());
     let (film, tiles) = film(1);
-    let display = Display::open(&settings, film.window(), &COLOUR);
+    let display = Display::open(&settings, film.window(), Layers::colour());
     assert!(shown(&display, &film, &tiles) < Duration::from_secs(10));
     let said = display.failure().unwrap().to_string();
     assert!(said.contains(&settings.address.to_string()) && said.contains("--display-server"), "{said}");

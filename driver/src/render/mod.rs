@@ -28,7 +28,6 @@ use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{FrameParameters, Tile};
 
 use self::cards::{Cards, Outcome};
-use crate::channel::COLOUR;
 use crate::display::{Display, DisplayError};
 use crate::emitter::Emitters;
 use crate::emulator::trace::TraceFile;
@@ -121,7 +120,7 @@ pub fn render(
         settings.check(&budget)?;
     }
     // Not before the settings are known to be possible: a film may be large.
-    let mut film = Film::new(settings.width, settings.height, settings.window())?;
+    let mut film = settings.film()?;
     let partial = begin_partial(scene, settings, &mut film, observer)?;
     let mut all = tiles(settings.window(), settings.tile, settings.order);
     let count = all.len();
@@ -165,7 +164,7 @@ fn render_whole_frame(
     settings.check_resume()?;
     let chips = cards::reference_chips(&settings.cards)?;
     settings.check(&REFERENCE)?;
-    let mut film = Film::new(settings.width, settings.height, settings.window())?;
+    let mut film = settings.film()?;
     let partial = begin_partial(scene, settings, &mut film, observer)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, std::iter::once(REFERENCE), &mut times, observer)?;
@@ -210,7 +209,7 @@ fn begin_partial(
 
 /// Begins to show the picture, with the tiles that are there, if the settings say so.
 fn open_display(settings: &RenderSettings, film: &Film, tiles: &[Tile]) -> Option<Display> {
-    let display = Display::open(settings.display.as_ref()?, film.window(), &COLOUR);
+    let display = Display::open(settings.display.as_ref()?, film.window(), &settings.layers.channels());
     tiles.iter().filter(|tile| film.has(tile)).for_each(|tile| display.show(tile, film));
     Some(display)
 }

@@ -2,13 +2,12 @@
 
 use core::ops::Range;
 
-use glam::Vec3;
 use photoncard_shared::budget::MOST_GATHER_RAYS;
 use photoncard_shared::message::{Fault, FrameParameters};
 
+use super::light::{Component, add_light, count_gather};
 use super::position::Stage;
 use super::{Chip, allowed_error};
-use crate::fixed_point::ColourSum;
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::SeenSample;
 use crate::memory::{MemoryPort, Stage as MemoryStage};
@@ -108,14 +107,6 @@ fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpo
     }
 }
 
-/// Adds light to the pixel that it is for, in radiance units.
-#[inline]
-pub(super) fn add_light(sums: &mut [ColourSum], target: u16, brought: Vec3) {
-    if let Some(sum) = sums.get_mut(target as usize) {
-        sum.add_light(brought);
-    }
-}
-
 impl<
     const TILE_PIXELS: usize,
     const CANDIDATES: usize,
@@ -133,6 +124,9 @@ impl<
             let surface = eye::surface(context, place, &seen)?;
             let purpose = self.light_at_once(context, index, at, place, &surface);
             let mut point = pixel_point(context.frame, at, surface, purpose);
+            if purpose == Purpose::Sample && point.rays > 0 {
+                count_gather(&mut self.sums, context.frame, index);
+            }
             point.choose_directions(context, self.gathers.candidates.view())?;
             stored = StoredPoint { seen, directions: point.directions, rays: StoredRays::new(&point) };
         }
@@ -161,9 +155,12 @@ impl<
         let interpolated = allowed.and_then(|allowed| self.cache.interpolate(&sample, allowed));
         context.counters.lambertian_samples += u64::from(is_lambertian);
         context.counters.interpolated_samples += u64::from(interpolated.is_some());
-        let reflected = interpolated.map_or(Vec3::ZERO, |light| surface.reflection.diffuse * light);
-        add_light(&mut self.sums, index as u16, (surface.emission + reflected) * sample_share(context));
-        if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample }
+        let (share, target) = (sample_share(context), index as u16);
+        add_light(&mut self.sums, frame, target, Component::Direct, surface.emission * share);
+        let Some(light) = interpolated else { return Purpose::Sample };
+        let reflected = surface.reflection.diffuse * light;
+        add_light(&mut self.sums, frame, target, Component::Indirect, reflected * share);
+        Purpose::Lobe
     }
 
     /// What shadow rays bring the present pixel.
@@ -174,7 +171,8 @@ impl<
             && let Some(point) = stored.restore(context, at)?
         {
             let reflected = direct::reflected(context, at, &point)?;
-            add_light(&mut self.sums, index as u16, reflected * sample_share(context));
+            let light = reflected * sample_share(context);
+            add_light(&mut self.sums, context.frame, index as u16, Component::Direct, light);
         }
         if self.position.next_index(self.block.pixels()) {
             self.position.stage = Stage::Rays;
@@ -211,7 +209,7 @@ impl<
                 // A tile has at most TILE_PIXELS pixels, which 16 bits tell apart.
                 let end = final_gather::cast(context, &point, index as u16, share, ray)?;
                 let Some(end) = end else { continue };
-                add_light(sums, index as u16, end.direct);
+                add_light(sums, frame, index as u16, Component::Direct, end.direct);
                 match (end.request, &mut context.outlet) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => {
@@ -219,7 +217,7 @@ impl<
                     }
                     (Some(request), None) => {
                         gathers.submit(context, request, &mut |request, brought| {
-                            add_light(sums, request.target, brought);
+                            add_light(sums, frame, request.target, Component::Indirect, brought);
                         })?;
                     }
                 }

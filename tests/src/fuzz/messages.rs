@@ -39,6 +39,7 @@ pub(super) fn frame() -> FrameParameters {
         drain: Drain::Sort,
         queue: 1024,
         radiance: Radiance::Precomputed,
+        layers: false,
     }
 }
 
