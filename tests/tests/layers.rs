@@ -1,6 +1,6 @@
 //! Layers: they add up to the picture, do not change it, and are what they say.
 
-use photoncard_driver::film::{Film, FilmPixel, PixelLayers};
+use photoncard_driver::film::{Film, FilmPixel, PixelLayers, PixelValue};
 use photoncard_driver::layer::Layers;
 use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, RenderError, RenderSettings, Rendering, Unobserved, render};
@@ -33,7 +33,7 @@ fn settings() -> RenderSettings {
 
 /// The bits of all that every film has.
 fn picture_bits(film: &Film) -> Vec<u8> {
-    film.pixels().iter().flat_map(|pixel| pixel.to_bytes()).collect()
+    film.pixels().iter().flat_map(PixelValue::to_bytes).collect()
 }
 
 /// The bits of layers.
