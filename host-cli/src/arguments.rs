@@ -117,7 +117,7 @@ pub(crate) struct RenderOptions {
     /// Name of the camera [default: the first of the file]
     #[arg(long)]
     camera: Option<String>,
-    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, emission or exponent; may be repeated
+    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness or emission; may be repeated
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
     /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or OpenEXR (.exr) picture whose middle is -z and top is y;
