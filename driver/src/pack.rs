@@ -129,7 +129,7 @@ impl PackedScene {
         packed.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
         packed.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
         packed.append(SectionKind::Attributes, corners.records.iter().map(layout::Attributes::to_bytes))?;
-        packed.append(SectionKind::Materials, scene.materials.iter().map(materials::record))?;
+        packed.append(SectionKind::Materials, materials::records(scene, &lights).into_iter())?;
         packed.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
         packed.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;
         let place = |triangle: usize| places.get(triangle).copied().unwrap_or(0);

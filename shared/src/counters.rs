@@ -72,6 +72,17 @@ impl Counters {
         most_waiting: 0,
     };
 
+    /// Counts a search for the nearest photons: those that were tested, that became candidates, that selections of the nearest
+    /// went through, and that were found.
+    #[inline(always)]
+    pub fn count_gather(&mut self, tested: u32, taken: u32, selected: u32, found: u32) {
+        self.gathers += 1;
+        self.photons_tested += u64::from(tested);
+        self.photons_taken += u64::from(taken);
+        self.photons_selected += u64::from(selected);
+        self.photons_found += u64::from(found);
+    }
+
     /// Rays of any kind, gathers and lookups of irradiance, together.
     #[inline(always)]
     pub fn rays_and_gathers(&self) -> u64 {

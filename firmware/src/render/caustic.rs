@@ -4,10 +4,11 @@
 use glam::Vec3;
 use photoncard_shared::message::{CausticGather, Fault};
 
+use super::final_gather::search;
 use super::{Context, GatherPoint};
 use crate::gather::PartialReflection;
 use crate::memory::{MemoryPort, Stage};
-use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, reflected_radiance};
+use crate::photon::{Candidates, NearestPhotons, PhotonMap, reflected_radiance};
 
 /// Radiance that a point reflects of the light of caustics, in the image's radiance units.
 ///
@@ -27,7 +28,7 @@ pub fn reflected<M: MemoryPort>(
     context.counters.caustic_gathers += 1;
     let position = point.surface.position;
     let mut nearest = NearestPhotons::new(candidates, neighbors, max_distance);
-    gather(context.scene, context.memory, PhotonMap::Caustics, position, &mut nearest)?;
+    search(context, PhotonMap::Caustics, position, &mut nearest)?;
     let header = &context.scene.header;
     let unit = header.caustic_power_unit / header.radiance_unit;
     let surface = point.surface.flat();

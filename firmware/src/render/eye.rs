@@ -3,12 +3,12 @@
 use glam::Vec3;
 use photoncard_shared::message::Fault;
 
-use super::specular_path::{PathEnd, follow};
+use super::specular_path::{Carried, PathEnd, SpecularPath};
 use super::{Context, PixelSample};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::light::environment_radiance;
-use crate::scene::{Ray, Seen, Surface, closest_hit};
+use crate::scene::{Ray, Seen, Surface, closest_hit, read_surface};
 use crate::vector::unit;
 
 /// The place of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over
@@ -66,22 +66,31 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
         0 => pattern.point(pattern.index_in_all(0, sample, samples), samples)[0],
         _ => pattern.choice(sample, bounce),
     };
-    let (path, end) = follow(context, ray, random)?;
-    let (surface, seen) = match end {
-        PathEnd::Surface(surface, seen) => (surface, seen),
-        PathEnd::Escaped => {
-            let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
-            return Ok(Sight::Background(radiance * path.throughput));
-        }
-        PathEnd::Lost => return Ok(Sight::Background(Vec3::ZERO)),
+    let mut path = SpecularPath::new(ray, Carried::Radiance);
+    let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
+        return background(context, &path);
     };
-    let is_direct = path.bounces == 0 && surface.specular.is_none();
+    let mut surface = read_surface(context.scene, context.memory, &ray, &hit)?;
+    let is_direct = surface.specular.is_none();
+    if !is_direct {
+        match path.follow(context, &mut surface, &mut hit, &random)? {
+            PathEnd::Surface => {}
+            PathEnd::Escaped => return background(context, &path),
+            PathEnd::Lost => return Ok(Sight::Background(Vec3::ZERO)),
+        }
+    }
     let along_axis = ray.direction.dot(context.frame.camera.forward.into());
     Ok(Sight::Surface(View {
         depth: if is_direct { depth(context, &surface) } else { path.first_distance * along_axis },
         surface: surface.dimmed(path.throughput),
-        seen: is_direct.then_some(seen),
+        seen: is_direct.then(|| Seen::new(&hit)),
     }))
+}
+
+/// The environment at the end of a path that left the scene.
+fn background<M: MemoryPort>(context: &mut Context<M>, path: &SpecularPath) -> Result<Sight, Fault> {
+    let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
+    Ok(Sight::Background(radiance * path.throughput))
 }
 
 /// What the eye ray at a place of the picture meets.

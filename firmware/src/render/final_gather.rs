@@ -6,13 +6,14 @@
 use glam::Vec3;
 use photoncard_shared::message::{Fault, Radiance};
 
-use super::specular_path::{PathEnd, follow};
+use super::specular_path::{Carried, PathEnd, SpecularPath};
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, PartialReflection, Place};
+use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
-use crate::scene::Ray;
 use crate::scene::light::environment_radiance;
+use crate::scene::{Ray, closest_hit, read_surface};
 
 /// What the end of a final gather ray brings.
 #[derive(Clone, Copy, Debug)]
@@ -44,30 +45,29 @@ pub fn cast<M: MemoryPort>(
     };
     let ray = Ray::new(point.surface.offset_origin(), sampled.direction);
     context.counters.gather_rays += 1;
-    let (path, end) = follow(context, ray, |bounce| point.pattern.choice(index, bounce))?;
+    let mut path = SpecularPath::new(ray, Carried::Radiance);
     // The mean is taken here, so that the sum stays small.
-    let weight = sampled.weight * path.throughput * (share / point.rays as f32);
-    // What has come through specular surfaces is brought neither by shadow rays nor, without them, by photons of caustics.
-    let beyond_specular = if context.frame.caustics.is_none() { 1.0 } else { 0.0 };
-    let unit = 1.0 / context.scene.header.radiance_unit;
-    let met = match end {
-        PathEnd::Surface(met, _) => met.flat(),
-        PathEnd::Escaped if context.scene.header.lights.texture.is_some() => {
-            let emitted = if path.bounces == 0 {
-                direct::escaped(context, point, path.ray.direction, sampled.density)?
-            } else {
-                environment_radiance(context.scene, context.memory, path.ray.direction)? * beyond_specular
-            };
-            let direct = emitted * weight * unit;
-            return Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }));
-        }
-        PathEnd::Escaped | PathEnd::Lost => return Ok(None),
+    let weight = sampled.weight * (share / point.rays as f32);
+    let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
+        return escaped(context, point, &path, &sampled, weight);
     };
+    let mut met = read_surface(context.scene, context.memory, &ray, &hit)?;
+    if !met.specular.is_none() {
+        let random = |bounce| point.pattern.choice(index, bounce);
+        match path.follow(context, &mut met, &mut hit, &random)? {
+            PathEnd::Surface => {}
+            PathEnd::Escaped => return escaped(context, point, &path, &sampled, weight),
+            PathEnd::Lost => return Ok(None),
+        }
+    }
+    met.normal = met.geometric_normal;
+    let weight = weight * path.throughput;
     let emitted = if path.bounces == 0 {
         direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density)?
     } else {
-        met.emission * beyond_specular
+        met.emission * beyond_specular(context)
     };
+    let unit = 1.0 / context.scene.header.radiance_unit;
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
         place: Place::new(&header.photon_grid, met.position.to_array()),
@@ -80,6 +80,33 @@ pub fn cast<M: MemoryPort>(
         cell: sampled.cell,
     });
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct: emitted * weight * unit, request }))
+}
+
+/// What a gather ray brings of the environment, if there is one, where it leaves the scene.
+#[inline(never)]
+fn escaped<M: MemoryPort>(
+    context: &mut Context<M>,
+    point: &GatherPoint,
+    path: &SpecularPath,
+    sampled: &GatherDirection,
+    weight: Vec3,
+) -> Result<Option<GatherRayEnd>, Fault> {
+    if context.scene.header.lights.texture.is_none() {
+        return Ok(None);
+    }
+    let emitted = if path.bounces == 0 {
+        direct::escaped(context, point, path.ray.direction, sampled.density)?
+    } else {
+        environment_radiance(context.scene, context.memory, path.ray.direction)? * beyond_specular(context)
+    };
+    let direct = emitted * weight * path.throughput * (1.0 / context.scene.header.radiance_unit);
+    Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
+}
+
+/// The share of emitted light that gather rays bring by way of perfectly specular surfaces: no shadow ray brings any, but
+/// photons of caustics do, if there are any.
+fn beyond_specular<M>(context: &Context<M>) -> f32 {
+    if context.frame.caustics.is_none() { 1.0 } else { 0.0 }
 }
 
 /// Does a gather: what it adds to its target, in the image's radiance units.
@@ -113,7 +140,7 @@ fn irradiance<M: MemoryPort>(context: &mut Context<M>, position: Vec3, normal: u
 
 /// The frame's number of photons nearest to a place.
 #[inline(always)]
-pub(super) fn nearest_photons<'a, M: MemoryPort>(
+fn nearest_photons<'a, M: MemoryPort>(
     context: &mut Context<M>,
     position: Vec3,
     candidates: Candidates<'a>,
@@ -121,10 +148,18 @@ pub(super) fn nearest_photons<'a, M: MemoryPort>(
     let frame = context.frame;
     let mut nearest = NearestPhotons::new(candidates, frame.neighbors, frame.max_distance);
     let tested = gather(context.scene, context.memory, PhotonMap::Indirect, position, &mut nearest)?;
-    context.counters.gathers += 1;
-    context.counters.photons_tested += tested as u64;
-    context.counters.photons_taken += nearest.taken() as u64;
-    context.counters.photons_selected += nearest.selected() as u64;
-    context.counters.photons_found += nearest.len() as u64;
+    context.counters.count_gather(tested, nearest.taken(), nearest.selected(), nearest.len() as u32);
     Ok(nearest)
+}
+
+/// The photons of a map nearest to a place, as many as `nearest` looks for: for gathers at the points that the eye sees. They are
+/// few, and have the code in common.
+#[inline(never)]
+pub(super) fn search<M: MemoryPort>(
+    context: &mut Context<M>,
+    map: PhotonMap,
+    position: Vec3,
+    nearest: &mut NearestPhotons,
+) -> Result<u32, Fault> {
+    gather(context.scene, context.memory, map, position, nearest)
 }

@@ -5,10 +5,10 @@ use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{Fault, Sampling};
 
 use super::Context;
-use super::final_gather::nearest_photons;
+use super::final_gather::search;
 use crate::importance::{DirectionTable, IncidentFlux, Reflector};
 use crate::memory::{MemoryPort, Stage};
-use crate::photon::Candidates;
+use crate::photon::{Candidates, NearestPhotons, PhotonMap};
 use crate::sampler::Pattern;
 use crate::scene::{Reflection, Surface};
 use crate::vector::max_component;
@@ -91,7 +91,10 @@ impl GatherPoint {
             context.counters.tables += 1;
             context.memory.enter(Stage::Table);
             let Surface { position, normal, geometric_normal, .. } = self.surface;
-            let nearest = nearest_photons(context, position, candidates)?;
+            let frame = context.frame;
+            let mut nearest = NearestPhotons::new(candidates, frame.neighbors, frame.max_distance);
+            let tested = search(context, PhotonMap::Indirect, position, &mut nearest)?;
+            context.counters.count_gather(tested, nearest.taken(), nearest.selected(), nearest.len() as u32);
             let colour = reflector.reflection.diffuse + reflector.reflection.specular;
             IncidentFlux::new(&nearest, normal, encode_normal(geometric_normal.to_array()), colour)
                 .table(sampling, &reflector)

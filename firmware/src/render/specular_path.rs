@@ -12,7 +12,7 @@ use photoncard_shared::message::Fault;
 
 use super::Context;
 use crate::memory::MemoryPort;
-use crate::scene::{Hit, Ray, Reflection, Seen, Surface, closest_hit, read_surface};
+use crate::scene::{Hit, Ray, Reflection, Surface, closest_hit, read_surface};
 use crate::vector::{max, max_component};
 
 /// A path on its way.
@@ -54,10 +54,10 @@ pub enum Arrival {
 }
 
 /// Where a path has ended.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathEnd {
-    /// On a surface, and where that is.
-    Surface(Surface, Seen),
+    /// On a surface.
+    Surface,
     /// Nowhere: it left the scene.
     Escaped,
     /// It was lost on its way.
@@ -120,43 +120,23 @@ impl SpecularPath {
     }
 }
 
-/// Follows a ray through perfectly specular surfaces to its end. `random` gives a number in [0, 1) for each bounce.
-///
-/// # Errors
-/// If the image is not sound.
-#[inline(always)]
-pub fn follow<M: MemoryPort>(
-    context: &mut Context<M>,
-    ray: Ray,
-    random: impl Fn(u32) -> f32,
-) -> Result<(SpecularPath, PathEnd), Fault> {
-    let mut path = SpecularPath::new(ray, Carried::Radiance);
-    // Most rays meet no such surface: those that do go a longer way.
-    let Some(hit) = closest_hit(context.scene, context.memory, &ray)? else {
-        return Ok((path, PathEnd::Escaped));
-    };
-    let surface = read_surface(context.scene, context.memory, &ray, &hit)?;
-    let end = if surface.specular.is_none() {
-        PathEnd::Surface(surface, Seen::new(&hit))
-    } else {
-        path.follow_from(context, surface, hit, &random)?
-    };
-    Ok((path, end))
-}
-
 impl SpecularPath {
-    /// Follows the path from a surface that it has come to.
+    /// Follows the path from a perfectly specular surface that it has come to, to its end: what is met there takes the place of
+    /// `surface` and `hit`. `random` gives a number in [0, 1) for each bounce.
+    ///
+    /// # Errors
+    /// If the image is not sound.
     #[inline(never)]
-    fn follow_from<M: MemoryPort>(
+    pub fn follow<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
-        mut surface: Surface,
-        mut hit: Hit,
+        surface: &mut Surface,
+        hit: &mut Hit,
         random: &dyn Fn(u32) -> f32,
     ) -> Result<PathEnd, Fault> {
         loop {
-            match self.arrive(&surface, random(self.bounces)) {
-                Arrival::Ends => return Ok(PathEnd::Surface(surface, Seen::new(&hit))),
+            match self.arrive(surface, random(self.bounces)) {
+                Arrival::Ends => return Ok(PathEnd::Surface),
                 Arrival::Lost => {
                     context.counters.lost_paths += 1;
                     return Ok(PathEnd::Lost);
@@ -165,8 +145,8 @@ impl SpecularPath {
             }
             let next = closest_hit(context.scene, context.memory, &self.ray)?;
             let Some(next) = next else { return Ok(PathEnd::Escaped) };
-            surface = read_surface(context.scene, context.memory, &self.ray, &next)?;
-            hit = next;
+            *hit = next;
+            *surface = read_surface(context.scene, context.memory, &self.ray, hit)?;
         }
     }
 }
