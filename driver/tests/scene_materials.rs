@@ -147,7 +147,6 @@ fn what_is_out_of_range_is_refused() {
             material["extensions"]["KHR_materials_transmission"] = json!({"transmissionFactor": 2});
         }),
         ("KHR_materials_ior", |material| {
-            material["extensions"]["KHR_materials_transmission"] = json!({"transmissionFactor": 1});
             material["extensions"]["KHR_materials_ior"] = json!({"ior": 0.5});
         }),
         ("KHR_materials_volume", |material| {

@@ -78,7 +78,7 @@ fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
 }
 
 /// A GLB of some JSON and bytes. What its header and chunks say of their lengths is true.
-fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
+pub(super) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let mut text = text.to_vec();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut file = b"glTF".to_vec();

@@ -96,6 +96,10 @@ impl VertexReader<'_, '_> {
         transforms: &[Cow<'_, Transform>; 3],
         triangle: &Triangle,
     ) -> Result<Option<Attributes>, SceneError> {
+        let is_mapped = self.primitive.coordinates.iter().any(Option::is_some);
+        if !is_mapped && self.primitive.normals.is_none() && self.primitive.colours.is_none() {
+            return Ok(None);
+        }
         let mut coordinates = Attributes::NONE.coordinates;
         for (set, coordinates) in coordinates.iter_mut().enumerate() {
             for (coordinate, corner) in coordinates.iter_mut().zip(corners) {
@@ -107,7 +111,6 @@ impl VertexReader<'_, '_> {
             coordinates,
             colours: corners.map(|corner| self.colour(corner)),
         };
-        let is_mapped = self.primitive.coordinates.iter().any(Option::is_some);
         Ok(Some(attributes).filter(|attributes| is_mapped || *attributes != Attributes::NONE))
     }
 
