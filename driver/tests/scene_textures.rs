@@ -1,4 +1,5 @@
-//! Textures arrive as texels, samplers and transforms; images that cannot be had are refused with the place and the remedy.
+//! Textures arrive as texels, samplers and transforms; images that cannot be had are refused with the place and the
+//! remedy.
 
 mod scene_support;
 
@@ -241,6 +242,15 @@ fn sizes_are_refused_by_the_header() {
         bytes[29..33].copy_from_slice(&(!crc).to_be_bytes());
         bytes
     };
+    // As many bytes as an image of one bit a texel may have, all of them missing: the sum is refused before.
+    let mut large = header(16_384, 16_384);
+    large.resize(1 << 16, 0);
+    let mut two = embedded(&large, "image/png");
+    let view = two.view(TEXEL);
+    push(&mut two.json, "images", json!({"bufferView": view}));
+    push(&mut two.json, "textures", json!({"source": 1}));
+    two.json["materials"][0]["emissiveTexture"] = json!({"index": 1});
+    check(&two.load().unwrap_err(), &["images[1]", "268435457 texels"]);
     for (size, part) in [
         ([1, 100_000], "1 x 100000 texels, more than 16384"),
         ([16_385, 1], "16385 x 1"),

@@ -60,7 +60,7 @@ fn load_one(
     let reflection = if let Some(phong) = read_phong(document, index, source, &name)? {
         let (specular, exponent) = (Vec3::from(phong.specular), phong.exponent);
         Reflection::Phong { diffuse: base_colour, specular, exponent }
-    } else if is_lambertian {
+    } else if is_lambertian && !is_transmissive(source) {
         Reflection::Phong { diffuse: base_colour, specular: Vec3::ZERO, exponent: 0.0 }
     } else {
         metallic_roughness(source, base_colour)
@@ -169,6 +169,12 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
         // What reflects everything transmits nothing.
         transmission: if ior == 0.0 { None } else { transmission(extensions, ior) },
     }
+}
+
+/// Whether light passes the material's surface.
+pub(super) fn is_transmissive(material: &json::Material) -> bool {
+    let transmission = material.extensions.as_ref().and_then(|extensions| extensions.transmission.as_ref());
+    transmission.is_some_and(|transmission| transmission.transmission_factor.0 > 0.0)
 }
 
 fn transmission(extensions: Option<&json::extensions::material::Material>, ior: f32) -> Option<Transmission> {

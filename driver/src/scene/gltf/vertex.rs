@@ -133,8 +133,8 @@ impl VertexReader<'_, '_> {
         colour.map(|channel| if channel > 0.0 { channel.min(1.0) } else { 0.0 })
     }
 
-    /// The corners' normals, unless they are the triangle's own. The triangle's own takes the place of a normal that is none
-    /// or lies on the other side.
+    /// The corners' normals, unless they are the triangle's own. The triangle's own takes the place of a normal that is
+    /// none or lies on the other side.
     fn normals(
         &self,
         corners: [u64; 3],
