@@ -1,4 +1,5 @@
-//! Textures arrive as texels, samplers and transforms; images that cannot be had are refused with the place and the remedy.
+//! Textures arrive as texels, samplers and transforms; images that cannot be had are refused with the place and the
+//! remedy.
 
 mod scene_support;
 
@@ -20,7 +21,7 @@ const GREY: &[u8] = include_bytes!("images/grey.jpg");
 const CMYK: &[u8] = include_bytes!("images/cmyk.jpg");
 
 /// The triangle with coordinates, whose base colour is texture 0 of image 0.
-fn textured(image: Value) -> Extended {
+fn textured(image: &Value) -> Extended {
     let mut scene = Extended::new();
     let coordinates = scene.floats("VEC2", &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
     scene.primitive()["attributes"]["TEXCOORD_0"] = json!(coordinates);
@@ -36,7 +37,7 @@ fn pbr(json: &mut Value) -> &mut Value {
 
 /// The same with an image in a buffer view.
 fn embedded(bytes: &[u8], kind: &str) -> Extended {
-    let mut scene = textured(json!(null));
+    let mut scene = textured(&json!(null));
     let view = scene.view(bytes);
     scene.json["images"] = json!([{"bufferView": view, "mimeType": kind}]);
     scene
@@ -73,7 +74,7 @@ fn check(error: &SceneError, parts: &[&str]) {
 
 #[test]
 fn an_image_is_the_same_wherever_it_lies() {
-    let uri = |uri: &str| textured(json!({"uri": uri}));
+    let uri = |uri: &str| textured(&json!({"uri": uri}));
     let data = uri(&format!("data:image/png;base64,{}", base64(TEXEL)));
     let untyped = uri(&format!("data:application/octet-stream;base64,{}", base64(TEXEL)));
     let mut in_view = embedded(TEXEL, "image/png");
@@ -191,7 +192,7 @@ fn images_without_a_use_are_not_read() {
 
 #[test]
 fn images_that_cannot_be_had_are_refused() {
-    let uri = |uri: &str| textured(json!({"uri": uri}));
+    let uri = |uri: &str| textured(&json!({"uri": uri}));
     let jpeg_as_png = format!("data:image/png;base64,{}", base64(COLOUR));
     let cases: [(Extended, &[&str]); 19] = [
         (uri("absent.png"), &["images[0].uri", "absent.png"]),
@@ -205,8 +206,8 @@ fn images_that_cannot_be_had_are_refused() {
         (uri("data:image/png;base64,*"), &["images[0].uri", "base64"]),
         (uri(&jpeg_as_png), &["images[0].uri", "image/png", "image/jpeg"]),
         (uri("data:image/png;base64,"), &["images[0]", "empty"]),
-        (textured(json!({})), &["images[0]", "neither uri nor bufferView"]),
-        (textured(json!({"uri": "a.png", "bufferView": 0})), &["images[0]", "both"]),
+        (textured(&json!({})), &["images[0]", "neither uri nor bufferView"]),
+        (textured(&json!({"uri": "a.png", "bufferView": 0})), &["images[0]", "both"]),
         (embedded(COLOUR, "image/png"), &["images[0].mimeType", "image/png"]),
         (embedded(b"RIFF....WEBPVP8 ", "image/webp"), &["images[0]", "WebP"]),
         (embedded(&TEXEL[..TEXEL.len() - 20], "image/png"), &["images[0]", "decoded"]),
@@ -241,6 +242,15 @@ fn sizes_are_refused_by_the_header() {
         bytes[29..33].copy_from_slice(&(!crc).to_be_bytes());
         bytes
     };
+    // As many bytes as an image of one bit a texel may have, all of them missing: the sum is refused before.
+    let mut large = header(16_384, 16_384);
+    large.resize(1 << 16, 0);
+    let mut two = embedded(&large, "image/png");
+    let view = two.view(TEXEL);
+    push(&mut two.json, "images", json!({"bufferView": view}));
+    push(&mut two.json, "textures", json!({"source": 1}));
+    two.json["materials"][0]["emissiveTexture"] = json!({"index": 1});
+    check(&two.load().unwrap_err(), &["images[1]", "268435457 texels"]);
     for (size, part) in [
         ([1, 100_000], "1 x 100000 texels, more than 16384"),
         ([16_385, 1], "16385 x 1"),
@@ -316,7 +326,7 @@ fn a_scene_in_a_linked_folder_reads_what_is_beside_it() {
     let folder = tempfile::tempdir().unwrap();
     let inside = folder.path().join("scene");
     fs::create_dir(&inside).unwrap();
-    let scene = textured(json!({"uri": "texel.png"}));
+    let scene = textured(&json!({"uri": "texel.png"}));
     fs::write(inside.join("data.bin"), &scene.bytes).unwrap();
     fs::write(inside.join("texel.png"), TEXEL).unwrap();
     fs::write(inside.join("scene.gltf"), scene.json.to_string()).unwrap();

@@ -4,7 +4,7 @@ mod scene_support;
 
 use glam::{Vec2, Vec3};
 use miette::Diagnostic;
-use photoncard_driver::scene::{Attributes, NO_ATTRIBUTES, Scene};
+use photoncard_driver::scene::{Attributes, NO_ATTRIBUTES, Scene, Triangle};
 use scene_support::Extended;
 use serde_json::{Value, json};
 
@@ -111,7 +111,7 @@ fn lists_strips_and_fans_give_the_same_square() {
         *scene.primitive() = json!({"attributes": {"POSITION": positions}, "mode": mode, "material": 0});
         let scene = scene.load().unwrap();
         assert_eq!(scene.triangles.len(), 2, "{mode}");
-        let normals = scene.triangles.iter().map(|triangle| triangle.scaled_normal());
+        let normals = scene.triangles.iter().map(Triangle::scaled_normal);
         assert_eq!(normals.collect::<Vec<_>>(), [Vec3::Z; 2], "{mode}");
         assert_eq!(scene.bounds(), (Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)));
         assert_eq!(scene.notices, Vec::<String>::new());

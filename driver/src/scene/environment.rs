@@ -18,9 +18,9 @@ const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
 /// Radiance from infinitely far, W/(sr m^2) per linear RGB channel: an equirectangular map, constant if it is 1 x 1.
 ///
-/// Column u, 0 to 1 from the left, and row v, 0 to 1 from the top, show the direction
-/// `(sin(theta) sin(phi), cos(theta), -sin(theta) cos(phi))` with `phi = 2 pi (u - 0.5)` and `theta = pi v`: y is up, and
-/// the middle of the map is -z, where a camera of glTF looks.
+/// Column u, 0 to 1 from the left, and row v, 0 to 1 from the top, show the direction `(sin(theta) sin(phi),
+/// cos(theta), -sin(theta) cos(phi))` with `phi = 2 pi (u - 0.5)` and `theta = pi v`: y is up, and the middle of the
+/// map is -z, where a camera of glTF looks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     /// Texels of a row.
@@ -37,13 +37,13 @@ impl Environment {
         Self { width: 1, height: 1, texels: vec![radiance.to_array()] }
     }
 
-    /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that has the channels
-    /// R, G and B. Which of them a file is, its first bytes tell.
+    /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that has the
+    /// channels R, G and B. Which of them a file is, its first bytes tell.
     ///
     /// # Errors
-    /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged, larger than
-    /// [`MAX_SIDE`] texels a side or [`MAX_TEXELS`](super::MAX_TEXELS) in all, or holds a radiance that is negative, infinite,
-    /// not a number, or above 1e20.
+    /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged, larger
+    /// than [`MAX_SIDE`] texels a side or [`MAX_TEXELS`](super::MAX_TEXELS) in all, or holds a radiance that is
+    /// negative, infinite, not a number, or above 1e20.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let unreadable = |source| SceneError::Unreadable { file: path.to_owned(), source };
         if !fs::metadata(path).map_err(unreadable)?.is_file() {

@@ -27,8 +27,8 @@ pub struct Material {
     pub alpha_cutoff: Option<f32>,
     /// Alpha of the base colour factor, 0 to 1.
     pub alpha: f32,
-    /// The texture whose colour multiplies the base colour or the diffuse albedo, and whose alpha multiplies `alpha`; sRGB.
-    /// As those of the other textures, an index into [`Scene::textures`](super::Scene::textures).
+    /// The texture whose colour multiplies the base colour or the diffuse albedo, and whose alpha multiplies `alpha`;
+    /// sRGB. As those of the other textures, an index into [`Scene::textures`](super::Scene::textures).
     pub base_texture: Option<u32>,
     /// The texture whose green multiplies the roughness, and whose blue multiplies the metalness; linear.
     pub metallic_roughness_texture: Option<u32>,
@@ -39,9 +39,9 @@ pub struct Material {
 /// How a surface reflects and transmits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflection {
-    /// A Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2 pi) max(0, cos
-    /// alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`, or, without the lobe, by
-    /// `KHR_materials_specular` with the factor 0.
+    /// A Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2 pi) max(0,
+    /// cos alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`, or, without the lobe and
+    /// without transmission, by `KHR_materials_specular` with the factor 0.
     Phong {
         /// Lambertian albedo, 0 to 1.
         diffuse: Vec3,
@@ -58,8 +58,8 @@ pub enum Reflection {
         metallic: f32,
         /// Perceptual roughness, 0 to 1: the square root of the width alpha of the distribution of microfacets.
         roughness: f32,
-        /// Reflectance at normal incidence of the dielectric part: `((ior - 1) / (ior + 1))^2` times the colour (the product at
-        /// most 1) and the factor of `KHR_materials_specular`.
+        /// Reflectance at normal incidence of the dielectric part: `((ior - 1) / (ior + 1))^2` times the colour (the
+        /// product at most 1) and the factor of `KHR_materials_specular`.
         dielectric: Vec3,
         /// What light passes the surface; `None` for opaque ones.
         transmission: Option<Transmission>,
@@ -77,8 +77,8 @@ pub struct Transmission {
     /// Whether the surface bounds a volume (`KHR_materials_volume` with a thickness above 0), at which light is
     /// refracted. Without one the surface is a thin wall, which light passes straight on.
     pub is_volume: bool,
-    /// Absorption coefficient, 1/m: `-ln(attenuationColor) / attenuationDistance`; zero without a volume. The scale of nodes
-    /// does not change it.
+    /// Absorption coefficient, 1/m: `-ln(attenuationColor) / attenuationDistance`; zero without a volume. The scale of
+    /// nodes does not change it.
     pub absorption: Vec3,
 }
 

@@ -46,15 +46,15 @@ impl Property {
 impl Scene {
     /// Applies `MATERIAL.PROPERTY=VALUE` to every material of that name.
     ///
-    /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material) or `emission`
-    /// of any material, `specular` or `exponent` of one that states a Phong lobe or is Lambertian, or `metallic` or
-    /// `roughness` of a metallic-roughness one. Colours are `r,g,b` or one number for all three, the others one number. Textures
-    /// go on to multiply what they multiply. The material's name may itself contain dots. Whether the scene still has a light
-    /// is for [`Scene::check_light`] to say once all settings are applied.
+    /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material) or
+    /// `emission` of any material, `specular` or `exponent` of one that states a Phong lobe or is Lambertian, or
+    /// `metallic` or `roughness` of a metallic-roughness one. Colours are `r,g,b` or one number for all three, the
+    /// others one number. Textures go on to multiply what they multiply. The material's name may itself contain dots.
+    /// Whether the scene still has a light is for [`Scene::check_light`] to say once all settings are applied.
     ///
     /// # Errors
-    /// If the form is not kept, no material has that name, it has no such property, or it would then be out of range; the
-    /// scene stays as it was.
+    /// If the form is not kept, no material has that name, it has no such property, or it would then be out of range;
+    /// the scene stays as it was.
     pub fn apply(&mut self, assignment: &str) -> Result<(), SceneError> {
         let fault = |reason: String, remedy| SceneError::Setting {
             assignment: assignment.to_owned(),

@@ -37,11 +37,11 @@ impl Triangle {
 /// What the corners of a triangle carry beyond their places.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attributes {
-    /// Unit shading normals of the corners in world space, on the front's side. `None`: the triangle is flat, also where
-    /// all three equal the geometric normal.
+    /// Unit shading normals of the corners in world space, on the front's side. `None`: the triangle is flat, also
+    /// where all three equal the geometric normal.
     pub normals: Option<[Vec3; 3]>,
-    /// Texture coordinates of the corners, sets 0 and 1 (`TEXCOORD_0` and `TEXCOORD_1`), untransformed; v counts from the
-    /// image's top.
+    /// Texture coordinates of the corners, sets 0 and 1 (`TEXCOORD_0` and `TEXCOORD_1`), untransformed; v counts from
+    /// the image's top.
     pub coordinates: [[Vec2; 3]; 2],
     /// Linear RGBA of the corners, white without `COLOR_0`. It multiplies the base colour (or the diffuse albedo) and
     /// alpha.

@@ -22,8 +22,8 @@ pub(super) struct Scenes {
     folder: TempDir,
 }
 
-/// Everything that the loader reads: a hierarchy, sparse positions, normals, coordinates, colours, a skin, instances, a strip,
-/// textures, a lobe, glass, lights, an orthographic camera.
+/// Everything that the loader reads: a hierarchy, sparse positions, normals, coordinates, colours, a skin, instances, a
+/// strip, textures, a lobe, glass, lights, an orthographic camera.
 const RICH: &[u8] = include_bytes!("../../fuzz/rich.gltf");
 const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/furnace.gltf"),
@@ -35,8 +35,8 @@ const SHIPPED: [&[u8]; 3] = [
 const PNG: &[u8] = include_bytes!("../../../driver/tests/images/texel.png");
 const JPEG: &[u8] = include_bytes!("../../../driver/tests/images/grey.jpg");
 
-/// A triangle's vertices, its indices, an index and a position that take the place of another, coordinates, colours, joints,
-/// weights, a matrix, and images.
+/// A triangle's vertices, its indices, an index and a position that take the place of another, coordinates, colours,
+/// joints, weights, a matrix, and images.
 fn triangle_bytes() -> Vec<u8> {
     let vertices = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let indices = [0_u16, 1, 2, 1].map(u16::to_le_bytes);
@@ -77,7 +77,7 @@ fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
 }
 
 /// A GLB of some JSON and bytes. What its header and chunks say of their lengths is true.
-fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
+pub(super) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let mut text = text.to_vec();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut file = b"glTF".to_vec();

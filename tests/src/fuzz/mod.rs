@@ -3,6 +3,7 @@
 //! No input may panic, take longer than some seconds, or allocate more than a bound. What that finds is what a coverage
 //! guided fuzzer would be used for; this one needs no other compiler, and a failing input is replayed by its number.
 
+mod environment;
 mod gltf;
 mod image;
 mod messages;
@@ -11,6 +12,7 @@ mod picture;
 mod random;
 mod run;
 mod session;
+mod texture;
 mod transport;
 
 use std::sync::Arc;
@@ -37,7 +39,8 @@ pub trait Target: Send + Sync {
 }
 
 /// The names of all targets.
-pub const NAMES: [&str; 6] = ["frames", "messages", "session", "image", "gltf", "exr"];
+pub const NAMES: [&str; 8] =
+    ["frames", "messages", "session", "image", "gltf", "textures", "environments", "exr"];
 
 /// The target of a name.
 pub fn target(name: &str) -> Option<Arc<dyn Target>> {
@@ -47,6 +50,8 @@ pub fn target(name: &str) -> Option<Arc<dyn Target>> {
         "session" => Some(Arc::new(session::Sessions::new())),
         "image" => Some(Arc::new(image::Image::new())),
         "gltf" => Some(Arc::new(gltf::Scenes::new())),
+        "textures" => Some(Arc::new(texture::Textures::new())),
+        "environments" => Some(Arc::new(environment::Environments::new())),
         "exr" => Some(Arc::new(picture::Pictures::new())),
         _ => None,
     }

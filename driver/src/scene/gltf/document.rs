@@ -139,7 +139,9 @@ impl Document {
             Fault::Oversize => "the size is beyond this machine's limits",
             Fault::Unsupported => "it is not supported",
         };
-        Err(self.invalid(path.as_str(), reason, "export the scene again, or correct the file at this place"))
+        // The types' names of the extension's fields are not those of the file.
+        let item = path.as_str().replace("khrLightsPunctual", "KHR_lights_punctual");
+        Err(self.invalid(item, reason, "export the scene again, or correct the file at this place"))
     }
 }
 

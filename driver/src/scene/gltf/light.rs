@@ -11,8 +11,8 @@ use crate::scene::{PunctualKind, PunctualLight, Scene};
 /// Intensities that a light may have: their products and squares stay within single precision.
 const INTENSITY: std::ops::RangeInclusive<f32> = 1e-20..=1e20;
 
-/// The narrowest step, in cosines, between the two cones of a spot light, as `KHR_lights_punctual` recommends. Exporters
-/// write equal angles for a sharp edge.
+/// The narrowest step, in cosines, between the two cones of a spot light, as `KHR_lights_punctual` recommends.
+/// Exporters write equal angles for a sharp edge.
 const LEAST_PENUMBRA: f32 = 0.001;
 
 /// How far beyond a right angle a spot light's rounded outer angle may lie.

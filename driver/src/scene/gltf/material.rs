@@ -10,7 +10,7 @@ use gltf::json::validation::Checked;
 use super::document::Document;
 use super::texture::Textures;
 use crate::error::SceneError;
-use crate::scene::material::Property;
+use crate::scene::material::{OutOfRange, Property};
 use crate::scene::{Encoding, Material, Reflection, Transmission};
 
 /// What `extras` may hold for this renderer; everything else in `extras` is other programs' business.
@@ -60,7 +60,7 @@ fn load_one(
     let reflection = if let Some(phong) = read_phong(document, index, source, &name)? {
         let (specular, exponent) = (Vec3::from(phong.specular), phong.exponent);
         Reflection::Phong { diffuse: base_colour, specular, exponent }
-    } else if is_lambertian {
+    } else if is_lambertian && !is_transmissive(source) {
         Reflection::Phong { diffuse: base_colour, specular: Vec3::ZERO, exponent: 0.0 }
     } else {
         metallic_roughness(source, base_colour)
@@ -74,7 +74,7 @@ fn load_one(
         ..Material::new(name, reflection)
     };
     add_textures(&mut material, index, source, textures)?;
-    material.check().map_err(|fault| {
+    check_extensions(extensions).and_then(|()| material.check()).map_err(|fault| {
         let item = match fault.property {
             Property::Diffuse | Property::Alpha => "pbrMetallicRoughness.baseColorFactor",
             Property::Metallic => "pbrMetallicRoughness.metallicFactor",
@@ -122,6 +122,27 @@ fn add_textures(
     Ok(())
 }
 
+/// Checks what cannot be told from the reflection any more.
+fn check_extensions(extensions: Option<&json::extensions::material::Material>) -> Result<(), OutOfRange> {
+    let Some(extensions) = extensions else { return Ok(()) };
+    if let Some(specular) = &extensions.specular {
+        let (factor, colour) = (specular.specular_factor.0, specular.specular_color_factor.0);
+        if !(0.0..=1.0).contains(&factor) || colour.iter().any(|channel| channel.is_nan() || *channel < 0.0) {
+            let reason = format!("the specular factor is {factor}, its colour {}", Vec3::from(colour));
+            let remedy = "the specular factor is 0 to 1, its colour 0 or more";
+            return Err(OutOfRange { property: Property::Dielectric, reason, remedy });
+        }
+    }
+    match extensions.ior.as_ref().map(|ior| ior.ior.0) {
+        Some(ior) if !(ior == 0.0 || (1.0..f32::INFINITY).contains(&ior)) => {
+            let reason = format!("the index of refraction is {ior}");
+            let remedy = "indices of refraction are 1 or more, or 0 for a mirror; glass has 1.5";
+            Err(OutOfRange { property: Property::Ior, reason, remedy })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The index of refraction of materials that state none.
 const IOR: f32 = 1.5;
 
@@ -148,6 +169,12 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
         // What reflects everything transmits nothing.
         transmission: if ior == 0.0 { None } else { transmission(extensions, ior) },
     }
+}
+
+/// Whether light passes the material's surface.
+pub(super) fn is_transmissive(material: &json::Material) -> bool {
+    let transmission = material.extensions.as_ref().and_then(|extensions| extensions.transmission.as_ref());
+    transmission.is_some_and(|transmission| transmission.transmission_factor.0 > 0.0)
 }
 
 fn transmission(extensions: Option<&json::extensions::material::Material>, ior: f32) -> Option<Transmission> {

@@ -8,6 +8,7 @@ use gltf::json::validation::Checked;
 
 use super::document::{Document, SUPPORTED_EXTENSIONS};
 use super::light;
+use super::material::is_transmissive;
 use super::primitive::Topology;
 
 /// Names listed in one notice; the others are counted.
@@ -110,11 +111,6 @@ fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String]
         material.extensions.as_ref().is_some_and(|extensions| extensions.unlit.is_some())
     });
     note("unlit materials are rendered as lit ones", "material", &unlit);
-}
-
-fn is_transmissive(material: &json::Material) -> bool {
-    let transmission = material.extensions.as_ref().and_then(|extensions| extensions.transmission.as_ref());
-    transmission.is_some_and(|transmission| transmission.transmission_factor.0 > 0.0)
 }
 
 /// Whether an extension whose factors are used states a texture.

@@ -29,7 +29,8 @@ const JOINTS: Format = Format {
 const WEIGHTS: Format =
     Format { types: &[Type::Vec4], components: FRACTIONS, integers: Integers::Normalized };
 
-/// Whole positions and the formats of normals and texture coordinates, with `KHR_mesh_quantization` or without.
+// With `KHR_mesh_quantization` or without it:
+
 const fn positions(is_quantized: bool) -> Format {
     let components = if is_quantized { QUANTIZED } else { FLOATS };
     Format { types: &[Type::Vec3], components, integers: Integers::AsStated }

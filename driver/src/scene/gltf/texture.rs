@@ -101,9 +101,9 @@ type Affine = ([[f32; 2]; 2], [f32; 2]);
 
 const IDENTITY: Affine = ([[1.0, 0.0], [0.0, 1.0]], [0.0; 2]);
 
-/// `KHR_texture_transform`: the coordinates are scaled, then rotated counter-clockwise, then moved. As v points down, that is
-/// clockwise by the signs of its equations; those in the extension's text turn the other way, against its words, its example
-/// and its implementations (KhronosGroup/glTF issue 1563).
+/// `KHR_texture_transform`: the coordinates are scaled, then rotated counter-clockwise, then moved. As v points down,
+/// that is clockwise by the signs of its equations; those in the extension's text turn the other way, against its
+/// words, its example and its implementations (KhronosGroup/glTF issue 1563).
 fn affine(transform: &TextureTransform) -> Option<Affine> {
     let (offset, [width, height]) = (transform.offset.0, transform.scale.0);
     let angle = transform.rotation.0;

@@ -96,6 +96,10 @@ impl VertexReader<'_, '_> {
         transforms: &[Cow<'_, Transform>; 3],
         triangle: &Triangle,
     ) -> Result<Option<Attributes>, SceneError> {
+        let is_mapped = self.primitive.coordinates.iter().any(Option::is_some);
+        if !is_mapped && self.primitive.normals.is_none() && self.primitive.colours.is_none() {
+            return Ok(None);
+        }
         let mut coordinates = Attributes::NONE.coordinates;
         for (set, coordinates) in coordinates.iter_mut().enumerate() {
             for (coordinate, corner) in coordinates.iter_mut().zip(corners) {
@@ -107,7 +111,6 @@ impl VertexReader<'_, '_> {
             coordinates,
             colours: corners.map(|corner| self.colour(corner)),
         };
-        let is_mapped = self.primitive.coordinates.iter().any(Option::is_some);
         Ok(Some(attributes).filter(|attributes| is_mapped || *attributes != Attributes::NONE))
     }
 
@@ -130,8 +133,8 @@ impl VertexReader<'_, '_> {
         colour.map(|channel| if channel > 0.0 { channel.min(1.0) } else { 0.0 })
     }
 
-    /// The corners' normals, unless they are the triangle's own. The triangle's own takes the place of a normal that is none
-    /// or lies on the other side.
+    /// The corners' normals, unless they are the triangle's own. The triangle's own takes the place of a normal that is
+    /// none or lies on the other side.
     fn normals(
         &self,
         corners: [u64; 3],

@@ -24,8 +24,8 @@ fn decoder(bytes: &[u8]) -> Decoder<'_> {
     JpegDecoder::new_with_options(ZCursor::new(bytes), options)
 }
 
-/// Runs the decoder. It is written not to panic; should it, the file is a damaged one. Nothing is shared with the closure,
-/// so nothing can be left half changed.
+/// Runs the decoder. It is written not to panic; should it, the file is a damaged one. Nothing is shared with the
+/// closure, so nothing can be left half changed.
 fn guarded<T>(decode: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
     catch_unwind(AssertUnwindSafe(decode))
         .unwrap_or_else(|_| Err(Fault::damaged("its structure contradicts itself")))

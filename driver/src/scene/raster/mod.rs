@@ -1,7 +1,8 @@
 //! PNG and JPEG files as texels of 8-bit RGBA.
 //!
-//! Sizes are checked in the header, before anything is allocated for them: against limits, and against what a file of its
-//! length can hold however well it is compressed. What a file says of its own colour space is ignored, as glTF demands.
+//! Sizes are checked in the header, before anything is allocated for them: against limits, and against what a file of
+//! its length can hold however well it is compressed. What a file says of its own colour space is ignored, as glTF
+//! demands.
 
 mod jpeg;
 mod png;

@@ -1,0 +1,107 @@
+//! Textures: PNG and JPEG files in a scene that is otherwise sound.
+
+use std::fs;
+use std::path::PathBuf;
+
+use photoncard_driver::scene::gltf;
+use tempfile::TempDir;
+
+use super::gltf::glb;
+use super::{Random, Target, bound, mutation};
+
+/// The target. An input is an image file.
+pub(super) struct Textures {
+    seeds: Vec<Vec<u8>>,
+    folder: TempDir,
+}
+
+const SEEDS: [&[u8]; 4] = [
+    include_bytes!("../../../driver/tests/images/texel.png"),
+    include_bytes!("../../../driver/tests/images/colour.jpg"),
+    include_bytes!("../../../driver/tests/images/progressive.jpg"),
+    include_bytes!("../../../driver/tests/images/grey.jpg"),
+];
+
+const PNG_MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// A scene whose second buffer view, of so many bytes, is the base colour of its only triangle.
+fn scene(image_bytes: usize) -> String {
+    let length = TRIANGLE_BYTES + image_bytes;
+    format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0, "TEXCOORD_0": 1}}, "material": 0}}]}}],
+        "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}],
+        "textures": [{{"source": 0}}], "images": [{{"bufferView": 1}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}},
+                      {{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC2"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": {TRIANGLE_BYTES}}},
+                        {{"buffer": 0, "byteOffset": {TRIANGLE_BYTES}, "byteLength": {image_bytes}}}],
+        "buffers": [{{"byteLength": {length}}}]}}"#
+    )
+}
+
+const TRIANGLE_BYTES: usize = 36;
+
+/// Makes the checksums of a PNG's chunks right: else most edits would end there.
+fn mend_png(file: &mut [u8]) {
+    let mut at = PNG_MAGIC.len();
+    while let Some(length) = file.get(at..).and_then(|rest| rest.first_chunk::<4>()) {
+        let end = at.saturating_add(8).saturating_add(u32::from_be_bytes(*length) as usize);
+        let Some(chunk) = file.get(at + 4..end) else { return };
+        let sum = chunk.iter().fold(u32::MAX, |sum, &byte| {
+            (0..8).fold(sum ^ u32::from(byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xedb8_8320))
+        });
+        let Some(stored) = file.get_mut(end..end + 4) else { return };
+        stored.copy_from_slice(&(!sum).to_be_bytes());
+        at = end + 4;
+    }
+}
+
+impl Textures {
+    pub(super) fn new() -> Self {
+        let seeds = SEEDS.map(<[u8]>::to_vec).to_vec();
+        Self { seeds, folder: tempfile::tempdir().expect("there is room for a folder") }
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.path().join("scene.glb")
+    }
+}
+
+impl Target for Textures {
+    fn name(&self) -> &'static str {
+        "textures"
+    }
+
+    fn allocation_bound(&self, input: usize) -> usize {
+        // Deflate makes a byte at most 1032, of eight texels each if they are of one bit, and a texel four bytes.
+        bound(input, 1032 * 8 * 5)
+    }
+
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        let mut file = random.pick(&self.seeds).clone();
+        mutation::edit(&mut file, &self.seeds, random);
+        if file.starts_with(PNG_MAGIC) && !random.once_in(8) {
+            mend_png(&mut file);
+        }
+        file
+    }
+
+    fn read(&self, input: &[u8]) -> bool {
+        let triangle = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
+        let bytes = [triangle.as_flattened(), input].concat();
+        fs::write(self.path(), glb(scene(input.len()).as_bytes(), &bytes))
+            .expect("there is room for a scene");
+        match gltf::load(&self.path()) {
+            Ok(scene) => {
+                let [image] = &scene.images[..] else { panic!("one image is in use") };
+                assert_eq!(image.texels.len(), image.width as usize * image.height as usize);
+                true
+            }
+            Err(error) => {
+                let _ = error.to_string();
+                false
+            }
+        }
+    }
+}
