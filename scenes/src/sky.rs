@@ -16,8 +16,8 @@ const GROUND: Vec3 = Vec3::new(0.22, 0.19, 0.15);
 
 /// Towards the sun; its radiance, and the angle at which a third of that is left, in radians.
 const SUN: Vec3 = Vec3::new(-0.55, 0.75, -0.6);
-const SUN_RADIANCE: Vec3 = Vec3::new(420.0, 350.0, 250.0);
-const SUN_WIDTH: f32 = 0.07;
+const SUN_RADIANCE: Vec3 = Vec3::new(1100.0, 900.0, 620.0);
+const SUN_WIDTH: f32 = 0.06;
 
 fn radiance(direction: Vec3) -> Vec3 {
     if direction.y < 0.0 {

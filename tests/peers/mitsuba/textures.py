@@ -45,7 +45,9 @@ def finer(values, axis, wrap):
 
 def pixels(texture):
     """The texels as they are encoded, RGBA within 0 and 1, rows from the top."""
-    stream = mi.MemoryStream(bytes(texture.image))
+    stream = mi.MemoryStream()
+    stream.write(texture.image)
+    stream.seek(0)
     picture = mi.Bitmap(stream)
     # Only the layout is changed: both ends say that they are encoded.
     picture.set_srgb_gamma(True)
