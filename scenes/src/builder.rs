@@ -17,7 +17,6 @@ const FLOAT: u32 = 5126;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 const LINEAR: u32 = 9729;
-const LINEAR_MIPMAP_LINEAR: u32 = 9987;
 
 /// Vertices and indices already in the file, to be used by any number of meshes.
 #[derive(Clone, Copy, Debug)]
@@ -120,11 +119,11 @@ impl SceneBuilder {
         self.document.images.len() - 1
     }
 
-    /// Adds a texture of an image, which is interpolated between texels; returns its index.
+    /// Adds a texture of an image, which is interpolated between texels and has no coarser copies; returns its index.
     pub fn texture(&mut self, image: usize, [wrap_s, wrap_t]: [Wrap; 2]) -> usize {
         let sampler = Sampler {
             mag_filter: LINEAR,
-            min_filter: LINEAR_MIPMAP_LINEAR,
+            min_filter: LINEAR,
             wrap_s: wrap_s.number(),
             wrap_t: wrap_t.number(),
         };

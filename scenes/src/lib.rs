@@ -10,6 +10,7 @@ pub mod document;
 mod furnace;
 pub mod material;
 pub mod mesh;
+mod room;
 mod sky;
 mod sphere;
 
@@ -32,6 +33,7 @@ pub fn scenes() -> Vec<SceneFile> {
         SceneFile { name: "furnace.gltf", bytes: furnace::furnace() },
         SceneFile { name: "atrium.glb", bytes: atrium::atrium() },
         SceneFile { name: "atrium-open.glb", bytes: atrium::open() },
+        SceneFile { name: "room.glb", bytes: room::room() },
         SceneFile { name: "sky.exr", bytes: sky::sky() },
     ]
 }
