@@ -11,6 +11,7 @@ mod furnace;
 pub mod material;
 pub mod mesh;
 mod room;
+mod roughness;
 mod sky;
 mod sphere;
 
@@ -34,6 +35,7 @@ pub fn scenes() -> Vec<SceneFile> {
         SceneFile { name: "atrium.glb", bytes: atrium::atrium() },
         SceneFile { name: "atrium-open.glb", bytes: atrium::open() },
         SceneFile { name: "room.glb", bytes: room::room() },
+        SceneFile { name: "roughness.glb", bytes: roughness::roughness() },
         SceneFile { name: "sky.exr", bytes: sky::sky() },
     ]
 }

@@ -71,7 +71,9 @@ def main():
     width, height = (int(side) for side in arguments.size.split("x"))
     scene = scenes.load(arguments.scene, width, height, arguments.camera, arguments.environment)
     limits = {"max_depth": arguments.max_depth, "rr_depth": RUSSIAN_ROULETTE_DEPTH}
-    integrator = mi.load_dict({"type": "path", **limits})
+    # Only the integrator of volumes lets light that is sampled at a lamp through holes in surfaces; the other finds it by chance.
+    kind = "volpath" if scenes.has_holes(arguments.scene) else "path"
+    integrator = mi.load_dict({"type": kind, **limits})
     arguments.work.mkdir(parents=True, exist_ok=True)
     sums = Sums(arguments.work / f"{arguments.output.stem}.npz", (height, width, 3))
     while sums.passes < arguments.passes and not has_converged(sums, arguments):

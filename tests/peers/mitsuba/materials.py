@@ -54,6 +54,8 @@ def rough(material):
 
     mi.register_bsdf("metallic_roughness", MetallicRoughness)
     metallic_roughness = material["pbrMetallicRoughness"]
+    if metallic_roughness.get("metallicFactor", 1.0) not in (0.0, 1.0) or "baseColorTexture" in metallic_roughness:
+        raise ValueError(f"{material['name']}: what is neither a metal nor a dielectric, or textured, is not read here")
     return {
         "type": "metallic_roughness",
         "base_colour": mi.ScalarColor3f([float(value) for value in base_factor(material)[:3]]),

@@ -26,6 +26,11 @@ def load(path, width, height, camera_name=None, environment_path=None):
     return mi.load_dict(parts)
 
 
+def has_holes(path):
+    """Whether surfaces are cut out."""
+    return any(material.get("alphaMode") == "MASK" for material in gltf.Scene(path).materials)
+
+
 def sensor(camera, width, height):
     """glTF's cameras look along -z and hold the vertical angle; Mitsuba's look along z, with x to the left."""
     _, world, perspective = camera
