@@ -9,6 +9,7 @@ clamped, and a path ends by Russian roulette from depth 8, or at the depth given
 import argparse
 import json
 import os
+import sys
 from pathlib import Path
 
 import mitsuba as mi
@@ -17,6 +18,7 @@ import numpy as np
 mi.set_variant("llvm_ad_rgb")
 
 import scene as scenes  # noqa: E402: needs the variant
+from caustics import Caustics  # noqa: E402: needs the variant
 
 BLOCK = 16
 RUSSIAN_ROULETTE_DEPTH = 8
@@ -70,10 +72,7 @@ def main():
     arguments = parse()
     width, height = (int(side) for side in arguments.size.split("x"))
     scene = scenes.load(arguments.scene, width, height, arguments.camera, arguments.environment)
-    limits = {"max_depth": arguments.max_depth, "rr_depth": RUSSIAN_ROULETTE_DEPTH}
-    # Only the integrator of volumes lets light that is sampled at a lamp through holes in surfaces; the other finds it by chance.
-    kind = "volpath" if scenes.has_holes(arguments.scene) else "path"
-    integrator = mi.load_dict({"type": kind, **limits})
+    integrator = choose_integrator(arguments)
     arguments.work.mkdir(parents=True, exist_ok=True)
     sums = Sums(arguments.work / f"{arguments.output.stem}.npz", (height, width, 3))
     while sums.passes < arguments.passes and not has_converged(sums, arguments):
@@ -84,9 +83,23 @@ def main():
         sums.add(picture.astype(np.float64))
         if sums.passes % arguments.every == 0:
             sums.keep()
+            write(sums, arguments)
             print(json.dumps(note(sums, arguments)), flush=True)
+    if sums.passes == 0:
+        sys.exit("nothing has been rendered")
     sums.keep()
     write(sums, arguments)
+
+
+def choose_integrator(arguments):
+    """What follows the paths."""
+    if arguments.caustics:
+        mi.register_integrator("caustics", Caustics)
+        return mi.load_dict({"type": "caustics"})
+    # Only the integrator of volumes lets light that is sampled at a lamp through holes in surfaces; the other finds it by
+    # chance alone.
+    kind = "volpath" if scenes.has_holes(arguments.scene) else "path"
+    return mi.load_dict({"type": kind, "max_depth": arguments.max_depth, "rr_depth": RUSSIAN_ROULETTE_DEPTH})
 
 
 def has_converged(sums, arguments):
@@ -123,6 +136,7 @@ def parse():
     parser.add_argument("scene")
     parser.add_argument("--camera")
     parser.add_argument("--environment", help="an equirectangular map")
+    parser.add_argument("--caustics", action="store_true", help="of the light of caustics alone")
     parser.add_argument("--size", default="256x256")
     parser.add_argument("--output", type=Path, required=True, help="the EXR")
     parser.add_argument("--work", type=Path, required=True, help="the folder of what has been rendered")
