@@ -92,8 +92,10 @@ class Scene:
         if "NORMAL" in attributes:
             normals = self.accessor(attributes["NORMAL"]) @ np.linalg.inv(linear)
             normals = (normals / np.linalg.norm(normals, axis=1, keepdims=True))[corners]
-        rest = [self.accessor(attributes[name])[corners] if name in attributes else None for name in ("TEXCOORD_0", "COLOR_0")]
-        return Part(primitive["material"], positions[corners], normals, *rest)
+        coordinates, colours = (
+            self.accessor(attributes[name])[corners] if name in attributes else None for name in ("TEXCOORD_0", "COLOR_0")
+        )
+        return Part(primitive["material"], positions[corners], normals, coordinates, colours)
 
     def corners(self, primitive, count):
         """The vertices of each triangle of a primitive."""
