@@ -9,7 +9,8 @@ import mitsuba as mi
 
 
 class MetallicRoughness(mi.BSDF):
-    """A metal or a dielectric, nothing between. One-sided; sampled by visible normals and by the cosine, in the ratio of what they reflect straight on."""
+    """A metal or a dielectric, nothing between. One-sided; sampled by visible normals and by the cosine, in the ratio of what
+    they reflect straight on."""
 
     def __init__(self, props):
         mi.BSDF.__init__(self, props)
