@@ -1,95 +1,68 @@
 //! Puts meshes, materials, nodes and cameras together into a glTF file.
 
 use base64::Engine;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::document::{
-    Accessor, Attributes, Buffer, BufferView, CameraEntry, Document, EmissiveStrength, Extensions, Extras,
-    MaterialEntry, MeshEntry, MetallicRoughness, Node, Perspective, Phong, PhotoncardExtras, Primitive,
-    Roots, Specular,
+    Accessor, Attributes, Buffer, BufferView, CameraEntry, Document, ImageEntry, MaterialEntry, MeshEntry,
+    Node, Perspective, Primitive, Roots, Sampler, TextureEntry,
 };
+use crate::material::Material;
 use crate::mesh::Mesh;
 
-/// glTF's numbers for the type of a component and the use of a buffer view.
+/// glTF's numbers for the type of a component, the use of a buffer view, and how samples lie between texels.
 const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
-
-/// What a surface reflects and emits.
-#[derive(Clone, Debug, Default)]
-pub struct Material {
-    name: String,
-    albedo: [f64; 3],
-    radiance: [f64; 3],
-    double_sided: bool,
-    phong: Option<Phong>,
-}
-
-impl Material {
-    /// A purely Lambertian material; `albedo` is the reflected share, red, green and blue.
-    pub fn diffuse(name: &str, albedo: [f64; 3]) -> Self {
-        Self { name: name.into(), albedo, ..Self::default() }
-    }
-
-    /// The same, emitting `radiance` in W/(sr m^2).
-    #[must_use]
-    pub fn emitting(mut self, radiance: [f64; 3]) -> Self {
-        self.radiance = radiance;
-        self
-    }
-
-    /// The same on both sides.
-    #[must_use]
-    pub fn double_sided(mut self) -> Self {
-        self.double_sided = true;
-        self
-    }
-
-    /// The same with a Phong lobe on top.
-    #[must_use]
-    pub fn with_phong(mut self, phong: Phong) -> Self {
-        self.phong = Some(phong);
-        self
-    }
-
-    /// glTF keeps `emissiveFactor` within one; the rest of the radiance is the strength.
-    fn emission(&self) -> (Option<[f64; 3]>, Option<EmissiveStrength>) {
-        let peak = self.radiance.into_iter().fold(0.0, f64::max);
-        if peak == 0.0 {
-            (None, None)
-        } else if peak <= 1.0 {
-            (Some(self.radiance), None)
-        } else {
-            let factor = self.radiance.map(|channel| channel / peak);
-            (Some(factor), Some(EmissiveStrength { emissive_strength: peak }))
-        }
-    }
-
-    fn entry(&self) -> MaterialEntry {
-        let [r, g, b] = self.albedo;
-        let (emissive_factor, emissive_strength) = self.emission();
-        MaterialEntry {
-            name: self.name.clone(),
-            pbr_metallic_roughness: MetallicRoughness {
-                base_color_factor: [r, g, b, 1.0],
-                metallic_factor: 0.0,
-                roughness_factor: 1.0,
-            },
-            emissive_factor,
-            double_sided: self.double_sided,
-            extensions: Extensions { emissive_strength, specular: Specular { specular_factor: 0.0 } },
-            extras: self.phong.map(|phong| Extras { photoncard: PhotoncardExtras { phong } }),
-        }
-    }
-}
+const LINEAR: u32 = 9729;
 
 /// Vertices and indices already in the file, to be used by any number of meshes.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
-    positions: usize,
-    indices: usize,
+    attributes: Attributes,
+    indices: Option<usize>,
+    mode: Option<u32>,
+}
+
+/// How vertices without indices are joined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Joined {
+    /// Each with the two before it, every other triangle turned.
+    Strip,
+    /// Each with the one before it and the first.
+    Fan,
+}
+
+impl Joined {
+    fn mode(self) -> u32 {
+        match self {
+            Self::Strip => 5,
+            Self::Fan => 6,
+        }
+    }
+}
+
+/// Where a texture goes on beyond its image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrap {
+    /// The image again.
+    Repeat,
+    /// The image again, every other one turned over.
+    Mirror,
+    /// The texels of the edge.
+    Clamp,
+}
+
+impl Wrap {
+    fn number(self) -> u32 {
+        match self {
+            Self::Repeat => 10497,
+            Self::Mirror => 33648,
+            Self::Clamp => 33071,
+        }
+    }
 }
 
 /// A pinhole camera.
@@ -139,13 +112,30 @@ impl SceneBuilder {
         self.document.materials.len() - 1
     }
 
+    /// Adds an image as it lies in its file, of type "image/png" or "image/jpeg"; returns its index.
+    pub fn image(&mut self, name: &str, mime_type: &'static str, bytes: Vec<u8>) -> usize {
+        let buffer_view = self.view(bytes, None);
+        self.document.images.push(ImageEntry { name: name.into(), buffer_view, mime_type });
+        self.document.images.len() - 1
+    }
+
+    /// Adds a texture of an image, which is interpolated between texels and has no coarser copies; returns its index.
+    pub fn texture(&mut self, image: usize, [wrap_s, wrap_t]: [Wrap; 2]) -> usize {
+        let sampler = Sampler {
+            mag_filter: LINEAR,
+            min_filter: LINEAR,
+            wrap_s: wrap_s.number(),
+            wrap_t: wrap_t.number(),
+        };
+        self.document.samplers.push(sampler);
+        let sampler = self.document.samplers.len() - 1;
+        self.document.textures.push(TextureEntry { sampler, source: image });
+        self.document.textures.len() - 1
+    }
+
     /// Adds the vertices and indices of a mesh; the indices are as narrow as the vertices allow.
     pub fn geometry(&mut self, mesh: &Mesh) -> Geometry {
-        let (min, max) = mesh.bounds();
-        let bytes = mesh.positions.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect();
-        let positions = self.accessor(bytes, ARRAY_BUFFER, FLOAT, mesh.positions.len(), "VEC3");
-        self.document.accessors[positions].min = Some(min.to_array());
-        self.document.accessors[positions].max = Some(max.to_array());
+        let attributes = self.attributes(mesh);
         let indices = mesh.triangles.iter().flatten();
         // 0xffff restarts a primitive, so it cannot name a vertex.
         let (bytes, component): (Vec<u8>, u32) = if mesh.positions.len() <= 0xffff {
@@ -154,8 +144,45 @@ impl SceneBuilder {
             (indices.flat_map(|&index| index.to_le_bytes()).collect(), UNSIGNED_INT)
         };
         let count = 3 * mesh.triangles.len();
-        let indices = self.accessor(bytes, ELEMENT_ARRAY_BUFFER, component, count, "SCALAR");
-        Geometry { positions, indices }
+        let indices = Some(self.accessor(bytes, ELEMENT_ARRAY_BUFFER, component, count, "SCALAR"));
+        Geometry { attributes, indices, mode: None }
+    }
+
+    /// Adds the vertices of a mesh without indices, to be joined in their order; its triangles play no part.
+    pub fn joined(&mut self, mesh: &Mesh, joined: Joined) -> Geometry {
+        let attributes = self.attributes(mesh);
+        Geometry { attributes, indices: None, mode: Some(joined.mode()) }
+    }
+
+    /// Adds what the vertices of a mesh have. Normals that are the positions, as on a unit sphere, are those.
+    fn attributes(&mut self, mesh: &Mesh) -> Attributes {
+        let (min, max) = mesh.bounds();
+        let position = self.vectors(mesh.positions.iter().map(Vec3::to_array), "VEC3");
+        self.document.accessors[position].min = Some(min.to_array());
+        self.document.accessors[position].max = Some(max.to_array());
+        let mut attributes = Attributes { position, normal: None, texcoord_0: None, color_0: None };
+        if mesh.normals == mesh.positions {
+            attributes.normal = Some(position);
+        } else if !mesh.normals.is_empty() {
+            attributes.normal = Some(self.vectors(mesh.normals.iter().map(Vec3::to_array), "VEC3"));
+        }
+        if !mesh.coordinates.is_empty() {
+            attributes.texcoord_0 = Some(self.vectors(mesh.coordinates.iter().map(Vec2::to_array), "VEC2"));
+        }
+        if !mesh.colours.is_empty() {
+            attributes.color_0 = Some(self.vectors(mesh.colours.iter().copied(), "VEC3"));
+        }
+        attributes
+    }
+
+    fn vectors<const N: usize>(
+        &mut self,
+        values: impl ExactSizeIterator<Item = [f32; N]>,
+        kind: &'static str,
+    ) -> usize {
+        let count = values.len();
+        let bytes = values.flatten().flat_map(f32::to_le_bytes).collect();
+        self.accessor(bytes, ARRAY_BUFFER, FLOAT, count, kind)
     }
 
     fn accessor(
@@ -166,22 +193,27 @@ impl SceneBuilder {
         count: usize,
         kind: &'static str,
     ) -> usize {
-        let (byte_offset, byte_length) = (self.binary.len(), bytes.len());
-        self.binary.extend(bytes);
-        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
-        let buffer_view = self.document.buffer_views.len();
-        self.document.buffer_views.push(BufferView { buffer: 0, byte_offset, byte_length, target });
+        let buffer_view = self.view(bytes, Some(target));
         let accessor = Accessor { buffer_view, component_type, count, kind, min: None, max: None };
         self.document.accessors.push(accessor);
         self.document.accessors.len() - 1
     }
 
+    fn view(&mut self, bytes: Vec<u8>, target: Option<u32>) -> usize {
+        let (byte_offset, byte_length) = (self.binary.len(), bytes.len());
+        self.binary.extend(bytes);
+        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
+        self.document.buffer_views.push(BufferView { buffer: 0, byte_offset, byte_length, target });
+        self.document.buffer_views.len() - 1
+    }
+
     /// Adds a mesh made of parts, each a geometry and the index of its material; returns its index.
     pub fn mesh(&mut self, name: &str, parts: &[(Geometry, usize)]) -> usize {
         let primitives = parts.iter().map(|&(geometry, material)| Primitive {
-            attributes: Attributes { position: geometry.positions },
+            attributes: geometry.attributes,
             indices: geometry.indices,
             material,
+            mode: geometry.mode,
         });
         self.document.meshes.push(MeshEntry { name: name.into(), primitives: primitives.collect() });
         self.document.meshes.len() - 1
@@ -202,6 +234,11 @@ impl SceneBuilder {
     /// Adds a node at the top that shows `mesh` in `material`, both under the name of the node.
     pub fn object(&mut self, name: &str, mesh: &Mesh, material: usize) {
         let geometry = self.geometry(mesh);
+        self.placed(name, geometry, material);
+    }
+
+    /// The same with a geometry that is in the file.
+    pub fn placed(&mut self, name: &str, geometry: Geometry, material: usize) {
         let mesh = Some(self.mesh(name, &[(geometry, material)]));
         self.root(Node { name: name.into(), mesh, ..Node::default() });
     }
@@ -220,10 +257,12 @@ impl SceneBuilder {
         let document = &mut self.document;
         document.scenes = vec![Roots { nodes: self.roots }];
         document.buffers = vec![Buffer { byte_length: self.binary.len(), uri }];
-        if document.materials.iter().any(|material| material.extensions.emissive_strength.is_some()) {
-            document.extensions_used.push("KHR_materials_emissive_strength");
-        }
-        document.extensions_used.push("KHR_materials_specular");
+        let mut used: Vec<_> =
+            document.materials.iter().flat_map(|material| material.extensions.names()).collect();
+        used.extend(document.materials.iter().filter_map(MaterialEntry::transform_extension));
+        used.sort_unstable();
+        used.dedup();
+        document.extensions_used = used;
         (self.document, self.binary)
     }
 

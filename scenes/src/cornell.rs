@@ -1,10 +1,13 @@
-//! The Cornell box, scaled to two metres, the same box with a glossy floor, and lit by a lamp that faces the ceiling.
+//! The Cornell box, scaled to two metres: the same box with a glossy floor, lit by a lamp that faces the ceiling, and with
+//! a mirror ball and a glass ball in place of its blocks.
 
 use glam::Vec3;
 
-use crate::builder::{Camera, Material, SceneBuilder};
-use crate::document::Phong;
+use crate::builder::{Camera, SceneBuilder};
+use crate::document::{Node, Phong};
+use crate::material::{Glass, Material};
 use crate::mesh::Mesh;
+use crate::sphere::icosphere;
 
 /// Four corners, counterclockwise from the front.
 type Quad = [[f32; 3]; 4];
@@ -57,6 +60,14 @@ const CUP_ALBEDO: [f64; 3] = [0.1; 3];
 /// As much power as the ceiling's lamp has in a third of the area.
 const UPLIGHT_RADIANCE: [f64; 3] = [56.0, 42.6, 20.6];
 
+/// The balls, which float a little above the floor: their centres and their radius.
+const MIRROR_BALL: [f32; 3] = [-0.45, -0.58, -0.4];
+const GLASS_BALL: [f32; 3] = [0.42, -0.58, 0.3];
+const BALL_RADIUS: f32 = 0.4;
+/// Clear, with a tint of bottle glass where it is thick.
+const GLASS: Glass =
+    Glass { ior: 1.5, thickness: 0.8, attenuation_colour: [0.8, 0.93, 0.86], attenuation_distance: 1.0 };
+
 /// The whole open side fills the picture.
 const FRONT: Camera =
     Camera { eye: Vec3::new(0.0, 0.0, 3.9), target: Vec3::ZERO, yfov: 0.6860487863861751, aspect_ratio: 1.0 };
@@ -83,6 +94,15 @@ fn standing_box(shape: &StandingBox) -> Mesh {
 
 /// The box with the given material on its floor, or the white of the other walls, and a lamp.
 fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> SceneBuilder {
+    let (mut scene, white) = empty_box(floor, add_lamp);
+    scene.object("small-box", &standing_box(&SMALL_BOX), white);
+    scene.object("large-box", &standing_box(&LARGE_BOX), white);
+    scene.camera("camera", &FRONT);
+    scene
+}
+
+/// The walls and the lamp; also returns the index of the material of white walls.
+fn empty_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> (SceneBuilder, usize) {
     let mut scene = SceneBuilder::default();
     let white = scene.material(&Material::diffuse("white", WHITE));
     let green = scene.material(&Material::diffuse("green", GREEN));
@@ -94,10 +114,7 @@ fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> Sce
     scene.object("back", &quad(BACK), white);
     scene.object("green-wall", &quad(GREEN_WALL), green);
     scene.object("red-wall", &quad(RED_WALL), red);
-    scene.object("small-box", &standing_box(&SMALL_BOX), white);
-    scene.object("large-box", &standing_box(&LARGE_BOX), white);
-    scene.camera("camera", &FRONT);
-    scene
+    (scene, white)
 }
 
 fn add_ceiling_lamp(scene: &mut SceneBuilder) {
@@ -130,6 +147,22 @@ pub(crate) fn glossy_floor() -> Vec<u8> {
 /// from there.
 pub(crate) fn uplight() -> Vec<u8> {
     cornell_box(None, add_uplight).into_gltf()
+}
+
+/// A mirror ball and a glass ball between Lambertian walls: light that a smooth surface sends on to a Lambertian one.
+pub(crate) fn spheres() -> Vec<u8> {
+    let (mut scene, _) = empty_box(None, add_ceiling_lamp);
+    let mirror = scene.material(&Material::metallic_roughness("mirror", [1.0; 3], 1.0, 0.0));
+    let glass = scene.material(&Material::glass("glass", GLASS));
+    let ball = scene.geometry(&icosphere(5));
+    for (name, material, centre) in [("mirror-ball", mirror, MIRROR_BALL), ("glass-ball", glass, GLASS_BALL)]
+    {
+        let mesh = Some(scene.mesh(name, &[(ball, material)]));
+        let (translation, scale) = (Some(centre), Some([BALL_RADIUS; 3]));
+        scene.root(Node { name: name.into(), mesh, translation, scale, ..Node::default() });
+    }
+    scene.camera("camera", &FRONT);
+    scene.into_glb()
 }
 
 /// The bottom and the four sides of the cup.

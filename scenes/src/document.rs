@@ -17,6 +17,12 @@ pub struct Document {
     pub(crate) nodes: Vec<Node>,
     pub(crate) meshes: Vec<MeshEntry>,
     pub(crate) materials: Vec<MaterialEntry>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) textures: Vec<TextureEntry>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) samplers: Vec<Sampler>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) images: Vec<ImageEntry>,
     pub(crate) cameras: Vec<CameraEntry>,
     pub(crate) accessors: Vec<Accessor>,
     pub(crate) buffer_views: Vec<BufferView>,
@@ -68,14 +74,23 @@ pub(crate) struct MeshEntry {
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Primitive {
     pub(crate) attributes: Attributes,
-    pub(crate) indices: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) indices: Option<usize>,
     pub(crate) material: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) mode: Option<u32>,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(crate) struct Attributes {
     pub(crate) position: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) normal: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) texcoord_0: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) color_0: Option<usize>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -85,17 +100,35 @@ pub(crate) struct MaterialEntry {
     pub(crate) pbr_metallic_roughness: MetallicRoughness,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) emissive_factor: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) emissive_texture: Option<TextureInfo>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) alpha_mode: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) alpha_cutoff: Option<f64>,
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub(crate) double_sided: bool,
+    #[serde(skip_serializing_if = "Extensions::is_empty")]
     pub(crate) extensions: Extensions,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) extras: Option<Extras>,
+}
+
+impl MaterialEntry {
+    /// The extension's name if a texture is transformed.
+    pub(crate) fn transform_extension(&self) -> Option<&'static str> {
+        let textures = [self.pbr_metallic_roughness.base_color_texture, self.emissive_texture];
+        let is_there = textures.iter().flatten().any(|texture| texture.extensions.is_some());
+        is_there.then_some("KHR_texture_transform")
+    }
 }
 
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct MetallicRoughness {
     pub(crate) base_color_factor: [f64; 4],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) base_color_texture: Option<TextureInfo>,
     pub(crate) metallic_factor: f64,
     pub(crate) roughness_factor: f64,
 }
@@ -104,8 +137,33 @@ pub(crate) struct MetallicRoughness {
 pub(crate) struct Extensions {
     #[serde(rename = "KHR_materials_emissive_strength", skip_serializing_if = "Option::is_none")]
     pub(crate) emissive_strength: Option<EmissiveStrength>,
-    #[serde(rename = "KHR_materials_specular")]
-    pub(crate) specular: Specular,
+    #[serde(rename = "KHR_materials_specular", skip_serializing_if = "Option::is_none")]
+    pub(crate) specular: Option<Specular>,
+    #[serde(rename = "KHR_materials_transmission", skip_serializing_if = "Option::is_none")]
+    pub(crate) transmission: Option<Transmission>,
+    #[serde(rename = "KHR_materials_ior", skip_serializing_if = "Option::is_none")]
+    pub(crate) ior: Option<IndexOfRefraction>,
+    #[serde(rename = "KHR_materials_volume", skip_serializing_if = "Option::is_none")]
+    pub(crate) volume: Option<Volume>,
+}
+
+impl Extensions {
+    /// The names of those that are there.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &'static str> {
+        [
+            ("KHR_materials_emissive_strength", self.emissive_strength.is_some()),
+            ("KHR_materials_specular", self.specular.is_some()),
+            ("KHR_materials_transmission", self.transmission.is_some()),
+            ("KHR_materials_ior", self.ior.is_some()),
+            ("KHR_materials_volume", self.volume.is_some()),
+        ]
+        .into_iter()
+        .filter_map(|(name, is_there)| is_there.then_some(name))
+    }
+
+    fn is_empty(&self) -> bool {
+        self.names().next().is_none()
+    }
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -118,6 +176,73 @@ pub(crate) struct EmissiveStrength {
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Specular {
     pub(crate) specular_factor: f64,
+}
+
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Transmission {
+    pub(crate) transmission_factor: f64,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct IndexOfRefraction {
+    pub(crate) ior: f64,
+}
+
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Volume {
+    pub(crate) thickness_factor: f64,
+    pub(crate) attenuation_distance: f64,
+    pub(crate) attenuation_color: [f64; 3],
+}
+
+/// Which texture a material takes, and how it lies.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct TextureInfo {
+    pub(crate) index: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) extensions: Option<TextureExtensions>,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct TextureExtensions {
+    #[serde(rename = "KHR_texture_transform")]
+    pub(crate) transform: TextureTransform,
+}
+
+/// Coordinates are scaled, then turned, then moved, before the texture is looked up.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct TextureTransform {
+    /// Added last.
+    pub offset: [f64; 2],
+    /// Radians, counterclockwise where the second coordinate grows downwards.
+    pub rotation: f64,
+    /// How often the image fits into one unit of each coordinate.
+    pub scale: [f64; 2],
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct TextureEntry {
+    pub(crate) sampler: usize,
+    pub(crate) source: usize,
+}
+
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Sampler {
+    pub(crate) mag_filter: u32,
+    pub(crate) min_filter: u32,
+    pub(crate) wrap_s: u32,
+    pub(crate) wrap_t: u32,
+}
+
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct ImageEntry {
+    pub(crate) name: String,
+    pub(crate) buffer_view: usize,
+    pub(crate) mime_type: &'static str,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -176,7 +301,8 @@ pub(crate) struct BufferView {
     pub(crate) buffer: usize,
     pub(crate) byte_offset: usize,
     pub(crate) byte_length: usize,
-    pub(crate) target: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) target: Option<u32>,
 }
 
 #[derive(Clone, Debug, Serialize)]

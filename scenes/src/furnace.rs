@@ -4,7 +4,8 @@
 
 use glam::Vec3;
 
-use crate::builder::{Camera, Material, SceneBuilder};
+use crate::builder::{Camera, SceneBuilder};
+use crate::material::Material;
 use crate::mesh::Mesh;
 
 /// A box between two corners given in the wrong order shows its front to the inside.

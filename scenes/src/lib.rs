@@ -8,7 +8,12 @@ pub mod builder;
 mod cornell;
 pub mod document;
 mod furnace;
+pub mod material;
 pub mod mesh;
+mod room;
+mod roughness;
+mod sky;
+mod sphere;
 
 /// A scene as it lies on disk.
 #[derive(Clone, Debug)]
@@ -19,13 +24,18 @@ pub struct SceneFile {
     pub bytes: Vec<u8>,
 }
 
-/// Makes every scene.
+/// Makes every scene, and the sky that goes with one.
 pub fn scenes() -> Vec<SceneFile> {
     vec![
         SceneFile { name: "cornell.gltf", bytes: cornell::lambertian() },
         SceneFile { name: "cornell-glossy.gltf", bytes: cornell::glossy_floor() },
         SceneFile { name: "cornell-uplight.gltf", bytes: cornell::uplight() },
+        SceneFile { name: "cornell-spheres.glb", bytes: cornell::spheres() },
         SceneFile { name: "furnace.gltf", bytes: furnace::furnace() },
         SceneFile { name: "atrium.glb", bytes: atrium::atrium() },
+        SceneFile { name: "atrium-open.glb", bytes: atrium::open() },
+        SceneFile { name: "room.glb", bytes: room::room() },
+        SceneFile { name: "roughness.glb", bytes: roughness::roughness() },
+        SceneFile { name: "sky.exr", bytes: sky::sky() },
     ]
 }

@@ -12,6 +12,12 @@ pub struct Mesh {
     pub positions: Vec<Vec3>,
     /// Three vertices each, counterclockwise from the front.
     pub triangles: Vec<[u32; 3]>,
+    /// Unit normals of the vertices of a smooth surface; none if it is flat.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates of the vertices, the second downwards in the image; none without a texture.
+    pub coordinates: Vec<Vec2>,
+    /// Colours of the vertices, linear red, green and blue; none if they are white.
+    pub colours: Vec<[f32; 3]>,
 }
 
 impl Mesh {
@@ -44,6 +50,12 @@ impl Mesh {
     pub fn quad(&mut self, corners: [Vec3; 4]) {
         let corners = corners.map(|corner| self.vertex(corner));
         self.quad_between(corners);
+    }
+
+    /// The same with texture coordinates, which a mesh has everywhere or nowhere.
+    pub fn textured_quad(&mut self, corners: [Vec3; 4], coordinates: [[f32; 2]; 4]) {
+        self.quad(corners);
+        self.coordinates.extend(coordinates.map(Vec2::from_array));
     }
 
     /// Adds a triangle with vertices of its own.
@@ -134,6 +146,9 @@ impl Mesh {
     pub fn append(&mut self, other: &Self, offset: Vec3) {
         let first = self.positions.len() as u32;
         self.positions.extend(other.positions.iter().map(|&p| p + offset));
+        self.normals.extend(&other.normals);
+        self.coordinates.extend(&other.coordinates);
+        self.colours.extend(&other.colours);
         self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|index| first + index)));
     }
 
@@ -143,6 +158,23 @@ impl Mesh {
         for p in &mut self.positions {
             *p = Vec3::new(p.z, p.y, 0.0 - p.x);
         }
+        for n in &mut self.normals {
+            *n = Vec3::new(n.z, n.y, 0.0 - n.x);
+        }
+        self
+    }
+
+    /// Gives each vertex the normal of the triangles around it, weighted by their areas.
+    #[must_use]
+    pub fn smooth(mut self) -> Self {
+        let mut sums = vec![Vec3::ZERO; self.positions.len()];
+        for corners in &self.triangles {
+            let [a, b, c] = corners.map(|index| self.positions[index as usize]);
+            for index in corners {
+                sums[*index as usize] += (b - a).cross(c - a);
+            }
+        }
+        self.normals = sums.into_iter().map(Vec3::normalize_or_zero).collect();
         self
     }
 

@@ -6,15 +6,20 @@ use std::path::Path;
 use base64::Engine;
 use glam::{Mat4, Vec3};
 use gltf::buffer::Source;
-use gltf::{Gltf, Node};
+use gltf::mesh::Mode;
+use gltf::{Gltf, Node, Primitive};
 
 /// A scene's name, the triangles it may have, and its cameras.
-const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 5] = [
+const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 9] = [
     ("cornell.gltf", 36..=36, &["camera"]),
     ("cornell-glossy.gltf", 36..=36, &["camera", "floor"]),
     ("cornell-uplight.gltf", 46..=46, &["camera"]),
+    ("cornell-spheres.glb", 40_972..=40_972, &["camera"]),
     ("furnace.gltf", 12..=12, &["camera"]),
     ("atrium.glb", 60_000..=150_000, &["court", "gallery"]),
+    ("atrium-open.glb", 60_000..=150_000, &["court", "gallery"]),
+    ("room.glb", 1_500..=3_000, &["camera"]),
+    ("roughness.glb", 51_206..=51_206, &["camera"]),
 ];
 
 fn shipped(name: &str) -> Vec<u8> {
@@ -33,6 +38,16 @@ fn binary(file: &Gltf) -> Vec<u8> {
     }
 }
 
+/// The vertices of each triangle of a primitive.
+fn joined<'a>(primitive: &Primitive<'_>, indices: &'a [u32]) -> Box<dyn Iterator<Item = [u32; 3]> + 'a> {
+    match primitive.mode() {
+        Mode::Triangles => Box::new(indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]])),
+        Mode::TriangleStrip => Box::new(indices.windows(3).map(|c| [c[0], c[1], c[2]])),
+        Mode::TriangleFan => Box::new(indices[1..].windows(2).map(|c| [c[0], c[1], indices[0]])),
+        mode => panic!("{mode:?}"),
+    }
+}
+
 /// Adds the triangles of a node and of those below it, in world space.
 fn collect(node: &Node<'_>, parent: Mat4, data: &[u8], triangles: &mut Vec<[Vec3; 3]>) {
     let transform = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
@@ -40,9 +55,10 @@ fn collect(node: &Node<'_>, parent: Mat4, data: &[u8], triangles: &mut Vec<[Vec3
         let reader = primitive.reader(|_| Some(data));
         let place = |position| transform.transform_point3(Vec3::from_array(position));
         let positions: Vec<Vec3> = reader.read_positions().expect("positions").map(place).collect();
-        let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
-        let corners = indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]].map(|i| positions[i as usize]));
-        triangles.extend(corners);
+        let indices: Vec<u32> = reader
+            .read_indices()
+            .map_or_else(|| (0..positions.len() as u32).collect(), |indices| indices.into_u32().collect());
+        triangles.extend(joined(&primitive, &indices).map(|corners| corners.map(|i| positions[i as usize])));
     }
     for child in node.children() {
         collect(&child, transform, data, triangles);
@@ -61,7 +77,8 @@ fn triangles(file: &Gltf) -> Vec<[Vec3; 3]> {
 #[test]
 fn shipped_files_are_what_the_generator_makes() {
     let scenes = photoncard_scenes::scenes();
-    assert_eq!(scenes.len(), EXPECTED.len());
+    // One of them is the sky, which is no scene of its own.
+    assert_eq!(scenes.len(), EXPECTED.len() + 1);
     for scene in scenes {
         let same = shipped(scene.name) == scene.bytes;
         assert!(same, "{} differs: run `cargo run -p photoncard-scenes`", scene.name);
@@ -89,6 +106,31 @@ fn no_triangle_is_degenerate() {
             let height = doubled / longest;
             assert!(height > 1e-3, "{name}: {a} {b} {c} is {height} m high");
             assert!(longest < 200.0 * height, "{name}: {a} {b} {c} is a sliver");
+        }
+    }
+}
+
+#[test]
+fn normals_are_of_unit_length_and_on_the_side_of_the_front() {
+    for (name, ..) in EXPECTED {
+        let file = Gltf::from_slice(&shipped(name)).expect(name);
+        let data = binary(&file);
+        for primitive in file.meshes().flat_map(|mesh| mesh.primitives().collect::<Vec<_>>()) {
+            let reader = primitive.reader(|_| Some(&data));
+            let (Some(normals), Some(indices)) = (reader.read_normals(), reader.read_indices()) else {
+                continue;
+            };
+            let normals: Vec<Vec3> = normals.map(Vec3::from_array).collect();
+            let positions: Vec<Vec3> =
+                reader.read_positions().expect("positions").map(Vec3::from_array).collect();
+            assert!(normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-5), "{name}");
+            let indices: Vec<u32> = indices.into_u32().collect();
+            for corners in joined(&primitive, &indices) {
+                let [a, b, c] = corners.map(|index| positions[index as usize]);
+                let front = (b - a).cross(c - a);
+                let sum: f32 = corners.iter().map(|index| normals[*index as usize].dot(front)).sum();
+                assert!(sum > 0.0, "{name}: {a} {b} {c}");
+            }
         }
     }
 }

@@ -61,8 +61,24 @@ const SIDES: [Plan; 4] = [
     },
 ];
 
-/// Makes the whole scene.
+/// The court under a sky and a sun of its own.
 pub(crate) fn atrium() -> Vec<u8> {
+    let (mut scene, colours) = court();
+    scene.object("sky", &light::sky(), colours.sky);
+    scene.object("sun", &light::sun(), colours.sun);
+    place_cameras(&mut scene);
+    scene.into_glb()
+}
+
+/// The court without any light, open to surroundings that a renderer is given.
+pub(crate) fn open() -> Vec<u8> {
+    let (mut scene, _) = court();
+    place_cameras(&mut scene);
+    scene.into_glb()
+}
+
+/// All that does not shine.
+fn court() -> (SceneBuilder, Palette) {
     let mut scene = SceneBuilder::default();
     let colours = Palette::new(&mut scene);
     let parts = Parts::new(&mut scene, &colours);
@@ -72,10 +88,7 @@ pub(crate) fn atrium() -> Vec<u8> {
     build_rings(&mut scene, &colours);
     build_floor(&mut scene, &colours);
     furnish(&mut scene, &colours, &parts);
-    scene.object("sky", &light::sky(), colours.sky);
-    scene.object("sun", &light::sun(), colours.sun);
-    place_cameras(&mut scene);
-    scene.into_glb()
+    (scene, colours)
 }
 
 /// What runs around the whole court: steps, cornices with the floors behind them, rails, outer wall.

@@ -1,6 +1,7 @@
 //! The materials of the atrium, all Lambertian.
 
-use crate::builder::{Material, SceneBuilder};
+use crate::builder::SceneBuilder;
+use crate::material::Material;
 
 /// Indices of the materials in the file.
 #[derive(Clone, Copy, Debug)]

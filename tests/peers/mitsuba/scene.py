@@ -1,5 +1,5 @@
-"""Mitsuba's scene of a glTF file, by photoncard's conventions: flat triangles, one-sided unless `doubleSided`, emissive
-triangles as Lambertian area lights, nothing else."""
+"""Mitsuba's scene of a glTF file, by photoncard's conventions: surfaces are one-sided unless `doubleSided`, emissive
+triangles are Lambertian area lights, and there is nothing else but an environment that may be given."""
 
 import math
 
@@ -7,19 +7,28 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+import environment
 import gltf
+import materials
 
 
-def load(path, width, height, camera_name=None):
+def load(path, width, height, camera_name=None, environment_path=None):
     """The scene that the file's first camera sees, or the named one."""
     source = gltf.Scene(path)
     chosen = [camera for camera in source.cameras if camera_name in (None, camera[0])]
     if not chosen:
         raise ValueError(f"{path} has no camera '{camera_name}'")
     parts = {"type": "scene", "sensor": sensor(chosen[0], width, height)}
-    for index, triangles in source.triangles.items():
-        parts[f"material{index}"] = mesh(source.materials[index], triangles)
+    for index, part in enumerate(source.parts):
+        parts[f"part{index}"] = mesh(source, part)
+    if environment_path is not None:
+        parts["environment"] = environment.emitter(environment_path)
     return mi.load_dict(parts)
+
+
+def has_holes(path):
+    """Whether surfaces are cut out."""
+    return any(material.get("alphaMode") == "MASK" for material in gltf.Scene(path).materials)
 
 
 def sensor(camera, width, height):
@@ -48,50 +57,32 @@ def sensor(camera, width, height):
     }
 
 
-def mesh(material, triangles):
-    """All triangles of a material, each with corners of its own."""
+def mesh(source, part):
+    """All triangles of a part, each with corners of its own."""
+    material = source.materials[part.material]
     properties = mi.Properties()
-    properties["bsdf"] = mi.load_dict(reflection(material))
-    emission = np.array(material.get("emissiveFactor", [0.0, 0.0, 0.0]))
-    emission *= extension(material, "KHR_materials_emissive_strength").get("emissiveStrength", 1.0)
-    if emission.any():
-        if material.get("doubleSided"):
-            raise ValueError("Mitsuba's area lights have one side")
-        properties["emitter"] = mi.load_dict({"type": "area", "radiance": colour(emission)})
-    count = len(triangles)
-    shape = mi.Mesh(material["name"], 3 * count, count, props=properties)
+    properties["bsdf"] = mi.load_dict(materials.reflection(source, material, part))
+    emission = materials.emission(source, material)
+    if emission is not None:
+        properties["emitter"] = mi.load_dict({"type": "area", "radiance": emission})
+    # Flat triangles without normals of their own.
+    properties["face_normals"] = part.normals is None
+    count = 3 * len(part.positions)
+    has_normals, has_coordinates = part.normals is not None, part.coordinates is not None
+    shape = mi.Mesh(material["name"], count, count // 3, properties, has_normals, has_coordinates)
+    if part.colours is not None:
+        shape.add_attribute(materials.VERTEX_COLOUR, 3, flat(part.colours[..., :3]))
     parameters = mi.traverse(shape)
-    parameters["vertex_positions"] = mi.Float(triangles.reshape(-1).astype(np.float32))
-    parameters["faces"] = dr.arange(mi.UInt32, 3 * count)
+    parameters["vertex_positions"] = flat(part.positions)
+    parameters["faces"] = dr.arange(mi.UInt32, count)
+    if has_normals:
+        parameters["vertex_normals"] = flat(part.normals)
+    if has_coordinates:
+        parameters["vertex_texcoords"] = flat(part.coordinates)
     parameters.update()
     return shape
 
 
-def reflection(material):
-    """The reflection of a material: Lambertian, and the Phong lobe that it may state."""
-    diffuse = material["pbrMetallicRoughness"]["baseColorFactor"][:3]
-    phong = material.get("extras", {}).get("photoncard", {}).get("phong")
-    if phong is None:
-        front = {"type": "diffuse", "reflectance": colour(diffuse)}
-    else:
-        # Imported here, as the variant must have been chosen before a BSDF is derived.
-        from phong import PhongLobe
-
-        mi.register_bsdf("phong_lobe", PhongLobe)
-        front = {
-            "type": "phong_lobe",
-            "diffuse": mi.ScalarColor3f(diffuse),
-            "specular": mi.ScalarColor3f(phong["specular"]),
-            "exponent": float(phong["exponent"]),
-        }
-    return {"type": "twosided", "front": front} if material.get("doubleSided") else front
-
-
-def colour(values):
-    """Linear RGB."""
-    return {"type": "rgb", "value": [float(value) for value in values]}
-
-
-def extension(material, name):
-    """An extension of a material, or nothing."""
-    return material.get("extensions", {}).get(name, {})
+def flat(values):
+    """Values one after the other, as Mitsuba holds them."""
+    return mi.Float(values.reshape(-1).astype(np.float32))

@@ -1,0 +1,147 @@
+//! What surfaces reflect, let through and emit, and how glTF says it.
+
+use crate::document::{
+    EmissiveStrength, Extensions, Extras, IndexOfRefraction, MaterialEntry, MetallicRoughness, Phong,
+    PhotoncardExtras, Specular, TextureExtensions, TextureInfo, TextureTransform, Transmission, Volume,
+};
+
+/// What a surface reflects and emits.
+#[derive(Clone, Debug, Default)]
+pub struct Material {
+    name: String,
+    base_colour: [f64; 3],
+    /// Metallic factor and roughness; none is Lambertian.
+    microfacets: Option<[f64; 2]>,
+    glass: Option<Glass>,
+    radiance: [f64; 3],
+    double_sided: bool,
+    phong: Option<Phong>,
+    base_texture: Option<TextureInfo>,
+    emissive_texture: Option<TextureInfo>,
+    alpha_cutoff: Option<f64>,
+}
+
+/// What fills a clear, smooth body.
+#[derive(Clone, Copy, Debug)]
+pub struct Glass {
+    /// Index of refraction.
+    pub ior: f64,
+    /// How thick a body is about, in metres, for renderers that do not trace through it.
+    pub thickness: f64,
+    /// What is left of white light after `attenuation_distance`, red, green and blue.
+    pub attenuation_colour: [f64; 3],
+    /// In metres.
+    pub attenuation_distance: f64,
+}
+
+impl Material {
+    /// A purely Lambertian material; `albedo` is the reflected share, red, green and blue.
+    pub fn diffuse(name: &str, albedo: [f64; 3]) -> Self {
+        Self { name: name.into(), base_colour: albedo, ..Self::default() }
+    }
+
+    /// glTF's metallic-roughness model; a metal of roughness 0 is a mirror.
+    pub fn metallic_roughness(name: &str, base_colour: [f64; 3], metallic: f64, roughness: f64) -> Self {
+        Self { microfacets: Some([metallic, roughness]), ..Self::diffuse(name, base_colour) }
+    }
+
+    /// The surface of a clear, smooth body.
+    pub fn glass(name: &str, glass: Glass) -> Self {
+        Self { glass: Some(glass), ..Self::metallic_roughness(name, [1.0; 3], 0.0, 0.0) }
+    }
+
+    /// The same, emitting `radiance` in W/(sr m^2).
+    #[must_use]
+    pub fn emitting(mut self, radiance: [f64; 3]) -> Self {
+        self.radiance = radiance;
+        self
+    }
+
+    /// The same on both sides.
+    #[must_use]
+    pub fn double_sided(mut self) -> Self {
+        self.double_sided = true;
+        self
+    }
+
+    /// The same with a Phong lobe on top.
+    #[must_use]
+    pub fn with_phong(mut self, phong: Phong) -> Self {
+        self.phong = Some(phong);
+        self
+    }
+
+    /// The same with its base colour multiplied by a texture.
+    #[must_use]
+    pub fn textured(mut self, texture: usize, transform: Option<TextureTransform>) -> Self {
+        self.base_texture = Some(info(texture, transform));
+        self
+    }
+
+    /// The same with its radiance multiplied by a texture.
+    #[must_use]
+    pub fn emission_textured(mut self, texture: usize) -> Self {
+        self.emissive_texture = Some(info(texture, None));
+        self
+    }
+
+    /// The same, but not there where the texture's alpha is below `cutoff`.
+    #[must_use]
+    pub fn cut_out(mut self, cutoff: f64) -> Self {
+        self.alpha_cutoff = Some(cutoff);
+        self
+    }
+
+    /// glTF keeps `emissiveFactor` within one; the rest of the radiance is the strength.
+    fn emission(&self) -> (Option<[f64; 3]>, Option<EmissiveStrength>) {
+        let peak = self.radiance.into_iter().fold(0.0, f64::max);
+        if peak == 0.0 {
+            (None, None)
+        } else if peak <= 1.0 {
+            (Some(self.radiance), None)
+        } else {
+            let factor = self.radiance.map(|channel| channel / peak);
+            (Some(factor), Some(EmissiveStrength { emissive_strength: peak }))
+        }
+    }
+
+    fn extensions(&self, emissive_strength: Option<EmissiveStrength>) -> Extensions {
+        Extensions {
+            emissive_strength,
+            specular: self.microfacets.is_none().then_some(Specular { specular_factor: 0.0 }),
+            transmission: self.glass.map(|_| Transmission { transmission_factor: 1.0 }),
+            ior: self.glass.map(|glass| IndexOfRefraction { ior: glass.ior }),
+            volume: self.glass.map(|glass| Volume {
+                thickness_factor: glass.thickness,
+                attenuation_distance: glass.attenuation_distance,
+                attenuation_color: glass.attenuation_colour,
+            }),
+        }
+    }
+
+    pub(crate) fn entry(&self) -> MaterialEntry {
+        let [r, g, b] = self.base_colour;
+        let [metallic_factor, roughness_factor] = self.microfacets.unwrap_or([0.0, 1.0]);
+        let (emissive_factor, emissive_strength) = self.emission();
+        MaterialEntry {
+            name: self.name.clone(),
+            pbr_metallic_roughness: MetallicRoughness {
+                base_color_factor: [r, g, b, 1.0],
+                base_color_texture: self.base_texture,
+                metallic_factor,
+                roughness_factor,
+            },
+            emissive_factor,
+            emissive_texture: self.emissive_texture,
+            alpha_mode: self.alpha_cutoff.map(|_| "MASK"),
+            alpha_cutoff: self.alpha_cutoff,
+            double_sided: self.double_sided,
+            extensions: self.extensions(emissive_strength),
+            extras: self.phong.map(|phong| Extras { photoncard: PhotoncardExtras { phong } }),
+        }
+    }
+}
+
+fn info(index: usize, transform: Option<TextureTransform>) -> TextureInfo {
+    TextureInfo { index, extensions: transform.map(|transform| TextureExtensions { transform }) }
+}
