@@ -40,7 +40,12 @@ fn hall(triangles: u32) -> Scene {
             PunctualKind::Point { position: place(i, 20) * 10.0 }
         } else {
             let direction = place(i, 23).normalize();
-            PunctualKind::Spot { position: place(i, 20) * 10.0, direction, inner_cosine: 0.9, outer_cosine: 0.7 }
+            PunctualKind::Spot {
+                position: place(i, 20) * 10.0,
+                direction,
+                inner_cosine: 0.9,
+                outer_cosine: 0.7,
+            }
         },
         intensity: Vec3::splat(0.01),
     };
@@ -99,8 +104,9 @@ fn the_probabilities_of_all_emitters_sum_to_one() {
     let packed = PackedScene::new(&hall(300)).unwrap();
     let (image, mut memory) = packed.view();
     for index in 0..30 {
-        let mut probability =
-            |emitter| f64::from(selection_probability(&image, &mut memory, &receiver(index), emitter).unwrap());
+        let mut probability = |emitter| {
+            f64::from(selection_probability(&image, &mut memory, &receiver(index), emitter).unwrap())
+        };
         let sum: f64 = (0..340).map(&mut probability).sum();
         // A part may be lost where a node's children are all behind, though the node as a whole is not.
         assert!(sum > 0.85 && sum < 1.0 + 1e-5, "{sum}");

@@ -130,11 +130,8 @@ fn sky() -> Environment {
 fn the_eye_sees_the_environment() {
     // The middle of a texel: row 1, column 4 of 8, beside the map's middle.
     let (theta, phi) = (PI * 1.5 / 4.0, 2.0 * PI * (4.5 / 8.0 - 0.5));
-    let direction = Vec3::new(
-        (theta.sin() * phi.sin()) as f32,
-        theta.cos() as f32,
-        -(theta.sin() * phi.cos()) as f32,
-    );
+    let direction =
+        Vec3::new((theta.sin() * phi.sin()) as f32, theta.cos() as f32, -(theta.sin() * phi.cos()) as f32);
     let view = Camera { vertical_fov: 0.001, ..camera(Vec3::Y, direction) };
     let environment = Some(sky());
     let scene = Scene { environment, cameras: vec![view], ..bare_floor(Vec3::ZERO) };
@@ -152,8 +149,7 @@ fn lamps_and_sky() -> Scene {
     let mut lamp = |centre: Vec3, half: f32, emission: f32, double_sided: bool| {
         let material = all.materials.len() as u32;
         let at = |x: f32, z: f32| centre + Vec3::new(x * half, 0.3 * x * half, z * half);
-        all.triangles
-            .extend(quad([at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)], material));
+        all.triangles.extend(quad([at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)], material));
         let emission = Vec3::splat(emission);
         all.materials.push(Material { emission, double_sided, ..lambertian("lamp", 0.0) });
     };

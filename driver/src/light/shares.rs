@@ -1,6 +1,5 @@
 //! How light samples are shared out between emitters, the environment and distant lights.
 
-
 use glam::{DVec3, Vec3};
 use photoncard_shared::layout::DistantLight;
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    DOUBLE_SIDED, Material, NO_TEXTURE, Record, Reflectance, THIN_WALLED, Triangle,
+    DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Record, Reflectance, THIN_WALLED, Triangle,
 };
 use photoncard_shared::message::Fault;
 
@@ -157,7 +157,7 @@ pub(super) fn surface_of(
         ..Surface::white(Vec3::ZERO, normal, magnitude(&[a, b, c, ray.origin]))
     };
     if let Reflectance::Phong { diffuse, specular, exponent } = material.reflectance
-        && is_plain(scene, &material)
+        && is_plain(&material)
     {
         let reflection = Reflection { diffuse: diffuse.into(), specular: specular.into(), exponent };
         let is_visible = is_front || double_sided;
@@ -172,9 +172,8 @@ pub(super) fn surface_of(
 
 /// Whether a material is all that there is to its surfaces.
 #[inline(always)]
-fn is_plain(scene: &SceneImage, material: &Material) -> bool {
-    let has_texture = material.textures != [NO_TEXTURE; 3];
-    !has_texture && scene.header.section(SectionKind::LeafAttributes).records == 0
+fn is_plain(material: &Material) -> bool {
+    material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0
 }
 
 /// A surface with its corners' attributes, its textures and its material.
@@ -191,7 +190,8 @@ fn finished(
         return Ok(bare);
     }
     let mut surface = Surface { emission: material.emission.into(), ..bare };
-    let corners = Corners::read(scene, memory, index, weights)?;
+    let has_corners = material.flags & HAS_ATTRIBUTES != 0;
+    let corners = if has_corners { Corners::read(scene, memory, index, weights)? } else { None };
     let mut colour = [1.0; 4];
     let mut roughness = [1.0; 4];
     if let Some(corners) = &corners {

@@ -7,6 +7,9 @@ pub const DOUBLE_SIDED: u32 = 1;
 /// In [`Material::flags`], of [`Reflectance::Glass`]: the surface is a thin wall, through which light goes straight on.
 pub const THIN_WALLED: u32 = 2;
 
+/// In [`Material::flags`]: some of its triangles have [`super::Attributes`].
+pub const HAS_ATTRIBUTES: u32 = 4;
+
 const KIND_SHIFT: u32 = 4;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
@@ -21,7 +24,7 @@ pub struct Material {
     pub reflectance: Reflectance,
     /// Emitted radiance, W/(sr m^2); the emissive texture multiplies it.
     pub emission: [f32; 3],
-    /// [`DOUBLE_SIDED`], [`THIN_WALLED`] or 0.
+    /// [`DOUBLE_SIDED`], [`THIN_WALLED`] and [`HAS_ATTRIBUTES`], or 0.
     pub flags: u32,
     /// Of triangles with cut-outs: where the alpha of the base texture and of the corners is below this, there is nothing.
     pub cutoff: f32,
@@ -90,7 +93,7 @@ impl Material {
                 _ => Reflectance::Phong { diffuse: first, specular: second, exponent: a },
             },
             emission: read_vector(bytes, 32),
-            flags: kind & (DOUBLE_SIDED | THIN_WALLED),
+            flags: kind & (DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES),
             cutoff: read_f32(bytes, 48),
             textures: [textures[0] as u16, (textures[0] >> 16) as u16, textures[1] as u16],
         }
