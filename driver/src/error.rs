@@ -92,15 +92,15 @@ pub enum SceneError {
     #[error("{place} requires the extension {name}, which is not supported")]
     #[diagnostic(
         code(scene::required_extension),
-        help(
-            "export the scene without {name}; supported are KHR_materials_emissive_strength and KHR_materials_specular"
-        )
+        help("export the scene without {name}; supported are {supported}")
     )]
     RequiredExtension {
         /// Where it is required.
         place: Place,
         /// The extension.
         name: String,
+        /// The extensions that are supported.
+        supported: String,
     },
 
     /// The file breaks a rule of glTF.
@@ -127,7 +127,31 @@ pub enum SceneError {
         remedy: &'static str,
     },
 
-    /// A vertex position is not a number, infinite, or out of any scale.
+    /// An image's texels cannot be had.
+    #[error("{place}: {reason}")]
+    #[diagnostic(code(scene::image), help("{remedy}"))]
+    Image {
+        /// Which image.
+        place: Place,
+        /// What is wrong.
+        reason: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+
+    /// An environment cannot be read.
+    #[error("{}: {reason}", file.display())]
+    #[diagnostic(code(scene::environment), help("{remedy}"))]
+    Environment {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        reason: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+
+    /// A vertex's place, or something else of it, is not a number, infinite, or out of any scale.
     #[error("{place}: vertex {vertex} of mesh '{mesh}', primitive {primitive}, {reason}")]
     #[diagnostic(code(scene::vertex), help("repair the mesh in the modelling tool and export it again"))]
     Vertex {

@@ -1,7 +1,7 @@
 //! Pictures as `OpenEXR` files: writing a film, and reading radiance back to compare it.
 //!
-//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; the first
-//! surface seen is in `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z`. The data window is the film's crop window,
+//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; layers are in channels
+//! like `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The data window is the film's crop window,
 //! the display window the full picture. What the picture was made from is JSON in the one attribute `photoncard`:
 //! the `exr` crate keeps attributes in a hash map, so several would change the file's bytes from run to run.
 
@@ -18,7 +18,8 @@ use exr::prelude::{
 };
 use thiserror::Error;
 
-use crate::film::{Film, PixelValue};
+use crate::film::Film;
+use crate::layer::{Channel, Layers};
 use crate::output::{self, OutputError};
 
 /// The attribute that says what the picture was made from.
@@ -27,7 +28,7 @@ pub const PROVENANCE: &str = "photoncard";
 /// The most pixels a picture may have to be read.
 pub const MAX_READ_PIXELS: u64 = 1 << 28;
 
-/// How radiance, albedo and normals are stored. Depth is always single precision.
+/// How samples are stored. Depth and gathers are always in single precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SampleFormat {
     /// 16 bits: three digits, up to 65504; larger finite values are stored as 65504.
@@ -112,17 +113,23 @@ pub enum ExrError {
 
 /// Writes the film to `path`, whole or not at all, the same bytes for the same film every time.
 ///
-/// Pixels that were never written are zero. `provenance_json` is stored in the attribute `photoncard`; characters
+/// Pixels that were never written are zero, and so are layers that the film does not have. `provenance_json` is stored in the attribute `photoncard`; characters
 /// beyond ASCII are stored as JSON's `\u` escapes.
 ///
 /// # Errors
 /// If the file cannot be written, or the provenance is empty.
-pub fn write(path: &Path, film: &Film, provenance_json: &str, format: SampleFormat) -> Result<(), ExrError> {
+pub fn write(
+    path: &Path,
+    film: &Film,
+    layers: &Layers,
+    provenance_json: &str,
+    format: SampleFormat,
+) -> Result<(), ExrError> {
     let fault = |reason: String| ExrError::Encode { path: path.to_owned(), reason };
     if provenance_json.is_empty() {
         return Err(fault("the provenance is empty".to_owned()));
     }
-    let image = image_of(film, provenance_json, format)
+    let image = image_of(film, layers, provenance_json, format)
         .ok_or_else(|| fault("the provenance is not text".to_owned()))?;
     let mut bytes = Cursor::new(Vec::new());
     image.write().to_buffered(&mut bytes).map_err(|error| fault(error.to_string()))?;
@@ -131,6 +138,7 @@ pub fn write(path: &Path, film: &Film, provenance_json: &str, format: SampleForm
 
 fn image_of(
     film: &Film,
+    layers: &Layers,
     provenance: &str,
     format: SampleFormat,
 ) -> Option<Image<Layer<AnyChannels<FlatSamples>>>> {
@@ -147,29 +155,23 @@ fn image_of(
         blocks: exr::image::Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    Some(Image { attributes, layer_data: Layer::new(size, own, encoding, channels(film, format)) })
+    Some(Image { attributes, layer_data: Layer::new(size, own, encoding, channels(film, layers, format)) })
 }
 
-fn channels(film: &Film, format: SampleFormat) -> AnyChannels<FlatSamples> {
-    let stored = |name: &str, value: &dyn Fn(&PixelValue) -> f32| {
+fn channels(film: &Film, layers: &Layers, format: SampleFormat) -> AnyChannels<FlatSamples> {
+    let stored = |channel: &Channel, format: SampleFormat| {
+        let values = film.all().map(|pixel| (channel.value)(&pixel));
         let samples = match format {
-            SampleFormat::Half => {
-                FlatSamples::F16(film.pixels().iter().map(|pixel| to_half(value(pixel))).collect())
-            }
-            SampleFormat::Float => FlatSamples::F32(film.pixels().iter().map(value).collect()),
+            SampleFormat::Half => FlatSamples::F16(values.map(to_half).collect()),
+            SampleFormat::Float => FlatSamples::F32(values.collect()),
         };
-        AnyChannel::new(name, samples)
+        AnyChannel::new(channel.name, samples)
     };
-    let mut list = SmallVec::new();
-    for (axis, name) in ["R", "G", "B"].into_iter().enumerate() {
-        list.push(stored(name, &|pixel| pixel.radiance[axis]));
-        list.push(stored(&format!("albedo.{name}"), &|pixel| pixel.albedo[axis]));
+    let mut list: SmallVec<_> = Layers::colour().iter().map(|channel| stored(channel, format)).collect();
+    for layer in layers.iter() {
+        let format = if layer.is_always_single() { SampleFormat::Float } else { format };
+        list.extend(layer.channels().iter().map(|channel| stored(channel, format)));
     }
-    for (axis, name) in ["N.X", "N.Y", "N.Z"].into_iter().enumerate() {
-        list.push(stored(name, &|pixel| pixel.normal[axis]));
-    }
-    let depth = film.pixels().iter().map(|pixel| pixel.depth).collect();
-    list.push(AnyChannel::new("Z", FlatSamples::F32(depth)));
     AnyChannels::sort(list)
 }
 

@@ -1,10 +1,10 @@
 //! The picture while it is being rendered: what is known of each pixel of the crop window.
 
-pub use photoncard_shared::message::Pixel as PixelValue;
 use photoncard_shared::message::Tile;
+pub use photoncard_shared::message::{Pixel as PixelValue, PixelLayers, PixelRecord};
 use thiserror::Error;
 
-/// The most pixels a film may hold: 2^28, about 10 GiB.
+/// The most pixels a film may hold: 2^28, about 10 GiB, with layers 20.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// The largest width or height of a picture.
@@ -92,6 +92,15 @@ pub enum FilmError {
     },
 }
 
+/// All that a film has of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FilmPixel {
+    /// What every film has.
+    pub pixel: PixelValue,
+    /// Zero in a film without layers.
+    pub layers: PixelLayers,
+}
+
 /// The pixels of a crop window of a picture.
 #[derive(Clone, Debug)]
 pub struct Film {
@@ -99,12 +108,14 @@ pub struct Film {
     height: u32,
     window: Window,
     pixels: Vec<PixelValue>,
+    /// Of each pixel, or nothing.
+    layers: Vec<PixelLayers>,
     written: Vec<bool>,
     missing: usize,
 }
 
 impl Film {
-    /// An empty film for the crop window `window` of a picture of `width` x `height` pixels.
+    /// An empty film for the crop window `window` of a picture of `width` x `height` pixels, without layers.
     ///
     /// # Errors
     /// If the picture or the window has no pixels or too many, or the window leaves the picture.
@@ -125,7 +136,25 @@ impl Film {
         written.try_reserve_exact(count).map_err(|_| too_large)?;
         pixels.resize(count, PixelValue::default());
         written.resize(count, false);
-        Ok(Self { width, height, window, pixels, written, missing: count })
+        Ok(Self { width, height, window, pixels, layers: Vec::new(), written, missing: count })
+    }
+
+    /// The same with layers.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_layers(width: u32, height: u32, window: Window) -> Result<Self, FilmError> {
+        let mut film = Self::new(width, height, window)?;
+        let count = film.pixels.len();
+        let too_large = FilmError::Memory { width: window.width(), height: window.height() };
+        film.layers.try_reserve_exact(count).map_err(|_| too_large)?;
+        film.layers.resize(count, PixelLayers::default());
+        Ok(film)
+    }
+
+    /// Whether there are layers.
+    pub fn has_layers(&self) -> bool {
+        !self.layers.is_empty()
     }
 
     /// Width of the full picture.
@@ -151,6 +180,35 @@ impl Film {
     /// The pixel at `(x, y)` of the full picture, or `None` outside the crop window.
     pub fn pixel(&self, x: u32, y: u32) -> Option<&PixelValue> {
         self.index(x, y).map(|index| &self.pixels[index])
+    }
+
+    /// All there is of the pixels of the crop window, row by row from the top.
+    pub fn all(&self) -> impl Iterator<Item = FilmPixel> {
+        (0..self.pixels.len()).map(|index| self.all_of(index))
+    }
+
+    /// All there is of the pixel at `(x, y)` of the full picture, or `None` outside the crop window.
+    pub fn all_at(&self, x: u32, y: u32) -> Option<FilmPixel> {
+        self.index(x, y).map(|index| self.all_of(index))
+    }
+
+    fn all_of(&self, index: usize) -> FilmPixel {
+        let layers = self.layers.get(index).copied().unwrap_or_default();
+        FilmPixel { pixel: self.pixels[index], layers }
+    }
+
+    /// Writes a pixel as a chip tells it. Layers that it or the film does not have are left out.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_record(&mut self, x: u32, y: u32, record: &PixelRecord) -> Result<(), FilmError> {
+        self.write(x, y, record.pixel)?;
+        if let (Some(index), Some(layers)) = (self.index(x, y), record.layers)
+            && let Some(slot) = self.layers.get_mut(index)
+        {
+            *slot = layers;
+        }
+        Ok(())
     }
 
     /// Writes the pixel at `(x, y)` of the full picture; writing one again replaces it.

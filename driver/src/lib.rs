@@ -3,11 +3,13 @@
 
 pub mod bvh;
 pub mod difference;
+pub mod display;
 pub mod emulator;
 pub mod error;
 pub mod exr;
 pub mod film;
 mod fold;
+pub mod layer;
 mod light;
 pub mod link;
 pub mod output;

@@ -3,7 +3,7 @@
 //! ```text
 //! photoncard partial render 1\n
 //! { settings as JSON }\n
-//! tile: x, y, width, height: u32 each | its pixels, 40 bytes each | CRC-32C of both: u32
+//! tile: x, y, width, height: u32 each | its pixels, 40 bytes each, with layers 80 | CRC-32C of both: u32
 //! ...
 //! ```
 //!

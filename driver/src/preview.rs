@@ -1,20 +1,62 @@
 //! A picture to look at: PNG, 8 bits a channel, tone-mapped to sRGB.
 //!
 //! Radiance is scaled by `2^exposure`, or without an exposure so that the log-average luminance of the lit pixels
-//! becomes 0.18, middle grey. Luminance is then compressed by Reinhard's extended curve
-//! `L (1 + L / w^2) / (1 + L)` with the white point `w = 4`, the colour scaled along with it and clipped to 1, and
-//! encoded with the sRGB transfer curve (Reinhard et al., "Photographic Tone Reproduction for Digital Images", 2002).
+//! becomes 0.18, middle grey (Reinhard, Stark, Shirley, Ferwerda 2002, *Photographic tone reproduction for digital images*,
+//! equations 1 and 2). A [`ToneCurve`] then compresses it, and it is clipped to 1 and encoded with the sRGB transfer curve.
 //! The picture is the film's crop window alone.
 
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::film::Film;
+use crate::film::{Film, PixelValue};
 use crate::output::{self, OutputError};
 
-/// Luminance, once scaled, that becomes white.
+/// What compresses scaled radiance to what a screen can show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ToneCurve {
+    /// Nothing does: what is above 1 is clipped.
+    None,
+    /// Reinhard's extended curve (2002, equation 4) of luminance, `L (1 + L / w^2) / (1 + L)` with the white point `w = 4`. The
+    /// colour is scaled along with its luminance.
+    #[default]
+    Reinhard,
+    /// Narkowicz' fit of the Academy Color Encoding System's filmic curve, of each channel: `x (2.51 x + 0.03) / (x (2.43 x +
+    /// 0.59) + 0.14)` (2016, <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>). It maps 1 to 0.80;
+    /// the Academy's own curve is this one of 0.6 times the radiance.
+    Aces,
+}
+
+impl ToneCurve {
+    /// Compresses scaled radiance, not negative and finite.
+    fn compress(self, scaled: [f32; 3]) -> [f32; 3] {
+        match self {
+            Self::None => scaled,
+            Self::Reinhard => {
+                let luminance = luminance(scaled);
+                let ratio = (1.0 + luminance / (WHITE * WHITE)) / (1.0 + luminance);
+                scaled.map(|value| value * ratio)
+            }
+            Self::Aces => {
+                scaled.map(|value| value * (2.51 * value + 0.03) / (value * (2.43 * value + 0.59) + 0.14))
+            }
+        }
+    }
+}
+
+/// How radiance becomes what a screen shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ToneMapping {
+    /// Stops: radiance is doubled so often. `None` chooses by the picture.
+    pub exposure: Option<f32>,
+    /// The curve.
+    pub curve: ToneCurve,
+}
+
+/// Scaled luminance that Reinhard's curve makes white.
 const WHITE: f32 = 4.0;
+/// Scaled radiance is taken for at most this: its square is a number.
+const MOST: f32 = 1e18;
 
 /// What the log-average luminance becomes when no exposure is stated.
 const MIDDLE_GREY: f64 = 0.18;
@@ -45,12 +87,12 @@ pub enum PreviewError {
     },
 }
 
-/// Writes the film's crop window to `path`, whole or not at all. `exposure` is in stops; `None` chooses one.
+/// Writes the film's crop window to `path`, whole or not at all.
 ///
 /// # Errors
 /// If the file cannot be written, or the exposure is not finite.
-pub fn write_png(path: &Path, film: &Film, exposure: Option<f32>) -> Result<(), PreviewError> {
-    let scale = match exposure {
+pub fn write_png(path: &Path, film: &Film, mapping: ToneMapping) -> Result<(), PreviewError> {
+    let scale = match mapping.exposure {
         None => automatic_scale(film),
         Some(stops) if stops.is_finite() => stops.exp2(),
         Some(exposure) => return Err(PreviewError::Exposure { exposure }),
@@ -61,7 +103,8 @@ pub fn write_png(path: &Path, film: &Film, exposure: Option<f32>) -> Result<(), 
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    let pixels: Vec<u8> = film.pixels().iter().flat_map(|pixel| tone_map(pixel.radiance, scale)).collect();
+    let shown = |pixel: &PixelValue| tone_map(pixel.radiance, scale, mapping.curve);
+    let pixels: Vec<u8> = film.pixels().iter().flat_map(shown).collect();
     let encoded = encoder.write_header().and_then(|mut writer| {
         writer.write_image_data(&pixels)?;
         writer.finish()
@@ -88,12 +131,10 @@ fn automatic_scale(film: &Film) -> f32 {
     if count == 0 { 1.0 } else { (MIDDLE_GREY / (sum / count as f64).exp()) as f32 }
 }
 
-fn tone_map(radiance: [f32; 3], scale: f32) -> [u8; 3] {
+fn tone_map(radiance: [f32; 3], scale: f32, curve: ToneCurve) -> [u8; 3] {
     // Negative and undefined radiance is shown black, infinite radiance white.
-    let scaled = radiance.map(|value| (value * scale).clamp(0.0, f32::MAX.sqrt()));
-    let luminance = luminance(scaled);
-    let compressed = (1.0 + luminance / (WHITE * WHITE)) / (1.0 + luminance);
-    scaled.map(|value| encode(value * compressed))
+    let scaled = radiance.map(|value| (value * scale).clamp(0.0, MOST));
+    curve.compress(scaled).map(encode)
 }
 
 /// The sRGB transfer curve, in 8 bits.
@@ -107,7 +148,7 @@ fn encode(linear: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{PixelValue, Window};
+    use crate::film::Window;
 
     fn film(radiance: impl Fn(u32, u32) -> f32) -> Film {
         let window = Window { x0: 1, x1: 5, y0: 2, y1: 5 };
@@ -127,38 +168,88 @@ mod tests {
         (info.width, info.height, pixels)
     }
 
+    fn written(name: &str, film: &Film, exposure: Option<f32>, curve: ToneCurve) -> (u32, u32, Vec<u8>) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        write_png(&path, film, ToneMapping { exposure, curve }).unwrap();
+        decode(&path)
+    }
+
     #[test]
     fn the_preview_is_the_crop_window_and_grows_with_radiance() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("preview.png");
-        write_png(&path, &film(|x, y| (4 * (y - 2) + x - 1) as f32 * 0.3), Some(0.0)).unwrap();
-        let (width, height, pixels) = decode(&path);
-        assert_eq!((width, height), (4, 3));
-        let grey: Vec<u8> = pixels.chunks(3).map(|pixel| pixel[0]).collect();
-        assert_eq!(grey[0], 0);
-        assert!(grey.is_sorted_by(|a, b| a < b), "{grey:?}");
+        let film = film(|x, y| (4 * (y - 2) + x - 1) as f32 * 0.08);
+        for curve in [ToneCurve::None, ToneCurve::Reinhard, ToneCurve::Aces] {
+            let (width, height, pixels) = written("preview.png", &film, Some(0.0), curve);
+            assert_eq!((width, height), (4, 3));
+            let grey: Vec<u8> = pixels.chunks(3).map(|pixel| pixel[0]).collect();
+            assert_eq!(grey[0], 0);
+            assert!(grey.is_sorted_by(|a, b| a < b), "{curve:?} {grey:?}");
+        }
     }
 
     #[test]
     fn an_automatic_exposure_does_not_depend_on_the_unit_of_radiance() {
-        let folder = tempfile::tempdir().unwrap();
-        let paths = [folder.path().join("a.png"), folder.path().join("b.png")];
-        for (path, unit) in paths.iter().zip([1.0, 1024.0]) {
-            write_png(path, &film(|x, y| unit * (x * y) as f32), None).unwrap();
-        }
-        assert_eq!(decode(&paths[0]), decode(&paths[1]));
+        let of_unit = |unit| {
+            let film = film(|x, y| unit * (x * y) as f32);
+            written("preview.png", &film, None, ToneCurve::Reinhard)
+        };
+        assert_eq!(of_unit(1.0), of_unit(1024.0));
     }
 
     #[test]
-    fn white_is_reached_at_the_white_point_and_odd_values_are_shown() {
-        assert_eq!(tone_map([WHITE; 3], 1.0), [255; 3]);
-        assert_eq!(tone_map([0.0; 3], 1.0), [0; 3]);
-        assert_eq!(tone_map([f32::NAN, -1.0, 0.0], 1.0), [0; 3]);
-        assert_eq!(tone_map([f32::INFINITY; 3], 1.0), [255; 3]);
+    fn a_stop_doubles_radiance() {
+        let [once, twice] = [1.0, 2.0].map(|unit| film(move |x, y| unit * (x * y) as f32 * 0.02));
+        for curve in [ToneCurve::None, ToneCurve::Reinhard, ToneCurve::Aces] {
+            let brighter = written("a.png", &once, Some(1.0), curve);
+            assert_eq!(brighter, written("b.png", &twice, Some(0.0), curve));
+            assert_ne!(brighter, written("d.png", &once, Some(0.0), curve));
+        }
+    }
+
+    /// Computed by hand from the curves' formulas.
+    #[test]
+    fn curves_have_their_known_values() {
+        let grey = |curve: ToneCurve, value: f32| curve.compress([value; 3])[1];
+        for (curve, value, expected) in [
+            (ToneCurve::None, 3.0, 3.0),
+            (ToneCurve::Reinhard, 0.18, 0.154_258_5),
+            (ToneCurve::Reinhard, 1.0, 0.531_25),
+            (ToneCurve::Reinhard, WHITE, 1.0),
+            (ToneCurve::Aces, 0.18, 0.266_898_9),
+            (ToneCurve::Aces, 1.0, 0.803_797_5),
+            // The curve's limit is 2.51 / 2.43: it is clipped.
+            (ToneCurve::Aces, 1e6, 1.032_921_5),
+        ] {
+            let found = grey(curve, value);
+            assert!((found - expected).abs() < 2e-6 * expected, "{curve:?} {value}: {found}");
+        }
+        // Reinhard's keeps the hue, the filmic one bleaches.
+        let [red, green, _] = ToneCurve::Reinhard.compress([2.0, 0.5, 0.1]);
+        assert!((red / green - 4.0).abs() < 1e-5);
+        let [red, green, _] = ToneCurve::Aces.compress([2.0, 0.5, 0.1]);
+        assert!(red / green < 2.0);
+    }
+
+    /// IEC 61966-2-1: half of full intensity is 188 of 255.
+    #[test]
+    fn the_screen_curve_has_its_known_values() {
+        for (linear, code) in [(0.0, 0), (0.003, 10), (0.18, 118), (0.5, 188), (1.0, 255), (7.0, 255)] {
+            assert_eq!(tone_map([linear; 3], 1.0, ToneCurve::None), [code; 3]);
+        }
+    }
+
+    #[test]
+    fn odd_values_are_shown_and_odd_exposures_refused() {
+        for curve in [ToneCurve::None, ToneCurve::Reinhard, ToneCurve::Aces] {
+            assert_eq!(tone_map([f32::NAN, -1.0, 0.0], 1.0, curve), [0; 3]);
+            assert_eq!(tone_map([f32::INFINITY; 3], 1.0, curve), [255; 3]);
+            assert_eq!(tone_map([f32::MAX; 3], 1.0, curve), [255; 3]);
+        }
         let black = film(|_, _| 0.0);
         assert_eq!(automatic_scale(&black), 1.0);
         let folder = tempfile::tempdir().unwrap();
-        let result = write_png(&folder.path().join("x.png"), &black, Some(f32::NAN));
+        let mapping = ToneMapping { exposure: Some(f32::NAN), curve: ToneCurve::default() };
+        let result = write_png(&folder.path().join("x.png"), &black, mapping);
         assert!(matches!(result, Err(PreviewError::Exposure { .. })));
     }
 }

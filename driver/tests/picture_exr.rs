@@ -5,11 +5,12 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use exr::prelude::{
-    Compression, Encoding, Image, LayerAttributes, ReadChannels, ReadLayers, SpecificChannels, Vec2,
-    WritableImage,
+    Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels, ReadLayers, SpecificChannels,
+    Vec2, WritableImage,
 };
 use photoncard_driver::exr::{ExrError, SampleFormat, read_rgb, write};
-use photoncard_driver::film::{Film, PixelValue, Window};
+use photoncard_driver::film::{Film, PixelLayers, PixelRecord, PixelValue, Window};
+use photoncard_driver::layer::Layers;
 use proptest::prelude::{ProptestConfig, any, proptest};
 
 const WINDOW: Window = Window { x0: 3, x1: 20, y0: 5, y1: 45 };
@@ -37,7 +38,7 @@ fn film() -> Film {
 fn written(format: SampleFormat, provenance: &str) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("picture.exr");
-    write(&path, &film(), provenance, format).unwrap();
+    write(&path, &film(), &Layers::default(), provenance, format).unwrap();
     (folder, path)
 }
 
@@ -99,6 +100,65 @@ fn windows_channels_and_provenance_are_as_documented() {
     assert_eq!(json["scene"], "Küche 🍳");
 }
 
+/// The channels of a file: their names, whether they are in single precision, and their values.
+fn channels(path: &Path) -> Vec<(String, bool, Vec<f32>)> {
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .unwrap();
+    let list = image.layer_data.channel_data.list.into_iter();
+    list.map(|channel| {
+        let is_single = matches!(channel.sample_data, FlatSamples::F32(_));
+        (channel.name.to_string(), is_single, channel.sample_data.values_as_f32().collect())
+    })
+    .collect()
+}
+
+#[test]
+fn the_layers_that_are_asked_for_are_in_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("layers.exr");
+    let layers = PixelLayers {
+        direct: [0.5, 1.0, 1.5],
+        indirect: [2.0, 2.5, 3.0],
+        caustic: [3.5, 4.0, 4.5],
+        gathers: 2049.0,
+    };
+    let mut film = Film::with_layers(1, 1, Window::full(1, 1)).unwrap();
+    film.write_record(0, 0, &PixelRecord { pixel: value(3, 5), layers: Some(layers) }).unwrap();
+    let written = |list: &str, format| {
+        write(&path, &film, &list.parse().unwrap(), "{}", format).unwrap();
+        channels(&path)
+    };
+    for format in [SampleFormat::Half, SampleFormat::Float] {
+        let is_float = format == SampleFormat::Float;
+        let names = |list| written(list, format).into_iter().map(|(name, ..)| name).collect::<Vec<_>>();
+        assert_eq!(names("none"), ["B", "G", "R"]);
+        assert_eq!(
+            names("N,direct"),
+            ["B", "G", "N.X", "N.Y", "N.Z", "R", "direct.B", "direct.G", "direct.R"]
+        );
+        let all = written("all", format);
+        assert_eq!(all.len(), 20);
+        let channel = |name: &str| all.iter().find(|(other, ..)| other == name).unwrap();
+        for (name, is_single, value) in [
+            ("direct.R", is_float, 0.5),
+            ("direct.B", is_float, 1.5),
+            ("indirect.G", is_float, 2.5),
+            ("caustic.R", is_float, 3.5),
+            ("N.Y", is_float, -1.0),
+            ("gathers.Y", true, 2049.0),
+            ("Z", true, 1000.0 + 3.0 / 1024.0),
+        ] {
+            assert_eq!(*channel(name), (name.to_owned(), is_single, vec![value]));
+        }
+    }
+}
+
 #[test]
 fn two_writes_give_the_same_bytes() {
     let provenance = format!(r#"{{"scene":"{}"}}"#, "a".repeat(3000));
@@ -117,7 +177,7 @@ fn a_bright_light_stays_finite_in_halves() {
     for (x, radiance) in [[1e6, 65504.0, 65530.0], [f32::INFINITY, -1e6, 1e-9]].into_iter().enumerate() {
         film.write(x as u32, 0, PixelValue { radiance, ..PixelValue::default() }).unwrap();
     }
-    write(&path, &film, "{}", SampleFormat::Half).unwrap();
+    write(&path, &film, &Layers::default(), "{}", SampleFormat::Half).unwrap();
     let image = read_rgb(&path).unwrap();
     assert_eq!(image.pixels, [[65504.0; 3], [f32::INFINITY, -65504.0, 0.0]]);
 }
@@ -133,10 +193,13 @@ fn bad_files_are_named() {
         assert!(matches!(read_rgb(&path), Err(ExrError::Malformed { .. })));
     }
     assert!(matches!(
-        write(Path::new("absent/x.exr"), &film(), "{}", SampleFormat::Half),
+        write(Path::new("absent/x.exr"), &film(), &Layers::default(), "{}", SampleFormat::Half),
         Err(ExrError::Output(_))
     ));
-    assert!(matches!(write(&path, &film(), "", SampleFormat::Half), Err(ExrError::Encode { .. })));
+    assert!(matches!(
+        write(&path, &film(), &Layers::default(), "", SampleFormat::Half),
+        Err(ExrError::Encode { .. })
+    ));
 }
 
 #[test]
@@ -185,7 +248,7 @@ proptest! {
         let path = folder.path().join("picture.exr");
         let mut film = Film::new(12, 20, Window::full(12, 20)).unwrap();
         film.write(1, 1, value(1, 1)).unwrap();
-        write(&path, &film, "{}", SampleFormat::Half).unwrap();
+        write(&path, &film, &Layers::default(), "{}", SampleFormat::Half).unwrap();
         let mut bytes = fs::read(&path).unwrap();
         for (at, value, in_header) in flips {
             // Half of the damage goes where the sizes are.

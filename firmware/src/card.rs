@@ -14,8 +14,8 @@ use photoncard_shared::budget::{
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::{Header, LAYOUT_VERSION, SectionKind};
 use photoncard_shared::message::{
-    self, CausticGather, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXEL_BYTES,
-    PIXELS_PER_REPLY, PROTOCOL_VERSION, Radiance, Reply, Tile,
+    self, CausticGather, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXELS_BYTES,
+    PROTOCOL_VERSION, PixelRecord, Radiance, Reply, Tile, record_bytes,
 };
 use photoncard_shared::transport::Transport;
 
@@ -77,7 +77,7 @@ enum TileWork {
 }
 
 /// Bytes of pixels or checksums in one reply.
-const DATA_BYTES: usize = PIXEL_BYTES * PIXELS_PER_REPLY;
+const DATA_BYTES: usize = PIXELS_BYTES;
 const _: () = assert!(CHECKSUMS_BYTES <= DATA_BYTES);
 
 impl<
@@ -260,7 +260,7 @@ impl<
         let fits =
             |first: u32, count: u32, size: u32| first.checked_add(count).is_some_and(|end| end <= size);
         let is_inside = fits(tile.x, tile.width, frame.width) && fits(tile.y, tile.height, frame.height);
-        if !is_inside || tile.pixels() == 0 || tile.pixels() > self.chip.tile_pixels() {
+        if !is_inside || tile.pixels() == 0 || tile.pixels() > self.chip.tile_pixels(&frame) {
             return Err(Fault { code: FaultCode::Tile, detail: tile.id });
         }
         let too_many = Fault { code: FaultCode::TooManyTiles, detail: tile.id };
@@ -309,7 +309,7 @@ impl<
         match self.at_work {
             None => {
                 if let Some(tile) = self.tiles.pop_front() {
-                    if !self.chip.begin(memory, tile) {
+                    if !self.chip.begin(memory, frame, tile) {
                         return Err(Fault { code: FaultCode::Tile, detail: tile.id });
                     }
                     self.data.clear();
@@ -328,13 +328,18 @@ impl<
             Some(TileWork::Sending(tile, next)) => {
                 let counters = &mut self.counters;
                 let context = &mut Context { scene, memory, frame, counters, outlet: None };
-                let Some(pixel) = self.chip.complete(context, next as usize)? else { return Ok(()) };
+                let Some(record) = self.chip.complete(context, next as usize)? else { return Ok(()) };
+                let PixelRecord { pixel, layers } = record;
                 let data = &mut self.data;
-                // There is room for PIXELS_PER_REPLY.
+                let bytes = record_bytes(frame.layers);
+                // There is room: what is full is sent.
                 let _ = data.extend_from_slice(&pixel.to_bytes());
+                if let Some(layers) = layers {
+                    let _ = data.extend_from_slice(&layers.to_bytes());
+                }
                 let is_last = next as u64 + 1 >= tile.pixels();
-                if data.is_full() || is_last {
-                    let first = next + 1 - (data.len() / PIXEL_BYTES) as u32;
+                if data.len() + bytes > data.capacity() || is_last {
+                    let first = next + 1 - (data.len() / bytes) as u32;
                     send(transport, &Reply::Pixels { tile: tile.id, first, data });
                     data.clear();
                 }
@@ -386,6 +391,7 @@ fn check_frame(budget: &Budget, header: &Header, frame: &FrameParameters) -> Res
             let is_length = max_distance.is_finite() && max_distance > 0.0;
             neighbors >= 2 && within(neighbors, budget.neighbors) && is_length
         }),
+        true,
     ];
     match checks.iter().position(|&holds| !holds) {
         Some(index) => Err(Fault { code: FaultCode::Parameter, detail: index as u32 }),

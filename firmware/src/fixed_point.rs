@@ -74,6 +74,14 @@ impl ColourSum {
         }
     }
 
+    /// Adds a sum of light. It stays at 2^23 units where it reaches them: the sum is what it would be of all terms at once.
+    #[inline(always)]
+    pub fn add_sum(&mut self, light: &Self) {
+        for (sum, more) in self.0.iter_mut().zip(light.0) {
+            sum.0 = sum.0.saturating_add(more.0);
+        }
+    }
+
     /// Adds a shared-exponent colour: what [`Self::add`] does of the decoded one, in integers alone.
     #[inline(always)]
     pub fn add_rgbe(&mut self, power: Rgbe) {
@@ -138,6 +146,12 @@ mod tests {
         assert_eq!(greatest.value(), Vec3::splat((1 << 23) as f32));
         for order in [[5, 4, 3, 2, 1, 0], [3, 0, 1, 2, 5, 4], [1, 5, 0, 2, 4, 3]] {
             assert_eq!(sum(order), greatest);
+            // Nor does it matter whether some are added up before.
+            let [mut first, mut second] = [ColourSum::ZERO; 2];
+            order[..2].iter().for_each(|&index| first.add_light(terms[index]));
+            order[2..].iter().for_each(|&index| second.add_light(terms[index]));
+            first.add_sum(&second);
+            assert_eq!(first, greatest);
         }
         let mut nothing = ColourSum::ZERO;
         nothing.add_light(Vec3::new(f32::NAN, -1.0, -0.0));

@@ -1,11 +1,12 @@
 //! The arguments of every command, and what they mean.
 
+mod picture;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use photoncard_driver::emulator::ChipKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
-use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::film::Window;
 use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::partial::PartialSettings;
@@ -13,6 +14,7 @@ use photoncard_driver::photon::PhotonLayout;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
+pub(crate) use self::picture::PictureOptions;
 use crate::environment::EnvironmentOption;
 use crate::study::StudyArguments;
 
@@ -103,7 +105,7 @@ impl CardKind {
 pub(crate) struct RenderOptions {
     /// A glTF 2.0 file, .gltf or .glb
     pub(crate) scene: PathBuf,
-    /// The picture, an EXR file: linear RGB radiance with albedo, N and Z layers
+    /// The picture, an EXR file: linear RGB radiance and the layers of --aov
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: PathBuf,
     /// Width and height of the picture, pixels
@@ -115,7 +117,7 @@ pub(crate) struct RenderOptions {
     /// Name of the camera [default: the first of the file]
     #[arg(long)]
     camera: Option<String>,
-    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, emission or exponent; may be repeated
+    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness or emission; may be repeated
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
     /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or OpenEXR (.exr) picture whose middle is -z and top is y;
@@ -153,9 +155,10 @@ pub(crate) struct RenderOptions {
     /// Samples a pixel
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     spp: u32,
-    /// Side of a tile, pixels
-    #[arg(long, default_value_t = 16, allow_negative_numbers = true)]
-    tile: u32,
+    /// Side of a tile, pixels [default: 16; 8 with direct, indirect, caustic or gathers in --aov, but on cards of the kind
+    /// emulated]
+    #[arg(long, allow_negative_numbers = true)]
+    tile: Option<u32>,
     /// What the directions of gather rays are chosen by; it never changes what the picture converges to
     #[arg(long, default_value = "combined")]
     sampling: SamplingOption,
@@ -202,12 +205,8 @@ pub(crate) struct RenderOptions {
     /// Threads of the host's own work [default: a thread a core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
-    /// Type of the picture's samples; depth is always float
-    #[arg(long, default_value = "float")]
-    sample_type: SampleType,
-    /// Write a tone-mapped PNG as well
-    #[arg(long, value_name = "OUT.png")]
-    pub(crate) preview: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) picture: PictureOptions,
     /// Write what the render took, as JSON
     #[arg(long, value_name = "OUT.json")]
     pub(crate) stats: Option<PathBuf>,
@@ -326,12 +325,6 @@ enum Switch {
     Off,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum SampleType {
-    Half,
-    Float,
-}
-
 #[derive(Clone, Copy)]
 enum MaxDistance {
     Auto,
@@ -342,6 +335,7 @@ impl RenderOptions {
     /// The settings that the options stand for; a text that says why not.
     pub(crate) fn settings(&self) -> Result<RenderSettings, String> {
         let emulated = || "emulated".parse();
+        let cards = if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() };
         Ok(RenderSettings {
             width: self.size.0,
             height: self.size.1,
@@ -360,7 +354,8 @@ impl RenderOptions {
             gather_rays: self.gather_rays,
             shadow_rays: self.shadow_rays,
             samples: self.spp,
-            tile: self.tile,
+            tile: self.tile.unwrap_or_else(|| RenderSettings::default_tile(&self.picture.aov, &cards)),
+            layers: self.picture.aov.clone(),
             sampling: self.sampling.sampling(),
             radiance: self.radiance.radiance(),
             irradiance_error: (self.irradiance_cache == Switch::On && self.gather_rays > 0)
@@ -368,11 +363,12 @@ impl RenderOptions {
             order: self.order.gather_order(),
             bins: self.bins,
             queue: self.queue,
-            cards: if self.cards.is_empty() { vec![emulated()?] } else { self.cards.clone() },
+            cards,
             faults: self.faults,
             partial: Some(PartialSettings { path: self.partial_path(), resume: self.resume }),
             caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
             trace: self.trace.clone(),
+            display: self.picture.display(&self.output),
         })
     }
 
@@ -391,14 +387,6 @@ impl RenderOptions {
     /// What tells radiance, as it was given.
     pub(crate) fn radiance_name(&self) -> Option<String> {
         self.radiance.to_possible_value().map(|value| value.get_name().to_owned())
-    }
-
-    /// The type of the picture's samples.
-    pub(crate) fn sample_format(&self) -> SampleFormat {
-        match self.sample_type {
-            SampleType::Half => SampleFormat::Half,
-            SampleType::Float => SampleFormat::Float,
-        }
     }
 }
 

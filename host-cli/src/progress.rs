@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use photoncard_driver::display::DisplayError;
 use photoncard_driver::render::{Observer, Phase};
 use photoncard_driver::session::SessionError;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -75,6 +76,10 @@ impl Observer for Progress {
 
     fn lost(&self, card: &str, error: &SessionError) {
         say(format_args!("photoncard: {card} is lost: {error}; the others render its tiles"));
+    }
+
+    fn not_shown(&self, error: &DisplayError) {
+        say(format_args!("photoncard: {error}"));
     }
 }
 

@@ -71,7 +71,7 @@ fn tell_memory(memory: &MemoryStatistics, statistics: &Statistics) {
 }
 
 fn outputs(options: &RenderOptions) -> impl Iterator<Item = &Path> {
-    [Some(&options.output), options.preview.as_ref(), options.stats.as_ref(), options.trace.as_ref()]
+    [Some(&options.output), options.picture.preview.as_ref(), options.stats.as_ref(), options.trace.as_ref()]
         .into_iter()
         .flatten()
         .map(AsRef::as_ref)
@@ -126,10 +126,17 @@ fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) 
 
 fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Rendering) -> Result<(), Failure> {
     let provenance = provenance(options, settings, rendering).to_string();
-    exr::write(&options.output, &rendering.film, &provenance, options.sample_format())
-        .map_err(|error| Failure::work_error(&error))?;
-    if let Some(path) = &options.preview {
-        preview::write_png(path, &rendering.film, None).map_err(|error| Failure::work_error(&error))?;
+    exr::write(
+        &options.output,
+        &rendering.film,
+        &options.picture.aov,
+        &provenance,
+        options.picture.sample_format(),
+    )
+    .map_err(|error| Failure::work_error(&error))?;
+    if let Some(path) = &options.picture.preview {
+        preview::write_png(path, &rendering.film, options.picture.tone_mapping())
+            .map_err(|error| Failure::work_error(&error))?;
     }
     if let Some(path) = &options.stats {
         let text = serde_json::to_string_pretty(&rendering.statistics)

@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use photoncard_driver::scene::Reflection;
 use photoncard_driver::scene::gltf::load;
+use photoncard_driver::scene::{
+    Camera, Encoding, Image, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture, Wrap,
+};
 
 use crate::console::print;
 use crate::failure::Failure;
@@ -12,31 +14,101 @@ use crate::failure::Failure;
 pub(crate) fn info(path: &Path) -> Result<(), Failure> {
     let scene = load(path).map_err(Failure::input)?;
     let (lower, upper) = scene.bounds();
-    let mut lines = Vec::new();
-    lines.push(format!("triangles  {}", scene.triangles.len()));
-    lines.push(format!("skipped    {} of zero area", scene.skipped_triangles));
-    lines.push(format!("bounds     {lower} to {upper} m"));
-    for camera in &scene.cameras {
-        let degrees = camera.vertical_fov.to_degrees();
-        lines.push(format!(
-            "camera     {} at {}, vertical field of view {degrees:.1} degrees",
-            camera.name, camera.origin
-        ));
-    }
-    for material in &scene.materials {
-        let mut parts = reflection(&material.reflection);
-        if material.emission.max_element() > 0.0 {
-            parts.push(format!("emission {} W/(sr m^2)", material.emission));
-        }
-        if material.double_sided {
-            parts.push("double-sided".into());
-        }
-        lines.push(format!("material   {}: {}", material.name, parts.join(", ")));
-    }
-    for notice in &scene.notices {
-        lines.push(format!("ignored    {notice}"));
-    }
+    let mut lines = vec![
+        format!("triangles  {}", scene.triangles.len()),
+        format!("skipped    {} of zero area", scene.skipped_triangles),
+        format!("bounds     {lower} to {upper} m"),
+        attributes(&scene),
+        textures(&scene),
+    ];
+    lines.extend(scene.images.iter().map(image));
+    lines.extend(scene.cameras.iter().map(camera));
+    lines.extend(scene.lights.iter().map(light));
+    lines.extend(scene.materials.iter().map(|item| material(item, &scene)));
+    lines.extend(scene.notices.iter().map(|notice| format!("ignored    {notice}")));
     print(&(lines.join("\n") + "\n"))
+}
+
+fn attributes(scene: &Scene) -> String {
+    let smooth = scene.attributes.iter().filter(|attributes| attributes.normals.is_some()).count();
+    let is_coloured = |colours: &[[f32; 4]; 3]| colours.as_flattened().iter().any(|channel| *channel < 1.0);
+    let coloured = scene.attributes.iter().filter(|attributes| is_coloured(&attributes.colours)).count();
+    let count = scene.attributes.len();
+    format!("attributes {count} triangles: {smooth} with smooth normals, {coloured} with colours")
+}
+
+fn textures(scene: &Scene) -> String {
+    let texels: usize = scene.images.iter().map(|image| image.texels.len()).sum();
+    let bytes: u64 = scene.images.iter().map(Image::bytes).sum();
+    let images = scene.images.len();
+    format!("textures   {} of {images} images, {texels} texels, {bytes} bytes", scene.textures.len())
+}
+
+fn image(image: &Image) -> String {
+    let encoding = match image.encoding {
+        Encoding::Srgb => "sRGB",
+        Encoding::Linear => "linear",
+    };
+    format!("image      {}: {} x {}, {encoding}", image.name, image.width, image.height)
+}
+
+fn camera(camera: &Camera) -> String {
+    let degrees = camera.vertical_fov.to_degrees();
+    format!("camera     {} at {}, vertical field of view {degrees:.1} degrees", camera.name, camera.origin)
+}
+
+fn light(light: &PunctualLight) -> String {
+    let PunctualLight { name, kind, intensity } = light;
+    let degrees = |cosine: f32| cosine.clamp(-1.0, 1.0).acos().to_degrees();
+    let kind = match kind {
+        PunctualKind::Point { position } => format!("point at {position}, {intensity} W/sr"),
+        PunctualKind::Spot { position, direction, inner_cosine, outer_cosine } => {
+            let (inner, outer) = (degrees(*inner_cosine), degrees(*outer_cosine));
+            let cone = format!("{inner:.1} to {outer:.1} degrees");
+            format!("spot at {position} towards {direction}, {cone}, {intensity} W/sr")
+        }
+        PunctualKind::Directional { direction } => {
+            format!("directional towards {direction}, {intensity} W/m^2")
+        }
+    };
+    format!("light      {name}: {kind}")
+}
+
+fn material(material: &Material, scene: &Scene) -> String {
+    let mut parts = reflection(&material.reflection);
+    if material.emission.max_element() > 0.0 {
+        parts.push(format!("emission {} W/(sr m^2)", material.emission));
+    }
+    if material.double_sided {
+        parts.push("double-sided".into());
+    }
+    if let Some(cutoff) = material.alpha_cutoff {
+        parts.push(format!("not there where alpha {} is below {cutoff}", material.alpha));
+    }
+    let textures = [
+        ("base", material.base_texture),
+        ("metallic-roughness", material.metallic_roughness_texture),
+        ("emissive", material.emissive_texture),
+    ];
+    for (use_, index) in textures {
+        if let Some(texture) = index.and_then(|index| scene.textures.get(index as usize)) {
+            parts.push(format!("{use_} texture {}", describe(texture, scene)));
+        }
+    }
+    format!("material   {}: {}", material.name, parts.join(", "))
+}
+
+fn describe(texture: &Texture, scene: &Scene) -> String {
+    let name = scene.images.get(texture.image as usize).map_or("", |image| &image.name);
+    let wrap = texture.wrap.map(|wrap| match wrap {
+        Wrap::Repeat => "repeated",
+        Wrap::Mirror => "mirrored",
+        Wrap::Clamp => "clamped",
+    });
+    let [across, down] = wrap;
+    let wrap = if across == down { across.to_owned() } else { format!("{across} across and {down} down") };
+    let filter = if texture.nearest { " nearest" } else { "" };
+    format!("{name} (set {}, {wrap}{filter})", texture.set)
 }
 
 fn reflection(reflection: &Reflection) -> Vec<String> {
@@ -53,9 +125,9 @@ fn reflection(reflection: &Reflection) -> Vec<String> {
                 "base colour {base_colour}, metallic {metallic}, roughness {roughness}, dielectric {dielectric}"
             )];
             if let Some(transmission) = transmission {
-                let kind = if transmission.is_volume { "volume" } else { "thin wall" };
+                let kind = if transmission.is_volume { "into a volume" } else { "through a thin wall" };
                 parts.push(format!(
-                    "transmission {} through a {kind}, ior {}, absorption {} / m",
+                    "transmission {} {kind}, ior {}, absorption {} / m",
                     transmission.factor, transmission.ior, transmission.absorption
                 ));
             }

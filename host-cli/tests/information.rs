@@ -18,6 +18,28 @@ fn scene_info_tells_what_a_scene_holds() {
     assert!(outcome.stdout.ends_with('\n'));
 }
 
+/// A scene of every kind of thing: what is used is told with its numbers, and what is not is named as ignored.
+#[test]
+fn scene_info_tells_of_textures_lights_and_what_is_ignored() {
+    let outcome = Room::new().run(&[
+        "scene",
+        "info",
+        concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/painted.gltf"),
+    ]);
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    for line in [
+        "attributes 1 triangles: 0 with smooth normals, 0 with colours",
+        "textures   1 of 1 images, 1 texels, 4 bytes",
+        "image      paint: 1 x 1, sRGB",
+        "light      bulb: point at [0, 0, 2], [8, 8, 8] W/sr",
+        "material   painted: base colour [1, 1, 1], metallic 0, roughness 0.5, dielectric [0.04, 0.04, 0.04], base \
+         texture paint (set 0, clamped across and repeated down)",
+        "ignored    the range of lights is ignored, their light reaches everywhere: light 'bulb'",
+    ] {
+        assert!(outcome.stdout.lines().any(|found| found == line), "{line}: {}", outcome.stdout);
+    }
+}
+
 #[test]
 fn card_info_tells_what_a_card_holds() {
     for (card, dram) in [("emulated", 536_870_912), ("emulated-micro:2", 16_777_216)] {

@@ -11,6 +11,58 @@ fn picture(room: &Room, name: &str) -> RgbImage {
 }
 
 #[test]
+fn layers_are_asked_for_by_name_and_leave_the_picture_as_it_is() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let of_options = |options: &[&str]| {
+        room.rendered("scene.gltf", &[&["-o", "a.exr"], options].concat());
+        (picture(&room, "a.exr"), room.read("a.exr"))
+    };
+    let (plain, bytes) = of_options(&[]);
+    assert_eq!(of_options(&["--aov=Z,N,albedo"]).1, bytes);
+    let mut sizes = vec![bytes.len()];
+    for list in ["all", "none", "direct,gathers"] {
+        for card in ["emulated:2", "emulated-micro:2"] {
+            let (same, other) = of_options(&["--aov", list, "--card", card]);
+            assert!(same == plain, "{list}");
+            sizes.push(other.len());
+        }
+    }
+    // What is asked for is in the file, and nothing else.
+    let [default, all, again, none, _, some, _] = sizes[..] else { panic!("{sizes:?}") };
+    assert!(all == again && all > default && none < some && none < default, "{sizes:?}");
+
+    let outcome = room.render("scene.gltf", &["-o", "b.exr", "--aov=all", "--tile=33", "--card=emulated:1"]);
+    assert_eq!(outcome.status, Some(2));
+    assert!(outcome.stderr.contains("32 or less") && outcome.stderr.contains("--aov"), "{}", outcome.stderr);
+    let outcome = room.render("scene.gltf", &["-o", "b.exr", "--aov=depth"]);
+    assert_eq!(outcome.status, Some(2));
+    assert!(outcome.stderr.contains("direct,indirect,caustic,albedo,N,Z,gathers"), "{}", outcome.stderr);
+}
+
+#[test]
+fn exposure_and_tone_curve_change_the_preview_alone() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let preview = |options: &[&str]| {
+        let options = [&["-o", "a.exr", "--preview", "a.png"], options].concat();
+        room.rendered("scene.gltf", &options);
+        (room.read("a.exr"), room.read("a.png"))
+    };
+    let (picture, plain) = preview(&[]);
+    assert_eq!((picture.clone(), plain.clone()), preview(&["--exposure=auto", "--tonemap=reinhard"]));
+    for option in ["--exposure=-2.5", "--tonemap=none", "--tonemap=aces"] {
+        let (same, other) = preview(&[option]);
+        assert_eq!(same, picture);
+        assert_ne!(other, plain, "{option}");
+    }
+    for options in [&["--exposure=inf", "--preview=a.png"] as &[_], &["--exposure=1"], &["--tonemap=aces"]] {
+        let outcome = room.render("scene.gltf", &[&["-o", "a.exr"], options].concat());
+        assert_eq!(outcome.status, Some(2), "{options:?}");
+    }
+}
+
+#[test]
 fn a_render_writes_picture_preview_and_statistics() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");

@@ -17,7 +17,7 @@ pub struct Budget {
     pub scene_cache_bytes: u32,
     /// Share of the on-chip memory for the stack, bytes.
     pub stack_bytes: u32,
-    /// Pixels of one tile.
+    /// Pixels of one tile, without layers.
     pub tile_pixels: u32,
     /// Photons that one gather can look for.
     pub neighbors: u32,
@@ -35,6 +35,21 @@ pub struct Budget {
     pub samples: u32,
     /// Tile commands that may be waiting or at work on a chip: its credits.
     pub tiles: u32,
+}
+
+/// Sums of light that a chip keeps of a pixel of a picture with layers: three components, and a count of gathers.
+pub const SUMS_WITH_LAYERS: u32 = 4;
+
+/// Sums of light that a chip keeps of a pixel.
+pub const fn sums_of_pixel(layers: bool) -> u32 {
+    if layers { SUMS_WITH_LAYERS } else { 1 }
+}
+
+impl Budget {
+    /// Pixels of one tile of a picture without or with layers.
+    pub const fn pixels_of_tile(&self, layers: bool) -> u32 {
+        self.tile_pixels / sums_of_pixel(layers)
+    }
 }
 
 /// The reference chip: the dissertation's, with 128 KB of photon cache (6.5), a 75 KB ray caster cache (7.3.2), tiles

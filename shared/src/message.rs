@@ -14,6 +14,12 @@
 //!
 //! Whatever a card cannot do it answers with [`Reply::Fault`]; it stays ready for the next command.
 
+mod pixel;
+
+pub use self::pixel::{
+    LAYER_BYTES, PIXEL_BYTES, PIXELS_BYTES, Pixel, PixelLayers, PixelRecord, record_bytes,
+};
+
 use serde::{Deserialize, Serialize};
 
 use crate::budget::Budget;
@@ -92,6 +98,9 @@ pub struct FrameParameters {
     pub radiance: Radiance,
     /// The gathers of caustics; without them gather rays bring the light of emitters by way of perfectly specular surfaces.
     pub caustics: Option<CausticGather>,
+    /// Whether pixels come with their [`PixelLayers`]. The rest of them is the same; a tile has fewer
+    /// ([`Budget::pixels_of_tile`]).
+    pub layers: bool,
 }
 
 /// What a gather of caustics looks for.
@@ -234,13 +243,13 @@ pub enum Reply<'a> {
     ImageAccepted,
     /// Tiles may come.
     FrameAccepted,
-    /// Some pixels of a tile, in rows, [`PIXEL_BYTES`] each.
+    /// Some pixels of a tile, in rows, [`record_bytes`] each.
     Pixels {
         /// The tile's number.
         tile: u32,
         /// The first of these pixels, counted in the tile's rows.
         first: u32,
-        /// [`Pixel`] records.
+        /// [`PixelRecord`]s.
         #[serde(borrow)]
         data: &'a [u8],
     },
@@ -293,43 +302,6 @@ pub enum FaultCode {
     Record,
     /// A bounding volume hierarchy that is deeper than the stack, or no tree; detail: the node.
     Depth,
-}
-
-/// A pixel of a tile, as the wire carries it: ten `f32`, little-endian.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Pixel {
-    /// Radiance towards the eye, W/(sr m^2).
-    pub radiance: [f32; 3],
-    /// Mean albedo of the surfaces seen, 0 to 1 a channel.
-    pub albedo: [f32; 3],
-    /// Mean of the unit normals seen, in world space, on the side of the eye.
-    pub normal: [f32; 3],
-    /// Mean distance along the view's axis of the surfaces seen, metres; infinite where none is.
-    pub depth: f32,
-}
-
-/// Bytes of one [`Pixel`].
-pub const PIXEL_BYTES: usize = 40;
-/// Pixels that one [`Reply::Pixels`] may carry.
-pub const PIXELS_PER_REPLY: usize = 25;
-
-impl Pixel {
-    /// Reads a record.
-    pub fn read(bytes: &[u8; PIXEL_BYTES]) -> Self {
-        let word = |index: usize| bytes.as_chunks().0.get(index).map_or(0.0, |w| f32::from_le_bytes(*w));
-        let vector = |first: usize| [word(first), word(first + 1), word(first + 2)];
-        Self { radiance: vector(0), albedo: vector(3), normal: vector(6), depth: word(9) }
-    }
-
-    /// The record's bytes.
-    pub fn to_bytes(&self) -> [u8; PIXEL_BYTES] {
-        let mut bytes = [0; PIXEL_BYTES];
-        let values = self.radiance.into_iter().chain(self.albedo).chain(self.normal).chain([self.depth]);
-        for (word, value) in bytes.as_chunks_mut().0.iter_mut().zip(values) {
-            *word = value.to_le_bytes();
-        }
-        bytes
-    }
 }
 
 /// Writes a message into `bytes`; its length, or `None` if there is no room.

@@ -155,7 +155,7 @@ fn the_longest_messages_fit_a_frame() {
     let mut bytes = [0; MAX_PAYLOAD];
     let lines = [0xff; 128 * LINES_PER_WRITE];
     assert!(encode(&Command::WriteLines { first: u32::MAX, data: &lines }, &mut bytes).is_some());
-    let pixels = [0xff; PIXEL_BYTES * PIXELS_PER_REPLY];
+    let pixels = [0xff; PIXELS_BYTES];
     assert!(encode(&Reply::Pixels { tile: u32::MAX, first: u32::MAX, data: &pixels }, &mut bytes).is_some());
     let checksums = [0xff; 8 * CHECKSUMS_PER_REPLY as usize];
     assert!(encode(&Reply::Checksums { first: u32::MAX, data: &checksums }, &mut bytes).is_some());
@@ -204,7 +204,7 @@ fn opcodes_are_pinned() {
 /// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
 #[test]
 fn golden_structures() {
-    assert_eq!(PROTOCOL_VERSION, 7);
+    assert_eq!(PROTOCOL_VERSION, 8);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,
@@ -250,12 +250,22 @@ fn golden_structures() {
         queue: 300,
         radiance: Radiance::Precomputed,
         caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
+        layers: true,
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero].concat();
-    let bytes =
-        [&[5, 1, 2][..], &camera, &[3, 4, 5, 6, 7], &one, &[2, 1], &one, &[8, 2, 0xac, 2, 1, 1, 50], &one]
-            .concat();
+    let bytes = [
+        &[5, 1, 2][..],
+        &camera,
+        &[3, 4, 5, 6, 7],
+        &one,
+        &[2, 1],
+        &one,
+        &[8, 2, 0xac, 2, 1, 1, 50],
+        &one,
+        &[1],
+    ]
+    .concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);
 
     let counters = Counters {
@@ -326,4 +336,16 @@ fn a_pixel_survives_its_record() {
     let pixel =
         Pixel { radiance: [1., 2., 3.], albedo: [4., 5., 6.], normal: [7., 8., 9.], depth: f32::INFINITY };
     assert_eq!(Pixel::read(&pixel.to_bytes()), pixel);
+    let layers =
+        PixelLayers { direct: [1., 2., 3.], indirect: [4., 5., 6.], caustic: [7., 8., 9.], gathers: 4096. };
+    let bytes = [pixel.to_bytes(), layers.to_bytes()].concat();
+    let numbers: Vec<u8> = (1..10).chain([4096]).flat_map(|number| (number as f32).to_le_bytes()).collect();
+    assert_eq!(bytes[PIXEL_BYTES..], numbers);
+    for (has_layers, layers) in [(false, None), (true, Some(layers))] {
+        let length = record_bytes(has_layers);
+        assert_eq!(PixelRecord::read(&bytes[..length]), Some(PixelRecord { pixel, layers }));
+        assert_eq!(PixelRecord::read(&bytes[..length - 1]), None);
+        assert!(PIXELS_BYTES >= 12 * length);
+    }
+    assert_eq!(PixelRecord::read(&[bytes, vec![0]].concat()), None);
 }

@@ -178,7 +178,7 @@ fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
     let mut chip = Box::new(ReferenceChip::new());
     let tile = Tile { id: 0, x: 256, y: 256, width: 16, height: 16 };
     bencher.counter(ItemsCount::new(256_usize)).bench_local(|| {
-        assert!(chip.begin(context.memory, tile));
+        assert!(chip.begin(context.memory, context.frame, tile));
         while chip.step(&mut context).expect("sound") == Progress::Busy {}
     });
 }

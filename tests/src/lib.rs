@@ -1,6 +1,7 @@
 //! What the tests of the whole share: small scenes of known radiance, and renders of them.
 #![forbid(unsafe_code)]
 
+pub mod everything;
 pub mod fuzz;
 pub mod lru;
 pub mod mapped;

@@ -6,7 +6,7 @@ use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::budget::MICRO;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{
-    self, Command, Fault, FaultCode, LINES_PER_WRITE, MemoryUse, PIXEL_BYTES, PROTOCOL_VERSION, Reply,
+    self, Command, Fault, FaultCode, LINES_PER_WRITE, MemoryUse, PROTOCOL_VERSION, Reply, record_bytes,
 };
 use photoncard_shared::transport::Transport;
 
@@ -16,6 +16,8 @@ pub struct Wire<'a> {
     pub card: Box<MicroCard<Dram<'a>>>,
     host: Transport,
     session: u16,
+    /// Whether the frame that was begun last has layers.
+    layers: bool,
 }
 
 /// A reply, without what it borrows.
@@ -41,7 +43,7 @@ impl<'a> Wire<'a> {
     /// A card that was just switched on, with some memory.
     pub fn new(memory: &'a mut [Line]) -> Self {
         let card = Box::new(MicroCard::new(MICRO, Dram::new(memory)));
-        Self { card, host: Transport::host(), session: 0 }
+        Self { card, host: Transport::host(), session: 0, layers: false }
     }
 
     /// Sends a command and works until the card rests. Returns its answers.
@@ -49,6 +51,9 @@ impl<'a> Wire<'a> {
     /// # Panics
     /// If the card's answers are no replies.
     pub fn say(&mut self, command: &Command) -> Vec<Answer> {
+        if let Command::BeginFrame(frame) = command {
+            self.layers = frame.layers;
+        }
         assert!(self.host.send(|bytes| message::encode(command, bytes)), "there is room for a command");
         self.work()
     }
@@ -82,7 +87,8 @@ impl<'a> Wire<'a> {
             while !rest.is_empty() {
                 rest = &rest[self.host.receive(rest).0..];
                 while let Some(payload) = self.host.take() {
-                    answers.push(answer(message::decode(payload).expect("a card sends replies")));
+                    let reply = message::decode(payload).expect("a card sends replies");
+                    answers.push(answer(reply, self.layers));
                 }
             }
             if to_card.is_empty() && to_host.is_empty() && !self.card.is_busy() {
@@ -125,13 +131,13 @@ impl<'a> Wire<'a> {
     }
 }
 
-fn answer(reply: Reply) -> Answer {
+fn answer(reply: Reply, layers: bool) -> Answer {
     match reply {
         Reply::Hello { written_lines, memory_use, .. } => Answer::Hello(written_lines, memory_use),
         Reply::Checksums { data, .. } => Answer::Checksums(data.to_vec()),
         Reply::ImageAccepted => Answer::ImageAccepted,
         Reply::FrameAccepted => Answer::FrameAccepted,
-        Reply::Pixels { data, .. } => Answer::Pixels(data.len() / PIXEL_BYTES),
+        Reply::Pixels { data, .. } => Answer::Pixels(data.len() / record_bytes(layers)),
         Reply::TileDone { tile, .. } => Answer::TileDone(tile),
         Reply::Fault(Fault { code, .. }) => Answer::Fault(code),
     }

@@ -73,6 +73,32 @@ fn commands_out_of_order_are_faults_and_the_card_goes_on() {
     });
 }
 
+/// With layers a pixel takes four sums of the buffer: the micro chip has room for those of 64 pixels, and 12 fit a reply.
+#[test]
+fn a_tile_with_layers_has_a_fourth_of_the_pixels() {
+    with_room_for_a_card(|| {
+        let mut memory = vec![Line::ZERO; DRAM_LINES];
+        let mut wire = Wire::new(&mut memory);
+        wire.hello();
+        wire.load(image().lines());
+        let plain = FrameParameters { width: 16, ..frame() };
+        let wide = Tile { width: 9, ..TILE };
+        for (layers, fits) in [(true, false), (false, true), (true, false)] {
+            let frame = FrameParameters { layers, ..plain };
+            assert_eq!(wire.say(&Command::BeginFrame(frame)), [Answer::FrameAccepted]);
+            let answers = wire.say(&Command::RenderTile(wide));
+            if fits {
+                assert_eq!(answers.last(), Some(&Answer::TileDone(7)));
+            } else {
+                assert_eq!(answers, [Answer::Fault(FaultCode::Tile)]);
+            }
+        }
+        let mut expected = vec![Answer::Pixels(12); 5];
+        expected.extend([Answer::Pixels(4), Answer::TileDone(7)]);
+        assert_eq!(wire.say(&Command::RenderTile(TILE)), expected);
+    });
+}
+
 #[test]
 fn frames_and_tiles_outside_the_budget_are_faults() {
     with_room_for_a_card(|| {

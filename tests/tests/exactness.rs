@@ -6,6 +6,7 @@ use photoncard_driver::render::{CardAddress, Radiance, RenderSettings, Sampling,
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_shared::budget::{MICRO, REFERENCE};
+use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
 
 fn glossy() -> Scene {
@@ -91,18 +92,25 @@ fn variants() -> Vec<RenderSettings> {
 
 /// Checks all variants with a sampling, without and with records of irradiance.
 fn check_variants(sampling: Sampling) {
-    check_variants_of(&RenderSettings { sampling, ..settings() });
+    check_variants_of(&glossy(), &RenderSettings { sampling, ..settings() });
 }
 
 /// Checks all variants with the sampling and the radiance of some settings.
-fn check_variants_of(&RenderSettings { sampling, radiance, .. }: &RenderSettings) {
-    let scene = glossy();
+fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
+    let RenderSettings { sampling, radiance, caustic_photons, .. } = *settings_of;
     for (irradiance_error, samples) in [(None, 2), (Some(0.025), 1), (Some(0.025), 2)] {
-        let with = |settings| RenderSettings { sampling, radiance, irradiance_error, samples, ..settings };
-        let expected = bits(&render_or_panic(&scene, &with(settings())).film);
+        let with = |settings| RenderSettings {
+            sampling,
+            radiance,
+            caustic_photons,
+            irradiance_error,
+            samples,
+            ..settings
+        };
+        let expected = bits(&render_or_panic(scene, &with(settings())).film);
         for variant in variants() {
             let variant = with(variant);
-            let film = render_or_panic(&scene, &variant).film;
+            let film = render_or_panic(scene, &variant).film;
             assert!(bits(&film) == expected, "{variant:?} changes the picture");
         }
     }
@@ -130,7 +138,12 @@ fn nor_do_they_with_rays_by_the_mixture() {
 
 #[test]
 fn nor_do_they_with_precomputed_irradiance() {
-    check_variants_of(&RenderSettings { radiance: Radiance::Precomputed, ..settings() });
+    check_variants_of(&glossy(), &RenderSettings { radiance: Radiance::Precomputed, ..settings() });
+}
+
+#[test]
+fn nor_do_they_with_textures_cut_outs_mirrors_glass_and_lights_of_every_kind() {
+    check_variants_of(&everything(), &RenderSettings { caustic_photons: Some(3000), ..settings() });
 }
 
 #[test]

@@ -11,7 +11,8 @@ use super::memory_model::{MeasuredMemory, MemoryTraffic};
 
 /// A rendered tile, and what it took.
 pub struct RenderedTile {
-    /// The light of its pixels, row by row, in the image's radiance units.
+    /// The light of its pixels, row by row, in the image's radiance units: a sum a pixel, or with layers
+    /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
     pub sums: Vec<ColourSum>,
     /// What was counted.
     pub counters: Counters,
@@ -35,13 +36,13 @@ pub fn render_tile(
     let mut counters = Counters::ZERO;
     let outlet = outlet.map(|outlet| outlet as &mut dyn GatherOutlet);
     let mut context = Context { scene, memory: &mut memory, frame, counters: &mut counters, outlet };
-    if !chip.begin(context.memory, tile) {
+    if !chip.begin(context.memory, frame, tile) {
         return Err(Fault { code: FaultCode::Tile, detail: tile.id });
     }
     while chip.step(&mut context)? == Progress::Busy {}
     if context.outlet.is_none() {
         // What a card reads to complete its pixels is counted here as well.
-        for index in 0..chip.sums().len() {
+        for index in 0..tile.pixels() as usize {
             while chip.complete(&mut context, index)?.is_none() {}
         }
     }

@@ -7,14 +7,14 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
-use photoncard_firmware::chip::{Completion, ReferenceChip};
+use photoncard_firmware::chip::{Completion, Component, ReferenceChip};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::CandidateBuffer;
 use photoncard_firmware::render::final_gather::gathered;
 use photoncard_firmware::render::{Context, GatherOutlet};
-use photoncard_shared::budget::{REFERENCE, gather_candidates};
+use photoncard_shared::budget::{REFERENCE, gather_candidates, sums_of_pixel};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FrameParameters, Tile};
 use rayon::prelude::*;
@@ -75,7 +75,7 @@ struct Waiting {
     request: GatherRequest,
 }
 
-/// The sums of a frame's pixels, tile after tile, and the gathers that are still to be added.
+/// The sums of a frame's pixels, tile after tile, one or some a pixel, and the gathers that are still to be added.
 struct Frame {
     sums: Vec<ColourSum>,
     waiting: Vec<Waiting>,
@@ -155,7 +155,7 @@ fn render_with<'a, M: MeasuredMemory>(
     let gathers_of_tile = rays_of_pixel(frame) * tiles.iter().map(Tile::pixels).max().unwrap_or(1);
     let tiles_per_round = (GATHERS_PER_CAST / gathers_of_tile.max(1)).max(2 * chips as u64) as usize;
     for tiles in tiles.chunks(tiles_per_round) {
-        all.add(pool.install(|| cast_tiles(job, model, tiles, &go_on))?)?;
+        all.add(frame, pool.install(|| cast_tiles(job, model, tiles, &go_on))?)?;
     }
     pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.request.place));
     let mut done = 0;
@@ -194,7 +194,8 @@ impl Frame {
         let pixels: u64 = tiles.iter().map(Tile::pixels).sum();
         let gathers = pixels * rays_of_pixel(frame);
         let too_many = || FrameError::TooManyGathers { gathers };
-        if gathers > MOST_GATHERS || pixels > u32::MAX as u64 {
+        let sums = pixels * u64::from(sums_of_pixel(frame.layers));
+        if gathers > MOST_GATHERS || sums > u32::MAX as u64 {
             return Err(too_many());
         }
         let mut all = Self {
@@ -203,13 +204,13 @@ impl Frame {
             counters: Counters::ZERO,
             traffic: MemoryTraffic::ZERO,
         };
-        all.sums.try_reserve_exact(pixels as usize).map_err(|_| too_many())?;
+        all.sums.try_reserve_exact(sums as usize).map_err(|_| too_many())?;
         all.waiting.try_reserve_exact(gathers as usize).map_err(|_| too_many())?;
         Ok(all)
     }
 
     /// Takes over what tiles leave. Only lobes beside an irradiance cache can be more than there was room made for.
-    fn add(&mut self, tiles: Vec<CastTile>) -> Result<(), FrameError> {
+    fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), FrameError> {
         for CastTile { tile, waiting } in tiles {
             let gathers = (self.waiting.len() + waiting.len()) as u64;
             let too_many = || FrameError::TooManyGathers { gathers };
@@ -221,7 +222,9 @@ impl Frame {
             self.sums.extend(tile.sums);
             self.counters.add(&tile.counters);
             self.traffic.add(&tile.traffic);
-            let sum_of = |request: &GatherRequest| first + request.target as u32;
+            let sum_of = |request: &GatherRequest| {
+                first + Component::Indirect.sum_of(frame, request.target.into()) as u32
+            };
             self.waiting
                 .extend(waiting.into_iter().map(|request| Waiting { sum: sum_of(&request), request }));
         }
@@ -263,10 +266,11 @@ fn complete<'a, M: MeasuredMemory>(
     let places = job.tiles.iter().flat_map(|tile| {
         (0..tile.height).flat_map(move |y| (0..tile.width).map(move |x| (tile.x + x, tile.y + y)))
     });
-    for (sum, (x, y)) in all.sums.iter().zip(places) {
+    let sums_of_pixel = sums_of_pixel(job.frame.layers) as usize;
+    for (sums, (x, y)) in all.sums.chunks_exact(sums_of_pixel).zip(places) {
         let mut completion = Completion::NOTHING;
         while !completion.step(&mut context, x, y)? {}
-        film.write(x, y, completion.pixel(&context, sum))?;
+        film.write_record(x, y, &completion.pixel(&context, sums))?;
     }
     all.traffic.add(&memory.traffic());
     Ok(())

@@ -5,9 +5,9 @@ use std::io::{self, BufReader, ErrorKind, Read, Seek};
 
 use photoncard_shared::budget::REFERENCE;
 use photoncard_shared::checksum::checksum;
-use photoncard_shared::message::{PIXEL_BYTES, Pixel, Tile};
+use photoncard_shared::message::{PixelRecord, Tile, record_bytes};
 
-use crate::film::Film;
+use crate::film::{Film, FilmPixel};
 
 pub(super) const PLACE_BYTES: usize = 16;
 pub(super) const CHECKSUM_BYTES: usize = 4;
@@ -19,12 +19,17 @@ const MOST_IN_VAIN: u64 = 32 << 20;
 
 /// What is kept of a finished tile.
 pub(crate) fn record(tile: &Tile, film: &Film) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(PLACE_BYTES + tile.pixels() as usize * PIXEL_BYTES + 4);
+    let pixels = tile.pixels() as usize * record_bytes(film.has_layers());
+    let mut bytes = Vec::with_capacity(PLACE_BYTES + pixels + CHECKSUM_BYTES);
     for number in [tile.x, tile.y, tile.width, tile.height] {
         bytes.extend(number.to_le_bytes());
     }
     for (x, y) in places(tile) {
-        bytes.extend(film.pixel(x, y).copied().unwrap_or_default().to_bytes());
+        let FilmPixel { pixel, layers } = film.all_at(x, y).unwrap_or_default();
+        bytes.extend(pixel.to_bytes());
+        if film.has_layers() {
+            bytes.extend(layers.to_bytes());
+        }
     }
     bytes.extend(checksum(&bytes).to_le_bytes());
     bytes
@@ -83,7 +88,8 @@ fn read_tile(reader: &mut impl Read, most: u64, film: &mut Film) -> io::Result<F
     if !is_inside || tile.pixels() > MOST_PIXELS {
         return Ok(Found::Nothing(0));
     }
-    let length = (PLACE_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * PIXEL_BYTES as u64;
+    let pixel_bytes = record_bytes(film.has_layers());
+    let length = (PLACE_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * pixel_bytes as u64;
     if length > most {
         return Ok(Found::Nothing(0));
     }
@@ -96,9 +102,9 @@ fn read_tile(reader: &mut impl Read, most: u64, film: &mut Film) -> io::Result<F
     if checksum(bytes).to_le_bytes() != sum {
         return Ok(Found::Nothing(length));
     }
-    for ((x, y), pixel) in places(&tile).zip(bytes[PLACE_BYTES..].as_chunks::<PIXEL_BYTES>().0) {
-        // The tile lies inside the window.
-        let _ = film.write(x, y, Pixel::read(pixel));
+    for ((x, y), record) in places(&tile).zip(bytes[PLACE_BYTES..].chunks_exact(pixel_bytes)) {
+        // The tile lies inside the window, and records have their length.
+        let _ = PixelRecord::read(record).map(|record| film.write_record(x, y, &record));
     }
     Ok(Found::Tile(length))
 }

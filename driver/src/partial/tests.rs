@@ -1,4 +1,4 @@
-use photoncard_shared::message::{PIXEL_BYTES, Pixel, Tile};
+use photoncard_shared::message::{PIXEL_BYTES, Pixel, PixelLayers, PixelRecord, Tile};
 use serde_json::json;
 
 use super::records::{CHECKSUM_BYTES, PLACE_BYTES, places};
@@ -67,6 +67,26 @@ fn damage_loses_the_tile_that_it_hits_alone() {
     shorter.drain(start + 2 * length + 30..start + 2 * length + 50);
     assert_eq!(taken_over(&folder, &shorter), [0, 1, 3, 4, 5]);
     assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
+}
+
+#[test]
+fn layers_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = partial(&folder, true);
+    let with_layers = || Film::with_layers(4, 3, Window::full(4, 3)).unwrap();
+    let mut film = with_layers();
+    for (number, (x, y)) in places(&tile(0)).enumerate() {
+        let pixel = Pixel { depth: number as f32, ..Pixel::default() };
+        let layers = Some(PixelLayers { gathers: 0.5 * number as f32, ..PixelLayers::default() });
+        film.write_record(x, y, &PixelRecord { pixel, layers }).unwrap();
+    }
+    let partial = PartialRender::begin(&settings, json!({}), &mut film).unwrap();
+    partial.keep(&record(&tile(0), &film));
+    drop(partial);
+    let mut again = with_layers();
+    PartialRender::begin(&settings, json!({}), &mut again).unwrap();
+    assert!(again.is_complete());
+    assert_eq!(again.all().collect::<Vec<_>>(), film.all().collect::<Vec<_>>());
 }
 
 #[test]

@@ -73,6 +73,9 @@ impl<'a> Shared<'a> {
         if self.failed.load(Ordering::Relaxed) || self.observer.is_stopped() {
             return Err(RenderError::Stopped);
         }
+        if let Some(error) = self.picture.display_failure() {
+            self.observer.not_shown(&error);
+        }
         self.picture.check_partial().inspect_err(|_| self.failed.store(true, Ordering::Relaxed))?;
         Ok(self.picture.scheduler().is_complete())
     }

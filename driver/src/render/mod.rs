@@ -25,9 +25,10 @@ use std::time::Instant;
 
 use photoncard_shared::budget::{Budget, REFERENCE};
 use photoncard_shared::checksum::image_checksum;
-use photoncard_shared::message::{CausticGather, FrameParameters};
+use photoncard_shared::message::{CausticGather, FrameParameters, Tile};
 
 use self::cards::{Cards, Outcome};
+use crate::display::{Display, DisplayError};
 use crate::emulator::trace::TraceFile;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 use crate::film::Film;
@@ -67,6 +68,9 @@ pub trait Observer: Sync {
 
     /// Tells that a card was lost, or is used no more; the others go on with its tiles.
     fn lost(&self, _card: &str, _error: &SessionError) {}
+
+    /// Tells that the picture is not shown on the display server, or no more; the render goes on.
+    fn not_shown(&self, _error: &DisplayError) {}
 }
 
 /// Watches nothing and never stops.
@@ -115,10 +119,11 @@ pub fn render(
         settings.check(&budget)?;
     }
     // Not before the settings are known to be possible: a film may be large.
-    let mut film = Film::new(settings.width, settings.height, settings.window())?;
+    let mut film = settings.film()?;
     let partial = begin_partial(scene, settings, &mut film, observer)?;
     let mut all = tiles(settings.window(), settings.tile, settings.order);
     let count = all.len();
+    let display = open_display(settings, &film, &all);
     all.retain(|tile| !film.has(tile));
     if all.len() < count {
         observer.resumed(count - all.len(), count);
@@ -127,7 +132,7 @@ pub fn render(
     let prepared = prepare(scene, settings, cards.budgets(), &mut times, observer)?;
     cards.share(prepared.image.clone());
     let frame = settings.frame(camera, prepared.max_distance, prepared.caustics);
-    let picture = Picture::new(Scheduler::new(all), film, partial);
+    let picture = Picture::new(Scheduler::new(all), film, partial).shown_on(display);
     let job = Job {
         image: prepared.image.lines(),
         checksum: image_checksum(prepared.image.lines()),
@@ -142,7 +147,8 @@ pub fn render(
     times.render = outcome.render_seconds;
     times.total = start.elapsed().as_secs_f64();
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
-    let (film, partial) = picture.into_parts();
+    let (film, partial, display) = picture.into_parts();
+    finish_display(display.as_ref(), &film, observer);
     Ok(Rendering { film, statistics, partial })
 }
 
@@ -157,14 +163,16 @@ fn render_whole_frame(
     settings.check_resume()?;
     let chips = cards::reference_chips(&settings.cards)?;
     settings.check(&REFERENCE)?;
-    let mut film = Film::new(settings.width, settings.height, settings.window())?;
+    let mut film = settings.film()?;
     let partial = begin_partial(scene, settings, &mut film, observer)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, std::iter::once(REFERENCE), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance, prepared.caustics);
     let tiles = tiles(settings.window(), settings.tile, settings.order);
+    let display = open_display(settings, &film, &tiles);
     let progress = |done: u64, total: u64| {
         observer.progress(Phase::Tiles, done, total);
+        tell_failure(display.as_ref(), observer);
         !observer.is_stopped()
     };
     let begun = Instant::now();
@@ -173,6 +181,10 @@ fn render_whole_frame(
     let CurveOutcome { counters, traffic } = render_along_curve(job, caches.as_ref(), &mut film, &progress)?;
     times.render = begun.elapsed().as_secs_f64();
     times.total = start.elapsed().as_secs_f64();
+    if let Some(display) = &display {
+        tiles.iter().for_each(|tile| display.show(tile, &film));
+    }
+    finish_display(display.as_ref(), &film, observer);
     let traffic = caches.map(|_| traffic);
     let outcome = Outcome { counters, traffic, cards: chips, ..Outcome::default() };
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
@@ -192,6 +204,28 @@ fn begin_partial(
         observer.kept();
     }
     Ok(partial)
+}
+
+/// Begins to show the picture, with the tiles that are there, if the settings say so.
+fn open_display(settings: &RenderSettings, film: &Film, tiles: &[Tile]) -> Option<Display> {
+    let display = Display::open(settings.display.as_ref()?, film.window(), &settings.layers.channels());
+    tiles.iter().filter(|tile| film.has(tile)).for_each(|tile| display.show(tile, film));
+    Some(display)
+}
+
+/// Shows what is still to be shown.
+fn finish_display(display: Option<&Display>, film: &Film, observer: &dyn Observer) {
+    if let Some(display) = display {
+        display.finish(film);
+    }
+    tell_failure(display, observer);
+}
+
+/// Tells why the picture is not shown, once.
+fn tell_failure(display: Option<&Display>, observer: &dyn Observer) {
+    if let Some(error) = display.and_then(Display::failure) {
+        observer.not_shown(&error);
+    }
 }
 
 /// What is to be loaded into the cards.

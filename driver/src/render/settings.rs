@@ -6,14 +6,17 @@ use glam::Vec3;
 pub use photoncard_firmware::card::LEAST_IRRADIANCE_ERROR;
 use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_firmware::importance::ENTRIES;
-use photoncard_shared::budget::{Budget, MOST_BINS};
+use photoncard_shared::budget::{Budget, MICRO, MOST_BINS};
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, CausticGather, FrameParameters, Radiance, Sampling};
 use serde_json::{Value, json};
 
 use super::{CardAddress, RenderError, cards};
+use crate::display::DisplaySettings;
+use crate::emulator::ChipKind;
 use crate::emulator::memory_model::CacheSettings;
-use crate::film::Window;
+use crate::film::{Film, FilmError, Window};
+use crate::layer::Layers;
 use crate::link::LineFaults;
 use crate::partial::PartialSettings;
 use crate::photon::{PhotonLayout, PhotonSettings};
@@ -54,6 +57,8 @@ pub struct RenderSettings {
     pub samples: u32,
     /// Side of a tile, pixels.
     pub tile: u32,
+    /// The layers that the picture has besides radiance.
+    pub layers: Layers,
     /// What the directions of gather rays are chosen by.
     pub sampling: Sampling,
     /// The relative error that interpolated irradiance may have; `None` to interpolate none.
@@ -75,6 +80,8 @@ pub struct RenderSettings {
     /// Where finished tiles are kept until the picture is written; `None` to keep none. Not with the order `hilbert`, which has
     /// no finished tiles before the end.
     pub partial: Option<PartialSettings>,
+    /// Where tiles are shown as they land; `None` to show none.
+    pub display: Option<DisplaySettings>,
     /// The file that every read of the chip is written to. It takes one chip; without `caches` those of the default.
     pub trace: Option<PathBuf>,
 }
@@ -98,6 +105,7 @@ impl Default for RenderSettings {
             shadow_rays: 8,
             samples: 1,
             tile: 16,
+            layers: Layers::default(),
             sampling: Sampling::Product,
             irradiance_error: None,
             radiance: Radiance::Density,
@@ -107,6 +115,7 @@ impl Default for RenderSettings {
             cards: vec![CardAddress::default()],
             faults: None,
             partial: None,
+            display: None,
             caches: None,
             trace: None,
         }
@@ -145,6 +154,7 @@ impl RenderSettings {
             "sampling": format!("{:?}", self.sampling),
             "irradiance-cache": self.irradiance_error,
             "radiance": format!("{:?}", self.radiance),
+            "layers": self.layers.are_of_chip(),
         })
     }
 
@@ -180,7 +190,8 @@ impl RenderSettings {
         within("--spp", self.samples as u64, 1, budget.samples as u64)?;
         within("--bins", self.bins.unwrap_or(1) as u64, 1, MOST_BINS as u64)?;
         within("--queue", self.queue.unwrap_or(1) as u64, 1, budget.gather_queue as u64)?;
-        within("--tile", self.tile as u64, 1, budget.tile_pixels.isqrt() as u64)?;
+        within("--tile", self.tile as u64, 1, budget.pixels_of_tile(false).isqrt() as u64)?;
+        self.check_tile_with_layers(budget)?;
         if let Some(error) = self.irradiance_error
             && !(LEAST_IRRADIANCE_ERROR..=1.0).contains(&error)
         {
@@ -200,6 +211,41 @@ impl RenderSettings {
             }),
             _ => Ok(()),
         }
+    }
+
+    /// Checks that a chip has room for a tile with layers, if the picture has any of chips.
+    fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
+        let most = budget.pixels_of_tile(self.layers.are_of_chip()).isqrt();
+        if self.tile <= most {
+            return Ok(());
+        }
+        Err(RenderError::Setting {
+            option: "--tile",
+            value: self.tile.to_string(),
+            reason: format!("with --aov {} it must be 1 to {most} on this card", self.layers),
+            remedy: format!(
+                "choose {most} or less, or leave direct, indirect, caustic and gathers out of --aov: with them a chip keeps \
+                 four sums a pixel"
+            ),
+        })
+    }
+
+    /// The side of a tile where none is asked for, pixels: one that the cards have room for, as far as that is known
+    /// without asking them.
+    pub fn default_tile(layers: &Layers, cards: &[CardAddress]) -> u32 {
+        let are_large =
+            cards.iter().all(|card| matches!(card, CardAddress::Emulated { kind: ChipKind::Reference, .. }));
+        let side = Self::default().tile;
+        if are_large { side } else { side.min(MICRO.pixels_of_tile(layers.are_of_chip()).isqrt()) }
+    }
+
+    /// An empty film for the picture.
+    ///
+    /// # Errors
+    /// If its size or its crop is not possible.
+    pub fn film(&self) -> Result<Film, FilmError> {
+        let new = if self.layers.are_of_chip() { Film::with_layers } else { Film::new };
+        new(self.width, self.height, self.window())
     }
 
     /// The caches that memory is modelled with, if it is.
@@ -305,6 +351,7 @@ impl RenderSettings {
             queue: self.queue.unwrap_or(u32::MAX),
             radiance: self.radiance,
             caustics,
+            layers: self.layers.are_of_chip(),
         }
     }
 

@@ -1,6 +1,20 @@
 //! Light from infinitely far.
 
+use std::fs;
+use std::io;
+use std::path::Path;
+
 use glam::Vec3;
+
+use super::raster::{Fault, check_size};
+use super::{MAX_SIDE, radiance};
+use crate::error::SceneError;
+use crate::exr::{self, ExrError};
+
+/// The brightest radiance, as of surfaces, W/(sr m^2): products and squares stay within single precision.
+const BRIGHTEST: f32 = 1e20;
+
+const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
 /// Radiance from infinitely far, W/(sr m^2) per linear RGB channel: an equirectangular map, constant if it is 1 x 1.
 ///
@@ -23,8 +37,74 @@ impl Environment {
         Self { width: 1, height: 1, texels: vec![radiance.to_array()] }
     }
 
+    /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that has the channels
+    /// R, G and B. Which of them a file is, its first bytes tell.
+    ///
+    /// # Errors
+    /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged, larger than
+    /// [`MAX_SIDE`] texels a side or [`MAX_TEXELS`](super::MAX_TEXELS) in all, or holds a radiance that is negative, infinite,
+    /// not a number, or above 1e20.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let unreadable = |source| SceneError::Unreadable { file: path.to_owned(), source };
+        if !fs::metadata(path).map_err(unreadable)?.is_file() {
+            let error = io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file");
+            return Err(unreadable(error));
+        }
+        let bytes = fs::read(path).map_err(unreadable)?;
+        let read = if bytes.starts_with(EXR_MAGIC) {
+            drop(bytes);
+            read_exr(path)
+        } else if bytes.starts_with(radiance::MAGIC) {
+            radiance::read(&bytes).map(|(size, texels)| Self::of(size, texels))
+        } else {
+            Err(Fault {
+                reason: "it is neither a Radiance picture nor an OpenEXR picture".to_owned(),
+                remedy: "convert the environment to .hdr or .exr",
+            })
+        };
+        let fault =
+            |Fault { reason, remedy }| SceneError::Environment { file: path.to_owned(), reason, remedy };
+        read.and_then(Self::checked).map_err(fault)
+    }
+
+    fn of([width, height]: [u32; 2], texels: Vec<[f32; 3]>) -> Self {
+        Self { width, height, texels }
+    }
+
+    fn checked(self) -> Result<Self, Fault> {
+        let is_bad = |texel: &[f32; 3]| !texel.iter().all(|value| (0.0..=BRIGHTEST).contains(value));
+        let Some(index) = self.texels.iter().position(is_bad) else { return Ok(self) };
+        let (x, y) = (index % self.width as usize, index / self.width as usize);
+        let reason = format!("texel ({x}, {y}) is {:?}, which is no radiance", self.texels[index]);
+        Err(Fault {
+            reason,
+            remedy: "limit every channel to the range of 0 to 1e20, and store the map again",
+        })
+    }
+
     /// Whether any light comes from it.
     pub fn is_lit(&self) -> bool {
         self.texels.iter().flatten().any(|radiance| *radiance > 0.0)
     }
+}
+
+fn read_exr(path: &Path) -> Result<Environment, Fault> {
+    let image = exr::read_rgb(path).map_err(|error| match error {
+        ExrError::NoColour { channels, .. } => Fault {
+            reason: format!("it has no channels R, G and B, only {channels}"),
+            remedy: "write the picture as plain RGB",
+        },
+        ExrError::Compression { compression, .. } => Fault {
+            reason: format!("it has {compression}, which is not read"),
+            remedy: "store the picture with ZIP compression",
+        },
+        ExrError::TooLarge { width, height, .. } => Fault {
+            reason: format!("the image has {width} x {height} texels, more than {MAX_SIDE} x {MAX_SIDE}"),
+            remedy: "scale the image down to 16384 texels a side or less",
+        },
+        other => Fault { reason: other.to_string(), remedy: "export or copy the picture again" },
+    })?;
+    let size = [image.width, image.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+    check_size(size)?;
+    Ok(Environment::of(size, image.pixels))
 }

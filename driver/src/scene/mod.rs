@@ -8,6 +8,8 @@ mod environment;
 pub mod gltf;
 mod light;
 mod material;
+mod radiance;
+mod raster;
 mod settings;
 mod texture;
 mod triangle;
@@ -18,7 +20,7 @@ pub use self::camera::Camera;
 pub use self::environment::Environment;
 pub use self::light::{PunctualKind, PunctualLight};
 pub use self::material::{MAX_EXPONENT, Material, Reflection, Transmission};
-pub use self::texture::{Encoding, Image, Texture, Wrap};
+pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
 pub use self::triangle::{Attributes, NO_ATTRIBUTES, Triangle};
 use crate::error::SceneError;
 

@@ -1,5 +1,11 @@
 //! Images, and how they lie on surfaces.
 
+/// The most texels of an image, or of an environment, a side.
+pub const MAX_SIDE: u32 = 16_384;
+
+/// The most texels of all images of a scene together, and of an environment.
+pub const MAX_TEXELS: u64 = 1 << 28;
+
 /// How an image lies on surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {

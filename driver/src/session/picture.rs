@@ -4,6 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use photoncard_shared::message::Tile;
 
+use crate::display::{Display, DisplayError};
 use crate::film::{Film, FilmError, Window};
 use crate::partial::{self, PartialError, PartialRender};
 use crate::scheduler::Scheduler;
@@ -14,12 +15,19 @@ pub struct Picture {
     scheduler: Scheduler,
     film: Mutex<Film>,
     partial: Option<PartialRender>,
+    display: Option<Display>,
 }
 
 impl Picture {
     /// The tiles that are left, the film they go to, and where finished ones are kept, if they are.
     pub fn new(scheduler: Scheduler, film: Film, partial: Option<PartialRender>) -> Self {
-        Self { scheduler, film: Mutex::new(film), partial }
+        Self { scheduler, film: Mutex::new(film), partial, display: None }
+    }
+
+    /// The same picture, shown while it is rendered.
+    #[must_use]
+    pub fn shown_on(self, display: Option<Display>) -> Self {
+        Self { display, ..self }
     }
 
     /// A picture of one pixel and no tile, for a session that has nothing to render yet.
@@ -48,6 +56,9 @@ impl Picture {
             let record = partial::record(tile, &self.film());
             partial.keep(&record);
         }
+        if let Some(display) = &self.display {
+            display.show(tile, &self.film());
+        }
         self.scheduler.complete();
     }
 
@@ -64,8 +75,14 @@ impl Picture {
         self.partial.as_ref().is_some_and(PartialRender::holds_tiles)
     }
 
-    /// The film, and where finished tiles are kept.
-    pub(crate) fn into_parts(self) -> (Film, Option<PartialRender>) {
-        (self.film.into_inner().unwrap_or_else(PoisonError::into_inner), self.partial)
+    /// Why the picture is not shown, or no more, if that was not told before.
+    pub(crate) fn display_failure(&self) -> Option<DisplayError> {
+        self.display.as_ref().and_then(Display::failure)
+    }
+
+    /// The film, where finished tiles are kept, and where they are shown.
+    pub(crate) fn into_parts(self) -> (Film, Option<PartialRender>, Option<Display>) {
+        let film = self.film.into_inner().unwrap_or_else(PoisonError::into_inner);
+        (film, self.partial, self.display)
     }
 }

@@ -1,6 +1,6 @@
 //! The tiles at a card.
 
-use photoncard_shared::message::{FrameParameters, PIXEL_BYTES, Pixel, Tile};
+use photoncard_shared::message::{FrameParameters, PixelRecord, Tile, record_bytes};
 
 use super::{Picture, SessionError};
 
@@ -27,7 +27,7 @@ impl TilesInFlight {
         self.0.push(TileInFlight { tile, pixels: 0 });
     }
 
-    /// Takes a tile's next pixels, some of [`PIXEL_BYTES`] each.
+    /// Takes a tile's next pixels, with layers if the film has any.
     pub(super) fn take_pixels(
         &mut self,
         id: u32,
@@ -37,17 +37,19 @@ impl TilesInFlight {
     ) -> Result<(), SessionError> {
         let in_flight = self.0.iter_mut().find(|in_flight| in_flight.tile.id == id);
         let in_flight = in_flight.ok_or(SessionError::Unexpected("pixels of another tile"))?;
-        let (pixels, rest) = data.as_chunks::<PIXEL_BYTES>();
+        let mut film = picture.film();
+        let pixels = data.chunks_exact(record_bytes(film.has_layers()));
+        let is_whole = pixels.remainder().is_empty();
         let end = first as u64 + pixels.len() as u64;
         let are_next = first as u64 == in_flight.pixels && end <= in_flight.tile.pixels();
-        if !are_next || pixels.is_empty() || !rest.is_empty() {
+        if !are_next || data.is_empty() || !is_whole {
             return Err(SessionError::Unexpected("pixels that are not the next"));
         }
         in_flight.pixels = end;
         let Tile { x, y, width, .. } = in_flight.tile;
-        let mut film = picture.film();
         for (index, pixel) in (first..).zip(pixels) {
-            film.write(x + index % width, y + index / width, Pixel::read(pixel))?;
+            let record = PixelRecord::read(pixel).unwrap_or_default();
+            film.write_record(x + index % width, y + index / width, &record)?;
         }
         Ok(())
     }

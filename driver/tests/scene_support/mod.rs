@@ -53,6 +53,7 @@ pub(crate) fn triangle_json() -> Value {
 }
 
 /// A GLB of `json`, whose first buffer becomes the BIN chunk.
+#[allow(dead_code, reason = "not every test file makes one")]
 pub(crate) fn glb(mut json: Value, bin: &[u8]) -> Vec<u8> {
     json["buffers"][0].as_object_mut().unwrap().remove("uri");
     let mut text = serde_json::to_vec(&json).unwrap();
@@ -68,6 +69,59 @@ pub(crate) fn glb(mut json: Value, bin: &[u8]) -> Vec<u8> {
     bytes.extend(b"BIN\0");
     bytes.extend(bin);
     bytes
+}
+
+/// The triangle, to which views and accessors are added.
+#[allow(dead_code, reason = "not every test file adds accessors")]
+pub(crate) struct Extended {
+    pub(crate) json: Value,
+    pub(crate) bytes: Vec<u8>,
+}
+
+#[allow(dead_code, reason = "not every test file adds accessors")]
+impl Extended {
+    pub(crate) fn new() -> Self {
+        Self { json: triangle_json(), bytes: triangle_bytes() }
+    }
+
+    /// Adds a buffer view of these bytes, and returns its index.
+    pub(crate) fn view(&mut self, bytes: &[u8]) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
+        self.bytes.extend(bytes);
+        self.json["buffers"][0]["byteLength"] = json!(self.bytes.len());
+        push(&mut self.json, "bufferViews", view)
+    }
+
+    /// Adds an accessor of these bytes, and returns its index.
+    pub(crate) fn accessor(&mut self, kind: &str, component: u32, count: usize, bytes: &[u8]) -> usize {
+        let view = self.view(bytes);
+        let accessor = json!({"bufferView": view, "componentType": component, "count": count, "type": kind});
+        push(&mut self.json, "accessors", accessor)
+    }
+
+    /// Adds an accessor of single precision, and returns its index.
+    pub(crate) fn floats<const N: usize>(&mut self, kind: &str, values: &[[f32; N]]) -> usize {
+        let bytes: Vec<u8> = values.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
+        self.accessor(kind, 5126, values.len(), &bytes)
+    }
+
+    /// The only primitive.
+    pub(crate) fn primitive(&mut self) -> &mut Value {
+        &mut self.json["meshes"][0]["primitives"][0]
+    }
+
+    pub(crate) fn load(&self) -> Result<Scene, SceneError> {
+        load_with(&self.json, &self.bytes)
+    }
+}
+
+/// Appends to a list at the top of the JSON, and returns the index.
+#[allow(dead_code, reason = "not every test file appends")]
+pub(crate) fn push(json: &mut Value, list: &str, item: Value) -> usize {
+    let list = json.as_object_mut().unwrap().entry(list).or_insert(json!([])).as_array_mut().unwrap();
+    list.push(item);
+    list.len() - 1
 }
 
 /// Loads a file of these bytes.

@@ -51,7 +51,7 @@ pub(crate) fn render(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option
     let mut nowhere = Nowhere;
     let outlet = (work == Work::Rays).then_some(&mut nowhere as &mut dyn GatherOutlet);
     let mut context = Context { scene: &scene, memory, frame: &frame, counters, outlet };
-    if !chip.begin(context.memory, Tile { id: 0, x, y, width: TILE_SIDE, height: TILE_SIDE }) {
+    if !chip.begin(context.memory, context.frame, Tile { id: 0, x, y, width: TILE_SIDE, height: TILE_SIDE }) {
         return None;
     }
     while chip.step(&mut context).ok()? == Progress::Busy {}

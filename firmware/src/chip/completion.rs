@@ -4,8 +4,9 @@
 //! done in steps.
 
 use glam::Vec3;
-use photoncard_shared::message::{Fault, Pixel};
+use photoncard_shared::message::{Fault, Pixel, PixelLayers, PixelRecord};
 
+use super::light::light_of;
 use crate::fixed_point::ColourSum;
 use crate::memory::MemoryPort;
 use crate::render::{Context, PixelSample, eye};
@@ -50,15 +51,25 @@ impl Completion {
         Ok(end >= samples)
     }
 
-    /// The pixel, after the last step. Its radiance is the sum of all that was brought to it, in the image's radiance units.
-    pub fn pixel<M>(&self, context: &Context<M>, radiance: &ColourSum) -> Pixel {
+    /// The pixel, after the last step, from its sums of light.
+    pub fn pixel<M>(&self, context: &Context<M>, sums: &[ColourSum]) -> PixelRecord {
         let per_sample = 1.0 / context.frame.samples.max(1) as f32;
         let per_surface = 1.0 / self.surfaces as f32;
-        Pixel {
-            radiance: (radiance.value() * context.scene.header.radiance_unit).to_array(),
-            albedo: (self.albedo * per_sample).to_array(),
+        let unit = context.scene.header.radiance_unit;
+        let (radiance, layers) = light_of(sums);
+        let pixel = Pixel {
+            radiance: (radiance * unit).to_array(),
+            albedo: (self.albedo * per_sample).clamp(Vec3::ZERO, Vec3::ONE).to_array(),
             normal: (self.normal * per_sample).to_array(),
             depth: if self.surfaces > 0 { self.depth * per_surface } else { f32::INFINITY },
-        }
+        };
+        let scaled = |light: [f32; 3]| light.map(|component| component * unit);
+        let layers = layers.map(|PixelLayers { direct, indirect, caustic, gathers }| PixelLayers {
+            direct: scaled(direct),
+            indirect: scaled(indirect),
+            caustic: scaled(caustic),
+            gathers,
+        });
+        PixelRecord { pixel, layers }
     }
 }

@@ -6,18 +6,23 @@
 
 mod completion;
 mod gathers;
+mod light;
 mod pixels;
 mod position;
 mod records;
 
 use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::budget::{Budget, MICRO, REFERENCE, TechniqueMemory, gather_candidates};
-use photoncard_shared::message::{Fault, FrameParameters, Pixel, Tile};
+use photoncard_shared::budget::{
+    Budget, MICRO, REFERENCE, TechniqueMemory, gather_candidates, sums_of_pixel,
+};
+use photoncard_shared::message::{Fault, FrameParameters, PixelRecord, Tile};
 
 pub use self::completion::Completion;
 use self::gathers::Gathers;
-use self::pixels::{StoredPoint, add_light};
+pub use self::light::Component;
+use self::light::{add_light, sums_of};
+use self::pixels::StoredPoint;
 use self::position::{Block, Position, Stage};
 use crate::fixed_point::ColourSum;
 use crate::gather::GatherQueue;
@@ -54,7 +59,7 @@ pub struct Chip<
 > {
     /// Where gather rays start, in the present sample: what each pixel of the tile sees, or records.
     points: Vec<StoredPoint, TILE_PIXELS>,
-    /// The light of each pixel of the tile so far, in radiance units.
+    /// The light of each pixel of the tile so far, in radiance units: a sum a pixel, or those of its components.
     sums: Vec<ColourSum, TILE_PIXELS>,
     gathers: Gathers<CANDIDATES, QUEUE>,
     cache: IrradianceCache<RECORDS, GATHERED>,
@@ -127,14 +132,14 @@ impl<
         }
     }
 
-    /// Pixels that a tile may have.
-    pub const fn tile_pixels(&self) -> u64 {
-        TILE_PIXELS as u64
+    /// Pixels that a tile of a frame may have.
+    pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
+        TILE_PIXELS as u64 / u64::from(sums_of_pixel(frame.layers))
     }
 
-    /// Begins a tile. Returns whether it has pixels and its buffers suffice.
+    /// Begins a tile of a frame. Returns whether it has pixels and its buffers suffice.
     #[must_use]
-    pub fn begin(&mut self, memory: &mut impl MemoryPort, tile: Tile) -> bool {
+    pub fn begin(&mut self, memory: &mut impl MemoryPort, frame: &FrameParameters, tile: Tile) -> bool {
         memory.begin_tile();
         self.tile = tile;
         self.position = Position::DONE;
@@ -143,10 +148,12 @@ impl<
         self.sums.clear();
         self.gathers.clear();
         self.blocks.clear();
-        let Ok(pixels) = usize::try_from(tile.pixels()) else { return false };
-        pixels > 0
-            && self.points.resize(pixels, StoredPoint::NOTHING).is_ok()
-            && self.sums.resize(pixels, ColourSum::ZERO).is_ok()
+        if tile.pixels() == 0 || tile.pixels() > self.tile_pixels(frame) {
+            return false;
+        }
+        let pixels = tile.pixels() as usize;
+        self.points.resize(pixels, StoredPoint::NOTHING).is_ok()
+            && self.sums.resize(pixels * sums_of_pixel(frame.layers) as usize, ColourSum::ZERO).is_ok()
             && self.blocks.push(Block::whole(tile.width, tile.height)).is_ok()
     }
 
@@ -213,17 +220,19 @@ impl<
     /// Some of the gathers that wait.
     fn drain<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Self { sums, gathers, cache, position, .. } = self;
+        let frame = context.frame;
         if matches!(position.stage, Stage::RecordRays | Stage::RecordSums) {
             return gathers.drain(context, &mut |request, brought| {
                 cache.add(request.target, request.cell, brought);
             });
         }
         gathers.drain(context, &mut |request, brought| {
-            add_light(sums, request.target, brought);
+            add_light(sums, frame, request.target, Component::Indirect, brought);
         })
     }
 
-    /// The light of the complete tile's pixels, in rows, in radiance units.
+    /// The light of the complete tile's pixels, in rows, in radiance units: a sum a pixel, or with layers
+    /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
     pub fn sums(&self) -> &[ColourSum] {
         &self.sums
     }
@@ -237,7 +246,7 @@ impl<
         &mut self,
         context: &mut Context<M>,
         index: usize,
-    ) -> Result<Option<Pixel>, Fault> {
+    ) -> Result<Option<PixelRecord>, Fault> {
         let width = self.tile.width.max(1);
         let [x, y] = [self.tile.x + index as u32 % width, self.tile.y + index as u32 / width];
         if !self.completion.step(context, x, y)? {
@@ -245,7 +254,7 @@ impl<
         }
         let completion = core::mem::replace(&mut self.completion, Completion::NOTHING);
         // Past the last pixel there is no light.
-        Ok(Some(completion.pixel(context, self.sums.get(index).unwrap_or(&ColourSum::ZERO))))
+        Ok(Some(completion.pixel(context, sums_of(&self.sums, context.frame, index))))
     }
 }
 

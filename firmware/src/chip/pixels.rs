@@ -2,13 +2,12 @@
 
 use core::ops::Range;
 
-use glam::Vec3;
 use photoncard_shared::budget::MOST_GATHER_RAYS;
 use photoncard_shared::message::{Fault, FrameParameters};
 
+use super::light::{Component, add_light, count_gather};
 use super::position::Stage;
 use super::{Chip, allowed_error};
-use crate::fixed_point::ColourSum;
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::SeenSample;
 use crate::memory::{MemoryPort, Stage as MemoryStage};
@@ -116,14 +115,6 @@ fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpo
     }
 }
 
-/// Adds light to the pixel that it is for, in radiance units.
-#[inline]
-pub(super) fn add_light(sums: &mut [ColourSum], target: u16, brought: Vec3) {
-    if let Some(sum) = sums.get_mut(target as usize) {
-        sum.add_light(brought);
-    }
-}
-
 impl<
     const TILE_PIXELS: usize,
     const CANDIDATES: usize,
@@ -138,11 +129,15 @@ impl<
         let mut stored = StoredPoint::NOTHING;
         match eye::view(context, at)? {
             Sight::Background(radiance) => {
-                add_light(&mut self.sums, index as u16, radiance * sample_share(context));
+                let light = radiance * sample_share(context);
+                add_light(&mut self.sums, context.frame, index as u16, Component::Direct, light);
             }
             Sight::Surface(view) => {
                 let purpose = self.light_at_once(context, index, at, &view);
                 let mut point = pixel_point(context.frame, at, view.surface, purpose);
+                if purpose == Purpose::Sample && point.rays > 0 {
+                    count_gather(&mut self.sums, context.frame, index);
+                }
                 point.choose_directions(context, self.gathers.candidates.view())?;
                 stored = StoredPoint {
                     seen: view.seen.unwrap_or(Seen::ELSEWHERE),
@@ -176,9 +171,12 @@ impl<
         let interpolated = allowed.and_then(|allowed| self.cache.interpolate(&sample, allowed));
         context.counters.lambertian_samples += u64::from(is_lambertian);
         context.counters.interpolated_samples += u64::from(interpolated.is_some());
-        let reflected = interpolated.map_or(Vec3::ZERO, |light| surface.reflection.diffuse * light);
-        add_light(&mut self.sums, index as u16, (surface.emission + reflected) * sample_share(context));
-        if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample }
+        let (share, target) = (sample_share(context), index as u16);
+        add_light(&mut self.sums, frame, target, Component::Direct, surface.emission * share);
+        let Some(light) = interpolated else { return Purpose::Sample };
+        let reflected = surface.reflection.diffuse * light;
+        add_light(&mut self.sums, frame, target, Component::Indirect, reflected * share);
+        Purpose::Lobe
     }
 
     /// What shadow rays and caustics bring the present pixel.
@@ -189,9 +187,11 @@ impl<
             && let Some(point) = stored.restore(context, at)?
         {
             let reflected = direct::reflected(context, at, &point)?;
-            add_light(&mut self.sums, index as u16, reflected * sample_share(context));
+            let light = reflected * sample_share(context);
+            add_light(&mut self.sums, context.frame, index as u16, Component::Direct, light);
             let focused = caustic::reflected(context, &point, self.gathers.candidates.view())?;
-            add_light(&mut self.sums, index as u16, focused / context.frame.samples.max(1) as f32);
+            let light = focused / context.frame.samples.max(1) as f32;
+            add_light(&mut self.sums, context.frame, index as u16, Component::Caustic, light);
         }
         if self.position.next_index(self.block.pixels()) {
             self.position.stage = Stage::Rays;
@@ -228,7 +228,7 @@ impl<
                 // A tile has at most TILE_PIXELS pixels, which 16 bits tell apart.
                 let end = final_gather::cast(context, &point, index as u16, share, ray)?;
                 let Some(end) = end else { continue };
-                add_light(sums, index as u16, end.direct);
+                add_light(sums, frame, index as u16, Component::Direct, end.direct);
                 match (end.request, &mut context.outlet) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => {
@@ -236,7 +236,7 @@ impl<
                     }
                     (Some(request), None) => {
                         gathers.submit(context, request, &mut |request, brought| {
-                            add_light(sums, request.target, brought);
+                            add_light(sums, frame, request.target, Component::Indirect, brought);
                         })?;
                     }
                 }

@@ -12,7 +12,7 @@ use photoncard_shared::message::Fault;
 
 use super::Context;
 use crate::memory::MemoryPort;
-use crate::scene::{Ray, Reflection, Seen, Surface, closest_hit, read_surface};
+use crate::scene::{Hit, Ray, Reflection, Seen, Surface, closest_hit, read_surface};
 use crate::vector::{max, max_component};
 
 /// A path on its way.
@@ -131,17 +131,42 @@ pub fn follow<M: MemoryPort>(
     random: impl Fn(u32) -> f32,
 ) -> Result<(SpecularPath, PathEnd), Fault> {
     let mut path = SpecularPath::new(ray, Carried::Radiance);
-    loop {
-        let hit = closest_hit(context.scene, context.memory, &path.ray)?;
-        let Some(hit) = hit else { return Ok((path, PathEnd::Escaped)) };
-        let surface = read_surface(context.scene, context.memory, &path.ray, &hit)?;
-        match path.arrive(&surface, random(path.bounces)) {
-            Arrival::Ends => return Ok((path, PathEnd::Surface(surface, Seen::new(&hit)))),
-            Arrival::Lost => {
-                context.counters.lost_paths += 1;
-                return Ok((path, PathEnd::Lost));
+    // Most rays meet no such surface: those that do go a longer way.
+    let Some(hit) = closest_hit(context.scene, context.memory, &ray)? else {
+        return Ok((path, PathEnd::Escaped));
+    };
+    let surface = read_surface(context.scene, context.memory, &ray, &hit)?;
+    let end = if surface.specular.is_none() {
+        PathEnd::Surface(surface, Seen::new(&hit))
+    } else {
+        path.follow_from(context, surface, hit, &random)?
+    };
+    Ok((path, end))
+}
+
+impl SpecularPath {
+    /// Follows the path from a surface that it has come to.
+    #[inline(never)]
+    fn follow_from<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+        mut surface: Surface,
+        mut hit: Hit,
+        random: &dyn Fn(u32) -> f32,
+    ) -> Result<PathEnd, Fault> {
+        loop {
+            match self.arrive(&surface, random(self.bounces)) {
+                Arrival::Ends => return Ok(PathEnd::Surface(surface, Seen::new(&hit))),
+                Arrival::Lost => {
+                    context.counters.lost_paths += 1;
+                    return Ok(PathEnd::Lost);
+                }
+                Arrival::GoesOn => context.counters.specular_rays += 1,
             }
-            Arrival::GoesOn => context.counters.specular_rays += 1,
+            let next = closest_hit(context.scene, context.memory, &self.ray)?;
+            let Some(next) = next else { return Ok(PathEnd::Escaped) };
+            surface = read_surface(context.scene, context.memory, &self.ray, &next)?;
+            hit = next;
         }
     }
 }

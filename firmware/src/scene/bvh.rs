@@ -151,12 +151,12 @@ fn descend(
                         ControlFlow::Break(()) => return Ok(()),
                     }
                 }
-                for Hit { intersection, triangle, index } in with_cut_outs {
+                for Hit { intersection, triangle, index } in &with_cut_outs {
                     let is_near = intersection.distance <= until;
-                    if !is_near || !is_there(scene, memory, &triangle, index, intersection.barycentric)? {
+                    if !is_near || !is_there(scene, memory, triangle, *index, intersection.barycentric)? {
                         continue;
                     }
-                    match visit(intersection, index, &|| triangle) {
+                    match visit(*intersection, *index, &|| *triangle) {
                         ControlFlow::Continue(distance) => until = distance,
                         ControlFlow::Break(()) => return Ok(()),
                     }

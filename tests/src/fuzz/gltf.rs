@@ -22,7 +22,8 @@ pub(super) struct Scenes {
     folder: TempDir,
 }
 
-/// Everything that the loader reads: a hierarchy, sparse positions, normals, a lobe, lights, an orthographic camera.
+/// Everything that the loader reads: a hierarchy, sparse positions, normals, coordinates, colours, a skin, instances, a strip,
+/// textures, a lobe, glass, lights, an orthographic camera.
 const RICH: &[u8] = include_bytes!("../../fuzz/rich.gltf");
 const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/furnace.gltf"),
@@ -30,19 +31,49 @@ const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/cornell-glossy.gltf"),
 ];
 
-/// A triangle's vertices, its indices, and an index and a position that take the place of another.
+/// Images, each at a multiple of four bytes, after the triangle's numbers.
+const PNG: &[u8] = include_bytes!("../../../driver/tests/images/texel.png");
+const JPEG: &[u8] = include_bytes!("../../../driver/tests/images/grey.jpg");
+
+/// A triangle's vertices, its indices, an index and a position that take the place of another, coordinates, colours, joints,
+/// weights, a matrix, and images.
 fn triangle_bytes() -> Vec<u8> {
     let vertices = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let indices = [0_u16, 1, 2, 1].map(u16::to_le_bytes);
     let replaced = [1.0_f32, 0.5, 0.0].map(f32::to_le_bytes);
-    [vertices.as_flattened(), indices.as_flattened(), replaced.as_flattened()].concat()
+    let coordinates = [0_f32, 0.0, 1.0, 0.0, 0.0, 1.0].map(f32::to_le_bytes);
+    let colours = [[255_u8, 128, 0, 255], [0, 128, 255, 128], [9, 9, 9, 9]];
+    let joints = [[0_u8, 1, 0, 0]; 3];
+    let weights = [[255_u8, 0, 0, 0], [128, 127, 0, 0], [0, 255, 0, 0]];
+    let mut matrix = [0_f32; 16];
+    [0, 5, 10, 15].into_iter().for_each(|place| matrix[place] = 1.0);
+    let matrix = matrix.map(f32::to_le_bytes);
+    let mut bytes = [
+        vertices.as_flattened(),
+        indices.as_flattened(),
+        replaced.as_flattened(),
+        coordinates.as_flattened(),
+        colours.as_flattened(),
+        joints.as_flattened(),
+        weights.as_flattened(),
+        matrix.as_flattened(),
+        matrix.as_flattened(),
+    ]
+    .concat();
+    for image in [PNG, JPEG] {
+        bytes.extend(image);
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+    }
+    bytes
 }
 
 /// A scene whose bytes are in its text.
 fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let data: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
     let text = String::from_utf8_lossy(text);
-    text.replace("\"byteLength\": 56", &format!("\"byteLength\": 56, \"uri\": \"data:,{data}\"")).into_bytes()
+    let stated = format!("\"byteLength\": {}", bytes.len());
+    assert!(text.contains(&stated), "the scene states as many bytes as there are");
+    text.replace(&stated, &format!("{stated}, \"uri\": \"data:,{data}\"")).into_bytes()
 }
 
 /// A GLB of some JSON and bytes. What its header and chunks say of their lengths is true.

@@ -53,6 +53,7 @@ fn frame(choice: u8) -> FrameParameters {
         bins: if is_set(4) { 8 } else { 1 },
         drain: [Drain::Immediate, Drain::Hash, Drain::Sort, Drain::Sort][usize::from(choice >> 5 & 3)],
         queue: if is_set(7) { 3 } else { 64 },
+        layers: choice.count_ones() % 2 == 1,
         radiance: if choice >> 5 & 3 == 3 { Radiance::Precomputed } else { Radiance::Density },
         ..settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None)
     }

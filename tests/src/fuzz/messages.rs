@@ -40,6 +40,7 @@ pub(super) fn frame() -> FrameParameters {
         queue: 1024,
         radiance: Radiance::Precomputed,
         caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
+        layers: false,
     }
 }
 

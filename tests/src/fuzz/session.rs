@@ -10,7 +10,9 @@ use photoncard_shared::budget::{Budget, MICRO};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
 use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{self, FrameParameters, PROTOCOL_VERSION, Reply, Tile};
+use photoncard_shared::message::{
+    self, FrameParameters, PIXELS_BYTES, PROTOCOL_VERSION, Reply, Tile, record_bytes,
+};
 use photoncard_shared::transport::Transport;
 
 use super::{Random, Target, bound, messages, mutation};
@@ -26,23 +28,48 @@ const MOST_FRAMES: usize = 64;
 /// Steps in which a session fails of which the card is silent.
 const MOST_STEPS: usize = 400;
 
-/// What the card does in a step: the first byte of each record of an input. Any other sends the reply that follows.
+/// What the card does in a step: the first byte of each record of an input, of which the first byte of all says whether the frame
+/// has layers. Any other sends the reply that follows.
 const RESET: u8 = 0xff;
 const WAIT: u8 = 0xfe;
 
 /// The target.
 pub(super) struct Sessions {
-    /// The replies of a sound session, in order.
-    replies: Vec<Vec<u8>>,
+    /// The replies of a sound session, in order: without layers, and with them.
+    replies: [Vec<Vec<u8>>; 2],
     others: Vec<Vec<u8>>,
     image: Vec<Line>,
-    frame: FrameParameters,
+    frames: [FrameParameters; 2],
+}
+
+/// The replies of a sound session, in order.
+fn sound_replies(hello: Reply, layers: bool) -> Vec<Vec<u8>> {
+    let tile_pixels = vec![0; (SIDE * SIDE) as usize * record_bytes(layers)];
+    let pixels_of_reply = PIXELS_BYTES / record_bytes(layers);
+    let mut replies = vec![
+        hello,
+        Reply::Checksums { first: 0, data: &[7; 24] },
+        Reply::ImageAccepted,
+        Reply::FrameAccepted,
+    ];
+    for tile in 0..2 {
+        let parts = tile_pixels.chunks(pixels_of_reply * record_bytes(layers));
+        let firsts = (0..).step_by(pixels_of_reply);
+        replies.extend(firsts.zip(parts).map(|(first, data)| Reply::Pixels { tile, first, data }));
+        replies.push(Reply::TileDone { tile, counters: Counters::ZERO });
+    }
+    replies.iter().map(encoded).collect()
+}
+
+fn encoded(reply: &Reply) -> Vec<u8> {
+    let mut bytes = vec![0; MAX_PAYLOAD];
+    let length = message::encode(reply, &mut bytes).expect("there is room for the reply");
+    bytes.truncate(length);
+    bytes
 }
 
 impl Sessions {
     pub(super) fn new() -> Self {
-        let tile_pixels = [0; (SIDE * SIDE * 40) as usize];
-        let (first, rest) = tile_pixels.split_at(25 * 40);
         let budget = Budget { tiles: 2, ..MICRO };
         let hello = |written_lines| Reply::Hello {
             protocol: PROTOCOL_VERSION,
@@ -52,33 +79,19 @@ impl Sessions {
             memory_use: None,
             build: "a card",
         };
-        let mut replies =
-            vec![hello(LINES), Reply::Checksums { first: 0, data: &[7; 24] }, Reply::ImageAccepted];
-        replies.push(Reply::FrameAccepted);
-        for tile in 0..2 {
-            replies.push(Reply::Pixels { tile, first: 0, data: first });
-            replies.push(Reply::Pixels { tile, first: 25, data: rest });
-            replies.push(Reply::TileDone { tile, counters: Counters::ZERO });
-        }
-        let encoded = |reply: &Reply| {
-            let mut bytes = vec![0; MAX_PAYLOAD];
-            let length = message::encode(reply, &mut bytes).expect("there is room for the reply");
-            bytes.truncate(length);
-            bytes
-        };
         Self {
-            replies: replies.iter().map(encoded).collect(),
+            replies: [false, true].map(|layers| sound_replies(hello(LINES), layers)),
             others: [messages::replies(), vec![encoded(&hello(0)), encoded(&hello(u32::MAX))]].concat(),
             image: vec![Line::ZERO; LINES as usize],
-            frame: messages::frame(),
+            frames: [false, true].map(|layers| FrameParameters { layers, ..messages::frame() }),
         }
     }
 
     /// A reply of a card that may be hostile.
-    fn reply(&self, sound: &[u8], random: &mut Random) -> Vec<u8> {
+    fn reply(&self, replies: &[Vec<u8>], sound: &[u8], random: &mut Random) -> Vec<u8> {
         let mut bytes = match random.below(16) {
             0 => random.pick(&self.others).clone(),
-            1 => random.pick(&self.replies).clone(),
+            1 => random.pick(replies).clone(),
             _ => sound.to_vec(),
         };
         if random.once_in(12) {
@@ -160,11 +173,13 @@ impl Target for Sessions {
     }
 
     fn input(&self, random: &mut Random) -> Vec<u8> {
-        let mut input = Vec::new();
+        let layers = random.below(2);
+        let replies = &self.replies[layers];
+        let mut input = vec![layers as u8];
         for _ in 0..1 + random.below(3) {
-            let end = random.below(2 * self.replies.len()).min(self.replies.len());
-            for sound in &self.replies[..end] {
-                put(&mut input, random.below(4) as u8, &self.reply(sound, random));
+            let end = random.below(2 * replies.len()).min(replies.len());
+            for sound in &replies[..end] {
+                put(&mut input, random.below(4) as u8, &self.reply(replies, sound, random));
                 if random.once_in(10) {
                     put(&mut input, if random.once_in(2) { RESET } else { WAIT }, &[]);
                 }
@@ -176,14 +191,16 @@ impl Target for Sessions {
 
     fn read(&self, mut input: &[u8]) -> bool {
         let tiles = [0, 1].map(|id| Tile { id, x: SIDE * id, y: 0, width: SIDE, height: SIDE });
-        let film = Film::new(2 * SIDE, SIDE, Window::full(2 * SIDE, SIDE)).expect("a small film");
+        let layers = input.split_off_first().is_some_and(|first| first & 1 != 0);
+        let new = if layers { Film::with_layers } else { Film::new };
+        let film = new(2 * SIDE, SIDE, Window::full(2 * SIDE, SIDE)).expect("a small film");
         let mut ends = Ends {
             session: Session::new(1, Duration::ZERO),
             card: Transport::card(),
             picture: Picture::new(Scheduler::new(tiles.to_vec()), film, None),
             now: Duration::ZERO,
         };
-        let job = Job { image: &self.image, checksum: 0, frame: &self.frame };
+        let job = Job { image: &self.image, checksum: 0, frame: &self.frames[usize::from(layers)] };
         ends.session.start(job, ends.now);
         let mut was_loaded = false;
         while let Some((what, reply)) = next_record(&mut input) {

@@ -18,10 +18,30 @@ pub(super) struct Source<'a> {
     pub(super) buffers: &'a [std::borrow::Cow<'a, [u8]>],
 }
 
+/// What an accessor may hold at some place.
+pub(super) struct Format {
+    pub(super) types: &'static [Type],
+    pub(super) components: &'static [ComponentType],
+    pub(super) integers: Integers,
+}
+
+/// What integer components stand for (glTF 2.0, 3.11 "Accessors").
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Integers {
+    /// Themselves.
+    Whole,
+    /// The range 0 to 1, or -1 to 1 of signed ones.
+    Normalized,
+    /// The one or the other, as the accessor states.
+    AsStated,
+}
+
 /// The elements of one accessor.
 pub(super) struct Elements<'a> {
     pub(super) count: u64,
     component: ComponentType,
+    components: usize,
+    is_normalized: bool,
     base: Option<Strided<'a>>,
     sparse: Option<Sparse<'a>>,
 }
@@ -66,18 +86,31 @@ impl<'a> Sparse<'a> {
     }
 }
 
+/// A component as a number.
+fn number(component: ComponentType, is_normalized: bool, bytes: &[u8]) -> f32 {
+    let scaled = |value: f32, whole: f32| if is_normalized { (value / whole).max(-1.0) } else { value };
+    match (component, bytes) {
+        (ComponentType::I8, &[a]) => scaled(f32::from(a as i8), 127.0),
+        (ComponentType::U8, &[a]) => scaled(f32::from(a), 255.0),
+        (ComponentType::I16, &[a, b]) => scaled(f32::from(i16::from_le_bytes([a, b])), 32_767.0),
+        (ComponentType::U16, &[a, b]) => scaled(f32::from(u16::from_le_bytes([a, b])), 65_535.0),
+        (ComponentType::U32, &[a, b, c, d]) => u32::from_le_bytes([a, b, c, d]) as f32,
+        (ComponentType::F32, &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]),
+        _ => 0.0,
+    }
+}
+
 fn unsigned(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |value, &byte| value << 8 | u64::from(byte))
 }
 
 impl<'a> Elements<'a> {
-    /// The accessor `index`, which `item` refers to and which must be of one of `components` and of type `kind`.
+    /// The accessor `index`, which `item` refers to and which must be of a format.
     pub(super) fn new(
         source: &Source<'a>,
         index: usize,
         item: &str,
-        kind: Type,
-        components: &[ComponentType],
+        format: &Format,
     ) -> Result<Self, SceneError> {
         let document = source.document;
         let here = format!("accessors[{index}]");
@@ -87,7 +120,7 @@ impl<'a> Elements<'a> {
             .get(index)
             .ok_or_else(|| document.invalid(item, format!("accessor {index} does not exist"), REMEDY))?;
         let component = match accessor.component_type {
-            Checked::Valid(component) if components.contains(&component.0) => component.0,
+            Checked::Valid(component) if format.components.contains(&component.0) => component.0,
             _ => {
                 let reason = format!("{here} is of a component type that is not allowed here");
                 return Err(document.invalid(
@@ -97,10 +130,16 @@ impl<'a> Elements<'a> {
                 ));
             }
         };
-        if !matches!(accessor.type_, Checked::Valid(found) if found == kind) {
-            return Err(document.invalid(item, format!("{here} is not of type {kind:?}"), REMEDY));
-        }
-        let size = component.size() * kind.multiplicity();
+        let kind = match accessor.type_ {
+            Checked::Valid(kind) if format.types.contains(&kind) => kind,
+            _ => {
+                let types: Vec<_> = format.types.iter().map(|kind| format!("{kind:?}")).collect();
+                let reason = format!("{here} is not of type {}", types.join(" or "));
+                return Err(document.invalid(item, reason, REMEDY));
+            }
+        };
+        let components = kind.multiplicity();
+        let size = component.size() * components;
         let count = accessor.count.0;
         let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
         let base = accessor
@@ -112,7 +151,12 @@ impl<'a> Elements<'a> {
             .as_ref()
             .map(|sparse| source.sparse(sparse, count, size, &format!("{here}.sparse")))
             .transpose()?;
-        Ok(Self { count, component, base, sparse })
+        let is_normalized = match format.integers {
+            Integers::Whole => false,
+            Integers::Normalized => true,
+            Integers::AsStated => accessor.normalized,
+        };
+        Ok(Self { count, component, components, is_normalized, base, sparse })
     }
 
     /// The bytes of an element, or `None` where glTF says zero.
@@ -121,14 +165,32 @@ impl<'a> Elements<'a> {
         replaced.or_else(|| self.base.as_ref()?.get(usize::try_from(index).ok()?))
     }
 
-    /// An element of three floats.
+    /// An element as numbers. Components that elements of this accessor do not have are those of `absent`.
+    pub(super) fn floats<const N: usize>(&self, index: u64, absent: [f32; N]) -> [f32; N] {
+        let mut vector = absent;
+        let present = vector.iter_mut().take(self.components);
+        match self.bytes(index) {
+            None => present.for_each(|value| *value = 0.0),
+            Some(bytes) => {
+                for (value, bytes) in present.zip(bytes.chunks_exact(self.component.size())) {
+                    *value = number(self.component, self.is_normalized, bytes);
+                }
+            }
+        }
+        vector
+    }
+
+    /// An element of three numbers.
     pub(super) fn vec3(&self, index: u64) -> [f32; 3] {
-        let mut vector = [0.0; 3];
-        if self.component == ComponentType::F32
-            && let Some(bytes) = self.bytes(index)
-        {
-            for (value, word) in vector.iter_mut().zip(bytes.as_chunks().0) {
-                *value = f32::from_le_bytes(*word);
+        self.floats(index, [0.0; 3])
+    }
+
+    /// An element of four unsigned integers.
+    pub(super) fn unsigned4(&self, index: u64) -> [u64; 4] {
+        let mut vector = [0; 4];
+        if let Some(bytes) = self.bytes(index) {
+            for (value, bytes) in vector.iter_mut().zip(bytes.chunks_exact(self.component.size())) {
+                *value = unsigned(bytes);
             }
         }
         vector
@@ -141,6 +203,15 @@ impl<'a> Elements<'a> {
 }
 
 impl<'a> Source<'a> {
+    /// The bytes of a buffer view, which `item` refers to.
+    pub(super) fn bytes(&self, view: usize, item: &str) -> Result<&'a [u8], SceneError> {
+        let (bytes, _) = self.view(view)?;
+        bytes.ok_or_else(|| {
+            let reason = format!("bufferViews[{view}] reaches beyond its buffer");
+            self.document.invalid(item, reason, REMEDY)
+        })
+    }
+
     /// `count` elements of `size` bytes that start `offset` bytes into a buffer view.
     fn strided(
         &self,

@@ -10,11 +10,25 @@ use gltf::json::mesh::Semantic;
 use gltf::json::validation::{Checked, Error as Fault, Validate};
 use miette::{NamedSource, SourceSpan};
 
+use super::instances::INSTANCING;
 use crate::error::{Place, SceneError};
 
 /// Extensions whose meaning the loader knows.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 2] =
-    ["KHR_materials_emissive_strength", "KHR_materials_specular"];
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 10] = [
+    INSTANCING,
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    // Lit all the same, which a notice tells.
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    QUANTIZATION,
+    "KHR_texture_transform",
+];
+
+const QUANTIZATION: &str = "KHR_mesh_quantization";
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER: usize = 12;
@@ -42,6 +56,12 @@ impl Document {
         Ok(document)
     }
 
+    /// Whether vertices may be integers.
+    pub(super) fn is_quantized(&self) -> bool {
+        let Self { root, .. } = self;
+        root.extensions_used.iter().chain(&root.extensions_required).any(|name| name == QUANTIZATION)
+    }
+
     /// The place `item` of this file.
     pub(super) fn place(&self, item: impl Into<String>) -> Place {
         Place::new(&self.path, item)
@@ -61,7 +81,8 @@ impl Document {
         for (i, name) in self.root.extensions_required.iter().enumerate() {
             if !SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
                 let place = self.place(format!("extensionsRequired[{i}]"));
-                return Err(SceneError::RequiredExtension { place, name: name.clone() });
+                let supported = SUPPORTED_EXTENSIONS.join(", ");
+                return Err(SceneError::RequiredExtension { place, name: name.clone(), supported });
             }
         }
         self.check_positions()?;
@@ -105,7 +126,8 @@ impl Document {
             let path = path();
             // Bounds are not used, so that files without them load too.
             let is_bound = path.as_str().ends_with(".min") || path.as_str().ends_with(".max");
-            if first.is_none() && !is_bound {
+            // Which extensions may be required was checked before.
+            if first.is_none() && !is_bound && fault != Fault::Unsupported {
                 first = Some((path, fault));
             }
         });

@@ -4,11 +4,14 @@ use glam::Vec3;
 use gltf::json;
 use serde::Deserialize;
 
+use gltf::json::material::AlphaMode;
+use gltf::json::validation::Checked;
+
 use super::document::Document;
-use super::notices::Notices;
+use super::texture::Textures;
 use crate::error::SceneError;
 use crate::scene::material::Property;
-use crate::scene::{Material, Reflection, Transmission};
+use crate::scene::{Encoding, Material, Reflection, Transmission};
 
 /// What `extras` may hold for this renderer; everything else in `extras` is other programs' business.
 #[derive(Deserialize)]
@@ -29,25 +32,25 @@ struct Phong {
     exponent: f32,
 }
 
-/// The material of primitives that state none: glTF's default.
+/// The material of primitives that state none: glTF's default, a rough white metal.
 pub(super) fn default_material() -> Material {
-    Material::lambertian("default", Vec3::ONE)
+    Material::new("default", metallic_roughness(&json::Material::default(), Vec3::ONE))
 }
 
 /// Every material of the file, in its order.
-pub(super) fn load(document: &Document, notices: &mut Notices) -> Result<Vec<Material>, SceneError> {
+pub(super) fn load(document: &Document, textures: &mut Textures) -> Result<Vec<Material>, SceneError> {
     let materials = document.root.materials.iter().enumerate();
-    materials.map(|(index, material)| load_one(document, index, material, notices)).collect()
+    materials.map(|(index, material)| load_one(document, index, material, textures)).collect()
 }
 
 fn load_one(
     document: &Document,
     index: usize,
     source: &json::Material,
-    _notices: &mut Notices,
+    textures: &mut Textures,
 ) -> Result<Material, SceneError> {
     let name = source.name.clone().unwrap_or_else(|| format!("material {index}"));
-    let [red, green, blue, _] = source.pbr_metallic_roughness.base_color_factor.0;
+    let [red, green, blue, alpha] = source.pbr_metallic_roughness.base_color_factor.0;
     let extensions = source.extensions.as_ref();
     let strength = extensions.and_then(|extensions| extensions.emissive_strength.as_ref());
     let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
@@ -62,11 +65,15 @@ fn load_one(
     } else {
         metallic_roughness(source, base_colour)
     };
-    let material = Material {
+    let mut material = Material {
         emission: Vec3::from(source.emissive_factor.0) * strength,
         double_sided: source.double_sided,
+        alpha_cutoff: (source.alpha_mode == Checked::Valid(AlphaMode::Mask))
+            .then(|| source.alpha_cutoff.unwrap_or_default().0),
+        alpha,
         ..Material::new(name, reflection)
     };
+    add_textures(&mut material, index, source, textures)?;
     material.check().map_err(|fault| {
         let item = match fault.property {
             Property::Diffuse | Property::Alpha => "pbrMetallicRoughness.baseColorFactor",
@@ -91,6 +98,30 @@ fn load_one(
     Ok(material)
 }
 
+/// Adds those textures that the material's reflection and emission have a use for.
+fn add_textures(
+    material: &mut Material,
+    index: usize,
+    source: &json::Material,
+    textures: &mut Textures,
+) -> Result<(), SceneError> {
+    let pbr = &source.pbr_metallic_roughness;
+    let mut add = |info: Option<&json::texture::Info>, name: &str, encoding| {
+        info.map(|info| textures.add(&format!("materials[{index}].{name}"), info, encoding)).transpose()
+    };
+    material.base_texture =
+        add(pbr.base_color_texture.as_ref(), "pbrMetallicRoughness.baseColorTexture", Encoding::Srgb)?;
+    if matches!(material.reflection, Reflection::MetallicRoughness { .. }) {
+        let info = pbr.metallic_roughness_texture.as_ref();
+        material.metallic_roughness_texture =
+            add(info, "pbrMetallicRoughness.metallicRoughnessTexture", Encoding::Linear)?;
+    }
+    if material.is_emissive() {
+        material.emissive_texture = add(source.emissive_texture.as_ref(), "emissiveTexture", Encoding::Srgb)?;
+    }
+    Ok(())
+}
+
 /// The index of refraction of materials that state none.
 const IOR: f32 = 1.5;
 
@@ -103,8 +134,8 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
     let extensions = source.extensions.as_ref();
     let ior = extensions.and_then(|extensions| extensions.ior.as_ref()).map_or(IOR, |ior| ior.ior.0);
     // With an index of 0, which stands for an infinite one, this is 1, as KHR_materials_ior has it.
-    let amplitude = (ior - 1.0) / (ior + 1.0);
-    let normal_reflectance = amplitude * amplitude;
+    let amplitude = (f64::from(ior) - 1.0) / (f64::from(ior) + 1.0);
+    let normal_reflectance = (amplitude * amplitude) as f32;
     let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
     let (factor, colour) = specular.map_or((1.0, Vec3::ONE), |specular| {
         (specular.specular_factor.0, Vec3::from(specular.specular_color_factor.0))

@@ -4,12 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use gltf::json;
 use gltf::json::material::AlphaMode;
-use gltf::json::mesh::Semantic;
 use gltf::json::validation::Checked;
 
 use super::document::{Document, SUPPORTED_EXTENSIONS};
-
-const PUNCTUAL_LIGHTS: &str = "KHR_lights_punctual";
+use super::light;
+use super::primitive::Topology;
 
 /// Names listed in one notice; the others are counted.
 const LISTED: usize = 8;
@@ -17,12 +16,8 @@ const LISTED: usize = 8;
 /// What loading found; the rest is in the JSON.
 #[derive(Default)]
 pub(super) struct Notices {
-    /// Indices of meshes whose normals are not those of their triangles.
-    pub(super) smooth: BTreeSet<usize>,
     /// Orthographic cameras.
     pub(super) orthographic: Vec<String>,
-    /// Whether some primitive has no material.
-    pub(super) default_material: bool,
     /// Whether the scene has no camera and was framed.
     pub(super) framed: bool,
 }
@@ -68,40 +63,21 @@ impl Notices {
                 sentences.push(format!("{sentence}: {}", list(kind, names)));
             }
         };
-        note("textures are ignored, the factors alone count", "material", &materials(root, has_texture));
-        let blended = materials(root, |material| material.alpha_mode != Checked::Valid(AlphaMode::Opaque));
-        note("alpha is ignored, the surface is rendered opaque", "material", &blended);
-        let smooth = self.smooth.iter().map(|&mesh| mesh_name(root, mesh)).collect::<Vec<_>>();
-        note("smooth normals are rendered as flat", "mesh", &smooth);
-        let coloured = meshes(root, |primitive| {
-            primitive.attributes.keys().any(|key| matches!(key, Checked::Valid(Semantic::Colors(_))))
-        });
-        note("vertex colours are ignored", "mesh", &coloured);
-        let other_modes = meshes(root, |primitive| !is_triangles(primitive));
-        note(
-            "points, lines, strips and fans are ignored, only triangle lists are rendered",
-            "mesh",
-            &other_modes,
-        );
+        note_materials(root, &mut note);
+        let other_modes = meshes(root, |primitive| Topology::of(primitive).is_none());
+        note("points and lines are ignored, only triangles are rendered", "mesh", &other_modes);
         let morphed =
             meshes(root, |primitive| primitive.targets.as_ref().is_some_and(|list| !list.is_empty()));
         note("morph targets are ignored, the base shape is rendered", "mesh", &morphed);
-        let skinned = names("node", &root.nodes, |node| node.name.as_ref(), |node| node.skin.is_some());
-        note("skins are ignored, the mesh is rendered in its rest pose", "node", &skinned);
         let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
         note("animations are ignored, the scene is rendered as it stands", "animation", &moving);
-        note(
-            "punctual lights are ignored, only emissive surfaces give light",
-            "light",
-            &punctual_lights(root),
-        );
+        let lights = light::lights(document);
+        let limited = names("light", lights, |light| light.name.as_ref(), |light| light.range.is_some());
+        note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
         note("orthographic cameras are ignored", "camera", &self.orthographic);
         for (extension, places) in other_extensions(root) {
             let places = if places.is_empty() { String::new() } else { format!(": {}", places.join(", ")) };
             sentences.push(format!("the extension {extension} is ignored{places}"));
-        }
-        if self.default_material {
-            sentences.push("primitives without a material are rendered white and one-sided".to_owned());
         }
         if self.framed {
             sentences
@@ -116,31 +92,46 @@ pub(super) fn mesh_name(root: &json::Root, mesh: usize) -> String {
     root.meshes[mesh].name.clone().unwrap_or_else(|| format!("mesh {mesh}"))
 }
 
-pub(super) fn is_triangles(primitive: &json::mesh::Primitive) -> bool {
-    primitive.mode == Checked::Valid(json::mesh::Mode::Triangles)
+/// What of the materials is not used.
+fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String])) {
+    let normal = materials(root, |material| material.normal_texture.is_some());
+    note("normal textures are ignored, the surface is rendered without its bumps", "material", &normal);
+    let occluded = materials(root, |material| material.occlusion_texture.is_some());
+    note("occlusion textures are ignored, occlusion is computed", "material", &occluded);
+    let extended = materials(root, has_extension_texture);
+    note("textures of extensions are ignored, the factors alone count", "material", &extended);
+    let blended = materials(root, |material| material.alpha_mode == Checked::Valid(AlphaMode::Blend));
+    note("alpha is ignored, the surface is rendered opaque", "material", &blended);
+    let frosted = materials(root, |material| {
+        is_transmissive(material) && material.pbr_metallic_roughness.roughness_factor.0 > 0.0
+    });
+    note("rough transmission is rendered as smooth glass", "material", &frosted);
+    let unlit = materials(root, |material| {
+        material.extensions.as_ref().is_some_and(|extensions| extensions.unlit.is_some())
+    });
+    note("unlit materials are rendered as lit ones", "material", &unlit);
 }
 
-fn has_texture(material: &json::Material) -> bool {
-    let pbr = &material.pbr_metallic_roughness;
-    let specular = material.extensions.as_ref().and_then(|extensions| extensions.specular.as_ref());
-    pbr.base_color_texture.is_some()
-        || pbr.metallic_roughness_texture.is_some()
-        || material.normal_texture.is_some()
-        || material.occlusion_texture.is_some()
-        || material.emissive_texture.is_some()
-        || specular.is_some_and(|s| s.specular_texture.is_some() || s.specular_color_texture.is_some())
+fn is_transmissive(material: &json::Material) -> bool {
+    let transmission = material.extensions.as_ref().and_then(|extensions| extensions.transmission.as_ref());
+    transmission.is_some_and(|transmission| transmission.transmission_factor.0 > 0.0)
 }
 
-fn punctual_lights(root: &json::Root) -> Vec<String> {
-    let lights = root.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
-    let lights = lights.map_or(&[][..], |extension| &extension.lights);
-    names("light", lights, |light| light.name.as_ref(), |_| true)
+/// Whether an extension whose factors are used states a texture.
+fn has_extension_texture(material: &json::Material) -> bool {
+    let Some(extensions) = &material.extensions else { return false };
+    let specular = extensions.specular.as_ref();
+    let transmission = extensions.transmission.as_ref();
+    let volume = extensions.volume.as_ref();
+    specular.is_some_and(|s| s.specular_texture.is_some() || s.specular_color_texture.is_some())
+        || transmission.is_some_and(|transmission| transmission.transmission_texture.is_some())
+        || volume.is_some_and(|volume| volume.thickness_texture.is_some())
 }
 
 /// Every extension in use that means nothing to the loader, and the materials, meshes and nodes that use it.
 fn other_extensions(root: &json::Root) -> BTreeMap<String, Vec<String>> {
     let mut users: BTreeMap<String, BTreeMap<&str, Vec<String>>> = BTreeMap::new();
-    let is_ignored = |name: &str| !SUPPORTED_EXTENSIONS.contains(&name) && name != PUNCTUAL_LIGHTS;
+    let is_ignored = |name: &str| !SUPPORTED_EXTENSIONS.contains(&name);
     for name in root.extensions_used.iter().filter(|name| is_ignored(name)) {
         users.entry(name.clone()).or_default();
     }

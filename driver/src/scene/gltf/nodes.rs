@@ -1,0 +1,141 @@
+//! The nodes of a scene with their transforms in the world, and what they show.
+
+use std::collections::BTreeMap;
+
+use glam::DMat4;
+
+use super::accessor::Source;
+use super::camera::CameraPlacer;
+use super::document::Document;
+use super::instances::Instances;
+use super::light;
+use super::mesh::{MeshPlacer, Pose};
+use super::notices::Notices;
+use super::skin::Skin;
+use super::transform;
+use crate::error::SceneError;
+use crate::scene::Scene;
+
+/// The deepest hierarchy of nodes.
+const MAX_DEPTH: usize = 1024;
+
+/// Places the meshes, lights and cameras of the scene's nodes.
+pub(super) fn place(source: &Source<'_>, scene: &mut Scene, notices: &mut Notices) -> Result<(), SceneError> {
+    let document = source.document;
+    let nodes = walk(document)?;
+    let mut worlds = vec![None; document.root.nodes.len()];
+    for &(index, world) in &nodes {
+        worlds[index] = Some(world);
+    }
+    let mut placer = Placer {
+        source,
+        meshes: MeshPlacer::new(source),
+        cameras: CameraPlacer::new(document),
+        skins: BTreeMap::new(),
+        worlds,
+    };
+    nodes.into_iter().try_for_each(|(index, world)| placer.place(index, world, scene, notices))
+}
+
+struct Placer<'a> {
+    source: &'a Source<'a>,
+    meshes: MeshPlacer<'a>,
+    cameras: CameraPlacer<'a>,
+    skins: BTreeMap<usize, Skin>,
+    /// The transforms of the nodes that are part of the scene.
+    worlds: Vec<Option<DMat4>>,
+}
+
+impl Placer<'_> {
+    fn place(
+        &mut self,
+        index: usize,
+        world: DMat4,
+        scene: &mut Scene,
+        notices: &mut Notices,
+    ) -> Result<(), SceneError> {
+        let document = self.source.document;
+        let node = &document.root.nodes[index];
+        if let Some(mesh) = node.mesh {
+            match node.skin {
+                Some(skin) => self.place_skinned(mesh.value(), skin.value(), world, scene)?,
+                None => self.place_mesh(mesh.value(), index, world, scene)?,
+            }
+        }
+        if let Some(camera) = node.camera {
+            self.cameras.place(camera.value(), index, &world, scene, notices)?;
+        }
+        let extensions = node.extensions.as_ref();
+        if let Some(light) = extensions.and_then(|extensions| extensions.khr_lights_punctual.as_ref()) {
+            light::place(document, light.light.value(), index, &world, scene)?;
+        }
+        Ok(())
+    }
+
+    fn place_mesh(
+        &mut self,
+        mesh: usize,
+        node: usize,
+        world: DMat4,
+        scene: &mut Scene,
+    ) -> Result<(), SceneError> {
+        let instances = Instances::of(self.source, node, &self.source.document.root.nodes[node])?;
+        let Some(instances) = instances else {
+            return self.meshes.place(mesh, &Pose::new(world, None), scene);
+        };
+        for instance in 0..instances.count {
+            let local = instances.transform(self.source, instance)?;
+            self.meshes.place(mesh, &Pose::new(world * local, None), scene)?;
+        }
+        Ok(())
+    }
+
+    fn place_skinned(
+        &mut self,
+        mesh: usize,
+        skin: usize,
+        world: DMat4,
+        scene: &mut Scene,
+    ) -> Result<(), SceneError> {
+        if !self.skins.contains_key(&skin) {
+            self.skins.insert(skin, Skin::new(self.source, skin, &self.worlds)?);
+        }
+        self.meshes.place(mesh, &Pose::new(world, self.skins.get(&skin)), scene)
+    }
+}
+
+/// The nodes of the default scene, or of the first, each parent before its children.
+fn walk(document: &Document) -> Result<Vec<(usize, DMat4)>, SceneError> {
+    let root = &document.root;
+    let chosen = root.scene.map_or(0, |scene| scene.value());
+    let Some(chosen) = root.scenes.get(chosen) else {
+        return Err(SceneError::NoScene { file: document.path.clone() });
+    };
+    let mut placed = Vec::new();
+    let mut seen = vec![false; root.nodes.len()];
+    // The node, the transform of its parents, and its depth; the next one last.
+    let mut open: Vec<_> = chosen.nodes.iter().rev().map(|node| (node.value(), DMat4::IDENTITY, 0)).collect();
+    while let Some((index, parent, depth)) = open.pop() {
+        let fault = |reason, remedy| Err(document.invalid(format!("nodes[{index}]"), reason, remedy));
+        if std::mem::replace(&mut seen[index], true) {
+            let reason = "the node is reached twice: it has two parents, or is its own descendant";
+            return fault(reason, "give every node one parent; a mesh may be shown by several nodes instead");
+        }
+        if depth > MAX_DEPTH {
+            let reason = format!("the node lies more than {MAX_DEPTH} levels deep");
+            let remedy = "flatten the hierarchy of nodes";
+            return Err(document.invalid(format!("nodes[{index}]"), reason, remedy));
+        }
+        let node = &root.nodes[index];
+        let Some(local) = transform::local(node) else {
+            let reason =
+                "the transform is not finite, or does not keep parallels parallel, or has a zero rotation";
+            return fault(reason, "give the node a finite translation, rotation and scale");
+        };
+        let world = parent * local;
+        placed.push((index, world));
+        let children = node.children.iter().flatten().rev();
+        open.extend(children.map(|child| (child.value(), world, depth + 1)));
+    }
+    Ok(placed)
+}

@@ -1,0 +1,235 @@
+//! A primitive of a mesh: which vertices make its triangles, and what the vertices carry.
+
+use gltf::json;
+use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::mesh::{Mode, Semantic};
+use gltf::json::validation::Checked;
+
+use super::accessor::{Elements, Format, Integers, Source};
+use crate::error::SceneError;
+
+const FLOATS: &[ComponentType] = &[ComponentType::F32];
+const FRACTIONS: &[ComponentType] = &[ComponentType::F32, ComponentType::U8, ComponentType::U16];
+/// Those of `KHR_mesh_quantization`.
+const QUANTIZED: &[ComponentType] =
+    &[ComponentType::F32, ComponentType::I8, ComponentType::U8, ComponentType::I16, ComponentType::U16];
+
+const INDICES: Format = Format {
+    types: &[Type::Scalar],
+    components: &[ComponentType::U8, ComponentType::U16, ComponentType::U32],
+    integers: Integers::Whole,
+};
+const COLOURS: Format =
+    Format { types: &[Type::Vec3, Type::Vec4], components: FRACTIONS, integers: Integers::Normalized };
+const JOINTS: Format = Format {
+    types: &[Type::Vec4],
+    components: &[ComponentType::U8, ComponentType::U16],
+    integers: Integers::Whole,
+};
+const WEIGHTS: Format =
+    Format { types: &[Type::Vec4], components: FRACTIONS, integers: Integers::Normalized };
+
+/// Whole positions and the formats of normals and texture coordinates, with `KHR_mesh_quantization` or without.
+const fn positions(is_quantized: bool) -> Format {
+    let components = if is_quantized { QUANTIZED } else { FLOATS };
+    Format { types: &[Type::Vec3], components, integers: Integers::AsStated }
+}
+
+const fn normals(is_quantized: bool) -> Format {
+    let components = if is_quantized { QUANTIZED } else { FLOATS };
+    Format { types: &[Type::Vec3], components, integers: Integers::Normalized }
+}
+
+const fn coordinates(is_quantized: bool) -> Format {
+    let components = if is_quantized { QUANTIZED } else { FRACTIONS };
+    let integers = if is_quantized { Integers::AsStated } else { Integers::Normalized };
+    Format { types: &[Type::Vec2], components, integers }
+}
+
+/// How vertices in their order make triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Topology {
+    List,
+    Strip,
+    Fan,
+}
+
+impl Topology {
+    /// That of a primitive, if it is made of triangles.
+    pub(super) fn of(primitive: &json::mesh::Primitive) -> Option<Self> {
+        match primitive.mode {
+            Checked::Valid(Mode::Triangles) => Some(Self::List),
+            Checked::Valid(Mode::TriangleStrip) => Some(Self::Strip),
+            Checked::Valid(Mode::TriangleFan) => Some(Self::Fan),
+            _ => None,
+        }
+    }
+
+    /// How many triangles so many vertices make, if they make whole ones.
+    fn triangles(self, vertices: u64) -> Option<u64> {
+        match self {
+            Self::List => vertices.is_multiple_of(3).then_some(vertices / 3),
+            Self::Strip | Self::Fan if vertices == 0 => Some(0),
+            Self::Strip | Self::Fan => vertices.checked_sub(2).filter(|triangles| *triangles > 0),
+        }
+    }
+
+    /// Which vertices a triangle has, counter-clockwise (glTF 2.0, 3.7.2.1).
+    fn vertices(self, triangle: u64) -> [u64; 3] {
+        let odd = triangle % 2;
+        match self {
+            Self::List => [3 * triangle, 3 * triangle + 1, 3 * triangle + 2],
+            Self::Strip => [triangle, triangle + 1 + odd, triangle + 2 - odd],
+            Self::Fan => [triangle + 1, triangle + 2, 0],
+        }
+    }
+}
+
+/// A primitive of triangles whose accessors are in bounds.
+pub(super) struct Primitive<'a> {
+    pub(super) index: usize,
+    /// How many triangles it has.
+    pub(super) triangles: u64,
+    topology: Topology,
+    pub(super) positions: Elements<'a>,
+    pub(super) indices: Option<Elements<'a>>,
+    pub(super) normals: Option<Elements<'a>>,
+    /// Sets of texture coordinates, those that its material uses.
+    pub(super) coordinates: [Option<Elements<'a>>; 2],
+    pub(super) colours: Option<Elements<'a>>,
+    /// Joints and their weights, four to a pair.
+    pub(super) influences: Vec<(Elements<'a>, Elements<'a>)>,
+    /// The index of its material in the scene.
+    pub(super) material: u32,
+}
+
+/// Reads the attributes of one primitive.
+struct Attributes<'s, 'a> {
+    source: &'s Source<'a>,
+    item: String,
+    primitive: &'s json::mesh::Primitive,
+}
+
+impl<'a> Attributes<'_, 'a> {
+    fn get(&self, semantic: Semantic, format: &Format) -> Result<Option<Elements<'a>>, SceneError> {
+        let item = format!("{}.attributes.{}", self.item, semantic.to_string());
+        let Some(accessor) = self.primitive.attributes.get(&Checked::Valid(semantic)) else {
+            return Ok(None);
+        };
+        Elements::new(self.source, accessor.value(), &item, format).map(Some)
+    }
+
+    /// Refuses an attribute of another number of vertices than there are positions.
+    fn of_count(
+        &self,
+        count: u64,
+        semantic: Semantic,
+        format: &Format,
+    ) -> Result<Option<Elements<'a>>, SceneError> {
+        let item = format!("{}.attributes.{}", self.item, semantic.to_string());
+        let elements = self.get(semantic, format)?;
+        match elements.as_ref().map(|elements| elements.count).filter(|found| *found != count) {
+            None => Ok(elements),
+            Some(found) => {
+                let reason = format!("there are {found} of them, and {count} positions");
+                let remedy = "export the mesh again; its attributes do not fit together";
+                Err(self.source.document.invalid(item, reason, remedy))
+            }
+        }
+    }
+}
+
+impl<'a> Primitive<'a> {
+    /// The primitive `index` of a mesh, with those sets of texture coordinates that are used.
+    pub(super) fn new(
+        source: &Source<'a>,
+        mesh: usize,
+        index: usize,
+        topology: Topology,
+        material: u32,
+        used_sets: [bool; 2],
+    ) -> Result<Self, SceneError> {
+        let document = source.document;
+        let primitive = &document.root.meshes[mesh].primitives[index];
+        let item = format!("meshes[{mesh}].primitives[{index}]");
+        let attributes = Attributes { source, item: item.clone(), primitive };
+        let is_quantized = document.is_quantized();
+        let positions = attributes.get(Semantic::Positions, &positions(is_quantized))?.ok_or_else(|| {
+            let reason = "the primitive has no POSITION";
+            document.invalid(&item, reason, "export the mesh again, with vertex positions")
+        })?;
+        let of_count = |semantic, format: &Format| attributes.of_count(positions.count, semantic, format);
+        let mut sets = [None, None];
+        for (set, found) in sets.iter_mut().enumerate().filter(|(set, _)| used_sets[*set]) {
+            *found = of_count(Semantic::TexCoords(set as u32), &coordinates(is_quantized))?;
+            if found.is_none() {
+                let reason =
+                    format!("its material has a texture that takes TEXCOORD_{set}, which is not there");
+                let remedy = "unwrap the mesh in the modelling tool, or take the texture off its material";
+                return Err(document.invalid(format!("{item}.attributes"), reason, remedy));
+            }
+        }
+        let indices = primitive
+            .indices
+            .map(|accessor| Elements::new(source, accessor.value(), &format!("{item}.indices"), &INDICES));
+        let indices = indices.transpose()?;
+        let count = indices.as_ref().map_or(positions.count, |indices| indices.count);
+        let triangles = topology.triangles(count).ok_or_else(|| {
+            let reason = format!("{count} vertices do not make whole triangles");
+            document.invalid(&item, reason, "export the mesh again, triangulated")
+        })?;
+        Ok(Self {
+            index,
+            triangles,
+            topology,
+            normals: of_count(Semantic::Normals, &normals(is_quantized))?,
+            coordinates: sets,
+            colours: of_count(Semantic::Colors(0), &COLOURS)?,
+            influences: influences(&attributes, positions.count)?,
+            material,
+            positions,
+            indices,
+        })
+    }
+
+    /// The places, in the list of indices or of vertices, of a triangle's corners.
+    pub(super) fn corners(&self, triangle: u64) -> [u64; 3] {
+        self.topology.vertices(triangle)
+    }
+}
+
+/// All pairs of joints and weights.
+fn influences<'a>(
+    attributes: &Attributes<'_, 'a>,
+    count: u64,
+) -> Result<Vec<(Elements<'a>, Elements<'a>)>, SceneError> {
+    let mut pairs = Vec::new();
+    loop {
+        let set = pairs.len() as u32;
+        let joints = attributes.of_count(count, Semantic::Joints(set), &JOINTS)?;
+        let weights = attributes.of_count(count, Semantic::Weights(set), &WEIGHTS)?;
+        let (Some(joints), Some(weights)) = (joints, weights) else { return Ok(pairs) };
+        pairs.push((joints, weights));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A strip and a fan of a quadrilateral have its two triangles, and both of its orientation.
+    #[test]
+    fn strips_and_fans_keep_their_side() {
+        assert_eq!([0, 1].map(|triangle| Topology::List.vertices(triangle)), [[0, 1, 2], [3, 4, 5]]);
+        assert_eq!([0, 1].map(|triangle| Topology::Strip.vertices(triangle)), [[0, 1, 2], [1, 3, 2]]);
+        assert_eq!([0, 1].map(|triangle| Topology::Fan.vertices(triangle)), [[1, 2, 0], [2, 3, 0]]);
+    }
+
+    #[test]
+    fn vertices_make_whole_triangles() {
+        let counts = |topology: Topology| [0, 1, 2, 3, 4].map(|count| topology.triangles(count));
+        assert_eq!(counts(Topology::List), [Some(0), None, None, Some(1), None]);
+        assert_eq!(counts(Topology::Strip), [Some(0), None, None, Some(1), Some(2)]);
+        assert_eq!(counts(Topology::Fan), counts(Topology::Strip));
+    }
+}

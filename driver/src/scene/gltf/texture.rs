@@ -1,0 +1,134 @@
+//! The textures that materials use, each once, with their samplers and transforms.
+
+use std::collections::BTreeMap;
+
+use gltf::json;
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::texture::{MagFilter, WrappingMode};
+use gltf::json::validation::Checked;
+
+use super::accessor::Source;
+use super::document::Document;
+use super::image;
+use crate::error::SceneError;
+use crate::scene::{Encoding, Image, Texture, Wrap};
+
+/// The largest number of a transform: in single precision, coordinates beyond it tell texels apart no more.
+const MOST_TRANSFORM: f32 = 1e6;
+
+/// Textures as materials ask for them.
+pub(super) struct Textures<'a> {
+    document: &'a Document,
+    textures: Vec<Texture>,
+    /// The index of a texture by its bits.
+    known: BTreeMap<[u32; 11], u32>,
+    images: Vec<(usize, Encoding)>,
+    image_indices: BTreeMap<(usize, Encoding), u32>,
+}
+
+impl<'a> Textures<'a> {
+    pub(super) fn new(document: &'a Document) -> Self {
+        Self {
+            document,
+            textures: Vec::new(),
+            known: BTreeMap::new(),
+            images: Vec::new(),
+            image_indices: BTreeMap::new(),
+        }
+    }
+
+    /// The index of the texture that the `textureInfo` at `item` describes.
+    pub(super) fn add(
+        &mut self,
+        item: &str,
+        info: &json::texture::Info,
+        encoding: Encoding,
+    ) -> Result<u32, SceneError> {
+        let document = self.document;
+        let index = info.index.value();
+        let texture = &document.root.textures[index];
+        if document.root.images.get(texture.source.value()).is_none() {
+            let reason = "the texture has no image in PNG or JPEG";
+            let remedy = "export the scene with PNG or JPEG textures, without extensions for other formats";
+            return Err(document.invalid(format!("textures[{index}].source"), reason, remedy));
+        }
+        let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
+        let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
+        if set > 1 {
+            let reason = format!("the texture takes TEXCOORD_{set}, and only sets 0 and 1 are supported");
+            let remedy = "export the mesh with at most two sets of texture coordinates";
+            return Err(document.invalid(format!("{item}.texCoord"), reason, remedy));
+        }
+        let (matrix, offset) = transform.map_or(Ok(IDENTITY), |transform| {
+            let found = affine(transform);
+            let remedy = "state offset, rotation and scale as numbers of at most 1000000";
+            let place = format!("{item}.extensions.KHR_texture_transform");
+            found.ok_or_else(|| document.invalid(place, "the transform is out of range", remedy))
+        })?;
+        let image = self.image(texture.source.value(), encoding);
+        let (wrap, nearest) = sampler(document, texture);
+        Ok(self.insert(Texture { image, set, wrap, nearest, matrix, offset }))
+    }
+
+    fn image(&mut self, index: usize, encoding: Encoding) -> u32 {
+        let Self { images, image_indices, .. } = self;
+        *image_indices.entry((index, encoding)).or_insert_with(|| {
+            images.push((index, encoding));
+            images.len() as u32 - 1
+        })
+    }
+
+    fn insert(&mut self, texture: Texture) -> u32 {
+        let Texture { image, set, wrap: [across, down], nearest, matrix: [[a, b], [c, d]], offset: [e, f] } =
+            texture;
+        let [a, b, c, d, e, f] = [a, b, c, d, e, f].map(f32::to_bits);
+        let bits = [image, set, across as u32, down as u32, u32::from(nearest), a, b, c, d, e, f];
+        let Self { textures, known, .. } = self;
+        *known.entry(bits).or_insert_with(|| {
+            textures.push(texture);
+            textures.len() as u32 - 1
+        })
+    }
+
+    /// All textures, and the images that they refer to.
+    pub(super) fn finish(self, source: &Source<'_>) -> Result<(Vec<Texture>, Vec<Image>), SceneError> {
+        Ok((self.textures, image::load(source, &self.images)?))
+    }
+}
+
+/// A matrix and an offset.
+type Affine = ([[f32; 2]; 2], [f32; 2]);
+
+const IDENTITY: Affine = ([[1.0, 0.0], [0.0, 1.0]], [0.0; 2]);
+
+/// `KHR_texture_transform`: the coordinates are scaled, then rotated counter-clockwise, then moved. As v points down, that is
+/// clockwise by the signs of its equations; those in the extension's text turn the other way, against its words, its example
+/// and its implementations (KhronosGroup/glTF issue 1563).
+fn affine(transform: &TextureTransform) -> Option<Affine> {
+    let (offset, [width, height]) = (transform.offset.0, transform.scale.0);
+    let angle = transform.rotation.0;
+    let numbers = [offset[0], offset[1], width, height, angle];
+    if !numbers.iter().all(|number| number.abs() <= MOST_TRANSFORM) {
+        return None;
+    }
+    let (sine, cosine) = (libm::sin(angle.into()), libm::cos(angle.into()));
+    let product = |factor: f64, scale: f32| (factor * f64::from(scale)) as f32;
+    let matrix =
+        [[product(cosine, width), product(sine, height)], [product(-sine, width), product(cosine, height)]];
+    Some((matrix, offset))
+}
+
+/// How the sampler wraps, and whether it takes the nearest texel.
+fn sampler(document: &Document, texture: &json::Texture) -> ([Wrap; 2], bool) {
+    let Some(sampler) = texture.sampler.and_then(|index| document.root.samplers.get(index.value())) else {
+        return ([Wrap::Repeat; 2], false);
+    };
+    let wrap = |mode: Checked<WrappingMode>| match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+        // Anything else was refused by the document's rules.
+        _ => Wrap::Repeat,
+    };
+    let nearest = sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest));
+    ([wrap(sampler.wrap_s), wrap(sampler.wrap_t)], nearest)
+}

@@ -1,0 +1,154 @@
+//! The vertices of a primitive: their indices, their places in the world, and what else they carry.
+
+use std::borrow::Cow;
+
+use glam::{DVec3, Vec2, Vec3};
+
+use super::accessor::Source;
+use super::mesh::Pose;
+use super::notices::mesh_name;
+use super::primitive::Primitive;
+use super::transform::Transform;
+use crate::error::SceneError;
+use crate::scene::{Attributes, Triangle};
+
+/// The largest coordinate in metres: products of three stay far inside what single precision holds.
+pub(super) const MAX_COORDINATE: f32 = 1e8;
+
+/// The largest texture coordinate: in single precision, those beyond it tell texels apart no more.
+const MAX_TEXTURE_COORDINATE: f32 = 1e6;
+
+/// The distance of unit vectors, that of a tenth of a degree, up to which a vertex normal counts as the triangle's.
+const FLAT_DISTANCE: f64 = 0.001_745;
+
+/// Reads the vertices of one primitive.
+pub(super) struct VertexReader<'r, 'a> {
+    pub(super) source: &'r Source<'a>,
+    pub(super) mesh: usize,
+    pub(super) primitive: &'r Primitive<'a>,
+}
+
+impl VertexReader<'_, '_> {
+    fn fault(&self, attribute: &str, vertex: u64, reason: String) -> SceneError {
+        let Self { source, mesh, primitive } = self;
+        let item = format!("meshes[{mesh}].primitives[{}].attributes.{attribute}", primitive.index);
+        SceneError::Vertex {
+            place: source.document.place(item),
+            mesh: mesh_name(&source.document.root, *mesh),
+            primitive: primitive.index,
+            vertex,
+            reason,
+        }
+    }
+
+    /// The three vertices of a triangle.
+    pub(super) fn indices(&self, triangle: u64) -> Result<[u64; 3], SceneError> {
+        let primitive = self.primitive;
+        let places = primitive.corners(triangle);
+        let Some(indices) = &primitive.indices else { return Ok(places) };
+        let corners = places.map(|place| indices.unsigned(place));
+        let vertices = primitive.positions.count;
+        match corners.iter().position(|&index| index >= vertices) {
+            None => Ok(corners),
+            Some(corner) => Err(SceneError::IndexOutOfRange {
+                place: self
+                    .source
+                    .document
+                    .place(format!("meshes[{}].primitives[{}].indices", self.mesh, primitive.index)),
+                mesh: mesh_name(&self.source.document.root, self.mesh),
+                primitive: primitive.index,
+                position: places[corner],
+                index: corners[corner],
+                vertices,
+            }),
+        }
+    }
+
+    /// What takes a vertex into the world.
+    pub(super) fn transform<'p>(
+        &self,
+        pose: &'p Pose<'_>,
+        vertex: u64,
+    ) -> Result<Cow<'p, Transform>, SceneError> {
+        pose.of(self.primitive, vertex).map_err(|reason| self.fault("JOINTS_0", vertex, reason))
+    }
+
+    /// A vertex in world space.
+    pub(super) fn place(&self, vertex: u64, transform: &Transform) -> Result<Vec3, SceneError> {
+        let local = Vec3::from(self.primitive.positions.vec3(vertex));
+        let placed = transform.place(local);
+        let is_usable = |value: f32| value.abs() <= MAX_COORDINATE;
+        if placed.to_array().into_iter().all(is_usable) {
+            return Ok(placed);
+        }
+        let reason = if local.is_finite() {
+            format!("lies at {placed} once placed, further than {MAX_COORDINATE} m from the origin")
+        } else {
+            format!("is {local}: not a finite number")
+        };
+        Err(self.fault("POSITION", vertex, reason))
+    }
+
+    /// What the corners of a triangle carry, if it is more than their places.
+    pub(super) fn attributes(
+        &self,
+        corners: [u64; 3],
+        transforms: &[Cow<'_, Transform>; 3],
+        triangle: &Triangle,
+    ) -> Result<Option<Attributes>, SceneError> {
+        let mut coordinates = Attributes::NONE.coordinates;
+        for (set, coordinates) in coordinates.iter_mut().enumerate() {
+            for (coordinate, corner) in coordinates.iter_mut().zip(corners) {
+                *coordinate = self.coordinate(set, corner)?;
+            }
+        }
+        let attributes = Attributes {
+            normals: self.normals(corners, transforms, triangle),
+            coordinates,
+            colours: corners.map(|corner| self.colour(corner)),
+        };
+        let is_mapped = self.primitive.coordinates.iter().any(Option::is_some);
+        Ok(Some(attributes).filter(|attributes| is_mapped || *attributes != Attributes::NONE))
+    }
+
+    fn coordinate(&self, set: usize, vertex: u64) -> Result<Vec2, SceneError> {
+        let Some(elements) = &self.primitive.coordinates[set] else { return Ok(Vec2::ZERO) };
+        let coordinate = Vec2::from(elements.floats(vertex, [0.0; 2]));
+        if coordinate.abs().to_array().into_iter().all(|value| value <= MAX_TEXTURE_COORDINATE) {
+            return Ok(coordinate);
+        }
+        let reason =
+            format!("has the coordinates {coordinate}: not finite, or beyond {MAX_TEXTURE_COORDINATE}");
+        Err(self.fault(&format!("TEXCOORD_{set}"), vertex, reason))
+    }
+
+    /// The vertex's colour in the range that glTF demands (2.0, 3.7.2.1); white without one.
+    fn colour(&self, vertex: u64) -> [f32; 4] {
+        let colours = self.primitive.colours.as_ref();
+        let colour = colours.map_or([1.0; 4], |colours| colours.floats(vertex, [1.0; 4]));
+        // What is not a number becomes 0.
+        colour.map(|channel| if channel > 0.0 { channel.min(1.0) } else { 0.0 })
+    }
+
+    /// The corners' normals, unless they are the triangle's own. The triangle's own takes the place of a normal that is none
+    /// or lies on the other side.
+    fn normals(
+        &self,
+        corners: [u64; 3],
+        transforms: &[Cow<'_, Transform>; 3],
+        triangle: &Triangle,
+    ) -> Option<[Vec3; 3]> {
+        let elements = self.primitive.normals.as_ref()?;
+        let [a, b, c] = triangle.vertices.map(Vec3::as_dvec3);
+        let own = (b - a).cross(c - a).try_normalize()?;
+        let mut normals = [own.as_vec3(); 3];
+        let mut is_smooth = false;
+        for ((normal, corner), transform) in normals.iter_mut().zip(corners).zip(transforms) {
+            let stated = transform.normal(Vec3::from(elements.vec3(corner)));
+            let Some(stated) = stated.filter(|stated| stated.as_dvec3().dot(own) > 0.0) else { continue };
+            is_smooth |= DVec3::distance(stated.as_dvec3(), own) > FLAT_DISTANCE;
+            *normal = stated;
+        }
+        is_smooth.then_some(normals)
+    }
+}

@@ -1,0 +1,95 @@
+//! JPEG: baseline and progressive, grey or colour.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use zune_core::bytestream::ZCursor;
+use zune_core::colorspace::ColorSpace;
+use zune_core::options::DecoderOptions;
+use zune_jpeg::JpegDecoder;
+
+use super::Fault;
+use crate::scene::texture::MAX_SIDE;
+
+pub(super) const MAGIC: &[u8] = b"\xff\xd8\xff";
+
+/// A block of samples takes a bit at least, and however coarsely components are sampled, each 128 texels have a block.
+const TEXELS_OF_A_BYTE: u64 = 8 * 128;
+
+type Decoder<'a> = JpegDecoder<ZCursor<&'a [u8]>>;
+
+fn decoder(bytes: &[u8]) -> Decoder<'_> {
+    let side = MAX_SIDE as usize;
+    // Strictly: else what is cut off would be grey.
+    let options = DecoderOptions::new_safe().set_strict_mode(true).set_max_width(side).set_max_height(side);
+    JpegDecoder::new_with_options(ZCursor::new(bytes), options)
+}
+
+/// Runs the decoder. It is written not to panic; should it, the file is a damaged one. Nothing is shared with the closure,
+/// so nothing can be left half changed.
+fn guarded<T>(decode: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
+    catch_unwind(AssertUnwindSafe(decode))
+        .unwrap_or_else(|_| Err(Fault::damaged("its structure contradicts itself")))
+}
+
+/// Width and height, and the most texels that a file of this length can hold.
+pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
+    let frame = frame_header(bytes).ok_or_else(|| Fault::damaged("it has no frame header"))?;
+    Ok((frame, TEXELS_OF_A_BYTE * bytes.len() as u64))
+}
+
+/// Width and height in the frame header (ITU-T T.81, B.2.2), which the decoder tells only within its own limits.
+fn frame_header(bytes: &[u8]) -> Option<[u32; 2]> {
+    let mut rest = bytes.get(2..)?;
+    loop {
+        let start = rest.iter().position(|&byte| byte == 0xff)?;
+        let marker = *rest.get(start + 1)?;
+        rest = rest.get(start + 1..)?;
+        match marker {
+            // Fill bytes, stuffed bytes, and markers that stand alone.
+            0xff => {}
+            0x00 | 0x01 | 0xd0..=0xd8 => rest = rest.get(1..)?,
+            // Scans and the end come after the frame.
+            0xd9 | 0xda => return None,
+            _ => {
+                let length = u16::from_be_bytes(*rest.get(1..)?.first_chunk()?);
+                let segment = rest.get(1..1 + length as usize)?;
+                // All of C0 to CF are frames but tables (C4), an extension (C8) and arithmetic conditions (CC).
+                if matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc) {
+                    let side = |at: usize| Some(u16::from_be_bytes(*segment.get(at..)?.first_chunk()?));
+                    return Some([side(5)?.into(), side(3)?.into()]);
+                }
+                rest = rest.get(1 + length as usize..)?;
+            }
+        }
+    }
+}
+
+pub(super) fn decode(bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
+    guarded(|| decode_unguarded(bytes, size))
+}
+
+fn decode_unguarded(bytes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
+    let mut decoder = decoder(bytes);
+    decoder.decode_headers().map_err(|error| Fault::damaged(format!("{error:?}")))?;
+    if decoder.dimensions() != Some((width as usize, height as usize)) {
+        return Err(Fault::damaged("its headers contradict each other"));
+    }
+    let colours = match decoder.input_colorspace() {
+        Some(ColorSpace::Luma) => ColorSpace::Luma,
+        Some(ColorSpace::YCbCr | ColorSpace::RGB) => ColorSpace::RGB,
+        Some(ColorSpace::CMYK | ColorSpace::YCCK) => {
+            let reason = "the JPEG is of CMYK, colours of ink, which stand for no light".to_owned();
+            return Err(Fault { reason, remedy: "convert the image to RGB" });
+        }
+        _ => {
+            let reason = "the JPEG has neither one channel nor three".to_owned();
+            return Err(Fault { reason, remedy: "convert the image to RGB" });
+        }
+    };
+    decoder.set_options(decoder.options().jpeg_set_out_colorspace(colours));
+    let samples = decoder.decode().map_err(|error| Fault::damaged(format!("{error:?}")))?;
+    Ok(match colours {
+        ColorSpace::Luma => samples.iter().map(|&grey| [grey, grey, grey, 255]).collect(),
+        _ => samples.as_chunks().0.iter().map(|&[red, green, blue]| [red, green, blue, 255]).collect(),
+    })
+}

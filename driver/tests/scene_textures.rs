@@ -1,0 +1,326 @@
+//! Textures arrive as texels, samplers and transforms; images that cannot be had are refused with the place and the remedy.
+
+mod scene_support;
+
+use std::fs;
+use std::path::Path;
+
+use miette::Diagnostic;
+use photoncard_driver::error::SceneError;
+use photoncard_driver::scene::{Encoding, Scene, Wrap, gltf};
+use scene_support::{Extended, push};
+use serde_json::{Value, json};
+
+/// One texel: (255, 128, 0, 51).
+const TEXEL: &[u8] = include_bytes!("images/texel.png");
+/// 24 x 16 texels of (10 x, 16 y, 200 - 8 x).
+const COLOUR: &[u8] = include_bytes!("images/colour.jpg");
+const PROGRESSIVE: &[u8] = include_bytes!("images/progressive.jpg");
+const GREY: &[u8] = include_bytes!("images/grey.jpg");
+const CMYK: &[u8] = include_bytes!("images/cmyk.jpg");
+
+/// The triangle with coordinates, whose base colour is texture 0 of image 0.
+fn textured(image: Value) -> Extended {
+    let mut scene = Extended::new();
+    let coordinates = scene.floats("VEC2", &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+    scene.primitive()["attributes"]["TEXCOORD_0"] = json!(coordinates);
+    scene.json["images"] = json!([image]);
+    scene.json["textures"] = json!([{"source": 0}]);
+    pbr(&mut scene.json)["baseColorTexture"] = json!({"index": 0});
+    scene
+}
+
+fn pbr(json: &mut Value) -> &mut Value {
+    &mut json["materials"][0]["pbrMetallicRoughness"]
+}
+
+/// The same with an image in a buffer view.
+fn embedded(bytes: &[u8], kind: &str) -> Extended {
+    let mut scene = textured(json!(null));
+    let view = scene.view(bytes);
+    scene.json["images"] = json!([{"bufferView": view, "mimeType": kind}]);
+    scene
+}
+
+fn base64(bytes: &[u8]) -> String {
+    use base64::Engine;
+    base64::engine::general_purpose::STANDARD.encode(bytes)
+}
+
+/// Loads a scene in a folder where these files lie.
+fn load_beside(scene: &Extended, files: &[(&str, &[u8])]) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = folder.path().join("scene");
+    fs::create_dir_all(inside.join("sub")).unwrap();
+    fs::write(folder.path().join("secret.png"), TEXEL).unwrap();
+    fs::write(inside.join("data.bin"), &scene.bytes).unwrap();
+    for (name, bytes) in files {
+        fs::write(inside.join(name), bytes).unwrap();
+    }
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(folder.path().join("secret.png"), inside.join("link.png")).unwrap();
+    fs::write(inside.join("scene.gltf"), scene.json.to_string()).unwrap();
+    gltf::load(&inside.join("scene.gltf"))
+}
+
+fn check(error: &SceneError, parts: &[&str]) {
+    let text = error.to_string();
+    for part in parts {
+        assert!(text.contains(part), "{part:?} is not in {text:?}");
+    }
+    assert!(error.help().is_some_and(|help| !help.to_string().is_empty()), "{text}: no remedy");
+}
+
+#[test]
+fn an_image_is_the_same_wherever_it_lies() {
+    let uri = |uri: &str| textured(json!({"uri": uri}));
+    let data = uri(&format!("data:image/png;base64,{}", base64(TEXEL)));
+    let untyped = uri(&format!("data:application/octet-stream;base64,{}", base64(TEXEL)));
+    let mut in_view = embedded(TEXEL, "image/png");
+    for scene in [&data, &untyped, &in_view, &uri("my%20texel.png"), &uri("sub/texel.png")] {
+        let scene = load_beside(scene, &[("my texel.png", TEXEL), ("sub/texel.png", TEXEL)]).unwrap();
+        let [image] = &scene.images[..] else { panic!("{:?}", scene.images) };
+        assert_eq!((image.width, image.height, &image.texels[..]), (1, 1, &[[255, 128, 0, 51]][..]));
+        assert_eq!(image.encoding, Encoding::Srgb);
+        assert_eq!(scene.materials[0].base_texture, Some(0));
+        assert_eq!(scene.notices, Vec::<String>::new());
+    }
+    in_view.json["images"][0]["name"] = json!("paint");
+    assert_eq!(in_view.load().unwrap().images[0].name, "paint");
+}
+
+/// Both kinds of JPEG keep colours to within what its quality and coarser chroma leave.
+#[test]
+fn jpegs_are_decoded() {
+    for bytes in [COLOUR, PROGRESSIVE] {
+        let scene = embedded(bytes, "image/jpeg").load().unwrap();
+        let image = &scene.images[0];
+        assert_eq!((image.width, image.height), (24, 16));
+        let mut sum = 0;
+        for (index, texel) in image.texels.iter().enumerate() {
+            let (x, y) = (index as i32 % 24, index as i32 / 24);
+            let expected = [10 * x, 16 * y, 200 - 8 * x, 255];
+            sum += texel.iter().zip(expected).map(|(&found, e)| (i32::from(found) - e).abs()).sum::<i32>();
+        }
+        let mean = f64::from(sum) / (3.0 * 24.0 * 16.0);
+        assert!(mean < 4.0, "{mean}");
+    }
+    let grey = embedded(GREY, "image/jpeg").load().unwrap();
+    assert!(
+        grey.images[0]
+            .texels
+            .iter()
+            .all(|[red, green, blue, alpha]| { red == green && green == blue && *alpha == 255 })
+    );
+}
+
+#[test]
+fn samplers_and_transforms_are_taken() {
+    let plain = embedded(TEXEL, "image/png").load().unwrap().textures[0];
+    assert_eq!((plain.wrap, plain.nearest, plain.set), ([Wrap::Repeat; 2], false, 0));
+    assert_eq!((plain.matrix, plain.offset), ([[1.0, 0.0], [0.0, 1.0]], [0.0; 2]));
+
+    let mut scene = embedded(TEXEL, "image/png");
+    scene.json["samplers"] = json!([{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9987}]);
+    scene.json["textures"][0]["sampler"] = json!(0);
+    scene.json["extensionsRequired"] = json!(["KHR_texture_transform"]);
+    // The lower left quadrant, turned clockwise, as the extension's own example has it.
+    let quarter = std::f64::consts::FRAC_PI_2;
+    pbr(&mut scene.json)["baseColorTexture"]["extensions"] = json!({"KHR_texture_transform": {
+        "offset": [0, 1], "rotation": quarter, "scale": [0.5, 0.5], "texCoord": 0
+    }});
+    pbr(&mut scene.json)["baseColorTexture"]["texCoord"] = json!(7);
+    let texture = scene.load().unwrap().textures[0];
+    assert_eq!((texture.wrap, texture.nearest), ([Wrap::Clamp, Wrap::Mirror], true));
+    let place = |u: f32, v: f32| {
+        let row = |row: usize| texture.matrix[row][0] * u + texture.matrix[row][1] * v + texture.offset[row];
+        [row(0), row(1)]
+    };
+    for (from, to) in [((0.0, 0.0), [0.0, 1.0]), ((1.0, 0.0), [0.0, 0.5]), ((0.0, 1.0), [0.5, 1.0])] {
+        let found = place(from.0, from.1);
+        assert!(found.iter().zip(to).all(|(found, to)| (found - to).abs() < 1e-6), "{from:?}: {found:?}");
+    }
+}
+
+/// Scaling comes before turning.
+#[test]
+fn a_transform_scales_turns_and_moves_in_this_order() {
+    let mut scene = embedded(TEXEL, "image/png");
+    pbr(&mut scene.json)["baseColorTexture"]["extensions"] =
+        json!({"KHR_texture_transform": {"rotation": std::f64::consts::FRAC_PI_6, "scale": [2, 4]}});
+    let [[a, b], [c, d]] = scene.load().unwrap().textures[0].matrix;
+    let half_root = 3_f32.sqrt() / 2.0;
+    for (found, expected) in [(a, 2.0 * half_root), (b, 2.0), (c, -1.0), (d, 4.0 * half_root)] {
+        assert!((found - expected).abs() < 1e-6, "{found} is not {expected}");
+    }
+}
+
+/// One image for colours and one for numbers, although the file has only one; equal textures are one.
+#[test]
+fn images_and_textures_are_there_once_for_each_use() {
+    let mut scene = embedded(TEXEL, "image/png");
+    scene.json["materials"][0]["extensions"].as_object_mut().unwrap().remove("KHR_materials_specular");
+    pbr(&mut scene.json)["metallicRoughnessTexture"] = json!({"index": 0});
+    scene.json["materials"][0]["emissiveTexture"] = json!({"index": 1});
+    push(&mut scene.json, "textures", json!({"source": 0, "name": "the same again"}));
+    let scene = scene.load().unwrap();
+    let material = &scene.materials[0];
+    let used = [material.base_texture, material.metallic_roughness_texture, material.emissive_texture];
+    assert_eq!(used, [Some(0), Some(1), Some(0)]);
+    let encodings: Vec<_> =
+        scene.textures.iter().map(|texture| scene.images[texture.image as usize].encoding).collect();
+    assert_eq!(encodings, [Encoding::Srgb, Encoding::Linear]);
+    assert_eq!(scene.images.len(), 2);
+    assert!(scene.images.iter().all(|image| image.texels == [[255, 128, 0, 51]]));
+}
+
+/// What no surface shows is not read: it may be missing, or not an image.
+#[test]
+fn images_without_a_use_are_not_read() {
+    let mut scene = embedded(TEXEL, "image/png");
+    push(&mut scene.json, "images", json!({"uri": "absent.png"}));
+    push(&mut scene.json, "textures", json!({"source": 1}));
+    // A Lambertian material has no use for roughness, and one that does not emit none for emission.
+    pbr(&mut scene.json)["metallicRoughnessTexture"] = json!({"index": 1});
+    assert_eq!(scene.load().unwrap().images.len(), 1);
+    scene.json["materials"][0]["emissiveFactor"] = json!([0, 0, 0]);
+    scene.json["materials"][0]["emissiveTexture"] = json!({"index": 1});
+    assert_eq!(scene.load().unwrap().images.len(), 1);
+    assert_eq!(scene.load().unwrap().materials[0].textures().count(), 1);
+}
+
+#[test]
+fn images_that_cannot_be_had_are_refused() {
+    let uri = |uri: &str| textured(json!({"uri": uri}));
+    let jpeg_as_png = format!("data:image/png;base64,{}", base64(COLOUR));
+    let cases: [(Extended, &[&str]); 19] = [
+        (uri("absent.png"), &["images[0].uri", "absent.png"]),
+        (uri("sub"), &["images[0].uri", "regular file"]),
+        (uri("/etc/hostname"), &["images[0].uri", "relative"]),
+        (uri("../secret.png"), &["images[0].uri", "leaves"]),
+        (uri("sub/%2e%2e/%2E%2e/secret.png"), &["images[0].uri", "leaves"]),
+        (uri("..%2fsecret.png"), &["images[0].uri", "leaves"]),
+        (uri("file:///etc/hostname"), &["images[0].uri", "scheme"]),
+        (uri("https://example.org/a.png"), &["images[0].uri", "scheme"]),
+        (uri("data:image/png;base64,*"), &["images[0].uri", "base64"]),
+        (uri(&jpeg_as_png), &["images[0].uri", "image/png", "image/jpeg"]),
+        (uri("data:image/png;base64,"), &["images[0]", "empty"]),
+        (textured(json!({})), &["images[0]", "neither uri nor bufferView"]),
+        (textured(json!({"uri": "a.png", "bufferView": 0})), &["images[0]", "both"]),
+        (embedded(COLOUR, "image/png"), &["images[0].mimeType", "image/png"]),
+        (embedded(b"RIFF....WEBPVP8 ", "image/webp"), &["images[0]", "WebP"]),
+        (embedded(&TEXEL[..TEXEL.len() - 20], "image/png"), &["images[0]", "decoded"]),
+        (embedded(&COLOUR[..COLOUR.len() - 100], "image/jpeg"), &["images[0]", "decoded"]),
+        (embedded(&COLOUR[..100], "image/jpeg"), &["images[0]"]),
+        (embedded(CMYK, "image/jpeg"), &["images[0]", "CMYK"]),
+    ];
+    for (scene, parts) in cases {
+        match load_beside(&scene, &[]) {
+            Ok(_) => panic!("{parts:?} was loaded"),
+            Err(error) => check(&error, parts),
+        }
+    }
+    #[cfg(unix)]
+    check(&load_beside(&uri("link.png"), &[]).unwrap_err(), &["images[0].uri", "link"]);
+    let mut beyond = embedded(TEXEL, "image/png");
+    beyond.json["bufferViews"][2]["byteLength"] = json!(1000);
+    beyond.json["images"][0]["bufferView"] = json!(2);
+    check(&beyond.load().unwrap_err(), &["images[0].bufferView", "beyond"]);
+}
+
+/// A header alone, with a right checksum, of a size that is too large or that no file of its length can have.
+#[test]
+fn sizes_are_refused_by_the_header() {
+    let header = |width: u32, height: u32| {
+        let mut bytes = TEXEL.to_vec();
+        bytes[16..20].copy_from_slice(&width.to_be_bytes());
+        bytes[20..24].copy_from_slice(&height.to_be_bytes());
+        let crc = bytes[12..29].iter().fold(u32::MAX, |sum, &byte| {
+            (0..8).fold(sum ^ u32::from(byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xedb8_8320))
+        });
+        bytes[29..33].copy_from_slice(&(!crc).to_be_bytes());
+        bytes
+    };
+    for (size, part) in [
+        ([1, 100_000], "1 x 100000 texels, more than 16384"),
+        ([16_385, 1], "16385 x 1"),
+        ([16_384, 16_384], "do not fit into 70 bytes"),
+        ([u32::MAX >> 1, u32::MAX >> 1], "more than 16384"),
+    ] {
+        let error = embedded(&header(size[0], size[1]), "image/png").load().unwrap_err();
+        check(&error, &["images[0]", part]);
+    }
+    let mut wide = COLOUR.to_vec();
+    let frame = wide.windows(2).position(|bytes| bytes == [0xff, 0xc0]).unwrap();
+    wide[frame + 5..frame + 9].copy_from_slice(&[0xff; 4]);
+    check(&embedded(&wide, "image/jpeg").load().unwrap_err(), &["images[0]", "65535 x 65535"]);
+}
+
+#[test]
+fn textures_without_an_image_or_coordinates_are_refused() {
+    type Change = fn(&mut Value);
+    let cases: [(&[&str], Change); 6] = [
+        (&["textures[0].source"], |json| {
+            json["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+        }),
+        (&["textures[0].source"], |json| json["textures"][0]["source"] = json!(3)),
+        (&["materials[0].pbrMetallicRoughness.baseColorTexture.index"], |json| {
+            pbr(json)["baseColorTexture"]["index"] = json!(3);
+        }),
+        (&["baseColorTexture.texCoord", "TEXCOORD_2"], |json| {
+            pbr(json)["baseColorTexture"]["texCoord"] = json!(2);
+        }),
+        (&["meshes[0].primitives[0].attributes", "TEXCOORD_1"], |json| {
+            pbr(json)["baseColorTexture"]["texCoord"] = json!(1);
+        }),
+        (&["KHR_texture_transform", "out of range"], |json| {
+            pbr(json)["baseColorTexture"]["extensions"] =
+                json!({"KHR_texture_transform": {"scale": [1e9, 1]}});
+        }),
+    ];
+    for (parts, change) in cases {
+        let mut scene = embedded(TEXEL, "image/png");
+        change(&mut scene.json);
+        match scene.load() {
+            Ok(_) => panic!("{parts:?} was loaded"),
+            Err(error) => check(&error, parts),
+        }
+    }
+    let mut endless = embedded(TEXEL, "image/png");
+    let coordinates = endless.floats("VEC2", &[[0.0, 0.0], [f32::NAN, 0.0], [0.0, 1.0]]);
+    endless.primitive()["attributes"]["TEXCOORD_0"] = json!(coordinates);
+    check(&endless.load().unwrap_err(), &["TEXCOORD_0", "vertex 1"]);
+}
+
+/// Two scenes that differ in a texel only have different checksums.
+#[test]
+fn checksums_tell_texels_and_samplers_apart() {
+    let scene = embedded(TEXEL, "image/png").load().unwrap();
+    let mut other = scene.clone();
+    other.images[0].texels[0][1] = 127;
+    let mut nearest = scene.clone();
+    nearest.textures[0].nearest = true;
+    let mut moved = scene.clone();
+    moved.attributes[0].coordinates[0][1].x = 0.5;
+    let sums = [&scene, &other, &nearest, &moved].map(Scene::checksum);
+    for (i, a) in sums.iter().enumerate() {
+        assert!(sums[..i].iter().all(|b| a != b), "{sums:?}");
+    }
+    assert_eq!(scene.checksum(), embedded(TEXEL, "image/png").load().unwrap().checksum());
+}
+
+/// The file's own folder may be reached through a link.
+#[cfg(unix)]
+#[test]
+fn a_scene_in_a_linked_folder_reads_what_is_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = folder.path().join("scene");
+    fs::create_dir(&inside).unwrap();
+    let scene = textured(json!({"uri": "texel.png"}));
+    fs::write(inside.join("data.bin"), &scene.bytes).unwrap();
+    fs::write(inside.join("texel.png"), TEXEL).unwrap();
+    fs::write(inside.join("scene.gltf"), scene.json.to_string()).unwrap();
+    let linked = folder.path().join("linked");
+    std::os::unix::fs::symlink(Path::new("scene"), &linked).unwrap();
+    assert_eq!(gltf::load(&linked.join("scene.gltf")).unwrap().images.len(), 1);
+}

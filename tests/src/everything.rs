@@ -1,0 +1,106 @@
+//! One small scene of everything that a scene can hold.
+
+use glam::{Vec2, Vec3};
+use photoncard_driver::scene::{
+    Encoding, Image, Material, Reflection, Scene, Texture, Transmission, Triangle, Wrap,
+};
+
+use crate::shapes::{add_ball, add_textured_quad};
+use crate::{camera, lambertian, quad, room, scene};
+
+const WALL: u32 = 0;
+const LAMP: u32 = 1;
+const PAPER: u32 = 2;
+const METAL: u32 = 3;
+const MIRROR: u32 = 4;
+const GLASS: u32 = 5;
+const LATTICE: u32 = 6;
+const SCREEN: u32 = 7;
+
+/// A room with a lamp, textured walls by both sets of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, and a
+/// screen.
+pub fn everything() -> Scene {
+    let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
+    let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);
+    add_textures(&mut scene);
+    add_lamp(&mut scene);
+    // Of the room's walls those of paper and metal have coordinates and colours.
+    for index in 0..12 {
+        let Triangle { vertices, material, .. } = scene.triangles[index];
+        if material != WALL {
+            scene.triangles[index].attributes = scene.attributes.len() as u32;
+            let coordinates = vertices.map(|vertex| Vec2::new(vertex.x + vertex.z, vertex.y - vertex.z));
+            let colours = [[1.0, 0.9, 0.8, 1.0], [0.7, 1.0, 0.6, 1.0], [0.9, 0.5, 1.0, 1.0]];
+            scene.attributes.push(photoncard_driver::scene::Attributes {
+                normals: None,
+                coordinates: [coordinates, coordinates.map(|coordinate| coordinate * 3.0)],
+                colours,
+            });
+        }
+    }
+    add_ball(&mut scene, Vec3::new(-0.45, -0.55, -0.3), 0.35, 8, MIRROR);
+    add_ball(&mut scene, Vec3::new(0.4, -0.6, 0.1), 0.3, 8, GLASS);
+    let upright = |centre: Vec3, half: f32| {
+        [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]]
+            .map(|[x, y]| centre + Vec3::new(x * half, y * half, 0.3 * x))
+    };
+    let coordinates = [[0., 3.], [3., 3.], [3., 0.], [0., 0.]];
+    add_textured_quad(&mut scene, upright(Vec3::new(0.3, 0.2, -0.5), 0.4), coordinates, LATTICE);
+    add_textured_quad(&mut scene, upright(Vec3::new(-0.5, 0.3, -0.7), 0.25), coordinates, SCREEN);
+    scene
+}
+
+fn materials() -> Vec<Material> {
+    let glossy = |metallic: f32, roughness: f32, transmission| Reflection::MetallicRoughness {
+        base_colour: Vec3::new(0.9, 0.8, 0.7),
+        metallic,
+        roughness,
+        dielectric: Vec3::splat(0.04),
+        transmission,
+    };
+    let absorption = Vec3::new(0.1, 0.5, 1.0);
+    let clear = Transmission { factor: 0.95, ior: 1.5, is_volume: true, absorption };
+    vec![
+        lambertian("wall", 0.6),
+        Material { emission: Vec3::splat(12.0), ..lambertian("lamp", 0.0) },
+        Material { base_texture: Some(0), ..lambertian("paper", 0.9) },
+        Material {
+            base_texture: Some(1),
+            metallic_roughness_texture: Some(2),
+            ..Material::new("metal", glossy(0.8, 0.6, None))
+        },
+        Material::new("mirror", glossy(1.0, 0.0, None)),
+        Material::new("glass", glossy(0.0, 0.0, Some(clear))),
+        Material {
+            alpha_cutoff: Some(0.4),
+            base_texture: Some(3),
+            double_sided: true,
+            ..lambertian("lattice", 0.8)
+        },
+        Material { emission: Vec3::splat(2.0), emissive_texture: Some(0), ..lambertian("screen", 0.1) },
+    ]
+}
+
+fn add_textures(scene: &mut Scene) {
+    let texel = |x: u32, y: u32, k: u32| (x * 53 + y * 97 + k * 71 + x * y * 13) as u8;
+    let image = |width: u32, height: u32, encoding| Image {
+        name: "image".into(),
+        width,
+        height,
+        texels: (0..width * height).map(|i| [0, 1, 2, 3].map(|k| texel(i % width, i / width, k))).collect(),
+        encoding,
+    };
+    scene.images = vec![image(13, 9, Encoding::Srgb), image(16, 4, Encoding::Linear)];
+    scene.textures = vec![
+        Texture::new(0),
+        Texture { set: 1, wrap: [Wrap::Mirror, Wrap::Clamp], ..Texture::new(0) },
+        Texture { nearest: true, matrix: [[0.8, 0.6], [-0.6, 0.8]], offset: [0.3, 0.1], ..Texture::new(1) },
+        Texture { wrap: [Wrap::Repeat, Wrap::Mirror], ..Texture::new(0) },
+    ];
+}
+
+fn add_lamp(scene: &mut Scene) {
+    let corner = |x: f32, z: f32| Vec3::new(0.3 * x, 0.98, 0.3 * z);
+    let lamp = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], LAMP);
+    scene.triangles.extend(lamp);
+}
