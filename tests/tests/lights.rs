@@ -199,7 +199,7 @@ fn panel(emission: f32, image: Option<Image>) -> Scene {
 
 #[test]
 fn a_panel_with_a_fine_texture_lights_as_its_mean_does() {
-    let texel = |i: u32| if (i / 32 + i % 32) % 4 == 0 { [255; 4] } else { [0, 0, 0, 255] };
+    let texel = |i: u32| if (i / 32 + i % 32).is_multiple_of(4) { [255; 4] } else { [0, 0, 0, 255] };
     let texels = (0..32 * 32).map(texel).collect();
     let image = Image { name: "grid".into(), width: 32, height: 32, texels, encoding: Encoding::Srgb };
     let many = RenderSettings { samples: 16, ..settings(64, 0) };

@@ -74,7 +74,7 @@ impl Targets {
 
     /// The areas that all spheres show from afar, m^2.
     pub(super) fn area(&self) -> f32 {
-        self.spheres.iter().map(|sphere| sphere.disc_area()).sum()
+        self.spheres.iter().map(Sphere::disc_area).sum()
     }
 
     /// The direction from a place through a sphere that belongs to a point of the unit square.
@@ -91,7 +91,7 @@ impl Targets {
     /// sphere, that belongs to a point of the unit square.
     pub(crate) fn place(&self, direction: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.area();
-        let (index, c) = choose(c, all, self.spheres.iter().map(|sphere| sphere.disc_area()))?;
+        let (index, c) = choose(c, all, self.spheres.iter().map(Sphere::disc_area))?;
         let Sphere { centre, radius } = self.spheres[index];
         let (tangent, bitangent) = direction.any_orthonormal_pair();
         let (sin, cos) = libm::sincosf(2.0 * PI * d);
@@ -159,12 +159,13 @@ impl Sphere {
     fn cone(&self, from: Vec3) -> SolidCone {
         let way = self.centre - from;
         let sine_squared = self.radius * self.radius / way.length_squared();
-        // Not `>= 1`: in the middle it is no number.
-        if !(sine_squared < 1.0) {
-            return SolidCone::ALL;
+        if sine_squared < 1.0 {
+            let cosine = (1.0 - sine_squared).sqrt();
+            SolidCone { axis: way.normalize(), height: sine_squared / (1.0 + cosine) }
+        } else {
+            // In the very middle it is no number.
+            SolidCone::ALL
         }
-        let cosine = (1.0 - sine_squared).sqrt();
-        SolidCone { axis: way.normalize(), height: sine_squared / (1.0 + cosine) }
     }
 
     fn disc_area(&self) -> f32 {
