@@ -95,6 +95,7 @@ pub struct PackedScene {
     radiance_unit: f32,
     lights: image::Lights,
     sources: Sources,
+    aimed_sources: Option<Sources>,
     keeps_photons: bool,
 }
 
@@ -123,13 +124,14 @@ impl PackedScene {
             radiance_unit: radiance_unit(scene, &lights),
             lights: lights.header(scene.textures.len() as u32),
             sources: Sources::new(scene, &lights),
+            aimed_sources: Sources::aimed(scene, &lights),
             keeps_photons: scene.keeps_photons(),
         };
         packed.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
         packed.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
         packed.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
         packed.append(SectionKind::Attributes, corners.records.iter().map(layout::Attributes::to_bytes))?;
-        packed.append(SectionKind::Materials, materials::records(scene, &lights).into_iter())?;
+        packed.append(SectionKind::Materials, materials::records(scene, &lights))?;
         packed.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
         packed.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;
         let place = |triangle: usize| places.get(triangle).copied().unwrap_or(0);
@@ -193,6 +195,11 @@ impl PackedScene {
     /// Where photons come from.
     pub(crate) fn sources(&self) -> &Sources {
         &self.sources
+    }
+
+    /// Where photons of caustics come from, aimed at what is perfectly specular; `None` if nothing is.
+    pub(crate) fn aimed_sources(&self) -> Option<&Sources> {
+        self.aimed_sources.as_ref()
     }
 
     /// Whether there is any surface that photons are stored at.

@@ -170,6 +170,23 @@ fn names_that_do_not_exist() {
 }
 
 #[test]
+fn environments_that_are_none() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    room.write("text.hdr", "no picture");
+    for (environment, words) in [
+        ("absent.hdr", ["absent.hdr", "cannot read"]),
+        ("text.hdr", ["text.hdr", "OpenEXR"]),
+        ("1,2", ["--environment", "R,G,B"]),
+        ("1,2,-3", ["--environment", "R,G,B"]),
+    ] {
+        refused(&room, "scene.gltf", &["--environment", environment], &words);
+    }
+    let options = ["--environment", "text.hdr", "-o", "text.hdr"];
+    refused(&room, "scene.gltf", &options, &["it is the environment as well", "a name of its own"]);
+}
+
+#[test]
 fn options_for_emulated_cards_alone() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());

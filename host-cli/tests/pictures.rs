@@ -151,6 +151,22 @@ fn a_setting_of_a_material_changes_the_picture() {
 }
 
 #[test]
+fn an_environment_lights_the_picture() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let pixels = |options: &[&str]| {
+        room.rendered("scene.gltf", &[&["-o", "a.exr"], options].concat());
+        picture(&room, "a.exr").pixels
+    };
+    let plain = pixels(&[]);
+    assert!(plain == pixels(&["--environment", "0,0,0"]));
+    assert!(plain != pixels(&["--environment", "1, 2, 3"]));
+    // A picture of the scene is as good a map as any.
+    room.rendered("scene.gltf", &["-o", "map.exr"]);
+    assert!(plain != pixels(&["--environment", "map.exr"]));
+}
+
+#[test]
 fn triangles_of_no_area_are_counted_and_left_out() {
     let room = Room::new();
     let mut bytes = scene_bytes();

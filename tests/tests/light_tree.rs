@@ -12,7 +12,8 @@ use photoncard_firmware::scene::light::{
     Fraction, Receiver, environment_density, sample_light, select_emitter, selection_probability,
 };
 use photoncard_shared::address::{Line, LineAddress, Structure};
-use photoncard_shared::message::Fault;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::message::{Fault, FaultCode};
 use photoncard_tests::{camera, lambertian, scene};
 
 fn random(index: u32, dimension: u32) -> f32 {
@@ -36,7 +37,7 @@ fn hall(triangles: u32) -> Scene {
     };
     let light = |i: u32| PunctualLight {
         name: "light".into(),
-        kind: if i % 2 == 0 {
+        kind: if i.is_multiple_of(2) {
             PunctualKind::Point { position: place(i, 20) * 10.0 }
         } else {
             let direction = place(i, 23).normalize();
@@ -100,16 +101,24 @@ fn sampling_and_its_probability_agree_to_the_bit() {
 }
 
 #[test]
-fn the_probabilities_of_all_emitters_sum_to_one() {
+fn the_probabilities_of_all_emitters_sum_to_that_of_finding_one() {
     let packed = PackedScene::new(&hall(300)).unwrap();
     let (image, mut memory) = packed.view();
     for index in 0..30 {
-        let mut probability = |emitter| {
-            f64::from(selection_probability(&image, &mut memory, &receiver(index), emitter).unwrap())
-        };
+        let receiver = receiver(index);
+        let mut probability =
+            |emitter| f64::from(selection_probability(&image, &mut memory, &receiver, emitter).unwrap());
         let sum: f64 = (0..340).map(&mut probability).sum();
-        // A part may be lost where a node's children are all behind, though the node as a whole is not.
-        assert!(sum > 0.85 && sum < 1.0 + 1e-5, "{sum}");
+        let samples = 4000;
+        let finds = |sample: &u32| {
+            let fraction =
+                Fraction::new((*sample as f32 + random(*sample, 7)) / samples as f32, hash(*sample));
+            select_emitter(&image, &mut packed.view().1, &receiver, fraction).unwrap().is_some()
+        };
+        let found = (0..samples).filter(finds).count() as f64 / f64::from(samples);
+        // None is found where a node's children are all behind, though the node as a whole is not.
+        assert!((found - sum).abs() < 0.02 && sum < 1.0 + 1e-5, "{found} are found of {sum}");
+        assert!(sum > 0.3, "{sum}");
     }
 }
 
@@ -208,4 +217,42 @@ fn the_environments_samples_have_the_density_that_it_tells() {
     // The mean of the inverse densities is the solid angle of the sphere.
     let sphere = inverse / 20_000.0;
     assert!((sphere / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.05, "{sphere}");
+}
+
+#[test]
+fn an_unsound_tree_is_a_fault_and_never_the_end() {
+    let packed = PackedScene::new(&hall(100)).unwrap();
+    let (image, Lines(sound)) = packed.view();
+    let nodes = image.header.section(SectionKind::LightNodes);
+    let of_tree = nodes.first_line as usize..(nodes.first_line + nodes.records) as usize;
+    let faults = |lines: &[Line]| {
+        let receiver = receiver(3);
+        let selected = select_emitter(&image, &mut Lines(lines), &receiver, Fraction::new(0.4, 5));
+        let told = selection_probability(&image, &mut Lines(lines), &receiver, 70);
+        [selected.map(drop).err(), told.map(drop).err()].map(|fault| fault.map(|fault| fault.code))
+    };
+    assert_eq!(faults(sound), [None; 2]);
+    for (link, code) in [(0_u32, FaultCode::Depth), (0x7fff_fff0, FaultCode::Record)] {
+        let mut lines = sound.to_vec();
+        for line in &mut lines[of_tree.clone()] {
+            for child in line.0.as_chunks_mut::<32>().0 {
+                // From everywhere to all sides.
+                child[12..16].copy_from_slice(&1e9_f32.to_le_bytes());
+                child[28..].copy_from_slice(&link.to_le_bytes());
+            }
+        }
+        assert_eq!(faults(&lines), [Some(code); 2]);
+    }
+    for seed in 0..2000 {
+        let mut lines = sound.to_vec();
+        for (index, line) in (0..).zip(&mut lines[of_tree.clone()]) {
+            for (place, byte) in (0..).zip(&mut line.0) {
+                let bits = hash(hash(seed * 64 + index).wrapping_add(place));
+                if bits.is_multiple_of(16) {
+                    *byte = (bits >> 8) as u8;
+                }
+            }
+        }
+        faults(&lines);
+    }
 }

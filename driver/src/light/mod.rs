@@ -6,6 +6,7 @@ pub(crate) mod environment;
 mod footprint;
 mod shares;
 mod sources;
+mod targets;
 mod thresholds;
 mod tree;
 
@@ -20,6 +21,7 @@ use self::emission::EmissiveTextures;
 pub(crate) use self::environment::EnvironmentMap;
 use self::shares::Shares;
 pub(crate) use self::sources::{Source, Sources};
+pub(crate) use self::targets::{Aim, SolidCone, Targets};
 use self::thresholds::thresholds;
 use self::tree::{Bounds, Cone, LightTree};
 use crate::scene::{Material, PunctualKind, PunctualLight, Scene, Triangle};

@@ -1,9 +1,12 @@
 //! Where photons come from: each source by its power.
 
+use std::f64::consts::PI;
+
 use glam::{DVec3, Vec3};
 use photoncard_firmware::scene::light::environment_direction;
 
 use super::shares::projected_area;
+use super::targets::Targets;
 use super::thresholds::thresholds;
 use super::{Lights, mean};
 use crate::scene::Scene;
@@ -38,7 +41,9 @@ pub(crate) struct Sources {
     thresholds: Vec<u32>,
     /// The box that light from infinitely far comes through: a little larger than the scene's.
     pub(crate) bounds: [Vec3; 2],
-    /// Watts of all, mean of the channels.
+    /// What photons are aimed at; nothing in particular if there are none.
+    pub(crate) targets: Targets,
+    /// Watts of all, mean of the channels; 0 if photons are aimed.
     pub(crate) power: f64,
     /// Watts in the strongest channel of the strongest photon, as if it were the only one.
     pub(crate) strongest: f32,
@@ -53,25 +58,42 @@ pub(crate) struct ChosenSource {
     pub(crate) rest: f32,
 }
 
+/// The least share of an emitter's light that is taken to go towards what photons are aimed at.
+const LEAST_AIMED_SHARE: f64 = 1e-3;
 /// How much larger the box is than the scene's, of its greatest side and of its greatest coordinate.
 const MARGIN: f32 = 1e-4;
 
 impl Sources {
     /// Those of a scene.
     pub(crate) fn new(scene: &Scene, lights: &Lights) -> Self {
+        Self::towards(scene, lights, Targets::default())
+    }
+
+    /// The same, for photons that are aimed at what is perfectly specular; `None` if nothing is.
+    pub(crate) fn aimed(scene: &Scene, lights: &Lights) -> Option<Self> {
+        let targets = Targets::new(scene);
+        (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
+    }
+
+    fn towards(scene: &Scene, lights: &Lights, targets: Targets) -> Self {
         let bounds = enlarged(scene.bounds());
         let size = (bounds[1] - bounds[0]).as_dvec3();
+        let is_aimed = !targets.is_empty();
         let mut all = AllSources::default();
         for (index, emitter) in (0..).zip(&lights.emitters) {
-            all.add(Source::Emitter(index), emitter.bounds.power, emitter.strongest);
+            let share = if is_aimed { aimed_share(&targets, &emitter.bounds.corners) } else { 1.0 };
+            all.add(Source::Emitter(index), emitter.bounds.power * share, emitter.strongest);
         }
+        let shown = |direction: DVec3| {
+            if is_aimed { f64::from(targets.area()) } else { projected_area(size, direction) }
+        };
         for light in &lights.distant {
             let [direction, irradiance] = [light.direction, light.irradiance].map(Vec3::from);
-            let area = projected_area(size, direction.as_dvec3());
+            let area = shown(direction.as_dvec3());
             let strongest = f64::from(irradiance.max_element()) * area;
             all.add(Source::Distant { direction, irradiance }, mean(irradiance) * area, strongest);
         }
-        all.add_cells(lights, size);
+        all.add_cells(lights, shown, is_aimed.then_some(f64::from(targets.area())), size);
         let thresholds = thresholds(&all.powers);
         let strongest = all.strongest.iter().enumerate().map(|(index, watts)| {
             let (lower, upper) = share(&thresholds, index);
@@ -79,10 +101,11 @@ impl Sources {
         });
         Self {
             strongest: strongest.filter(|watts| watts.is_finite()).fold(0.0, f32::max),
-            power: all.powers.iter().sum(),
+            power: if is_aimed { 0.0 } else { all.powers.iter().sum() },
             list: all.list,
             thresholds,
             bounds,
+            targets,
         }
     }
 
@@ -100,6 +123,13 @@ impl Sources {
             rest: ((into / width) as f32).min(1.0 - f32::EPSILON / 2.0),
         })
     }
+}
+
+/// About the share of an emitter's light that goes towards what photons are aimed at: not too little for what the spheres show of it
+/// from one place alone.
+fn aimed_share(targets: &Targets, corners: &[DVec3]) -> f64 {
+    let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
+    (f64::from(targets.solid_angle(middle.as_vec3())) / (4.0 * PI)).clamp(LEAST_AIMED_SHARE, 1.0)
 }
 
 /// The ends of a share, of 2^32.
@@ -129,10 +159,12 @@ impl AllSources {
         self.strongest.push(strongest);
     }
 
-    /// Adds the cells of the environment.
-    fn add_cells(&mut self, lights: &Lights, size: DVec3) {
+    /// Adds the cells of the environment, by the area that is shown this way, or by one that is all the same.
+    fn add_cells(&mut self, lights: &Lights, shown: impl Fn(DVec3) -> f64, same: Option<f64>, size: DVec3) {
         let Some(map) = lights.environment() else { return };
         let cells = &map.cells;
+        // On a mean a box shows half of what it shows along its axes together.
+        let all_sides = same.map_or(size.y * size.z + size.z * size.x + size.x * size.y, |area| 2.0 * area);
         for row in 0..cells.rows {
             let border = |row: u32| libm::cos(std::f64::consts::PI * f64::from(row) / f64::from(cells.rows));
             let [upper, lower] = [border(row), border(row + 1)];
@@ -141,11 +173,8 @@ impl AllSources {
                 let left = column as f32 * width;
                 let middle = environment_direction(left + 0.5 * width, (0.5 * (upper + lower)) as f32);
                 // A cell that is much of the sphere shows the box from many sides.
-                let area = if cells.columns < 8 || cells.rows < 8 {
-                    0.5 * (size.y * size.z + size.z * size.x + size.x * size.y)
-                } else {
-                    projected_area(size, middle.as_dvec3())
-                };
+                let is_wide = cells.columns < 8 || cells.rows < 8;
+                let area = if is_wide { 0.5 * all_sides } else { shown(middle.as_dvec3()) };
                 let weight = cells.weights[(row * cells.columns + column) as usize];
                 let solid_angle = cells.solid_angle(row);
                 let source = Source::Cell {
@@ -153,8 +182,7 @@ impl AllSources {
                     cosines: [upper as f32, lower as f32],
                     solid_angle: solid_angle as f32,
                 };
-                let most_area = size.y * size.z + size.z * size.x + size.x * size.y;
-                let strongest = f64::from(map.brightest) * solid_angle * most_area;
+                let strongest = f64::from(map.brightest) * solid_angle * all_sides;
                 self.add(source, weight * area, strongest);
             }
         }

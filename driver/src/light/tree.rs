@@ -308,7 +308,7 @@ mod tests {
             let middle = at(0) * 10.0;
             let corners = [3, 6, 9].map(|k| middle + 0.1 * at(k));
             let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
-            let cone = if i % 5 == 0 { Cone::ALL } else { Cone::new(normal, 0.0) };
+            let cone = if i.is_multiple_of(5) { Cone::ALL } else { Cone::new(normal, 0.0) };
             Bounds { corners: corners.to_vec(), cone, power: random(i, 12) }
         };
         (0..count).map(triangle).collect()

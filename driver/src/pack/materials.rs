@@ -2,34 +2,41 @@
 
 use glam::Vec3;
 use photoncard_shared::layout::{
-    self, DOUBLE_SIDED, HAS_CORNERS, NO_TEXTURE, Record, Reflectance, THIN_WALLED,
+    self, DOUBLE_SIDED, HAS_ATTRIBUTES, NO_TEXTURE, Record, Reflectance, THIN_WALLED,
 };
 
 use crate::light::Lights;
 use crate::scene::{Material, NO_ATTRIBUTES, Reflection, Scene, Transmission};
 
-/// The records of a scene's materials. Textures are so few that `u16` tells them apart.
-pub(super) fn records(scene: &Scene, lights: &Lights) -> Vec<[u8; layout::Material::BYTES]> {
-    let mut has_corners = vec![false; scene.materials.len()];
+const RECORD_BYTES: usize = layout::Material::BYTES;
+
+/// The records of a scene's materials.
+pub(super) fn records(scene: &Scene, lights: &Lights) -> impl ExactSizeIterator<Item = [u8; RECORD_BYTES]> {
+    let mut has_attributes = vec![false; scene.materials.len()];
     for (index, triangle) in (0..).zip(&scene.triangles) {
-        let has_some = triangle.attributes != NO_ATTRIBUTES || lights.of_triangle(index).is_some();
-        has_corners[triangle.material as usize] |= has_some;
+        let has_any = triangle.attributes != NO_ATTRIBUTES || lights.of_triangle(index).is_some();
+        has_attributes[triangle.material as usize] |= has_any;
     }
-    scene.materials.iter().zip(has_corners).map(|(material, has)| record(material, has)).collect()
+    scene
+        .materials
+        .iter()
+        .zip(has_attributes)
+        .map(|(material, has_attributes)| record(material, has_attributes))
 }
 
-/// The record of a material, of which some triangles have attributes if `has_corners`.
-fn record(material: &Material, has_corners: bool) -> [u8; layout::Material::BYTES] {
+/// The record of a material, some of whose triangles may have attributes. Its textures are as many as the scene's, which `u16`
+/// tells apart.
+fn record(material: &Material, has_attributes: bool) -> [u8; RECORD_BYTES] {
     let transmission = transmission_of(&material.reflection);
     let mut flags = if material.double_sided { DOUBLE_SIDED } else { 0 };
     if transmission.is_some_and(|transmission| !transmission.is_volume) {
         flags |= THIN_WALLED;
     }
-    if has_corners {
-        flags |= HAS_CORNERS;
-    }
     let texture =
         |index: Option<u32>| index.and_then(|index| u16::try_from(index).ok()).unwrap_or(NO_TEXTURE);
+    if has_attributes {
+        flags |= HAS_ATTRIBUTES;
+    }
     layout::Material {
         reflectance: reflectance(&material.reflection),
         emission: material.emission.to_array(),

@@ -99,7 +99,7 @@ mod tests {
     use crate::scene::Texture;
 
     fn image(width: u32, height: u32) -> Image {
-        let texels = (0..width * height).map(|texel| texel.to_le_bytes()).collect();
+        let texels = (0..width * height).map(u32::to_le_bytes).collect();
         Image { name: "counted".into(), width, height, texels, encoding: Encoding::Linear }
     }
 

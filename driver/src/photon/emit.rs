@@ -14,10 +14,10 @@ use photoncard_firmware::scene::light::{
     EmitterPoint, emitter_point, environment_direction, environment_radiance, falloff, read_emitter,
 };
 use photoncard_firmware::scene::{Ray, SceneImage, Surface};
-use photoncard_shared::layout::EmitterKind;
+use photoncard_shared::layout::{Emitter, EmitterKind};
 use photoncard_shared::message::Fault;
 
-use crate::light::{Source, Sources};
+use crate::light::{Aim, SolidCone, Source, Sources, Targets};
 
 /// A photon on its way.
 #[derive(Clone, Copy, Debug)]
@@ -110,13 +110,16 @@ pub(super) fn emit(
     let [b, c, d] = [b, c, d].map(unit_of_bits);
     let Some(chosen) = sources.choose(first) else { return Ok(None) };
     let emission = match chosen.source {
-        Source::Emitter(index) => from_emitter(scene, memory, index, [chosen.rest, b, c, d])?,
-        Source::Distant { direction, irradiance } => Some(from_afar(sources, direction, irradiance, [c, d])),
+        Source::Emitter(index) => {
+            let emitter = read_emitter(scene, memory, index)?;
+            from_emitter(scene, memory, &emitter, &sources.targets, [chosen.rest, b, c, d])?
+        }
+        Source::Distant { direction, irradiance } => from_afar(sources, direction, irradiance, [c, d]),
         Source::Cell { across: [left, width], cosines: [upper, lower], solid_angle } => {
             let cosine = (upper + (lower - upper) * b).clamp(-1.0, 1.0);
             let towards = environment_direction(left + width * chosen.rest, cosine);
             let irradiance = environment_radiance(scene, memory, towards)? * solid_angle;
-            Some(from_afar(sources, -towards, irradiance, [c, d]))
+            from_afar(sources, -towards, irradiance, [c, d])
         }
     };
     let emission =
@@ -136,61 +139,97 @@ fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emissi
     (roulette < probability).then(|| Emission { power: emission.power / probability, ..emission })
 }
 
-/// What comes from an emitter, as if it were the only source.
+/// What comes from an emitter, as if it were the only source; towards targets, if there are any.
 fn from_emitter(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    index: u32,
+    emitter: &Emitter,
+    targets: &Targets,
     [a, b, c, d]: [f32; 4],
 ) -> Result<Option<Emission>, Fault> {
-    let emitter = read_emitter(scene, memory, index)?;
     let intensity = Vec3::from(emitter.emission);
     Ok(match emitter.kind {
         EmitterKind::Triangle { vertices, double_sided, .. } => {
-            let point = emitter_point(scene, memory, &emitter, [a, b])?;
-            point.and_then(|point| from_triangle(&point, vertices, double_sided, [c, d]))
+            let Some(point) = emitter_point(scene, memory, emitter, [a, b])? else { return Ok(None) };
+            let [p, q, r] = vertices.map(Vec3::from);
+            let area = 0.5 * (q - p).cross(r - p).length();
+            let emission = if targets.is_empty() {
+                by_cosine(&point, double_sided, [c, d])
+            } else {
+                aimed(&point, double_sided, targets, [c, d])
+            };
+            emission.map(|Emission { ray, power }| Emission { ray, power: power * area })
         }
         EmitterKind::Point { position } => {
-            let (direction, solid_angle) = in_cone(Vec3::Z, -1.0, [c, d]);
-            Some(Emission { ray: Ray::new(position.into(), direction), power: intensity * solid_angle })
+            let position = Vec3::from(position);
+            let aim = aim(targets, position, SolidCone::ALL, [c, d]);
+            aim.map(|Aim { towards, measure }| Emission {
+                ray: Ray::new(position, towards),
+                power: intensity * measure,
+            })
         }
         EmitterKind::Spot { position, direction, scale, offset } => {
-            let outer_cosine = (-offset / scale).clamp(-1.0, 1.0);
-            let axis = Vec3::from(direction);
-            let (direction, solid_angle) = in_cone(axis, outer_cosine, [c, d]);
-            let power = intensity * (solid_angle * falloff(axis.dot(direction), scale, offset));
-            Some(Emission { ray: Ray::new(position.into(), direction), power })
+            let [position, axis] = [position, direction].map(Vec3::from);
+            let height = (1.0 + offset / scale).clamp(0.0, 2.0);
+            let aim = aim(targets, position, SolidCone { axis, height }, [c, d]);
+            aim.map(|Aim { towards, measure }| Emission {
+                ray: Ray::new(position, towards),
+                power: intensity * (measure * falloff(axis.dot(towards), scale, offset)),
+            })
         }
     })
 }
 
-/// What comes from a point on a triangle, by the cosine; from both sides of a double-sided one.
-fn from_triangle(
-    point: &EmitterPoint,
-    vertices: [[f32; 3]; 3],
-    double_sided: bool,
-    [c, d]: [f32; 2],
-) -> Option<Emission> {
+/// A direction in the cone that light goes to, or towards targets, if there are any.
+fn aim(targets: &Targets, from: Vec3, cone: SolidCone, square: [f32; 2]) -> Option<Aim> {
+    if targets.is_empty() {
+        return Some(Aim { towards: cone.direction(square), measure: cone.solid_angle() });
+    }
+    targets.direction(from, square)
+}
+
+/// What comes from a point on a triangle by the cosine, of each square metre; from both sides of a double-sided one.
+fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Option<Emission> {
     let (sides, is_back, c) = if double_sided {
         (2.0, c >= 0.5, if c >= 0.5 { 2.0 * c - 1.0 } else { 2.0 * c })
     } else {
         (1.0, false, c)
     };
     let normal = if is_back { -point.normal } else { point.normal };
-    let [p, q, r] = vertices.map(Vec3::from);
-    let area = 0.5 * (q - p).cross(r - p).length();
     // A white Lambertian surface reflects by the cosine, as the emitter emits.
     let white = Surface::white(point.position, normal, point.magnitude);
     sample_reflection(&white, [c, d]).map(|sampled| Emission {
         ray: Ray::new(white.offset_origin(), sampled.direction),
-        power: point.emission * (PI * sides * area),
+        power: point.emission * (PI * sides),
     })
 }
 
-/// What comes from infinitely far this way, with the irradiance of a surface that faces it: through the faces of the box around the
-/// scene that face it, each by the area that it shows.
-fn from_afar(sources: &Sources, direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
-    let [lower, upper] = sources.bounds;
+/// What goes from a point on a triangle towards targets, of each square metre.
+fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f32; 2]) -> Option<Emission> {
+    let Aim { towards, measure } = targets.direction(point.position, square)?;
+    let cosine = point.normal.dot(towards);
+    let normal = if cosine < 0.0 { -point.normal } else { point.normal };
+    let origin = Surface::white(point.position, normal, point.magnitude).offset_origin();
+    (cosine > 0.0 || double_sided).then(|| Emission {
+        ray: Ray::new(origin, towards),
+        power: point.emission * (cosine.abs() * measure),
+    })
+}
+
+/// What comes from infinitely far this way, with the irradiance of a surface that faces it; towards targets, if there are any.
+fn from_afar(sources: &Sources, direction: Vec3, irradiance: Vec3, square: [f32; 2]) -> Option<Emission> {
+    if sources.targets.is_empty() {
+        return Some(through_box(sources.bounds, direction, irradiance, square));
+    }
+    let Aim { towards, measure } = sources.targets.place(direction, square)?;
+    // Before everything on its way.
+    let corners = sources.bounds.map(|corner| corner * direction);
+    let origin = towards + direction * corners[0].min(corners[1]).element_sum();
+    Some(Emission { ray: Ray::new(origin, direction), power: irradiance * measure })
+}
+
+/// The same through the faces of the box around the scene that face it, each by the area that it shows.
+fn through_box([lower, upper]: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
     let size = upper - lower;
     let shown = direction.abs() * Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y);
     let area = shown.element_sum();
@@ -204,23 +243,10 @@ fn from_afar(sources: &Sources, direction: Vec3, irradiance: Vec3, [c, d]: [f32;
         number -= shown[candidate];
     }
     let across = if shown[axis] > 0.0 { (number / shown[axis]).clamp(0.0, 1.0) } else { 0.5 };
-    let mut place = [across, d, across];
+    let mut place = [0.0; 3];
     place[axis] = if direction[axis] < 0.0 { 1.0 } else { 0.0 };
     place[(axis + 1) % 3] = across;
     place[(axis + 2) % 3] = d;
     let origin = lower + size * Vec3::from(place);
     Emission { ray: Ray::new(origin, direction), power: irradiance * area }
-}
-
-/// A direction within a cone about an axis, evenly by solid angle, and that of the cone, sr.
-fn in_cone(axis: Vec3, least_cosine: f32, [c, d]: [f32; 2]) -> (Vec3, f32) {
-    // From 1 down, so that it is exact in a narrow cone.
-    let height = 1.0 - least_cosine;
-    let fall = height * c;
-    let sine = libm::sqrtf((fall * (2.0 - fall)).max(0.0));
-    let angle = 2.0 * PI * d;
-    let (tangent, bitangent) = axis.any_orthonormal_pair();
-    let direction =
-        axis * (1.0 - fall) + tangent * (sine * libm::cosf(angle)) + bitangent * (sine * libm::sinf(angle));
-    (direction.normalize(), 2.0 * PI * height)
 }

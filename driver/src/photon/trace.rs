@@ -88,7 +88,8 @@ fn trace_while(
     go_on: &dyn Fn(usize, u64) -> bool,
 ) -> Result<PhotonPass, PhotonError> {
     // Hardly any photon is stronger than it was emitted: at a Phong lobe, twice at the most.
-    let sources = packed.sources();
+    let aimed = packed.aimed_sources().filter(|_| purpose == Purpose::Caustics);
+    let sources = aimed.unwrap_or(packed.sources());
     let path_unit = power_of_two_above(sources.strongest.into());
     let (scene, grid) = (packed.view().0, packed.photon_grid());
     let tracer = Tracer { scene, sources, grid, path_unit, seed, purpose };

@@ -20,13 +20,13 @@ use crate::scene::{Ray, closest_hit, read_surface};
 pub struct GatherRayEnd {
     /// The cell of the hemisphere that the ray went through.
     pub cell: u8,
-    /// Direct light of the emitter it met, weighted, in the image's radiance units.
+    /// Direct light of the emitter or the environment it met, weighted, in the image's radiance units.
     pub direct: Vec3,
     /// The gather of what is reflected there, if anything is.
     pub request: Option<GatherRequest>,
 }
 
-/// Casts ray `index` of a gather point; `None` if it meets nothing. What it brings is its share of the mean over all
+/// Casts ray `index` of a gather point; `None` if it meets nothing, the environment neither. What it brings is its share of the mean over all
 /// rays of the point, times `share`; the request's results go to `target`.
 ///
 /// # Errors

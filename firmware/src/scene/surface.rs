@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    DOUBLE_SIDED, HAS_CORNERS, Material, Record, Reflectance, THIN_WALLED, Triangle,
+    DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Record, Reflectance, THIN_WALLED, Triangle,
 };
 use photoncard_shared::message::Fault;
 
@@ -157,7 +157,7 @@ pub(super) fn surface_of(
         ..Surface::white(Vec3::ZERO, normal, magnitude(&[a, b, c, ray.origin]))
     };
     if let Reflectance::Phong { diffuse, specular, exponent } = material.reflectance
-        && material.flags & HAS_CORNERS == 0
+        && is_plain(&material)
     {
         let reflection = Reflection { diffuse: diffuse.into(), specular: specular.into(), exponent };
         let is_visible = is_front || double_sided;
@@ -168,6 +168,12 @@ pub(super) fn surface_of(
         });
     }
     finished(scene, memory, bare, (index, weights, is_front), &material)
+}
+
+/// Whether a material is all that there is to its surfaces.
+#[inline(always)]
+fn is_plain(material: &Material) -> bool {
+    material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0
 }
 
 /// A surface with its corners' attributes, its textures and its material.
@@ -184,7 +190,7 @@ fn finished(
         return Ok(bare);
     }
     let mut surface = Surface { emission: material.emission.into(), ..bare };
-    let has_corners = material.flags & HAS_CORNERS != 0;
+    let has_corners = material.flags & HAS_ATTRIBUTES != 0;
     let corners = if has_corners { Corners::read(scene, memory, index, weights)? } else { None };
     let mut colour = [1.0; 4];
     let mut roughness = [1.0; 4];

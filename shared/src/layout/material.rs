@@ -6,8 +6,8 @@ use super::{Record, read_f32, read_u32, read_vector, write_f32, write_u32, write
 pub const DOUBLE_SIDED: u32 = 1;
 /// In [`Material::flags`], of [`Reflectance::Glass`]: the surface is a thin wall, through which light goes straight on.
 pub const THIN_WALLED: u32 = 2;
-/// In [`Material::flags`]: some triangles of the material have [`super::Attributes`]. Those of others are not looked for.
-pub const HAS_CORNERS: u32 = 4;
+/// In [`Material::flags`]: some of its triangles have [`super::Attributes`].
+pub const HAS_ATTRIBUTES: u32 = 4;
 
 const KIND_SHIFT: u32 = 4;
 const METALLIC_ROUGHNESS: u32 = 1;
@@ -23,7 +23,7 @@ pub struct Material {
     pub reflectance: Reflectance,
     /// Emitted radiance, W/(sr m^2); the emissive texture multiplies it.
     pub emission: [f32; 3],
-    /// [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_CORNERS`] or 0.
+    /// [`DOUBLE_SIDED`], [`THIN_WALLED`] and [`HAS_ATTRIBUTES`], or 0.
     pub flags: u32,
     /// Of triangles with cut-outs: where the alpha of the base texture and of the corners is below this, there is nothing.
     pub cutoff: f32,
@@ -92,7 +92,7 @@ impl Material {
                 _ => Reflectance::Phong { diffuse: first, specular: second, exponent: a },
             },
             emission: read_vector(bytes, 32),
-            flags: kind & (DOUBLE_SIDED | THIN_WALLED | HAS_CORNERS),
+            flags: kind & (DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES),
             cutoff: read_f32(bytes, 48),
             textures: [textures[0] as u16, (textures[0] >> 16) as u16, textures[1] as u16],
         }
@@ -141,7 +141,7 @@ mod tests {
             },
             Reflectance::Glass { base: first, absorption: second, transmission: 0.9, ior: 1.5 },
         ] {
-            for flags in 0..=DOUBLE_SIDED | THIN_WALLED | HAS_CORNERS {
+            for flags in 0..=DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES {
                 let material = Material {
                     reflectance,
                     emission: [18.0, 14.0, 6.5],

@@ -166,12 +166,14 @@ fn from_area(
     let distance = libm::sqrtf(distance_squared);
     let direction = way / distance;
     let cosine = -normal.dot(direction);
-    // Not `<= 0`: a zero distance makes it NaN.
-    if !(cosine > 0.0) {
-        return None;
-    }
     let density = density * (distance_squared / cosine);
-    Some(LightSample { direction, distance, irradiance: target.emission / density, density: Some(density) })
+    // Of a zero distance the cosine is no number.
+    (cosine > 0.0).then_some(LightSample {
+        direction,
+        distance,
+        irradiance: target.emission / density,
+        density: Some(density),
+    })
 }
 
 /// What comes from a point whose intensity depends on the direction towards it.

@@ -1,0 +1,296 @@
+//! What photons of caustics are aimed at: spheres around all that reflects or lets light through perfectly specularly.
+//!
+//! A direction is chosen through one of them, each by the solid angle that it is seen under, and evenly within that. Where spheres
+//! overlap a direction may be chosen through any of them: the density of it is that of all together, which is the number
+//! of spheres in that direction over the sum of their solid angles.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use crate::scene::Scene;
+
+/// A sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sphere {
+    centre: Vec3,
+    /// Metres.
+    radius: f32,
+}
+
+/// Spheres around all specular surfaces of a scene; none if there are no such surfaces.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Targets {
+    spheres: Vec<Sphere>,
+}
+
+/// A direction, or a place, that was chosen evenly among many.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Aim {
+    /// Unit vector of the way, or the place, metres.
+    pub(crate) towards: Vec3,
+    /// One over its density: sr, or m^2.
+    pub(crate) measure: f32,
+}
+
+/// Spheres, at most.
+const MOST_SPHERES: usize = 32;
+/// How much larger a sphere is than what it is around, of its radius and of the greatest coordinate: what is rounded.
+const MARGIN: f32 = 1e-3;
+
+impl Targets {
+    /// Those of a scene.
+    pub(super) fn new(scene: &Scene) -> Self {
+        let is_specular = |material: u32| scene.materials[material as usize].is_specular();
+        let triangles = scene.triangles.iter().filter(|triangle| is_specular(triangle.material));
+        let all: Vec<[Vec3; 3]> = triangles.map(|triangle| triangle.vertices).collect();
+        let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
+        while parts.len() < MOST_SPHERES {
+            // The largest that two smaller ones are better than.
+            let sizes = parts.iter().enumerate().filter(|(_, part)| part.may_be_split);
+            let Some((index, _)) = sizes.max_by(|(_, a), (_, b)| a.sphere.radius.total_cmp(&b.sphere.radius))
+            else {
+                break;
+            };
+            match parts[index].split() {
+                Some([first, second]) => {
+                    parts[index] = first;
+                    parts.push(second);
+                }
+                None => parts[index].may_be_split = false,
+            }
+        }
+        Self { spheres: parts.into_iter().map(|part| part.sphere).collect() }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.spheres.is_empty()
+    }
+
+    /// The solid angles of all spheres from a place, sr: those that overlap are counted repeatedly.
+    pub(super) fn solid_angle(&self, from: Vec3) -> f32 {
+        self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()).sum()
+    }
+
+    /// The areas that all spheres show from afar, m^2.
+    pub(super) fn area(&self) -> f32 {
+        self.spheres.iter().map(Sphere::disc_area).sum()
+    }
+
+    /// The direction from a place through a sphere that belongs to a point of the unit square.
+    pub(crate) fn direction(&self, from: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
+        let all = self.solid_angle(from);
+        let (index, c) = choose(c, all, self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()))?;
+        let towards = self.spheres[index].cone(from).direction([c, d]);
+        let others = self.spheres.iter().enumerate().filter(|(other, _)| *other != index);
+        let covering = others.filter(|(_, sphere)| sphere.cone(from).holds(towards)).count();
+        Some(Aim { towards, measure: all / (1 + covering) as f32 })
+    }
+
+    /// The place, in the plane through the origin that a direction is the normal of, of a ray of that direction through a
+    /// sphere, that belongs to a point of the unit square.
+    pub(crate) fn place(&self, direction: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
+        let all = self.area();
+        let (index, c) = choose(c, all, self.spheres.iter().map(Sphere::disc_area))?;
+        let Sphere { centre, radius } = self.spheres[index];
+        let (tangent, bitangent) = direction.any_orthonormal_pair();
+        let (sin, cos) = libm::sincosf(2.0 * PI * d);
+        let place = centre + (tangent * cos + bitangent * sin) * (radius * c.sqrt());
+        let others = self.spheres.iter().enumerate().filter(|(other, _)| *other != index);
+        let is_near = |sphere: &Sphere| {
+            (place - sphere.centre).reject_from_normalized(direction).length_squared()
+                < sphere.radius * sphere.radius
+        };
+        let covering = others.filter(|(_, sphere)| is_near(sphere)).count();
+        let towards = place.reject_from_normalized(direction);
+        Some(Aim { towards, measure: all / (1 + covering) as f32 })
+    }
+}
+
+/// Which of some shares of `all` a number in [0, 1) falls in, and what is left of the number.
+fn choose(number: f32, all: f32, shares: impl Iterator<Item = f32>) -> Option<(usize, f32)> {
+    let mut left = number * all;
+    let mut last = None;
+    for (index, share) in shares.enumerate() {
+        let rest = if share > 0.0 { (left / share).clamp(0.0, 1.0 - f32::EPSILON) } else { 0.5 };
+        last = Some((index, rest));
+        if left < share {
+            break;
+        }
+        left -= share;
+    }
+    last
+}
+
+/// The directions within an angle of an axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SolidCone {
+    pub(crate) axis: Vec3,
+    /// 1 less the cosine of the angle: 0 to 2.
+    pub(crate) height: f32,
+}
+
+impl SolidCone {
+    /// All directions.
+    pub(crate) const ALL: Self = Self { axis: Vec3::Z, height: 2.0 };
+
+    /// sr.
+    pub(crate) fn solid_angle(&self) -> f32 {
+        2.0 * PI * self.height
+    }
+
+    /// The direction that belongs to a point of the unit square, evenly by solid angle.
+    pub(crate) fn direction(&self, [c, d]: [f32; 2]) -> Vec3 {
+        let fall = self.height * c;
+        let sine = (fall * (2.0 - fall)).max(0.0).sqrt();
+        let (sin, cos) = libm::sincosf(2.0 * PI * d);
+        let (tangent, bitangent) = self.axis.any_orthonormal_pair();
+        (self.axis * (1.0 - fall) + (tangent * cos + bitangent * sin) * sine).normalize()
+    }
+
+    fn holds(&self, direction: Vec3) -> bool {
+        // As `1 - cosine`, without its rounding.
+        0.5 * (direction - self.axis).length_squared() < self.height
+    }
+}
+
+impl Sphere {
+    /// The directions from a place through it: all from within.
+    fn cone(&self, from: Vec3) -> SolidCone {
+        let way = self.centre - from;
+        let sine_squared = self.radius * self.radius / way.length_squared();
+        if sine_squared < 1.0 {
+            let cosine = (1.0 - sine_squared).sqrt();
+            SolidCone { axis: way.normalize(), height: sine_squared / (1.0 + cosine) }
+        } else {
+            // In the very middle it is no number.
+            SolidCone::ALL
+        }
+    }
+
+    fn disc_area(&self) -> f32 {
+        PI * self.radius * self.radius
+    }
+}
+
+/// Some triangles, and the sphere around them.
+struct Part {
+    triangles: Vec<[Vec3; 3]>,
+    sphere: Sphere,
+    may_be_split: bool,
+}
+
+impl Part {
+    fn new(triangles: Vec<[Vec3; 3]>) -> Option<Self> {
+        let corners = || triangles.iter().flatten().copied();
+        let [lower, upper] = [corners().reduce(Vec3::min)?, corners().reduce(Vec3::max)?];
+        let centre = lower.midpoint(upper);
+        let radius = corners().map(|corner| corner.distance(centre)).fold(0.0, f32::max);
+        let greatest = lower.abs().max(upper.abs()).max_element();
+        let radius = radius * (1.0 + MARGIN) + greatest * MARGIN * MARGIN;
+        let may_be_split = triangles.len() > 1;
+        Some(Self { triangles, sphere: Sphere { centre, radius }, may_be_split })
+    }
+
+    /// Two parts that show less than this one, if there are such.
+    fn split(&self) -> Option<[Self; 2]> {
+        let middle = |[a, b, c]: &[Vec3; 3]| (a + b + c) / 3.0;
+        let lower = self.triangles.iter().map(middle).reduce(Vec3::min)?;
+        let upper = self.triangles.iter().map(middle).reduce(Vec3::max)?;
+        let axis = (upper - lower).max_position();
+        let border = lower.midpoint(upper)[axis];
+        let (first, second) = self.triangles.iter().partition(|triangle| middle(triangle)[axis] < border);
+        let parts = [Self::new(first)?, Self::new(second)?];
+        let [a, b] = [&parts[0], &parts[1]].map(|part| part.sphere.radius * part.sphere.radius);
+        (a + b < self.sphere.radius * self.sphere.radius).then_some(parts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_firmware::sampler::hash;
+
+    use super::*;
+
+    fn random(index: u32, dimension: u32) -> f32 {
+        (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
+    }
+
+    /// Three spheres, two of which overlap.
+    fn targets() -> Targets {
+        let sphere = |x: f32, y: f32, radius: f32| Sphere { centre: Vec3::new(x, y, 5.0), radius };
+        Targets { spheres: vec![sphere(0.0, 0.0, 1.0), sphere(0.8, 0.0, 0.7), sphere(-3.0, 2.0, 0.5)] }
+    }
+
+    /// The measure of all that any of the spheres covers, by uniform numbers over a square.
+    fn covered(is_covered: impl Fn(f32, f32) -> f32) -> f32 {
+        let steps = 1500;
+        let at = |i: u32| (i as f32 + 0.5) / steps as f32;
+        let cells = (0..steps).flat_map(|i| (0..steps).map(move |j| (at(i), at(j))));
+        cells.map(|(u, v)| f64::from(is_covered(u, v))).sum::<f64>() as f32 / (steps * steps) as f32
+    }
+
+    #[test]
+    fn the_mean_of_the_measures_is_the_solid_angle_that_the_spheres_cover() {
+        let targets = targets();
+        let count = 100_000;
+        let aims = (0..count).filter_map(|i| targets.direction(Vec3::ZERO, [random(i, 0), random(i, 1)]));
+        let mut sum = 0.0;
+        for Aim { towards, measure } in aims {
+            assert!(targets.spheres.iter().any(|sphere| {
+                let nearest = towards * sphere.centre.dot(towards);
+                nearest.distance(sphere.centre) <= sphere.radius * 1.0001
+            }));
+            sum += f64::from(measure);
+        }
+        // Over the plane z = 1, whose solid angle falls off by the cube of the cosine.
+        let expected = covered(|u, v| {
+            let direction = Vec3::new(2.0 * u - 1.0, 2.0 * v - 1.0, 1.0);
+            let is_hit =
+                targets.spheres.iter().any(|sphere| sphere.cone(Vec3::ZERO).holds(direction.normalize()));
+            if is_hit { 4.0 / direction.length().powi(3) } else { 0.0 }
+        });
+        let found = sum as f32 / count as f32;
+        assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
+    }
+
+    #[test]
+    fn the_mean_of_the_measures_is_the_area_that_the_spheres_show_from_afar() {
+        let targets = targets();
+        let count = 100_000;
+        let aims = (0..count).filter_map(|i| targets.place(Vec3::Z, [random(i, 0), random(i, 1)]));
+        let found = aims.map(|aim| f64::from(aim.measure)).sum::<f64>() as f32 / count as f32;
+        let expected = covered(|u, v| {
+            let place = Vec3::new(8.0 * u - 5.0, 8.0 * v - 4.0, 5.0);
+            let is_hit = targets.spheres.iter().any(|sphere| place.distance(sphere.centre) < sphere.radius);
+            if is_hit { 64.0 } else { 0.0 }
+        });
+        assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
+    }
+
+    #[test]
+    fn a_row_of_mirrors_has_spheres_of_its_own_parts() {
+        let mirror = crate::scene::Material::new(
+            "mirror",
+            crate::scene::Reflection::MetallicRoughness {
+                base_colour: Vec3::ONE,
+                metallic: 1.0,
+                roughness: 0.0,
+                dielectric: Vec3::ZERO,
+                transmission: None,
+            },
+        );
+        let triangle = |x: f32| {
+            crate::scene::Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y].map(|v| v * 0.1 + Vec3::X * x), 0)
+        };
+        let triangles: Vec<_> = (0..100).map(|i| triangle(i as f32)).collect();
+        let scene = Scene { triangles, materials: vec![mirror], ..Scene::default() };
+        let targets = Targets::new(&scene);
+        assert_eq!(targets.spheres.len(), MOST_SPHERES);
+        assert!(targets.spheres.iter().all(|sphere| sphere.radius < 4.0));
+        for corner in scene.triangles.iter().flat_map(|triangle| triangle.vertices) {
+            assert!(targets.spheres.iter().any(|sphere| sphere.centre.distance(corner) <= sphere.radius));
+        }
+        assert!(Targets::new(&Scene::default()).is_empty());
+    }
+}
