@@ -2,7 +2,8 @@
 
 use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{
-    Encoding, Image, Material, Reflection, Scene, Texture, Transmission, Triangle, Wrap,
+    Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture,
+    Transmission, Triangle, Wrap,
 };
 
 use crate::shapes::{add_ball, add_textured_quad};
@@ -17,15 +18,17 @@ const GLASS: u32 = 5;
 const LATTICE: u32 = 6;
 const SCREEN: u32 = 7;
 
-/// A room with a lamp, textured walls by both sets of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, and a
-/// screen.
+/// A room with a lamp, a point light, a spot and a directional light, with a sky through its open front, textured walls by both sets
+/// of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, and a screen.
 pub fn everything() -> Scene {
     let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
     let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);
+    // The wall behind the eye.
+    scene.triangles.truncate(10);
     add_textures(&mut scene);
-    add_lamp(&mut scene);
+    add_lights(&mut scene);
     // Of the room's walls those of paper and metal have coordinates and colours.
-    for index in 0..12 {
+    for index in 0..10 {
         let Triangle { vertices, material, .. } = scene.triangles[index];
         if material != WALL {
             scene.triangles[index].attributes = scene.attributes.len() as u32;
@@ -99,8 +102,19 @@ fn add_textures(scene: &mut Scene) {
     ];
 }
 
-fn add_lamp(scene: &mut Scene) {
+fn add_lights(scene: &mut Scene) {
     let corner = |x: f32, z: f32| Vec3::new(0.3 * x, 0.98, 0.3 * z);
     let lamp = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], LAMP);
     scene.triangles.extend(lamp);
+    let direction = Vec3::new(0.2, -0.5, -0.8).normalize();
+    let position = Vec3::new(-0.7, 0.6, 0.5);
+    scene.lights = [
+        PunctualKind::Point { position: Vec3::new(0.7, 0.5, 0.6) },
+        PunctualKind::Spot { position, direction, inner_cosine: 0.9, outer_cosine: 0.7 },
+        PunctualKind::Directional { direction },
+    ]
+    .map(|kind| PunctualLight { name: "light".into(), kind, intensity: Vec3::new(0.9, 1.0, 0.8) })
+    .to_vec();
+    let texels = (0..32).map(|i| [0.2 + (i % 7) as f32 * 0.3, 0.5, (i % 3) as f32]).collect();
+    scene.environment = Some(Environment { width: 8, height: 4, texels });
 }

@@ -13,6 +13,7 @@ use photoncard_driver::scene::gltf;
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::budget::MICRO;
+use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
 
 /// How long a machine may take to be built and to start.
@@ -143,8 +144,33 @@ fn renders_as_the_emulated_card(name: &str) {
         // The image that is there already is not sent again.
         assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, number == 1);
     }
+    renders_everything(name, &address);
     stays_within_the_budget(name, &address);
     drop(machine);
+}
+
+/// Textures, cut-outs, mirrors, glass and lights of every kind.
+fn renders_everything(name: &str, address: &CardAddress) {
+    let scene = everything();
+    let settings = RenderSettings {
+        width: 24,
+        height: 20,
+        photons: 3000,
+        caustic_photons: Some(1000),
+        gather_rays: 2,
+        shadow_rays: 3,
+        samples: 2,
+        ..settings()
+    };
+    let expected = render_or_panic(&scene, &settings).film;
+    let film = render_or_panic(&scene, &RenderSettings { cards: vec![address.clone()], ..settings }).film;
+    for (index, (pixel, expected)) in film.pixels().iter().zip(expected.pixels()).enumerate() {
+        assert_eq!(
+            pixel.to_bytes(),
+            expected.to_bytes(),
+            "{name}, pixel {index}: {pixel:?}, not {expected:?}"
+        );
+    }
 }
 
 /// What the image says over its link that it takes of on-chip memory, after all that it has rendered.

@@ -2,13 +2,17 @@
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{precompute_irradiance, trace};
+use photoncard_driver::photon::{map_photons, precompute_irradiance, trace};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Material;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::message::{Command, Drain, FaultCode, FrameParameters, Radiance, Sampling, Tile};
+use photoncard_shared::image::HEADER_LINES;
+use photoncard_shared::message::{
+    CausticGather, Command, Drain, FaultCode, FrameParameters, Radiance, Sampling, Tile,
+};
 
 use super::{Random, Target, bound, mutation};
+use crate::everything::everything;
 use crate::wire::{Answer, Wire};
 use crate::{camera, lambertian, room, scene};
 
@@ -22,8 +26,9 @@ pub(super) struct Image {
     seeds: Vec<Vec<u8>>,
 }
 
-/// A lit room with a few photons, in both layouts of the photon map, and irradiance points.
-fn images() -> [CardImage; 2] {
+/// A lit room with a few photons, in both layouts of the photon map, and irradiance points; and a scene of everything, with a caustic
+/// map.
+fn images() -> [CardImage; 3] {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;
     let glossy = Material::phong("glossy", Vec3::splat(0.5), Vec3::splat(0.25), 12.0);
@@ -34,8 +39,13 @@ fn images() -> [CardImage; 2] {
         let pass = trace(&packed, 0, 300, &|_| true).expect("the room is lit");
         packed.with_photons(pass.photons, 20).expect("the map is packed")
     };
-    [image().with_photon_tree().expect("the map is packed as a tree"), image()]
-        .map(|image| precompute_irradiance(image, 20, 0.5, &|| true).expect("the irradiance is packed"))
+    let [tree, leaves] = [image().with_photon_tree().expect("the map is packed as a tree"), image()]
+        .map(|image| precompute_irradiance(image, 20, 0.5, &|| true).expect("the irradiance is packed"));
+    let scene = everything();
+    let packed = PackedScene::new(&scene).expect("the scene is packed");
+    let settings = RenderSettings { photons: 300, caustic_photons: Some(100), ..RenderSettings::default() };
+    let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("the scene is lit");
+    [tree, leaves, mapped.image]
 }
 
 /// The frame that a byte chooses: every technique.
@@ -53,6 +63,7 @@ fn frame(choice: u8) -> FrameParameters {
         bins: if is_set(4) { 8 } else { 1 },
         drain: [Drain::Immediate, Drain::Hash, Drain::Sort, Drain::Sort][usize::from(choice >> 5 & 3)],
         queue: if is_set(7) { 3 } else { 64 },
+        caustics: choice.is_multiple_of(3).then_some(CausticGather { neighbors: 10, max_distance: 0.3 }),
         layers: choice.count_ones() % 2 == 1,
         radiance: if choice >> 5 & 3 == 3 { Radiance::Precomputed } else { Radiance::Density },
         ..settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None)
@@ -74,7 +85,7 @@ fn edit(image: &mut Vec<u8>, seeds: &[Vec<u8>], random: &mut Random) {
     }
     // The words of a line, of the header some of the time: all but the first are numbers.
     let place = match random.below(4) {
-        0 => 12 + 4 * random.below(29),
+        0 => 12 + 4 * random.below(HEADER_LINES * LINE_BYTES / 4 - 3),
         1 => LINE_BYTES * random.below(lines) + random.below(LINE_BYTES),
         _ => LINE_BYTES * random.below(lines) + 4 * random.below(LINE_BYTES / 4),
     };
