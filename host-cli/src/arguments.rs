@@ -120,7 +120,7 @@ pub(crate) struct RenderOptions {
     /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness or emission; may be repeated
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
-    /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or OpenEXR (.exr) picture whose middle is -z and top is y;
+    /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and top is y;
     /// or the same radiance from everywhere
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]
     pub(crate) environment: Option<EnvironmentOption>,
