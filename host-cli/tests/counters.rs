@@ -23,9 +23,16 @@ fn sum(statistics: &Value, part: &str, names: &[&str], key: &str) -> u64 {
 }
 
 fn check_sums(statistics: &Value) {
-    let photon_map = ["photon_nodes", "photons", "irradiance_nodes", "irradiance_points"];
-    let scene = ["nodes", "triangles", "materials", "emitters"];
-    let stages = ["eye", "survey", "table", "shadow", "gather_ray", "gather"];
+    let photon_map = [
+        "photon_nodes",
+        "photons",
+        "irradiance_nodes",
+        "irradiance_points",
+        "caustic_nodes",
+        "caustic_photons",
+    ];
+    let scene = ["nodes", "triangles", "materials", "emitters", "attributes", "textures"];
+    let stages = ["eye", "survey", "table", "shadow", "gather_ray", "gather", "caustic"];
     for key in KEYS {
         let halves = ["photon_map", "scene"].map(|half| count(statistics, half, key));
         assert_eq!(sum(statistics, "structures", &photon_map, key), halves[0], "{key}");

@@ -274,6 +274,10 @@ fn counts_are_of_whole_records_and_whole_lines() {
             structures.photons,
             structures.irradiance_nodes,
             structures.irradiance_points,
+            structures.caustic_nodes,
+            structures.caustic_photons,
+            structures.attributes,
+            structures.textures,
         ];
         for reads in all {
             assert_eq!(reads.line_hits + reads.line_misses, reads.requests);
