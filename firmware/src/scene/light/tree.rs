@@ -284,13 +284,16 @@ mod tests {
         let options = [0, 1, 2, 3].map(|index| choice.option(index).map_or(0.0, |option| option.probability));
         assert!((options.iter().sum::<f32>() - 1.0).abs() < 1e-6, "{options:?}");
         assert!(options[0] > 0.9 && options[1] == 0.0 && options[2] > 0.005 && options[3] > 0.005);
-        let mut counts = [0.0; 4];
+        let mut counts = [0_u32; 4];
         for step in 0..100_000 {
             let fraction = Fraction::new((step as f32 + 0.5) / 100_000.0, step);
             let (chosen, _) = choice.choose(fraction).unwrap();
             let index = options.iter().position(|&option| option == chosen.probability).unwrap();
-            counts[index] += 1e-5;
+            counts[index] += 1;
         }
-        assert!(options.iter().zip(counts).all(|(a, b)| (a - b).abs() < 1e-4), "{options:?} {counts:?}");
+        assert!(
+            options.iter().zip(counts).all(|(a, b)| (a - b as f32 / 100_000.0).abs() < 1e-4),
+            "{options:?} {counts:?}"
+        );
     }
 }
