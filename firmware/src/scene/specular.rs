@@ -95,8 +95,8 @@ impl Glass {
 fn fresnel(cosine: f32, index: f32) -> (f32, f32) {
     let sine_squared = (1.0 - cosine * cosine) / (index * index);
     let cosine_squared = 1.0 - sine_squared;
-    // Not `<`: an index that is no number refracts nothing.
-    if !(cosine_squared > 0.0) {
+    // An index that is no number refracts nothing.
+    if cosine_squared.is_nan() || cosine_squared <= 0.0 {
         return (1.0, 0.0);
     }
     let behind = libm::sqrtf(cosine_squared);
