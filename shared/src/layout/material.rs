@@ -2,7 +2,7 @@
 
 use super::{Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
-/// In [`Material::flags`] and [`super::Emitter::flags`]: the back does what the front does.
+/// In [`Material::flags`]: the back does what the front does.
 pub const DOUBLE_SIDED: u32 = 1;
 /// In [`Material::flags`], of [`Reflectance::Glass`]: the surface is a thin wall, through which light goes straight on.
 pub const THIN_WALLED: u32 = 2;

@@ -1,6 +1,6 @@
 //! Lights, for shadow rays: which one, from where on it, and how likely.
 //!
-//! Emissive triangles, points and spots are leaves of the light tree ([`tree`]); distant lights and the environment are everywhere
+//! Emissive triangles, points and spots are leaves of the light tree (module `tree`); distant lights and the environment are everywhere
 //! equally far, and chosen apart: the header tells the three shares. One point of the unit square chooses all of it: each choice
 //! uses up a part of a coordinate, and what is left is spread over [0, 1) again ([`Fraction`]). So neighbouring points
 //! are near each other on one light, and a stratified pattern stratifies the lights.
