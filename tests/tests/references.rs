@@ -1,18 +1,20 @@
 //! Pictures against path-traced references, by the means of blocks.
 //!
-//! The references have 256x256 pixels and the renders 64x64: a block of 16x16 of the one is a block of 4x4 of the
-//! other, as both have a box filter.
+//! A render has a fourth of its reference's pixels each way: a block of 16x16 of the one is a block of 4x4 of the other, as both
+//! have a box filter.
 
 use std::path::PathBuf;
 
 use photoncard_driver::exr::{RgbImage, read_rgb};
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{Radiance, RenderSettings, Sampling};
-use photoncard_driver::scene::gltf;
+use photoncard_driver::scene::{Environment, gltf};
 use photoncard_tests::render_or_panic;
 
-/// Blocks along each side.
-const BLOCKS: usize = 16;
+/// Side of a block of a reference, pixels.
+const BLOCK: usize = 16;
+/// How much smaller than its reference a render is.
+const SHRUNK: usize = 4;
 /// Blocks whose reference exceeds this see the emitter, and are left out.
 const EMITTER: f32 = 5.0;
 
@@ -21,10 +23,10 @@ fn path(name: &str) -> PathBuf {
 }
 
 /// Mean of each block over pixels and channels, and the greatest channel in it.
-fn blocks(pixels: &[[f32; 3]], side: usize) -> Vec<(f64, f32)> {
-    let block = side / BLOCKS;
-    let block_of = |index: usize| (index / side / block) * BLOCKS + (index % side) / block;
-    let mut blocks = vec![(0.0, 0.0_f32); BLOCKS * BLOCKS];
+fn blocks(pixels: &[[f32; 3]], width: usize, block: usize) -> Vec<(f64, f32)> {
+    let across = width / block;
+    let block_of = |index: usize| (index / width / block) * across + (index % width) / block;
+    let mut blocks = vec![(0.0, 0.0_f32); pixels.len() / (block * block)];
     for (index, pixel) in pixels.iter().enumerate() {
         let (mean, greatest) = &mut blocks[block_of(index)];
         *mean += pixel.iter().map(|&c| c as f64).sum::<f64>() / (3 * block * block) as f64;
@@ -33,23 +35,25 @@ fn blocks(pixels: &[[f32; 3]], side: usize) -> Vec<(f64, f32)> {
     blocks
 }
 
-fn compare(film: &Film, reference: &RgbImage) {
+/// Checks the mean, and of the blocks' errors the median and the 95th percentile.
+fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
     let image: Vec<[f32; 3]> = film.pixels().iter().map(|pixel| pixel.radiance).collect();
-    let pairs: Vec<(f64, f64)> = blocks(&image, film.width() as usize)
+    let pairs: Vec<(f64, f64)> = blocks(&image, film.width() as usize, BLOCK / SHRUNK)
         .into_iter()
-        .zip(blocks(&reference.pixels, reference.width))
+        .zip(blocks(&reference.pixels, reference.width, BLOCK))
         .filter(|(_, (_, greatest))| *greatest <= EMITTER)
         .map(|((mean, _), (expected, _))| (mean, expected))
         .collect();
-    assert!(pairs.len() > 240);
+    assert!(pairs.len() * BLOCK * BLOCK > reference.pixels.len() * 8 / 10);
     let sums = pairs.iter().fold((0.0, 0.0), |(a, b), (mean, expected)| (a + mean, b + expected));
     let overall = sums.0 / sums.1 - 1.0;
     let mut errors: Vec<f64> = pairs.iter().map(|(mean, expected)| (mean / expected - 1.0).abs()).collect();
     errors.sort_by(f64::total_cmp);
     let [median, high] = [errors.len() / 2, errors.len() * 95 / 100].map(|place| errors[place]);
     assert!(overall.abs() < 0.01, "the overall mean is off by {overall}");
-    assert!(median < 0.015, "the median block is off by {median}");
-    assert!(high < 0.05, "the 95th percentile of the blocks is off by {high}");
+    let [most_median, most_high] = most;
+    assert!(median < most_median, "the median block is off by {median}");
+    assert!(high < most_high, "the 95th percentile of the blocks is off by {high}");
 }
 
 /// Checks a scene as it is rendered by default, with all that saves gathers, and with precomputed irradiance.
@@ -80,7 +84,30 @@ fn check_with(
         ..RenderSettings::default()
     };
     let film = render_or_panic(&scene, &settings).film;
-    compare(&film, &read_rgb(&path("references").join(reference)).expect("a shipped reference reads"));
+    compare(&film, &read(reference), [0.015, 0.05]);
+}
+
+fn read(reference: &str) -> RgbImage {
+    read_rgb(&path("references").join(reference)).expect("a shipped reference reads")
+}
+
+/// Checks a scene of mirrors, glass, textures or sky.
+fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>) {
+    let mut scene = gltf::load(&path("../scenes").join(scene)).expect("a shipped scene loads");
+    let file = environment.map(|file| path("../scenes").join(file));
+    scene.environment = file.map(|file| Environment::load(&file).expect("a shipped sky loads"));
+    let reference = read(reference);
+    let settings = RenderSettings {
+        width: (reference.width / SHRUNK) as u32,
+        height: (reference.height / SHRUNK) as u32,
+        photons: 500_000,
+        gather_rays: 8,
+        shadow_rays: 2,
+        samples: 64,
+        cards: vec!["emulated:2".parse().unwrap()],
+        ..RenderSettings::default()
+    };
+    compare(&render_or_panic(&scene, &settings).film, &reference, [0.02, 0.06]);
 }
 
 #[test]
@@ -91,4 +118,19 @@ fn the_cornell_box_is_right() {
 #[test]
 fn the_glossy_cornell_box_is_right() {
     check("cornell-glossy.gltf", "cornell-glossy-032.exr");
+}
+
+#[test]
+fn a_mirror_and_a_glass_ball_with_their_caustics_are_right() {
+    check_light_paths("cornell-spheres.glb", "cornell-spheres.exr", None);
+}
+
+#[test]
+fn a_room_full_of_textures_is_right() {
+    check_light_paths("room.glb", "room.exr", None);
+}
+
+#[test]
+fn a_court_under_a_sky_is_right() {
+    check_light_paths("atrium-open.glb", "atrium-sky.exr", Some("sky.exr"));
 }
