@@ -28,7 +28,7 @@ pub struct PhotonPass {
 /// Paths that may be traced before each photon stored; beyond them there must be a photon to every thousand paths.
 const FRUITLESS_PATHS: u64 = 1_000_000;
 /// Paths that may be traced for each photon of caustics, besides those.
-const MOST_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 100;
+const MOST_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
 /// Paths that one task traces.
 const PATHS_PER_TASK: u64 = 2048;
 /// A path with more bounces than this has met surfaces that lose nothing; it ends.
@@ -45,16 +45,12 @@ pub fn trace(
     count: usize,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<PhotonPass, PhotonError> {
-    if !packed.keeps_photons() {
-        let photons = Photons { list: Vec::new(), grid: packed.photon_grid(), power_unit: 1.0 };
-        return Ok(PhotonPass { photons, paths: 0 });
-    }
     let is_fruitless = |stored: usize, paths: u64| paths >= FRUITLESS_PATHS + 1_000 * stored as u64;
     let traced = trace_while(packed, (seed, Purpose::Indirect), count, &|stored, paths| {
         !is_fruitless(stored, paths) && progress(stored)
     })?;
     let stored = traced.photons.len();
-    if stored >= count {
+    if stored >= count || !packed.keeps_photons() {
         return Ok(traced);
     }
     if is_fruitless(stored, traced.paths) {
@@ -87,6 +83,10 @@ fn trace_while(
     count: usize,
     go_on: &dyn Fn(usize, u64) -> bool,
 ) -> Result<PhotonPass, PhotonError> {
+    if !packed.keeps_photons() {
+        let photons = Photons { list: Vec::new(), grid: packed.photon_grid(), power_unit: 1.0 };
+        return Ok(PhotonPass { photons, paths: 0 });
+    }
     // Hardly any photon is stronger than it was emitted: at a Phong lobe, twice at the most.
     let aimed = packed.aimed_sources().filter(|_| purpose == Purpose::Caustics);
     let sources = aimed.unwrap_or(packed.sources());
