@@ -59,10 +59,14 @@ fn every_tile_is_shown_though_few_have_room_to_wait() {
     let display = Display::with_room_for(100_000, &settings, film.window(), Layers::colour());
     shown(&display, &film, &tiles);
     assert!(display.failure().is_none());
-    let mut expected = vec![create_image("film", [64, 576], &["R", "G", "B"])];
-    expected.extend(tiles.iter().map(|tile| display.packet(tile, &film)));
+    let mut expected: Vec<Vec<u8>> = tiles.iter().map(|tile| display.packet(tile, &film)).collect();
     drop(display);
-    assert_eq!(viewer.join().unwrap(), expected);
+    let mut shown = viewer.join().unwrap();
+    assert!(shown.remove(0) == create_image("film", [64, 576], &["R", "G", "B"]));
+    // Those that had no room come last, and how many had depends on the sender.
+    shown.sort_unstable();
+    expected.sort_unstable();
+    assert!(shown == expected, "{} packets of {}", shown.len(), expected.len());
 }
 
 #[test]
