@@ -133,6 +133,28 @@ fn sparse_elements_replace_those_of_the_base_and_zeros_fill_the_rest() {
     assert!(matches!(error, SceneError::OnlyZeroArea { skipped: 1, .. }), "{error}");
 }
 
+/// glTF 2.0, 3.6.2.1: "When undefined, the accessor MUST be initialized with zeros".
+#[test]
+fn an_accessor_without_bytes_is_of_zeros() {
+    let without_bytes = |json: &mut Value, kind: &str| {
+        let accessors = json["accessors"].as_array_mut().unwrap();
+        accessors.push(json!({"componentType": 5126, "count": 3, "type": kind}));
+        accessors.len() - 1
+    };
+    let black = load_changed(|json| {
+        let index = without_bytes(json, "VEC3");
+        json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(index);
+    })
+    .unwrap();
+    assert_eq!(black.attributes[0].colours, [[0.0, 0.0, 0.0, 1.0]; 3]);
+    let moving_nothing = load_changed(|json| {
+        let index = without_bytes(json, "VEC3");
+        json["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": index}]);
+    })
+    .unwrap();
+    assert_eq!(moving_nothing.triangles, load_changed(|_| {}).unwrap().triangles);
+}
+
 #[test]
 fn nodes_place_meshes_by_matrix_or_by_parts_through_their_parents() {
     let scene = load_changed(|json| {

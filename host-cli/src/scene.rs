@@ -108,7 +108,9 @@ fn describe(texture: &Texture, scene: &Scene) -> String {
     let [across, down] = wrap;
     let wrap = if across == down { across.to_owned() } else { format!("{across} across and {down} down") };
     let filter = if texture.nearest { " nearest" } else { "" };
-    format!("{name} (set {}, {wrap}{filter})", texture.set)
+    let is_transformed = texture.matrix != [[1.0, 0.0], [0.0, 1.0]] || texture.offset != [0.0; 2];
+    let transform = if is_transformed { ", transformed" } else { "" };
+    format!("{name} (set {}, {wrap}{filter}{transform})", texture.set)
 }
 
 fn reflection(reflection: &Reflection) -> Vec<String> {

@@ -12,8 +12,8 @@ pub enum PhotonError {
         "only {stored} photons were stored of {paths} traced from the lights: they meet hardly any surface"
     )]
     #[diagnostic(help(
-        "turn the emissive triangles so that their fronts face the scene (or make them double-sided), and check that \
-         surfaces reflect"
+        "the back of a one-sided triangle neither shines nor reflects: turn the triangles of lamps and of what they light \
+         so that their fronts face each other, or make them double-sided; and check that surfaces reflect"
     ))]
     Lost {
         /// Photons stored.

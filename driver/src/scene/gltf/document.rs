@@ -126,8 +126,10 @@ impl Document {
             let path = path();
             // Bounds are not used, so that files without them load too.
             let is_bound = path.as_str().ends_with(".min") || path.as_str().ends_with(".max");
+            // An accessor without bytes is of zeros, as exporters write morph targets that move nothing.
+            let is_zeros = fault == Fault::Missing && is_accessors_view(path.as_str());
             // Which extensions may be required was checked before.
-            if first.is_none() && !is_bound && fault != Fault::Unsupported {
+            if first.is_none() && !is_bound && !is_zeros && fault != Fault::Unsupported {
                 first = Some((path, fault));
             }
         });
@@ -143,6 +145,13 @@ impl Document {
         let item = path.as_str().replace("khrLightsPunctual", "KHR_lights_punctual");
         Err(self.invalid(item, reason, "export the scene again, or correct the file at this place"))
     }
+}
+
+/// Whether a place is the buffer view of an accessor, not of its sparse elements.
+fn is_accessors_view(path: &str) -> bool {
+    path.strip_prefix("accessors[")
+        .and_then(|rest| rest.split_once(']'))
+        .is_some_and(|(_, field)| field == ".bufferView")
 }
 
 /// Reads a regular file; a pipe or a device could go on for ever.
