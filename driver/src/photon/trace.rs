@@ -27,7 +27,8 @@ pub struct PhotonPass {
 
 /// Paths that may be traced before each photon stored; beyond them there must be a photon to every thousand paths.
 const FRUITLESS_PATHS: u64 = 1_000_000;
-/// Paths that may be traced for each photon of caustics, besides those.
+/// Paths that may be traced for each photon of caustics that is stored, besides those: where fewer of them lead to one there is
+/// little light in caustics, and few photons tell it.
 const MOST_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
 /// Paths that one task traces.
 const PATHS_PER_TASK: u64 = 2048;
@@ -70,9 +71,11 @@ pub fn trace_caustics(
     count: usize,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Photons, PhotonError> {
-    let most_paths = FRUITLESS_PATHS + MOST_PATHS_TO_A_CAUSTIC_PHOTON * count as u64;
-    let traced =
-        trace_while(packed, (seed, Purpose::Caustics), count, &|_, paths| paths < most_paths && go_on())?;
+    let is_fruitful =
+        |stored: usize, paths| paths < FRUITLESS_PATHS + MOST_PATHS_TO_A_CAUSTIC_PHOTON * stored as u64;
+    let traced = trace_while(packed, (seed, Purpose::Caustics), count, &|stored, paths| {
+        is_fruitful(stored, paths) && go_on()
+    })?;
     if go_on() { Ok(traced.photons) } else { Err(PhotonError::Stopped) }
 }
 
