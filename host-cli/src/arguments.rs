@@ -140,7 +140,7 @@ pub(crate) struct RenderOptions {
     /// perfectly specular]. With 0 gather rays bring that light, with more noise, and that of punctual lights is lost
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     caustic_photons: Option<usize>,
-    /// Photons that a gather of caustics looks for: fewer are sharper, more are smoother
+    /// Photons that a gather of caustics looks for, at least 8: fewer are sharper, more are smoother
     #[arg(long, value_name = "K", default_value_t = 50, allow_negative_numbers = true)]
     caustic_neighbors: u32,
     /// Greatest distance of a gather in metres, or auto: from the photons' density

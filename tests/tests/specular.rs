@@ -3,8 +3,10 @@
 
 use glam::Vec3;
 use photoncard_driver::render::{CardAddress, RenderSettings};
-use photoncard_driver::scene::{Material, Reflection, Scene, Transmission};
-use photoncard_tests::shapes::{add_ball, cuboid};
+use photoncard_driver::scene::{
+    Encoding, Environment, Image, Material, Reflection, Scene, Texture, Transmission,
+};
+use photoncard_tests::shapes::{add_ball, add_textured_quad, cuboid};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
 
 const EMISSION: f32 = 1.0;
@@ -178,4 +180,67 @@ fn a_caustic_through_a_pane_is_the_lamp_dimmed() {
     // Most light comes steeply: the pane leaves little less than at normal incidence.
     let share = look(true) / look(false);
     assert!((0.88..0.925).contains(&share), "{share}");
+}
+
+/// A coat or a mirror alone casts no caustic on anything: what it shows is the sky, and what its base reflects of it.
+#[test]
+fn specular_things_alone_under_a_sky_show_it() {
+    let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+    let pane = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 0);
+    let coat = Reflection::MetallicRoughness {
+        base_colour: Vec3::splat(0.8),
+        metallic: 0.0,
+        roughness: 0.0,
+        dielectric: Vec3::splat(0.04),
+        transmission: None,
+    };
+    for (material, expected) in [(mirror(1.0), 1.0), (Material::new("coat", coat), 0.04 + 0.96 * 0.8)] {
+        let mut view = camera(Vec3::Z, Vec3::NEG_Z);
+        view.vertical_fov = 0.02;
+        let mut scene = scene(pane.to_vec(), vec![material], view);
+        scene.environment = Some(Environment::constant(Vec3::ONE));
+        let settings = RenderSettings { width: 16, height: 16, samples: 64, photons: 1000, ..settings() };
+        let seen = mean(&radiances(&render_or_panic(&scene, &settings).film));
+        assert!((seen / expected - 1.0).abs() < 0.02, "{seen} instead of {expected}");
+    }
+}
+
+/// A texture may say that what the factors make a metal is glass.
+#[test]
+fn where_a_texture_says_that_there_is_no_metal_glass_lets_light_through() {
+    let texel = |blue: u8| {
+        let Reflection::MetallicRoughness { base_colour, roughness, dielectric, transmission, .. } =
+            glass(false, 0.0).reflection
+        else {
+            unreachable!("glass is metallic-roughness")
+        };
+        let reflection =
+            Reflection::MetallicRoughness { base_colour, metallic: 1.0, roughness, dielectric, transmission };
+        let material = Material { metallic_roughness_texture: Some(0), ..Material::new("pane", reflection) };
+        let mut view = camera(Vec3::Z, Vec3::NEG_Z);
+        view.vertical_fov = 0.02;
+        let mut scene = scene(lamp(-2.0, 1.0).to_vec(), vec![black_lamp(), material], view);
+        let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+        let corners = [corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)];
+        add_textured_quad(&mut scene, corners, [[0.; 2], [1., 0.], [1.; 2], [0., 1.]], 1);
+        let texels = vec![[0, 255, blue, 255]];
+        let encoding = Encoding::Linear;
+        scene.images.push(Image { name: "metal".into(), width: 1, height: 1, texels, encoding });
+        scene.textures.push(Texture::new(0));
+        let settings = RenderSettings { width: 16, height: 16, samples: 256, photons: 1000, ..settings() };
+        mean(&radiances(&render_or_panic(&scene, &settings).film))
+    };
+    let through = (1.0 - FACE) / (1.0 + FACE);
+    assert!((texel(0) / through - 1.0).abs() < 0.01, "{} instead of {through}", texel(0));
+    assert!(texel(255) < 0.01, "metal lets {} through", texel(255));
+}
+
+#[test]
+fn the_back_of_one_sided_glass_emits_nothing() {
+    let glowing = Material { emission: Vec3::ONE, ..glass(false, 0.0) };
+    let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+    let pane = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 0);
+    let from = |sign: f32| glance(pane.to_vec(), vec![glowing.clone()], Vec3::Z * sign);
+    assert!((from(1.0) - 1.0).abs() < 0.01, "{}", from(1.0));
+    assert_eq!(from(-1.0), 0.0);
 }

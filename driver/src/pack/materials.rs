@@ -27,7 +27,7 @@ pub(super) fn records(scene: &Scene, lights: &Lights) -> impl ExactSizeIterator<
 /// The record of a material, some of whose triangles may have attributes. Its textures are as many as the scene's, which `u16`
 /// tells apart.
 fn record(material: &Material, has_attributes: bool) -> [u8; RECORD_BYTES] {
-    let transmission = transmission_of(&material.reflection);
+    let transmission = transmission_of(material);
     let mut flags = if material.double_sided { DOUBLE_SIDED } else { 0 };
     if transmission.is_some_and(|transmission| !transmission.is_volume) {
         flags |= THIN_WALLED;
@@ -38,7 +38,7 @@ fn record(material: &Material, has_attributes: bool) -> [u8; RECORD_BYTES] {
         flags |= HAS_ATTRIBUTES;
     }
     layout::Material {
-        reflectance: reflectance(&material.reflection),
+        reflectance: reflectance(material),
         emission: material.emission.to_array(),
         flags,
         cutoff: cutoff(material),
@@ -61,28 +61,39 @@ fn cutoff(material: &Material) -> f32 {
 }
 
 /// The transmission of a surface that lets light through.
-fn transmission_of(reflection: &Reflection) -> Option<Transmission> {
-    match reflection {
-        Reflection::MetallicRoughness { transmission, metallic, .. } if *metallic < 1.0 => {
+fn transmission_of(material: &Material) -> Option<Transmission> {
+    match material.reflection {
+        Reflection::MetallicRoughness { transmission, metallic, .. }
+            if material.may_be_dielectric(metallic) =>
+        {
             transmission.filter(|transmission| transmission.factor > 0.0)
         }
         _ => None,
     }
 }
 
-fn reflectance(reflection: &Reflection) -> Reflectance {
-    match *reflection {
+/// The share of a dielectric's reflectance that a material states, of one of the index of refraction.
+fn specular_share(dielectric: Vec3, ior: f32) -> f32 {
+    let amplitude = (ior - 1.0) / (ior + 1.0);
+    let of_index = amplitude * amplitude;
+    if of_index > 0.0 { (dielectric.max_element() / of_index).min(1.0) } else { 1.0 }
+}
+
+fn reflectance(material: &Material) -> Reflectance {
+    match material.reflection {
         Reflection::Phong { diffuse, specular, exponent } => {
             Reflectance::Phong { diffuse: diffuse.to_array(), specular: specular.to_array(), exponent }
         }
         Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, .. } => {
-            match transmission_of(reflection) {
-                // Metal among glass lets nothing through: that share is reflected by the base.
+            match transmission_of(material) {
                 Some(Transmission { factor, ior, absorption, .. }) => Reflectance::Glass {
                     base: base_colour.to_array(),
                     absorption: absorption.max(Vec3::ZERO).to_array(),
-                    transmission: factor * (1.0 - metallic),
+                    transmission: factor,
                     ior,
+                    specular: specular_share(dielectric, ior),
+                    metallic,
+                    roughness,
                 },
                 None => Reflectance::MetallicRoughness {
                     base: base_colour.to_array(),

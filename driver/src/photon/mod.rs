@@ -147,7 +147,7 @@ pub fn map_photons(
     Ok(MappedImage { image, max_distance, caustics, paths, times })
 }
 
-/// The photons of caustics, if any are asked for.
+/// The photons of caustics, if any are asked for and there are any: without a map of them gather rays bring their light.
 fn caustics(
     packed: &PackedScene,
     settings: &PhotonSettings,
@@ -157,7 +157,8 @@ fn caustics(
         return Ok(None);
     }
     let go_on = || progress(settings.photons);
-    trace_caustics(packed, settings.seed, settings.caustic_photons, &go_on).map(Some)
+    let photons = trace_caustics(packed, settings.seed, settings.caustic_photons, &go_on)?;
+    Ok((!photons.is_empty()).then_some(photons))
 }
 
 #[cfg(test)]

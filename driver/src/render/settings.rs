@@ -184,7 +184,7 @@ impl RenderSettings {
         within("--photons", self.photons as u64, 1, MAX_PHOTONS as u64)?;
         within("--neighbors", self.neighbors as u64, 2, budget.neighbors as u64)?;
         within("--caustic-photons", self.caustic_photons.unwrap_or(0) as u64, 0, MAX_PHOTONS as u64)?;
-        within("--caustic-neighbors", self.caustic_neighbors as u64, 2, budget.neighbors as u64)?;
+        within("--caustic-neighbors", self.caustic_neighbors as u64, 8, budget.neighbors as u64)?;
         within("--gather-rays", self.gather_rays as u64, 0, budget.gather_rays as u64)?;
         within("--shadow-rays", self.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
         within("--spp", self.samples as u64, 1, budget.samples as u64)?;

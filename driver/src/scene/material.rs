@@ -161,7 +161,7 @@ impl Material {
             Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
                 let transmits = transmission.is_some_and(|transmission| transmission.factor > 0.0);
                 let reflects = dielectric.max_element() > 0.0 || metallic * base_colour.max_element() > 0.0;
-                roughness == 0.0 && reflects || transmits && metallic < 1.0
+                roughness == 0.0 && reflects || transmits && self.may_be_dielectric(metallic)
             }
         }
     }
@@ -172,11 +172,17 @@ impl Material {
             Reflection::Phong { diffuse, specular, .. } => (diffuse + specular).max_element() > 0.0,
             Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
                 let is_opaque = transmission.is_none_or(|transmission| transmission.factor < 1.0);
-                let has_base = base_colour.max_element() > 0.0 && metallic < 1.0 && is_opaque;
+                let has_base =
+                    base_colour.max_element() > 0.0 && self.may_be_dielectric(metallic) && is_opaque;
                 let has_lobe = roughness > 0.0 && (dielectric + base_colour * metallic).max_element() > 0.0;
                 has_base || has_lobe
             }
         }
+    }
+
+    /// Whether it is not metal everywhere: a texture may say otherwise than the factor.
+    pub(crate) fn may_be_dielectric(&self, metallic: f32) -> bool {
+        metallic < 1.0 || self.metallic_roughness_texture.is_some()
     }
 
     /// The textures in use, as indices into [`Scene::textures`](super::Scene::textures).

@@ -42,6 +42,11 @@ impl PartialReflection {
         }
     }
 
+    /// The same among photons of another surface normal, of this code.
+    pub fn among(self, normal: u8) -> Self {
+        Self { normal, ..self }
+    }
+
     /// A white diffuser that tells irradiance: what it is multiplied with is one. `normal` is its surface normal's code.
     pub fn diffuser(normal: u8) -> Self {
         // One is a power of two: nothing is rounded.

@@ -2,6 +2,8 @@
 //! (Jensen 1996, *Global illumination using photon maps*).
 
 use glam::Vec3;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{CausticGather, Fault};
 
 use super::final_gather::search;
@@ -21,7 +23,8 @@ pub fn reflected<M: MemoryPort>(
 ) -> Result<Vec3, Fault> {
     let frame = context.frame;
     let Some(CausticGather { neighbors, max_distance }) = frame.caustics else { return Ok(Vec3::ZERO) };
-    if point.surface.reflection.is_black() {
+    let photons = context.scene.header.section(SectionKind::CausticLeaves).records;
+    if photons == 0 || point.surface.reflection.is_black() {
         return Ok(Vec3::ZERO);
     }
     context.memory.enter(Stage::Caustic);
@@ -31,7 +34,9 @@ pub fn reflected<M: MemoryPort>(
     search(context, PhotonMap::Caustics, position, &mut nearest)?;
     let header = &context.scene.header;
     let unit = header.caustic_power_unit / header.radiance_unit;
-    let surface = point.surface.flat();
-    let reflection = PartialReflection::new(&surface, Vec3::splat(unit), point.pattern.dither(0));
+    // Light is reflected by the smooth normal, photons lie on the triangle.
+    let surface = &point.surface;
+    let reflection = PartialReflection::new(surface, Vec3::splat(unit), point.pattern.dither(0))
+        .among(encode_normal(surface.geometric_normal.to_array()));
     Ok(reflected_radiance(&nearest, position, &reflection))
 }

@@ -15,6 +15,9 @@ use crate::memory::MemoryPort;
 use crate::scene::{Hit, Ray, Reflection, Surface, closest_hit, read_surface};
 use crate::vector::{max, max_component};
 
+/// The least chance to stay where anything besides is reflected, of that to go on.
+const LEAST_STAY: f32 = 1.0 / 16.0;
+
 /// A path on its way.
 #[derive(Clone, Copy, Debug)]
 pub struct SpecularPath {
@@ -94,10 +97,12 @@ impl SpecularPath {
         }
         let Reflection { diffuse, specular: lobe, .. } = surface.reflection;
         let [reflected, transmitted] = [specular.reflected, specular.transmitted].map(max_component);
+        let goes = reflected + transmitted;
         let stays = max_component(diffuse + lobe);
-        let stays =
-            if max_component(surface.emission) > 0.0 { max(stays, reflected + transmitted) } else { stays };
-        let all = reflected + transmitted + stays;
+        // Not so seldom that a path that stays is a firefly; an emitter is seen half of the time.
+        let stays = if stays > 0.0 { max(stays, goes * LEAST_STAY) } else { 0.0 };
+        let stays = if max_component(surface.emission) > 0.0 { max(stays, goes) } else { stays };
+        let all = goes + stays;
         let chosen = random * all;
         if chosen < stays {
             self.throughput *= all / stays;

@@ -35,6 +35,11 @@ impl Specular {
         Self { reflected, ..Self::NONE }
     }
 
+    /// A share of it.
+    pub(super) fn dimmed(self, share: f32) -> Self {
+        Self { reflected: self.reflected * share, transmitted: self.transmitted * share, ..self }
+    }
+
     /// Whether there is none.
     #[inline(always)]
     pub fn is_none(&self) -> bool {
@@ -57,6 +62,8 @@ pub(super) struct Glass {
     pub(super) transmission: f32,
     /// Index of refraction.
     pub(super) ior: f32,
+    /// Of what such a dielectric reflects, the share that this one does.
+    pub(super) specular: f32,
     pub(super) is_thin: bool,
 }
 
@@ -72,6 +79,8 @@ impl Glass {
         let cosine = max(normal.dot(outgoing), 0.0);
         let index = if is_inside && !self.is_thin { 1.0 / self.ior } else { self.ior };
         let (reflectance, cosine_behind) = fresnel(cosine, index);
+        // Where nothing is refracted all is reflected.
+        let reflectance = if cosine_behind > 0.0 { reflectance * self.specular } else { reflectance };
         // Of a thin wall both faces reflect, again and again (Stokes 1862).
         let reflectance = if self.is_thin { 2.0 * reflectance / (1.0 + reflectance) } else { reflectance };
         let refracted = unit(normal * (cosine / index - cosine_behind) - outgoing * (1.0 / index));
@@ -114,6 +123,7 @@ mod tests {
         absorption: Vec3::new(1.0, 2.0, 3.0),
         transmission: 1.0,
         ior: 1.5,
+        specular: 1.0,
         is_thin: false,
     };
 

@@ -189,7 +189,9 @@ fn finished(
     if !(is_front || bare.double_sided || is_glass) {
         return Ok(bare);
     }
-    let mut surface = Surface { emission: material.emission.into(), ..bare };
+    let emits = is_front || bare.double_sided;
+    let emission = if emits { material.emission.into() } else { Vec3::ZERO };
+    let mut surface = Surface { emission, ..bare };
     let has_corners = material.flags & HAS_ATTRIBUTES != 0;
     let corners = if has_corners { Corners::read(scene, memory, index, weights)? } else { None };
     let mut colour = [1.0; 4];
@@ -248,20 +250,23 @@ impl Surface {
                     (self.reflection, self.specular) = surface.smooth(cosine);
                 }
             }
-            Reflectance::Glass { base, absorption, transmission, ior } => {
+            Reflectance::Glass { base, absorption, transmission, ior, specular, metallic, roughness } => {
                 let is_thin = material.flags & THIN_WALLED != 0;
-                let glass = Glass {
-                    base: Vec3::from(base) * colour,
-                    absorption: absorption.into(),
-                    transmission,
-                    ior,
-                    is_thin,
-                };
+                let (base, absorption) = (Vec3::from(base) * colour, Vec3::from(absorption));
+                let glass = Glass { base, absorption, transmission, ior, specular, is_thin };
                 let normals = [self.normal, self.geometric_normal];
                 let (diffuse, specular) = glass.at(self.outgoing, normals, !is_front);
-                self.reflection = Reflection { diffuse, ..Reflection::BLACK };
-                self.specular = specular;
-                self.absorption = if is_front || is_thin { Vec3::ZERO } else { absorption.into() };
+                // Metal lets nothing through.
+                let [metallic, roughness] = [metallic * blue, roughness * green];
+                let metal = MetallicRoughness { base, dielectric: Vec3::ZERO, metallic: 1.0, roughness };
+                let metal = metal.reflection();
+                self.reflection = Reflection {
+                    diffuse: diffuse * (1.0 - metallic),
+                    specular: metal.specular * metallic,
+                    exponent: metal.exponent,
+                };
+                self.specular = specular.dimmed(1.0 - metallic);
+                self.absorption = if is_front || is_thin { Vec3::ZERO } else { absorption };
             }
         }
     }

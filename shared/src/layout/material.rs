@@ -65,6 +65,12 @@ pub enum Reflectance {
         transmission: f32,
         /// Index of refraction.
         ior: f32,
+        /// Of what a dielectric of that index reflects, the share that this one does, 0 to 1 in steps of 1/255.
+        specular: f32,
+        /// Share of metal, 0 to 1, which lets nothing through.
+        metallic: f32,
+        /// Roughness of the metal, 0 to 1 in steps of 1/255.
+        roughness: f32,
     },
 }
 
@@ -80,6 +86,7 @@ impl Material {
         let [first, second] = [read_vector(bytes, 0), read_vector(bytes, 12)];
         let [a, b] = [read_f32(bytes, 24), read_f32(bytes, 28)];
         let textures = [read_u32(bytes, 52), read_u32(bytes, 56)];
+        let share = |shift: u32| (textures[1] >> shift & 0xff) as f32 * (1.0 / 255.0);
         Self {
             reflectance: match kind >> KIND_SHIFT {
                 METALLIC_ROUGHNESS => Reflectance::MetallicRoughness {
@@ -88,7 +95,15 @@ impl Material {
                     metallic: a,
                     roughness: b,
                 },
-                GLASS => Reflectance::Glass { base: first, absorption: second, transmission: a, ior: b },
+                GLASS => Reflectance::Glass {
+                    base: first,
+                    absorption: second,
+                    transmission: a,
+                    ior: b,
+                    specular: share(16),
+                    metallic: read_f32(bytes, 60),
+                    roughness: share(24),
+                },
                 _ => Reflectance::Phong { diffuse: first, specular: second, exponent: a },
             },
             emission: read_vector(bytes, 32),
@@ -106,7 +121,7 @@ impl Material {
             Reflectance::MetallicRoughness { base, dielectric, metallic, roughness } => {
                 (METALLIC_ROUGHNESS, base, dielectric, metallic, roughness)
             }
-            Reflectance::Glass { base, absorption, transmission, ior } => {
+            Reflectance::Glass { base, absorption, transmission, ior, .. } => {
                 (GLASS, base, absorption, transmission, ior)
             }
         };
@@ -120,6 +135,11 @@ impl Material {
         let [base, metallic_roughness, emissive] = self.textures.map(u32::from);
         write_u32(&mut bytes, 52, base | metallic_roughness << 16);
         write_u32(&mut bytes, 56, emissive);
+        if let Reflectance::Glass { specular, metallic, roughness, .. } = self.reflectance {
+            let byte = |share: f32| (share.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
+            write_u32(&mut bytes, 56, emissive | byte(specular) << 16 | byte(roughness) << 24);
+            write_f32(&mut bytes, 60, metallic);
+        }
         bytes
     }
 }
@@ -139,7 +159,15 @@ mod tests {
                 metallic: 0.25,
                 roughness: 0.75,
             },
-            Reflectance::Glass { base: first, absorption: second, transmission: 0.9, ior: 1.5 },
+            Reflectance::Glass {
+                base: first,
+                absorption: second,
+                transmission: 0.9,
+                ior: 1.5,
+                specular: 0.2,
+                metallic: 0.7,
+                roughness: 0.4,
+            },
         ] {
             for flags in 0..=DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES {
                 let material = Material {

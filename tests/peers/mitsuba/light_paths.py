@@ -84,7 +84,7 @@ def compare(name, arguments):
     expected = read(path)
     output = arguments.folder / f"{name}.exr"
     command = [arguments.photoncard, "render", *comparison.common(), "-o", output, "--quiet"]
-    run([*command, *comparison.settings, *arguments.options])
+    run([*command, *(arguments.options or comparison.settings)])
     picture = read(output)
     greatest = np.nan_to_num(blocks(expected, np.max))
     pair = blocks(picture, np.mean), blocks(expected, np.mean)
