@@ -4,14 +4,13 @@
 //! in it with the chip's own ray caster, so that photons land on exactly the surfaces that gather rays meet. With a
 //! photon map it becomes a [`CardImage`].
 
-use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::budget::Budget;
 use photoncard_shared::image::{self, HEADER_LINES, Header, SECTIONS, Section, SectionKind};
 use photoncard_shared::layout::{
-    self, BvhNode, DistantLight, LEAF_TRIANGLES, NodeBox, Photon, PhotonGrid, PhotonLeaf, Record, WideNode,
+    self, BvhNode, DistantLight, LEAF_TRIANGLES, NodeBox, Photon, PhotonGrid, Record, WideNode,
     power_of_two_above,
 };
 use photoncard_shared::message::Radiance;
@@ -19,36 +18,24 @@ use photoncard_shared::message::Radiance;
 use crate::bvh::{self, HierarchyError, LeafTriangles};
 use crate::light::{Lights, Sources};
 use crate::photon::leaves::PhotonTree;
-use crate::photon::map::{balance, for_each_in_heap};
-use crate::photon::stored::StoredPhoton;
 use crate::photon::{PhotonLayout, Photons, search_radius};
 use crate::scene::Scene;
 
+mod card_image;
 mod corners;
+mod lines;
 mod materials;
 mod textures;
 
+pub use self::card_image::CardImage;
 use self::corners::PackedCorners;
+use self::lines::append;
 
 /// Photons of a line of leaves, the inner nodes' lines counted in, about.
 const PHOTONS_OF_A_LEAF: usize = 9;
 
-/// The sections of the photon map, irradiance points among them.
-const PHOTON_SECTIONS: [SectionKind; 7] = [
-    SectionKind::Photons,
-    SectionKind::PhotonNodes,
-    SectionKind::PhotonLeaves,
-    SectionKind::CausticNodes,
-    SectionKind::CausticLeaves,
-    SectionKind::IrradianceNodes,
-    SectionKind::IrradianceLeaves,
-];
-
 /// Textures that materials can tell apart.
 const MOST_TEXTURES: usize = layout::NO_TEXTURE as usize;
-
-const CAUSTIC_SECTIONS: [SectionKind; 2] = [SectionKind::CausticNodes, SectionKind::CausticLeaves];
-const IRRADIANCE_SECTIONS: [SectionKind; 2] = [SectionKind::IrradianceNodes, SectionKind::IrradianceLeaves];
 
 /// Why a scene does not fit a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
@@ -97,11 +84,6 @@ pub struct PackedScene {
     sources: Sources,
     aimed_sources: Option<Sources>,
     keeps_photons: bool,
-}
-
-/// A complete card image.
-pub struct CardImage {
-    lines: Vec<Line>,
 }
 
 impl PackedScene {
@@ -273,174 +255,6 @@ impl PackedScene {
     }
 }
 
-impl CardImage {
-    /// All lines, the header first.
-    pub fn lines(&self) -> &[Line] {
-        &self.lines
-    }
-
-    /// The image as a chip sees it.
-    pub fn view(&self) -> (SceneImage, Lines<'_>) {
-        // `with_photons` wrote this header.
-        let head = self.lines.first_chunk().unwrap_or_else(|| unreachable!("it begins with a header"));
-        let header = Header::read(head).unwrap_or_else(|error| unreachable!("own header: {error:?}"));
-        (SceneImage { header }, Lines(&self.lines))
-    }
-
-    /// The diagonal of the box around the scene, metres.
-    pub fn diagonal(&self) -> f32 {
-        let (scene, mut memory) = self.view();
-        root_box(&scene, &mut memory)
-            .map_or(1.0, |NodeBox { lower, upper }| Vec3::from(upper).distance(Vec3::from(lower)))
-    }
-
-    /// The same image with its photons in a left-balanced tree instead of leaves, and without irradiance points. It finds the
-    /// same photons.
-    ///
-    /// # Errors
-    /// If there are more lines than an address can tell.
-    pub fn with_photon_tree(self) -> Result<Self, PackError> {
-        let (SceneImage { mut header }, _) = self.view();
-        let mut photons = self.stored_photons();
-        if photons.is_empty() {
-            return Ok(self);
-        }
-        let mut lines = self.lines;
-        // The last sections, the last first.
-        for kind in PHOTON_SECTIONS.into_iter().rev() {
-            let section = std::mem::take(&mut header.sections[kind as usize]);
-            if section.records > 0 {
-                lines.truncate(section.first_line as usize);
-            }
-        }
-        let first_line = lines.len();
-        let all_lines = first_line + photons.len().div_ceil(Photon::PER_LINE);
-        let too_large = |_| PackError::TooLarge { bytes: all_lines as u64 * LINE_BYTES as u64 };
-        header.lines = u32::try_from(all_lines).map_err(too_large)?;
-        // No more photons than lines of leaves could hold.
-        let records = photons.len() as u32;
-        header.sections[SectionKind::Photons as usize] = Section { first_line: first_line as u32, records };
-        balance(&mut photons);
-        lines.reserve_exact(all_lines - first_line);
-        lines.resize(all_lines, Line::ZERO);
-        for_each_in_heap(&photons, &mut |place, photon| {
-            let line = &mut lines[first_line + place / Photon::PER_LINE];
-            if let Some(record) = line.record_mut(place % Photon::PER_LINE) {
-                *record = photon.record(&header.photon_grid);
-            }
-        });
-        lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
-        Ok(Self { lines })
-    }
-
-    /// The photons of the leaves.
-    fn stored_photons(&self) -> Vec<StoredPhoton> {
-        let leaves =
-            || self.leaf_lines(SectionKind::PhotonLeaves).iter().map(|line| PhotonLeaf::read(&line.0));
-        let mut photons = Vec::with_capacity(leaves().map(|leaf| leaf.photons() as usize).sum());
-        for leaf in leaves() {
-            photons.extend((0..leaf.photons()).map(|i| StoredPhoton::at(leaf.point(i), leaf.content(i))));
-        }
-        photons
-    }
-
-    /// The lines of a section of leaves.
-    pub(crate) fn leaf_lines(&self, kind: SectionKind) -> &[Line] {
-        let (SceneImage { header }, _) = self.view();
-        let section = header.section(kind);
-        &self.lines[section.first_line as usize..][..section.records as usize]
-    }
-
-    /// The same, to be changed in place.
-    pub(crate) fn leaf_lines_mut(&mut self) -> &mut [Line] {
-        let (SceneImage { header }, _) = self.view();
-        let section = header.section(SectionKind::PhotonLeaves);
-        &mut self.lines[section.first_line as usize..][..section.records as usize]
-    }
-
-    /// The same image with a caustic map, for searches of about so many neighbours.
-    ///
-    /// # Errors
-    /// If there are more lines than an address can tell.
-    pub(crate) fn with_caustics(self, photons: Photons, neighbors: u32) -> Result<Self, PackError> {
-        let (SceneImage { mut header }, _) = self.view();
-        header.caustic_power_unit = photons.power_unit();
-        let radius = search_radius(&photons, neighbors);
-        let Photons { mut list, .. } = photons;
-        self.with_trees(header, PhotonTree::new(&mut list, radius).as_ref(), CAUSTIC_SECTIONS)
-    }
-
-    /// The same image with irradiance points.
-    ///
-    /// # Errors
-    /// If there are more lines than an address can tell.
-    pub(crate) fn with_irradiance(self, points: &PhotonTree) -> Result<Self, PackError> {
-        let (SceneImage { header }, _) = self.view();
-        self.with_trees(header, Some(points), IRRADIANCE_SECTIONS)
-    }
-
-    /// The same image with another tree, or with none.
-    fn with_trees(
-        self,
-        mut header: Header,
-        tree: Option<&PhotonTree>,
-        [nodes, leaves]: [SectionKind; 2],
-    ) -> Result<Self, PackError> {
-        let mut lines = self.lines;
-        if let Some(tree) = tree {
-            append(&mut lines, &mut header.sections, nodes, tree.nodes())?;
-            append(&mut lines, &mut header.sections, leaves, tree.leaves())?;
-        }
-        // `append` has checked that the number of lines fits.
-        header.lines = lines.len() as u32;
-        lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
-        Ok(Self { lines })
-    }
-
-    /// Checks that the image fits a card's memory.
-    ///
-    /// # Errors
-    /// If not.
-    pub fn check_budget(&self, budget: &Budget) -> Result<(), PackError> {
-        let (needed, available) = (self.bytes(), budget.dram_bytes as u64);
-        if needed <= available {
-            return Ok(());
-        }
-        let (SceneImage { header }, _) = self.view();
-        let lines = |kind: SectionKind| {
-            let lines = header.section(kind).records.div_ceil(kind.records_per_line());
-            u64::from(lines) * LINE_BYTES as u64
-        };
-        Err(PackError::Dram {
-            needed,
-            photons: PHOTON_SECTIONS.into_iter().map(lines).sum(),
-            available,
-            remedy: "lower --photons, or use a card with more memory".into(),
-        })
-    }
-
-    /// Bytes of the image.
-    pub fn bytes(&self) -> u64 {
-        self.lines.len() as u64 * LINE_BYTES as u64
-    }
-}
-
-/// Appends a section to the lines of an image.
-fn append<const N: usize>(
-    lines: &mut Vec<Line>,
-    sections: &mut [Section; SECTIONS],
-    kind: SectionKind,
-    records: impl ExactSizeIterator<Item = [u8; N]>,
-) -> Result<(), PackError> {
-    let bytes = (lines.len() + records.len()) as u64 * LINE_BYTES as u64;
-    let count = |n: usize| u32::try_from(n).map_err(|_| PackError::TooLarge { bytes });
-    sections[kind as usize] = Section { first_line: count(lines.len())?, records: count(records.len())? };
-    // Exactly: an image is most of what the host holds.
-    lines.reserve_exact(records.len().div_ceil(LINE_BYTES / N));
-    lines.extend(pack_lines(records));
-    count(lines.len()).map(drop)
-}
-
 /// Where each triangle of a scene is in the card image whose leaves hold these.
 fn places_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
     let mut places = vec![0; scene.triangles.len()];
@@ -458,20 +272,6 @@ fn root_box(scene: &SceneImage, memory: &mut Lines) -> Option<NodeBox> {
     let line = scene.line(memory, SectionKind::Nodes, 0, 0..LINE_BYTES as u32).ok()?;
     let children = 0..WideNode(line).children() as usize;
     children.filter_map(|child| BvhNode(line).bounds(child)).reduce(NodeBox::union)
-}
-
-/// Packs records into lines, none of them across a border.
-fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl Iterator<Item = Line> {
-    let per_line = LINE_BYTES / N;
-    let mut records = records.peekable();
-    std::iter::from_fn(move || {
-        records.peek()?;
-        let mut line = Line::ZERO;
-        for (slot, record) in line.0.as_chunks_mut::<N>().0.iter_mut().zip(records.by_ref().take(per_line)) {
-            *slot = record;
-        }
-        Some(line)
-    })
 }
 
 /// Fixed-point sums of radiance hold 23 bits above the unit and 40 below.
