@@ -131,10 +131,17 @@ fn roughness_and_metalness_follow_their_texture() {
     scene.triangles.extend(quad([corner(-9., -9.), corner(9., -9.), corner(9., 9.), corner(-9., 9.)], 1));
     let film = film(&scene);
     let albedo = |x: usize| Vec3::from(film.pixels()[24 * 48 + x].albedo);
-    let metal = Vec3::new(0.8, 0.4, 0.2) * (20.0 / 21.0) + 1.0 / 21.0;
+    // What the coat reflects of normal and of grazing reflectance: the firmware's fit.
+    let coat = |alpha: f32| {
+        let grazing = 1.0 + 1.5 * alpha + 19.5 * alpha * alpha;
+        [20.0 / 21.0 / (1.0 + 1.6 * alpha * alpha), 1.0 / 21.0 / grazing]
+    };
+    let colour = Vec3::new(0.8, 0.4, 0.2);
+    let [normal, grazing] = coat((77.0_f32 / 255.0).powi(2));
+    let metal = (colour * normal + grazing) * 1.1;
     assert!((albedo(10) - metal).abs().max_element() < 1e-3, "{}", albedo(10));
-    let coat = 0.04 + 0.96 / 21.0;
-    let dull = Vec3::new(0.8, 0.4, 0.2) * (1.0 - coat) + coat;
+    let [normal, grazing] = coat(1.0);
+    let dull = colour * (0.96 * (1.0 - 0.0037)) + 0.04 * normal + grazing;
     assert!((albedo(37) - dull).abs().max_element() < 1e-3, "{}", albedo(37));
 }
 
