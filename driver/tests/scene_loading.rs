@@ -313,7 +313,7 @@ fn cameras_are_found_by_name_and_have_unit_axes() {
 #[test]
 fn what_is_not_used_is_named_once() {
     type Change = fn(&mut Value);
-    let cases: [(&str, &str, Change); 14] = [
+    let cases: [(&str, &str, Change); 15] = [
         ("normal textures", "'lamp'", |json| {
             json["textures"] = json!([{"source": 0}]);
             json["images"] = json!([{"uri": "absent.png"}]);
@@ -323,6 +323,12 @@ fn what_is_not_used_is_named_once() {
             json["textures"] = json!([{"source": 0}]);
             json["images"] = json!([{"uri": "absent.png"}]);
             json["materials"][0]["occlusionTexture"] = json!({"index": 0});
+        }),
+        ("emissive textures", "'lamp'", |json| {
+            json["textures"] = json!([{"source": 0}]);
+            json["images"] = json!([{"uri": "absent.png"}]);
+            json["materials"][0]["emissiveFactor"] = json!([0, 0, 0]);
+            json["materials"][0]["emissiveTexture"] = json!({"index": 0});
         }),
         ("textures of extensions", "'lamp'", |json| {
             json["textures"] = json!([{"source": 0}]);

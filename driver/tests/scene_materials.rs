@@ -8,11 +8,12 @@ use photoncard_driver::scene::{Material, Reflection, Transmission};
 use scene_support::load_changed;
 use serde_json::{Value, json};
 
-/// The only material, without the extension that makes it Lambertian, after a change of it.
+/// The only material, without the extension and the factor that make it Lambertian, after a change of it.
 fn material(change: impl FnOnce(&mut Value)) -> Material {
     let scene = load_changed(|json| {
         let material = &mut json["materials"][0];
         material["extensions"].as_object_mut().unwrap().remove("KHR_materials_specular");
+        material["pbrMetallicRoughness"].as_object_mut().unwrap().remove("metallicFactor");
         change(material);
     });
     scene.unwrap().materials[0].clone()
@@ -65,6 +66,20 @@ fn the_reflectance_at_normal_incidence_follows_from_ior_and_specular() {
     // The colour is limited before the factor.
     let bright = json!({"specularFactor": 0.5, "specularColorFactor": [100, 1, 1]});
     close(dielectric(json!({"KHR_materials_specular": bright})), Vec3::new(0.5, 0.02, 0.02));
+}
+
+/// A specular factor of 0 takes the reflection off the dielectric part alone; what states no metalness is metal.
+#[test]
+fn metal_reflects_whatever_the_specular_factor() {
+    for (factor, metallic) in [(None, 1.0), (Some(1.0), 1.0), (Some(0.25), 0.25)] {
+        let metal = material(|material| {
+            material["extensions"]["KHR_materials_specular"] = json!({"specularFactor": 0});
+            if let Some(factor) = factor {
+                material["pbrMetallicRoughness"]["metallicFactor"] = json!(factor);
+            }
+        });
+        assert_eq!(parts(&metal), (BASE, metallic, 1.0, Vec3::ZERO, None), "{factor:?}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod scene_support;
 use glam::{Vec2, Vec3};
 use miette::Diagnostic;
 use photoncard_driver::scene::{Attributes, NO_ATTRIBUTES, Scene, Triangle};
-use scene_support::Extended;
+use scene_support::{Extended, push};
 use serde_json::{Value, json};
 
 /// The attributes of the only triangle.
@@ -138,6 +138,26 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
     close(places[0], [Vec3::Y, Vec3::new(1.0, 1.0, 0.0), Vec3::new(0.0, 2.0, 0.0)]);
     close(places[1], [Vec3::new(5.0, 1.0, 0.0), Vec3::new(5.0, 3.0, 0.0), Vec3::new(3.0, 1.0, 0.0)]);
     assert_eq!(scene.notices, Vec::<String>::new());
+}
+
+/// Many nodes may share a list of instances, which costs the file next to nothing: where there is nothing to place, it
+/// is not gone through. The rotations of this one are zeros, and would be refused.
+#[test]
+fn instances_of_points_are_not_looked_at() {
+    let mut scene = Extended::new();
+    let instances =
+        push(&mut scene.json, "accessors", json!({"componentType": 5126, "count": 1 << 24, "type": "VEC4"}));
+    let extension = json!({"EXT_mesh_gpu_instancing": {"attributes": {"ROTATION": instances}}});
+    let mut points = scene.primitive().clone();
+    points["mode"] = json!(0);
+    let points = push(&mut scene.json, "meshes", json!({"name": "dust", "primitives": [points]}));
+    for _ in 0..1000 {
+        let node = push(&mut scene.json, "nodes", json!({"mesh": points, "extensions": extension}));
+        scene.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
+    }
+    assert_eq!(scene.load().unwrap().triangles.len(), 1);
+    scene.json["nodes"][0]["extensions"] = extension;
+    assert!(scene.load().unwrap_err().to_string().contains("zero rotation"));
 }
 
 /// Two joints: one stands still, the other has moved by 3 along x; its bind pose was at 1.

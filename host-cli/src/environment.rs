@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use photoncard_driver::scene::Environment;
+use photoncard_driver::scene::{BRIGHTEST, Environment};
 
 use crate::failure::Failure;
 
@@ -15,9 +15,6 @@ pub(crate) enum EnvironmentOption {
     /// The map of a file.
     File(PathBuf),
 }
-
-/// The greatest radiance of an environment, as of an emitter: squares of it stay within single precision.
-const BRIGHTEST: f32 = 1e20;
 
 impl FromStr for EnvironmentOption {
     type Err = String;

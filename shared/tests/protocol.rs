@@ -201,6 +201,13 @@ fn opcodes_are_pinned() {
     assert!(encoded(&hello(Some(memory_use))).ends_with(&[0, 1, 3, 5, 4, 1, b'x']));
 }
 
+/// The page that other implementations are written from is that of this version.
+#[test]
+fn the_page_is_of_this_version() {
+    let page = include_str!("../../docs/protocol.md");
+    assert!(page.contains(&format!("The version is {PROTOCOL_VERSION}\n")));
+}
+
 /// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
 #[test]
 fn golden_structures() {

@@ -7,12 +7,9 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::raster::{Fault, check_size};
-use super::{MAX_SIDE, radiance};
+use super::{BRIGHTEST, MAX_SIDE, radiance};
 use crate::error::SceneError;
 use crate::exr::{self, ExrError};
-
-/// The brightest radiance, as of surfaces, W/(sr m^2): products and squares stay within single precision.
-const BRIGHTEST: f32 = 1e20;
 
 const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
@@ -43,7 +40,7 @@ impl Environment {
     /// # Errors
     /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged, larger
     /// than [`MAX_SIDE`] texels a side or [`MAX_TEXELS`](super::MAX_TEXELS) in all, or holds a radiance that is
-    /// negative, infinite, not a number, or above 1e20.
+    /// negative, infinite, not a number, or above [`BRIGHTEST`].
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let unreadable = |source| SceneError::Unreadable { file: path.to_owned(), source };
         if !fs::metadata(path).map_err(unreadable)?.is_file() {

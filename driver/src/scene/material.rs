@@ -2,14 +2,13 @@
 
 use glam::Vec3;
 
+use super::EMISSION;
+
 /// How far above 1 the sum of the two albedos may lie: they are often written in three digits.
 const SUM_TOLERANCE: f32 = 1e-4;
 
 /// The largest exponent: the lobe is then under a degree wide, and a mirror to the photons.
 pub const MAX_EXPONENT: f32 = 10_000.0;
-
-/// Radiances that an emitter may have, W/(sr m^2): their products and squares stay within single precision.
-const EMISSION: std::ops::RangeInclusive<f32> = 1e-20..=1e20;
 
 /// How a surface reflects, transmits and emits, and which of it is there.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,8 +39,8 @@ pub struct Material {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflection {
     /// A Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2 pi) max(0,
-    /// cos alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`, or, without the lobe and
-    /// without transmission, by `KHR_materials_specular` with the factor 0.
+    /// cos alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`, or, without the lobe, by
+    /// `KHR_materials_specular` with the factor 0 of what neither has a share of metal nor transmits.
     Phong {
         /// Lambertian albedo, 0 to 1.
         diffuse: Vec3,

@@ -49,7 +49,8 @@ impl Scene {
     /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material) or
     /// `emission` of any material, `specular` or `exponent` of one that states a Phong lobe or is Lambertian, or
     /// `metallic` or `roughness` of a metallic-roughness one. Colours are `r,g,b` or one number for all three, the
-    /// others one number. Textures go on to multiply what they multiply. The material's name may itself contain dots.
+    /// others one number. Textures go on to multiply what they multiply; an emissive texture of what did
+    /// not emit was not loaded, as a notice says. The material's name may itself contain dots.
     /// Whether the scene still has a light is for [`Scene::check_light`] to say once all settings are applied.
     ///
     /// # Errors

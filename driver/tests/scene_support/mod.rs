@@ -33,7 +33,7 @@ pub(crate) fn triangle_json() -> Value {
         ],
         "materials": [{
             "name": "lamp",
-            "pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 1.0]},
+            "pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 1.0], "metallicFactor": 0.0},
             "emissiveFactor": [1.0, 0.5, 0.25],
             "extensions": {
                 "KHR_materials_specular": {"specularFactor": 0.0},

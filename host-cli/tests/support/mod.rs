@@ -196,7 +196,7 @@ fn material(name: &str, emission: [f32; 3]) -> Value {
     json!({
         "name": name,
         "emissiveFactor": emission,
-        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1.0]},
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1.0], "metallicFactor": 0.0},
         "extensions": {"KHR_materials_specular": {"specularFactor": 0.0}}
     })
 }

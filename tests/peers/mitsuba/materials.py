@@ -47,7 +47,8 @@ def smooth(material):
 
 def rough(material):
     """glTF's metallic-roughness model, or nothing if the material is Lambertian."""
-    if extension(material, SPECULAR).get("specularFactor", 1.0) == 0.0:
+    is_metallic = material["pbrMetallicRoughness"].get("metallicFactor", 1.0) != 0.0
+    if extension(material, SPECULAR).get("specularFactor", 1.0) == 0.0 and not is_metallic:
         return None
     # Imported here, as the variant must have been chosen before a BSDF is derived.
     from microfacets import MetallicRoughness

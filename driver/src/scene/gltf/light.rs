@@ -6,10 +6,7 @@ use gltf::json::validation::Checked;
 
 use super::document::Document;
 use crate::error::SceneError;
-use crate::scene::{PunctualKind, PunctualLight, Scene};
-
-/// Intensities that a light may have: their products and squares stay within single precision.
-const INTENSITY: std::ops::RangeInclusive<f32> = 1e-20..=1e20;
+use crate::scene::{EMISSION, PunctualKind, PunctualLight, Scene};
 
 /// The narrowest step, in cosines, between the two cones of a spot light, as `KHR_lights_punctual` recommends.
 /// Exporters write equal angles for a sharp edge.
@@ -35,7 +32,7 @@ pub(super) fn place(
     let light = &lights(document)[index];
     let item = |field: &str| format!("extensions.KHR_lights_punctual.lights[{index}].{field}");
     let intensity = Vec3::from(light.color) * light.intensity;
-    let is_possible = |value: f32| value == 0.0 || INTENSITY.contains(&value);
+    let is_possible = |value: f32| value == 0.0 || EMISSION.contains(&value);
     if !intensity.to_array().into_iter().all(is_possible) {
         let reason = format!("the light's intensity is {intensity}, its colour included");
         let remedy = "state a colour of 0 or more, and an intensity of 0, or of 1e-20 to 1e20";

@@ -52,21 +52,17 @@ fn load_one(
     let name = source.name.clone().unwrap_or_else(|| format!("material {index}"));
     let [red, green, blue, alpha] = source.pbr_metallic_roughness.base_color_factor.0;
     let extensions = source.extensions.as_ref();
-    let strength = extensions.and_then(|extensions| extensions.emissive_strength.as_ref());
-    let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
     let base_colour = Vec3::new(red, green, blue);
-    let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
-    let is_lambertian = specular.is_some_and(|specular| specular.specular_factor.0 == 0.0);
     let reflection = if let Some(phong) = read_phong(document, index, source, &name)? {
         let (specular, exponent) = (Vec3::from(phong.specular), phong.exponent);
         Reflection::Phong { diffuse: base_colour, specular, exponent }
-    } else if is_lambertian && !is_transmissive(source) {
+    } else if is_lambertian(source) {
         Reflection::Phong { diffuse: base_colour, specular: Vec3::ZERO, exponent: 0.0 }
     } else {
         metallic_roughness(source, base_colour)
     };
     let mut material = Material {
-        emission: Vec3::from(source.emissive_factor.0) * strength,
+        emission: emission(source),
         double_sided: source.double_sided,
         alpha_cutoff: (source.alpha_mode == Checked::Valid(AlphaMode::Mask))
             .then(|| source.alpha_cutoff.unwrap_or_default().0),
@@ -169,6 +165,26 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
         // What reflects everything transmits nothing.
         transmission: if ior == 0.0 { None } else { transmission(extensions, ior) },
     }
+}
+
+/// The radiance that the factors state, W/(sr m^2).
+fn emission(material: &json::Material) -> Vec3 {
+    let strength = material.extensions.as_ref().and_then(|extensions| extensions.emissive_strength.as_ref());
+    Vec3::from(material.emissive_factor.0) * strength.map_or(1.0, |strength| strength.emissive_strength.0)
+}
+
+/// Whether the material has a texture for its emission, and none for it to multiply.
+pub(super) fn has_dark_texture(material: &json::Material) -> bool {
+    material.emissive_texture.is_some() && emission(material) == Vec3::ZERO
+}
+
+/// Whether all that the material does is to scatter: `KHR_materials_specular` takes the reflection off the dielectric
+/// part, and off that part alone, so that a metal, which glTF means where it states no metalness, goes on to reflect.
+fn is_lambertian(material: &json::Material) -> bool {
+    let specular = material.extensions.as_ref().and_then(|extensions| extensions.specular.as_ref());
+    specular.is_some_and(|specular| specular.specular_factor.0 == 0.0)
+        && material.pbr_metallic_roughness.metallic_factor.0 == 0.0
+        && !is_transmissive(material)
 }
 
 /// Whether light passes the material's surface.

@@ -43,7 +43,7 @@ impl<'s> Pose<'s> {
 pub(super) struct MeshPlacer<'a> {
     source: &'a Source<'a>,
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,
-    /// Triangles and primitives looked at so far, those of zero area too.
+    /// Triangles and primitives placed so far, those of zero area too.
     work: usize,
 }
 
@@ -59,14 +59,23 @@ impl<'a> MeshPlacer<'a> {
         pose: &Pose<'_>,
         scene: &mut Scene,
     ) -> Result<(), SceneError> {
-        let primitives = if let Some(primitives) = self.prepared.get(&index) {
-            Rc::clone(primitives)
-        } else {
-            let primitives = Rc::new(self.prepare(index, scene)?);
-            self.prepared.insert(index, Rc::clone(&primitives));
-            primitives
-        };
+        let primitives = self.primitives(index, scene)?;
         primitives.iter().try_for_each(|primitive| self.place_primitive(index, primitive, pose, scene))
+    }
+
+    /// Whether mesh `index` has a primitive of triangles.
+    pub(super) fn has_triangles(&mut self, index: usize, scene: &mut Scene) -> Result<bool, SceneError> {
+        Ok(!self.primitives(index, scene)?.is_empty())
+    }
+
+    /// The primitives of triangles of mesh `index`.
+    fn primitives(&mut self, index: usize, scene: &mut Scene) -> Result<Rc<Vec<Primitive<'a>>>, SceneError> {
+        if let Some(primitives) = self.prepared.get(&index) {
+            return Ok(Rc::clone(primitives));
+        }
+        let primitives = Rc::new(self.prepare(index, scene)?);
+        self.prepared.insert(index, Rc::clone(&primitives));
+        Ok(primitives)
     }
 
     fn prepare(&self, mesh: usize, scene: &mut Scene) -> Result<Vec<Primitive<'a>>, SceneError> {

@@ -79,6 +79,10 @@ impl Placer<'_> {
         world: DMat4,
         scene: &mut Scene,
     ) -> Result<(), SceneError> {
+        // Instances count by the triangles and primitives they place: those of nothing would be without a limit.
+        if !self.meshes.has_triangles(mesh, scene)? {
+            return Ok(());
+        }
         let instances = Instances::of(self.source, node, &self.source.document.root.nodes[node])?;
         let Some(instances) = instances else {
             return self.meshes.place(mesh, &Pose::new(world, None), scene);

@@ -8,7 +8,7 @@ use gltf::json::validation::Checked;
 
 use super::document::{Document, SUPPORTED_EXTENSIONS};
 use super::light;
-use super::material::is_transmissive;
+use super::material::{has_dark_texture, is_transmissive};
 use super::primitive::Topology;
 
 /// Names listed in one notice; the others are counted.
@@ -99,6 +99,8 @@ fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String]
     note("normal textures are ignored, the surface is rendered without its bumps", "material", &normal);
     let occluded = materials(root, |material| material.occlusion_texture.is_some());
     note("occlusion textures are ignored, occlusion is computed", "material", &occluded);
+    let dark = materials(root, has_dark_texture);
+    note("emissive textures are ignored where the emissive factor or strength is 0", "material", &dark);
     let extended = materials(root, has_extension_texture);
     note("textures of extensions are ignored, the factors alone count", "material", &extended);
     let blended = materials(root, |material| material.alpha_mode == Checked::Valid(AlphaMode::Blend));
