@@ -211,9 +211,14 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
         return Err(unreadable(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
+    decode_rgb(path, &bytes, MAX_READ_PIXELS)
+}
+
+/// As [`read_rgb`], of a file that holds these bytes, and of at most so many pixels.
+pub(crate) fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
     // The `exr` crate trusts a file's numbers in places (sums of window sizes, offsets of blocks) and panics on a
     // malformed one. Nothing is shared with the closure, so nothing can be left half changed.
-    catch_unwind(AssertUnwindSafe(|| decode(path, &bytes))).unwrap_or_else(|_| {
+    catch_unwind(AssertUnwindSafe(|| decode(path, bytes, most_pixels))).unwrap_or_else(|_| {
         Err(ExrError::Malformed {
             path: path.to_owned(),
             reason: "its structure contradicts itself".to_owned(),
@@ -221,13 +226,13 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
     })
 }
 
-fn decode(path: &Path, bytes: &[u8]) -> Result<RgbImage, ExrError> {
+fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
     let malformed =
         |error: exr::error::Error| ExrError::Malformed { path: path.to_owned(), reason: error.to_string() };
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(malformed)?;
     MetaData::validate(&meta.headers, false).map_err(malformed)?;
     for header in &meta.headers {
-        check_size(path, header, bytes.len() as u64)?;
+        check_size(path, header, bytes.len() as u64, most_pixels)?;
     }
     if !meta.headers.iter().any(has_colour) {
         let names = meta.headers.iter().flat_map(|header| header.channels.list.iter());
@@ -261,10 +266,10 @@ fn has_colour(header: &Header) -> bool {
 }
 
 /// Refuses sizes that are too large, or that a file of this length cannot hold however well it is compressed.
-fn check_size(path: &Path, header: &Header, length: u64) -> Result<(), ExrError> {
+fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Result<(), ExrError> {
     const CHUNK_OVERHEAD: u64 = 16;
     let Vec2(width, height) = header.layer_size;
-    let pixels = (width as u64).checked_mul(height as u64).filter(|&pixels| pixels <= MAX_READ_PIXELS);
+    let pixels = (width as u64).checked_mul(height as u64).filter(|&pixels| pixels <= most_pixels);
     let pixels = pixels.ok_or_else(|| ExrError::TooLarge { path: path.to_owned(), width, height })?;
     let contradiction = |reason: String| Err(ExrError::Malformed { path: path.to_owned(), reason });
     if (header.chunk_count as u64).saturating_mul(CHUNK_OVERHEAD) > length {

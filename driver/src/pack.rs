@@ -277,11 +277,12 @@ fn root_box(scene: &SceneImage, memory: &mut Lines) -> Option<NodeBox> {
 /// Fixed-point sums of radiance hold 23 bits above the unit and 40 below.
 ///
 /// The unit is the radiance that all surfaces would have if the emitted power were spread over them, once reflected by
-/// white: a typical one. A much brighter emitter raises it, so that its own radiance is within 2^12 units: shadow rays next
-/// to it may bring a thousand times as much.
+/// white: a typical one. A much brighter emitter or texel of the environment raises it, so that its own radiance is within
+/// 2^12 units: shadow rays next to an emitter may bring a thousand times as much.
 fn radiance_unit(scene: &Scene, lights: &Lights) -> f32 {
     let area: f64 = scene.triangles.iter().map(|triangle| triangle.area() as f64).sum();
     let typical = lights.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));
-    let brightest = scene.materials.iter().map(|m| m.emission.max_element()).fold(0.0, f32::max) as f64;
-    power_of_two_above(typical.max(brightest / (1 << 12) as f64))
+    let environment = lights.environment().map_or(0.0, |environment| environment.brightest);
+    let brightest = scene.materials.iter().map(|m| m.emission.max_element()).fold(environment, f32::max);
+    power_of_two_above(typical.max(f64::from(brightest) / f64::from(1 << 12)))
 }

@@ -94,7 +94,7 @@ pub enum PreviewError {
 pub fn write_png(path: &Path, film: &Film, mapping: ToneMapping) -> Result<(), PreviewError> {
     let scale = match mapping.exposure {
         None => automatic_scale(film),
-        Some(stops) if stops.is_finite() => stops.exp2(),
+        Some(stops) if stops.is_finite() => libm::exp2f(stops),
         Some(exposure) => return Err(PreviewError::Exposure { exposure }),
     };
     let window = film.window();
@@ -124,11 +124,11 @@ fn automatic_scale(film: &Film) -> f32 {
     for pixel in film.pixels() {
         let luminance = f64::from(luminance(pixel.radiance));
         if luminance > 0.0 && luminance.is_finite() {
-            sum += luminance.ln();
+            sum += libm::log(luminance);
             count += 1;
         }
     }
-    if count == 0 { 1.0 } else { (MIDDLE_GREY / (sum / count as f64).exp()) as f32 }
+    if count == 0 { 1.0 } else { (MIDDLE_GREY / libm::exp(sum / count as f64)) as f32 }
 }
 
 fn tone_map(radiance: [f32; 3], scale: f32, curve: ToneCurve) -> [u8; 3] {
@@ -140,7 +140,8 @@ fn tone_map(radiance: [f32; 3], scale: f32, curve: ToneCurve) -> [u8; 3] {
 /// The sRGB transfer curve, in 8 bits.
 fn encode(linear: f32) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
-    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    let encoded =
+        if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::powf(linear, 1.0 / 2.4) - 0.055 };
     // A conversion from NaN gives 0.
     (255.0 * encoded + 0.5) as u8
 }

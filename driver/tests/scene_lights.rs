@@ -8,6 +8,7 @@ use std::path::Path;
 use glam::Vec3;
 use miette::Diagnostic;
 use photoncard_driver::error::SceneError;
+use photoncard_driver::pack::PackedScene;
 use photoncard_driver::scene::{Environment, PunctualKind, Scene};
 use scene_support::load_changed;
 use serde_json::{Value, json};
@@ -153,4 +154,24 @@ fn environments_that_are_none_are_refused() {
         exr(&path, &[[0.0; 3], [0.0, bad, 0.0]]);
         refused(&path, "texel (1, 0)");
     }
+}
+
+#[test]
+fn environments_of_too_many_texels_are_refused_with_a_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 8193\n";
+    let error = Environment::load(&write(folder.path(), "sky.hdr", header)).unwrap_err();
+    assert!(error.to_string().contains("8193 x 8192 texels"), "{error}");
+    assert!(error.help().is_some_and(|help| help.to_string().contains("scale")));
+}
+
+#[test]
+fn the_unit_of_radiance_is_not_far_below_the_brightest_texel_of_the_environment() {
+    let brightest = 1e6;
+    let mut texels = vec![[0.0; 3]; 1024 * 512];
+    texels[100 * 1024 + 7] = [0.0, brightest, 0.0];
+    let environment = Some(Environment { width: 1024, height: 512, texels });
+    let scene = Scene { environment, ..lit(&json!({"type": "point"})).unwrap() };
+    let unit = PackedScene::new(&scene).unwrap().view().0.header.radiance_unit;
+    assert!(unit >= brightest / 4096.0, "{unit}");
 }

@@ -1,25 +1,26 @@
 //! How much an emissive triangle emits: the mean of its texture over it.
 
-use std::cell::OnceCell;
+use std::sync::OnceLock;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::footprint::Footprint;
-use crate::scene::{Attributes, Encoding, Image, Material, Scene, Triangle};
+use super::pyramid::{Level, Pyramid, decode};
+use crate::scene::{Attributes, Image, Material, Scene, Triangle};
+
+/// How far from its middle a texel can be seen where texels are interpolated, texels.
+const REACH: f64 = 1.0;
 
 /// Emissive textures of a scene: their means over triangles.
 pub(super) struct EmissiveTextures<'s> {
     scene: &'s Scene,
-    /// Of each texture the mean over all of it, once it is asked for.
-    means: Vec<OnceCell<DVec3>>,
-    /// Linear values of the 256 codes of sRGB.
-    linear: [f64; 256],
+    /// Of each image its pyramid, once it is asked for.
+    pyramids: Vec<OnceLock<Pyramid>>,
 }
 
 impl<'s> EmissiveTextures<'s> {
     pub(super) fn new(scene: &'s Scene) -> Self {
-        let means = scene.textures.iter().map(|_| OnceCell::new()).collect();
-        Self { scene, means, linear: std::array::from_fn(|code| linear(code as u8)) }
+        Self { scene, pyramids: scene.images.iter().map(|_| OnceLock::new()).collect() }
     }
 
     /// The mean radiance over a triangle, W/(sr m^2): about so, and zero only where no texel glows.
@@ -29,65 +30,69 @@ impl<'s> EmissiveTextures<'s> {
         let Some(texture) = self.scene.textures.get(index as usize) else { return DVec3::ZERO };
         let Some(image) = self.scene.images.get(texture.image as usize) else { return DVec3::ZERO };
         let attributes = self.scene.attributes.get(triangle.attributes as usize).unwrap_or(&Attributes::NONE);
+        let footprint = Footprint::new(texture, attributes);
         let mut mean = Mean::default();
-        let footprint = Footprint::new(texture, image, attributes);
-        let is_seen = footprint.for_each_texel(|texel| mean.add(self.decode(image.encoding, texel)));
-        let mean = if is_seen { mean.value() } else { self.mean_of_all(index as usize, image) };
-        emission * mean
+        let texel = |index: usize, _| mean.add(decode(image.encoding, image.texels[index]), 1.0);
+        let is_seen = footprint.for_each_cell([image.width, image.height], REACH, texel);
+        emission
+            * if is_seen { mean.value() } else { self.coarse_mean(texture.image as usize, image, &footprint) }
     }
 
-    fn mean_of_all(&self, texture: usize, image: &Image) -> DVec3 {
-        *self.means[texture].get_or_init(|| {
+    /// The mean over a triangle that has too many texels: of the finest level whose cells are few enough, or of all of the image.
+    fn coarse_mean(&self, index: usize, image: &Image, footprint: &Footprint) -> DVec3 {
+        let levels = &self.pyramids[index].get_or_init(|| Pyramid::new(image)).levels;
+        for level in levels {
             let mut mean = Mean::default();
-            image.texels.iter().for_each(|&texel| mean.add(self.decode(image.encoding, texel)));
-            mean.value()
-        })
-    }
-
-    fn decode(&self, encoding: Encoding, [red, green, blue, _]: [u8; 4]) -> DVec3 {
-        let channel = |code: u8| match encoding {
-            Encoding::Srgb => self.linear[usize::from(code)],
-            Encoding::Linear => f64::from(code) / 255.0,
-        };
-        DVec3::new(channel(red), channel(green), channel(blue))
+            let cell = |index: usize, is_inside| {
+                mean.add(level.cells[index], if is_inside { 1.0 } else { Level::OUTSIDE });
+            };
+            if footprint.for_each_cell(level.size, Level::REACH, cell) {
+                return mean.value();
+            }
+        }
+        levels.last().map_or(DVec3::ZERO, |level| level.cells.iter().map(|cell| cell.as_dvec3()).sum())
     }
 }
 
 #[derive(Default)]
 struct Mean {
     sum: DVec3,
-    count: u64,
+    weight: f64,
 }
 
 impl Mean {
-    fn add(&mut self, value: DVec3) {
-        self.sum += value;
-        self.count += 1;
+    fn add(&mut self, value: Vec3, weight: f64) {
+        self.sum += value.as_dvec3() * weight;
+        self.weight += weight;
     }
 
+    /// Zero of nothing.
     fn value(&self) -> DVec3 {
-        self.sum / self.count.max(1) as f64
+        if self.weight > 0.0 { self.sum / self.weight } else { DVec3::ZERO }
     }
-}
-
-/// The linear value of a code of sRGB (IEC 61966-2-1).
-fn linear(code: u8) -> f64 {
-    let value = f64::from(code) / 255.0;
-    if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{Vec2, Vec3};
+    use std::time::{Duration, Instant};
+
+    use glam::Vec2;
+    use rayon::prelude::*;
 
     use super::*;
-    use crate::scene::Texture;
+    use crate::scene::{Encoding, Texture};
 
     /// Half a quad with a texture that is black but for one texel.
     fn scene(lit: usize) -> Scene {
-        let mut texels = vec![[0, 0, 0, 255]; 64 * 64];
+        scene_of(64, lit)
+    }
+
+    /// The same, of a texture with so many texels a side.
+    fn scene_of(side: u32, lit: usize) -> Scene {
+        let mut texels = vec![[0, 0, 0, 255]; side as usize * side as usize];
         texels[lit] = [255; 4];
-        let image = Image { name: "spark".into(), width: 64, height: 64, texels, encoding: Encoding::Srgb };
+        let image =
+            Image { name: "spark".into(), width: side, height: side, texels, encoding: Encoding::Srgb };
         let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE];
         Scene {
             attributes: vec![Attributes { coordinates: [corners; 2], ..Attributes::NONE }],
@@ -118,5 +123,37 @@ mod tests {
         let mut scene = scene(40 * 64 + 10);
         scene.textures[0].matrix = [[100.0, 0.0], [0.0, 100.0]];
         assert!((mean(&scene) / (3.0 / 4096.0) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_single_texel_of_a_large_texture_counts_where_the_triangle_shows_it() {
+        // Cells of a side that is no power of four may have 3 x 3 texels, or cells, instead of 4 x 4.
+        for (side, tolerance) in [(1000, 7.0 / 9.0), (1023, 7.0 / 9.0), (1024, 0.03)] {
+            let spark = |x: usize, y: usize| mean(&scene_of(side, y * side as usize + x));
+            let once = 3.0 / (0.5 * f64::from(side * side));
+            for (x, y) in [(640, 160), (side as usize - 2, 0), (900, 400)] {
+                let shown = spark(x, y) / once;
+                assert!((shown - 1.0).abs() < tolerance, "{side}: {x}, {y}: {shown}");
+            }
+            assert!(spark(500, 500) > 0.0, "{side}: on the diagonal");
+            assert_eq!(spark(160, 640), 0.0, "{side}: in the other half");
+        }
+    }
+
+    #[test]
+    fn a_triangle_costs_no_more_for_a_large_texture() {
+        let scene = scene_of(1024, 160 * 1024 + 640);
+        let textures = EmissiveTextures::new(&scene);
+        let triangle = Triangle { attributes: 0, ..Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y], 0) };
+        let mut material = Material::lambertian("glow", Vec3::ZERO);
+        (material.emission, material.emissive_texture) = (Vec3::ONE, Some(0));
+        let begin = Instant::now();
+        let sum: f64 =
+            (0..10_000).into_par_iter().map(|_| textures.mean_radiance(&triangle, &material).x).sum();
+        let duration = begin.elapsed();
+        println!("10,000 triangles: {duration:?}");
+        assert!(sum > 0.0);
+        // All texels of each would take twenty.
+        assert!(duration < Duration::from_secs(6), "{duration:?}");
     }
 }

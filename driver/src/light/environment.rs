@@ -53,16 +53,16 @@ impl EnvironmentMap {
         let cells = Cells::new(environment);
         let (texels, radiance) = match environment.texels[..] {
             // Exactly.
-            [texel] => (vec![[1.0; 3]], texel),
+            [texel] => (vec![shared_exponent([1.0; 3])], texel),
             _ => {
                 let scale = scale(brightest);
-                let scaled = environment.texels.iter().map(|texel| texel.map(|channel| channel / scale));
-                (scaled.collect(), [scale; 3])
+                let stored = |texel: &[f32; 3]| shared_exponent(texel.map(|channel| channel / scale));
+                (environment.texels.par_iter().map(stored).collect(), [scale; 3])
             }
         };
         Some(Self {
             size: [environment.width, environment.height],
-            texels: texels.into_iter().map(shared_exponent).collect(),
+            texels,
             radiance,
             fluence: cells.weights.iter().sum(),
             cells,

@@ -1,90 +1,94 @@
 //! The texels that show on a triangle.
 
-use crate::scene::{Attributes, Image, Texture, Wrap};
+use crate::scene::{Attributes, Texture, Wrap};
 
 /// A triangle on a texture.
-pub(super) struct Footprint<'s> {
-    image: &'s Image,
+pub(super) struct Footprint {
     wrap: [Wrap; 2],
-    /// Its corners, in texels from the upper left corner of the image.
+    /// Its corners, in sides of the image from its upper left corner.
     corners: [[f64; 2]; 3],
 }
 
-/// How much farther than the texel's own middle interpolation spreads it, texels.
-const REACH: f64 = 1.0;
-/// More texels than so many times those of the image are not looked at one by one.
-const MOST_REPEATS: f64 = 4.0;
+/// Beyond this a cell is not told from the next.
+const FARTHEST: f64 = 1e12;
+/// The most cells of the rectangle around a triangle that are looked at one by one.
+const MOST_CELLS: f64 = 8192.0;
 
-impl<'s> Footprint<'s> {
-    pub(super) fn new(texture: &Texture, image: &'s Image, attributes: &Attributes) -> Self {
+impl Footprint {
+    pub(super) fn new(texture: &Texture, attributes: &Attributes) -> Self {
         let coordinates = attributes.coordinates[texture.set as usize & 1];
         let corners = coordinates.map(|coordinate| {
             let [u, v] = coordinate.to_array().map(f64::from);
-            let [x, y] = [0, 1].map(|axis| {
+            [0, 1].map(|axis| {
                 let [a, b] = texture.matrix[axis].map(f64::from);
                 a * u + b * v + f64::from(texture.offset[axis])
-            });
-            [x * f64::from(image.width), y * f64::from(image.height)]
+            })
         });
-        Self { image, wrap: texture.wrap, corners }
+        Self { wrap: texture.wrap, corners }
     }
 
-    /// Shows every texel that has a part in what shows on the triangle, those of a repeated image repeatedly. `false`, and none, if
-    /// they are too many, as where the image is repeated often.
-    pub(super) fn for_each_texel(&self, mut visit: impl FnMut([u8; 4])) -> bool {
+    /// Shows the index of every cell that has a part in what shows on the triangle, and whether its middle does; those of a repeated image
+    /// repeatedly. The image is a grid of so many columns and rows of cells, and each is seen no farther than `reach` cells from its
+    /// middle. `false`, and none, if they are too many.
+    pub(super) fn for_each_cell(
+        &self,
+        size: [u32; 2],
+        reach: f64,
+        mut visit: impl FnMut(usize, bool),
+    ) -> bool {
+        let [columns, rows] = size;
+        let corners = self.corners.map(|[x, y]| [x * f64::from(columns), y * f64::from(rows)]);
         let side = |axis: usize| {
-            let places = self.corners.map(|corner| corner[axis]);
-            let [lower, upper] = [
-                places.into_iter().fold(f64::INFINITY, f64::min),
-                places.into_iter().fold(f64::MIN, f64::max),
-            ];
-            [lower, upper]
+            let places = corners.map(|corner| corner[axis]);
+            let lower = places.into_iter().fold(f64::INFINITY, f64::min);
+            [lower, places.into_iter().fold(f64::NEG_INFINITY, f64::max)]
         };
         let [[left, right], [top, bottom]] = [side(0), side(1)];
-        let all = (right - left + 2.0) * (bottom - top + 2.0);
-        let most = MOST_REPEATS * (self.image.texels.len() as f64 + 64.0);
-        // Not `all > most`: it may be no number. Beyond 2^40 a texel is not told from the next.
-        if !(all <= most && [left, right, top, bottom].into_iter().all(|place| place.abs() < 1e12)) {
+        let all = (right - left + 2.0 * reach) * (bottom - top + 2.0 * reach);
+        let is_near = corners.as_flattened().iter().all(|place| place.abs() < FARTHEST);
+        // What is no number is neither.
+        let is_seen = is_near && all <= MOST_CELLS;
+        if !is_seen {
             return false;
         }
-        let texels = |lower: f64, upper: f64| {
-            (lower - 0.5 - REACH).ceil() as i64..=(upper - 0.5 + REACH).floor() as i64
+        let cells = |lower: f64, upper: f64| {
+            (lower - 0.5 - reach).ceil() as i64..=(upper - 0.5 + reach).floor() as i64
         };
-        for row in texels(top, bottom) {
+        for row in cells(top, bottom) {
             let middle = row as f64 + 0.5;
-            let Some([left, right]) = self.across(middle - REACH, middle + REACH) else { continue };
-            for column in texels(left, right) {
-                let x = wrapped(column, self.image.width, self.wrap[0]);
-                let y = wrapped(row, self.image.height, self.wrap[1]);
-                visit(self.image.texels[y as usize * self.image.width as usize + x as usize]);
+            let Some([left, right]) = across(corners, middle - reach, middle + reach) else { continue };
+            let first = wrapped(row, rows, self.wrap[1]) as usize * columns as usize;
+            let inside = across(corners, middle, middle).unwrap_or([f64::INFINITY; 2]);
+            for column in cells(left, right) {
+                let is_inside = (inside[0]..=inside[1]).contains(&(column as f64 + 0.5));
+                visit(first + wrapped(column, columns, self.wrap[0]) as usize, is_inside);
             }
         }
         true
     }
-
-    /// How far the triangle goes to the sides between two heights.
-    fn across(&self, top: f64, bottom: f64) -> Option<[f64; 2]> {
-        let [a, b, c] = self.corners;
-        let mut sides: Option<[f64; 2]> = None;
-        let mut include = |x: f64| {
-            let [left, right] = sides.unwrap_or([x, x]);
-            sides = Some([left.min(x), right.max(x)]);
-        };
-        for [[x0, y0], [x1, y1]] in [[a, b], [b, c], [c, a]] {
-            if (top..=bottom).contains(&y0) {
-                include(x0);
-            }
-            for border in [top, bottom] {
-                if (y0 < border) != (y1 < border) {
-                    include(x0 + (x1 - x0) * ((border - y0) / (y1 - y0)));
-                }
-            }
-        }
-        sides
-    }
 }
 
-/// The texel of the image that lies at a place beyond its borders too.
+/// How far a triangle goes to the sides between two heights.
+fn across([a, b, c]: [[f64; 2]; 3], top: f64, bottom: f64) -> Option<[f64; 2]> {
+    let mut sides: Option<[f64; 2]> = None;
+    let mut include = |x: f64| {
+        let [left, right] = sides.unwrap_or([x, x]);
+        sides = Some([left.min(x), right.max(x)]);
+    };
+    for [[x0, y0], [x1, y1]] in [[a, b], [b, c], [c, a]] {
+        if (top..=bottom).contains(&y0) {
+            include(x0);
+        }
+        for border in [top, bottom] {
+            if (y0 < border) != (y1 < border) {
+                include(x0 + (x1 - x0) * ((border - y0) / (y1 - y0)));
+            }
+        }
+    }
+    sides
+}
+
+/// The column or row of the image that lies at a place beyond its borders too.
 fn wrapped(place: i64, size: u32, wrap: Wrap) -> u32 {
     let size = i64::from(size);
     let texel = match wrap {

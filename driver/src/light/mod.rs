@@ -4,6 +4,7 @@
 mod emission;
 pub(crate) mod environment;
 mod footprint;
+mod pyramid;
 mod shares;
 mod sources;
 mod targets;
@@ -16,6 +17,7 @@ use glam::{DVec3, Vec3};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image;
 use photoncard_shared::layout::{DistantLight, Emitter, EmitterKind};
+use rayon::prelude::*;
 
 use self::emission::EmissiveTextures;
 pub(crate) use self::environment::EnvironmentMap;
@@ -150,7 +152,7 @@ fn area_emitters(scene: &Scene) -> Vec<SceneEmitter> {
         let material = &scene.materials[triangle.material as usize];
         material.is_emissive().then(|| SceneEmitter::of_triangle(index, triangle, material, &textures))?
     };
-    scene.triangles.iter().enumerate().filter_map(emitter).collect()
+    scene.triangles.par_iter().enumerate().filter_map(emitter).collect()
 }
 
 impl SceneEmitter {
@@ -231,7 +233,7 @@ impl Spot {
         // From the outer cone to where the whole intensity is reached, or to the axis.
         let reached = (scale + offset).clamp(0.0, 1.0);
         let whole = (1.0 - (1.0 - offset) / scale).max(0.0);
-        2.0 * PI * (reached.powi(3) / (3.0 * scale) + whole)
+        2.0 * PI * (reached * reached * reached / (3.0 * scale) + whole)
     }
 }
 

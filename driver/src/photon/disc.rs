@@ -198,7 +198,9 @@ impl<'a> Meter<'a> {
         let spread = spread(&photons, middle);
         let outer = radius + spread;
         // The ways from the open point are in the ball as well.
-        let reach = outer.hypot(spread + OPEN_HEIGHT * radius);
+        // In double precision the squares of no two lengths are too large.
+        let [across, along] = [outer, spread + OPEN_HEIGHT * radius].map(f64::from);
+        let reach = (across * across + along * along).sqrt() as f32;
         let ball = Ball { centre: middle.position, radius: 1.001 * reach + 2.0 * self.lift(radius) };
         let cluster = Cluster { ball, radius, outer };
         let Searcher { scene, memory, .. } = &self.searcher;

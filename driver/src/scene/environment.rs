@@ -1,5 +1,6 @@
 //! Light from infinitely far.
 
+use std::fmt::Display;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -10,6 +11,9 @@ use super::raster::{Fault, check_size};
 use super::{BRIGHTEST, MAX_SIDE, radiance};
 use crate::error::SceneError;
 use crate::exr::{self, ExrError};
+
+/// The most texels of an environment: each is twelve bytes here and four more for a card.
+pub const MAX_ENVIRONMENT_TEXELS: u64 = 1 << 26;
 
 const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
@@ -39,8 +43,8 @@ impl Environment {
     ///
     /// # Errors
     /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged, larger
-    /// than [`MAX_SIDE`] texels a side or [`MAX_TEXELS`](super::MAX_TEXELS) in all, or holds a radiance that is
-    /// negative, infinite, not a number, or above [`BRIGHTEST`].
+    /// than [`MAX_SIDE`] texels a side or [`MAX_ENVIRONMENT_TEXELS`] in all, or holds a radiance that is negative,
+    /// infinite, not a number, or above [`BRIGHTEST`].
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let unreadable = |source| SceneError::Unreadable { file: path.to_owned(), source };
         if !fs::metadata(path).map_err(unreadable)?.is_file() {
@@ -49,8 +53,7 @@ impl Environment {
         }
         let bytes = fs::read(path).map_err(unreadable)?;
         let read = if bytes.starts_with(EXR_MAGIC) {
-            drop(bytes);
-            read_exr(path)
+            read_exr(path, &bytes)
         } else if bytes.starts_with(radiance::MAGIC) {
             radiance::read(&bytes).map(|(size, texels)| Self::of(size, texels))
         } else {
@@ -85,8 +88,8 @@ impl Environment {
     }
 }
 
-fn read_exr(path: &Path) -> Result<Environment, Fault> {
-    let image = exr::read_rgb(path).map_err(|error| match error {
+fn read_exr(path: &Path, bytes: &[u8]) -> Result<Environment, Fault> {
+    let image = exr::decode_rgb(path, bytes, MAX_ENVIRONMENT_TEXELS).map_err(|error| match error {
         ExrError::NoColour { channels, .. } => Fault {
             reason: format!("it has no channels R, G and B, only {channels}"),
             remedy: "write the picture as plain RGB",
@@ -95,13 +98,25 @@ fn read_exr(path: &Path) -> Result<Environment, Fault> {
             reason: format!("it has {compression}, which is not read"),
             remedy: "store the picture with ZIP compression",
         },
-        ExrError::TooLarge { width, height, .. } => Fault {
-            reason: format!("the image has {width} x {height} texels, more than {MAX_SIDE} x {MAX_SIDE}"),
-            remedy: "scale the image down to 16384 texels a side or less",
-        },
+        ExrError::TooLarge { width, height, .. } => too_large([width, height]),
         other => Fault { reason: other.to_string(), remedy: "export or copy the picture again" },
     })?;
     let size = [image.width, image.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
-    check_size(size)?;
+    check_map_size(size)?;
     Ok(Environment::of(size, image.pixels))
+}
+
+/// Checks a map's size against the limits.
+pub(super) fn check_map_size(size: [u32; 2]) -> Result<(), Fault> {
+    let [width, height] = size.map(u64::from);
+    let is_too_large =
+        size.into_iter().any(|side| side > MAX_SIDE) || width * height > MAX_ENVIRONMENT_TEXELS;
+    if is_too_large { Err(too_large(size)) } else { check_size(size) }
+}
+
+fn too_large([width, height]: [impl Display; 2]) -> Fault {
+    let reason = format!(
+        "the map has {width} x {height} texels, more than {MAX_SIDE} a side or {MAX_ENVIRONMENT_TEXELS} in all"
+    );
+    Fault { reason, remedy: "scale the map down to 8192 x 4096 texels or less" }
 }

@@ -17,7 +17,7 @@ mod triangle;
 use glam::Vec3;
 
 pub use self::camera::Camera;
-pub use self::environment::Environment;
+pub use self::environment::{Environment, MAX_ENVIRONMENT_TEXELS};
 pub use self::light::{PunctualKind, PunctualLight};
 pub use self::material::{MAX_EXPONENT, Material, Reflection, Transmission};
 pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};

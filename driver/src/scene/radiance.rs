@@ -1,7 +1,8 @@
 //! Pictures of the Radiance system: `.hdr`, `.pic` (Ward, "Real Pixels", Graphics Gems II, 1991; "Radiance Picture File
 //! Format", <https://radsite.lbl.gov/radiance/refer/filefmts.pdf>).
 
-use super::raster::{Fault, check_size};
+use super::environment::check_map_size;
+use super::raster::Fault;
 
 /// The first bytes; the program's name follows.
 pub(super) const MAGIC: &[u8] = b"#?";
@@ -38,7 +39,7 @@ struct Header {
 /// Width and height, and radiance in rows from the top.
 pub(super) fn read(bytes: &[u8]) -> Result<([u32; 2], Vec<[f32; 3]>), Fault> {
     let (header, mut rest) = read_header(bytes)?;
-    check_size(header.size)?;
+    check_map_size(header.size)?;
     let [width, height] = header.size.map(|side| side as usize);
     if (width * height) as u64 > TEXELS_OF_A_BYTE * bytes.len() as u64 {
         return Err(damaged(format!("{width} x {height} texels do not fit into {} bytes", bytes.len())));
@@ -221,7 +222,8 @@ mod tests {
             ("\n+X 1 -Y 1\n", "+X 1 -Y 1"),
             ("\n-Y 1 +X 100000\n", "100000 x 1"),
             ("\n-Y 0 +X 1\n", "no texels"),
-            ("\n-Y 16384 +X 16384\n", "do not fit"),
+            ("\n-Y 8192 +X 8192\n", "do not fit"),
+            ("\n-Y 8192 +X 8193\n", "67108864 in all"),
             ("\n-Y 1 +X 2\n", "ends"),
             ("no end", "header"),
         ];

@@ -19,7 +19,7 @@ pub(crate) use material::{lobe_power, mirror};
 pub use seen::Seen;
 pub use specular::Specular;
 pub use surface::{Surface, read_surface};
-pub use texture::{read_texture, sample_texture};
+pub use texture::{decode_texel, read_texture, sample_texture};
 pub use triangle::{Intersection, RayFrame};
 
 use core::ops::Range;

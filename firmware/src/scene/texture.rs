@@ -118,10 +118,11 @@ fn texel(
         scene.line(memory, SectionKind::Texels, line, first..first + TEXEL_BYTES)?;
     let texel = bytes.as_chunks().0.get(place);
     let texel = *texel.ok_or(Fault { code: FaultCode::Record, detail: line })?;
-    Ok(decode(texture.format, texel))
+    Ok(decode_texel(texture.format, texel))
 }
 
-fn decode(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
+/// What a texel stands for: linear red, green, blue and alpha.
+pub fn decode_texel(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
     let linear = |channel: u8| f32::from(channel) * (1.0 / 255.0);
     let [red, green, blue, alpha] = texel;
     match format {
@@ -192,9 +193,9 @@ mod tests {
         let bits = |red: u32, green: u32, blue: u32, exponent: u32| {
             (red | green << 9 | blue << 18 | exponent << 27).to_le_bytes()
         };
-        assert_eq!(decode(TexelFormat::SharedExponent, bits(256, 128, 0, 16)), [1.0, 0.5, 0.0, 1.0]);
-        assert_eq!(decode(TexelFormat::SharedExponent, bits(511, 1, 2, 31))[0], 65_408.0);
-        assert_eq!(decode(TexelFormat::SharedExponent, [0; 4]), [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(decode_texel(TexelFormat::SharedExponent, bits(256, 128, 0, 16)), [1.0, 0.5, 0.0, 1.0]);
+        assert_eq!(decode_texel(TexelFormat::SharedExponent, bits(511, 1, 2, 31))[0], 65_408.0);
+        assert_eq!(decode_texel(TexelFormat::SharedExponent, [0; 4]), [0.0, 0.0, 0.0, 1.0]);
     }
 
     #[track_caller]
