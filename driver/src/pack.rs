@@ -8,30 +8,26 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::budget::Budget;
 use photoncard_shared::image::{self, HEADER_LINES, Header, SECTIONS, Section, SectionKind};
 use photoncard_shared::layout::{
     self, BvhNode, DistantLight, LEAF_TRIANGLES, NodeBox, Photon, PhotonGrid, PhotonLeaf, Record, WideNode,
     power_of_two_above,
 };
-use photoncard_shared::message::Radiance;
 
 use crate::bvh::{self, HierarchyError, LeafTriangles};
 use crate::light::{Lights, Sources};
 use crate::photon::leaves::PhotonTree;
 use crate::photon::map::{balance, for_each_in_heap};
 use crate::photon::stored::StoredPhoton;
-use crate::photon::{PhotonLayout, Photons, search_radius};
+use crate::photon::{Photons, search_radius};
 use crate::scene::Scene;
 
+mod budget;
 mod corners;
 mod materials;
 mod textures;
 
 use self::corners::PackedCorners;
-
-/// Photons of a line of leaves, the inner nodes' lines counted in, about.
-const PHOTONS_OF_A_LEAF: usize = 9;
 
 /// The sections of the photon map, irradiance points among them.
 const PHOTON_SECTIONS: [SectionKind; 7] = [
@@ -59,7 +55,7 @@ pub enum PackError {
     Hierarchy(#[from] HierarchyError),
     /// The image has more lines than an address can tell.
     #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
-    #[diagnostic(help("lower --photons, or simplify the scene"))]
+    #[diagnostic(help("lower --photons, use smaller textures, or simplify the scene"))]
     TooLarge {
         /// Bytes of the image.
         bytes: u64,
@@ -205,50 +201,6 @@ impl PackedScene {
         self.lines.len() as u64 * LINE_BYTES as u64
     }
 
-    /// Checks that an image of this scene may fit a card's memory with so many photons: in leaves as they are about, and
-    /// with irradiance points if radiance is precomputed.
-    ///
-    /// # Errors
-    /// If not; the error says what to lower.
-    pub fn check_budget(
-        &self,
-        photons: usize,
-        layout: PhotonLayout,
-        radiance: Radiance,
-        budget: &Budget,
-    ) -> Result<(), PackError> {
-        let per_line = match layout {
-            PhotonLayout::Jensen => Photon::PER_LINE,
-            // With the inner nodes; what does not fit after all is found when the map is there.
-            PhotonLayout::Lines => PHOTONS_OF_A_LEAF,
-        };
-        let points_per_line = (radiance == Radiance::Precomputed).then_some(PHOTONS_OF_A_LEAF);
-        let lines = |photons: usize| {
-            photons.div_ceil(per_line) + points_per_line.map_or(0, |per_line| photons.div_ceil(per_line))
-        };
-        let photon_bytes = (lines(photons) * LINE_BYTES) as u64;
-        let needed = self.bytes() + photon_bytes;
-        let available = budget.dram_bytes as u64;
-        if needed <= available {
-            return Ok(());
-        }
-        let free = available.saturating_sub(self.bytes()) / LINE_BYTES as u64;
-        let room = match points_per_line {
-            None => free * per_line as u64,
-            // Both last lines may be short.
-            Some(points) => free.saturating_sub(1) * (per_line * points) as u64 / (per_line + points) as u64,
-        };
-        let remedy = if room > 0 {
-            format!("lower --photons to {room} or less, or use a card with more memory")
-        } else {
-            format!(
-                "the scene alone takes {} bytes: simplify it, or use a card with more memory",
-                self.bytes()
-            )
-        };
-        Err(PackError::Dram { needed, photons: photon_bytes, available, remedy })
-    }
-
     /// Adds the photon map, in leaves, for searches of about so many neighbours.
     ///
     /// # Errors
@@ -388,28 +340,6 @@ impl CardImage {
         header.lines = lines.len() as u32;
         lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
         Ok(Self { lines })
-    }
-
-    /// Checks that the image fits a card's memory.
-    ///
-    /// # Errors
-    /// If not.
-    pub fn check_budget(&self, budget: &Budget) -> Result<(), PackError> {
-        let (needed, available) = (self.bytes(), budget.dram_bytes as u64);
-        if needed <= available {
-            return Ok(());
-        }
-        let (SceneImage { header }, _) = self.view();
-        let lines = |kind: SectionKind| {
-            let lines = header.section(kind).records.div_ceil(kind.records_per_line());
-            u64::from(lines) * LINE_BYTES as u64
-        };
-        Err(PackError::Dram {
-            needed,
-            photons: PHOTON_SECTIONS.into_iter().map(lines).sum(),
-            available,
-            remedy: "lower --photons, or use a card with more memory".into(),
-        })
     }
 
     /// Bytes of the image.
