@@ -7,20 +7,18 @@
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::budget::Budget;
 use photoncard_shared::image::{self, HEADER_LINES, Header, SECTIONS, Section, SectionKind};
 use photoncard_shared::layout::{
-    self, BvhNode, DistantLight, LEAF_TRIANGLES, NodeBox, Photon, PhotonGrid, Record, WideNode,
-    power_of_two_above,
+    self, BvhNode, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, WideNode, power_of_two_above,
 };
-use photoncard_shared::message::Radiance;
 
 use crate::bvh::{self, HierarchyError, LeafTriangles};
 use crate::light::{Lights, Sources};
 use crate::photon::leaves::PhotonTree;
-use crate::photon::{PhotonLayout, Photons, search_radius};
+use crate::photon::{Photons, search_radius};
 use crate::scene::Scene;
 
+mod budget;
 mod card_image;
 mod corners;
 mod lines;
@@ -30,9 +28,6 @@ mod textures;
 pub use self::card_image::CardImage;
 use self::corners::PackedCorners;
 use self::lines::append;
-
-/// Photons of a line of leaves, the inner nodes' lines counted in, about.
-const PHOTONS_OF_A_LEAF: usize = 9;
 
 /// Textures that materials can tell apart.
 const MOST_TEXTURES: usize = layout::NO_TEXTURE as usize;
@@ -46,7 +41,7 @@ pub enum PackError {
     Hierarchy(#[from] HierarchyError),
     /// The image has more lines than an address can tell.
     #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
-    #[diagnostic(help("lower --photons, or simplify the scene"))]
+    #[diagnostic(help("lower --photons, use smaller textures, or simplify the scene"))]
     TooLarge {
         /// Bytes of the image.
         bytes: u64,
@@ -192,50 +187,6 @@ impl PackedScene {
     /// Bytes of the scene's lines.
     pub fn bytes(&self) -> u64 {
         self.lines.len() as u64 * LINE_BYTES as u64
-    }
-
-    /// Checks that an image of this scene may fit a card's memory with so many photons: in leaves as they are about, and
-    /// with irradiance points if radiance is precomputed.
-    ///
-    /// # Errors
-    /// If not; the error says what to lower.
-    pub fn check_budget(
-        &self,
-        photons: usize,
-        layout: PhotonLayout,
-        radiance: Radiance,
-        budget: &Budget,
-    ) -> Result<(), PackError> {
-        let per_line = match layout {
-            PhotonLayout::Jensen => Photon::PER_LINE,
-            // With the inner nodes; what does not fit after all is found when the map is there.
-            PhotonLayout::Lines => PHOTONS_OF_A_LEAF,
-        };
-        let points_per_line = (radiance == Radiance::Precomputed).then_some(PHOTONS_OF_A_LEAF);
-        let lines = |photons: usize| {
-            photons.div_ceil(per_line) + points_per_line.map_or(0, |per_line| photons.div_ceil(per_line))
-        };
-        let photon_bytes = (lines(photons) * LINE_BYTES) as u64;
-        let needed = self.bytes() + photon_bytes;
-        let available = budget.dram_bytes as u64;
-        if needed <= available {
-            return Ok(());
-        }
-        let free = available.saturating_sub(self.bytes()) / LINE_BYTES as u64;
-        let room = match points_per_line {
-            None => free * per_line as u64,
-            // Both last lines may be short.
-            Some(points) => free.saturating_sub(1) * (per_line * points) as u64 / (per_line + points) as u64,
-        };
-        let remedy = if room > 0 {
-            format!("lower --photons to {room} or less, or use a card with more memory")
-        } else {
-            format!(
-                "the scene alone takes {} bytes: simplify it, or use a card with more memory",
-                self.bytes()
-            )
-        };
-        Err(PackError::Dram { needed, photons: photon_bytes, available, remedy })
     }
 
     /// Adds the photon map, in leaves, for searches of about so many neighbours.

@@ -4,7 +4,6 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::budget::Budget;
 use photoncard_shared::image::{HEADER_LINES, Header, Section, SectionKind};
 use photoncard_shared::layout::{NodeBox, Photon, PhotonLeaf, Record};
 
@@ -16,7 +15,7 @@ use crate::photon::stored::StoredPhoton;
 use crate::photon::{Photons, search_radius};
 
 /// The sections of the photon map, irradiance points among them.
-const PHOTON_SECTIONS: [SectionKind; 7] = [
+pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
     SectionKind::Photons,
     SectionKind::PhotonNodes,
     SectionKind::PhotonLeaves,
@@ -156,28 +155,6 @@ impl CardImage {
         header.lines = lines.len() as u32;
         lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
         Ok(Self { lines })
-    }
-
-    /// Checks that the image fits a card's memory.
-    ///
-    /// # Errors
-    /// If not.
-    pub fn check_budget(&self, budget: &Budget) -> Result<(), PackError> {
-        let (needed, available) = (self.bytes(), budget.dram_bytes as u64);
-        if needed <= available {
-            return Ok(());
-        }
-        let (SceneImage { header }, _) = self.view();
-        let lines = |kind: SectionKind| {
-            let lines = header.section(kind).records.div_ceil(kind.records_per_line());
-            u64::from(lines) * LINE_BYTES as u64
-        };
-        Err(PackError::Dram {
-            needed,
-            photons: PHOTON_SECTIONS.into_iter().map(lines).sum(),
-            available,
-            remedy: "lower --photons, or use a card with more memory".into(),
-        })
     }
 
     /// Bytes of the image.
