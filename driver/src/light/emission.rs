@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn a_single_texel_of_a_large_texture_counts_where_the_triangle_shows_it() {
         // Cells of a side that is no power of four may have 3 x 3 texels, or cells, instead of 4 x 4.
-        for (side, tolerance) in [(1000, 7.0 / 9.0), (1023, 7.0 / 9.0), (1024, 0.03)] {
+        for (side, tolerance) in [(1000, 7.0 / 9.0), (1023, 7.0 / 9.0), (1024, 0.15)] {
             let spark = |x: usize, y: usize| mean(&scene_of(side, y * side as usize + x));
             let once = 3.0 / (0.5 * f64::from(side * side));
             for (x, y) in [(640, 160), (side as usize - 2, 0), (900, 400)] {
