@@ -74,10 +74,7 @@ impl Mean {
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, Instant};
-
     use glam::Vec2;
-    use rayon::prelude::*;
 
     use super::*;
     use crate::scene::{Encoding, Texture};
@@ -141,19 +138,14 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_costs_no_more_for_a_large_texture() {
-        let scene = scene_of(1024, 160 * 1024 + 640);
-        let textures = EmissiveTextures::new(&scene);
-        let triangle = Triangle { attributes: 0, ..Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y], 0) };
-        let mut material = Material::lambertian("glow", Vec3::ZERO);
-        (material.emission, material.emissive_texture) = (Vec3::ONE, Some(0));
-        let begin = Instant::now();
-        let sum: f64 =
-            (0..10_000).into_par_iter().map(|_| textures.mean_radiance(&triangle, &material).x).sum();
-        let duration = begin.elapsed();
-        println!("10,000 triangles: {duration:?}");
-        assert!(sum > 0.0);
-        // All texels of each would take twenty.
-        assert!(duration < Duration::from_secs(6), "{duration:?}");
+    fn a_triangle_looks_at_few_texels_of_a_texture_of_any_size() {
+        let scene = scene(0);
+        let footprint = Footprint::new(&Texture::new(0), &scene.attributes[0]);
+        for side in [16, 64, 1024, 16_384] {
+            let mut cells = 0;
+            let is_seen = footprint.for_each_cell([side, side], REACH, |_, _| cells += 1);
+            assert!(cells <= 8192, "{cells} of a side of {side}");
+            assert_eq!(is_seen, cells > 0, "a coarser level is looked at instead of a side of {side}");
+        }
     }
 }
