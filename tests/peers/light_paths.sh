@@ -3,8 +3,9 @@
 #
 #   tests/peers/light_paths.sh [SCENE ...] [-- OPTION ...]      cornell-spheres, room, atrium-sky; all without any
 #
-# The options after -- go to `photoncard render` in place of `--spp 16 --photons 1000000 --gather-rays 200`. The references are those of tests/references; one that is not there is
-# rendered by Mitsuba 3, which takes an hour or so, and put there. PHOTONCARD may name a command that is built.
+# The options after -- go to `photoncard render` in place of `--spp 16 --photons 1000000 --gather-rays 200`. The references are
+# those of tests/references; one that is not there is rendered by Mitsuba 3, which takes an hour or so, and put there. PHOTONCARD
+# may name a command that is built.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
