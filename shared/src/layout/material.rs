@@ -86,7 +86,7 @@ impl Material {
         let [first, second] = [read_vector(bytes, 0), read_vector(bytes, 12)];
         let [a, b] = [read_f32(bytes, 24), read_f32(bytes, 28)];
         let textures = [read_u32(bytes, 52), read_u32(bytes, 56)];
-        let share = |shift: u32| (textures[1] >> shift & 0xff) as f32 * (1.0 / 255.0);
+        let share = |shift: u32| (textures[1] >> shift & 0xff) as f32 / 255.0;
         Self {
             reflectance: match kind >> KIND_SHIFT {
                 METALLIC_ROUGHNESS => Reflectance::MetallicRoughness {
