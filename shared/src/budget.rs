@@ -77,7 +77,7 @@ pub const MICRO: Budget = Budget {
     dram_bytes: 16 << 20,
     photon_cache_bytes: 64 << 10,
     scene_cache_bytes: 32 << 10,
-    stack_bytes: 16 << 10,
+    stack_bytes: 24 << 10,
     tile_pixels: 256,
     neighbors: 128,
     gather_rays: MOST_GATHER_RAYS,

@@ -123,9 +123,7 @@ impl SpecularPath {
         }
         Arrival::GoesOn
     }
-}
 
-impl SpecularPath {
     /// Follows the path from a perfectly specular surface that it has come to, to its end: what is met there takes the place of
     /// `surface` and `hit`. `random` gives a number in [0, 1) for each bounce.
     ///
