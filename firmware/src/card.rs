@@ -14,8 +14,8 @@ use photoncard_shared::budget::{
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::{Header, LAYOUT_VERSION, SectionKind};
 use photoncard_shared::message::{
-    self, CausticGather, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXELS_BYTES,
-    PROTOCOL_VERSION, PixelRecord, Radiance, Reply, Tile, record_bytes,
+    self, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXELS_BYTES, PROTOCOL_VERSION, Parameter,
+    PixelRecord, Radiance, Reply, Tile, record_bytes,
 };
 use photoncard_shared::transport::Transport;
 
@@ -366,37 +366,39 @@ fn hello(budget: &Budget, written_lines: u32, memory_use: Option<MemoryUse>) -> 
     }
 }
 
-/// Compares a frame's parameters with the budget and the image; the fault's detail is the parameter's index.
+/// Compares a frame's parameters with the budget and the image.
 fn check_frame(budget: &Budget, header: &Header, frame: &FrameParameters) -> Result<(), Fault> {
     let camera = &frame.camera;
     let camera = [camera.origin, camera.forward, camera.right, camera.up];
     let within = |value: u32, most: u32| (1..=most).contains(&value);
+    let is_length = |distance: f32| distance.is_finite() && distance > 0.0;
+    let neighbors = |count: u32| count >= 2 && within(count, budget.neighbors);
     let checks = [
-        within(frame.width, MAX_PICTURE_SIDE),
-        within(frame.height, MAX_PICTURE_SIDE),
-        camera.as_flattened().iter().all(|component| component.is_finite()),
-        true,
-        within(frame.samples, budget.samples),
-        frame.gather_rays <= budget.gather_rays,
-        frame.shadow_rays <= budget.shadow_rays,
-        frame.neighbors >= 2 && within(frame.neighbors, budget.neighbors),
-        frame.max_distance.is_finite() && frame.max_distance > 0.0,
-        true,
-        frame.irradiance_error.is_none_or(|error| (LEAST_IRRADIANCE_ERROR..=1.0).contains(&error)),
-        within(frame.bins, MOST_BINS),
-        true,
-        frame.queue >= 1,
-        frame.radiance == Radiance::Density || has_irradiance(header),
-        frame.caustics.is_none_or(|CausticGather { neighbors, max_distance }| {
-            let is_length = max_distance.is_finite() && max_distance > 0.0;
-            neighbors >= 2 && within(neighbors, budget.neighbors) && is_length
-        }),
-        true,
+        (Parameter::Width, within(frame.width, MAX_PICTURE_SIDE)),
+        (Parameter::Height, within(frame.height, MAX_PICTURE_SIDE)),
+        (Parameter::Camera, camera.as_flattened().iter().all(|component| component.is_finite())),
+        (Parameter::Samples, within(frame.samples, budget.samples)),
+        (Parameter::GatherRays, frame.gather_rays <= budget.gather_rays),
+        (Parameter::ShadowRays, frame.shadow_rays <= budget.shadow_rays),
+        (Parameter::Neighbors, neighbors(frame.neighbors)),
+        (Parameter::MaxDistance, is_length(frame.max_distance)),
+        (Parameter::IrradianceError, frame.irradiance_error.is_none_or(is_irradiance_error)),
+        (Parameter::Bins, within(frame.bins, MOST_BINS)),
+        (Parameter::Queue, frame.queue >= 1),
+        (Parameter::Radiance, frame.radiance == Radiance::Density || has_irradiance(header)),
+        (
+            Parameter::Caustics,
+            frame.caustics.is_none_or(|gather| neighbors(gather.neighbors) && is_length(gather.max_distance)),
+        ),
     ];
-    match checks.iter().position(|&holds| !holds) {
-        Some(index) => Err(Fault { code: FaultCode::Parameter, detail: index as u32 }),
+    match checks.iter().find(|(_, holds)| !holds) {
+        Some((parameter, _)) => Err(parameter.fault()),
         None => Ok(()),
     }
+}
+
+fn is_irradiance_error(error: f32) -> bool {
+    (LEAST_IRRADIANCE_ERROR..=1.0).contains(&error)
 }
 
 /// Whether an image has irradiance points, or no photons that they could be of.

@@ -14,8 +14,10 @@
 //!
 //! Whatever a card cannot do it answers with [`Reply::Fault`]; it stays ready for the next command.
 
+mod fault;
 mod pixel;
 
+pub use self::fault::{Fault, FaultCode, Parameter};
 pub use self::pixel::{
     LAYER_BYTES, PIXEL_BYTES, PIXELS_BYTES, Pixel, PixelLayers, PixelRecord, record_bytes,
 };
@@ -262,46 +264,6 @@ pub enum Reply<'a> {
     },
     /// A command could not be done.
     Fault(Fault),
-}
-
-/// Why a card could not do a command, and a number that says where.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Fault {
-    /// What is wrong.
-    pub code: FaultCode,
-    /// Where: a line, a record, a value; see the code.
-    pub detail: u32,
-}
-
-/// Numbered faults; the numbers are part of the protocol.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum FaultCode {
-    /// A payload is not a command; detail: its bytes.
-    Message,
-    /// The command does not fit the state of the session; detail: 0.
-    Order,
-    /// The image does not fit in the card's memory; detail: the lines there are.
-    ImageTooLarge,
-    /// Lines are not whole, not of the image, or too many; detail: the first.
-    Lines,
-    /// Chunks are not of what is written, or too many; detail: the first.
-    Chunks,
-    /// The image's checksum differs; detail: the lower half of the checksum found.
-    ImageChecksum,
-    /// The image's header is not sound; detail: the image's layout version for a wrong version, else 0.
-    ImageHeader,
-    /// A frame parameter is outside the budget, not a number, or asks for what the image does not have; detail: its index in [`FrameParameters`].
-    Parameter,
-    /// A tile is empty, outside the picture or above the budget; detail: its number.
-    Tile,
-    /// More tiles than the budget's; detail: the tile's number.
-    TooManyTiles,
-    /// A line outside the card's memory was asked for; detail: the line.
-    LineRange,
-    /// A record outside its section was asked for; detail: its index.
-    Record,
-    /// A bounding volume hierarchy that is deeper than the stack, or no tree; detail: the node.
-    Depth,
 }
 
 /// Writes a message into `bytes`; its length, or `None` if there is no room.

@@ -356,3 +356,13 @@ fn a_pixel_survives_its_record() {
     }
     assert_eq!(PixelRecord::read(&[bytes, vec![0]].concat()), None);
 }
+
+#[test]
+fn faults_are_words_that_name_the_parameter() {
+    for parameter in Parameter::ALL {
+        let words = parameter.fault().to_string();
+        assert!(words.contains(&format!("`{}`", parameter.name())), "{words}");
+    }
+    let unknown = Fault { code: FaultCode::Parameter, detail: 99 };
+    assert!(unknown.to_string().contains("parameter 99"));
+}

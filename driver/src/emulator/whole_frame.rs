@@ -48,7 +48,7 @@ pub enum FrameError {
         gathers: u64,
     },
     /// The image is not sound.
-    #[error("the image is not sound: fault {:?} ({})", .0.code, .0.detail)]
+    #[error("the card image is not sound: {0}")]
     Image(Fault),
     /// The system has no threads.
     #[error("the chips could not be started: {0}")]

@@ -45,7 +45,7 @@ pub enum RenderError {
     #[diagnostic(transparent)]
     Photons(PhotonError),
     /// The image that was just packed is not sound.
-    #[error("the packed image is not sound: fault {:?} ({})", .0.code, .0.detail)]
+    #[error("the packed card image is not sound: {0}")]
     #[diagnostic(help("this is a fault of the program: please report it with the scene"))]
     Image(Fault),
     /// A card could not be started.

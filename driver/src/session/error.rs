@@ -42,7 +42,7 @@ pub enum SessionError {
     ))]
     OtherBudget,
     /// The card could not do a command.
-    #[error("the card answered with fault {:?} ({})", .0.code, .0.detail)]
+    #[error("the card answers with a fault: {0}")]
     #[diagnostic(help(
         "this is a fault of the program or of the card: please report it with the command used"
     ))]
