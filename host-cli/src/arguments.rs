@@ -10,7 +10,7 @@ use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::film::Window;
 use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::partial::PartialSettings;
-use photoncard_driver::photon::PhotonLayout;
+use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 

@@ -14,7 +14,7 @@ use super::present::{
     table, text,
 };
 use crate::emulator::memory_model::{CacheSettings, CacheSpec};
-use crate::photon::PhotonLayout;
+use crate::photon_map::PhotonLayout;
 use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 

@@ -15,7 +15,7 @@ use super::present::{
     columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table, text,
 };
 use super::workload::tile_seconds;
-use crate::photon::PhotonLayout;
+use crate::photon_map::PhotonLayout;
 use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 

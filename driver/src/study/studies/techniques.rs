@@ -8,7 +8,7 @@ use super::SCENES;
 use super::present::{
     GIGA, cell, columns, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
 };
-use crate::photon::PhotonLayout;
+use crate::photon_map::PhotonLayout;
 use crate::render::{Radiance, RenderSettings, Sampling};
 use crate::scheduler::GatherOrder;
 
