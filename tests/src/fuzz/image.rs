@@ -12,7 +12,9 @@ use photoncard_shared::message::{
     CausticGather, Command, Drain, FaultCode, FrameParameters, Radiance, Sampling, Tile,
 };
 
-use super::{Random, Target, bound, mutation};
+use super::mutation;
+use super::random::Random;
+use super::target::{Target, bound};
 use crate::everything::everything;
 use crate::wire::{Answer, Wire};
 use crate::{camera, lambertian, room, scene};
