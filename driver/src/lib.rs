@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bvh;
+mod density;
 pub mod difference;
 pub mod display;
 pub mod emulator;
@@ -16,6 +17,7 @@ pub mod output;
 pub mod pack;
 pub mod partial;
 pub mod photon;
+pub mod photon_map;
 pub mod preview;
 pub mod render;
 pub mod scene;

@@ -1,81 +1,35 @@
-//! The card image: everything a chip needs of a scene, in lines.
+//! Packing: a scene as the sections of a card image, in lines.
 //!
-//! It grows in two steps. A [`PackedScene`] holds hierarchy, triangles, materials and emitters; the photon pass traces
-//! in it with the chip's own ray caster, so that photons land on exactly the surfaces that gather rays meet. With a
-//! photon map it becomes a [`CardImage`].
+//! A [`PackedScene`] holds hierarchy, triangles, materials and lights. The photon pass ([`crate::photon`]) traces in it with the
+//! chip's own ray caster, so that photons land on exactly the surfaces that gather rays meet. [`crate::photon_map`]
+//! adds the sections of the photon map.
 
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
-use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::image::{self, HEADER_LINES, Header, SECTIONS, Section, SectionKind};
+use photoncard_shared::image::{Header, SECTIONS, Section, SectionKind};
 use photoncard_shared::layout::{
-    self, BvhNode, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, WideNode, power_of_two_above,
+    self, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, power_of_two_above,
 };
 
-use crate::bvh::{self, HierarchyError, LeafTriangles};
+use crate::bvh::{self, LeafTriangles};
 use crate::light::{Lights, Sources};
-use crate::photon::leaves::PhotonTree;
-use crate::photon::{Photons, search_radius};
 use crate::scene::Scene;
 
-mod budget;
 mod card_image;
 mod corners;
-mod lines;
+mod error;
 mod materials;
 mod textures;
+mod writer;
 
 pub use self::card_image::CardImage;
 use self::corners::PackedCorners;
-use self::lines::append;
+pub use self::error::PackError;
+pub(crate) use self::writer::ImageWriter;
 
-/// Textures that materials can tell apart.
-const MOST_TEXTURES: usize = layout::NO_TEXTURE as usize;
-
-/// Why a scene does not fit a card.
-#[derive(Debug, thiserror::Error, miette::Diagnostic)]
-pub enum PackError {
-    /// The hierarchy is not one for a chip.
-    #[error(transparent)]
-    #[diagnostic(help("simplify the scene's geometry"))]
-    Hierarchy(#[from] HierarchyError),
-    /// The image has more lines than an address can tell.
-    #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
-    #[diagnostic(help("lower --photons, use smaller textures, or simplify the scene"))]
-    TooLarge {
-        /// Bytes of the image.
-        bytes: u64,
-    },
-    /// More textures than a material can tell.
-    #[error("the scene has {textures} textures; a card tells {MOST_TEXTURES} apart")]
-    #[diagnostic(help("join textures of the same image and sampler, or split the scene"))]
-    TooManyTextures {
-        /// Textures of the scene.
-        textures: usize,
-    },
-    /// The image is larger than the card's memory.
-    #[error(
-        "the card image takes {needed} bytes ({photons} of them photons), the card's DRAM budget is {available} bytes"
-    )]
-    #[diagnostic(help("{remedy}"))]
-    Dram {
-        /// Bytes of the image.
-        needed: u64,
-        /// Bytes of the photon map alone.
-        photons: u64,
-        /// Bytes of the card's DRAM.
-        available: u64,
-        /// What to lower, and how far.
-        remedy: String,
-    },
-}
-
-/// The scene in lines, without photons.
+/// The card image of a scene without photons, and the sources that light it.
 pub struct PackedScene {
-    lines: Vec<Line>,
-    sections: [Section; SECTIONS],
-    radiance_unit: f32,
-    lights: image::Lights,
+    image: CardImage,
     sources: Sources,
     aimed_sources: Option<Sources>,
     keeps_photons: bool,
@@ -88,125 +42,90 @@ impl PackedScene {
     /// If the geometry is too much for a chip, or there are more textures or lights than it can tell apart.
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
         let lights = Lights::new(scene);
-        let cut_out: Vec<bool> =
-            scene.materials.iter().map(|material| material.alpha_cutoff.is_some()).collect();
-        let hierarchy = bvh::build(&scene.triangles, &cut_out)?;
-        let corners = PackedCorners::new(scene, &lights, &hierarchy.leaf_triangles);
-        let textures = textures::records(scene, lights.environment())?;
-        let places = places_in_image(scene, &hierarchy.leaf_triangles);
-        let mut packed = Self {
-            // The first are the header's.
-            lines: vec![Line::ZERO; HEADER_LINES],
-            sections: [Section::default(); SECTIONS],
-            radiance_unit: radiance_unit(scene, &lights),
-            lights: lights.header(scene.textures.len() as u32),
+        Ok(Self {
+            image: write(scene, &lights)?,
             sources: Sources::new(scene, &lights),
             aimed_sources: Sources::aimed(scene, &lights),
             keeps_photons: scene.keeps_photons(),
-        };
-        packed.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
-        packed.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
-        packed.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
-        packed.append(SectionKind::Attributes, corners.records.iter().map(layout::Attributes::to_bytes))?;
-        packed.append(SectionKind::Materials, materials::records(scene, &lights))?;
-        packed.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
-        packed.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;
-        let place = |triangle: usize| places.get(triangle).copied().unwrap_or(0);
-        packed.append(SectionKind::Emitters, lights.emitters(place).map(|emitter| emitter.to_bytes()))?;
-        packed.append(SectionKind::LightNodes, lights.nodes())?;
-        packed.append(SectionKind::DistantLights, lights.distant().iter().map(DistantLight::to_bytes))?;
-        let cells = lights.cell_thresholds();
-        packed
-            .append(SectionKind::EnvironmentCells, cells.iter().map(|threshold| threshold.to_le_bytes()))?;
-        Ok(packed)
-    }
-
-    fn append<const N: usize>(
-        &mut self,
-        kind: SectionKind,
-        records: impl ExactSizeIterator<Item = [u8; N]>,
-    ) -> Result<(), PackError> {
-        append(&mut self.lines, &mut self.sections, kind, records)
-    }
-
-    /// Appends whole lines, as they are made.
-    fn append_lines(
-        &mut self,
-        kind: SectionKind,
-        lines: impl Iterator<Item = Line>,
-    ) -> Result<(), PackError> {
-        let first = self.lines.len();
-        self.lines.extend(lines);
-        let too_large = |_| PackError::TooLarge { bytes: self.lines.len() as u64 * LINE_BYTES as u64 };
-        let [first_line, end] = [first, self.lines.len()].map(u32::try_from);
-        let first_line = first_line.map_err(too_large)?;
-        self.sections[kind as usize] = Section { first_line, records: end.map_err(too_large)? - first_line };
-        Ok(())
-    }
-
-    fn header(&self, photon_power_unit: f32, photon_grid: PhotonGrid) -> Header {
-        Header {
-            // `append` has checked that the number of lines fits.
-            lines: self.lines.len() as u32,
-            photon_power_unit,
-            caustic_power_unit: 1.0,
-            radiance_unit: self.radiance_unit,
-            photon_grid,
-            lights: self.lights,
-            sections: self.sections,
-        }
+        })
     }
 
     /// The scene as a chip sees it, without photons.
     pub fn view(&self) -> (SceneImage, Lines<'_>) {
-        (SceneImage { header: self.header(1.0, PhotonGrid::UNIT) }, Lines(&self.lines))
+        self.image.view()
+    }
+
+    /// The card image, without photons.
+    pub(crate) fn image(&self) -> &CardImage {
+        &self.image
+    }
+
+    /// The card image, to be completed.
+    pub(crate) fn into_image(self) -> CardImage {
+        self.image
     }
 
     /// The grid for photons' positions: the finest that holds the scene.
     pub fn photon_grid(&self) -> PhotonGrid {
-        let (scene, mut memory) = self.view();
-        root_box(&scene, &mut memory)
+        self.image
+            .bounds()
             .map_or(PhotonGrid::UNIT, |NodeBox { lower, upper }| PhotonGrid::around(lower, upper))
     }
 
-    /// Where photons come from.
+    /// The sources of photons.
     pub(crate) fn sources(&self) -> &Sources {
         &self.sources
     }
 
-    /// Where photons of caustics come from, aimed at what is perfectly specular; `None` if nothing is.
+    /// The sources of caustic photons, aimed at perfectly specular surfaces; `None` if there are none.
     pub(crate) fn aimed_sources(&self) -> Option<&Sources> {
         self.aimed_sources.as_ref()
     }
 
-    /// Whether there is any surface that photons are stored at.
+    /// True if photons are stored at any surface.
     pub(crate) fn keeps_photons(&self) -> bool {
         self.keeps_photons
     }
+}
 
-    /// Bytes of the scene's lines.
-    pub fn bytes(&self) -> u64 {
-        self.lines.len() as u64 * LINE_BYTES as u64
-    }
+/// Writes the sections of a scene.
+fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
+    let cut_out: Vec<bool> = scene.materials.iter().map(|material| material.alpha_cutoff.is_some()).collect();
+    let hierarchy = bvh::build(&scene.triangles, &cut_out)?;
+    let corners = PackedCorners::new(scene, lights, &hierarchy.leaf_triangles);
+    let textures = textures::records(scene, lights.environment())?;
+    let places = places_in_image(scene, &hierarchy.leaf_triangles);
+    let mut image = ImageWriter::new(header(scene, lights));
+    image.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
+    image.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
+    image.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
+    image.append(SectionKind::Attributes, corners.records.iter().map(layout::Attributes::to_bytes))?;
+    image.append(SectionKind::Materials, materials::records(scene, lights))?;
+    image.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
+    image.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;
+    let place = |triangle: usize| places.get(triangle).copied().unwrap_or(0);
+    image.append(SectionKind::Emitters, lights.emitters(place).map(|emitter| emitter.to_bytes()))?;
+    image.append(SectionKind::LightNodes, lights.nodes())?;
+    image.append(SectionKind::DistantLights, lights.distant().iter().map(DistantLight::to_bytes))?;
+    let cells = lights.cell_thresholds();
+    image.append(SectionKind::EnvironmentCells, cells.iter().map(|threshold| threshold.to_le_bytes()))?;
+    Ok(image.finish())
+}
 
-    /// Adds the photon map, in leaves, for searches of about so many neighbours.
-    ///
-    /// # Errors
-    /// If there are more lines than an address can tell.
-    pub fn with_photons(mut self, photons: Photons, neighbors: u32) -> Result<CardImage, PackError> {
-        let radius = search_radius(&photons, neighbors);
-        let Photons { mut list, grid, power_unit } = photons;
-        if let Some(tree) = PhotonTree::new(&mut list, radius) {
-            self.append(SectionKind::PhotonNodes, tree.nodes())?;
-            self.append(SectionKind::PhotonLeaves, tree.leaves())?;
-        }
-        let header = self.header(power_unit, grid).to_lines();
-        self.lines[..HEADER_LINES].copy_from_slice(&header);
-        Ok(CardImage { lines: self.lines })
+/// The header of a scene without photons: units and lights. Lines and sections are the writer's.
+fn header(scene: &Scene, lights: &Lights) -> Header {
+    Header {
+        lines: 0,
+        photon_power_unit: 1.0,
+        caustic_power_unit: 1.0,
+        radiance_unit: radiance_unit(scene, lights),
+        photon_grid: PhotonGrid::UNIT,
+        lights: lights.header(scene.textures.len() as u32),
+        sections: [Section::default(); SECTIONS],
     }
 }
 
-/// Where each triangle of a scene is in the card image whose leaves hold these.
+/// Of each triangle of the scene, its index in the card image, by the triangles of the image's leaves.
 fn places_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
     let mut places = vec![0; scene.triangles.len()];
     for (leaf, triangles) in leaves.iter().enumerate() {
@@ -216,13 +135,6 @@ fn places_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
         }
     }
     places
-}
-
-/// The box around a scene, and little more.
-fn root_box(scene: &SceneImage, memory: &mut Lines) -> Option<NodeBox> {
-    let line = scene.line(memory, SectionKind::Nodes, 0, 0..LINE_BYTES as u32).ok()?;
-    let children = 0..WideNode(line).children() as usize;
-    children.filter_map(|child| BvhNode(line).bounds(child)).reduce(NodeBox::union)
 }
 
 /// Fixed-point sums of radiance hold 23 bits above the unit and 40 below.

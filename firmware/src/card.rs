@@ -19,7 +19,7 @@ use photoncard_shared::message::{
 };
 use photoncard_shared::transport::Transport;
 
-use self::load::{CHECKSUMS_BYTES, Checksums, ImageState, Loader};
+use self::load::{CHECKSUMS_BYTES, Checksums, ImageState, Loader, OUT_OF_ORDER};
 use crate::chip::{Chip, MicroChip, Progress, ReferenceChip, sram_bytes};
 use crate::memory::{CardMemory, Dram};
 use crate::render::Context;
@@ -184,8 +184,6 @@ fn send(transport: &mut Transport, reply: &Reply) {
     // Every reply fits a frame: tests pin the longest.
     transport.send(|bytes| message::encode(reply, bytes));
 }
-
-const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
 impl<
     const TILE_PIXELS: usize,

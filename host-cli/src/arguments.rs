@@ -1,6 +1,7 @@
 //! The arguments of every command, and what they mean.
 
 mod picture;
+pub(crate) mod threads;
 
 use std::path::PathBuf;
 
@@ -10,11 +11,12 @@ use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::film::Window;
 use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::partial::PartialSettings;
-use photoncard_driver::photon::PhotonLayout;
+use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
 pub(crate) use self::picture::PictureOptions;
+use self::threads::threads;
 use crate::environment::EnvironmentOption;
 use crate::study::StudyArguments;
 
@@ -405,15 +407,6 @@ fn crop(text: &str) -> Result<Window, String> {
         Ok(&[x0, x1, y0, y1]) => Ok(Window { x0, x1, y0, y1 }),
         _ => Err("a crop is X0,X1,Y0,Y1: four whole numbers, such as 0,64,0,64".into()),
     }
-}
-
-/// Threads that can be asked for: a system that runs out of them half-way ends the process.
-const MAX_THREADS: usize = 1024;
-
-pub(crate) fn threads(text: &str) -> Result<usize, String> {
-    let count = text.parse().ok().filter(|count| (1..=MAX_THREADS).contains(count));
-    count
-        .ok_or_else(|| format!("use 1 to {MAX_THREADS} threads, or leave the option out for a thread a core"))
 }
 
 fn ic_error(text: &str) -> Result<f32, String> {

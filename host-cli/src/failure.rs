@@ -1,11 +1,10 @@
-//! How a command fails: what is said, and the exit status.
+//! Failures of a command: the text for people, and the exit status.
 
+use std::fmt;
 use std::process::ExitCode;
 
 use miette::{Diagnostic, MietteDiagnostic, Report};
 use photoncard_driver::render::RenderError;
-
-use crate::console::say;
 
 /// Why a command did not do its work.
 pub(crate) enum Failure {
@@ -45,21 +44,22 @@ impl Failure {
         Self::Work(Report::new(MietteDiagnostic::new(text).with_help(help)))
     }
 
-    /// Says what happened, and gives the exit status.
-    pub(crate) fn report(self) -> ExitCode {
+    /// The exit status.
+    pub(crate) fn status(&self) -> ExitCode {
         match self {
-            Self::Input(report) => {
-                say(format_args!("{report:?}"));
-                ExitCode::from(2)
-            }
-            Self::Work(report) => {
-                say(format_args!("{report:?}"));
-                ExitCode::from(1)
-            }
-            Self::Stopped(text) => {
-                say(format_args!("photoncard: {text}"));
-                ExitCode::from(130)
-            }
+            Self::Input(_) => ExitCode::from(2),
+            Self::Work(_) => ExitCode::from(1),
+            Self::Stopped(_) => ExitCode::from(130),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    /// The text for people, with its remedy.
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Input(report) | Self::Work(report) => write!(f, "{report:?}"),
+            Self::Stopped(text) => write!(f, "photoncard: {text}"),
         }
     }
 }

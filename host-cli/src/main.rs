@@ -37,6 +37,9 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+        Err(failure) => {
+            console::say(format_args!("{failure}"));
+            failure.status()
+        }
     }
 }

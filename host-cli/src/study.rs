@@ -12,7 +12,7 @@ use photoncard_driver::study::{
     SampleRate, Scale, Study, StudyError, StudyObserver, StudyOptions, run as study,
 };
 
-use crate::arguments::threads;
+use crate::arguments::threads::threads;
 use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::stop_on_signals;

@@ -48,11 +48,9 @@ pub use emitter::{Emitter, EmitterKind};
 pub use irradiance_point::IrradiancePoint;
 pub use light_node::{LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode};
 pub use material::{DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Reflectance, THIN_WALLED};
-pub use photon::{DISC_CODES, FULL_DISC, Photon, Rgbe, disc_fraction, encode_disc};
+pub use photon::{DISC_CODES, FULL_DISC, PHOTON_CONTENT_BYTES, Photon, Rgbe, disc_fraction, encode_disc};
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};
-pub use photon_leaf::{
-    LEAF_LANES, LEAF_PHOTONS, LeafCoordinates, PHOTON_CONTENT_BYTES, PhotonLeaf, leaf_capacity,
-};
+pub use photon_leaf::{LEAF_LANES, LEAF_PHOTONS, LeafCoordinates, PhotonLeaf, leaf_capacity};
 pub use photon_node::{GridBox, NodeCoordinates, PhotonNode};
 pub use texture::{TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat, Texture, Wrap};
 pub use wide_node::{Child, Links, NODE_CHILDREN, WideNode};

@@ -19,34 +19,10 @@ mod session;
 use heapless::Vec;
 
 use self::session::{Control, End, Session};
+pub use self::session::{Event, LineStatistics, WINDOW};
 #[cfg(doc)]
 use crate::frame::{FrameKind, MAX_PAYLOAD};
 use crate::frame::{FrameReader, MAX_FRAME};
-
-/// Messages on their way in one direction.
-pub const WINDOW: usize = 4;
-
-/// What a transport has seen of its line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LineStatistics {
-    /// Frames that came damaged.
-    pub damaged: u64,
-    /// Messages that were sent again.
-    pub repeated: u64,
-    /// Messages that came again.
-    pub duplicates: u64,
-    /// Probes that were sent.
-    pub probes: u64,
-}
-
-/// What came, besides messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
-    /// A whole frame of this session.
-    Heard,
-    /// The other end does not know this session.
-    Unknown,
-}
 
 /// One end of a link.
 pub struct Transport {

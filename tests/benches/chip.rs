@@ -9,7 +9,7 @@ use divan::counter::ItemsCount;
 use glam::Vec3;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
+use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;

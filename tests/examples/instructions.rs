@@ -5,7 +5,7 @@
 //! tile as a board does, in the function `measured`, and prints what it counted.
 
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::photon::map_photons;
+use photoncard_driver::photon_map::map_photons;
 use photoncard_driver::render::{RenderSettings, Sampling};
 use photoncard_driver::scene::gltf;
 use photoncard_firmware::chip::MicroChip;

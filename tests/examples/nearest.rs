@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::Photons;
+use photoncard_driver::photon_map::store_photons;
 use photoncard_firmware::gather::Place;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::sampler::hash;
@@ -71,7 +72,7 @@ fn image(points: impl Iterator<Item = [f32; 3]>) -> (CardImage, Vec<[f32; 3]>) {
     let packed = PackedScene::new(&scene).expect("packs");
     let photons = Photons::new(packed.photon_grid(), 1.0, photons);
     let positions = photons.iter().map(|photon| photon.position).collect();
-    (packed.with_photons(photons, NEIGHBORS).expect("fits"), positions)
+    (store_photons(packed, photons, NEIGHBORS).expect("fits"), positions)
 }
 
 fn search_all(image: &CardImage, queries: &[[f32; 3]]) -> (u64, f64) {

@@ -5,7 +5,7 @@ use glam::Vec3;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::film::Window;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{MappedImage, map_photons};
+use photoncard_driver::photon_map::{MappedImage, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::tiles;

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::trace;
+use photoncard_driver::photon_map::store_photons;
 use photoncard_driver::render::RenderSettings;
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::MICRO;
@@ -26,7 +27,7 @@ fn image() -> CardImage {
         scene(room([0, 0, 0, 1, 0, 0]), vec![lambertian("wall", 0.5), lamp], camera(Vec3::ZERO, Vec3::NEG_Z));
     let packed = PackedScene::new(&scene).unwrap();
     let photons = trace(&packed, 0, 500, &|_| true).unwrap().photons;
-    packed.with_photons(photons, 20).unwrap()
+    store_photons(packed, photons, 20).unwrap()
 }
 
 fn frame() -> FrameParameters {

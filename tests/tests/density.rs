@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
+use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::{Material, Scene, Triangle};
 use photoncard_firmware::gather::PartialReflection;

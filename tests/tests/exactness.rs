@@ -1,7 +1,7 @@
 //! Exactness: renders that differ only in ordering, tile size, chips or threads have identical pixels.
 
 use photoncard_driver::film::{Film, PixelValue, Window};
-use photoncard_driver::photon::PhotonLayout;
+use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{CardAddress, Radiance, RenderSettings, Sampling, Unobserved, render};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;

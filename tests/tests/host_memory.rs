@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use peak_alloc::PeakAlloc;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::photon::map_photons;
+use photoncard_driver::photon_map::map_photons;
 use photoncard_driver::render::{Observer, Phase, RenderSettings, render};
 use photoncard_driver::scene::{Scene, gltf};
 

@@ -2,7 +2,7 @@
 
 use photoncard_driver::film::{Film, FilmPixel, PixelLayers, PixelValue};
 use photoncard_driver::layer::Layers;
-use photoncard_driver::photon::PhotonLayout;
+use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{CardAddress, RenderError, RenderSettings, Rendering, Unobserved, render};
 use photoncard_driver::scene::{Reflection, Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;

@@ -3,7 +3,7 @@
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::photon::{MappedImage, PhotonLayout, map_photons};
+use photoncard_driver::photon_map::{MappedImage, PhotonLayout, map_photons};
 use photoncard_driver::render::{MemoryStatistics, Radiance, ReadStatistics, RenderSettings, Statistics};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::{GatherOrder, tiles};

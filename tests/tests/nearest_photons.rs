@@ -3,6 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::Photons;
+use photoncard_driver::photon_map::{store_photons, to_kd_tree};
 use photoncard_firmware::photon::{Candidate, CandidateBuffer, NearestPhotons, PhotonMap, Search};
 use photoncard_firmware::simd::Level;
 use photoncard_shared::image::SectionKind;
@@ -24,8 +25,8 @@ fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     });
     let packed = || PackedScene::new(&scene).unwrap();
     let photons = Photons::new(packed().photon_grid(), 1.0, photons);
-    let image = || packed().with_photons(photons.clone(), 100).unwrap();
-    [image().with_photon_tree().unwrap(), image()]
+    let image = || store_photons(packed(), photons.clone(), 100).unwrap();
+    [to_kd_tree(image()).unwrap(), image()]
 }
 
 /// What tells a photon from another, as far as it matters.

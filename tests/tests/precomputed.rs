@@ -5,7 +5,8 @@ use core::f32::consts::PI;
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{Photons, precompute_irradiance};
+use photoncard_driver::photon::Photons;
+use photoncard_driver::photon_map::{precompute_irradiance, store_photons, to_kd_tree};
 use photoncard_firmware::photon::{
     Candidate, CandidateBuffer, FoundIrradiance, MIN_NORMAL_COSINE, NearestPhotons, PhotonMap, PointSearch,
     gather,
@@ -37,8 +38,8 @@ fn images(photons: &[Placed], neighbors: u32, max_distance: f32) -> [CardImage; 
     });
     let packed = || PackedScene::new(&scene).unwrap();
     let photons = Photons::new(packed().photon_grid(), 1.0, photons);
-    let image = || packed().with_photons(photons.clone(), neighbors).unwrap();
-    [image().with_photon_tree().unwrap(), image()]
+    let image = || store_photons(packed(), photons.clone(), neighbors).unwrap();
+    [to_kd_tree(image()).unwrap(), image()]
         .map(|image| precompute_irradiance(image, neighbors, max_distance, &|| true).unwrap())
 }
 

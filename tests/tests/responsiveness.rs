@@ -8,6 +8,7 @@ use std::time::Duration;
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
+use photoncard_driver::photon_map::store_photons;
 use photoncard_driver::render::RenderSettings;
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::memory::{CardMemory, MemoryPort};
@@ -98,7 +99,7 @@ fn most_reads(frame: &FrameParameters) -> u64 {
     let scene = scene(walls, vec![lambertian("wall", 0.5), lamp], camera(Vec3::ZERO, Vec3::NEG_Z));
     let packed = PackedScene::new(&scene).unwrap();
     let photons = trace(&packed, 0, 500, &|_| true).unwrap().photons;
-    let lines = packed.with_photons(photons, 20).unwrap().lines().to_vec();
+    let lines = store_photons(packed, photons, 20).unwrap().lines().to_vec();
     let reads = Cell::new(0);
     let commands = VecDeque::from([
         Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION },

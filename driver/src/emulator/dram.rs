@@ -120,13 +120,14 @@ mod tests {
     use super::*;
     use crate::pack::PackedScene;
     use crate::photon::Photons;
+    use crate::photon_map::store_photons;
     use crate::scene::gltf;
 
     fn image() -> Arc<CardImage> {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
         let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
         let packed = PackedScene::new(&scene).expect("packs");
-        Arc::new(packed.with_photons(Photons::new(PhotonGrid::UNIT, 1.0, []), 1).expect("packs"))
+        Arc::new(store_photons(packed, Photons::new(PhotonGrid::UNIT, 1.0, []), 1).expect("packs"))
     }
 
     fn is_shared(dram: &EmulatedDram) -> bool {

@@ -1,6 +1,7 @@
 //! The scene's lights for a card: emissive triangles, points and spots in a tree, distant lights, and the environment; how each is
 //! chosen for shadow rays, and how for photons.
 
+mod colour;
 mod emission;
 pub(crate) mod environment;
 mod footprint;
@@ -19,6 +20,7 @@ use photoncard_shared::image;
 use photoncard_shared::layout::{DistantLight, Emitter, EmitterKind};
 use rayon::prelude::*;
 
+use self::colour::mean;
 use self::emission::EmissiveTextures;
 pub(crate) use self::environment::EnvironmentMap;
 use self::shares::Shares;
@@ -254,9 +256,4 @@ fn distant_lights(lights: &[PunctualLight]) -> Vec<DistantLight> {
             threshold,
         })
         .collect()
-}
-
-/// The mean of the channels.
-fn mean(colour: Vec3) -> f64 {
-    colour.as_dvec3().element_sum() / 3.0
 }

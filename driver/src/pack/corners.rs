@@ -15,7 +15,7 @@ pub(super) struct PackedCorners {
 }
 
 impl PackedCorners {
-    /// Those of a scene whose triangles are in these leaves.
+    /// The attributes of a scene whose triangles are in these leaves.
     pub(super) fn new(scene: &Scene, lights: &Lights, leaves: &[LeafTriangles]) -> Self {
         let mut packed = Self { leaves: Vec::with_capacity(leaves.len()), records: Vec::new() };
         for leaf in leaves {

@@ -51,8 +51,7 @@ fn record(material: &Material, has_attributes: bool) -> [u8; RECORD_BYTES] {
     .to_bytes()
 }
 
-/// What the alpha of texture and corners must reach for the surface to be there: without the factor that both are
-/// multiplied with.
+/// The alpha cutoff for the product of texture and corner, the factor of the material divided out.
 fn cutoff(material: &Material) -> f32 {
     match material.alpha_cutoff {
         Some(cutoff) if cutoff > 0.0 => cutoff / material.alpha,

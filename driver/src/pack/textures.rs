@@ -1,9 +1,9 @@
 //! Textures as records and lines of texels of the card image.
 
 use photoncard_shared::address::Line;
-use photoncard_shared::layout::{self, TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat};
+use photoncard_shared::layout::{self, NO_TEXTURE, TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat};
 
-use super::{MOST_TEXTURES, PackError};
+use super::error::PackError;
 use crate::light::EnvironmentMap;
 use crate::scene::{Encoding, Image, Scene, Wrap};
 
@@ -15,7 +15,7 @@ pub(super) fn records(
     scene: &Scene,
     environment: Option<&EnvironmentMap>,
 ) -> Result<Vec<layout::Texture>, PackError> {
-    if scene.textures.len() >= MOST_TEXTURES {
+    if scene.textures.len() >= usize::from(NO_TEXTURE) {
         return Err(PackError::TooManyTextures { textures: scene.textures.len() });
     }
     let mut first_line = 0;
@@ -50,7 +50,7 @@ pub(super) fn lines(scene: &Scene, environment: Option<&EnvironmentMap>) -> impl
     of_images.chain(of_environment)
 }
 
-/// The lines of a texture whose texels are told by column and row.
+/// The lines of a texture with these texels by column and row.
 fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl Iterator<Item = Line> {
     let [width, height] = texture.size.map(u32::from);
     let across = width.div_ceil(TILE_WIDTH);

@@ -1,4 +1,4 @@
-//! Emission: where a photon path starts, and with what power.
+//! Emission: the first ray of a photon path, and its power.
 //!
 //! The first four random numbers of a path, the place and the direction, are a low-discrepancy sequence in the number
 //! of the path (the additive recurrence of Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*),
@@ -139,7 +139,7 @@ fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emissi
     (roulette < probability).then(|| Emission { power: emission.power / probability, ..emission })
 }
 
-/// What comes from an emitter, as if it were the only source; towards targets, if there are any.
+/// Emission of an emitter as the only source; towards targets, if there are any.
 fn from_emitter(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -188,7 +188,7 @@ fn aim(targets: &Targets, from: Vec3, cone: SolidCone, square: [f32; 2]) -> Opti
     targets.direction(from, square)
 }
 
-/// What comes from a point on a triangle by the cosine, of each square metre; from both sides of a double-sided one.
+/// Emission of a point on a triangle by the cosine, per square metre; from both sides of a double-sided one.
 fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Option<Emission> {
     let (sides, is_back, c) = if double_sided {
         (2.0, c >= 0.5, if c >= 0.5 { 2.0 * c - 1.0 } else { 2.0 * c })
@@ -204,7 +204,7 @@ fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Opti
     })
 }
 
-/// What goes from a point on a triangle towards targets, of each square metre.
+/// Emission of a point on a triangle towards targets, per square metre.
 fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f32; 2]) -> Option<Emission> {
     let Aim { towards, measure } = targets.direction(point.position, square)?;
     let cosine = point.normal.dot(towards);
@@ -216,7 +216,7 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
     })
 }
 
-/// What comes from infinitely far this way, with the irradiance of a surface that faces it; towards targets, if there are any.
+/// Emission from infinitely far along a direction, by the irradiance of a surface that faces it; towards targets, if there are any.
 fn from_afar(sources: &Sources, direction: Vec3, irradiance: Vec3, square: [f32; 2]) -> Option<Emission> {
     if sources.targets.is_empty() {
         return Some(through_box(sources.bounds, direction, irradiance, square));
@@ -228,7 +228,7 @@ fn from_afar(sources: &Sources, direction: Vec3, irradiance: Vec3, square: [f32;
     Some(Emission { ray: Ray::new(origin, direction), power: irradiance * measure })
 }
 
-/// The same through the faces of the box around the scene that face it, each by the area that it shows.
+/// Emission from infinitely far through the faces of the scene's box that face it, each by its projected area.
 fn through_box([lower, upper]: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
     let size = upper - lower;
     let shown = direction.abs() * Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y);

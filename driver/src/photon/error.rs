@@ -1,4 +1,4 @@
-//! Why there is no photon map.
+//! Errors of the photon pass and the photon map.
 
 use photoncard_shared::message::Fault;
 

@@ -1,4 +1,4 @@
-//! Photons on the host, in the least room: sixteen bytes each, from the moment they arrive until they are in card memory.
+//! Photons on the host: sixteen bytes each, from the moment they arrive until they are in card memory.
 
 use photoncard_shared::layout::{GRID_BITS, PHOTON_CONTENT_BYTES, Photon, PhotonGrid, Record};
 
@@ -14,7 +14,7 @@ pub(crate) struct StoredPhoton {
 }
 
 const COORDINATE_MASK: u64 = (1 << GRID_BITS) - 1;
-/// Where the splitting axis is in the content: it is none of a photon outside a tree.
+/// Place of the splitting axis in the content; zero outside a tree.
 const AXIS_SHIFT: u32 = 48;
 const AXIS_MASK: u64 = 3 << AXIS_SHIFT;
 
@@ -43,12 +43,12 @@ impl StoredPhoton {
         [0, 1, 2].map(|axis| self.coordinate(axis))
     }
 
-    /// What it carries.
+    /// The bytes besides its position.
     pub(crate) fn content(self) -> [u8; PHOTON_CONTENT_BYTES] {
         self.content.to_le_bytes()
     }
 
-    /// The same as the node of a tree that is split on an axis.
+    /// The photon as a node of the kd-tree that is split on an axis.
     #[must_use]
     pub(crate) fn split_on(self, axis: usize) -> Self {
         Self { content: self.content & !AXIS_MASK | (axis as u64) << AXIS_SHIFT, ..self }
@@ -70,9 +70,9 @@ impl StoredPhoton {
 /// Photons of a map, in any order.
 #[derive(Clone, Debug)]
 pub struct Photons {
-    pub(crate) list: Vec<StoredPhoton>,
-    pub(crate) grid: PhotonGrid,
-    pub(crate) power_unit: f32,
+    pub(super) list: Vec<StoredPhoton>,
+    pub(super) grid: PhotonGrid,
+    pub(super) power_unit: f32,
 }
 
 impl Photons {
@@ -82,19 +82,34 @@ impl Photons {
         Self { list, grid, power_unit }
     }
 
-    /// How many there are.
+    /// Number of photons.
     pub fn len(&self) -> usize {
         self.list.len()
     }
 
-    /// Whether there is none.
+    /// True without photons.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
+    }
+
+    /// The grid that their positions lie on.
+    pub fn grid(&self) -> PhotonGrid {
+        self.grid
     }
 
     /// Watts that a photon power of 1 stands for.
     pub fn power_unit(&self) -> f32 {
         self.power_unit
+    }
+
+    /// The photons themselves.
+    pub(crate) fn stored(&self) -> &[StoredPhoton] {
+        &self.list
+    }
+
+    /// The photons themselves, to be put in another order.
+    pub(crate) fn stored_mut(&mut self) -> &mut [StoredPhoton] {
+        &mut self.list
     }
 
     /// Photons as they will be in card memory.

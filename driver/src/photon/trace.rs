@@ -11,8 +11,8 @@ use photoncard_shared::layout::{
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
-use super::PhotonError;
 use super::emit::{PathRandom, emit};
+use super::error::PhotonError;
 use super::stored::{Photons, StoredPhoton};
 use crate::light::Sources;
 use crate::pack::PackedScene;
@@ -28,14 +28,14 @@ pub struct PhotonPass {
 /// Paths that may be traced before each photon stored; beyond them there must be a photon to every thousand paths.
 const FRUITLESS_PATHS: u64 = 1_000_000;
 /// Paths that may be traced for each photon of caustics that is stored, besides those: where fewer of them lead to one there is
-/// little light in caustics, and few photons tell it.
-const MOST_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
+/// little light in caustics, and few photons estimate it.
+const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
 /// Paths that one task traces.
 const PATHS_PER_TASK: u64 = 2048;
 /// A path with more bounces than this has met surfaces that lose nothing; it ends.
-const MOST_BOUNCES: u32 = 512;
+const MAX_BOUNCES: u32 = 512;
 
-/// Traces paths until `count` photons are stored; none if no surface keeps any. `progress` is told how many are, and says
+/// Traces paths until `count` photons are stored; none if no surface keeps any. `progress` gets their number, and returns
 /// whether to go on.
 ///
 /// # Errors
@@ -72,14 +72,14 @@ pub fn trace_caustics(
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Photons, PhotonError> {
     let is_fruitful =
-        |stored: usize, paths| paths < FRUITLESS_PATHS + MOST_PATHS_TO_A_CAUSTIC_PHOTON * stored as u64;
+        |stored: usize, paths| paths < FRUITLESS_PATHS + MAX_PATHS_TO_A_CAUSTIC_PHOTON * stored as u64;
     let traced = trace_while(packed, (seed, Purpose::Caustics), count, &|stored, paths| {
         is_fruitful(stored, paths) && go_on()
     })?;
     if go_on() { Ok(traced.photons) } else { Err(PhotonError::Stopped) }
 }
 
-/// Traces paths until `count` photons are stored, or `go_on`, told how many are and of how many paths, says to stop.
+/// Traces paths until `count` photons are stored, or until `go_on` returns false of their number and that of paths.
 fn trace_while(
     packed: &PackedScene,
     (seed, purpose): (u32, Purpose),
@@ -127,7 +127,7 @@ fn next_tasks(missing: usize, stored: usize, paths: u64) -> u64 {
     needed.div_ceil(PATHS_PER_TASK).clamp(1, 64)
 }
 
-/// What the paths of a task left.
+/// The photons of a task's paths.
 struct Traced {
     /// Photons in the order of their paths.
     photons: Vec<StoredPhoton>,
@@ -143,7 +143,7 @@ impl Traced {
     }
 }
 
-/// What photons are traced for.
+/// The map that photons are traced for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
     /// Every arrival at a surface that is not perfectly specular.
@@ -152,7 +152,7 @@ enum Purpose {
     Caustics,
 }
 
-/// What all paths share.
+/// The parameters of all paths.
 struct Tracer<'s> {
     scene: SceneImage,
     sources: &'s Sources,
@@ -186,7 +186,7 @@ impl Tracer<'_> {
         let mut power = emission.power;
         let mut path = SpecularPath::new(emission.ray, Carried::Power);
         let mut is_direct = true;
-        for bounce in 0..MOST_BOUNCES {
+        for bounce in 0..MAX_BOUNCES {
             let random = random.bounce(bounce);
             let Some(hit) = closest_hit(scene, memory, &path.ray)? else { break };
             let surface = read_surface(scene, memory, &path.ray, &hit)?;
@@ -241,9 +241,9 @@ impl Tracer<'_> {
 }
 
 /// The greatest share of [`shading_share`].
-const MOST_SHADING_SHARE: f32 = 4.0;
+const MAX_SHADING_SHARE: f32 = 4.0;
 
-/// What a photon's power is multiplied with where a smooth normal turns it: photons arrive and leave by the area of the
+/// The factor of a photon's power where a smooth normal turns it: photons arrive and leave by the area of the
 /// triangle, light is reflected by that of the smooth surface (Veach 1997, *Robust Monte Carlo methods for light transport
 /// simulation*, section 5.3).
 fn shading_share(surface: &Surface, left: Vec3) -> f32 {
@@ -253,7 +253,7 @@ fn shading_share(surface: &Surface, left: Vec3) -> f32 {
     }
     let cosines = |a: Vec3, b: Vec3| normal.dot(a).abs() * geometric_normal.dot(b).abs();
     let share = cosines(arrived, left) / cosines(left, arrived);
-    if share < MOST_SHADING_SHARE { share } else { MOST_SHADING_SHARE }
+    if share < MAX_SHADING_SHARE { share } else { MAX_SHADING_SHARE }
 }
 
 /// Russian roulette: a photon goes on with the probability that its strongest channel keeps, and then carries the

@@ -34,7 +34,7 @@ use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 use crate::film::Film;
 use crate::pack::{CardImage, PackedScene};
 use crate::partial::PartialRender;
-use crate::photon::{MappedImage, PhotonTimes, map_photons};
+use crate::photon_map::{self, MappedImage, PhotonTimes, map_photons};
 use crate::scene::{Camera, Scene};
 use crate::scheduler::{GatherOrder, Scheduler, tiles};
 use crate::session::{Job, Picture, SessionError};
@@ -250,8 +250,9 @@ fn prepare(
     let packed = PackedScene::new(scene)?;
     times.hierarchy = start.elapsed().as_secs_f64();
     let budgets: Vec<Budget> = budgets.collect();
+    let photon_settings = settings.photon_settings(scene);
     for budget in &budgets {
-        packed.check_budget(settings.photons, settings.photon_layout, settings.radiance, budget)?;
+        photon_map::check_packed(&packed, &photon_settings, budget)?;
     }
     let total = settings.photons as u64;
     let progress = |stored: usize| {
@@ -261,9 +262,9 @@ fn prepare(
         }
         !observer.is_stopped()
     };
-    let mapped = map_photons(packed, &settings.photon_settings(scene), &progress)?;
+    let mapped = map_photons(packed, &photon_settings, &progress)?;
     for budget in &budgets {
-        mapped.image.check_budget(budget)?;
+        photon_map::check_image(&mapped.image, budget)?;
     }
     let PhotonTimes { tracing, building, measuring, estimating } = mapped.times;
     times.photons = tracing.as_secs_f64();

@@ -19,7 +19,7 @@ use crate::film::{Film, FilmError, Window};
 use crate::layer::Layers;
 use crate::link::LineFaults;
 use crate::partial::PartialSettings;
-use crate::photon::{PhotonLayout, PhotonSettings};
+use crate::photon_map::{PhotonLayout, PhotonSettings};
 use crate::scene::{Camera, Scene};
 use crate::scheduler::GatherOrder;
 

@@ -1,19 +1,19 @@
 //! Light from infinitely far.
 
-use std::fmt::Display;
 use std::fs;
 use std::io;
 use std::path::Path;
 
 use glam::Vec3;
 
-use super::raster::{Fault, check_size};
-use super::{BRIGHTEST, MAX_SIDE, radiance};
+use super::limits::BRIGHTEST;
+use super::map_size::{MAX_ENVIRONMENT_TEXELS, check_map_size, too_large};
+use super::radiance;
+use super::raster::Fault;
+#[cfg(doc)]
+use super::texture::MAX_SIDE;
 use crate::error::SceneError;
 use crate::exr::{self, ExrError};
-
-/// The most texels of an environment: each is twelve bytes here and four more for a card.
-pub const MAX_ENVIRONMENT_TEXELS: u64 = 1 << 26;
 
 const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
@@ -104,19 +104,4 @@ fn read_exr(path: &Path, bytes: &[u8]) -> Result<Environment, Fault> {
     let size = [image.width, image.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
     check_map_size(size)?;
     Ok(Environment::of(size, image.pixels))
-}
-
-/// Checks a map's size against the limits.
-pub(super) fn check_map_size(size: [u32; 2]) -> Result<(), Fault> {
-    let [width, height] = size.map(u64::from);
-    let is_too_large =
-        size.into_iter().any(|side| side > MAX_SIDE) || width * height > MAX_ENVIRONMENT_TEXELS;
-    if is_too_large { Err(too_large(size)) } else { check_size(size) }
-}
-
-fn too_large([width, height]: [impl Display; 2]) -> Fault {
-    let reason = format!(
-        "the map has {width} x {height} texels, more than {MAX_SIDE} a side or {MAX_ENVIRONMENT_TEXELS} in all"
-    );
-    Fault { reason, remedy: "scale the map down to 8192 x 4096 texels or less" }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::EMISSION;
+use super::limits::EMISSION;
 
 /// How far above 1 the sum of the two albedos may lie: they are often written in three digits.
 const SUM_TOLERANCE: f32 = 1e-4;

@@ -7,6 +7,8 @@ mod checksum;
 mod environment;
 pub mod gltf;
 mod light;
+mod limits;
+mod map_size;
 mod material;
 mod radiance;
 mod raster;
@@ -17,19 +19,14 @@ mod triangle;
 use glam::Vec3;
 
 pub use self::camera::Camera;
-pub use self::environment::{Environment, MAX_ENVIRONMENT_TEXELS};
+pub use self::environment::Environment;
 pub use self::light::{PunctualKind, PunctualLight};
+pub use self::limits::BRIGHTEST;
+pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
 pub use self::material::{MAX_EXPONENT, Material, Reflection, Transmission};
 pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
 pub use self::triangle::{Attributes, NO_ATTRIBUTES, Triangle};
 use crate::error::SceneError;
-
-/// The brightest that anything may shine, in each channel: surfaces and the environment in W/(sr m^2), lights without
-/// extent in their unit of intensity. Products and squares of it stay within single precision.
-pub const BRIGHTEST: f32 = 1e20;
-
-/// What emits at all emits this much: products and squares of it stay within single precision, too.
-const EMISSION: std::ops::RangeInclusive<f32> = 1e-20..=BRIGHTEST;
 
 /// A scene in world space, every instance resolved.
 #[derive(Clone, Debug, Default)]

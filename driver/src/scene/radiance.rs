@@ -1,7 +1,7 @@
 //! Pictures of the Radiance system: `.hdr`, `.pic` (Ward, "Real Pixels", Graphics Gems II, 1991; "Radiance Picture File
 //! Format", <https://radsite.lbl.gov/radiance/refer/filefmts.pdf>).
 
-use super::environment::check_map_size;
+use super::map_size::check_map_size;
 use super::raster::Fault;
 
 /// The first bytes; the program's name follows.

@@ -13,7 +13,7 @@ use super::quality::{Quality, Reference};
 use super::store::PointStore;
 use crate::emulator::THREAD_STACK;
 use crate::pack::PackedScene;
-use crate::photon::{MappedImage, map_photons};
+use crate::photon_map::{MappedImage, map_photons};
 use crate::render::RenderError;
 use crate::scene::Scene;
 use crate::scene::gltf;
@@ -230,7 +230,7 @@ fn sharing_images(points: &[Point]) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::PhotonLayout;
+    use crate::photon_map::PhotonLayout;
     use crate::render::RenderSettings;
 
     fn point(exponent: u32, layout: PhotonLayout, tile: u32) -> Point {

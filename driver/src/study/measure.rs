@@ -14,7 +14,7 @@ use crate::emulator::direct::{RenderedTile, render_tile};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
 use crate::film::Film;
-use crate::photon::MappedImage;
+use crate::photon_map::MappedImage;
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::Scene;
 use crate::scheduler::{GatherOrder, tiles};

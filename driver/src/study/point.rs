@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::sample::SampleRate;
 use crate::emulator::memory_model::CacheSettings;
-use crate::photon::PhotonLayout;
+use crate::photon_map::PhotonLayout;
 use crate::render::{Radiance, RenderSettings, Sampling};
 use crate::scheduler::GatherOrder;
 

@@ -5,7 +5,7 @@ use photoncard_shared::budget::REFERENCE;
 use super::point::{Point, Task, layout_name};
 use super::sample::SampleRate;
 use crate::emulator::memory_model::CacheSettings;
-use crate::photon::PhotonLayout;
+use crate::photon_map::PhotonLayout;
 use crate::render::{RenderSettings, Sampling};
 use crate::scheduler::GatherOrder;
 

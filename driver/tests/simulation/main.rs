@@ -4,6 +4,7 @@
 //! A seed that fails is run again alone by `PHOTONCARD_SEEDS=SEED cargo test -p photoncard-driver --test simulation`, many
 //! by `PHOTONCARD_SEEDS=1..10000`.
 
+mod conditions;
 mod line;
 mod run;
 mod station;
@@ -15,8 +16,9 @@ use std::time::Duration;
 use photoncard_driver::session::{LinkBytes, Session};
 use photoncard_firmware::sampler::hash;
 
+use self::conditions::Run;
 use self::line::{Faults, Random};
-use self::run::{MOST_STEPS, Run};
+use self::run::MOST_STEPS;
 use self::station::Station;
 use self::world::Fixture;
 

@@ -1,28 +1,16 @@
 //! A run, from cards that were just switched on to the picture, or to no card that is left.
 
 use photoncard_driver::film::PixelValue;
-use photoncard_driver::session::{LinkBytes, Picture};
+use photoncard_driver::session::LinkBytes;
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::counters::Counters;
 
-use crate::line::{Faults, Random};
+use crate::conditions::Run;
+use crate::line::Random;
 use crate::station::{Health, Station};
-use crate::world::Fixture;
 
 /// Steps of a run after which it is taken for stuck.
 pub(crate) const MOST_STEPS: u64 = 20_000_000;
-
-/// A run.
-pub(crate) struct Run<'a> {
-    pub(crate) fixture: &'a Fixture,
-    pub(crate) faults: Faults,
-    pub(crate) cards: usize,
-    /// Cards, the first ones, that never do anything.
-    pub(crate) stopped: usize,
-    /// The tiles, the last ones to be rendered, at which every card crashes.
-    pub(crate) crashes: usize,
-    pub(crate) seed: u32,
-}
 
 /// What came of a run.
 pub(crate) struct Outcome {
@@ -37,17 +25,7 @@ pub(crate) struct Outcome {
     pub(crate) given_up: usize,
 }
 
-impl<'a> Run<'a> {
-    pub(crate) fn new(fixture: &'a Fixture, cards: usize, seed: u32) -> Self {
-        Self { fixture, faults: Faults::default(), cards, stopped: 0, crashes: 0, seed }
-    }
-
-    /// Whether cards crash at the tiles that are left of a picture.
-    pub(crate) fn is_crash(&self, picture: &Picture) -> bool {
-        let (done, all) = picture.scheduler().progress();
-        all - done <= self.crashes
-    }
-
+impl Run<'_> {
     pub(crate) fn go(&self) -> Outcome {
         let Self { fixture, cards, stopped, seed, .. } = *self;
         let random = &mut Random(hash(seed));

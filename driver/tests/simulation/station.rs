@@ -5,8 +5,8 @@ use std::time::Duration;
 use photoncard_driver::session::{Picture, Session, SessionError};
 use photoncard_firmware::card::MicroCard;
 
+use crate::conditions::Run;
 use crate::line::{Queue, Random};
-use crate::run::Run;
 use crate::world::{Fixture, Memory};
 
 /// Virtual time of a step.

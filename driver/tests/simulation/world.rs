@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::Vec3;
 use photoncard_driver::film::Film;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::photon::{MappedImage, map_photons};
+use photoncard_driver::photon_map::{MappedImage, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
 use photoncard_driver::scheduler::{Scheduler, tiles};

@@ -5,7 +5,7 @@ use core::time::Duration;
 
 use photoncard_shared::link::{Port, PortError};
 
-use super::Board;
+use super::board::Board;
 use super::ring::Ring;
 
 /// Received bytes that wait: far more than a host sends while a card computes, which is a few tile commands.

@@ -5,9 +5,11 @@ use photoncard_shared::checksum::{ImageChecksum, image_checksum};
 use photoncard_shared::image::{HEADER_LINES, Header, HeaderError};
 use photoncard_shared::message::{CHECKSUMS_PER_REPLY, CHUNK_LINES, Fault, FaultCode};
 
-use super::OUT_OF_ORDER;
 use crate::memory::{CardMemory, Stage};
 use crate::scene::SceneImage;
+
+/// The fault of a command that needs another one before it.
+pub(super) const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
 /// The image in memory.
 pub(super) enum ImageState {

@@ -10,6 +10,7 @@ mod light;
 mod pixels;
 mod position;
 mod records;
+mod stored_point;
 
 use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
@@ -22,8 +23,8 @@ pub use self::completion::Completion;
 use self::gathers::Gathers;
 pub use self::light::Component;
 use self::light::{add_light, sums_of};
-use self::pixels::StoredPoint;
 use self::position::{Block, Position, Stage};
+use self::stored_point::StoredPoint;
 use crate::fixed_point::ColourSum;
 use crate::gather::GatherQueue;
 use crate::importance::DirectionTable;

@@ -1,106 +1,16 @@
 //! The stages of a block's pixels, sample by sample.
 
-use core::ops::Range;
-
-use photoncard_shared::budget::MOST_GATHER_RAYS;
 use photoncard_shared::message::{Fault, FrameParameters};
 
 use super::light::{Component, add_light, count_gather};
 use super::position::Stage;
+use super::stored_point::{StoredPoint, StoredRays, pattern};
 use super::{Chip, allowed_error};
-use crate::importance::DirectionTable;
 use crate::irradiance_cache::SeenSample;
 use crate::memory::{MemoryPort, Stage as MemoryStage};
 use crate::render::eye::{Sight, View};
 use crate::render::{Context, GatherPoint, PixelSample, Purpose, caustic, direct, eye, final_gather};
-use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Seen, Surface};
-
-/// What is kept of a gather point from one direction bin to the next, 48 bytes: the rest is read again.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct StoredPoint {
-    /// Of pixels: where on which triangle; elsewhere if that is seen by way of perfectly specular surfaces.
-    seen: Seen,
-    pub(super) directions: DirectionTable,
-    /// Of pixels: how many rays there are to cast, and what for.
-    rays: StoredRays,
-}
-
-const _: () = assert!(size_of::<StoredPoint>() == 48);
-
-/// The number of a pixel's rays, none in most where irradiance is interpolated; and whether they are for the lobe alone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct StoredRays(u16);
-
-const _: () = assert!(MOST_GATHER_RAYS < StoredRays::OF_LOBE as u32 - 1);
-
-impl StoredRays {
-    const OF_LOBE: u16 = 1 << 15;
-    /// There is no surface.
-    const NOWHERE: Self = Self(u16::MAX);
-
-    fn new(point: &GatherPoint) -> Self {
-        let of_lobe = if point.purpose == Purpose::Lobe { Self::OF_LOBE } else { 0 };
-        Self(point.rays as u16 | of_lobe)
-    }
-
-    #[inline(always)]
-    fn number(self) -> u32 {
-        if self == Self::NOWHERE { 0 } else { u32::from(self.0 & !Self::OF_LOBE) }
-    }
-
-    #[inline(always)]
-    fn purpose(self) -> Purpose {
-        if self.0 & Self::OF_LOBE != 0 { Purpose::Lobe } else { Purpose::Sample }
-    }
-}
-
-impl StoredPoint {
-    pub(super) const NOTHING: Self =
-        Self { seen: Seen::NOWHERE, directions: DirectionTable::COSINE, rays: StoredRays::NOWHERE };
-
-    /// The rays of a direction bin: known before the surface is read again.
-    #[inline(always)]
-    fn rays_of_bin(&self, frame: &FrameParameters, at: PixelSample, bin: u32) -> Range<u32> {
-        match self.rays.number() {
-            0 => 0..0,
-            rays => self.directions.rays(pattern(frame, at), rays, bin, frame.bins),
-        }
-    }
-
-    /// The gather point of a sample of a pixel.
-    #[inline(always)]
-    fn restore<M: MemoryPort>(
-        &self,
-        context: &mut Context<M>,
-        at: PixelSample,
-    ) -> Result<Option<GatherPoint>, Fault> {
-        if self.rays == StoredRays::NOWHERE {
-            return Ok(None);
-        }
-        let surface = if self.seen.is_elsewhere() {
-            // The way there is followed again.
-            let Some(view) = eye::view(context, at)?.surface() else { return Ok(None) };
-            view.surface
-        } else {
-            let place = eye::place(context, at);
-            eye::surface(context, place, &self.seen)?
-        };
-        Ok(Some(GatherPoint {
-            surface,
-            pattern: pattern(context.frame, at),
-            rays: self.rays.number(),
-            directions: self.directions,
-            purpose: self.rays.purpose(),
-        }))
-    }
-}
-
-/// Where the random numbers of a sample's gather rays come from.
-#[inline(always)]
-fn pattern(frame: &FrameParameters, at: PixelSample) -> Pattern {
-    Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather)
-}
 
 /// The gather point of a sample, its directions not yet chosen.
 fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpose: Purpose) -> GatherPoint {

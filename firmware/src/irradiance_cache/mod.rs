@@ -26,6 +26,7 @@ mod interpolation;
 mod lattice;
 mod record;
 mod survey;
+mod survey_state;
 
 pub use interpolation::SeenSample;
 pub use lattice::{LatticePoint, Window};
@@ -37,7 +38,7 @@ use photoncard_shared::message::FrameParameters;
 
 use self::gradient::{coefficients, rotation};
 use self::record::{Content, Irradiance, Record};
-use self::survey::Survey;
+use self::survey_state::Survey;
 use crate::fixed_point::ColourSum;
 use crate::importance::CELLS;
 use crate::render::{Context, GatherPoint};

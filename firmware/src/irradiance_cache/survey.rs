@@ -9,6 +9,7 @@ use photoncard_shared::message::Fault;
 
 use super::lattice::{Cell, LEVELS};
 use super::record::Record;
+use super::survey_state::{Survey, Task};
 use super::{Full, IrradianceCache, LatticePoint, Window};
 use crate::importance::{CELLS, direction_in};
 use crate::memory::{MemoryPort, Stage};
@@ -18,34 +19,6 @@ use crate::scene::{Ray, Surface, closest_hit};
 
 /// A record reaches at least so many pixels.
 const LEAST_REACH: f32 = 3.0;
-
-/// How far the survey has come.
-pub(super) struct Survey {
-    level: u32,
-    task: Task,
-    /// What of the task is next: a cell of the level, of all coarsest cells; or a record.
-    index: usize,
-    /// The cell of the hemisphere.
-    direction: u8,
-    /// Records before this one are surveyed.
-    first: usize,
-}
-
-/// What is done of a level, in this order.
-#[derive(Clone, Copy)]
-enum Task {
-    /// Records are placed at the cells' corners.
-    Placing,
-    /// Rays are cast around the new records, one in each cell of the hemisphere.
-    Rays,
-    /// Cells are divided.
-    Division,
-}
-
-impl Survey {
-    /// Before the first step.
-    pub(super) const BEGIN: Self = Self { level: 0, task: Task::Placing, index: 0, direction: 0, first: 0 };
-}
 
 impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
     /// Does the next piece of the survey: one lattice cell, or one ray of one record.

@@ -6,7 +6,7 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{CausticGather, Fault};
 
-use super::final_gather::search;
+use super::search::search;
 use super::{Context, GatherPoint};
 use crate::gather::PartialReflection;
 use crate::memory::{MemoryPort, Stage};

@@ -151,15 +151,3 @@ fn nearest_photons<'a, M: MemoryPort>(
     context.counters.count_gather(tested, nearest.taken(), nearest.selected(), nearest.len() as u32);
     Ok(nearest)
 }
-
-/// The photons of a map nearest to a place, as many as `nearest` looks for: for gathers at the points that the eye sees. They are
-/// few, and have the code in common.
-#[inline(never)]
-pub(super) fn search<M: MemoryPort>(
-    context: &mut Context<M>,
-    map: PhotonMap,
-    position: Vec3,
-    nearest: &mut NearestPhotons,
-) -> Result<u32, Fault> {
-    gather(context.scene, context.memory, map, position, nearest)
-}

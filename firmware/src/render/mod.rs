@@ -5,6 +5,7 @@ pub mod direct;
 pub mod eye;
 pub mod final_gather;
 mod point;
+mod search;
 pub mod specular_path;
 
 pub use point::{GatherPoint, Purpose};

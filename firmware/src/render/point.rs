@@ -5,7 +5,7 @@ use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{Fault, Sampling};
 
 use super::Context;
-use super::final_gather::search;
+use super::search::search;
 use crate::importance::{DirectionTable, IncidentFlux, Reflector};
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap};

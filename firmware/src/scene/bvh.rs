@@ -10,21 +10,10 @@ use photoncard_shared::message::Fault;
 
 use super::cut_out::is_there;
 use super::slabs::Slabs;
-use super::{Intersection, Ray, RayFrame, SceneImage};
+use super::{Hit, Intersection, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
 use crate::wide_tree::{Descent, Order, Stack};
-
-/// The nearest triangle that a ray meets.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// Where on the ray and on the triangle.
-    pub intersection: Intersection,
-    /// The triangle.
-    pub triangle: Triangle,
-    /// Its index in the image.
-    pub index: u32,
-}
 
 /// The first triangle on the ray's way; of two at the same distance, that of the lower index.
 ///

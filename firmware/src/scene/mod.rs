@@ -13,14 +13,14 @@ mod surface;
 mod texture;
 mod triangle;
 
-pub use bvh::{AnyHit, ClosestHit, Hit, closest_hit, is_occluded};
+pub use bvh::{AnyHit, ClosestHit, closest_hit, is_occluded};
 pub use material::Reflection;
 pub(crate) use material::{lobe_power, mirror};
 pub use seen::Seen;
 pub use specular::Specular;
 pub use surface::{Surface, read_surface};
 pub use texture::{decode_texel, read_texture, sample_texture};
-pub use triangle::{Intersection, RayFrame};
+pub use triangle::{Hit, Intersection, RayFrame};
 
 use core::ops::Range;
 

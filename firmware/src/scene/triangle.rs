@@ -5,7 +5,7 @@
 //! `f64`, in which the products are exact.
 
 use glam::Vec3;
-use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, VERTEX_LANES};
+use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, Triangle, VERTEX_LANES};
 
 use super::Ray;
 use crate::simd::{HALF_LANES, Isa, LANES};
@@ -30,6 +30,17 @@ pub struct Intersection {
     pub distance: f32,
     /// Weights of the three corners, of sum 1.
     pub barycentric: [f32; 3],
+}
+
+/// The nearest triangle that a ray meets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Where on the ray and on the triangle.
+    pub intersection: Intersection,
+    /// The triangle.
+    pub triangle: Triangle,
+    /// Its index in the image.
+    pub index: u32,
 }
 
 #[inline(always)]

@@ -12,7 +12,7 @@ use core::arch::x86_64::{
 
 use photoncard_shared::address::Line;
 
-use super::{HALF_LANES, Isa, Kernel, LANES, Portable};
+use super::kernel::{HALF_LANES, Isa, Kernel, LANES, Portable};
 
 cpufeatures::new!(
     has_avx512, "avx512f", "avx512bw", "avx512dq", "avx512vl", "avx2", "bmi1", "bmi2", "popcnt"

@@ -1,6 +1,9 @@
 //! The photon of Jensen's book, 20 bytes: position, shared-exponent power, direction and flags.
 
-use super::{PHOTON_CONTENT_BYTES, Record, read_vector, write_vector};
+use super::{Record, read_vector, write_vector};
+
+/// Bytes of what a photon carries besides its position.
+pub const PHOTON_CONTENT_BYTES: usize = 8;
 
 /// One photon of the map, a node of the left-balanced kd-tree.
 ///

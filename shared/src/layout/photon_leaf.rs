@@ -3,7 +3,7 @@
 //! Nothing is lost against [`super::Photon`]: positions lie on a grid in either layout, and a leaf tells them by sixteen
 //! bits each from its own corner. Coordinates of one axis lie side by side, so that one instruction reads them all.
 
-use super::Photon;
+use super::photon::{PHOTON_CONTENT_BYTES, Photon};
 use super::photon_grid::{GRID_BITS, GRID_MASK};
 use super::photon_node::GridBox;
 use crate::address::LINE_BYTES;
@@ -46,8 +46,6 @@ pub struct LeafCoordinates<'a> {
     pub mask: u16,
 }
 
-/// Bytes of what a photon carries besides its position.
-pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// Photons that a leaf may have.
 pub const LEAF_PHOTONS: usize = 12;
 /// Coordinates that are read at once.

@@ -2,11 +2,35 @@
 
 use heapless::Vec;
 
-use super::{Event, LineStatistics, WINDOW};
 use crate::frame::{Frame, FrameHeader, FrameKind, MAX_FRAME, MAX_PAYLOAD, write_frame};
+
+/// Messages on their way in one direction.
+pub const WINDOW: usize = 4;
 
 /// Messages that are taken before the other end is told without being asked.
 const TOLD_UNASKED: u16 = WINDOW as u16 / 2;
+
+/// What a transport has seen of its line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LineStatistics {
+    /// Frames that came damaged.
+    pub damaged: u64,
+    /// Messages that were sent again.
+    pub repeated: u64,
+    /// Messages that came again.
+    pub duplicates: u64,
+    /// Probes that were sent.
+    pub probes: u64,
+}
+
+/// What came, besides messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A whole frame of this session.
+    Heard,
+    /// The other end does not know this session.
+    Unknown,
+}
 
 /// How far a message is on its way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

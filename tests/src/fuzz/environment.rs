@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use photoncard_driver::scene::Environment;
 use tempfile::TempDir;
 
-use super::{Random, Target, bound, mutation};
+use super::mutation;
+use super::random::Random;
+use super::target::{Target, bound};
 
 /// The target.
 pub(super) struct Environments {

@@ -7,7 +7,9 @@ use photoncard_driver::pack::PackedScene;
 use photoncard_driver::scene::gltf;
 use tempfile::TempDir;
 
-use super::{Random, Target, bound, mutation};
+use super::mutation;
+use super::random::Random;
+use super::target::{Target, bound};
 
 /// Scenes of more triangles are loaded only.
 const MOST_PACKED: usize = 2000;

@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon::{map_photons, precompute_irradiance, trace};
+use photoncard_driver::photon::trace;
+use photoncard_driver::photon_map::{map_photons, precompute_irradiance, store_photons, to_kd_tree};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Material;
 use photoncard_shared::address::{LINE_BYTES, Line};
@@ -11,7 +12,9 @@ use photoncard_shared::message::{
     CausticGather, Command, Drain, FaultCode, FrameParameters, Radiance, Sampling, Tile,
 };
 
-use super::{Random, Target, bound, mutation};
+use super::mutation;
+use super::random::Random;
+use super::target::{Target, bound};
 use crate::everything::everything;
 use crate::wire::{Answer, Wire};
 use crate::{camera, lambertian, room, scene};
@@ -37,9 +40,9 @@ fn images() -> [CardImage; 3] {
     let image = || {
         let packed = PackedScene::new(&scene).expect("the room is packed");
         let pass = trace(&packed, 0, 300, &|_| true).expect("the room is lit");
-        packed.with_photons(pass.photons, 20).expect("the map is packed")
+        store_photons(packed, pass.photons, 20).expect("the map is packed")
     };
-    let [tree, leaves] = [image().with_photon_tree().expect("the map is packed as a tree"), image()]
+    let [tree, leaves] = [to_kd_tree(image()).expect("the map is packed as a tree"), image()]
         .map(|image| precompute_irradiance(image, 20, 0.5, &|| true).expect("the irradiance is packed"));
     let scene = everything();
     let packed = PackedScene::new(&scene).expect("the scene is packed");

@@ -8,7 +8,9 @@ use photoncard_shared::message::{
     Reply, Sampling, Tile,
 };
 
-use super::{Random, Target, bound, mutation};
+use super::mutation;
+use super::random::Random;
+use super::target::{Target, bound};
 
 /// The target.
 pub(super) struct Messages {

@@ -12,6 +12,7 @@ mod picture;
 mod random;
 mod run;
 mod session;
+mod target;
 mod texture;
 mod transport;
 
@@ -19,24 +20,7 @@ use std::sync::Arc;
 
 pub use self::random::Random;
 pub use self::run::{Failure, Report, Settings, fuzz};
-
-/// Something that reads what others wrote.
-pub trait Target: Send + Sync {
-    /// Its name on the command line.
-    fn name(&self) -> &'static str;
-
-    /// The most bytes that it may have allocated at once for an input of so many bytes.
-    fn allocation_bound(&self, input: usize) -> usize;
-
-    /// Makes an input.
-    fn input(&self, random: &mut Random) -> Vec<u8>;
-
-    /// Reads an input. Returns whether it was sound.
-    ///
-    /// # Panics
-    /// If it is read otherwise than it must be.
-    fn read(&self, input: &[u8]) -> bool;
-}
+pub use self::target::Target;
 
 /// The names of all targets.
 pub const NAMES: [&str; 8] =
@@ -55,9 +39,4 @@ pub fn target(name: &str) -> Option<Arc<dyn Target>> {
         "exr" => Some(Arc::new(picture::Pictures::new())),
         _ => None,
     }
-}
-
-/// A bound on allocations: some of any input, and some for each byte.
-const fn bound(input: usize, for_each: usize) -> usize {
-    (64 << 20) + input * for_each
 }

@@ -13,7 +13,9 @@ use photoncard_driver::difference::compare;
 use photoncard_driver::exr::read_rgb;
 use tempfile::TempDir;
 
-use super::{Random, Target, bound, mutation};
+use super::mutation;
+use super::random::Random;
+use super::target::{Target, bound};
 
 /// Columns and rows of the pictures.
 const SIZE: [usize; 2] = [20, 36];

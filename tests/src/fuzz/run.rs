@@ -14,7 +14,8 @@ use std::time::{Duration, Instant};
 
 use peak_alloc::PeakAlloc;
 
-use super::{Random, Target};
+use super::random::Random;
+use super::target::Target;
 
 /// The worker's name: its panics are findings, and printed as such.
 const WORKER: &str = "fuzz";

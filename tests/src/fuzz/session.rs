@@ -15,7 +15,9 @@ use photoncard_shared::message::{
 };
 use photoncard_shared::transport::Transport;
 
-use super::{Random, Target, bound, messages, mutation};
+use super::random::Random;
+use super::target::{Target, bound};
+use super::{messages, mutation};
 
 /// Lines of the image: some chunks and a part of one.
 const LINES: u32 = 200;

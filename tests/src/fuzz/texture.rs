@@ -7,7 +7,9 @@ use photoncard_driver::scene::gltf;
 use tempfile::TempDir;
 
 use super::gltf::glb;
-use super::{Random, Target, bound, mutation};
+use super::mutation;
+use super::random::Random;
+use super::target::{Target, bound};
 
 /// The target. An input is an image file.
 pub(super) struct Textures {

@@ -5,7 +5,9 @@ use photoncard_shared::frame::{
 };
 use photoncard_shared::transport::{Transport, WINDOW};
 
-use super::{Random, Target, bound, messages, mutation};
+use super::random::Random;
+use super::target::{Target, bound};
+use super::{messages, mutation};
 
 /// The session of both ends.
 const SESSION: u16 = 7;

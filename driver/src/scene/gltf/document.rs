@@ -10,25 +10,8 @@ use gltf::json::mesh::Semantic;
 use gltf::json::validation::{Checked, Error as Fault, Validate};
 use miette::{NamedSource, SourceSpan};
 
-use super::instances::INSTANCING;
+use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
 use crate::error::{Place, SceneError};
-
-/// Extensions whose meaning the loader knows.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 10] = [
-    INSTANCING,
-    "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    // Lit all the same, which a notice tells.
-    "KHR_materials_unlit",
-    "KHR_materials_volume",
-    QUANTIZATION,
-    "KHR_texture_transform",
-];
-
-const QUANTIZATION: &str = "KHR_mesh_quantization";
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER: usize = 12;

@@ -5,12 +5,11 @@ use gltf::json;
 use gltf::json::accessor::{ComponentType, Type};
 use serde::Deserialize;
 
-use super::MAX_TRIANGLES;
 use super::accessor::{Elements, Format, Integers, Source};
+use super::extensions::INSTANCING;
+use super::limits::MAX_TRIANGLES;
 use super::transform::composed;
 use crate::error::SceneError;
-
-pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
 const REMEDY: &str = "export the scene without instances, or repair the extension's attributes";
 

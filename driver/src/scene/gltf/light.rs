@@ -6,7 +6,8 @@ use gltf::json::validation::Checked;
 
 use super::document::Document;
 use crate::error::SceneError;
-use crate::scene::{EMISSION, PunctualKind, PunctualLight, Scene};
+use crate::scene::limits::EMISSION;
+use crate::scene::{PunctualKind, PunctualLight, Scene};
 
 /// The narrowest step, in cosines, between the two cones of a spot light, as `KHR_lights_punctual` recommends.
 /// Exporters write equal angles for a sharp edge.

@@ -1,43 +1,18 @@
 //! Meshes: triangles placed into the world by each node that shows them.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use glam::{DMat4, Vec3};
+use glam::Vec3;
 
-use super::MAX_TRIANGLES;
 use super::accessor::Source;
+use super::limits::MAX_TRIANGLES;
 use super::material;
+use super::pose::Pose;
 use super::primitive::{Primitive, Topology};
-use super::skin::Skin;
-use super::transform::Transform;
 use super::vertex::VertexReader;
 use crate::error::SceneError;
 use crate::scene::{Scene, Triangle};
-
-/// What takes the vertices of a mesh into the world.
-pub(super) struct Pose<'s> {
-    transform: Transform,
-    skin: Option<&'s Skin>,
-}
-
-impl<'s> Pose<'s> {
-    /// The node's own transform, or the pose of the skin, beside which the node's does not count.
-    pub(super) fn new(world: DMat4, skin: Option<&'s Skin>) -> Self {
-        Self { transform: Transform::new(world), skin }
-    }
-
-    /// The transform of a vertex, or what is wrong with it.
-    pub(super) fn of(&self, primitive: &Primitive<'_>, vertex: u64) -> Result<Cow<'_, Transform>, String> {
-        match self.skin {
-            Some(skin) if !primitive.influences.is_empty() => {
-                Ok(Cow::Owned(Transform::new(skin.matrix(primitive, vertex)?)))
-            }
-            _ => Ok(Cow::Borrowed(&self.transform)),
-        }
-    }
-}
 
 /// Places meshes into a scene.
 pub(super) struct MeshPlacer<'a> {

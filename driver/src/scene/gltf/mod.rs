@@ -8,13 +8,16 @@ mod accessor;
 mod buffers;
 mod camera;
 mod document;
+mod extensions;
 mod image;
 mod instances;
 mod light;
+mod limits;
 mod material;
 mod mesh;
 mod nodes;
 mod notices;
+mod pose;
 mod primitive;
 mod skin;
 mod texture;
@@ -26,13 +29,11 @@ use std::path::Path;
 
 use self::accessor::Source;
 use self::document::Document;
+pub use self::limits::MAX_TRIANGLES;
 use self::notices::Notices;
 use self::texture::Textures;
 use crate::error::SceneError;
 use crate::scene::Scene;
-
-/// The most triangles a scene may hold, those of zero area included.
-pub const MAX_TRIANGLES: usize = 1 << 24;
 
 /// Loads the default scene of a glTF file, or its first.
 ///

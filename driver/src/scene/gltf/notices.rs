@@ -6,7 +6,8 @@ use gltf::json;
 use gltf::json::material::AlphaMode;
 use gltf::json::validation::Checked;
 
-use super::document::{Document, SUPPORTED_EXTENSIONS};
+use super::document::Document;
+use super::extensions::SUPPORTED_EXTENSIONS;
 use super::light;
 use super::material::{has_dark_texture, is_transmissive};
 use super::primitive::Topology;

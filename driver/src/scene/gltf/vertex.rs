@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::accessor::Source;
-use super::mesh::Pose;
 use super::notices::mesh_name;
+use super::pose::Pose;
 use super::primitive::Primitive;
 use super::transform::Transform;
 use crate::error::SceneError;

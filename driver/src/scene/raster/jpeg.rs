@@ -7,7 +7,7 @@ use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 
-use super::Fault;
+use super::fault::Fault;
 use crate::scene::texture::MAX_SIDE;
 
 pub(super) const MAGIC: &[u8] = b"\xff\xd8\xff";

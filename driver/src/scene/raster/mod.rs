@@ -4,27 +4,12 @@
 //! its length can hold however well it is compressed. What a file says of its own colour space is ignored, as glTF
 //! demands.
 
+mod fault;
 mod jpeg;
 mod png;
 
+pub(super) use self::fault::Fault;
 use super::texture::{MAX_SIDE, MAX_TEXELS};
-
-/// Why an image is not read.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Fault {
-    /// What is wrong.
-    pub(super) reason: String,
-    /// What to do.
-    pub(super) remedy: &'static str,
-}
-
-const COPY_AGAIN: &str = "export the image again, or copy it again: it is damaged or was cut off on the way";
-
-impl Fault {
-    fn damaged(reason: impl std::fmt::Display) -> Self {
-        Self { reason: format!("the image cannot be decoded: {reason}"), remedy: COPY_AGAIN }
-    }
-}
 
 /// A kind of image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

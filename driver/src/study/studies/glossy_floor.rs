@@ -6,10 +6,10 @@ use super::super::point::{Point, order_name};
 use super::super::report::{Panel, Report, Table, XScale, YScale};
 use super::super::sample::Estimate;
 use super::super::scale::Scale;
-use super::GLOSSY;
 use super::present::{
     columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
 };
+use super::scenes::GLOSSY;
 use crate::render::{RenderSettings, Sampling};
 use crate::scheduler::GatherOrder::{self, DirectionBins, Hash, Naive, Sort, Tiled};
 

@@ -6,9 +6,9 @@ use super::super::load_balance::Balance;
 use super::super::point::Point;
 use super::super::report::{self, Block, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
-use super::SCENES;
 use super::balance::{CREDITS, ORDERS, chip_counts, curves, deal};
 use super::present::{columns, how_it_counts, page, panel, plot, say, section, series, table, text};
+use super::scenes::SCENES;
 use super::workload::{cost, of_frame, tile_seconds};
 use crate::scheduler::GatherOrder;
 

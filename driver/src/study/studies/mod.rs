@@ -6,6 +6,7 @@ mod machine;
 mod present;
 mod reordering;
 mod scaling;
+mod scenes;
 mod techniques;
 mod workload;
 
@@ -70,9 +71,3 @@ impl Study {
         }
     }
 }
-
-/// Scenes that stand for simple, glossy and large ones: their files and what they are called.
-const SCENES: [(&str, &str); 3] =
-    [(CORNELL, "Cornell box"), (GLOSSY, "glossy Cornell box"), ("atrium.glb", "atrium")];
-const CORNELL: &str = "cornell.gltf";
-const GLOSSY: &str = "cornell-glossy.gltf";

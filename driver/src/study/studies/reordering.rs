@@ -8,13 +8,13 @@ use super::super::point::{Point, layout_name, order_name};
 use super::super::report::{Block, Cell, Column, Report, Series, Table, XScale, YScale};
 use super::super::sample::Estimate;
 use super::super::scale::{Scale, WIDEST_TILE};
-use super::CORNELL;
 use super::present::{
     GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section, series,
     table, text,
 };
+use super::scenes::CORNELL;
 use crate::emulator::memory_model::{CacheSettings, CacheSpec};
-use crate::photon::PhotonLayout;
+use crate::photon_map::PhotonLayout;
 use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 

@@ -8,14 +8,14 @@ use super::super::load_balance::Balance;
 use super::super::point::Point;
 use super::super::report::{Block, Column, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
-use super::CORNELL;
 use super::balance::{CREDITS, chip_counts, curves, deal};
 use super::machine::symbols;
 use super::present::{
     columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table, text,
 };
+use super::scenes::CORNELL;
 use super::workload::tile_seconds;
-use crate::photon::PhotonLayout;
+use crate::photon_map::PhotonLayout;
 use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 

@@ -4,11 +4,11 @@ use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{self, Block, Cell, Report, Table, XScale, YScale};
 use super::super::scale::{IRRADIANCE_ERROR, Scale, WIDEST_TILE};
-use super::SCENES;
 use super::present::{
     GIGA, cell, columns, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
 };
-use crate::photon::PhotonLayout;
+use super::scenes::SCENES;
+use crate::photon_map::PhotonLayout;
 use crate::render::{Radiance, RenderSettings, Sampling};
 use crate::scheduler::GatherOrder;
 

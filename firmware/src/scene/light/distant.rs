@@ -5,8 +5,8 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{DistantLight, Record};
 use photoncard_shared::message::Fault;
 
-use super::LightSample;
 use super::choice::{Fraction, choose};
+use super::sample::LightSample;
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 

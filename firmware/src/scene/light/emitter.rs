@@ -7,8 +7,8 @@ use photoncard_shared::layout::{Emitter, EmitterKind, NO_TEXTURE, Record, Triang
 use photoncard_shared::message::Fault;
 
 use super::choice::Fraction;
+use super::sample::{LightSample, Receiver};
 use super::tree::{select_emitter, selection_probability};
-use super::{LightSample, Receiver};
 use crate::memory::MemoryPort;
 use crate::scene::corners::Corners;
 use crate::scene::cut_out::is_there;

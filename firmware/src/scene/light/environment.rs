@@ -7,8 +7,8 @@ use glam::Vec3;
 use photoncard_shared::image::{SectionKind, THRESHOLDS_PER_LINE};
 use photoncard_shared::message::Fault;
 
-use super::LightSample;
 use super::choice::{Fraction, choose, probability};
+use super::sample::LightSample;
 use crate::memory::MemoryPort;
 use crate::scene::{SceneImage, read_texture, sample_texture};
 use crate::vector::{max, min};

@@ -14,8 +14,8 @@ use photoncard_shared::layout::{
 };
 use photoncard_shared::message::{Fault, FaultCode};
 
-use super::Receiver;
 use super::choice::Fraction;
+use super::sample::Receiver;
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::vector::{max, unit};

@@ -1,7 +1,7 @@
 //! What of the data can be drawn.
 
 use super::axis::Axis;
-use super::{Panel, Point, XScale, YScale};
+use super::content::{Panel, Point, XScale, YScale};
 
 /// Values beyond that, in either direction, have no place on an axis.
 const LARGEST: f64 = 1e300;

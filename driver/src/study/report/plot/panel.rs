@@ -1,11 +1,11 @@
 //! One panel: its layout and its drawing.
 
 use super::axis::{Axis, Tick};
+use super::content::{Panel, XScale, axis_label};
 use super::data::{self, Drawable, Mark};
 use super::style::{MARKER, Style};
 use super::svg::{self, Anchor, FRAME, GRID, Text, px};
 use super::text::{self, LABEL, TICK};
-use super::{Panel, XScale, axis_label};
 
 /// The height of a plotting area, in pixels.
 const AREA_HEIGHT: f64 = 290.0;

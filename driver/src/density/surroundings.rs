@@ -1,4 +1,4 @@
-//! The triangles around a place: what chords and short rays there may meet, found once for all of them.
+//! The triangles around a place, found once for all chords and short rays there.
 //!
 //! A descent in the hierarchy for every ray would visit the same few leaves again and again. Here one descent finds all
 //! triangles in a ball; then sixteen of them are tested for one ray, or sixteen chords for one of them. Coordinates are
@@ -7,33 +7,25 @@
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
-use photoncard_firmware::simd::{Isa, Kernel, LANES, run};
+use photoncard_firmware::simd::{LANES, run};
 use photoncard_shared::layout::Child;
 use photoncard_shared::message::Fault;
 
 use super::ball::{Ball, for_each_near};
-use super::chords::{Chords, Crossings};
-use super::lane_vectors::{LaneVector, at, cross, dot, greatest, least, minus, set};
+use super::block::{Block, FirstOnWay};
+use super::chords::{ChordFrame, Chords, Crossings};
+use super::lanes::set;
 use super::shadows::CrossAll;
 use super::sides::SideTable;
 
 /// Triangles that are tested one by one; of more, a descent for each ray finds the few that matter.
-const MOST_TRIANGLES: usize = 4096;
+const MAX_TRIANGLES: usize = 4096;
 /// Coordinates of corners beyond this, in radii, would round away what is near.
-const MOST_EXTENT: f32 = 1e4;
+const MAX_EXTENT: f32 = 1e4;
 /// Triangles of a plain wall within a ball, at the most.
-const MOST_PLAIN: usize = 24;
+const MAX_PLAIN: usize = 24;
 /// Triangles of a plane have normals that differ by less: to a thousandth of the radius at its end.
-const LEAST_PLAIN_COSINE: f32 = 1.0 - 5e-7;
-
-/// Sixteen triangles. Of what is no triangle the corners coincide: nothing meets it.
-pub(super) struct Block {
-    pub(super) corners: [LaneVector; 3],
-    /// Indices in the image.
-    pub(super) indices: [u32; LANES],
-    /// A bit for each whose back is the inside of something.
-    pub(super) are_solid: u32,
-}
+const MIN_PLAIN_COSINE: f32 = 1.0 - 5e-7;
 
 /// The triangles in a ball.
 #[derive(Default)]
@@ -43,22 +35,6 @@ pub(super) struct Surroundings {
     centre: Vec3,
     radius: f32,
     stack: Vec<Child>,
-}
-
-/// A frame along a normal, and a point that is inside of nothing; coordinates are those of a ball.
-pub(super) struct ChordFrame {
-    /// Two axes across the chords, and the normal along them.
-    pub(super) axes: [Vec3; 3],
-    /// The open point, along these axes.
-    pub(super) open: Vec3,
-}
-
-impl ChordFrame {
-    /// What is at a place relative to the ball's centre, along the axes.
-    pub(super) fn along(&self, place: Vec3) -> Vec3 {
-        let [x, y, z] = self.axes.map(|axis| axis.dot(place));
-        Vec3::new(x, y, z)
-    }
 }
 
 impl Surroundings {
@@ -84,8 +60,8 @@ impl Surroundings {
         all
     }
 
-    /// Whether all triangles in a ball are one plain wall around its centre, on the side of a normal's code. Asks for nothing
-    /// but the place for a stack: what is here stays.
+    /// True if all triangles in a ball are one plain wall around its centre, on the side of a normal's code. The triangles found
+    /// before are kept.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -98,13 +74,13 @@ impl Surroundings {
         wall: PlainWall,
     ) -> Result<bool, Fault> {
         let lift = wall.lift / ball.radius;
-        let mut triangles = heapless::Vec::<[Vec3; 3], MOST_PLAIN>::new();
+        let mut triangles = heapless::Vec::<[Vec3; 3], MAX_PLAIN>::new();
         let mut plane: Option<Vec3> = None;
         let mut stack = std::mem::take(&mut self.stack);
         let is_plane = for_each_near(scene, memory, ball, &mut stack, &mut |index, corners| {
             let [a, b, c] = *corners;
             let normal = (b - a).cross(c - a).normalize_or_zero();
-            let is_along = normal.dot(*plane.get_or_insert(normal)) >= LEAST_PLAIN_COSINE;
+            let is_along = normal.dot(*plane.get_or_insert(normal)) >= MIN_PLAIN_COSINE;
             let is_at = normal.dot(a).abs() <= lift;
             let is_side = sides.of(index).normal(true) == Some(wall.normal);
             is_along && is_at && is_side && triangles.push(*corners).is_ok()
@@ -118,7 +94,7 @@ impl Surroundings {
     #[inline(always)]
     fn add(&mut self, index: u32, corners: &[Vec3; 3], sides: &SideTable) -> bool {
         let extent = corners.iter().map(|corner| corner.abs().max_element()).fold(0.0, f32::max);
-        if self.triangles == MOST_TRIANGLES || extent > MOST_EXTENT {
+        if self.triangles == MAX_TRIANGLES || extent > MAX_EXTENT {
             return false;
         }
         let lane = self.triangles % LANES;
@@ -152,7 +128,7 @@ impl Surroundings {
             .then_some((distance, if normal.dot(direction) > 0.0 { -normal } else { normal }))
     }
 
-    /// What chords pass through within the ball.
+    /// Collects the crossings of chords within the ball.
     pub(super) fn cross(&self, frame: &ChordFrame, chords: &Chords, crossings: &mut Crossings) {
         crossings.clear(frame.open.z);
         run(CrossAll { blocks: &self.blocks, frame, chords, crossings });
@@ -164,20 +140,20 @@ impl Surroundings {
 pub(super) struct PlainWall<'a> {
     /// The code of its normal.
     pub(super) normal: u8,
-    /// What photons may be off the wall by, metres.
+    /// Greatest distance of photons from the wall, metres.
     pub(super) lift: f32,
     /// Other places on it.
     pub(super) places: &'a [Vec3],
 }
 
 impl PlainWall<'_> {
-    /// Whether all places are in the plane.
+    /// True if all places are in the plane.
     fn holds(&self, ball: Ball, normal: Vec3) -> bool {
         self.places.iter().all(|place| (*place - ball.centre).dot(normal).abs() <= self.lift)
     }
 }
 
-/// Whether triangles of one plane cover the disc of radius 1 around the origin once: one of them covers the origin, and no
+/// True if triangles of one plane cover the disc of radius 1 around the origin once: one of them covers the origin, and no
 /// edge in the disc is without another triangle beyond it.
 fn covers(triangles: &[[Vec3; 3]], normal: Vec3) -> bool {
     let edges = |[a, b, c]: [Vec3; 3]| [(a, b), (b, c), (c, a)];
@@ -191,50 +167,4 @@ fn covers(triangles: &[[Vec3; 3]], normal: Vec3) -> bool {
     };
     at_origin.count() == 1
         && all_edges().all(|(a, b)| is_far((a, b)) || all_edges().filter(|edge| *edge == (b, a)).count() == 1)
-}
-
-/// A triangle as seen from a point: the planes through the point and its edges, and six times the volume of both.
-///
-/// Of two triangles that share an edge the planes are opposite to the last bit: no ray passes between them.
-#[inline(always)]
-fn seen_from(point: [f32; 3], block: &Block, lane: usize) -> ([[f32; 3]; 3], f32) {
-    let corner = |corner: usize| minus(at(&block.corners[corner], lane), point);
-    let [a, b, c] = [corner(0), corner(1), corner(2)];
-    let planes = [cross(b, c), cross(c, a), cross(a, b)];
-    (planes, dot(a, planes[0]))
-}
-
-struct FirstOnWay<'a> {
-    blocks: &'a [Block],
-    origin: Vec3,
-    direction: Vec3,
-}
-
-impl Kernel for FirstOnWay<'_> {
-    /// The distance, and the triangle's corners.
-    type Output = Option<(f32, [Vec3; 3])>;
-
-    #[inline(always)]
-    fn run(self, _: impl Isa) -> Self::Output {
-        let (origin, direction) = (self.origin.to_array(), self.direction.to_array());
-        let mut first = (f32::INFINITY, [Vec3::ZERO; 3]);
-        for block in self.blocks {
-            let mut distances = [0.0; LANES];
-            for (lane, target) in distances.iter_mut().enumerate() {
-                let ([u, v, w], volume) = seen_from(origin, block, lane);
-                let [u, v, w] = [dot(u, direction), dot(v, direction), dot(w, direction)];
-                let determinant = u + v + w;
-                let is_met = (least(least(u, v), w) >= 0.0) | (greatest(greatest(u, v), w) <= 0.0);
-                let distance = volume / determinant;
-                *target =
-                    if is_met & (determinant != 0.0) & (distance > 0.0) { distance } else { f32::INFINITY };
-            }
-            for (lane, &distance) in distances.iter().enumerate() {
-                if distance < first.0 {
-                    first = (distance, block.corners.each_ref().map(|corner| Vec3::from(at(corner, lane))));
-                }
-            }
-        }
-        first.0.is_finite().then_some(first)
-    }
 }

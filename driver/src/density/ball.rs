@@ -1,4 +1,4 @@
-//! The triangles that may be in a ball, by one descent in the hierarchy.
+//! Triangles that may be in a ball, found by one descent in the hierarchy.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -33,7 +33,7 @@ impl Ball {
     }
 }
 
-/// Whether a triangle may be within 1 of the origin, and has an area.
+/// True if the triangle has an area, and its bounding box and its plane are within 1 of the origin.
 #[inline(always)]
 fn is_near(corners: &[Vec3; 3]) -> bool {
     let [a, b, c] = *corners;

@@ -1,9 +1,8 @@
-//! What the sides of all triangles are to photons: where they are stored, by which normal, and what bounds a solid.
+//! The two sides of every triangle: the normals that photons are stored by, and the bounds of solids.
 
 use std::collections::HashMap;
 
 use glam::Vec3;
-use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::Line;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
@@ -19,7 +18,7 @@ use crate::pack::CardImage;
 pub(super) struct Sides {
     /// Of the front and of the back: the code of its normal if it reflects, so that photons are stored there.
     normals: [Option<u8>; 2],
-    /// Whether the back is the inside of something. The back of a double-sided sheet is as open as its front.
+    /// True if the back is the inside of a solid. The back of a double-sided sheet is as open as its front.
     pub(super) is_solid: bool,
 }
 
@@ -36,7 +35,7 @@ pub(super) struct SideTable {
     sides: Vec<Sides>,
 }
 
-/// What of a material counts here.
+/// The properties of a material that decide on its sides.
 #[derive(Clone, Copy)]
 struct Finish {
     reflects: bool,
@@ -45,7 +44,7 @@ struct Finish {
     is_double_sided: bool,
 }
 
-/// Whether photons are stored on surfaces of a reflectance: they are not where all that is reflected is so perfectly specularly.
+/// True if photons are stored on surfaces of a reflectance: where not all light is reflected perfectly specularly.
 fn keeps_photons(reflectance: &Reflectance) -> bool {
     let any = |colour: &[f32; 3]| colour.iter().any(|albedo| *albedo > 0.0);
     match reflectance {
@@ -80,7 +79,7 @@ impl SideTable {
             })
             .collect();
         let finishes = finishes?;
-        let leaves = leaf_lines(image, &scene);
+        let leaves = image.section(SectionKind::Triangles);
         let mut sides = vec![Sides::default(); leaves.len() * LEAF_TRIANGLES];
         sides.par_chunks_mut(LEAF_TRIANGLES).zip(leaves).try_for_each(|(sides, line)| {
             let leaf = BvhLeaf(&line.0);
@@ -158,14 +157,6 @@ impl Sides {
             is_solid: !is_double_sided && !is_glass,
         }
     }
-}
-
-fn leaf_lines<'a>(image: &'a CardImage, scene: &SceneImage) -> &'a [Line] {
-    let section = scene.header.section(SectionKind::Triangles);
-    image
-        .lines()
-        .get(section.first_line as usize..)
-        .map_or(&[], |lines| lines.get(..section.records as usize).unwrap_or(lines))
 }
 
 fn edges_of<T: Copy>([a, b, c]: [T; 3]) -> [[T; 2]; 3] {

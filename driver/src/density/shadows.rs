@@ -3,9 +3,9 @@
 use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
 
-use super::chords::{BATCHES, Batch, Chords, Crossing, Crossings, Lane};
-use super::lane_vectors::{LaneVector, at, cross, greatest, least, minus};
-use super::surroundings::{Block, ChordFrame};
+use super::block::Block;
+use super::chords::{BATCHES, Batch, ChordFrame, Chords, Crossing, Crossings};
+use super::lanes::{Lane, LaneVector, at, cross, greatest, least, minus};
 
 /// Adds where chords cross the triangles of some blocks.
 pub(super) struct CrossAll<'a> {
@@ -62,7 +62,7 @@ struct Shadows {
 }
 
 /// Triangles that chords pass at a cosine below this are met by none.
-const LEAST_COSINE: f32 = 1e-4;
+const MIN_COSINE: f32 = 1e-4;
 
 impl Shadows {
     const NONE: Self = Self {
@@ -125,7 +125,7 @@ impl Shadows {
             z[lane] = a[2] + (a[0] * p + a[1] * q) / r;
             self.slopes[lane] = size.sqrt() / r.abs();
             self.is_front[lane] = if r > 0.0 { 1.0 } else { 0.0 };
-            let is_steep = r * r <= LEAST_COSINE * LEAST_COSINE * size;
+            let is_steep = r * r <= MIN_COSINE * MIN_COSINE * size;
             self.steep[lane] = if is_steep { f32::INFINITY } else { 0.0 };
         }
     }
@@ -154,7 +154,7 @@ impl Shadows {
         isa.below(&apart, 1)
     }
 
-    /// Where the chords of a batch pass through a triangle within the ball.
+    /// Adds the crossings of a batch of chords with a triangle within the ball.
     #[inline(always)]
     fn cross(
         &self,
@@ -192,7 +192,7 @@ impl Shadows {
     }
 }
 
-/// Where the plane at the height of an open point cuts a triangle: a line from `start` to `end`, relative to that point, with
+/// The cut of a triangle by the plane at the height of an open point: a line from `start` to `end`, relative to that point, with
 /// the front on its left.
 struct Cut {
     start: [f32; 2],

@@ -1,9 +1,48 @@
 //! The left-balanced kd-tree (Jensen 2001, ch. 6): the tree of its photons without gaps, in the order of a heap.
 
-use super::stored::StoredPhoton;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{Photon, PhotonLeaf, Record};
+
+use super::store::PHOTON_SECTIONS;
+use crate::pack::{CardImage, ImageWriter, PackError};
+use crate::photon::StoredPhoton;
 
 /// Below this number of photons a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
+
+/// Moves the photons of an image from leaves into the tree; irradiance points and caustics are left out. Searches find the same
+/// photons.
+///
+/// # Errors
+/// [`PackError::TooLarge`] if there are more lines than an address can number.
+pub fn to_kd_tree(image: CardImage) -> Result<CardImage, PackError> {
+    let mut photons = photons_of_leaves(&image);
+    if photons.is_empty() {
+        return Ok(image);
+    }
+    balance(&mut photons);
+    let (scene, _) = image.view();
+    let mut image = ImageWriter::resume(image);
+    image.remove_last(&PHOTON_SECTIONS);
+    let lines = image.append_zeroed(SectionKind::Photons, photons.len())?;
+    for_each_in_heap(&photons, &mut |place, photon| {
+        let line = &mut lines[place / Photon::PER_LINE];
+        if let Some(record) = line.record_mut(place % Photon::PER_LINE) {
+            *record = photon.record(&scene.header.photon_grid);
+        }
+    });
+    Ok(image.finish())
+}
+
+/// The photons of an image's leaves.
+fn photons_of_leaves(image: &CardImage) -> Vec<StoredPhoton> {
+    let leaves = || image.section(SectionKind::PhotonLeaves).iter().map(|line| PhotonLeaf::read(&line.0));
+    let mut photons = Vec::with_capacity(leaves().map(|leaf| leaf.photons() as usize).sum());
+    for leaf in leaves() {
+        photons.extend((0..leaf.photons()).map(|i| StoredPhoton::at(leaf.point(i), leaf.content(i))));
+    }
+    photons
+}
 
 /// Nodes in the left subtree of a left-balanced tree of `count` nodes, at least one.
 fn left_nodes(count: usize) -> usize {
@@ -15,7 +54,7 @@ fn left_nodes(count: usize) -> usize {
 /// Sorts photons so that every subtree is a run, its left subtree first, its root next: from left to right. Each is
 /// split along the longest side of its bounding box. The same tree for the same photons, whatever their order and the
 /// threads.
-pub(crate) fn balance(photons: &mut [StoredPhoton]) {
+fn balance(photons: &mut [StoredPhoton]) {
     if photons.len() < 2 {
         return;
     }
@@ -42,7 +81,7 @@ fn longest_side(photons: &[StoredPhoton]) -> usize {
 
 /// Calls `put` for every node of a balanced tree with its place in the heap, where the children of `i` are at `2 i + 1` and
 /// `2 i + 2`.
-pub(crate) fn for_each_in_heap(photons: &[StoredPhoton], put: &mut impl FnMut(usize, StoredPhoton)) {
+fn for_each_in_heap(photons: &[StoredPhoton], put: &mut impl FnMut(usize, StoredPhoton)) {
     // Subtrees still to come: the places of their roots, and their photons from left to right.
     let mut waiting = vec![(0, photons)];
     while let Some((node, run)) = waiting.pop() {

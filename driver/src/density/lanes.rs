@@ -1,8 +1,10 @@
-//! Vectors of sixteen lanes, and what is computed of one lane's.
+//! Numbers and vectors in sixteen lanes, and arithmetic on the vector of one lane.
 
 use glam::Vec3;
+use photoncard_firmware::simd::LANES;
 
-use super::chords::Lane;
+/// A number in each of sixteen lanes.
+pub(super) type Lane = [f32; LANES];
 
 /// The components of sixteen vectors.
 pub(super) type LaneVector = [Lane; 3];

@@ -1,4 +1,4 @@
-//! How much surface a gather around a photon takes for the photon's own: the boundary correction of the density estimate.
+//! Disc fractions: the boundary correction of the density estimate.
 //!
 //! A gather divides by the area of a flat disc. But its search looks into a sphere, and finds the photons of all surfaces
 //! there, of which those with about the same normal count. Near an edge or in a corner they are less than a disc, and the
@@ -7,34 +7,35 @@
 //! radius that a gather at the photon would have, along chords of the sphere ([`super::chords`]). A gather then divides
 //! by that area ([`photoncard_firmware::photon`]).
 //!
-//! Most photons lie inside a large flat surface, and have a whole disc: such leaves are told from the triangles around
+//! Most photons lie inside a large flat surface, and have a whole disc: such leaves are recognized by the triangles around
 //! them. The photons of other leaves share a search for the radius, one for the triangles around them, and their chords.
 
 use glam::Vec3;
 use photoncard_firmware::photon::MIN_NORMAL_COSINE;
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, closest_hit, magnitude, offset_origin};
+use photoncard_firmware::scene::{Ray, magnitude, offset_origin};
 use photoncard_firmware::simd::run;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{FULL_DISC, LEAF_PHOTONS, Photon, PhotonLeaf, decode_normal, encode_disc};
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
-use super::PhotonError;
 use super::ball::Ball;
-use super::chords::{Chords, Crossing, Crossings, FractionWithin, OpenSurfaces};
+use super::chords::{CHORDS, ChordFrame, Chords, Crossing, Crossings, FractionWithin, OpenSurfaces};
+use super::rays::{Met, all_on_way, first_triangle};
 use super::search::Searcher;
 use super::sides::SideTable;
-use super::surroundings::{ChordFrame, PlainWall, Surroundings};
+use super::surroundings::{PlainWall, Surroundings};
 use crate::pack::CardImage;
+use crate::photon::PhotonError;
 
 /// Leaves that one task measures.
 const LEAVES_PER_TASK: usize = 64;
 /// Photons share chords along the normal of one of them if theirs is at least at this cosine to it.
-const LEAST_SHARED_COSINE: f32 = 0.85;
-/// How high above a photon the point is that is inside of nothing, in radii, if there is room.
+const MIN_SHARED_COSINE: f32 = 0.85;
+/// Height above a photon of the point that is inside of no solid, in radii, if there is room.
 const OPEN_HEIGHT: f32 = 0.1;
-/// How far behind a triangle a ray goes on, in radii of the ball.
+/// Distance behind a triangle at which a ray goes on, in radii of the ball.
 const STEP: f32 = 1e-5;
 
 /// The codes of a leaf's photons.
@@ -47,13 +48,13 @@ type Places = heapless::Vec<Place, LEAF_PHOTONS>;
 ///
 /// # Errors
 /// If the image is not sound, or `go_on` says no.
-pub(super) fn measure_discs(
+pub(crate) fn measure_discs(
     image: &mut CardImage,
     neighbors: u32,
     max_distance: f32,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), PhotonError> {
-    let leaves = image.leaf_lines(SectionKind::PhotonLeaves).len();
+    let leaves = image.section(SectionKind::PhotonLeaves).len();
     let sides = SideTable::new(image)?;
     let measured: Result<Vec<Vec<(usize, Codes)>>, PhotonError> = (0..leaves.div_ceil(LEAVES_PER_TASK))
         .into_par_iter()
@@ -69,7 +70,7 @@ pub(super) fn measure_discs(
         )
         .collect();
     let measured = measured?;
-    let lines = image.leaf_lines_mut();
+    let lines = image.section_mut(SectionKind::PhotonLeaves);
     for (leaf, codes) in measured.into_iter().flatten() {
         for (index, code) in (0..).zip(codes) {
             PhotonLeaf::set_disc(&mut lines[leaf].0, index, code);
@@ -84,14 +85,14 @@ struct Meter<'a> {
     sides: &'a SideTable,
     searcher: Searcher<'a>,
     surroundings: Surroundings,
-    /// Whether [`Self::surroundings`] holds all triangles that matter.
+    /// True if [`Self::surroundings`] holds all triangles of the ball.
     is_complete: bool,
     chords: Chords,
     crossings: Crossings,
     surfaces: OpenSurfaces,
 }
 
-/// What is asked of a photon.
+/// A photon whose disc is measured.
 #[derive(Clone, Copy)]
 struct Place {
     /// Its number in its leaf.
@@ -135,7 +136,7 @@ impl<'a> Meter<'a> {
     fn measure_leaves(&mut self, first: usize, end: usize) -> Result<Vec<(usize, Codes)>, Fault> {
         let grid = self.searcher.scene.header.photon_grid;
         let mut measured = Vec::new();
-        for (index, line) in (first..end).zip(&self.image.leaf_lines(SectionKind::PhotonLeaves)[first..end]) {
+        for (index, line) in (first..end).zip(&self.image.section(SectionKind::PhotonLeaves)[first..end]) {
             let leaf = PhotonLeaf::read(&line.0);
             let photons: Places = (0..leaf.photons())
                 .map(|photon| {
@@ -171,7 +172,7 @@ impl<'a> Meter<'a> {
         Ok(fractions)
     }
 
-    /// Whether the spheres of some photons hold nothing but the plane that all of them lie on.
+    /// True if the spheres around some photons hold nothing but the plane that all of them lie on.
     fn is_plain(&mut self, photons: &[Place], radius: f32) -> Result<bool, Fault> {
         let Some(middle) = middle(photons) else { return Ok(true) };
         if photons.iter().any(|photon| photon.normal != middle.normal) {
@@ -209,7 +210,7 @@ impl<'a> Meter<'a> {
             let frame = self.frame(&nearest, &cluster)?;
             let [.., along] = frame.axes;
             let group = split_off(&mut photons, |photon| {
-                photon.photon == nearest.photon || photon.coded_normal().dot(along) >= LEAST_SHARED_COSINE
+                photon.photon == nearest.photon || photon.coded_normal().dot(along) >= MIN_SHARED_COSINE
             });
             self.measure_group(&group, &frame, &cluster, fractions)?;
         }
@@ -271,7 +272,7 @@ impl<'a> Meter<'a> {
         Ok(found.filter(|normal| normal.dot(coded) >= MIN_NORMAL_COSINE).unwrap_or(coded))
     }
 
-    /// How far above a photon rays start, metres: a little of the disc's radius, and more than the grid may have put the photon
+    /// Height above a photon at which rays start, metres: a little of the disc's radius, and more than the grid may have put the photon
     /// below its surface.
     fn lift(&self, radius: f32) -> f32 {
         1e-3 * radius + self.searcher.scene.header.photon_grid.cell
@@ -288,22 +289,25 @@ impl<'a> Meter<'a> {
             return Ok(self.surroundings.first_on_way(origin, direction, max_distance));
         }
         let ray = Ray { origin, direction, max_distance };
-        Ok(self.first_triangle(&ray)?.map(|Met { distance, normal, .. }| {
+        let Searcher { scene, memory, .. } = &self.searcher;
+        Ok(first_triangle(scene, *memory, &ray)?.map(|Met { distance, normal, .. }| {
             (distance, if normal.dot(direction) > 0.0 { -normal } else { normal })
         }))
     }
 
-    /// The same as [`Surroundings::cross`], where there are too many triangles to test them all.
+    /// [`Surroundings::cross`] by rays, where there are too many triangles to list.
     fn cross_by_rays(&mut self, frame: &ChordFrame, chords: &Chords, ball: Ball) -> Result<(), Fault> {
         self.crossings.clear(frame.open.z);
+        let Searcher { scene, memory, .. } = &self.searcher;
+        let step = STEP * ball.radius;
         let [tangent, bitangent, normal] = frame.axes;
         let place =
             |x: f32, y: f32, z: f32| ball.centre + (tangent * x + bitangent * y + normal * z) * ball.radius;
         let open = place(frame.open.x, frame.open.y, frame.open.z);
-        for chord in 0..super::chords::CHORDS {
+        for chord in 0..CHORDS {
             let [x, y] = chords.point(chord);
             let half = (1.0 - x * x - y * y).max(0.0).sqrt();
-            for met in self.all_on_way(place(x, y, half), place(x, y, -half), STEP * ball.radius)? {
+            for met in all_on_way(scene, *memory, [place(x, y, half), place(x, y, -half)], step)? {
                 let height = half - met.distance / ball.radius;
                 let cosine = met.normal.dot(normal);
                 let crossing = Crossing::new(chord, height, cosine > 0.0, met.triangle, cosine.abs().recip());
@@ -311,7 +315,7 @@ impl<'a> Meter<'a> {
             }
             let way = place(x, y, frame.open.z) - open;
             let mut depth = 0;
-            for met in self.all_on_way(open, open + way, STEP * ball.radius)? {
+            for met in all_on_way(scene, *memory, [open, open + way], step)? {
                 let change = if met.normal.dot(way) < 0.0 { 1 } else { -1 };
                 depth += if self.sides.of(met.triangle).is_solid { change } else { 0 };
             }
@@ -319,39 +323,6 @@ impl<'a> Meter<'a> {
         }
         Ok(())
     }
-
-    /// All triangles between two points that are at least a step apart.
-    fn all_on_way(&self, from: Vec3, to: Vec3, step: f32) -> Result<Vec<Met>, Fault> {
-        let length = from.distance(to);
-        let direction = (to - from) / length;
-        let (mut all, mut gone) = (Vec::new(), 0.0);
-        while gone < length {
-            let ray = Ray { origin: from + direction * gone, direction, max_distance: length - gone };
-            let Some(met) = self.first_triangle(&ray)? else { break };
-            let distance = gone + met.distance;
-            all.push(Met { distance, ..met });
-            gone = distance + step;
-        }
-        Ok(all)
-    }
-
-    fn first_triangle(&self, ray: &Ray) -> Result<Option<Met>, Fault> {
-        let (scene, mut memory) = (&self.searcher.scene, self.searcher.memory);
-        let Some(hit) = closest_hit(scene, &mut memory, ray)? else { return Ok(None) };
-        let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        Ok(Some(Met { distance: hit.intersection.distance, normal, triangle: hit.index }))
-    }
-}
-
-/// Where a ray meets a triangle.
-struct Met {
-    /// Metres.
-    distance: f32,
-    /// The unit normal of the front.
-    normal: Vec3,
-    /// The index in the image.
-    triangle: u32,
 }
 
 /// The photon nearest to the mean of some: on a curved surface the mean is off it.
@@ -364,7 +335,7 @@ fn nearest(photons: &[Place], to: Vec3) -> Option<Place> {
     photons.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).copied()
 }
 
-/// How far the farthest of some photons is from one of them, metres.
+/// The distance of the farthest of some photons from one of them, metres.
 fn spread(photons: &[Place], middle: Place) -> f32 {
     photons.iter().map(|photon| photon.position.distance(middle.position)).fold(0.0, f32::max)
 }
@@ -390,53 +361,4 @@ fn codes(fractions: &[f32; LEAF_PHOTONS], leaf: usize) -> Codes {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::pack::PackedScene;
-    use crate::photon::trace;
-    use crate::scene::gltf;
-
-    /// In rooms and on curved columns: what is tested against a list of triangles is what rays find.
-    #[test]
-    fn the_triangles_around_a_photon_are_what_rays_meet() {
-        for (name, photons) in [("cornell.gltf", 3000), ("atrium.glb", 10_000)] {
-            let path = format!("{}/../scenes/{name}", env!("CARGO_MANIFEST_DIR"));
-            let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
-            let packed = PackedScene::new(&scene).expect("packs");
-            let photons = trace(&packed, 1, photons, &|_| true).expect("it is lit").photons;
-            let image = packed.with_photons(photons, 20).expect("packs");
-            let sides = SideTable::new(&image).expect("sound");
-            let mut meter = Meter::new(&image, &sides, 20, f32::MAX.sqrt() * 0.5);
-            let grid = meter.searcher.scene.header.photon_grid;
-            let (mut discs, mut cut, mut far, mut sums) = (0, 0, 0, [0.0; 2]);
-            for line in image.leaf_lines(SectionKind::PhotonLeaves) {
-                let leaf = PhotonLeaf::read(&line.0);
-                let [.., low, high] = leaf.content(0);
-                let normal = Photon::normal_of_flags(u16::from_le_bytes([low, high]));
-                let place = Place { photon: 0, position: grid.position(leaf.point(0)).into(), normal };
-                let radius = meter.searcher.radius(place.position).expect("sound");
-                let ball = Ball { centre: place.position, radius: 1.1 * radius };
-                let Meter { searcher, surroundings, .. } = &mut meter;
-                if !surroundings.find(&searcher.scene, searcher.memory, &sides, ball).expect("sound") {
-                    continue;
-                }
-                let cluster = Cluster { ball, radius, outer: radius };
-                let [by_rays, by_list] = [false, true].map(|is_complete| {
-                    meter.is_complete = is_complete;
-                    let frame = meter.frame(&place, &cluster).expect("sound");
-                    let mut fractions = [0.0; LEAF_PHOTONS];
-                    meter.measure_group(&[place], &frame, &cluster, &mut fractions).expect("sound");
-                    fractions[0]
-                });
-                discs += 1;
-                cut += u32::from((by_rays - 1.0).abs() > 0.01);
-                far += u32::from((by_rays - by_list).abs() > 0.02);
-                sums = [sums[0] + by_rays, sums[1] + by_list];
-            }
-            println!("{name}: {discs} discs, {cut} not whole, {far} differ, sums {sums:?}");
-            assert!(discs > 200 && cut * 5 > discs, "{cut} of {discs} discs are not whole");
-            assert!(far * 100 <= discs, "{far} of {discs} differ");
-            assert!((sums[0] / sums[1] - 1.0).abs() < 1e-3, "{sums:?}");
-        }
-    }
-}
+mod tests;

@@ -1,4 +1,4 @@
-//! Searches of the photon map on the host: how far gathers look.
+//! The greatest distance of gathers, from searches of the photon map on the host.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -10,7 +10,6 @@ use photoncard_shared::layout::PhotonLeaf;
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
-use super::stored::{Photons, StoredPhoton};
 use crate::pack::CardImage;
 
 /// Leaves from which the automatic greatest distance is estimated, a photon of each.
@@ -18,7 +17,7 @@ const SAMPLED_LEAVES: usize = 2048;
 /// Share of the sampled photons whose k-th neighbour lies within the automatic greatest distance.
 const COVERED_SHARE: f64 = 0.95;
 
-/// The same of the photons of caustics.
+/// Share of the sampled caustic photons whose k-th neighbour lies within the automatic greatest distance.
 const FOCUSED_SHARE: f64 = 0.8;
 
 type Buffer = CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>;
@@ -39,7 +38,7 @@ impl<'a> Searcher<'a> {
         Self { scene, memory, buffer: Box::default(), map: PhotonMap::Indirect, neighbors, max_distance }
     }
 
-    /// The same in another map.
+    /// The searcher, in another map.
     fn of(self, map: PhotonMap) -> Self {
         Self { map, ..self }
     }
@@ -66,24 +65,24 @@ impl<'a> Searcher<'a> {
 ///
 /// # Errors
 /// If the image is not sound.
-pub(super) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
+pub(crate) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
     distance_within(image, PhotonMap::Indirect, neighbors, COVERED_SHARE)
 }
 
-/// The same of gathers of caustics: that within which most of their photons have `neighbors` others. Those that have not are
-/// light that is spread so far that it is no caustic.
+/// The greatest distance of gathers of caustics, metres: that within which 80 % of the caustic photons have `neighbors` others.
+/// The light of the others is spread so far that it is no caustic.
 ///
 /// # Errors
 /// If the image is not sound.
-pub(super) fn caustic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
+pub(crate) fn caustic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
     distance_within(image, PhotonMap::Caustics, neighbors, FOCUSED_SHARE)
 }
 
 /// The distance within which a share of the photons of a map have `neighbors` others.
 fn distance_within(image: &CardImage, map: PhotonMap, neighbors: u32, share: f64) -> Result<f32, Fault> {
     let leaves = match map {
-        PhotonMap::Indirect => image.leaf_lines(SectionKind::PhotonLeaves),
-        PhotonMap::Caustics => image.leaf_lines(SectionKind::CausticLeaves),
+        PhotonMap::Indirect => image.section(SectionKind::PhotonLeaves),
+        PhotonMap::Caustics => image.section(SectionKind::CausticLeaves),
     };
     let grid = image.view().0.header.photon_grid;
     let unlimited = f32::MAX.sqrt() * 0.5;
@@ -107,42 +106,4 @@ fn distance_within(image: &CardImage, map: PhotonMap, neighbors: u32, share: f64
     let place = (distances.len() as f64 * share) as usize;
     let covered = distances.get(place.min(distances.len().saturating_sub(1))).copied();
     Ok(covered.unwrap_or_else(|| image.diagonal()).max(f32::MIN_POSITIVE.sqrt()))
-}
-
-/// Photons around which [`search_radius`] looks.
-const SAMPLED_PHOTONS: usize = 64;
-/// Photons among which it looks, if they are enough.
-const SAMPLED_NEIGHBORS: usize = 1 << 16;
-/// Neighbours that it looks for, at the least, if the photons are not too many for that.
-const LEAST_NEIGHBORS: usize = 4;
-/// Photons of which one is as good as all, however few neighbours are looked for.
-const LEAST_STEP: usize = 32;
-
-/// The radius of a typical search for so many neighbours, cells of the photons' grid. It is estimated before there is any
-/// tree to search: in a part of the photons for as small a part of the neighbours.
-pub(crate) fn search_radius(photons: &Photons, neighbors: u32) -> f64 {
-    let all = &photons.list;
-    let neighbors = neighbors as usize;
-    let step = (all.len() / SAMPLED_NEIGHBORS).min((neighbors / LEAST_NEIGHBORS).max(LEAST_STEP)).max(1);
-    let rank = (neighbors / step).max(1);
-    let squared_distance = |a: StoredPhoton, b: StoredPhoton| {
-        let sides = [0, 1, 2].map(|axis| u64::from(a.coordinate(axis).abs_diff(b.coordinate(axis))));
-        sides.into_iter().map(|side| side * side).sum::<u64>()
-    };
-    let mut radii: Vec<u64> = all
-        .par_iter()
-        .step_by((all.len() / SAMPLED_PHOTONS).max(1))
-        .map(|photon| {
-            let others = all.iter().step_by(step);
-            let mut distances: Vec<u64> = others.map(|other| squared_distance(*photon, *other)).collect();
-            let farthest = distances.len() - 1;
-            *distances.select_nth_unstable(rank.min(farthest)).1
-        })
-        .collect();
-    let middle = radii.len() / 2;
-    if radii.is_empty() {
-        return 0.0;
-    }
-    let typical = *radii.select_nth_unstable(middle).1;
-    (typical as f64 * neighbors as f64 / (rank * step) as f64).sqrt()
 }

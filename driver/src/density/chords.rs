@@ -9,17 +9,15 @@ use glam::Vec3;
 use photoncard_firmware::photon::SameSurface;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
 
+use super::lanes::Lane;
 use super::sides::Sides;
-
-/// A number in each of sixteen lanes.
-pub(super) type Lane = [f32; LANES];
 
 /// Lanes of chords.
 pub(super) const BATCHES: usize = 8;
 /// Chords through a ball.
 pub(super) const CHORDS: usize = BATCHES * LANES;
 
-/// Where chords pass through the disc across them: sixteen neighbours, and what bounds them.
+/// Sixteen neighbouring chords: their points in the disc across them, and the bounds of these.
 #[derive(Clone, Copy)]
 pub(super) struct Batch {
     pub(super) x: Lane,
@@ -37,7 +35,7 @@ impl Batch {
         Self { x: axis(0), y: axis(1), lower: bound(f32::min), upper: bound(f32::max) }
     }
 
-    /// The same on a disc of another radius.
+    /// The batch on a disc `factor` times as large.
     fn scaled(&self, factor: f32) -> Self {
         Self {
             x: self.x.map(|x| x * factor),
@@ -73,10 +71,26 @@ impl Chords {
         Self { batches: self.batches.each_ref().map(|batch| batch.scaled(radius)) }
     }
 
-    /// Where chord `index` passes through the disc.
+    /// The point of chord `index` in the disc.
     pub(super) fn point(&self, index: usize) -> [f32; 2] {
         let Batch { x, y, .. } = &self.batches[index / LANES];
         [x[index % LANES], y[index % LANES]]
+    }
+}
+
+/// A frame along a normal, and a point that is inside of nothing; coordinates are those of a ball.
+pub(super) struct ChordFrame {
+    /// Two axes across the chords, and the normal along them.
+    pub(super) axes: [Vec3; 3],
+    /// The open point, along these axes.
+    pub(super) open: Vec3,
+}
+
+impl ChordFrame {
+    /// A vector from the ball's centre in the coordinates of the frame.
+    pub(super) fn along(&self, place: Vec3) -> Vec3 {
+        let [x, y, z] = self.axes.map(|axis| axis.dot(place));
+        Vec3::new(x, y, z)
     }
 }
 
@@ -90,7 +104,7 @@ fn gather_neighbors(points: &mut [[f32; 2]], axis: usize) {
     }
 }
 
-/// Where a chord passes through a triangle.
+/// The crossing of a chord and a triangle.
 #[derive(Clone, Copy)]
 pub(super) struct Crossing {
     /// By chord, from the top down, fronts before backs.
@@ -117,19 +131,18 @@ impl Crossing {
         (self.key >> 33) as usize
     }
 
-    /// Whether the chord, on its way down, comes to the triangle's front.
+    /// True if the chord, on its way down, meets the triangle's front.
     fn is_front(&self) -> bool {
         self.key & 1 == 0
     }
 }
 
-/// What chords pass through.
+/// The crossings of all chords.
 pub(super) struct Crossings {
     pub(super) list: Vec<Crossing>,
-    /// The same by chord.
+    /// [`Self::list`] by chord.
     sorted: Vec<Crossing>,
-    /// Where each chord passes through the plane at [`Self::height`]: how many solids more than at the open point it is
-    /// inside of.
+    /// Solids that each chord is inside of at [`Self::height`], less those that the open point is inside of.
     pub(super) depths: [[i32; LANES]; BATCHES],
     /// The height of the open point.
     pub(super) height: f32,
@@ -151,7 +164,7 @@ impl Crossings {
         self.depths[chord / LANES][chord % LANES] = depth;
     }
 
-    /// The open surfaces. `sides` tells of the triangles.
+    /// Collects the crossings at which the chord is inside of no solid. `sides` are those of a triangle.
     pub(super) fn open_surfaces(
         &mut self,
         chords: &Chords,
@@ -173,7 +186,7 @@ impl Crossings {
             let above = of_chord.iter().take_while(|crossing| crossing.height > self.height);
             let mut depth = self.depths[chord / LANES][chord % LANES] - above.map(change).sum::<i32>();
             for crossing in of_chord {
-                // Less than none is where a surface that closes nothing was passed from behind.
+                // Negative depth: the chord crossed the back of an open (non-manifold) surface.
                 if depth <= 0
                     && let Some(normal) = sides(crossing.triangle).normal(crossing.is_front())
                 {
@@ -263,7 +276,7 @@ pub(super) struct FractionWithin<'a> {
     pub(super) surfaces: &'a OpenSurfaces,
     pub(super) centre: Vec3,
     pub(super) radius: f32,
-    /// What heights may be off by.
+    /// Error of heights.
     pub(super) lift: f32,
 }
 

@@ -16,10 +16,10 @@ use photoncard_shared::layout::{IrradiancePoint, PHOTON_CONTENT_BYTES, Photon, P
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
-use super::PhotonError;
 use super::leaves::PhotonTree;
-use super::stored::StoredPhoton;
+use super::store::store_irradiance;
 use crate::pack::CardImage;
+use crate::photon::{PhotonError, StoredPhoton};
 
 /// Points that one task does; `go_on` is asked before each.
 const POINTS_OF_A_TASK: usize = 256;
@@ -58,7 +58,7 @@ pub fn precompute_irradiance(
     let distance = max_distance / (neighbors as f32).sqrt();
     let mut points = points?.concat();
     match PhotonTree::new(&mut points, f64::from(distance / cell)) {
-        Some(tree) => Ok(image.with_irradiance(&tree)?),
+        Some(tree) => Ok(store_irradiance(image, &tree)?),
         None => Ok(image),
     }
 }
@@ -88,7 +88,7 @@ impl<'a> Estimator<'a> {
     }
 }
 
-/// Where photons lie, and on surfaces of which normals, each place once; along a curve through each surface.
+/// The places of photons with the normals of their surfaces, each once; along a curve through each surface.
 fn surface_points(image: &CardImage) -> Result<Vec<SurfacePoint>, Fault> {
     let (scene, mut memory) = image.view();
     let grid = scene.header.photon_grid;

@@ -12,20 +12,20 @@ use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::PHOTON_STACK;
 use photoncard_shared::layout::{GridBox, LEAF_PHOTONS, PhotonLeaf, PhotonNode, leaf_capacity};
 
-use super::stored::StoredPhoton;
 use crate::fold::{Folded, Tree};
+use crate::photon::StoredPhoton;
 
 /// Below this number of photons a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
 /// Intervals of a side between which planes are tried, at the most and at the least.
 const INTERVALS: usize = 32;
-const LEAST_INTERVALS: usize = 8;
-/// Photons that tell where planes are tried: of more, some are as good.
+const MIN_INTERVALS: usize = 8;
+/// Photons by which planes are chosen: of more, a part is as good.
 const SAMPLED: usize = 4096;
 /// Photons from which on a part of space is expected to end in leaves of one surface.
 const MANY: usize = 64;
 /// Levels of a binary tree from which on it is halved.
-const MOST_SKEWED: usize = 40;
+const MAX_SKEWED: usize = 40;
 
 /// The photons of a leaf, in the order of the tree.
 #[derive(Clone, Copy)]
@@ -35,7 +35,7 @@ struct Run {
 }
 
 /// A tree of photons, to be written in lines.
-pub(crate) struct PhotonTree<'a> {
+pub(super) struct PhotonTree<'a> {
     photons: &'a [StoredPhoton],
     folded: Folded<Run, Extent>,
 }
@@ -43,17 +43,17 @@ pub(crate) struct PhotonTree<'a> {
 impl<'a> PhotonTree<'a> {
     /// Of photons in any order, for searches of about `radius` cells: the same tree for the same photons in the same
     /// order, whatever the threads. `None` without photons.
-    pub(crate) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
+    pub(super) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
         let mut folded = Folded::new(build(photons, 0, radius, 0)?);
         if folded.stack > PHOTON_STACK {
             // Halves of halves are not the best of trees, but no deeper than their number asks for.
-            folded = Folded::new(build(photons, 0, radius, MOST_SKEWED)?);
+            folded = Folded::new(build(photons, 0, radius, MAX_SKEWED)?);
         }
         Some(Self { photons, folded })
     }
 
     /// The lines of the nodes.
-    pub(crate) fn nodes(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
+    pub(super) fn nodes(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
         self.folded.nodes.iter().map(|node| {
             let boxes: Vec<GridBox> = node.children.iter().map(|extent| extent.0).collect();
             PhotonNode::encode(&boxes, node.links)
@@ -62,7 +62,7 @@ impl<'a> PhotonTree<'a> {
     }
 
     /// The lines of the leaves.
-    pub(crate) fn leaves(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
+    pub(super) fn leaves(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
         self.folded.leaves.iter().map(|run| {
             let photons = self.photons.iter().skip(run.first as usize).take(run.count.get().into());
             let placed: heapless::Vec<_, LEAF_PHOTONS> =
@@ -84,7 +84,7 @@ fn build(photons: &mut [StoredPhoton], first: u32, radius: f64, depth: usize) ->
     {
         return Some(Tree::leaf(Run { first, count }, extent, 0.0));
     }
-    let (axis, middle) = if depth < MOST_SKEWED {
+    let (axis, middle) = if depth < MAX_SKEWED {
         extent.split(photons, radius)
     } else {
         (extent.longest(), photons.len() / 2)
@@ -151,7 +151,7 @@ impl Extent {
     /// The plane of least cost by the voxel volume heuristic: its axis, and the photons below it.
     fn cheapest(&self, photons: &[StoredPhoton], radius: f64) -> (usize, usize) {
         let mut cheapest = (f64::INFINITY, self.longest(), photons.len() / 2);
-        let intervals = (photons.len() / 4).clamp(LEAST_INTERVALS, INTERVALS);
+        let intervals = (photons.len() / 4).clamp(MIN_INTERVALS, INTERVALS);
         let step = (photons.len() / SAMPLED).max(1);
         let sampled = photons.len().div_ceil(step);
         for axis in (0..3).filter(|&axis| self.side(axis) > 0) {

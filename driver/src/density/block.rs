@@ -1,0 +1,62 @@
+//! Triangles in blocks of sixteen, and a ray against them.
+
+use glam::Vec3;
+use photoncard_firmware::simd::{Isa, Kernel, LANES};
+
+use super::lanes::{LaneVector, at, cross, dot, greatest, least, minus};
+
+/// Sixteen triangles. Of what is no triangle the corners coincide: nothing meets it.
+pub(super) struct Block {
+    pub(super) corners: [LaneVector; 3],
+    /// Indices in the image.
+    pub(super) indices: [u32; LANES],
+    /// A bit for each whose back is the inside of something.
+    pub(super) are_solid: u32,
+}
+
+/// A triangle as seen from a point: the planes through the point and its edges, and six times the volume of both.
+///
+/// Of two triangles that share an edge the planes are opposite to the last bit: no ray passes between them.
+#[inline(always)]
+fn seen_from(point: [f32; 3], block: &Block, lane: usize) -> ([[f32; 3]; 3], f32) {
+    let corner = |corner: usize| minus(at(&block.corners[corner], lane), point);
+    let [a, b, c] = [corner(0), corner(1), corner(2)];
+    let planes = [cross(b, c), cross(c, a), cross(a, b)];
+    (planes, dot(a, planes[0]))
+}
+
+/// The first triangle of some blocks that a ray meets, in a ball's coordinates.
+pub(super) struct FirstOnWay<'a> {
+    pub(super) blocks: &'a [Block],
+    pub(super) origin: Vec3,
+    pub(super) direction: Vec3,
+}
+
+impl Kernel for FirstOnWay<'_> {
+    /// The distance, and the triangle's corners.
+    type Output = Option<(f32, [Vec3; 3])>;
+
+    #[inline(always)]
+    fn run(self, _: impl Isa) -> Self::Output {
+        let (origin, direction) = (self.origin.to_array(), self.direction.to_array());
+        let mut first = (f32::INFINITY, [Vec3::ZERO; 3]);
+        for block in self.blocks {
+            let mut distances = [0.0; LANES];
+            for (lane, target) in distances.iter_mut().enumerate() {
+                let ([u, v, w], volume) = seen_from(origin, block, lane);
+                let [u, v, w] = [dot(u, direction), dot(v, direction), dot(w, direction)];
+                let determinant = u + v + w;
+                let is_met = (least(least(u, v), w) >= 0.0) | (greatest(greatest(u, v), w) <= 0.0);
+                let distance = volume / determinant;
+                *target =
+                    if is_met & (determinant != 0.0) & (distance > 0.0) { distance } else { f32::INFINITY };
+            }
+            for (lane, &distance) in distances.iter().enumerate() {
+                if distance < first.0 {
+                    first = (distance, block.corners.each_ref().map(|corner| Vec3::from(at(corner, lane))));
+                }
+            }
+        }
+        first.0.is_finite().then_some(first)
+    }
+}

@@ -1,0 +1,44 @@
+//! Rays against the whole scene, where more triangles are around a photon than are listed.
+
+use glam::Vec3;
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::scene::{Ray, SceneImage, closest_hit};
+use photoncard_shared::message::Fault;
+
+/// The intersection of a ray with a triangle.
+pub(super) struct Met {
+    /// Metres from the ray's origin.
+    pub(super) distance: f32,
+    /// The unit normal of the front.
+    pub(super) normal: Vec3,
+    /// The index in the image.
+    pub(super) triangle: u32,
+}
+
+/// The first triangle that a ray meets.
+pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -> Result<Option<Met>, Fault> {
+    let Some(hit) = closest_hit(scene, &mut memory, ray)? else { return Ok(None) };
+    let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
+    let normal = (b - a).cross(c - a).normalize_or_zero();
+    Ok(Some(Met { distance: hit.intersection.distance, normal, triangle: hit.index }))
+}
+
+/// All triangles on the segment between two points that are at least a step apart.
+pub(super) fn all_on_way(
+    scene: &SceneImage,
+    memory: Lines,
+    [from, to]: [Vec3; 2],
+    step: f32,
+) -> Result<Vec<Met>, Fault> {
+    let length = from.distance(to);
+    let direction = (to - from) / length;
+    let (mut all, mut gone) = (Vec::new(), 0.0);
+    while gone < length {
+        let ray = Ray { origin: from + direction * gone, direction, max_distance: length - gone };
+        let Some(met) = first_triangle(scene, memory, &ray)? else { break };
+        let distance = gone + met.distance;
+        all.push(Met { distance, ..met });
+        gone = distance + step;
+    }
+    Ok(all)
+}

@@ -1,0 +1,43 @@
+//! Scenes that do not fit a card.
+
+use photoncard_shared::layout::NO_TEXTURE;
+
+use crate::bvh::HierarchyError;
+
+/// Why a scene does not fit a card.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum PackError {
+    /// The hierarchy is not one for a chip.
+    #[error(transparent)]
+    #[diagnostic(help("simplify the scene's geometry"))]
+    Hierarchy(#[from] HierarchyError),
+    /// More lines than a line address can number.
+    #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
+    #[diagnostic(help("lower --photons, use smaller textures, or simplify the scene"))]
+    TooLarge {
+        /// Bytes of the image.
+        bytes: u64,
+    },
+    /// More textures than the index in a material's record can name.
+    #[error("the scene has {textures} textures; a card tells {} apart", NO_TEXTURE)]
+    #[diagnostic(help("join textures of the same image and sampler, or split the scene"))]
+    TooManyTextures {
+        /// Textures of the scene.
+        textures: usize,
+    },
+    /// The image is larger than the card's memory.
+    #[error(
+        "the card image takes {needed} bytes ({photons} of them photons), the card's DRAM budget is {available} bytes"
+    )]
+    #[diagnostic(help("{remedy}"))]
+    Dram {
+        /// Bytes of the image.
+        needed: u64,
+        /// Bytes of the photon map alone.
+        photons: u64,
+        /// Bytes of the card's DRAM.
+        available: u64,
+        /// What to lower, and how far.
+        remedy: String,
+    },
+}

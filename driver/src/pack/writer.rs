@@ -1,0 +1,128 @@
+//! A card image under construction: sections appended one after another, in lines.
+
+use photoncard_shared::address::{LINE_BYTES, Line};
+use photoncard_shared::image::{HEADER_LINES, Header, Section, SectionKind};
+use photoncard_shared::layout::PhotonGrid;
+
+use super::card_image::CardImage;
+use super::error::PackError;
+
+/// Writes a card image, or goes on writing one: appends sections behind its last line.
+pub(crate) struct ImageWriter {
+    header: Header,
+    lines: Vec<Line>,
+}
+
+impl ImageWriter {
+    /// An image without sections. `header` gives its units and lights; lines and sections are counted here.
+    pub(super) fn new(header: Header) -> Self {
+        Self { header, lines: vec![Line::ZERO; HEADER_LINES] }
+    }
+
+    /// Goes on with an image that was finished before.
+    pub(crate) fn resume(CardImage { header, lines }: CardImage) -> Self {
+        Self { header, lines }
+    }
+
+    /// Sets the grid of photons' positions, and the watts that a photon power of 1 stands for.
+    pub(crate) fn set_photons(&mut self, grid: PhotonGrid, power_unit: f32) {
+        self.header.photon_grid = grid;
+        self.header.photon_power_unit = power_unit;
+    }
+
+    /// Sets the watts that a power of 1 of a caustic photon stands for.
+    pub(crate) fn set_caustic_power_unit(&mut self, power_unit: f32) {
+        self.header.caustic_power_unit = power_unit;
+    }
+
+    /// Appends a section of records, none of which straddles two lines.
+    ///
+    /// # Errors
+    /// [`PackError::TooLarge`] if there are more lines or records than 32 bits can count.
+    pub(crate) fn append<const N: usize>(
+        &mut self,
+        kind: SectionKind,
+        records: impl ExactSizeIterator<Item = [u8; N]>,
+    ) -> Result<(), PackError> {
+        let lines = records.len().div_ceil(LINE_BYTES / N);
+        self.header.sections[kind as usize] = section(self.lines.len(), records.len(), lines)?;
+        // Exactly: an image is most of what the host holds.
+        self.lines.reserve_exact(lines);
+        self.lines.extend(pack_lines(records));
+        Ok(())
+    }
+
+    /// Appends a section of whole lines, counted as they are made.
+    ///
+    /// # Errors
+    /// As [`Self::append`].
+    pub(super) fn append_lines(
+        &mut self,
+        kind: SectionKind,
+        lines: impl Iterator<Item = Line>,
+    ) -> Result<(), PackError> {
+        let first = self.lines.len();
+        self.lines.extend(lines);
+        let count = self.lines.len() - first;
+        self.header.sections[kind as usize] = section(first, count, count)?;
+        Ok(())
+    }
+
+    /// Appends a section of zeroed records, to be written in any order, and returns its lines.
+    ///
+    /// # Errors
+    /// As [`Self::append`].
+    pub(crate) fn append_zeroed(
+        &mut self,
+        kind: SectionKind,
+        records: usize,
+    ) -> Result<&mut [Line], PackError> {
+        let (first, lines) = (self.lines.len(), records.div_ceil(kind.records_per_line() as usize));
+        self.header.sections[kind as usize] = section(first, records, lines)?;
+        self.lines.reserve_exact(lines);
+        self.lines.resize(first + lines, Line::ZERO);
+        Ok(&mut self.lines[first..])
+    }
+
+    /// Removes sections, which must be the last of the image.
+    pub(crate) fn remove_last(&mut self, kinds: &[SectionKind]) {
+        for &kind in kinds {
+            let Section { first_line, records } = std::mem::take(&mut self.header.sections[kind as usize]);
+            if records > 0 {
+                self.lines.truncate(first_line as usize);
+            }
+        }
+    }
+
+    /// Writes the header into the first lines.
+    pub(crate) fn finish(self) -> CardImage {
+        let Self { mut header, mut lines } = self;
+        // `section` has checked that the number of lines fits.
+        header.lines = lines.len() as u32;
+        lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
+        CardImage { header, lines }
+    }
+}
+
+/// A section of so many records in so many lines from line `first` on.
+fn section(first: usize, records: usize, lines: usize) -> Result<Section, PackError> {
+    let end = first + lines;
+    let too_large = |_| PackError::TooLarge { bytes: end as u64 * LINE_BYTES as u64 };
+    let [first_line, records, end] =
+        [first, records, end].map(|count| u32::try_from(count).map_err(too_large));
+    end.and(Ok(Section { first_line: first_line?, records: records? }))
+}
+
+/// Packs records into lines, none of them across a border.
+fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl Iterator<Item = Line> {
+    let per_line = LINE_BYTES / N;
+    let mut records = records.peekable();
+    std::iter::from_fn(move || {
+        records.peek()?;
+        let mut line = Line::ZERO;
+        for (slot, record) in line.0.as_chunks_mut::<N>().0.iter_mut().zip(records.by_ref().take(per_line)) {
+            *slot = record;
+        }
+        Some(line)
+    })
+}

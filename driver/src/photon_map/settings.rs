@@ -1,0 +1,34 @@
+//! Parameters of a photon map.
+
+use photoncard_shared::message::Radiance;
+
+/// Parameters of a photon map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhotonSettings {
+    /// Seed of the photon paths.
+    pub seed: u32,
+    /// Photons to store.
+    pub photons: usize,
+    /// Photons of a density estimate.
+    pub neighbors: u32,
+    /// Greatest distance of a gather, metres; `None` for the one that the photons' density suggests.
+    pub max_distance: Option<f32>,
+    /// Caustic photons to store; 0 for no caustic map.
+    pub caustic_photons: usize,
+    /// Photons of a density estimate in the caustic map.
+    pub caustic_neighbors: u32,
+    /// Layout of the map in card memory.
+    pub layout: PhotonLayout,
+    /// Estimate of reflected radiance: [`Radiance::Precomputed`] adds irradiance points to the image.
+    pub radiance: Radiance,
+}
+
+/// Layout of the photon map in card memory. A gather finds the same photons in either.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PhotonLayout {
+    /// The left-balanced kd-tree of Jensen (2001), of 20-byte records: the dissertation's.
+    Jensen,
+    /// Photons in leaves that fill a line of card memory each: smaller, and faster to search.
+    #[default]
+    Lines,
+}

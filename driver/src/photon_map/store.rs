@@ -1,0 +1,75 @@
+//! Photons and irradiance points as sections of a card image: leaves, and the nodes above them.
+
+use photoncard_shared::image::SectionKind;
+
+use super::leaves::PhotonTree;
+use super::radius::typical_radius;
+use crate::pack::{CardImage, ImageWriter, PackError, PackedScene};
+use crate::photon::Photons;
+
+/// The sections of the photon map, irradiance points among them: the last of an image.
+pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
+    SectionKind::Photons,
+    SectionKind::PhotonNodes,
+    SectionKind::PhotonLeaves,
+    SectionKind::CausticNodes,
+    SectionKind::CausticLeaves,
+    SectionKind::IrradianceNodes,
+    SectionKind::IrradianceLeaves,
+];
+
+/// Completes the image of a scene with its photons, in leaves, for searches of about `neighbors` photons.
+///
+/// # Errors
+/// [`PackError::TooLarge`] if there are more lines than an address can number.
+pub fn store_photons(
+    packed: PackedScene,
+    mut photons: Photons,
+    neighbors: u32,
+) -> Result<CardImage, PackError> {
+    let mut image = ImageWriter::resume(packed.into_image());
+    image.set_photons(photons.grid(), photons.power_unit());
+    let radius = typical_radius(&photons, neighbors);
+    if let Some(tree) = PhotonTree::new(photons.stored_mut(), radius) {
+        append_tree(&mut image, [SectionKind::PhotonNodes, SectionKind::PhotonLeaves], &tree)?;
+    }
+    Ok(image.finish())
+}
+
+/// Adds a caustic map to an image, for searches of about `neighbors` photons.
+///
+/// # Errors
+/// As [`store_photons`].
+pub(super) fn store_caustics(
+    image: CardImage,
+    mut photons: Photons,
+    neighbors: u32,
+) -> Result<CardImage, PackError> {
+    let mut image = ImageWriter::resume(image);
+    image.set_caustic_power_unit(photons.power_unit());
+    let radius = typical_radius(&photons, neighbors);
+    if let Some(tree) = PhotonTree::new(photons.stored_mut(), radius) {
+        append_tree(&mut image, [SectionKind::CausticNodes, SectionKind::CausticLeaves], &tree)?;
+    }
+    Ok(image.finish())
+}
+
+/// Adds irradiance points to an image.
+///
+/// # Errors
+/// As [`store_photons`].
+pub(super) fn store_irradiance(image: CardImage, points: &PhotonTree) -> Result<CardImage, PackError> {
+    let mut image = ImageWriter::resume(image);
+    append_tree(&mut image, [SectionKind::IrradianceNodes, SectionKind::IrradianceLeaves], points)?;
+    Ok(image.finish())
+}
+
+/// Appends the nodes and the leaves of a tree.
+fn append_tree(
+    image: &mut ImageWriter,
+    [nodes, leaves]: [SectionKind; 2],
+    tree: &PhotonTree,
+) -> Result<(), PackError> {
+    image.append(nodes, tree.nodes())?;
+    image.append(leaves, tree.leaves())
+}

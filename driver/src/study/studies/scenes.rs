@@ -1,0 +1,7 @@
+//! Scenes of the studies.
+
+/// A simple, a glossy and a large scene: file and name in the reports.
+pub(super) const SCENES: [(&str, &str); 3] =
+    [(CORNELL, "Cornell box"), (GLOSSY, "glossy Cornell box"), ("atrium.glb", "atrium")];
+pub(super) const CORNELL: &str = "cornell.gltf";
+pub(super) const GLOSSY: &str = "cornell-glossy.gltf";

@@ -1,0 +1,98 @@
+//! A gather point as it waits from one direction bin to the next.
+
+use core::ops::Range;
+
+use photoncard_shared::budget::MOST_GATHER_RAYS;
+use photoncard_shared::message::{Fault, FrameParameters};
+
+use crate::importance::DirectionTable;
+use crate::memory::MemoryPort;
+use crate::render::{Context, GatherPoint, PixelSample, Purpose, eye};
+use crate::sampler::{Dimension, Pattern};
+use crate::scene::Seen;
+
+/// State of a gather point from one direction bin to the next, 48 bytes: the rest is read again.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StoredPoint {
+    /// Of pixels: the triangle and the place on it; elsewhere if it is seen by way of perfectly specular surfaces.
+    pub(super) seen: Seen,
+    pub(super) directions: DirectionTable,
+    /// Of pixels: the number of rays to cast, and their purpose.
+    pub(super) rays: StoredRays,
+}
+
+const _: () = assert!(size_of::<StoredPoint>() == 48);
+
+/// The number of a pixel's rays, none in most where irradiance is interpolated; and whether they are for the lobe alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct StoredRays(u16);
+
+const _: () = assert!(MOST_GATHER_RAYS < StoredRays::OF_LOBE as u32 - 1);
+
+impl StoredRays {
+    const OF_LOBE: u16 = 1 << 15;
+    /// No surface.
+    pub(super) const NOWHERE: Self = Self(u16::MAX);
+
+    pub(super) fn new(point: &GatherPoint) -> Self {
+        let of_lobe = if point.purpose == Purpose::Lobe { Self::OF_LOBE } else { 0 };
+        Self(point.rays as u16 | of_lobe)
+    }
+
+    #[inline(always)]
+    pub(super) fn number(self) -> u32 {
+        if self == Self::NOWHERE { 0 } else { u32::from(self.0 & !Self::OF_LOBE) }
+    }
+
+    #[inline(always)]
+    pub(super) fn purpose(self) -> Purpose {
+        if self.0 & Self::OF_LOBE != 0 { Purpose::Lobe } else { Purpose::Sample }
+    }
+}
+
+impl StoredPoint {
+    pub(super) const NOTHING: Self =
+        Self { seen: Seen::NOWHERE, directions: DirectionTable::COSINE, rays: StoredRays::NOWHERE };
+
+    /// The rays of a direction bin: known before the surface is read again.
+    #[inline(always)]
+    pub(super) fn rays_of_bin(&self, frame: &FrameParameters, at: PixelSample, bin: u32) -> Range<u32> {
+        match self.rays.number() {
+            0 => 0..0,
+            rays => self.directions.rays(pattern(frame, at), rays, bin, frame.bins),
+        }
+    }
+
+    /// The gather point of a sample of a pixel.
+    #[inline(always)]
+    pub(super) fn restore<M: MemoryPort>(
+        &self,
+        context: &mut Context<M>,
+        at: PixelSample,
+    ) -> Result<Option<GatherPoint>, Fault> {
+        if self.rays == StoredRays::NOWHERE {
+            return Ok(None);
+        }
+        let surface = if self.seen.is_elsewhere() {
+            // The way there is followed again.
+            let Some(view) = eye::view(context, at)?.surface() else { return Ok(None) };
+            view.surface
+        } else {
+            let place = eye::place(context, at);
+            eye::surface(context, place, &self.seen)?
+        };
+        Ok(Some(GatherPoint {
+            surface,
+            pattern: pattern(context.frame, at),
+            rays: self.rays.number(),
+            directions: self.directions,
+            purpose: self.rays.purpose(),
+        }))
+    }
+}
+
+/// The random numbers of a sample's gather rays.
+#[inline(always)]
+pub(super) fn pattern(frame: &FrameParameters, at: PixelSample) -> Pattern {
+    Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather)
+}

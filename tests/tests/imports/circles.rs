@@ -1,0 +1,53 @@
+//! Circles of a graph of files.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::path::{Path, PathBuf};
+
+/// Of each file the files that it imports, each with a path that does it.
+pub(crate) type Imports = BTreeMap<PathBuf, BTreeMap<PathBuf, String>>;
+
+/// The circles, each file in one of them at most: of each the imports that close it, a line each.
+pub(crate) fn circles(imports: &Imports, folder: &Path) -> Vec<String> {
+    let mut known = BTreeSet::new();
+    let mut circles = Vec::new();
+    for file in imports.keys() {
+        if known.contains(file) {
+            continue;
+        }
+        if let Some(circle) = shortest_circle(imports, file) {
+            circles.push(description(imports, &circle, folder));
+            known.extend(circle);
+        }
+    }
+    circles
+}
+
+/// The shortest way from a file back to itself, the file first; breadth first.
+fn shortest_circle<'i>(imports: &'i Imports, start: &'i PathBuf) -> Option<Vec<&'i PathBuf>> {
+    let mut importers: BTreeMap<&PathBuf, &PathBuf> = BTreeMap::new();
+    let mut waiting = VecDeque::from([start]);
+    while let Some(file) = waiting.pop_front() {
+        for imported in imports.get(file)?.keys() {
+            if imported == start {
+                let back = std::iter::successors(Some(file), |file| importers.get(file).copied());
+                let mut circle: Vec<_> = back.collect();
+                circle.reverse();
+                return Some(circle);
+            }
+            if !importers.contains_key(imported) {
+                importers.insert(imported, file);
+                waiting.push_back(imported);
+            }
+        }
+    }
+    None
+}
+
+fn description(imports: &Imports, circle: &[&PathBuf], folder: &Path) -> String {
+    let name = |file: &'_ PathBuf| file.strip_prefix(folder).unwrap_or(file).display().to_string();
+    let next = circle.iter().cycle().skip(1);
+    let lines = circle.iter().zip(next).map(|(&file, &imported)| {
+        format!("{} takes {} of {}", name(file), imports[file][imported], name(imported))
+    });
+    lines.collect::<Vec<_>>().join("\n  ")
+}
