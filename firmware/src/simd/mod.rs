@@ -1,9 +1,9 @@
-//! What a processor can do with sixteen numbers at once, chosen when the program runs.
+//! Vector instructions on sixteen lanes, chosen at run time.
 //!
-//! A [`Kernel`] is written once, as loops over [`LANES`] lanes in which each lane does what the others do. It is compiled
-//! for each [`Isa`] that the processor may have: the loops become vector instructions, and what loops cannot tell, to
-//! compare and to pack lanes, is a method of the `Isa`. Every lane rounds as a single number does and nothing is
-//! contracted, so all give the same bits; [`Portable`] is the twin that every processor has.
+//! A [`Kernel`] is written once, as loops over [`LANES`] lanes that all do the same. It is compiled for each [`Isa`]
+//! that the processor may have: the loops become vector instructions, and operations that compilers do not find in
+//! loops, to compare and to pack lanes, are methods of the `Isa`. Every lane rounds like a scalar and nothing is
+//! contracted, so that all give the same bits; [`Portable`] is the fallback for every processor.
 
 #[cfg(target_arch = "x86_64")]
 #[expect(
@@ -16,41 +16,42 @@ use photoncard_shared::address::Line;
 
 /// Numbers that are computed at once.
 pub const LANES: usize = 16;
-/// Half as many.
+/// Half of [`LANES`].
 pub const HALF_LANES: usize = LANES / 2;
 
-/// Instructions of a processor. A value of a type is the proof that the processor has them.
+/// An instruction set. A value of such a type is the proof that the processor has it.
 pub trait Isa: Copy {
-    /// How many lanes to compute if `used` are asked for: all, where they cost no more.
+    /// Number of lanes to compute if `used` are needed: all, where they cost no more.
     fn lanes(self, used: usize) -> usize;
 
-    /// A bit for every lane that is below a bound.
+    /// Mask of the lanes below a bound, lane 0 in the lowest bit.
     fn below(self, values: &[u32; LANES], bound: u32) -> u32;
 
-    /// Moves the lanes of a mask to the front of `packed`, in their order. What lies behind is of no use.
+    /// Moves the lanes of a mask to the front of `packed`, in order. The other lanes of `packed` are meaningless.
     fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]);
 
-    /// The same of twice as long numbers.
+    /// [`Isa::pack`] for 64-bit lanes.
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]);
 
-    /// The values with these indices, of which the lower four bits count.
+    /// The values with these indices; only the lower four bits of an index count.
     fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES];
 
-    /// Has a line brought near, if the processor can, as it may be read soon.
+    /// Prefetches a line into the processor's cache, if the instruction set can.
     #[inline(always)]
     fn prefetch(self, _: &Line) {}
 }
 
-/// What is compiled for every [`Isa`].
+/// An inner loop, compiled for every [`Isa`].
 pub trait Kernel {
-    /// What it returns.
+    /// Result of the kernel.
     type Output;
 
-    /// Does it. To be inlined always, as must be all that it calls, or it is compiled for [`Portable`] whatever `isa` is.
+    /// Runs the kernel. This method and all that it calls must be `#[inline(always)]`; otherwise they are compiled
+    /// without the instructions of `isa`.
     fn run(self, isa: impl Isa) -> Self::Output;
 }
 
-/// Runs a kernel with the best instructions that the processor has.
+/// Runs a kernel with the best instruction set of the processor.
 #[inline(always)]
 pub fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -59,28 +60,28 @@ pub fn run<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Portable)
 }
 
-/// The instructions to choose from, for tests that all give the same.
+/// All instruction sets, for tests that they give the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
-    /// Those of every processor.
+    /// [`Portable`].
     Portable,
-    /// Those of x86-64 with AVX2.
+    /// AVX2 of x86-64.
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// Those of x86-64 with AVX-512.
+    /// AVX-512 of x86-64.
     #[cfg(target_arch = "x86_64")]
     Avx512,
 }
 
 impl Level {
-    /// All that there are.
+    /// All instruction sets of this architecture.
     #[cfg(target_arch = "x86_64")]
     pub const ALL: &[Self] = &[Self::Portable, Self::Avx2, Self::Avx512];
-    /// All that there are.
+    /// All instruction sets of this architecture.
     #[cfg(not(target_arch = "x86_64"))]
     pub const ALL: &[Self] = &[Self::Portable];
 
-    /// Runs a kernel with these; `None` if the processor does not have them.
+    /// Runs a kernel with this instruction set; `None` if the processor lacks it.
     pub fn run<K: Kernel>(self, kernel: K) -> Option<K::Output> {
         match self {
             Self::Portable => Some(kernel.run(Portable)),
@@ -92,7 +93,7 @@ impl Level {
     }
 }
 
-/// What every processor has.
+/// The fallback without vector intrinsics, for every processor.
 #[derive(Clone, Copy, Debug)]
 pub struct Portable;
 
@@ -138,7 +139,7 @@ mod tests {
 
     use super::*;
 
-    /// What an [`Isa`] does of its own, for one mask.
+    /// Results of all of an [`Isa`]'s own methods for one mask.
     struct All {
         mask: u32,
         bound: u32,
