@@ -1,34 +1,34 @@
-//! Sums that come out the same in any order.
+//! Sums in fixed point, whose bits do not depend on the order of the terms.
 //!
-//! A float sum depends on the order of its terms; an integer sum does not. Terms are rounded once to 2^-40 of a unit
-//! that the host chooses per scene (a power of two near the largest term), and added as integers.
+//! A term is rounded once to 2^-40 of a unit, a power of two near the largest term that the host chooses for each
+//! scene, and added as an integer: unlike floating-point addition, integer addition is associative.
 
 use fixed::types::I24F40;
 use glam::Vec3;
 use photoncard_shared::layout::Rgbe;
 
-/// 2^40: exact in `f32`, and so is the product with it.
+/// 2^40: exact in `f32`, and so are products with it.
 const SCALE: f32 = (1_u64 << 40) as f32;
 
-/// The sum of many numbers, exact but for the rounding of each term: its order does not matter.
+/// Fixed-point sum of numbers, exact but for the rounding of each term.
 ///
-/// It holds less than 2^23 units and wraps above.
+/// Its range is -2^23 to 2^23 units; [`Self::add`] wraps beyond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sum(I24F40);
 
 impl Sum {
-    /// No term yet.
+    /// The empty sum.
     pub const ZERO: Self = Self(I24F40::ZERO);
 
-    /// Adds a term, in units, rounded towards zero to 2^-40; what is not a number is zero, what is too large is the
-    /// largest.
+    /// Adds a term, in units, rounded towards zero to a multiple of 2^-40; NaN counts as 0, and terms out of range are
+    /// clamped.
     #[inline(always)]
     pub fn add(&mut self, term: f32) {
         self.add_bits((term * SCALE) as i64);
     }
 
-    /// Adds a term that is not negative, in units; the sum stays at its greatest value when it is reached. In any order: a
-    /// sum that only grows is cut at the same value.
+    /// Adds a non-negative term, in units, with saturation. The order does not matter here either: a sum that only
+    /// grows saturates in every order or in none.
     #[inline(always)]
     fn add_up_to_greatest(&mut self, term: f32) {
         let bits = ((term * SCALE) as i64).max(0);
@@ -40,25 +40,25 @@ impl Sum {
         self.0 = self.0.wrapping_add(I24F40::from_bits(bits));
     }
 
-    /// The sum, in units.
+    /// Value of the sum, in units.
     #[inline(always)]
     pub fn value(self) -> f32 {
         self.0.to_bits() as f32 * (1.0 / SCALE)
     }
 }
 
-/// The sum of many colours, exact but for the rounding of each term: its order does not matter.
+/// Fixed-point sum of colours, exact but for the rounding of each term.
 ///
-/// A component is a [`Sum`]: `k` photons of a power unit each, reflected by a factor of at most a few thousand, stay far
-/// below its limit.
+/// Each component is a [`Sum`]: k photons of one power unit each, times a reflectance of at most a few thousand, stay
+/// far below its limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ColourSum([Sum; 3]);
 
 impl ColourSum {
-    /// No term yet.
+    /// The empty sum.
     pub const ZERO: Self = Self([Sum::ZERO; 3]);
 
-    /// Adds a term, in units.
+    /// Adds a colour, in units ([`Sum::add`]).
     #[inline(always)]
     pub fn add(&mut self, term: Vec3) {
         for (sum, component) in self.0.iter_mut().zip(term.to_array()) {
@@ -66,7 +66,7 @@ impl ColourSum {
         }
     }
 
-    /// Adds light, in units: components that are not negative. A sum that reaches 2^23 units stays there.
+    /// Adds a colour with non-negative components, in units; components saturate at 2^23 units.
     #[inline(always)]
     pub fn add_light(&mut self, light: Vec3) {
         for (sum, component) in self.0.iter_mut().zip(light.to_array()) {
@@ -74,7 +74,7 @@ impl ColourSum {
         }
     }
 
-    /// Adds a sum of light. It stays at 2^23 units where it reaches them: the sum is what it would be of all terms at once.
+    /// Adds a sum of light, saturating at 2^23 units: the result is the sum of all terms of both.
     #[inline(always)]
     pub fn add_sum(&mut self, light: &Self) {
         for (sum, more) in self.0.iter_mut().zip(light.0) {
@@ -82,13 +82,13 @@ impl ColourSum {
         }
     }
 
-    /// Adds a shared-exponent colour: what [`Self::add`] does of the decoded one, in integers alone.
+    /// Adds an [`Rgbe`] colour in integer arithmetic, with the bits of [`Self::add`] of the decoded colour.
     #[inline(always)]
     pub fn add_rgbe(&mut self, power: Rgbe) {
         self.add_powers(&[u32::from_le_bytes(power.0).into()]);
     }
 
-    /// Adds the [`Rgbe`] colours that are the first four bytes of each little-endian number.
+    /// Adds the [`Rgbe`] colours in the low four bytes of photons' contents.
     #[inline(always)]
     pub(crate) fn add_powers(&mut self, photons: &[u64]) {
         let mut sums = [0_u64; 3];
@@ -104,7 +104,7 @@ impl ColourSum {
         }
     }
 
-    /// Takes one of the colours away that [`Self::add_powers`] has added.
+    /// Subtracts a colour that [`Self::add_powers`] added.
     #[inline(always)]
     pub(crate) fn subtract_power(&mut self, photon: u64) {
         for (sum, bits) in self.0.iter_mut().zip(bits_of_power(photon)) {
@@ -112,20 +112,20 @@ impl ColourSum {
         }
     }
 
-    /// The sum, in units.
+    /// Value of the sum, in units.
     #[inline(always)]
     pub fn value(&self) -> Vec3 {
         Vec3::from_array(self.0.map(Sum::value))
     }
 }
 
-/// What a shared-exponent colour, the first four bytes, adds to the bits of three sums.
+/// Fixed-point components of the [`Rgbe`] colour in the low four bytes of a photon's content.
 #[inline(always)]
 fn bits_of_power(photon: u64) -> [u64; 3] {
-    // Of the exponent's byte, that of which a mantissa is in units of the sum's last bit.
+    // The exponent byte of a mantissa in units of 2^-40.
     const UNIT: u32 = Rgbe::EXPONENT_BIAS as u32 - I24F40::FRAC_NBITS;
     let exponent = (photon >> 24) as u32 & 0xff;
-    // A shift of 63 leaves nothing of a byte on either side; one of the two is none.
+    // One of the two shifts is 0; a byte shifted by 63 is out of range on the right, and 0 or 2^63 on the left.
     let [up, down] = [exponent.saturating_sub(UNIT).min(63), UNIT.saturating_sub(exponent).min(63)];
     [photon, photon >> 8, photon >> 16].map(|mantissa| (mantissa & 0xff) << up >> down)
 }

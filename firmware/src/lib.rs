@@ -3,39 +3,41 @@
 //! No allocator, no I/O, every buffer sized at compile time by [`photoncard_shared::budget`]. From the memory to the
 //! wire:
 //!
-//! | module | what |
+//! | module | contents |
 //! |---|---|
 //! | [`memory`] | 128-byte lines of card DRAM |
-//! | [`scene`] | bounding volume hierarchy, triangles, materials, emitters, read from those lines |
-//! | [`photon`] | the k nearest photons and the radiance they reflect; the nearest of precomputed irradiance |
+//! | [`scene`] | ray caster, surfaces, textures and lights, read from card memory |
+//! | [`photon`] | search for the k nearest photons, radiance estimate, precomputed irradiance |
 //! | [`sampler`] | stratified random numbers from (pixel, sample, dimension) |
-//! | [`gather`] | photon gathers that wait, and in which order they are done |
-//! | [`importance`] | which way a final gather ray goes |
-//! | [`irradiance_cache`] | indirect irradiance, gathered at few places and interpolated between them |
+//! | [`gather`] | queue of photon gathers, and their order |
+//! | [`importance`] | importance sampling of final gather directions |
+//! | [`irradiance_cache`] | indirect irradiance, gathered at few points and interpolated between them |
 //! | [`render`] | eye rays, direct light, final gather: the stages of a tile |
-//! | [`chip`] | owns the tile's state; one method a stage |
-//! | [`card`] | commands in, replies out |
-//! | [`serve`] | a card on a port |
+//! | [`chip`] | state of a tile; one method for each stage |
+//! | [`card`] | protocol of a card: commands in, replies out |
+//! | [`serve`] | main loop of a card on a port |
 //!
-//! # Where each path of light is counted
+//! # Light paths
 //!
-//! With E the eye, L a light, D and S a diffuse and a Phong reflection, at the point that the eye ray meets:
+//! Every path is counted once. In Heckbert's notation, with L a light, E the eye, D a reflection by the Lambertian part
+//! or the Phong lobe of a surface, and S a perfectly specular reflection or a refraction:
 //!
-//! - `LE`, light seen directly: the emission of the point itself.
-//! - `L(D|S)E`, direct light: shadow rays to points on emitters, and final gather rays that meet an emitter, each
-//!   weighted so that together they count it once ([`render::direct`]).
-//! - `L(D|S)+(D|S)E`, indirect light: final gather rays alone ([`render::final_gather`]). Where a ray ends, the photon
-//!   map gives all the light reflected there, first arrivals from lights included, as no shadow ray is cast from there.
+//! - `L S* E`, visible emission: the eye path, followed through S ([`render::eye`]).
+//! - `L D S* E`, direct light: shadow rays, and final gather rays that meet a light, combined by multiple importance
+//!   sampling ([`render::direct`]).
+//! - `L S+ D S* E`, caustics: the caustic map ([`render::caustic`]).
+//! - `L (S|D)* D S* D S* E`, indirect light: final gather rays alone, followed through S ([`render::final_gather`]). At
+//!   their ends the photon map gives all reflected light, direct light included, as no shadow rays start there.
 //!
 //! # Exactness
 //!
-//! Random numbers depend on (pixel, sample, dimension) alone. Sums over photons and over gather rays are made in fixed
-//! point ([`fixed_point`]), so their order does not matter. Nothing depends on the processor: `f32` operations, `libm`
-//! and integer arithmetic, never a fused multiply-add.
-// But for the instructions that `simd` chooses.
+//! Random numbers are functions of (seed, pixel, sample, dimension). Sums over photons and over gather rays are in
+//! fixed point ([`fixed_point`]), so that their order does not matter. All processors give the same bits: `f32` add,
+//! multiply, divide and square root, `libm`, integer arithmetic, and never a fused multiply-add.
+// `simd` alone is exempt, for its vector instructions.
 #![deny(unsafe_code)]
 #![no_std]
-// A chip never panics: what could is kept out, or its reason given.
+// A chip never panics: these lints catch what could, and each exception gives its reason.
 #![cfg_attr(
     not(test),
     warn(

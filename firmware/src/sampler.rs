@@ -1,64 +1,64 @@
-//! Random numbers from (seed, pixel, sample, dimension): never from a chip, a thread or what came before.
+//! Random numbers as functions of (seed, pixel, sample, dimension), independent of chip, thread and order of execution.
 //!
-//! Points in a pixel and on emitters are correlated multi-jittered (Kensler 2013, *Correlated multi-jittered sampling*):
-//! `count` points of the square in as many cells of equal area, in about sqrt(count) rows, and stratified within rows
-//! and columns. Kensler's grid is rectangular; here the rows of a count that is not a product hold one cell more or
-//! less, which keeps every cell's area, and so the expectation, exact.
+//! Points in a pixel and on emitters are correlated multi-jittered (Kensler 2013, *Correlated multi-jittered
+//! sampling*): `count` points of the unit square in as many cells of equal area, in about sqrt(count) rows, stratified
+//! in both dimensions. Kensler's grid is rectangular; here, if `count` is no multiple of the number of rows, some rows
+//! have one cell more, so that all cells have equal area and the expectation is exact.
 //!
-//! Final gather rays take points along a line ([`Pattern::jitter`]), which their table divides
-//! ([`crate::importance::DirectionTable`]), and across it a radical inverse: any run of neighbours, as fall in one cell
-//! of the table, is stratified both ways.
+//! The two coordinates of a final gather ray are a jittered one ([`Pattern::jitter`]), which selects a cell of the
+//! direction table ([`crate::importance::DirectionTable`]), and a radical inverse: any run of consecutive rays, such as
+//! those of one cell of the table, is stratified in both.
 
-/// What a random number is for. Each purpose has a pattern of its own.
+/// Dimension of a random number: its purpose. Patterns of different dimensions are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Dimension {
-    /// The place in the pixel.
+    /// Position in the pixel.
     Pixel = 1,
-    /// The point on an emitter.
+    /// Light, and point on it, of a shadow ray.
     Emitter = 2,
-    /// The directions of final gather rays.
+    /// Directions of a sample's final gather rays.
     Gather = 3,
-    /// The directions of the gather rays of an irradiance record.
+    /// Directions of an irradiance record's final gather rays.
     Irradiance = 4,
-    /// The directions of the rays that survey an irradiance record's surroundings.
+    /// Directions of an irradiance record's survey rays.
     Survey = 5,
-    /// Which way an eye ray goes on at perfectly specular surfaces.
+    /// Choice between reflection, transmission and absorption at perfectly specular surfaces on an eye path.
     Specular = 6,
 }
 
-/// A pattern of points for one pixel, sample and dimension.
+/// Random pattern of points of one pixel, sample and dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pattern(u32);
 
 impl Pattern {
-    /// The pattern of a purpose at a pixel, for one sample; patterns that spread over all samples take sample 0.
+    /// The pattern of a pixel, sample and dimension; a pattern shared by all samples of a pixel has sample 0.
     #[inline(always)]
     pub fn new(seed: u32, x: u32, y: u32, sample: u32, dimension: Dimension) -> Self {
         let pixel = hash(hash(seed ^ 0x9e37_79b9).wrapping_add(x)).wrapping_add(y);
         Self(hash(hash(hash(pixel).wrapping_add(sample)).wrapping_add(dimension as u32)))
     }
 
-    /// Random bits that belong to a point, independent of its place.
+    /// Random bits of point `index`, independent of its coordinates.
     #[inline(always)]
     pub fn dither(self, index: u32) -> u32 {
         self.bits(index, 0x2545_f491)
     }
 
-    /// A random number in [0, 1) for a choice of the path that begins with point `index`.
+    /// Random number in [0, 1) for the choice of this number on the path that starts with point `index`.
     #[inline(always)]
     pub fn choice(self, index: u32, choice: u32) -> f32 {
         unit_interval(hash(self.bits(index, 0x1656_67b1).wrapping_add(choice)))
     }
 
-    /// Random bits for the place of a point in its stratum of a line.
+    /// Random bits for the position of point `index` in its stratum of [0, 1).
     #[inline(always)]
     pub fn jitter(self, index: u32) -> u32 {
         self.bits(index, 0x967a_889b)
     }
 
-    /// The radical inverse of `index`, in [0, 1), its digits flipped at random: over the indices it is uniform, and any
-    /// 2^m neighbouring ones from a multiple of 2^m on lie in different 2^m-ths.
+    /// Base-2 radical inverse of `index`, in [0, 1), with randomly flipped digits (XOR scrambling). Each aligned run of
+    /// 2^m indices has one point in every stratum of width 2^-m.
     #[inline(always)]
     pub fn radical_inverse(self, index: u32) -> f32 {
         unit_interval(index.reverse_bits() ^ hash(self.0.wrapping_add(0x368c_c8b7)))
@@ -69,9 +69,9 @@ impl Pattern {
         hash(self.0.wrapping_add(salt) ^ index.wrapping_mul(0x9e37_79b9))
     }
 
-    /// Which of `count * samples` points is point `index` of a sample's `count`: each sample has one point of every run of
-    /// `samples` neighbours, chosen anew from run to run, and all samples together have every point once. With one sample
-    /// it is `index`.
+    /// Index, among the `count * samples` points of a pixel, of point `index` of `count` of one sample. Each sample
+    /// takes one point from every run of `samples` consecutive points, by a random permutation of each run, so that all
+    /// samples together take every point once; `index` itself with one sample.
     #[inline(always)]
     pub fn index_in_all(self, index: u32, sample: u32, samples: u32) -> u32 {
         let samples = samples.max(1);
@@ -92,16 +92,17 @@ impl Pattern {
     }
 }
 
-/// The cell of one point: a row of the square as high as its share of the points, cut into equal columns.
+/// Cell of one point: the square is divided into rows of a height in proportion to their points, each row into equal
+/// columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Cell {
-    /// Rows of the whole square.
+    /// Number of rows of the square.
     rows: u32,
     row: u32,
-    /// Columns of this row.
+    /// Number of columns of this row.
     columns: u32,
     column: u32,
-    /// Points in the rows before.
+    /// Number of points in the rows before.
     first: u32,
 }
 
@@ -111,7 +112,7 @@ impl Cell {
     fn new(index: u32, count: u32) -> Self {
         let count = count.max(1);
         let rows = (libm::sqrtf(count as f32) as u32).max(1);
-        // Row r holds the points from floor(r count / rows) on.
+        // The first point of row r is floor(r count / rows).
         let row = (index * rows + rows - 1) / count;
         let first = row * count / rows;
         let columns = ((row + 1) * count / rows - first).max(1);
@@ -119,9 +120,10 @@ impl Cell {
     }
 }
 
-/// The image of `index` under a permutation of `0..length` that `key` chooses.
+/// Image of `index` under the permutation of `0..length` with this key.
 ///
-/// A bijection of the next power of two, walked until it falls below `length`, then rotated.
+/// Cycle walking: a bijection on the next power of two is iterated until the image is below `length`; then it is
+/// rotated.
 #[inline(always)]
 fn permute(index: u32, length: u32, key: u32) -> u32 {
     let mask = length.next_power_of_two() - 1;
@@ -139,7 +141,7 @@ fn permute(index: u32, length: u32, key: u32) -> u32 {
     }
 }
 
-/// A hash of 32 bits with good avalanche (Wellons, `lowbias32`).
+/// 32-bit integer hash (Wellons, `lowbias32`).
 #[inline(always)]
 pub fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;
@@ -149,7 +151,7 @@ pub fn hash(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
-/// The radical inverse of `index` in base two, in [0, 1) (van der Corput 1935).
+/// Base-2 radical inverse of `index`, in [0, 1) (van der Corput 1935).
 #[inline(always)]
 pub fn radical_inverse(index: u32) -> f32 {
     unit_interval(index.reverse_bits())

@@ -1,4 +1,4 @@
-//! A card on a port: the loop that a board and the emulated card both run.
+//! Main loop of a card on a port: the same for boards and the emulated card.
 
 use core::time::Duration;
 
@@ -7,15 +7,15 @@ use photoncard_shared::link::{Port, PortError};
 use crate::card::Card;
 use crate::memory::CardMemory;
 
-/// How long an idle card waits for a byte before it looks around.
+/// Maximum wait of an idle card for a byte.
 const IDLE_WAIT: Duration = Duration::from_millis(20);
 
 /// Serves a card on a port until the port fails: bytes in, work, bytes out.
 ///
-/// Between two looks at the port lies at most one call of [`Card::work`].
+/// At most one call of [`Card::work`] lies between two reads of the port.
 ///
 /// # Errors
-/// Why the port cannot go on; [`PortError::Closed`] is how a session ends in order.
+/// The port's failure; [`PortError::Closed`] is the regular end of a session.
 pub fn serve<
     M: CardMemory,
     const TILE_PIXELS: usize,

@@ -1,14 +1,14 @@
-//! Small geometry that glam does not have, the same on every processor.
+//! Vector and float functions that glam lacks, with the same bits on every processor.
 
 use glam::Vec3;
 
-/// The lesser of two numbers; `b` if either is NaN, as the SSE instruction does.
+/// Minimum of two numbers; `b` if either is NaN, like SSE's `minss`.
 #[inline(always)]
 pub(crate) fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The greater of two numbers; `b` if either is NaN, as the SSE instruction does.
+/// Maximum of two numbers; `b` if either is NaN, like SSE's `maxss`.
 #[inline(always)]
 pub(crate) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
@@ -26,34 +26,34 @@ pub(crate) fn tangents(normal: Vec3) -> (Vec3, Vec3) {
     (tangent, bitangent)
 }
 
-/// The vector with these coordinates in the frame of `normal`, which is its third axis.
+/// The vector with these coordinates in the frame of [`tangents`], whose z axis is `normal`.
 #[inline(always)]
 pub(crate) fn from_frame(normal: Vec3, x: f32, y: f32, z: f32) -> Vec3 {
     let (tangent, bitangent) = tangents(normal);
     tangent * x + bitangent * y + normal * z
 }
 
-/// The unit vector along `vector`, or zero if it has no length.
+/// `vector / |vector|`, or zero for a zero vector.
 #[inline(always)]
 pub(crate) fn unit(vector: Vec3) -> Vec3 {
     let length_squared = vector.length_squared();
     if length_squared > 0.0 { vector * (1.0 / libm::sqrtf(length_squared)) } else { Vec3::ZERO }
 }
 
-/// The greatest component.
+/// Maximum component of a vector.
 #[inline(always)]
 pub(crate) fn max_component(v: Vec3) -> f32 {
     max(max(v.x, v.y), v.z)
 }
 
-/// The upper half of a float's bits, rounded, ties away from zero: eight bits of its mantissa. Numbers beyond the
-/// greatest are infinite; what is no number may become any.
+/// bfloat16 of an `f32`, rounded to nearest, ties away from zero. Finite numbers above the largest bfloat16 become
+/// infinite; a NaN may become any number.
 #[inline(always)]
 pub(crate) fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }
 
-/// The float of an upper half.
+/// `f32` of a bfloat16.
 #[inline(always)]
 pub(crate) fn from_upper_half(half: u16) -> f32 {
     f32::from_bits((half as u32) << 16)

@@ -1,7 +1,7 @@
-//! A descent in a tree of wide nodes: the hierarchy of a scene, or a photon map in leaves.
+//! Traversal of a tree of wide nodes: the bounding volume hierarchy, or a photon map in leaves.
 //!
-//! A visit of a node tells the distances to the boxes of all its children at once. Those that are near enough wait on a stack,
-//! the nearest on top.
+//! A visit of a node computes the distances to the boxes of all its children at once. Children within the limit are
+//! pushed onto a stack, the nearest on top.
 
 use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
@@ -15,14 +15,15 @@ use crate::simd::{Isa, LANES};
 
 const _: () = assert!(NODE_CHILDREN == LANES);
 
-/// The distance, as bits, of a child that is not to be visited.
+/// Distance bits of a child to be skipped.
 pub(crate) const BEYOND: u32 = u32::MAX;
 
-/// A part of the tree put off: the bits of a lower bound of the distance to it above, which part it is below.
+/// A subtree on the stack: the bits of a lower bound of its distance in the upper half, its leaf or node in the lower
+/// half.
 #[derive(Clone, Copy)]
 struct Deferred(u64);
 
-/// Marks a leaf in the lower half of a [`Deferred`].
+/// Flag of a leaf in the lower half of a [`Deferred`].
 const LEAF: u32 = 1 << 31;
 
 impl Deferred {
@@ -38,30 +39,31 @@ impl Deferred {
     }
 }
 
-/// Parts put off, the next on top: a tree's entries, and [`LANES`] more, as all children of a node are written at once.
+/// Stack of [`Deferred`] subtrees, the next on top. `ENTRIES` is the tree's maximum plus [`LANES`], as all lanes of a
+/// node are written at once.
 pub(crate) type Stack<const ENTRIES: usize> = Vec<u64, ENTRIES>;
 
-/// Which of the children of a node is to be visited next.
+/// Order of the visits to a node's children.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// The nearest: what is found there spares others a visit.
+    /// Nearest first: hits or photons found there shrink the limit for the others.
     NearestFirst,
-    /// Any: where the first that is found ends the descent, to sort them costs more than it spares.
+    /// Unsorted, for searches that end with the first hit: sorting costs more than it saves.
     Any,
 }
 
-/// A descent.
+/// Traversal of one tree, with its stack.
 pub(crate) struct Descent<'s, const ENTRIES: usize> {
     scene: &'s SceneImage,
     nodes: SectionKind,
     leaves: SectionKind,
-    /// By reference: a stack is large to be moved.
+    /// By reference, as a stack is too large to be moved.
     stack: &'s mut Stack<ENTRIES>,
     visits_left: u64,
 }
 
 impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
-    /// From the root of the tree in two sections, with an empty stack.
+    /// A traversal from the root of the tree in two sections; `stack` must be empty.
     #[inline(always)]
     pub(crate) fn new(
         scene: &'s SceneImage,
@@ -69,18 +71,21 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         leaves: SectionKind,
         stack: &'s mut Stack<ENTRIES>,
     ) -> Self {
-        // There is room for the root, node 0 at no distance.
+        // Always fits: the root, node 0, at distance 0.
         let _ = stack.push(0);
-        // A tree's part is visited once: more visits tell of a cycle in an unsound image.
+        // A tree visits each record once: more visits mean a cycle in an unsound image.
         let parts = [nodes, leaves].map(|kind| u64::from(scene.header.section(kind).records));
         Self { scene, nodes, leaves, stack, visits_left: parts.into_iter().sum() }
     }
 
-    /// The next part to visit, none of which is farther than `limit`, a distance's bits.
+    /// The next leaf or node at a distance of at most `limit`, as bits; `None` at the end of the traversal.
+    ///
+    /// # Errors
+    /// [`FaultCode::Depth`] if the image is not sound: the tree has a cycle.
     #[inline(always)]
     pub(crate) fn next(&mut self, limit: u32) -> Result<Option<Child>, Fault> {
         while let Some(part) = self.stack.pop().map(Deferred) {
-            // What lies below may be nearer: it was put off before this.
+            // Entries below were pushed earlier, and may be nearer: the loop goes on.
             if part.distance() <= limit {
                 let depth = Fault { code: FaultCode::Depth, detail: part.0 as u32 };
                 self.visits_left = self.visits_left.checked_sub(1).ok_or(depth)?;
@@ -90,7 +95,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(None)
     }
 
-    /// The line of a leaf.
+    /// Line of a leaf.
     #[inline(always)]
     pub(crate) fn leaf<'m>(
         &self,
@@ -100,8 +105,12 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         self.scene.line(memory, self.leaves, index, 0..LINE_BYTES as u32)
     }
 
-    /// Visits a node: puts off the children that are near enough, to be visited in an order, and has their lines brought
-    /// near. `distances` tells of a node's line the bits of lower bounds of the distances to its children, or [`BEYOND`].
+    /// Visits a node: pushes its children and prefetches their lines. `distances` maps the node's line to the bits of a
+    /// lower bound of each child's distance, or [`BEYOND`] for a child to be skipped.
+    ///
+    /// # Errors
+    /// [`FaultCode::Depth`] if the stack overflows; [`FaultCode::Record`] or [`FaultCode::LineRange`] if there is no
+    /// such node.
     #[inline(always)]
     pub(crate) fn enter(
         &mut self,
@@ -133,7 +142,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(())
     }
 
-    /// Puts some of the parts onto the stack; `None` if there is no room for all.
+    /// Pushes the lanes of `parts` in `mask`; `None` if the stack overflows.
     #[inline(always)]
     fn push(&mut self, isa: impl Isa, parts: &[u64; LANES], mask: u32) -> Option<()> {
         let bottom = self.stack.len();
@@ -144,11 +153,11 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
     }
 }
 
-/// What to put off of each child of a node.
+/// The [`Deferred`] entry of each child of a node.
 #[inline(always)]
 fn parts(isa: impl Isa, node: WideNode, distances: &[u32; LANES]) -> [u64; LANES] {
     let Links { leaves, first_leaf, first_node } = node.links();
-    // They wrap, and leaves are taken for nodes, in unsound images only.
+    // Indices that wrap or have the bit LEAF occur in unsound images only.
     let [leaf, node_of] = [first_leaf | LEAF, first_node.wrapping_sub(leaves)];
     let mut parts = [0; LANES];
     for lane in 0..isa.lanes(node.children() as usize) {
@@ -161,7 +170,7 @@ fn parts(isa: impl Isa, node: WideNode, distances: &[u32; LANES]) -> [u64; LANES
     parts
 }
 
-/// Sorts a few, the greatest first.
+/// Insertion sort of a few entries, in descending order.
 #[inline(always)]
 fn sort(parts: &mut [u64]) {
     for sorted in 1..parts.len() {

@@ -3,7 +3,7 @@
 /// Bytes of one line.
 pub const LINE_BYTES: usize = 128;
 
-/// One line of card memory, aligned to itself.
+/// One line of card memory, aligned to its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C, align(128))]
 pub struct Line(pub [u8; LINE_BYTES]);
@@ -18,17 +18,17 @@ impl Line {
         self.0.as_chunks::<N>().0.get(slot)
     }
 
-    /// The `slot`-th record of `N` bytes, to be written.
+    /// [`Self::record`], mutable.
     pub fn record_mut<const N: usize>(&mut self, slot: usize) -> Option<&mut [u8; N]> {
         self.0.as_chunks_mut::<N>().0.get_mut(slot)
     }
 }
 
-/// The number of a line, counted from the start of card memory.
+/// Index of a line, counted from the start of card memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LineAddress(pub u32);
 
-/// What a line holds: memory traffic is counted, and cached, by structure.
+/// The data structure that a line belongs to: memory traffic is counted, and cached, by structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Structure {
@@ -40,9 +40,10 @@ pub enum Structure {
     Triangles = 2,
     /// Materials.
     Materials = 3,
-    /// Lights, and what chooses one: the light tree and the environment's cells.
+    /// Lights and the distributions that sample them: emitters, the light tree, distant lights, the environment's
+    /// cells.
     Emitters = 4,
-    /// Inner nodes of a photon map that has its photons in leaves.
+    /// Inner nodes of a photon map in leaves.
     PhotonNodes = 5,
     /// Photons.
     Photons = 6,
@@ -50,13 +51,13 @@ pub enum Structure {
     IrradianceNodes = 7,
     /// Irradiance points.
     IrradiancePoints = 8,
-    /// Inner nodes above the photons of caustics.
+    /// Inner nodes of the caustic map.
     CausticNodes = 9,
-    /// Photons of caustics.
+    /// Photons of the caustic map.
     CausticPhotons = 10,
-    /// Normals, texture coordinates and colours of triangles' corners.
+    /// Vertex attributes of triangles: normals, texture coordinates and colours.
     Attributes = 11,
-    /// How textures lie on surfaces, and their texels.
+    /// Texture records and texels.
     Textures = 12,
 }
 
@@ -81,7 +82,7 @@ impl Structure {
         Self::Textures,
     ];
 
-    /// Whether it belongs to the photon maps, irradiance points among them, and not to the scene.
+    /// True if the structure belongs to a photon map or to the irradiance points, false if it belongs to the scene.
     #[inline(always)]
     pub const fn is_photon_map(self) -> bool {
         matches!(

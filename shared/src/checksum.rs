@@ -1,17 +1,17 @@
-//! The checksums of frames and of images. They are of two polynomials, so that what is wrong in a way that one does not
-//! show is shown by the other.
+//! The checksums of frames and of images: two polynomials, so that an error that one misses is caught by the other.
 //!
-//! [`Checksum`], of frames, is CRC-32C (Castagnoli), sixteen bytes at a time (Kounavis, Berry 2005): one table for each
-//! place among the sixteen. [`ImageChecksum`], of chunks and of the whole image, is CRC-64/XZ (ECMA-182), byte by byte.
+//! [`Checksum`], of frames, is CRC-32C (Castagnoli) by slicing-by-16 (Kounavis, Berry 2005): sixteen bytes at a time,
+//! with a table for each of the sixteen byte positions. [`ImageChecksum`], of chunks and of the whole image, is
+//! CRC-64/XZ (ECMA-182), byte by byte.
 
 use crate::address::Line;
 
-/// The polynomial of frames, its lowest coefficient first.
+/// Polynomial of CRC-32C, bit-reversed: the coefficient of x^31 is the lowest bit.
 const POLYNOMIAL: u32 = 0x82f6_3b78;
-/// The polynomial of images, its lowest coefficient first.
+/// Polynomial of CRC-64/XZ, bit-reversed: the coefficient of x^63 is the lowest bit.
 const IMAGE_POLYNOMIAL: u64 = 0xc96c_5795_d787_0f42;
 
-/// What a byte adds that is followed by as many zero bytes as its table's number.
+/// `TABLES[n][b]`: the CRC-32C remainder of byte `b` followed by `n` zero bytes.
 static TABLES: [[u32; 256]; 16] = tables();
 
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
@@ -40,7 +40,7 @@ const fn tables() -> [[u32; 256]; 16] {
     tables
 }
 
-/// What a byte adds to the checksum of an image.
+/// `IMAGE_TABLE[b]`: the CRC-64/XZ remainder of byte `b`.
 static IMAGE_TABLE: [u64; 256] = image_table();
 
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
@@ -59,14 +59,14 @@ const fn image_table() -> [u64; 256] {
     table
 }
 
-/// What a byte adds.
+/// The table entry of a byte.
 #[expect(clippy::indexing_slicing, reason = "a byte is below 256: the compiler drops the check")]
 #[inline(always)]
 fn look_up<T: Copy>(table: &[T; 256], byte: u8) -> T {
     table[usize::from(byte)]
 }
 
-/// CRC-32C of some bytes.
+/// CRC-32C of `bytes`.
 pub fn checksum(bytes: &[u8]) -> u32 {
     let mut sum = Checksum::default();
     sum.update(bytes);
@@ -84,7 +84,7 @@ impl Default for Checksum {
 }
 
 impl Checksum {
-    /// Goes on with the next bytes.
+    /// Appends bytes.
     pub fn update(&mut self, bytes: &[u8]) {
         let (sixteens, rest) = bytes.as_chunks::<16>();
         for [a, b, c, d, behind @ ..] in sixteens {
@@ -92,7 +92,7 @@ impl Checksum {
             let mut tables = TABLES.iter().rev();
             let head = (u32::from_le_bytes([*a, *b, *c, *d]) ^ self.0).to_le_bytes();
             let head = head.into_iter().zip(&mut tables).fold(0, add);
-            // Only the head waits for the sum so far.
+            // Only the first four bytes depend on the sum so far; the other twelve lookups need not wait for it.
             self.0 = behind.iter().copied().zip(tables).fold(0, add) ^ head;
         }
         for &byte in rest {
@@ -102,13 +102,13 @@ impl Checksum {
         }
     }
 
-    /// The checksum of all bytes so far.
+    /// CRC-32C of all bytes so far.
     pub fn value(&self) -> u32 {
         !self.0
     }
 }
 
-/// CRC-64/XZ of the bytes of some lines.
+/// CRC-64/XZ of the bytes of `lines`.
 pub fn image_checksum(lines: &[Line]) -> u64 {
     let mut sum = ImageChecksum::default();
     sum.update(lines);
@@ -126,7 +126,7 @@ impl Default for ImageChecksum {
 }
 
 impl ImageChecksum {
-    /// Goes on with the next lines.
+    /// Appends lines.
     pub fn update(&mut self, lines: &[Line]) {
         for &byte in lines.iter().flat_map(|line| &line.0) {
             let [low, ..] = self.0.to_le_bytes();
@@ -134,7 +134,7 @@ impl ImageChecksum {
         }
     }
 
-    /// The checksum of all lines so far.
+    /// CRC-64/XZ of all lines so far.
     pub fn value(&self) -> u64 {
         !self.0
     }

@@ -1,49 +1,52 @@
-//! What a chip counts.
+//! Counters of a chip's work.
 
 use serde::{Deserialize, Serialize};
 
-/// Work done on a tile. Sums over tiles do not depend on how they were dealt.
+/// Work done on a tile. Sums over all tiles do not depend on which chip rendered which tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
-    /// Rays from the eye: twice to each sample, with the irradiance cache thrice, and to points of its lattice.
+    /// Eye rays: 2 a sample, for its light and for its other channels; another for each later piece of work on a sample
+    /// that sees its surface by way of perfectly specular ones; and 1 for each lookup of a point of the irradiance
+    /// cache's lattice.
     pub eye_rays: u64,
-    /// Rays towards emitters.
+    /// Shadow rays.
     pub shadow_rays: u64,
     /// Final gather rays.
     pub gather_rays: u64,
     /// Rays that survey the surroundings of irradiance records.
     pub survey_rays: u64,
-    /// Rays that left perfectly specular surfaces, on the way of any of these but shadow rays.
+    /// Rays from perfectly specular surfaces, which continue eye and gather rays.
     pub specular_rays: u64,
-    /// Paths that were lost: they met too many perfectly specular surfaces, or one that takes everything.
+    /// Paths that ended black: after [`crate::budget::SPECULAR_BOUNCES`] perfectly specular surfaces, or at one that
+    /// absorbs all.
     pub lost_paths: u64,
-    /// Searches for the nearest photons of caustics.
+    /// Searches for the k nearest photons in the caustic map.
     pub caustic_gathers: u64,
-    /// Searches for the nearest photons.
+    /// Searches for the k nearest photons in the photon map.
     pub gathers: u64,
-    /// Those of them that made a table of directions.
+    /// Searches in [`Self::gathers`] that built a table of directions for importance sampling.
     pub tables: u64,
-    /// Irradiance records that were gathered.
+    /// Irradiance records gathered.
     pub records: u64,
-    /// Samples that see a surface with a Lambertian part, and are not left to shadow rays alone.
+    /// Samples of a frame with final gather rays that see a surface with a Lambertian part.
     pub lambertian_samples: u64,
-    /// Those of them whose indirect irradiance was interpolated.
+    /// Samples in [`Self::lambertian_samples`] whose indirect irradiance was interpolated.
     pub interpolated_samples: u64,
     /// Photons whose distance was computed.
     pub photons_tested: u64,
-    /// Photons that were near enough to become candidates of a search.
+    /// Photons within the search radius of the moment, which became candidates.
     pub photons_taken: u64,
-    /// Candidates that selections of the nearest went through.
+    /// Candidates read by selections of the k nearest.
     pub photons_selected: u64,
-    /// Photons that the searches returned.
+    /// Photons returned by searches.
     pub photons_found: u64,
     /// Searches for the nearest irradiance point.
     pub lookups: u64,
     /// Irradiance points whose distance was computed.
     pub points_tested: u64,
-    /// Times that waiting gathers were taken out of the queue.
+    /// Drains of the gather queue.
     pub drains: u64,
-    /// The most gathers that waited at once, on any chip.
+    /// Maximum number of gathers that waited at once on one chip.
     pub most_waiting: u64,
 }
 
@@ -72,8 +75,8 @@ impl Counters {
         most_waiting: 0,
     };
 
-    /// Counts a search for the nearest photons: those that were tested, that became candidates, that selections of the nearest
-    /// went through, and that were found.
+    /// Counts a search for the k nearest photons: photons tested, photons that became candidates, candidates read by
+    /// selections, photons found.
     #[inline(always)]
     pub fn count_gather(&mut self, tested: u32, taken: u32, selected: u32, found: u32) {
         self.gathers += 1;
@@ -83,7 +86,7 @@ impl Counters {
         self.photons_found += u64::from(found);
     }
 
-    /// Rays of any kind, gathers and lookups of irradiance, together.
+    /// Total number of rays, gathers and irradiance lookups.
     #[inline(always)]
     pub fn rays_and_gathers(&self) -> u64 {
         let rays = [self.eye_rays, self.shadow_rays, self.gather_rays, self.survey_rays, self.specular_rays];
@@ -91,7 +94,7 @@ impl Counters {
         rays.into_iter().chain(searches).fold(0, u64::wrapping_add)
     }
 
-    /// Adds another chip's counts.
+    /// Adds the counts of another tile or chip.
     pub fn add(&mut self, other: &Self) {
         self.eye_rays = self.eye_rays.saturating_add(other.eye_rays);
         self.shadow_rays = self.shadow_rays.saturating_add(other.shadow_rays);

@@ -1,57 +1,56 @@
-//! Frames: how bytes stay whole on a line.
+//! Frames: units of bytes with a checksum, on a line that damages, loses or repeats bytes.
 //!
 //! ```text
 //! COBS( kind: u8 | session: u16 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
 //! ```
 //!
-//! Numbers are little-endian. Stuffing ([`crate::stuffing`]) leaves no zero byte inside a frame, so that a receiver finds
-//! the next frame after any damage. What the header's numbers mean is told in
-//! [`crate::transport`].
+//! Numbers are little-endian. Stuffing ([`crate::stuffing`]) leaves no zero byte inside a frame, so that a receiver
+//! finds the next frame after any damage. [`crate::transport`] gives the header's numbers their meaning.
 
 use heapless::Vec;
 
 use crate::checksum::{Checksum, checksum};
 use crate::stuffing::{max_stuffed_bytes, stuff, unstuff};
 
-/// Bytes of the longest payload: eight lines and the words of their message.
+/// Maximum payload, bytes: eight lines and the other fields of their message.
 pub const MAX_PAYLOAD: usize = 8 * crate::address::LINE_BYTES + 32;
 /// Bytes of a frame's header.
 pub const HEADER_BYTES: usize = 8;
 const CHECKSUM_BYTES: usize = 4;
 const MAX_PLAIN: usize = HEADER_BYTES + MAX_PAYLOAD + CHECKSUM_BYTES;
-/// Bytes of the longest frame on the wire, its zero byte included.
+/// Maximum length of a frame on the wire, bytes, its terminating zero included.
 pub const MAX_FRAME: usize = max_stuffed_bytes(MAX_PLAIN) + 1;
 
-/// Why what came is not a frame.
+/// Defect of received bytes, which are no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
     /// No zero byte within [`MAX_FRAME`] bytes, or a payload above [`MAX_PAYLOAD`].
     TooLong,
     /// Not a COBS encoding.
     Encoding,
-    /// Shorter than the shortest frame.
+    /// Shorter than a header and a checksum.
     TooShort,
-    /// The checksum differs.
+    /// Wrong checksum.
     Checksum,
-    /// A kind that this version does not know.
+    /// A [`FrameKind`] unknown to this version.
     Kind,
 }
 
-/// What a frame is for. The numbers are part of the protocol.
+/// Purpose of a frame. The numbers are part of the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum FrameKind {
-    /// Carries a message.
+    /// A message.
     Data = 0,
-    /// The same, and begins a session.
+    /// A message that begins a session.
     Open = 1,
-    /// Tells what has come.
+    /// An acknowledgement alone.
     Acknowledge = 2,
-    /// Asks what has come; tells that frames below its sequence number, if they are not acknowledged, are lost.
+    /// A request for an [`Self::Answer`]; frames below its sequence number that are not acknowledged are lost.
     Probe = 3,
-    /// Answers a probe: tells what has come, and the number of the next frame.
+    /// Reply to a probe: an acknowledgement, and the number of the sender's next frame.
     Answer = 4,
-    /// Tells that its session is not known.
+    /// Reply to a frame of an unknown session.
     Unknown = 5,
 }
 
@@ -65,15 +64,15 @@ impl FrameKind {
 /// The header of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameHeader {
-    /// What it is for.
+    /// Purpose of the frame.
     pub kind: FrameKind,
-    /// The session that it belongs to.
+    /// Number of the frame's session.
     pub session: u16,
-    /// The number of the frame in its direction; see the kinds.
+    /// Number of the frame in its direction; see [`FrameKind`].
     pub sequence: u16,
-    /// All frames of the other direction before this number have been taken.
+    /// All frames of the other direction below this number have been received.
     pub acknowledged: u16,
-    /// Of the frames from that number on, a bit for each that has come: the lowest is of the number itself.
+    /// Bit `i` is set if frame `acknowledged + i` of the other direction has been received.
     pub held: u8,
 }
 
@@ -91,8 +90,8 @@ impl FrameHeader {
     }
 }
 
-/// Writes a frame behind what `wire` holds, or nothing if there is no room: a payload of up to [`MAX_PAYLOAD`] bytes fits
-/// [`MAX_FRAME`].
+/// Appends a frame to `wire`, or nothing if there is no room: [`MAX_FRAME`] bytes suffice for a payload of
+/// [`MAX_PAYLOAD`].
 pub fn write_frame<const N: usize>(header: &FrameHeader, payload: &[u8], wire: &mut Vec<u8, N>) {
     let begin = wire.len();
     let header = header.to_bytes();
@@ -106,20 +105,20 @@ pub fn write_frame<const N: usize>(header: &FrameHeader, payload: &[u8], wire: &
     }
 }
 
-/// A frame that came whole.
+/// A received frame with a valid checksum.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Its header.
+    /// Header.
     pub header: FrameHeader,
-    /// What it carries.
+    /// Payload, at most [`MAX_PAYLOAD`] bytes.
     pub payload: &'a [u8],
 }
 
-/// Reads the frames of one direction.
+/// Reader of the frames of one direction.
 pub struct FrameReader {
-    /// The bytes of the present frame: all but its zero byte.
+    /// Bytes of the current frame, without its terminating zero.
     wire: Vec<u8, { MAX_FRAME - 1 }>,
-    /// The bytes of the present frame are more than can be held: they are dropped up to the next zero byte.
+    /// True if the current frame is too long: its bytes are dropped up to the next zero byte.
     overrun: bool,
     complete: bool,
 }
@@ -136,8 +135,8 @@ impl FrameReader {
         Self { wire: Vec::new(), overrun: false, complete: false }
     }
 
-    /// Takes bytes up to the end of the next frame. Returns how many were taken and, if a frame ended, the frame or
-    /// what is wrong with it. Two zero bytes in a row are no frame and no error.
+    /// Consumes bytes up to the end of the next frame. Returns the number of bytes consumed and, if a frame ended, the
+    /// frame or its defect. Two zero bytes in a row are no frame and no error.
     pub fn read(&mut self, bytes: &[u8]) -> (usize, Option<Result<Frame<'_>, FrameError>>) {
         if core::mem::take(&mut self.complete) {
             self.wire.clear();

@@ -1,25 +1,25 @@
-//! The card image: one run of lines that holds all a chip needs of a scene.
+//! The card image: the lines that hold everything a chip needs of a scene.
 //!
-//! The first lines are the header: magic, layout version, number of lines, units, and a table of sections. A section is a run
-//! of lines that holds records of one kind, packed as [`crate::layout`] says; the last line of each is padded with
-//! zero bytes.
+//! The first lines are the header: magic, layout version, number of lines, units, lights, and a table of sections. A
+//! section is a run of lines that holds records of one kind ([`crate::layout`]), as many whole ones as fit in each
+//! line; unused bytes are zero.
 //!
 //! The photon map has one of two layouts, and the sections of the other are empty: [`SectionKind::Photons`], or
-//! [`SectionKind::PhotonNodes`] and [`SectionKind::PhotonLeaves`]. Irradiance points and the caustic map have sections of their own, or
-//! none; so have textures, and what they lie on surfaces by.
+//! [`SectionKind::PhotonNodes`] and [`SectionKind::PhotonLeaves`]. Sections of irradiance points, the caustic map,
+//! textures and vertex attributes are empty in an image without them.
 
 use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
 use crate::layout::{Attributes, DistantLight, Emitter, Material, Photon, PhotonGrid, Record, Texture};
 
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
-/// The version of everything in this module and in [`crate::layout`].
+/// Version of the formats in this module and in [`crate::layout`].
 pub const LAYOUT_VERSION: u16 = 8;
 /// Lines of the header.
 pub const HEADER_LINES: usize = 2;
 /// Entries of [`SectionKind::LeafAttributes`] in one line.
 pub const LEAF_ATTRIBUTES_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
-/// Thresholds in one line.
+/// Thresholds of [`SectionKind::EnvironmentCells`] in one line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
 /// The sections of an image, in the order of the table and of the image.
@@ -30,7 +30,7 @@ pub enum SectionKind {
     Nodes = 0,
     /// [`crate::layout::BvhLeaf`]s, of triangles.
     Triangles = 1,
-    /// One `u32` a leaf of triangles: where its [`Attributes`] are, see [`crate::layout::LeafAttributes`]. Empty if no triangle has any.
+    /// [`crate::layout::LeafAttributes`], one `u32` for each leaf of triangles. Empty if no triangle has attributes.
     LeafAttributes = 2,
     /// [`Attributes`] of triangles.
     Attributes = 3,
@@ -46,8 +46,9 @@ pub enum SectionKind {
     LightNodes = 8,
     /// [`DistantLight`]s.
     DistantLights = 9,
-    /// `u32`s, of 2^32: the upper ends of the probabilities of the rows of the environment's cells; then, row after row, those of
-    /// the cells in the row. The last of each are 2^32 - 1.
+    /// Distribution of the environment's cells: `u32` thresholds of the cumulative distribution function, in units of
+    /// 2^-32. First the marginal one of the rows, then for each row the conditional one of its cells; each ends with
+    /// 2^32 - 1.
     EnvironmentCells = 10,
     /// [`Photon`]s, a left-balanced kd-tree: the children of `i` are `2 i + 1` and `2 i + 2`.
     Photons = 11,
@@ -55,13 +56,14 @@ pub enum SectionKind {
     PhotonNodes = 12,
     /// [`crate::layout::PhotonLeaf`]s.
     PhotonLeaves = 13,
-    /// [`crate::layout::PhotonNode`]s above the photons of caustics, the root first.
+    /// [`crate::layout::PhotonNode`]s of the caustic map, the root first.
     CausticNodes = 14,
-    /// [`crate::layout::PhotonLeaf`]s of caustics: what has met perfectly specular surfaces alone, and one at least.
+    /// [`crate::layout::PhotonLeaf`]s of the caustic map: photons whose bounces, one at least, were all perfectly
+    /// specular.
     CausticLeaves = 15,
     /// [`crate::layout::PhotonNode`]s above irradiance points, the root first.
     IrradianceNodes = 16,
-    /// [`crate::layout::PhotonLeaf`]s that hold [`crate::layout::IrradiancePoint`]s in the place of photons' contents.
+    /// [`crate::layout::PhotonLeaf`]s of [`crate::layout::IrradiancePoint`]s instead of photons' contents.
     IrradianceLeaves = 17,
 }
 
@@ -91,7 +93,7 @@ impl SectionKind {
         Self::IrradianceLeaves,
     ];
 
-    /// Records that one line holds.
+    /// Records in one line.
     pub const fn records_per_line(self) -> u32 {
         match self {
             Self::LeafAttributes => LEAF_ATTRIBUTES_PER_LINE,
@@ -115,7 +117,7 @@ impl SectionKind {
         }
     }
 
-    /// What its lines are counted and cached as.
+    /// Structure as which the section's lines are counted and cached.
     #[inline(always)]
     pub const fn structure(self) -> Structure {
         match self {
@@ -137,12 +139,12 @@ impl SectionKind {
     }
 }
 
-/// A run of records.
+/// Position and size of a section: consecutive records of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Section {
-    /// The line it starts at.
+    /// Index of its first line.
     pub first_line: u32,
-    /// How many records it holds.
+    /// Number of its records.
     pub records: u32,
 }
 
@@ -158,44 +160,44 @@ impl Section {
     }
 }
 
-/// The first lines of an image.
+/// Header of an image, in its first [`HEADER_LINES`] lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
     /// Lines of the whole image, the header's own among them.
     pub lines: u32,
-    /// Watts that a photon power of 1 stands for.
+    /// Photon power unit of the photon map, W.
     pub photon_power_unit: f32,
-    /// Watts that a power of 1 of a photon of caustics stands for.
+    /// Photon power unit of the caustic map, W.
     pub caustic_power_unit: f32,
-    /// Radiance that a fixed-point pixel sum of 1 stands for, W/(sr m^2): a power of two.
+    /// Unit of the fixed-point sums of pixels, W/(sr m^2): a power of two.
     pub radiance_unit: f32,
-    /// The grid that photons' positions are on.
+    /// Grid of the photons' positions.
     pub photon_grid: PhotonGrid,
-    /// How light samples are shared out, and the environment.
+    /// Probabilities of the kinds of lights, and the environment.
     pub lights: Lights,
-    /// Where the records lie, by [`SectionKind`].
+    /// Sections, indexed by [`SectionKind`].
     pub sections: [Section; SECTIONS],
 }
 
-/// How light samples are shared out between the kinds of lights, and the light from infinitely far.
+/// Probabilities with which a light sample chooses a kind of light, and the environment light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lights {
-    /// The probability that a light sample is of an emitter, one of those of the light tree.
+    /// Probability that a light sample is taken of an emitter, by the light tree.
     pub emitters: f32,
-    /// That it is of the environment.
+    /// Probability that a light sample is taken of the environment.
     pub environment: f32,
-    /// That it is of a distant light.
+    /// Probability that a light sample is taken of a distant light.
     pub distant: f32,
-    /// What a texel of the environment of 1 stands for, W/(sr m^2) of each channel.
+    /// Scale of the environment's texels, W/(sr m^2) a channel.
     pub radiance: [f32; 3],
-    /// The environment's texture; `None` without an environment.
+    /// Index of the environment's texture; `None` without an environment.
     pub texture: Option<u32>,
-    /// Columns and rows of the environment's cells, of equal angles: 1 to 65535.
+    /// Columns and rows of the cells in which the environment is sampled, equal steps of the two angles: 1 to 65535.
     pub cells: [u16; 2],
 }
 
 impl Lights {
-    /// No light at all.
+    /// A scene without lights.
     pub const NONE: Self = Self {
         emitters: 0.0,
         environment: 0.0,
@@ -212,14 +214,15 @@ impl Lights {
     }
 }
 
-/// What is wrong with a header.
+/// Defect of a header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeaderError {
-    /// It does not begin with [`MAGIC`].
+    /// The image does not begin with [`MAGIC`].
     Magic,
-    /// It was written for another layout version, the one given.
+    /// The image has this layout version instead of [`LAYOUT_VERSION`].
     Version(u16),
-    /// A unit is not a positive finite number, a probability not in 0 to 1, or the environment's radiance not a finite one.
+    /// A unit or the grid's cell is not a positive normal number, a probability is not in [0, 1], or the environment's
+    /// radiance is negative or not finite.
     Unit,
     /// The section of this index reaches past the image's last line.
     Section(u8),
@@ -228,10 +231,10 @@ pub enum HeaderError {
 const PHOTON_GRID: usize = 32;
 const SECTION_TABLE: usize = 64;
 const HEADER_BYTES: usize = HEADER_LINES * LINE_BYTES;
-/// At the end: the section table may grow towards it.
+/// Offset of [`Lights`], at the header's end: the section table may grow towards it.
 const LIGHTS: usize = HEADER_BYTES - 32;
 const _: () = assert!(SECTION_TABLE + 8 * SECTIONS <= LIGHTS);
-/// In the place of the index of the environment's texture: there is none.
+/// Code of the environment texture's index in an image without an environment.
 const NO_ENVIRONMENT: u32 = u32::MAX;
 
 impl Header {
@@ -241,7 +244,7 @@ impl Header {
         self.sections[kind as usize]
     }
 
-    /// The header's lines.
+    /// The lines of the header.
     #[expect(clippy::indexing_slicing, reason = "constant places within the lines")]
     pub fn to_lines(&self) -> [Line; HEADER_LINES] {
         let mut bytes = [0; HEADER_BYTES];
@@ -274,7 +277,7 @@ impl Header {
         lines
     }
 
-    /// Reads and checks a header: whatever it returns, no section reaches past `lines`.
+    /// Reads and checks a header: no section of the result reaches past [`Self::lines`].
     pub fn read(lines: &[Line; HEADER_LINES]) -> Result<Self, HeaderError> {
         let word = |offset: usize| {
             let bytes = lines.get(offset / LINE_BYTES).map(|line| line.0.as_chunks().0);

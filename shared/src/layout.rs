@@ -1,6 +1,6 @@
-//! The records of card memory, little-endian, none of which straddles a line.
+//! The records of card memory: little-endian, and none straddles a line.
 //!
-//! | record | bytes | a line holds |
+//! | record | bytes | records in a line |
 //! |---|---|---|
 //! | [`Photon`] | 20 | 6 |
 //! | [`PhotonNode`] | 128 | 1 |
@@ -9,14 +9,14 @@
 //! | [`BvhNode`] | 128 | 1 |
 //! | [`BvhLeaf`], up to eight triangles | 128 | 1 |
 //! | [`Attributes`] | 64 | 2 |
-//! | where a leaf's [`Attributes`] are | 4 | 32 |
+//! | [`LeafAttributes`] | 4 | 32 |
 //! | [`Material`] | 64 | 2 |
 //! | [`Texture`] | 40 | 3 |
 //! | texel | 4 | 32 |
 //! | [`Emitter`] | 64 | 2 |
 //! | [`LightNode`] | 128 | 1 |
 //! | [`DistantLight`] | 32 | 4 |
-//! | threshold of a cell of the environment | 4 | 32 |
+//! | threshold of the environment's distribution | 4 | 32 |
 //!
 //! Colours and vectors are three `f32`; lengths are metres, powers watts per channel divided by the image's photon
 //! power unit, radiances W/(sr m^2).
@@ -63,7 +63,7 @@ pub trait Record: Sized {
     const PER_LINE: usize = LINE_BYTES / Self::BYTES;
 }
 
-/// Reads three consecutive `f32` from `bytes`, the first at `offset`; zero where the bytes end.
+/// Three consecutive `f32` of `bytes`, the first at `offset`; 0 past the end.
 #[inline(always)]
 fn read_vector<const N: usize>(bytes: &[u8; N], offset: usize) -> [f32; 3] {
     [read_f32(bytes, offset), read_f32(bytes, offset + 4), read_f32(bytes, offset + 8)]
@@ -100,7 +100,7 @@ fn write_vector<const N: usize>(bytes: &mut [u8; N], offset: usize, value: [f32;
 
 #[cfg(test)]
 mod tests {
-    /// Numbers that look random, the same for the same seed.
+    /// Pseudo-random numbers (xorshift64) of a seed.
     pub(super) fn random(seed: u64) -> impl FnMut() -> u64 {
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         move || {

@@ -1,14 +1,14 @@
 //! Wire and memory formats of photoncard: bytes, no rendering.
 //!
-//! Both ends of a link are built on this crate. It says what lies where in a card's memory ([`address`],
-//! [`layout`], [`image`]), what a chip can hold ([`budget`]), and how the two ends speak ([`message`] inside
+//! Both ends of a link are built on this crate. It defines the contents of a card's memory ([`address`], [`layout`],
+//! [`image`]), the capacities of a chip ([`budget`]), and the protocol between the two ends ([`message`] inside
 //! [`frame`]). The layers, from memory to wire:
 //!
-//! | module | unit | what it fixes |
+//! | module | unit | contents |
 //! |---|---|---|
-//! | [`address`] | 128-byte line | how card memory is addressed |
+//! | [`address`] | 128-byte line | addresses of card memory |
 //! | [`layout`] | record | little-endian photons, nodes, triangles, materials, emitters |
-//! | [`image`] | section | where the records of a scene lie in the card image |
+//! | [`image`] | section | positions of a scene's records in the card image |
 //! | [`message`] | message | commands of the host, replies of a card |
 //! | [`transport`] | message | windowed acknowledgement, selective repetition |
 //! | [`frame`] | frame | COBS, header, CRC-32C |
@@ -17,7 +17,7 @@
 //! Nothing here allocates, and nothing here panics on any input.
 #![forbid(unsafe_code)]
 #![no_std]
-// A chip never panics: what could is kept out, or its reason given.
+// A chip never panics: these lints catch what could, and each exception gives its reason.
 #![cfg_attr(
     not(test),
     warn(

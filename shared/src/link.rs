@@ -2,26 +2,27 @@
 
 use core::time::Duration;
 
-/// Why a port cannot go on.
+/// Permanent failure of a [`Port`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PortError {
     /// The other end is gone.
     Closed,
-    /// The device failed, with a number of its own.
+    /// The device failed; the number is the device's own error code.
     Device(u32),
 }
 
 /// One end of a byte link. Every call returns within `wait`, whether or not a byte has moved.
 pub trait Port {
-    /// Reads up to `buffer.len()` bytes, as soon as there is one; 0 if none came within `wait`.
+    /// Reads 1 to `buffer.len()` bytes as soon as any are there and returns their number; 0 if none came within `wait`.
     ///
     /// # Errors
-    /// If no more byte can come.
+    /// If no more bytes can come.
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError>;
 
-    /// Writes the first of `bytes`, as many as there is room for; 0 if there was none within `wait`.
+    /// Writes as many of the first `bytes` as there is room for and returns their number; 0 if no room came within
+    /// `wait`.
     ///
     /// # Errors
-    /// If no more byte can go.
+    /// If no more bytes can be sent.
     fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError>;
 }

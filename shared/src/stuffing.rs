@@ -1,21 +1,22 @@
-//! Consistent overhead byte stuffing (Cheshire, Baker 1999): bytes without a zero byte among them.
+//! Consistent overhead byte stuffing (COBS; Cheshire, Baker 1999): an encoding without zero bytes.
 //!
-//! The bytes are cut where they are zero and after 254 others. Each piece comes behind a code, its length plus one; after
-//! a piece whose code is below 255, and which is not the last, a zero is meant.
+//! The plain bytes are cut at every zero byte, which is left out, and after 254 non-zero bytes in a row. Each piece
+//! follows a code byte, its length plus one. A code below 255 stands for a zero byte after its piece, but for the last
+//! piece.
 
 use core::cell::Cell;
 
 use heapless::Vec;
 
+/// Code of a piece of 254 bytes, the longest: no zero byte follows it.
 const FULL: u8 = 0xff;
 
-/// Bytes that `plain` bytes take at most.
+/// Maximum stuffed length of `plain` bytes.
 pub const fn max_stuffed_bytes(plain: usize) -> usize {
     plain + plain.div_ceil(FULL as usize - 1) + (plain == 0) as usize
 }
 
-/// Writes the stuffed bytes of `plain` behind what `wire` holds. Returns whether there was room; if not, the last piece
-/// may be missing.
+/// Appends the stuffed bytes of `plain` to `wire`. Returns whether there was room; if not, `wire` holds a part of them.
 pub fn stuff<const N: usize>(plain: impl IntoIterator<Item = u8>, wire: &mut Vec<u8, N>) -> bool {
     let mut piece = Vec::<u8, { FULL as usize - 1 }>::new();
     let mut is_open = true;
@@ -30,7 +31,7 @@ pub fn stuff<const N: usize>(plain: impl IntoIterator<Item = u8>, wire: &mut Vec
             }
             piece.clear();
         } else if piece.push(byte).is_ok() && piece.is_full() {
-            // Whether another piece follows is told by the next byte.
+            // A full piece that ends the message has no piece after it: the next plain byte opens one.
             is_open = false;
             if !write_piece(&piece, wire) {
                 return false;
@@ -44,10 +45,10 @@ fn write_piece<const N: usize>(piece: &[u8], wire: &mut Vec<u8, N>) -> bool {
     wire.push(piece.len() as u8 + 1).is_ok() && wire.extend_from_slice(piece).is_ok()
 }
 
-/// Turns stuffed bytes, without their final zero, into what they stand for, in place; `None` if they stand for nothing.
+/// Decodes stuffed bytes, without the terminating zero, in place; `None` if they are not a COBS encoding.
 pub fn unstuff(wire: &mut [u8]) -> Option<&mut [u8]> {
     let cells = Cell::from_mut(&mut *wire).as_slice_of_cells();
-    // The plain bytes are fewer than the stuffed ones that have been read: what is written is not read again.
+    // In place: the write position stays behind the read position, as every piece is preceded by a code byte.
     let (mut rest, mut targets) = (cells, cells.iter());
     let (mut length, mut ends_with_zero) = (0, false);
     while let Some((code, behind)) = rest.split_first() {

@@ -1,4 +1,4 @@
-//! Loading of a card image: lines in any order, a checksum over all, and a header that is sound.
+//! Loading of a card image: lines in any order, then the checksum of all lines, then the header.
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::checksum::{ImageChecksum, image_checksum};
@@ -11,20 +11,20 @@ use crate::scene::SceneImage;
 /// The fault of a command that needs another one before it.
 pub(super) const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
-/// The image in memory.
+/// State of the image in memory.
 pub(super) enum ImageState {
     None,
     Loading(Loader),
-    /// All lines have come, and are compared with their checksum.
+    /// All lines have been received; their checksum is being computed.
     Checking(Check),
     Ready(SceneImage),
 }
 
 impl ImageState {
-    /// The loader.
+    /// The loader of the image.
     ///
     /// # Errors
-    /// If no image is being loaded.
+    /// [`FaultCode::Order`] if no image is being loaded.
     pub(super) fn loader(&self) -> Result<Loader, Fault> {
         match self {
             Self::Loading(loader) => Ok(*loader),
@@ -32,7 +32,7 @@ impl ImageState {
         }
     }
 
-    /// The scene, if one is loaded.
+    /// The scene, if an image has been loaded and checked.
     pub(super) fn scene(&self) -> Option<&SceneImage> {
         match self {
             Self::Ready(scene) => Some(scene),
@@ -41,7 +41,7 @@ impl ImageState {
     }
 }
 
-/// An image on its way into memory.
+/// Loader of an image into memory.
 #[derive(Clone, Copy)]
 pub(super) struct Loader {
     lines: u32,
@@ -57,7 +57,10 @@ impl Loader {
         Ok(Self { lines, checksum })
     }
 
-    /// Writes lines. Returns the line after the last.
+    /// Writes lines from line `first`. Returns the index past the last line.
+    ///
+    /// # Errors
+    /// [`FaultCode::Lines`] if `data` is not whole lines of the image; nothing is written.
     pub(super) fn write(self, memory: &mut impl CardMemory, first: u32, data: &[u8]) -> Result<u32, Fault> {
         let fault = Fault { code: FaultCode::Lines, detail: first };
         let (lines, rest) = data.as_chunks::<LINE_BYTES>();
@@ -73,7 +76,7 @@ impl Loader {
     }
 }
 
-/// The comparison of an image with its checksum, chunk by chunk.
+/// Check of an image against its checksum, chunk by chunk.
 pub(super) struct Check {
     loader: Loader,
     next: u32,
@@ -81,7 +84,10 @@ pub(super) struct Check {
 }
 
 impl Check {
-    /// Looks at the next chunk. Returns the scene after the last.
+    /// Adds the next chunk to the checksum. Returns the scene after the last chunk, `None` before.
+    ///
+    /// # Errors
+    /// [`FaultCode::ImageChecksum`] or [`FaultCode::ImageHeader`] if the image is not the one announced.
     pub(super) fn step(&mut self, memory: &mut impl CardMemory) -> Result<Option<SceneImage>, Fault> {
         let Loader { lines, checksum } = self.loader;
         let count = CHUNK_LINES.min(lines - self.next);
@@ -111,10 +117,10 @@ impl Check {
     }
 }
 
-/// The bytes of a reply's checksums.
+/// Maximum length of a reply's checksums, bytes.
 pub(super) const CHECKSUMS_BYTES: usize = 8 * CHECKSUMS_PER_REPLY as usize;
 
-/// Checksums of chunks on their way to the host.
+/// Computation of the checksums that the host has asked for, chunk by chunk.
 pub(super) struct Checksums {
     pub(super) first: u32,
     end: u32,
@@ -122,7 +128,10 @@ pub(super) struct Checksums {
 }
 
 impl Checksums {
-    /// Those of `count` chunks from `first` on, of `written` lines.
+    /// The checksums of `count` chunks from chunk `first`, in a memory with `written` lines written.
+    ///
+    /// # Errors
+    /// [`FaultCode::Chunks`] if `count` is 0 or above [`CHECKSUMS_PER_REPLY`], or a chunk is not written.
     pub(super) fn new(first: u32, count: u32, written: u32) -> Result<Self, Fault> {
         let fault = Fault { code: FaultCode::Chunks, detail: first };
         let in_all = written.div_ceil(CHUNK_LINES);
@@ -133,7 +142,7 @@ impl Checksums {
         Ok(Self { first, end, next: first })
     }
 
-    /// The checksum of the next chunk, and whether it is the last. The last chunk of what is written may be short.
+    /// The checksum of the next chunk, and whether it is the last asked for. The last chunk in memory may be short.
     pub(super) fn step(&mut self, memory: &impl CardMemory, written: u32) -> Result<(u64, bool), Fault> {
         let begin = self.next.saturating_mul(CHUNK_LINES);
         let lines = stored(memory, begin, CHUNK_LINES.min(written.saturating_sub(begin)))?;
@@ -142,7 +151,10 @@ impl Checksums {
     }
 }
 
-/// Lines of the memory; those that were never written are a fault.
+/// `count` lines of the memory from line `first`.
+///
+/// # Errors
+/// [`FaultCode::LineRange`] if they are not all in the memory.
 fn stored(memory: &impl CardMemory, first: u32, count: u32) -> Result<&[Line], Fault> {
     memory.stored(LineAddress(first), count).ok_or(Fault { code: FaultCode::LineRange, detail: first })
 }

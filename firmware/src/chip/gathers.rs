@@ -1,4 +1,4 @@
-//! The gathers of a chip: done at once, or waiting in the queue.
+//! Photon gathers of a chip: done at once, or queued for deferred reordering.
 
 use glam::Vec3;
 use photoncard_shared::message::{Drain, Fault, FrameParameters};
@@ -9,13 +9,13 @@ use crate::photon::CandidateBuffer;
 use crate::render::Context;
 use crate::render::final_gather::gathered;
 
-/// The candidates of a gather, and the gathers that wait.
+/// Candidate buffer of a gather, and the gather queue.
 pub(super) struct Gathers<const CANDIDATES: usize, const QUEUE: usize> {
     pub(super) candidates: CandidateBuffer<CANDIDATES>,
     queue: GatherQueue<QUEUE>,
 }
 
-/// Waiting gathers that one step does.
+/// Number of queued gathers done in one call of [`Gathers::drain`].
 const GATHERS_PER_STEP: usize = 16;
 
 impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
@@ -23,28 +23,31 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         Self { candidates: CandidateBuffer::new(), queue: GatherQueue::new() }
     }
 
-    /// Drops what waits.
+    /// Drops all queued gathers.
     pub(super) fn clear(&mut self) {
         self.queue.clear();
     }
 
-    /// Whether none waits.
+    /// True if no gather is queued.
     pub(super) fn is_empty(&self) -> bool {
         self.queue.is_empty()
     }
 
-    /// Whether waiting gathers are being done.
+    /// True while the queue is being drained.
     pub(super) fn is_draining(&self) -> bool {
         self.queue.is_draining()
     }
 
-    /// Whether the queue holds as many gathers as it may: they are to be done before another ray is cast.
+    /// True if the queue is at the frame's limit: it must be drained before another ray is cast.
     pub(super) fn is_full(&self, frame: &FrameParameters) -> bool {
         self.queue.len() >= most_waiting::<QUEUE>(frame)
     }
 
-    /// Does a gather at once, or lets it wait. One that finds the queue full, as a step before it did not, is done at
-    /// once. A gather that was done goes to `add`.
+    /// Queues a gather, or does it at once: without deferred reordering, or if the queue has filled up since the last
+    /// check of [`Self::is_full`]. `add` is called with a finished gather and its radiance.
+    ///
+    /// # Errors
+    /// If the image is not sound.
     pub(super) fn submit<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -63,7 +66,10 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
         self.queue.begin_drain(context.frame.drain);
     }
 
-    /// Does some of the gathers that wait.
+    /// Does the next [`GATHERS_PER_STEP`] queued gathers; `add` is called with each and its radiance.
+    ///
+    /// # Errors
+    /// If the image is not sound.
     pub(super) fn drain<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -91,7 +97,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
     }
 }
 
-/// Gathers that may wait in a queue of `QUEUE`.
+/// Maximum number of queued gathers in a frame: its own limit, within the capacity `QUEUE`.
 fn most_waiting<const QUEUE: usize>(frame: &FrameParameters) -> usize {
     (frame.queue as usize).clamp(1, QUEUE)
 }

@@ -1,8 +1,8 @@
-//! The light of a tile's pixels: a sum each, or with layers one of each component.
+//! Sums of a tile's pixels: one for each pixel, or with layers one for each component of its light.
 //!
-//! Both ways the same terms are added in fixed point, so that a pixel's radiance is the same bit for bit: the sum of its
-//! components is exact. With layers a pixel takes [`SUMS_WITH_LAYERS`] sums of the same buffer, of which the last counts
-//! gathers, and a tile has a fourth of the pixels at most.
+//! Fixed-point sums are exact, so that layers do not change a bit of a pixel's radiance: it is the sum of the
+//! components. With layers a pixel takes [`SUMS_WITH_LAYERS`] sums of the buffer, the last of which counts gathers, and
+//! a tile has at most a fourth of the pixels.
 
 use glam::Vec3;
 use photoncard_shared::budget::{SUMS_WITH_LAYERS, sums_of_pixel};
@@ -10,30 +10,31 @@ use photoncard_shared::message::{FrameParameters, PixelLayers};
 
 use crate::fixed_point::ColourSum;
 
-/// What a term of a pixel's light is.
+/// Component of a pixel's light; light paths are in the notation of the crate's page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Component {
-    /// Emission that is seen, what shadow rays bring, and emission that gather rays of the pixel meet.
+    /// `L S* E` and `L D S* E`: visible emission, and direct light by shadow rays and by the pixel's own gather rays.
     Direct,
-    /// What gathers of photons bring, and interpolated irradiance, of which emission that rays of records met is a part.
+    /// `L (S|D)* D S* D S* E`: radiance estimates at the ends of gather rays, and interpolated irradiance, which
+    /// includes the emission met by the irradiance records' rays.
     Indirect,
-    /// Light that comes through specular surfaces.
+    /// `L S+ D S* E`: radiance estimates in the caustic map.
     Caustic,
 }
 
 impl Component {
-    /// Which sum of a tile it is added to, for a pixel of the tile.
+    /// Index of the component's sum of a pixel, among the tile's sums.
     #[inline(always)]
     pub fn sum_of(self, frame: &FrameParameters, pixel: usize) -> usize {
         if frame.layers { pixel * SUMS_WITH_LAYERS as usize + self as usize } else { pixel }
     }
 }
 
-/// Which sum counts the gathers of a pixel.
+/// Index, among a pixel's sums, of its count of gathers.
 const GATHERS: usize = Component::Caustic as usize + 1;
 const _: () = assert!(GATHERS + 1 == SUMS_WITH_LAYERS as usize);
 
-/// Adds light to the pixel that it is for, in radiance units.
+/// Adds light, in the image's radiance units, to a component of pixel `target`.
 #[inline]
 pub(super) fn add_light(
     sums: &mut [ColourSum],
@@ -47,7 +48,7 @@ pub(super) fn add_light(
     }
 }
 
-/// Counts a sample of a pixel that takes a final gather of its own, if the picture has layers.
+/// Counts a sample of a pixel with a final gather of its own, if the frame has layers.
 #[inline]
 pub(super) fn count_gather(sums: &mut [ColourSum], frame: &FrameParameters, pixel: usize) {
     if let Some(sum) = sums.get_mut(pixel * SUMS_WITH_LAYERS as usize + GATHERS).filter(|_| frame.layers) {
@@ -55,13 +56,13 @@ pub(super) fn count_gather(sums: &mut [ColourSum], frame: &FrameParameters, pixe
     }
 }
 
-/// The sums of one pixel of a tile; of none past the last pixel.
+/// Sums of one pixel of a tile; empty past the last pixel.
 pub(super) fn sums_of<'a>(sums: &'a [ColourSum], frame: &FrameParameters, pixel: usize) -> &'a [ColourSum] {
     let count = sums_of_pixel(frame.layers) as usize;
     sums.get(pixel * count..(pixel + 1) * count).unwrap_or_default()
 }
 
-/// The light of a pixel, from its sums: its radiance, and with layers of what that consists. In the image's radiance units.
+/// Radiance of a pixel, and its layers if the frame has any, from its sums; in the image's radiance units.
 pub(super) fn light_of(sums: &[ColourSum]) -> (Vec3, Option<PixelLayers>) {
     match sums {
         [direct, indirect, caustic, gathers] => {

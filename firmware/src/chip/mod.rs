@@ -1,8 +1,8 @@
 //! One chip: the state of a tile, and its stages.
 //!
-//! A tile is rendered in blocks, with the irradiance cache off in one. A block goes through the stages of `position`;
-//! every stage is done for all pixels before the next begins, so that gathers of neighbouring pixels come together. Each
-//! call of [`Chip::step`] is one small piece of it.
+//! A tile is rendered in one block or, if its irradiance records do not fit into the cache, in several smaller ones. A
+//! block goes through the stages of `position`; every stage is done for all pixels before the next begins, so that
+//! gathers of neighbouring pixels are adjacent. Each call of [`Chip::step`] does a small piece of this work.
 
 mod completion;
 mod gathers;
@@ -49,8 +49,8 @@ pub type MicroChip = Chip<
     { MICRO.gathered_records as usize },
 >;
 
-/// A chip's buffers: `TILE_PIXELS` pixels, `CANDIDATES` photons of a gather, `QUEUE` gathers that wait, `RECORDS`
-/// irradiance records, `GATHERED` of them gathered at once.
+/// A chip, with buffers for `TILE_PIXELS` pixels, `CANDIDATES` candidates of a gather, `QUEUE` queued gathers, and
+/// `RECORDS` irradiance records, of which `GATHERED` are gathered at once.
 pub struct Chip<
     const TILE_PIXELS: usize,
     const CANDIDATES: usize,
@@ -58,33 +58,34 @@ pub struct Chip<
     const RECORDS: usize,
     const GATHERED: usize,
 > {
-    /// Where gather rays start, in the present sample: what each pixel of the tile sees, or records.
+    /// Origins of gather rays: the surface that each pixel of the tile sees in the current sample, or irradiance
+    /// records.
     points: Vec<StoredPoint, TILE_PIXELS>,
-    /// The light of each pixel of the tile so far, in radiance units: a sum a pixel, or those of its components.
+    /// Sums of the tile's pixels, in the image's radiance units: [`sums_of_pixel`] for each pixel.
     sums: Vec<ColourSum, TILE_PIXELS>,
     gathers: Gathers<CANDIDATES, QUEUE>,
     cache: IrradianceCache<RECORDS, GATHERED>,
     tile: Tile,
-    /// What of the tile is not begun.
+    /// Blocks of the tile that have not begun, the next on top.
     blocks: Vec<Block, MOST_BLOCKS>,
     block: Block,
     position: Position,
-    /// Of the pixel of the complete tile that is at work.
+    /// State of [`Self::complete`] for the current pixel.
     completion: Completion,
 }
 
-/// Blocks that wait: a tile is halved at most so often.
+/// Capacity of the stack of blocks: enough for all halvings of a tile.
 const MOST_BLOCKS: usize = 32;
 
-/// Rays and gathers after which a step ends.
+/// Number of rays and gathers after which a step ends.
 const WORK_OF_STEP: u64 = 16;
-/// Pieces of one step at the most: some cast no ray.
+/// Maximum number of pieces of one step, as some pieces cast no ray.
 const PIECES_PER_STEP: u32 = 64;
 
-/// What a step has led to.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// There is more to do.
+    /// The tile is not complete.
     Busy,
     /// The tile's pixels are complete.
     Complete,
@@ -111,7 +112,7 @@ impl<
     const GATHERED: usize,
 > Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
 {
-    /// What each technique adds to the chip's memory.
+    /// On-chip memory that each technique adds to the chip.
     pub const TECHNIQUES: TechniqueMemory = TechniqueMemory {
         reordering: size_of::<GatherQueue<QUEUE>>(),
         irradiance_cache: size_of::<IrradianceCache<RECORDS, GATHERED>>(),
@@ -133,12 +134,12 @@ impl<
         }
     }
 
-    /// Pixels that a tile of a frame may have.
+    /// Maximum number of pixels of a tile of a frame.
     pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
         TILE_PIXELS as u64 / u64::from(sums_of_pixel(frame.layers))
     }
 
-    /// Begins a tile of a frame. Returns whether it has pixels and its buffers suffice.
+    /// Begins a tile of a frame. Returns false if the tile has no pixels or more than [`Self::tile_pixels`].
     #[must_use]
     pub fn begin(&mut self, memory: &mut impl MemoryPort, frame: &FrameParameters, tile: Tile) -> bool {
         memory.begin_tile();
@@ -158,8 +159,8 @@ impl<
             && self.blocks.push(Block::whole(tile.width, tile.height)).is_ok()
     }
 
-    /// Does the next pieces of the tile, until some rays are cast or gathers done: little enough for a card to look at its
-    /// link after each step, and enough for the look to cost little.
+    /// Does the next pieces of the tile, about 16 rays and gathers: a card polls its link after each step, which must
+    /// be short enough for a prompt reply and long enough to make the cost of polling negligible.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -176,8 +177,8 @@ impl<
         Ok(Progress::Busy)
     }
 
-    /// Does the next piece of the tile: one stage of one pixel or record, in the stages of gather rays one direction
-    /// bin of it, in the survey one cell of the lattice or one ray, or some of the gathers that wait.
+    /// Does the next piece of the tile: one stage of one pixel or record; in the stages of gather rays, rays of one
+    /// direction bin of it; in the survey, one cell of the lattice or one ray; or some of the queued gathers.
     #[inline(always)]
     fn piece<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<Progress, Fault> {
         let stage = self.position.stage;
@@ -200,7 +201,7 @@ impl<
         Ok(Progress::Busy)
     }
 
-    /// Begins the next block; without one the tile is complete.
+    /// Begins the next block; the tile is complete if there is none.
     fn next_block<M>(&mut self, context: &Context<M>) -> Progress {
         let Some(block) = self.blocks.pop() else { return Progress::Complete };
         self.block = block;
@@ -211,14 +212,14 @@ impl<
         Progress::Busy
     }
 
-    /// The present pixel's number in the tile, and its present sample.
+    /// Index in the tile of the current pixel, and its current sample.
     fn present(&self) -> (usize, PixelSample) {
         let [column, row] = self.block.pixel(self.position.index);
         let at = PixelSample { x: self.tile.x + column, y: self.tile.y + row, sample: self.position.sample };
         ((row * self.tile.width + column) as usize, at)
     }
 
-    /// Some of the gathers that wait.
+    /// Does some of the queued gathers, and adds their radiance to records or pixels.
     fn drain<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Self { sums, gathers, cache, position, .. } = self;
         let frame = context.frame;
@@ -232,14 +233,14 @@ impl<
         })
     }
 
-    /// The light of the complete tile's pixels, in rows, in radiance units: a sum a pixel, or with layers
-    /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
+    /// Sums of the complete tile's pixels, row-major, in the image's radiance units: one for each pixel, or
+    /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`] in a frame with layers.
     pub fn sums(&self) -> &[ColourSum] {
         &self.sums
     }
 
-    /// Looks at the next samples of pixel `index` of the complete tile, counted in rows; to be called for one pixel until it
-    /// is there. Returns the pixel after the last of its samples.
+    /// Computes the record of pixel `index`, row-major, of the complete tile, some samples at a call: `None` until the
+    /// last sample. To be called for one pixel until its record is returned.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -254,17 +255,17 @@ impl<
             return Ok(None);
         }
         let completion = core::mem::replace(&mut self.completion, Completion::NOTHING);
-        // Past the last pixel there is no light.
+        // The sums of an index past the last pixel are empty: no light.
         Ok(Some(completion.pixel(context, sums_of(&self.sums, context.frame, index))))
     }
 }
 
-/// The error that interpolated irradiance may have; `None` if none is interpolated.
+/// Error bound of interpolated irradiance; `None` if the frame interpolates none.
 fn allowed_error(frame: &FrameParameters) -> Option<f32> {
     frame.irradiance_error.filter(|_| frame.gather_rays > 0)
 }
 
-/// On-chip memory that a card of `card_bytes` takes under a budget: its statics, caches with their tags, and stack.
+/// On-chip memory of a card, bytes: its state of `card_bytes`, and the budget's caches with their tags and stack.
 pub const fn sram_bytes(budget: &Budget, card_bytes: usize) -> usize {
     card_bytes + cache_bytes(budget) + tag_bytes(budget) + budget.stack_bytes as usize
 }

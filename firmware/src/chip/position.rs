@@ -1,8 +1,8 @@
-//! How far a tile has come.
+//! Progress of a tile: its blocks, and the stages of a block.
 
 use core::ops::Range;
 
-/// A rectangle of a tile's pixels, counted from the tile's corner.
+/// A rectangle of a tile's pixels, in coordinates from the tile's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {
     pub(super) x: u32,
@@ -14,7 +14,7 @@ pub(super) struct Block {
 impl Block {
     pub(super) const EMPTY: Self = Self { x: 0, y: 0, width: 0, height: 0 };
 
-    /// All pixels of a tile.
+    /// The block of all pixels of a tile.
     pub(super) fn whole(width: u32, height: u32) -> Self {
         Self { x: 0, y: 0, width, height }
     }
@@ -23,13 +23,13 @@ impl Block {
         self.width * self.height
     }
 
-    /// The column and the row in the tile of the block's pixel `index`, counted in rows.
+    /// Column and row in the tile of pixel `index` of the block, row-major.
     pub(super) fn pixel(&self, index: u32) -> [u32; 2] {
         let width = self.width.max(1);
         [self.x + index % width, self.y + index / width]
     }
 
-    /// Its two halves along its longer side; `None` of one pixel.
+    /// The two halves of the block across its longer side; `None` for a block of one pixel.
     pub(super) fn halves(&self) -> Option<[Self; 2]> {
         let Self { x, y, width, height } = *self;
         if self.pixels() < 2 {
@@ -45,53 +45,54 @@ impl Block {
     }
 }
 
-/// The stages of a block, in their order. Those from [`Stage::Survey`] to [`Stage::RecordSums`] are of the irradiance
-/// cache and left out without it.
+/// Stages of a block, in order. The stages from [`Stage::Survey`] to [`Stage::RecordSums`] are skipped without the
+/// irradiance cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {
-    /// Which irradiance records there are, level by level of the lattice.
+    /// Survey: placement of irradiance records, level by level of the lattice.
     Survey,
-    /// Where the rays of the next records start, of as many as are gathered at once.
+    /// Directions of the gather rays of the next records, as many as are gathered at once.
     RecordPoints,
-    /// Their gather rays, bin by bin.
+    /// Gather rays of the records, bin by bin.
     RecordRays,
-    /// What has come of them, when no gather waits.
+    /// Irradiance of the records, once the gather queue is empty.
     RecordSums,
-    /// What each pixel sees, sample by sample.
+    /// Eye rays of one sample of each pixel.
     Eye,
-    /// What shadow rays bring.
+    /// Shadow rays and caustic gathers of the sample.
     Direct,
-    /// The gather rays, bin by bin.
+    /// Gather rays of the sample, bin by bin.
     Rays,
-    /// The block is complete when no gather waits; the next one begins, if there is any.
+    /// End of the block, once the gather queue is empty.
     Done,
 }
 
-/// How far a block has come.
+/// Progress of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Position {
     pub(super) stage: Stage,
     pub(super) sample: u32,
-    /// The direction bin.
+    /// Direction bin.
     pub(super) bin: u32,
-    /// The pixel of the block, or the gather point of a record.
+    /// Index of the pixel in the block, or of the record among those being gathered.
     pub(super) index: u32,
-    /// Rays of the bin that are cast.
+    /// Number of rays of the bin already cast.
     rays: u32,
 }
 
-/// Gather rays that one step casts.
+/// Maximum number of gather rays of one piece of work.
 const RAYS_PER_STEP: u32 = 64;
 
 impl Position {
     pub(super) const DONE: Self = Self::at(Stage::Done);
 
-    /// The beginning of a stage, of the first sample.
+    /// The beginning of a stage, at the first sample.
     pub(super) const fn at(stage: Stage) -> Self {
         Self { stage, sample: 0, bin: 0, index: 0, rays: 0 }
     }
 
-    /// The next of the rays of the present bin and index that a step casts, and whether they are the last.
+    /// The next rays to cast, at most [`RAYS_PER_STEP`], of the current bin's rays `of_bin`, and whether they are the
+    /// last.
     pub(super) fn next_rays(&mut self, of_bin: Range<u32>) -> (Range<u32>, bool) {
         let first = of_bin.start + self.rays;
         let end = of_bin.end.min(first + RAYS_PER_STEP);
@@ -100,17 +101,17 @@ impl Position {
         (first..end, is_last)
     }
 
-    /// Goes on to the next of `count` indices; at the end of them to the first again. Returns whether it was the last.
+    /// Advances to the next of `count` indices, cyclically. Returns whether the index was the last.
     pub(super) fn next_index(&mut self, count: u32) -> bool {
         next(&mut self.index, count)
     }
 
-    /// Goes on to the next of `count` bins and says whether it was the last, as [`Self::next_index`].
+    /// Advances to the next of `count` bins, cyclically. Returns whether the bin was the last.
     pub(super) fn next_bin(&mut self, count: u32) -> bool {
         next(&mut self.bin, count)
     }
 
-    /// Goes on to the next of `count` samples and says whether it was the last, as [`Self::next_index`].
+    /// Advances to the next of `count` samples, cyclically. Returns whether the sample was the last.
     pub(super) fn next_sample(&mut self, count: u32) -> bool {
         next(&mut self.sample, count)
     }

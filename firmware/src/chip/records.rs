@@ -21,7 +21,7 @@ impl<
         Window { x0, x1: x0 + self.block.width, y0, y1: y0 + self.block.height }
     }
 
-    /// Begins the records of the block.
+    /// Begins the survey of the block's records.
     pub(super) fn begin_records(&mut self) {
         self.position = Position::at(Stage::Survey);
         if self.cache.begin(&self.window()).is_err() {
@@ -29,11 +29,13 @@ impl<
         }
     }
 
-    /// Puts the block off in two halves: its records do not fit. A block of one pixel always fits.
+    /// Replaces the block, whose records do not fit into the cache, by its two halves. A block of one pixel always
+    /// fits.
     fn divide_block(&mut self) {
         let Some([first, second]) = self.block.halves().filter(|_| self.blocks.len() + 2 <= MOST_BLOCKS)
         else {
-            // Never: there is room for one pixel, and for the halves of a tile down to it. Each sample gathers its own.
+            // Never reached: the cache has room for one pixel, and the stack of blocks for all halvings of a tile.
+            // Every sample would then do its own final gather.
             return self.do_without_records();
         };
         for half in [second, first] {
@@ -47,7 +49,7 @@ impl<
         self.position = Position::at(Stage::Eye);
     }
 
-    /// The next piece of the survey.
+    /// Does the next step of the survey.
     pub(super) fn survey<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Some(allowed) = allowed_error(context.frame) else {
             self.do_without_records();
@@ -61,13 +63,13 @@ impl<
         Ok(())
     }
 
-    /// Begins the gather of the next records, or goes on to the pixels if all are done.
+    /// Begins the gather of the next records, or the eye rays if all records are gathered.
     fn begin_gather(&mut self) {
         let count = self.cache.begin_gather(self.points.len());
         self.position = Position::at(if count > 0 { Stage::RecordPoints } else { Stage::Eye });
     }
 
-    /// The directions of one record's rays.
+    /// Chooses the directions of one record's gather rays.
     pub(super) fn choose_record_point<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -85,7 +87,7 @@ impl<
         Ok(())
     }
 
-    /// Gather rays of the present bin, for one record.
+    /// Casts gather rays of the current direction bin for one record.
     pub(super) fn cast_for_record<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Self { points, cache, gathers, position, .. } = self;
         let index = position.index;
@@ -95,7 +97,7 @@ impl<
             let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, context.frame.bins);
             let (rays, is_last) = position.next_rays(of_bin);
             for ray in rays {
-                // There are at most as many as the cache gathers at once.
+                // `index` fits 16 bits: it is below GATHERED.
                 let end = final_gather::cast(context, point, index as u16, 1.0, ray)?;
                 let Some(end) = end else { continue };
                 cache.add(index as u16, end.cell, end.direct);
@@ -115,7 +117,7 @@ impl<
         Ok(())
     }
 
-    /// What has come of the records; the next ones begin.
+    /// Turns the sums of the gathered records into their irradiance, and begins the next records.
     pub(super) fn end_records<M: MemoryPort>(&mut self, context: &mut Context<M>) {
         if let Some(allowed) = allowed_error(context.frame) {
             self.cache.end_gather(context, allowed);

@@ -1,27 +1,27 @@
-//! Places as the order of deferred reordering: a place is told by a number, and requests are done in its order.
+//! Sort keys of deferred reordering: positions on the photons' grid, coded along a Hilbert curve.
 
 use photoncard_shared::layout::{GRID_BITS, PhotonGrid};
 use photoncard_shared::message::Drain;
 
 use crate::sampler::hash;
 
-/// Bits of a coordinate that the Hilbert curve goes through.
+/// Upper bits of a grid coordinate, which the Hilbert curve orders.
 const CURVE_BITS: u32 = 10;
-/// Bits of a coordinate below them.
+/// Lower bits of a grid coordinate, its offset in a cell of the curve.
 const REST_BITS: u32 = GRID_BITS - CURVE_BITS;
 const REST_MASK: u64 = (1 << REST_BITS) - 1;
-/// Bits of a hash cell's coordinates: 16 cells each way of the grid.
+/// Bits of a hash cell's coordinates: 16 cells along each axis of the grid.
 const CELL_BITS: u32 = 4;
-/// Buckets that cells are hashed to.
+/// Number of buckets that cells are hashed to.
 const BUCKETS: u32 = 256;
 
-/// A place on the grid of the photons' positions: along the Hilbert curve through its 1024 cells each way, and within the
-/// cell. It is all that is kept of a gather's position.
+/// Position of a gather, rounded to the photons' grid: index along the Hilbert curve through 1024 cells an axis, and
+/// offset within the cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Place(u64);
 
 impl Place {
-    /// The grid point nearest to a position, metres.
+    /// Code of the grid point nearest to a position, metres.
     #[inline(always)]
     pub fn new(grid: &PhotonGrid, position: [f32; 3]) -> Self {
         let point = grid.nearest(position);
@@ -30,7 +30,7 @@ impl Place {
         Self(point.into_iter().fold(curve as u64, rest))
     }
 
-    /// The grid point.
+    /// Grid point of the code.
     #[inline(always)]
     fn point(self) -> [u32; 3] {
         let [x, y, z] = hilbert_cell((self.0 >> (3 * REST_BITS)) as u32, CURVE_BITS);
@@ -38,19 +38,19 @@ impl Place {
         [x << REST_BITS | rest(0), y << REST_BITS | rest(1), z << REST_BITS | rest(2)]
     }
 
-    /// The position, metres.
+    /// Position of the grid point, metres.
     #[inline(always)]
     pub fn position(self, grid: &PhotonGrid) -> [f32; 3] {
         grid.position(self.point())
     }
 
-    /// The bucket of its cell.
+    /// Bucket of the hash cell.
     fn bucket(self) -> u32 {
         let [x, y, z] = self.point().map(|coordinate| coordinate >> (GRID_BITS - CELL_BITS));
         hash((x << CELL_BITS | y) << CELL_BITS | z) % BUCKETS
     }
 
-    /// What waiting requests are sorted by.
+    /// Sort key of a queued request.
     #[inline(always)]
     pub fn key(self, drain: Drain) -> u64 {
         match drain {
@@ -61,13 +61,14 @@ impl Place {
     }
 }
 
-/// The bit of every coordinate that a level of the curve turns on, and those below it.
+/// Masks of a level of the curve: its bit of a coordinate, and all bits below.
 #[inline(always)]
 fn level_masks(level: u32) -> (u32, u32) {
     (1 << level, (1 << level) - 1)
 }
 
-/// One step of the curve's turns: mirrors `x`, or exchanges the lower bits of `x` and `other`.
+/// Elementary transform of the curve: mirrors the lower bits of `x`, or exchanges those of `x` and `other`. Returns the
+/// new `other`.
 #[inline(always)]
 fn turn(x: &mut u32, other: u32, (bit, below): (u32, u32)) -> u32 {
     if other & bit != 0 {
@@ -79,7 +80,7 @@ fn turn(x: &mut u32, other: u32, (bit, below): (u32, u32)) -> u32 {
     other ^ exchange
 }
 
-/// The place of a cell along the Hilbert curve through `2^bits` cells each way (Skilling 2004, *Programming the Hilbert
+/// Index of a cell along the 3D Hilbert curve through `2^bits` cells an axis (Skilling 2004, *Programming the Hilbert
 /// curve*); `bits` from 1 to 10.
 pub fn hilbert_index(cell: [u32; 3], bits: u32) -> u32 {
     let [mut x, mut y, mut z] = cell;
@@ -106,7 +107,7 @@ pub fn hilbert_index(cell: [u32; 3], bits: u32) -> u32 {
     })
 }
 
-/// The cell at a place along the curve: the inverse of [`hilbert_index`].
+/// Cell at an index along the 3D Hilbert curve: the inverse of [`hilbert_index`].
 pub fn hilbert_cell(index: u32, bits: u32) -> [u32; 3] {
     let coordinate =
         |offset: u32| (0..bits).fold(0, |v, level| v | (index >> (3 * level + offset) & 1) << level);

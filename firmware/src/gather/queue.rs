@@ -1,12 +1,13 @@
-//! The gather queue: requests wait here until it is full or their results are needed, and are then done in the order of their
-//! places. Full is back-pressure: the queue is drained, and nothing is lost.
+//! The gather queue of deferred reordering: requests are kept until the queue is full or their results are needed, and
+//! are then done in the order of [`super::Place::key`]. A full queue is drained before the next request; nothing is
+//! lost.
 
 use heapless::Vec;
 use photoncard_shared::message::Drain;
 
 use super::GatherRequest;
 
-/// Up to `N` requests, 24 bytes each.
+/// Queue of up to `N` gather requests, 24 bytes each.
 pub struct GatherQueue<const N: usize> {
     waiting: Vec<GatherRequest, N>,
     draining: bool,
@@ -24,38 +25,38 @@ impl<const N: usize> GatherQueue<N> {
         Self { waiting: Vec::new(), draining: false }
     }
 
-    /// Drops what waits.
+    /// Drops all queued requests.
     pub fn clear(&mut self) {
         self.waiting.clear();
         self.draining = false;
     }
 
-    /// Requests that wait.
+    /// Number of queued requests.
     pub fn len(&self) -> usize {
         self.waiting.len()
     }
 
-    /// Whether none waits.
+    /// True if no request is queued.
     pub fn is_empty(&self) -> bool {
         self.waiting.is_empty()
     }
 
-    /// Whether requests are being taken out.
+    /// True between [`Self::begin_drain`] and the end of the drain.
     pub fn is_draining(&self) -> bool {
         self.draining
     }
 
-    /// Adds a request.
+    /// Appends a request.
     ///
     /// # Errors
-    /// Gives it back if there is no room.
+    /// The request itself if the queue is full.
     pub fn push(&mut self, request: GatherRequest) -> Result<(), GatherRequest> {
         self.waiting.push(request)
     }
 
-    /// Begins to take requests out, in the order that `drain` tells.
+    /// Begins a drain: sorts the requests in the order of `drain`.
     pub fn begin_drain(&mut self, drain: Drain) {
-        // The last is taken first: the keys fall along the buffer.
+        // In descending order, as requests are popped from the end.
         self.waiting.sort_unstable_by_key(|request| u64::MAX - request.place.key(drain));
         self.draining = true;
     }

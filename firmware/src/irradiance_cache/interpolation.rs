@@ -1,4 +1,4 @@
-//! Interpolation between the records at the corners of a cell.
+//! Interpolation between the irradiance records at the corners of a cell.
 
 use glam::Vec3;
 
@@ -8,10 +8,10 @@ use super::{IrradianceCache, LatticePoint};
 use crate::scene::Surface;
 use crate::vector::min;
 
-/// The weights of a sample's records sum to this at the least.
+/// Minimum sum of the weights of a sample's records.
 const LEAST_WEIGHT: f32 = 0.05;
 
-/// The records at the corners of a cell.
+/// Records at the corners of a cell, where there are any.
 pub(super) struct Corners<'a>([Option<&'a Record>; 4]);
 
 impl<'a> Corners<'a> {
@@ -19,8 +19,8 @@ impl<'a> Corners<'a> {
         self.0.into_iter().flatten()
     }
 
-    /// The error of each record at a place. A record reaches no farther than the others let it: what is near one
-    /// cannot be farther from its neighbour than their distance more (neighbour clamping).
+    /// Error of each corner's record at a surface point, infinite without a record. Radii are clamped by neighbours'
+    /// (Křivánek 2006): by the triangle inequality, R_i <= R_j + |p_i - p_j|.
     pub(super) fn errors(&self, allowed: f32, position: Vec3, normal: Vec3) -> impl Iterator<Item = f32> {
         self.0
             .map(|record| {
@@ -35,18 +35,18 @@ impl<'a> Corners<'a> {
     }
 }
 
-/// What a sample sees, and where in the picture.
+/// Surface that a sample sees, and the sample's position in the picture.
 #[derive(Clone, Copy, Debug)]
 pub struct SeenSample<'a> {
     /// Column and row of its pixel.
     pub pixel: [u32; 2],
-    /// Its place in the picture, pixels.
+    /// Position in the picture, pixels from the upper left corner.
     pub place: [f32; 2],
-    /// The surface.
+    /// Visible surface.
     pub surface: &'a Surface,
 }
 
-/// The weights of the four corners of a sample's cell.
+/// Weights of a sample's cell's four corners.
 struct Weights {
     cell: Cell,
     weights: [f32; 4],
@@ -57,7 +57,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         Corners(cell.corners().map(|corner| self.records.get(&corner).and_then(Option::as_ref)))
     }
 
-    /// The undivided cell that holds a pixel.
+    /// The undivided cell that contains a pixel.
     fn undivided_cell(&self, [x, y]: [u32; 2]) -> Option<Cell> {
         let mut cell = Cell::coarsest(x, y);
         let (_, divided) = self.roots.iter().find(|(corner, _)| *corner == cell.corner)?;
@@ -67,10 +67,10 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         Some(cell)
     }
 
-    /// Which records a sample uses and how much; `None` if it cannot be interpolated.
+    /// Weights of the records for a sample; `None` if it cannot be interpolated.
     fn weights(&self, sample: &SeenSample, allowed: f32) -> Option<Weights> {
         let SeenSample { pixel, place, surface } = *sample;
-        // Of the pixel, and not of the place, which rounding may put on the next pixel's border.
+        // By pixel, as rounding may move `place` to the border of the next pixel.
         let cell = self.undivided_cell(pixel)?;
         let part = |at: f32, from: u32| (at - from as f32) / cell.side() as f32;
         let [x, y] = [part(place[0], cell.corner.x), part(place[1], cell.corner.y)];
@@ -79,13 +79,14 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         let errors = corners.errors(allowed, surface.position, surface.normal);
         let mut weights = bilinear;
         for (weight, error) in weights.iter_mut().zip(errors) {
-            // Falls to zero where the record's validity ends.
+            // Continuous: 0 at the error bound.
             *weight *= if error < allowed { 1.0 - error / allowed } else { 0.0 };
         }
         (weights.iter().sum::<f32>() >= LEAST_WEIGHT).then_some(Weights { cell, weights })
     }
 
-    /// The indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample has to gather its own.
+    /// Interpolated indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample needs a final gather of
+    /// its own.
     pub fn interpolate(&self, sample: &SeenSample, allowed: f32) -> Option<Vec3> {
         let Weights { cell, weights } = self.weights(sample, allowed)?;
         let surface = sample.surface;

@@ -1,33 +1,33 @@
-//! The lattice of picture positions where irradiance records may be: squares of 16 pixels, halved up to three times.
+//! The lattice of irradiance records: cells of 16x16 pixels, each the root of a quadtree of four levels.
 //!
-//! The lattice belongs to the picture and not to a tile: whoever needs the record at a position computes the same one.
+//! The lattice belongs to the picture and not to a tile: all tiles compute the same record for a lattice point.
 
-/// Side of a coarsest cell, pixels.
+/// Side of the coarsest cells, pixels.
 pub(super) const COARSEST_SIDE: u32 = 16;
-/// Levels: sides of 16, 8, 4 and 2 pixels.
+/// Number of levels of cells: sides of 16, 8, 4 and 2 pixels.
 pub(super) const LEVELS: u32 = 4;
 
-/// Side of a cell of a level, pixels: never 0, so that it divides without a panic.
+/// Side of the cells of a level, pixels; at least 1, so that division by it cannot panic.
 const fn side(level: u32) -> u32 {
     let side = COARSEST_SIDE >> level;
     if side == 0 { 1 } else { side }
 }
 
-/// A corner of pixels, counted from the picture's upper left corner.
+/// A corner of the lattice, pixels from the picture's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LatticePoint {
-    /// To the right.
+    /// Pixels to the right.
     pub x: u32,
-    /// Downwards.
+    /// Pixels downwards.
     pub y: u32,
 }
 
-/// How far from its lattice point a record is seen, pixels: in a symmetric view of a room, edges of walls run exactly
-/// through lattice points, and a record in an edge sees nothing of what is right beside it.
+/// Offset of a record's eye ray from its lattice point, pixels: in a symmetric view of a room, edges of walls run
+/// exactly through lattice points, and the survey rays of a record on an edge would miss the adjacent wall.
 const PLACE_OFFSET: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
 impl LatticePoint {
-    /// The place of the picture where the point's record is seen.
+    /// Picture position of the eye ray of the point's record, pixels.
     pub(super) fn place(&self) -> [f32; 2] {
         let [right, down] = PLACE_OFFSET;
         [self.x as f32 + right, self.y as f32 + down]
@@ -38,35 +38,35 @@ impl LatticePoint {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
     pub(super) corner: LatticePoint,
-    /// 0 is the coarsest.
+    /// Level in the quadtree, 0 for the coarsest cells.
     pub(super) level: u32,
 }
 
 impl Cell {
-    /// The coarsest cell that holds a pixel.
+    /// The coarsest cell that contains a pixel.
     pub(super) fn coarsest(x: u32, y: u32) -> Self {
         let floor = |v: u32| v - v % COARSEST_SIDE;
         Self { corner: LatticePoint { x: floor(x), y: floor(y) }, level: 0 }
     }
 
-    /// Its side, pixels.
+    /// Side of the cell, pixels.
     pub(super) fn side(&self) -> u32 {
         side(self.level)
     }
 
-    /// Whether it cannot be halved.
+    /// Returns whether the cell is of the last level, and cannot be divided.
     pub(super) fn is_finest(&self) -> bool {
         self.level + 1 >= LEVELS
     }
 
-    /// Its corners: the upper two, then the lower two, each from the left.
+    /// Corners of the cell: upper left, upper right, lower left, lower right.
     pub(super) fn corners(&self) -> [LatticePoint; 4] {
         let LatticePoint { x, y } = self.corner;
         let side = self.side();
         [(0, 0), (side, 0), (0, side), (side, side)].map(|(dx, dy)| LatticePoint { x: x + dx, y: y + dy })
     }
 
-    /// The points that its children add.
+    /// Corners of the cell's children that are not its own: the centre and the middles of its sides.
     pub(super) fn middles(&self) -> [LatticePoint; 5] {
         let LatticePoint { x, y } = self.corner;
         let [half, side] = [self.side() / 2, self.side()];
@@ -74,7 +74,7 @@ impl Cell {
             .map(|(dx, dy)| LatticePoint { x: x + dx, y: y + dy })
     }
 
-    /// Its number in the tree of its coarsest cell, the root 0; below 21 for a cell that can be halved.
+    /// Index of the cell in its quadtree, level by level from the root, 0; below 21 for cells that can be divided.
     pub(super) fn tree_number(&self) -> u32 {
         let root = Self::coarsest(self.corner.x, self.corner.y);
         let first = ((1 << (2 * self.level)) - 1) / 3;
@@ -83,19 +83,19 @@ impl Cell {
         first + (y << self.level) + x
     }
 
-    /// Cells of a level in the tree of one coarsest cell.
+    /// Number of cells of a level in one quadtree.
     pub(super) fn of_level(level: u32) -> usize {
         1 << (2 * level)
     }
 
-    /// Cell `number` of a level, in rows, in the tree of the coarsest cell at `root`.
+    /// Cell `number` of a level, row-major, in the quadtree with its upper left corner at `root`.
     pub(super) fn in_tree(root: LatticePoint, level: u32, number: usize) -> Self {
         let [row, column] = [number as u32 >> level, number as u32 & ((1 << level) - 1)];
         let side = side(level);
         Self { corner: LatticePoint { x: root.x + column * side, y: root.y + row * side }, level }
     }
 
-    /// The cell that it is a quarter of; `None` of a coarsest one.
+    /// The cell of which this one is a quarter; `None` for a coarsest cell.
     pub(super) fn parent(&self) -> Option<Self> {
         let level = self.level.checked_sub(1)?;
         let floor = |v: u32| v - v % side(level);
@@ -103,7 +103,7 @@ impl Cell {
         Some(Self { corner: LatticePoint { x: floor(x), y: floor(y) }, level })
     }
 
-    /// The child that holds a pixel of this cell.
+    /// The child that contains a pixel of this cell.
     pub(super) fn child_at(&self, x: u32, y: u32) -> Self {
         let half = (self.side() / 2).max(1);
         let step = |v: u32, from: u32| from + v.saturating_sub(from) / half * half;
@@ -111,7 +111,7 @@ impl Cell {
         Self { corner, level: self.level + 1 }
     }
 
-    /// Whether it has a pixel in common with a window.
+    /// Returns whether the cell has a pixel in common with a window.
     pub(super) fn overlaps(&self, window: &Window) -> bool {
         let LatticePoint { x, y } = self.corner;
         let side = self.side();
@@ -119,16 +119,16 @@ impl Cell {
     }
 }
 
-/// A rectangle of the picture: columns `x0` up to `x1`, rows `y0` up to `y1`.
+/// A rectangle of the picture: columns `x0..x1`, rows `y0..y1`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
     /// First column.
     pub x0: u32,
-    /// Past the last column.
+    /// Column past the last.
     pub x1: u32,
     /// First row.
     pub y0: u32,
-    /// Past the last row.
+    /// Row past the last.
     pub y1: u32,
 }
 

@@ -1,25 +1,26 @@
-//! The parallel irradiance cache: indirect irradiance is gathered at few places of the picture, with its gradients, and
-//! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992; neighbour clamping after Krivanek 2006,
-//! among the corners of a cell).
+//! The parallel irradiance cache: indirect irradiance is gathered at few points, with its gradients, and interpolated
+//! between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992; neighbour clamping after Křivánek 2006, among the
+//! corners of a cell).
 //!
-//! The published caches are filled as pixels need it, so that each pixel depends on those before it. The dissertation
-//! makes the cache parallel by removing that dependence; how is not told, and this is a reconstruction. Which records
-//! exist is decided by a rule that looks at the geometry of one cell of a lattice over the picture and at nothing else:
+//! The published caches are filled on demand, so that each pixel depends on the pixels before it. The dissertation
+//! makes the cache parallel by removing this dependence, without giving the method; this is a reconstruction. The
+//! positions of the records depend only on the geometry seen in one cell of a lattice over the picture:
 //!
-//! - Records are at the corners of the cells, 16 pixels apart. A record is the surface seen there, and the harmonic mean
-//!   distance of what a few rays find around it: nothing is gathered yet.
+//! - Records are at the corners of the cells, 16 pixels apart. A survey determines the surface that each record sees,
+//!   and the harmonic mean of its distances to surrounding surfaces along a few rays, without a gather.
 //! - A cell is divided in four, down to a side of 2 pixels, unless its corners cover it: every corner, and every point
 //!   that a division would add, is within the allowed error of all four corner records.
 //! - A sample interpolates the up to four corner records of its undivided cell that are valid at the surface it sees,
-//!   with weights that are continuous across cells of one size. Where none is, it casts gather rays of its own.
-//! - All records are gathered. Their gradients' coefficients are known from the survey, so their gathers may be reordered
-//!   like any. Hardly any is of no use: each is a corner of an undivided cell.
+//!   with weights that are continuous across cells of one size. Without a valid record it casts gather rays of its own.
+//! - All records are gathered. The coefficients of their gradients are known from the survey, so that their gathers may
+//!   be reordered like all others. Hardly any record is wasted: each is a corner of an undivided cell.
 //!
-//! A tile therefore computes what another tile would, and no seam shows. The records of a tile that do not fit in the
-//! cache make the chip render it in smaller blocks: more records are computed twice, and no pixel changes.
+//! Two tiles with a common lattice point therefore compute the same record, and there are no seams. A tile whose
+//! records do not fit into the cache is rendered in smaller blocks: more records are computed twice, and no pixel
+//! changes.
 //!
-//! Light straight from an emitter is weighted between shadow rays and gather rays as everywhere ([`crate::render::direct`]):
-//! the gather rays' part, which is that of large emitters, is in the records.
+//! Direct light is divided between shadow rays and gather rays ([`crate::render::direct`]): the gather rays' part,
+//! mostly light of large emitters, is in the records.
 
 mod gradient;
 mod interpolation;
@@ -45,35 +46,35 @@ use crate::render::{Context, GatherPoint};
 use crate::sampler::{Dimension, Pattern};
 use crate::vector::{from_upper_half, max, upper_half};
 
-/// Coarsest cells that a block may overlap.
+/// Maximum number of coarsest cells that a block may overlap.
 const MOST_ROOTS: usize = 16;
-/// Records of a block of one pixel at the most: 4 corners, and 5 for each division.
+/// Maximum number of records of a block of one pixel: 4 corners, and 5 more for each division.
 const LEAST_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
-/// The records of a block: up to `RECORDS`, a power of two, of which `GATHERED` are gathered at once.
+/// Irradiance records of a block: up to `RECORDS`, a power of two, of which up to `GATHERED` are gathered at once.
 pub struct IrradianceCache<const RECORDS: usize, const GATHERED: usize> {
-    /// By lattice point; none where no surface with a Lambertian part is seen.
+    /// Records by lattice point; `None` where no surface with a Lambertian part is seen.
     records: FnvIndexMap<LatticePoint, Option<Record>, RECORDS>,
-    /// The coarsest cells, with a bit for each divided cell of their tree.
+    /// Coarsest cells, each with a bit mask of the divided cells in its quadtree ([`lattice::Cell::tree_number`]).
     roots: Vec<(LatticePoint, u32), MOST_ROOTS>,
     survey: Survey,
     gathered: Vec<GatheredRecord, GATHERED>,
-    /// Records before this one are gathered.
+    /// Index of the first record that is not yet gathered or being gathered.
     next: usize,
 }
 
-/// A record on its way.
+/// Sums of a record that is being gathered.
 struct GatheredRecord {
-    /// Its index.
+    /// Index of the record.
     record: usize,
-    /// The coefficients of each cell for the translational gradient, the upper halves of floats.
+    /// Coefficients of each cell for the translational gradient, bfloat16.
     coefficients: [[u16; 2]; CELLS],
     mean: ColourSum,
     translation: [ColourSum; 2],
     rotation: [ColourSum; 2],
 }
 
-/// The buffers do not suffice for the block.
+/// Error: the cache's buffers do not suffice for the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Full;
 
@@ -101,10 +102,10 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         }
     }
 
-    /// Forgets all records and begins with the cells of a window of the picture.
+    /// Removes all records and begins with the coarsest cells of a window of the picture.
     ///
     /// # Errors
-    /// If there are too many.
+    /// [`Full`] if the window overlaps too many cells.
     pub fn begin(&mut self, window: &Window) -> Result<(), Full> {
         self.forget();
         let steps = |from: u32, to: u32| {
@@ -119,7 +120,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         Ok(())
     }
 
-    /// Forgets all records: nothing is interpolated.
+    /// Removes all cells and records: nothing is interpolated.
     pub fn forget(&mut self) {
         self.records.clear();
         self.roots.clear();
@@ -128,7 +129,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         self.next = 0;
     }
 
-    /// Chooses the next records that are not yet gathered, `most` of them. Returns how many.
+    /// Begins the gather of the next records, at most `most`. Returns their number; 0 if all records are gathered.
     pub fn begin_gather(&mut self, most: usize) -> u32 {
         self.gathered.clear();
         while self.gathered.len() < most.min(GATHERED) {
@@ -141,7 +142,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
                     translation: [ColourSum::ZERO; 2],
                     rotation: [ColourSum::ZERO; 2],
                 };
-                // There is room for GATHERED.
+                // Always fits: the loop ends at GATHERED.
                 let _ = self.gathered.push(gathered);
             }
             self.next += 1;
@@ -149,7 +150,8 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         self.gathered.len() as u32
     }
 
-    /// Where the rays of record `index` of those being gathered start; the directions are not yet chosen.
+    /// Gather point of record `index` of the records being gathered, without directions; `None` if there is no such
+    /// record.
     #[inline(always)]
     pub fn point(&self, frame: &FrameParameters, index: u32) -> Option<GatherPoint> {
         let gathered = self.gathered.get(index as usize)?;
@@ -158,12 +160,13 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         Some(GatherPoint::record(record.as_ref()?.surface(), pattern, frame.gather_rays))
     }
 
-    /// Records that are being gathered.
+    /// Number of records being gathered.
     pub fn being_gathered(&self) -> u32 {
         self.gathered.len() as u32
     }
 
-    /// Tells the directions of the rays of record `index` of those that [`Self::begin_gather`] chose.
+    /// Sets the directions of record `index` of the records being gathered, which determine its gradient's
+    /// coefficients.
     pub fn set_point(&mut self, index: u32, point: &GatherPoint) {
         let Some(gathered) = self.gathered.get_mut(index as usize) else { return };
         let record = self.records.get_index(gathered.record).and_then(|(_, record)| record.as_ref());
@@ -172,7 +175,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         }
     }
 
-    /// Adds what a gather ray through a cell of the hemisphere brought to record `index` of those being gathered.
+    /// Adds the radiance of a gather ray in a cell of the hemisphere to record `index` of the records being gathered.
     #[inline]
     pub fn add(&mut self, index: u16, cell: u8, brought: Vec3) {
         let Some(gathered) = self.gathered.get_mut(index as usize) else { return };
@@ -187,7 +190,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         }
     }
 
-    /// Ends the gather of the chosen records: their irradiance is known, in W/(sr m^2) over pi.
+    /// Ends the gather of the records: turns their sums into irradiance over pi, W/(sr m^2).
     pub fn end_gather<M>(&mut self, context: &mut Context<M>, allowed: f32) {
         let unit = context.scene.header.radiance_unit;
         for gathered in &self.gathered {

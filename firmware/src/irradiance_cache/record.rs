@@ -1,4 +1,4 @@
-//! One irradiance record: where it is, how far it reaches, and the irradiance with its gradients.
+//! One irradiance record: position, radius of validity, and irradiance with its gradients.
 
 use glam::Vec3;
 
@@ -7,60 +7,62 @@ use crate::importance::CELLS;
 use crate::scene::Surface;
 use crate::vector::{from_upper_half, max, tangents, upper_half};
 
-/// What a record knows of the light.
+/// State of a record, with its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Content {
-    /// Nothing yet: the inverse distance of what is around in each cell of the hemisphere, as far as it is known, 1/m.
+    /// During the survey: inverse distance to the surroundings in each cell of the hemisphere, 1/m, bfloat16; 0 in
+    /// cells to come.
     Surveying([u16; CELLS]),
-    /// The distances of what is around.
+    /// After the survey: distances to the surroundings.
     Surveyed(Distances),
-    /// What was gathered.
+    /// After the gather: irradiance.
     Gathered(Irradiance),
 }
 
-/// Indirect light at a record. Gradients are in the surface's tangent plane: along the tangent and the bitangent.
+/// Indirect irradiance at a record. Gradients are in the surface's tangent plane, components along tangent and
+/// bitangent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Irradiance {
-    /// The irradiance over pi, W/(sr m^2): the radiance that a white Lambertian surface would reflect.
+    /// Irradiance over pi, W/(sr m^2): the radiance that a white Lambertian surface reflects.
     pub(super) mean: Vec3,
-    /// Its change with the place, 1/m.
+    /// Translational gradient of `mean`, W/(sr m^3).
     pub(super) translation: [Vec3; 2],
-    /// Its change with the normal's rotation about an axis, 1/rad.
+    /// Rotational gradient of `mean`, W/(sr m^2 rad): derivative by the normal's rotation about each axis.
     pub(super) rotation: [Vec3; 2],
 }
 
-/// A record.
+/// An irradiance record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Record {
     pub(super) position: Vec3,
     /// Unit normal on the side of the eye.
     pub(super) normal: Vec3,
-    /// The greatest coordinate that the position was computed from, metres.
+    /// Maximum magnitude of the coordinates that the position was computed from, metres: it bounds the rounding error.
     magnitude: f32,
-    /// Harmonic mean of the distances of what is around, metres; unknown before the survey ends.
+    /// Harmonic mean of the distances to the surroundings, metres; undefined before the survey ends.
     pub(super) distance: f32,
-    /// The same, not below what makes the record reach some pixels.
+    /// Radius of validity, metres: `distance`, clamped from below so that the record reaches some pixels.
     pub(super) radius: f32,
     pub(super) content: Content,
 }
 
-/// The harmonic mean of the distances where there is nothing around, metres: its square is finite.
+/// Maximum harmonic mean distance, for records without surroundings, metres: its square is finite.
 const FARTHEST: f32 = 1e18;
-/// What is nearer is taken to be as far, metres: the sum of the inverse distances, and their squares, are finite.
+/// Minimum distance to the surroundings, metres: the sum of the inverse distances, and their squares, are finite.
 const NEAREST: f32 = 1.0 / FARTHEST;
-/// Of a record's radius, how far a place may be from its tangent plane, over the square root of the error.
+/// Maximum distance of an interpolated point from the record's tangent plane, over `radius sqrt(allowed error)`.
 const PLANE_SHARE: f32 = 0.1;
 
 impl Record {
-    /// The record of a surface that is not yet surveyed, with a radius of at least `least` metres.
+    /// Unsurveyed record of a surface, with a radius of at least `least` metres.
     pub(super) fn new(surface: &Surface, least: f32) -> Self {
         let Surface { position, normal, magnitude, .. } = *surface;
         let content = Content::Surveying([0; CELLS]);
         Self { position, normal, magnitude, distance: least, radius: least, content }
     }
 
-    /// Tells the distance of what is around in a cell of the hemisphere, metres, infinite if there is nothing. Its inverse is
-    /// rounded to eight bits.
+    /// Sets the distance to the surroundings in a cell of the hemisphere, metres; infinite if there are none. Its
+    /// inverse is rounded to bfloat16.
     pub(super) fn set_distance(&mut self, cell: u8, distance: f32) {
         if let Content::Surveying(inverses) = &mut self.content
             && let Some(inverse) = inverses.get_mut(cell as usize)
@@ -69,7 +71,7 @@ impl Record {
         }
     }
 
-    /// All distances are known: how far the record reaches.
+    /// Ends the survey: computes the harmonic mean distance and the radius.
     pub(super) fn end_survey(&mut self) {
         let Content::Surveying(inverses) = self.content else { return };
         let inverses = inverses.map(from_upper_half);
@@ -79,14 +81,14 @@ impl Record {
         self.content = Content::Surveyed(Distances::new(&inverses, self.distance));
     }
 
-    /// A white Lambertian surface where the record is.
+    /// White Lambertian surface at the record's position.
     pub(super) fn surface(&self) -> Surface {
         Surface::white(self.position, self.normal, self.magnitude)
     }
 
-    /// The error of the record at a place, for a radius of `radius`: the square of the distance over it, and how far
-    /// the normal has turned (Ward, Rubinstein, Clear 1988, whose error is of first order; with gradients it is of
-    /// second). Infinite out of its plane.
+    /// Error of the record at a point: `|p - p_i|^2 / R^2 + 1 - n n_i`, with `radius` R. It is of second order in
+    /// distance and angle, as gradients remove the first-order error of Ward, Rubinstein, Clear 1988. Infinite off the
+    /// record's tangent plane and for normals 90 degrees or more apart.
     pub(super) fn error(&self, radius: f32, allowed: f32, position: Vec3, normal: Vec3) -> f32 {
         let way = position - self.position;
         let cosine = self.normal.dot(normal);
@@ -100,7 +102,8 @@ impl Record {
 }
 
 impl Irradiance {
-    /// The irradiance over pi at a place near the record at `origin` with normal `origin_normal` (Ward, Heckbert 1992).
+    /// Irradiance over pi, extrapolated to a point by the gradients (Ward, Heckbert 1992), from the record at `origin`
+    /// with normal `origin_normal`; not negative.
     pub(super) fn at(&self, origin: Vec3, origin_normal: Vec3, position: Vec3, normal: Vec3) -> Vec3 {
         let (tangent, bitangent) = tangents(origin_normal);
         let along = |gradient: &[Vec3; 2], way: Vec3| {
@@ -112,7 +115,8 @@ impl Irradiance {
         changed.max(Vec3::ZERO)
     }
 
-    /// No gradient that changes the irradiance by more than itself within `distance`: such a one is noise.
+    /// The irradiance with its translational gradient limited to `mean / distance`, in the mean of the channels:
+    /// steeper gradients are noise.
     pub(super) fn limited(mut self, distance: f32) -> Self {
         let greatest = self.mean.element_sum() * (1.0 / 3.0) / distance;
         let [x, y] = self.translation.map(|component| component.element_sum() * (1.0 / 3.0));

@@ -1,8 +1,9 @@
-//! The survey: which records a block has, level by level of the lattice.
+//! The survey: placement of a block's irradiance records, level by level of the lattice.
 //!
-//! The cells of a level first place records at their corners. Then the rays around all of the level's new records are
-//! cast, those of one cell of the hemisphere before those of the next: rays that go the same way meet the same lines of
-//! the scene. Then cells that their corners do not cover are divided, into cells of the next level.
+//! For each level, records are first placed at the corners of its cells. Then survey rays are cast from all new
+//! records, all rays in one cell of the hemisphere before the next cell's, as rays of similar direction read the same
+//! lines of the scene. Then cells that are not covered by their corners' records are divided into cells of the next
+//! level.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -17,15 +18,14 @@ use crate::render::{Context, eye};
 use crate::sampler::{Dimension, Pattern, unit_interval};
 use crate::scene::{Ray, Surface, closest_hit};
 
-/// A record reaches at least so many pixels.
+/// Minimum reach of a record, pixels.
 const LEAST_REACH: f32 = 3.0;
 
 impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
-    /// Does the next piece of the survey: one lattice cell, or one ray of one record.
-    /// Returns whether it was the last.
+    /// Does the next piece of the survey: one lattice cell, or one ray of one record. Returns whether it was the last.
     ///
     /// # Errors
-    /// If the image is not sound. `Ok(Err(Full))` if there is no room for the records.
+    /// A [`Fault`] if the image is not sound; `Ok(Err(Full))` if the records do not fit into the cache.
     pub fn survey<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -57,7 +57,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         Ok(Ok(false))
     }
 
-    /// The next cell of the level that has a pixel in the window; `None` after the last.
+    /// The next cell of the level that overlaps the window; `None` after the last.
     fn next_cell(&mut self, window: &Window) -> Option<Cell> {
         let Survey { level, ref mut index, .. } = self.survey;
         let of_level = Cell::of_level(level);
@@ -91,8 +91,8 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         Ok(Ok(()))
     }
 
-    /// Casts the ray of the next new record in the present cell of the hemisphere. After the ray in the last cell the record
-    /// is surveyed.
+    /// Casts the next new record's ray in the current cell of the hemisphere. The ray in the last cell ends the
+    /// record's survey.
     fn cast<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Survey { index, direction, first, .. } = self.survey;
         let is_last = direction as usize + 1 >= CELLS;
@@ -116,7 +116,8 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         Ok(())
     }
 
-    /// Whether every corner and every point that a division would add is within the error of all corner records.
+    /// Returns whether all four corners have records, within whose error bounds lie the other corners and all points
+    /// that a division would add.
     fn is_covered<M: MemoryPort>(
         &self,
         context: &mut Context<M>,
@@ -149,14 +150,14 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
     }
 }
 
-/// The record of what is seen at a point of the lattice, not yet surveyed; none without a Lambertian part.
+/// Unsurveyed record of the surface seen at a lattice point; `None` without a surface with a Lambertian part.
 fn new_record<M: MemoryPort>(
     context: &mut Context<M>,
     point: LatticePoint,
     allowed: f32,
 ) -> Result<Option<Record>, Fault> {
     let seen = eye::see(context, point.place())?;
-    // What is seen by way of other surfaces is not where the lattice is.
+    // A surface seen in a mirror or through glass is not where the lattice point is.
     let surface = seen.filter(|surface| surface.reflection.has_lambertian() && surface.specular.is_none());
     Ok(surface.map(|surface| {
         let least = LEAST_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
@@ -164,7 +165,8 @@ fn new_record<M: MemoryPort>(
     }))
 }
 
-/// The distance of what is above a surface in a cell of its hemisphere, metres; nothing is infinitely far.
+/// Distance from a surface to the next one along a random ray in a cell of its hemisphere, metres; infinite if it hits
+/// nothing.
 fn distance_in<M: MemoryPort>(
     context: &mut Context<M>,
     surface: &Surface,

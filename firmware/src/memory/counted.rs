@@ -1,4 +1,4 @@
-//! Memory whose reads are counted.
+//! A memory port that counts reads.
 
 use core::ops::Range;
 
@@ -7,7 +7,7 @@ use photoncard_shared::message::Fault;
 
 use super::{CardMemory, MemoryPort, Stage, Traffic};
 
-/// A memory, and what was read of it. Above a cache it counts what the chip asks for, below it what the cache misses.
+/// A memory and its traffic. Above a cache it counts the chip's requests, below a cache the cache's misses.
 pub struct Counted<M> {
     memory: M,
     stage: Stage,
@@ -20,7 +20,7 @@ impl<M> Counted<M> {
         Self { memory, stage: Stage::Begin, traffic: Traffic::ZERO }
     }
 
-    /// What was counted.
+    /// Traffic counted so far.
     pub fn traffic(&self) -> &Traffic {
         &self.traffic
     }
@@ -30,7 +30,7 @@ impl<M> Counted<M> {
         &self.memory
     }
 
-    /// The memory below, to be changed.
+    /// The memory below, mutable.
     pub fn below_mut(&mut self) -> &mut M {
         &mut self.memory
     }
@@ -40,7 +40,8 @@ impl<M: MemoryPort> MemoryPort for Counted<M> {
     #[inline(always)]
     fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault> {
         let bytes = used.end.saturating_sub(used.start);
-        // Where there is no memory nothing is read: of a cache's line that goes past the end it counts the lines before it.
+        // Failed reads are not counted: of a cache line that extends past the end of the memory, only the lines inside
+        // count.
         let line = self.memory.read(structure, address, used)?;
         self.traffic.count(self.stage, structure, bytes);
         Ok(line)

@@ -1,4 +1,4 @@
-//! Directly addressed memory: a slice of lines, nothing copied, nothing counted.
+//! Directly addressed memory: a slice of lines, without copies or counts.
 
 use core::ops::Range;
 
@@ -13,7 +13,7 @@ pub struct Dram<'a> {
 }
 
 impl<'a> Dram<'a> {
-    /// The memory in `lines`; what is beyond 2^32 lines is not used.
+    /// The memory in `lines`; lines past the first 2^32 are unused.
     pub const fn new(lines: &'a mut [Line]) -> Self {
         Self { lines }
     }
@@ -31,7 +31,7 @@ impl MemoryPort for Dram<'_> {
     }
 }
 
-/// Lines that are only read: many readers may share them.
+/// Read-only memory, which many readers may share.
 #[derive(Clone, Copy)]
 pub struct Lines<'a>(pub &'a [Line]);
 

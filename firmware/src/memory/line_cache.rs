@@ -1,8 +1,8 @@
-//! Set-associative caches of lines, the least recently used of a set first out.
+//! Set-associative caches of lines with LRU replacement.
 //!
-//! One type for both uses: on a board whose DRAM is slow a cache holds the lines in on-chip memory; under a
-//! [`super::Counted`] it tells how many lines a chip of that shape would fetch. It holds the data in either case, so the
-//! hits are the same by construction, and a wrong line would be a wrong picture.
+//! One type for two uses: on a board with slow DRAM a cache keeps lines in on-chip memory; over a [`super::Counted`] it
+//! simulates the fetches of a chip with a cache of this shape. It holds data in either case, so that both have the same
+//! hits by construction, and a wrong line would show in the picture.
 
 use core::ops::Range;
 
@@ -12,47 +12,47 @@ use photoncard_shared::message::Fault;
 use super::{CardMemory, MemoryPort, Stage, outside};
 use crate::sampler::hash;
 
-/// How a line finds its set.
+/// Mapping from the index of a cache line in card memory to its set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SetIndex {
-    /// The remainder of its number by the number of sets.
+    /// Index modulo the number of sets.
     #[default]
     Modulo,
-    /// A hash of its number.
+    /// Hash of the index.
     Hashed,
 }
 
-/// The shape of a cache.
+/// Shape of a cache: size, line, associativity and set index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CacheShape {
     sets: u32,
     ways: u32,
-    /// Lines of card memory in a line of the cache.
+    /// Lines of card memory in one cache line.
     lines: u32,
     index: SetIndex,
 }
 
-/// Why there is no cache of some shape.
+/// Invalid parameter of a [`CacheShape`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShapeError {
-    /// A cache's line is one or several whole lines of card memory, up to [`CacheShape::MOST_LINE_BYTES`].
+    /// The cache line is not a whole number of card memory lines from 1 line to [`CacheShape::MOST_LINE_BYTES`].
     LineBytes,
-    /// The number of ways is not from 1 to the cache's lines.
+    /// The number of ways is 0 or above the number of cache lines.
     Ways,
-    /// The size is no whole number of sets, or larger than [`CacheShape::MOST_BYTES`].
+    /// The size is 0, not a whole number of sets, or above [`CacheShape::MOST_BYTES`].
     Bytes,
 }
 
 impl CacheShape {
-    /// The largest cache.
+    /// Maximum size of a cache, bytes.
     pub const MOST_BYTES: u32 = 64 << 20;
-    /// The largest line of a cache.
+    /// Maximum size of a cache line, bytes.
     pub const MOST_LINE_BYTES: u32 = 4096;
 
-    /// A cache of `bytes` in lines of `line_bytes`, `ways` to a set.
+    /// Shape of a cache of `bytes` in lines of `line_bytes`, `ways` in each set.
     ///
     /// # Errors
-    /// If there is none.
+    /// The first invalid parameter.
     pub const fn new(bytes: u32, line_bytes: u32, ways: u32, index: SetIndex) -> Result<Self, ShapeError> {
         let lines = line_bytes / LINE_BYTES as u32;
         if lines == 0 || !line_bytes.is_multiple_of(LINE_BYTES as u32) || line_bytes > Self::MOST_LINE_BYTES {
@@ -71,17 +71,17 @@ impl CacheShape {
         Ok(Self { sets: entries / ways, ways, lines, index })
     }
 
-    /// Lines of the cache, each with an entry.
+    /// Number of cache lines, each with a [`CacheEntry`].
     pub const fn entries(&self) -> usize {
         self.sets as usize * self.ways as usize
     }
 
-    /// Lines of card memory that it holds.
+    /// Capacity of the cache, lines of card memory.
     pub const fn lines(&self) -> usize {
         self.entries() * self.lines as usize
     }
 
-    /// The set of a block: of the lines of card memory from `block` times those in a line of the cache on.
+    /// Set of a block: a run of card memory lines, aligned to the size of a cache line, that one cache line holds.
     #[inline(always)]
     pub fn set(&self, block: u32) -> u32 {
         match self.index {
@@ -90,7 +90,7 @@ impl CacheShape {
         }
     }
 
-    /// The entries of the set of a block.
+    /// Indices of the entries of a block's set.
     #[inline(always)]
     fn entries_of(&self, block: u32) -> Range<usize> {
         let first = self.set(block) as usize * self.ways as usize;
@@ -98,33 +98,33 @@ impl CacheShape {
     }
 }
 
-/// What a cache knows of one of its lines.
+/// Tag of a cache line.
 #[derive(Clone, Copy, Debug)]
 pub struct CacheEntry {
-    /// Number of the line of the cache's size in card memory.
+    /// Index of the block in card memory.
     block: u32,
-    /// Where the cache keeps it.
+    /// Index of the cache line that holds the block.
     slot: u32,
 }
 
-/// No block that is held has this number.
+/// Block of an empty entry; never held.
 const NOTHING: u32 = u32::MAX;
 
 impl CacheEntry {
-    /// The entry of a line that is not there.
+    /// The tag of an empty cache line.
     pub const EMPTY: Self = Self { block: NOTHING, slot: 0 };
 }
 
-/// A cache in buffers of someone's: one [`CacheEntry`] and [`CacheShape::lines`] over [`CacheShape::entries`] lines for
-/// each of its lines. Arrays on a board, vectors on a host.
+/// A cache in the caller's buffers, arrays on a board and vectors on a host: [`CacheShape::entries`] tags and
+/// [`CacheShape::lines`] lines.
 pub struct LineCache<E, L> {
     shape: CacheShape,
-    /// By set; the most recently used of a set first.
+    /// Tags by set, in each set from the most to the least recently used.
     entries: E,
     lines: L,
-    /// Whether it is known to hold nothing: an image is loaded in thousands of writes, each of which clears it.
+    /// True if the cache is known to be empty: each of the thousands of writes that load an image clears it.
     is_clear: bool,
-    /// The first line that was found to be outside the memory, while a line of the cache before it was filled.
+    /// End of the memory, if filling the last cache line has found it; `u32::MAX` before.
     end: u32,
 }
 
@@ -137,7 +137,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
         fits.then_some(cache)
     }
 
-    /// Forgets all lines.
+    /// Invalidates all lines.
     pub fn clear(&mut self) {
         if self.is_clear {
             return;
@@ -149,7 +149,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
         self.end = u32::MAX;
     }
 
-    /// The line at an address; what is not there is read from `memory`.
+    /// The line at an address, read from `memory` on a miss.
     #[inline(always)]
     fn read(
         &mut self,
@@ -157,7 +157,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
         structure: Structure,
         address: LineAddress,
     ) -> Result<&Line, Fault> {
-        // The last line of 2^32 is not used: its block may be NOTHING.
+        // Line 2^32 - 1 is never read, as its block may be NOTHING.
         if address.0 >= self.end {
             return Err(outside(address));
         }
@@ -169,7 +169,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
             Some(way) => set.get_mut(..=way),
             None => Some(set),
         };
-        // The used line comes first, or takes the place of the last.
+        // LRU: the tag moves to the front of its set, or replaces the last.
         if let Some(recent) = recent {
             recent.rotate_right(1);
             if let Some(entry) = recent.first_mut() {
@@ -194,7 +194,11 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
     }
 }
 
-/// Reads a block of lines. Those after the one at `address` may be outside the memory: returns the first that is.
+/// Fills a cache line with a block. Lines after `address` may be outside the memory: returns the first such line, if
+/// any.
+///
+/// # Errors
+/// If the line at `address` is outside the memory.
 #[inline(always)]
 fn fill(
     lines: &mut [Line],
@@ -208,29 +212,29 @@ fn fill(
         match memory.read(structure, LineAddress(number), 0..LINE_BYTES as u32) {
             Ok(read) => *line = *read,
             Err(_) if number > address.0 => return Ok(Some(number)),
-            // Memory ends once: the line asked for comes after one that is not there.
+            // A line before `address` is outside the memory, so `address` is too.
             Err(fault) => return Err(Fault { detail: address.0, ..fault }),
         }
     }
     Ok(None)
 }
 
-/// A memory behind caches: one for the photon map and one for the scene, or one for both. Every tile begins with empty
-/// caches, so that what it reads does not depend on the tile before it.
+/// A memory behind caches: one for the photon maps and one for the scene, or one for both. Every tile begins with empty
+/// caches, so that its misses do not depend on the tile before it.
 pub struct LineCaches<M, E, L> {
     memory: M,
-    /// Of the photon map; without a second one of all.
+    /// Cache of the photon maps, or of everything without a cache of the scene.
     first: LineCache<E, L>,
     scene: Option<LineCache<E, L>>,
 }
 
 impl<M, E, L> LineCaches<M, E, L> {
-    /// A memory behind a cache of the photon map and one of the scene.
+    /// A memory behind a cache of the photon maps and one of the scene.
     pub const fn new(memory: M, photon_map: LineCache<E, L>, scene: LineCache<E, L>) -> Self {
         Self { memory, first: photon_map, scene: Some(scene) }
     }
 
-    /// A memory behind one cache.
+    /// A memory behind one cache of everything.
     pub const fn unified(memory: M, cache: LineCache<E, L>) -> Self {
         Self { memory, first: cache, scene: None }
     }
@@ -240,7 +244,7 @@ impl<M, E, L> LineCaches<M, E, L> {
         &self.memory
     }
 
-    /// The memory below, to be changed.
+    /// The memory below, mutable.
     pub fn below_mut(&mut self) -> &mut M {
         &mut self.memory
     }
@@ -288,7 +292,7 @@ where
     }
 
     fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        // Lines are written while an image is loaded, between tiles: nothing held may outlive it.
+        // Lines are written between tiles, while an image is loaded: the caches must not keep old contents.
         self.begin_tile();
         self.memory.write(first, lines)
     }

@@ -1,7 +1,7 @@
-//! Card memory, as the chip sees it: lines, by number.
+//! Card memory as the chip reads it: lines, by index.
 //!
-//! What stands between a chip and its DRAM is a [`MemoryPort`] over a [`MemoryPort`]: [`LineCaches`] hold lines,
-//! [`Counted`] counts them. The plain [`Dram`] costs nothing: borrowed slices, no copy, no count.
+//! Layers between a chip and its DRAM are [`MemoryPort`]s over a [`MemoryPort`]: [`LineCaches`] caches lines,
+//! [`Counted`] counts reads. The plain [`Dram`] costs nothing: borrowed slices, no copy, no count.
 
 mod counted;
 mod dram;
@@ -17,47 +17,47 @@ use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::{Fault, FaultCode};
 pub use traffic::{Reads, STAGES, Stage, Traffic};
 
-/// Where a chip reads lines. A cache or a counter is a `MemoryPort` over a `MemoryPort`.
+/// Read access of a chip to card memory. A cache or a counter is a `MemoryPort` over a `MemoryPort`.
 pub trait MemoryPort {
-    /// Reads a line of a structure, of which the bytes in `used` are asked for.
+    /// Reads a line of a structure; the chip uses the bytes in `used`.
     ///
     /// # Errors
     /// [`FaultCode::LineRange`] outside the memory.
     fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault>;
 
-    /// A line that may be read soon, where the processor reads the memory itself: for it to be brought near. This is no
-    /// read, and where reads are counted or cached there is none.
+    /// A line to be prefetched, if the processor addresses the memory directly. Not a read: `None` where reads are
+    /// cached or counted.
     #[inline(always)]
     fn near(&self, _: LineAddress) -> Option<&Line> {
         None
     }
 
-    /// Tells what the reads to come are for.
+    /// Sets the stage of the following reads.
     #[inline(always)]
     fn enter(&mut self, _: Stage) {}
 
-    /// Tells that the lines just read filled one line of a cache above.
+    /// Notifies that the last reads filled one line of a cache above.
     #[inline(always)]
     fn missed(&mut self, _: Structure) {}
 
-    /// Tells that a tile begins: its reads depend on no tile before it.
+    /// Begins a tile: caches are cleared, so that its misses do not depend on the tiles before it.
     #[inline(always)]
     fn begin_tile(&mut self) {}
 }
 
 /// Memory that a card image is loaded into.
 pub trait CardMemory: MemoryPort {
-    /// Lines there are.
+    /// Number of lines.
     fn lines(&self) -> u32;
 
-    /// `count` lines from `first` on, past all caches and counts; `None` if they are not all there.
+    /// `count` lines from line `first`, bypassing caches and counters; `None` if they are not all in the memory.
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]>;
 
-    /// Writes lines from `first` on; `None`, and nothing is written, if they are not all there.
+    /// Writes lines from line `first`; `None`, and nothing is written, if they are not all in the memory.
     fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()>;
 }
 
-/// Copies lines into those of a memory, of which there are as many.
+/// Copies lines into a memory's, as many as the shorter slice has.
 pub fn copy_lines(from: &[[u8; LINE_BYTES]], to: &mut [Line]) {
     for (line, bytes) in to.iter_mut().zip(from) {
         line.0 = *bytes;

@@ -1,18 +1,18 @@
-//! What memory is read for, and how much.
+//! Memory traffic by stage of rendering and structure.
 
 use photoncard_shared::address::{STRUCTURES, Structure};
 
-/// What a chip reads memory for.
+/// Stage of rendering that reads memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Stage {
     /// Loading an image and beginning a frame.
     Begin = 0,
-    /// Rays from the eye.
+    /// Eye rays.
     Eye = 1,
-    /// Rays around irradiance records.
+    /// Survey rays of irradiance records.
     Survey = 2,
-    /// Gathers that tables of directions are made of.
+    /// Photon gathers for direction tables (importance sampling).
     Table = 3,
     /// Shadow rays.
     Shadow = 4,
@@ -20,7 +20,7 @@ pub enum Stage {
     GatherRay = 5,
     /// Photon gathers at the ends of final gather rays.
     Gather = 6,
-    /// Gathers of photons of caustics, where the eye sees them.
+    /// Photon gathers in the caustic map, at visible surfaces.
     Caustic = 7,
 }
 
@@ -44,11 +44,11 @@ impl Stage {
 /// Reads of one structure in one stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reads {
-    /// How many.
+    /// Number of reads.
     pub requests: u64,
-    /// Bytes that were asked for.
+    /// Bytes used by the chip.
     pub bytes: u64,
-    /// Lines that a cache above missed, in its own size; 0 above all caches.
+    /// Misses of the cache above, cache lines; 0 without one.
     pub misses: u64,
 }
 
@@ -62,7 +62,7 @@ impl Reads {
     }
 }
 
-/// Reads by stage and structure, and writes.
+/// Traffic of a memory: reads by stage and structure, and bytes written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Traffic {
     reads: [[Reads; STRUCTURES]; STAGES],
@@ -71,10 +71,10 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// Nothing was read or written.
+    /// No traffic.
     pub const ZERO: Self = Self { reads: [[Reads::ZERO; STRUCTURES]; STAGES], written_bytes: 0 };
 
-    /// Adds another memory's traffic.
+    /// Adds the traffic of another memory.
     pub fn add(&mut self, other: &Self) {
         let pairs = self.reads.as_flattened_mut().iter_mut().zip(other.reads.as_flattened());
         pairs.for_each(|(reads, other)| reads.add(other));
@@ -90,26 +90,25 @@ impl Traffic {
         reads.bytes += bytes as u64;
     }
 
-    /// Counts a line that a cache above missed.
+    /// Counts a miss of the cache above.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "stages and structures number the rows and columns")]
     pub(super) fn count_miss(&mut self, stage: Stage, structure: Structure) {
         self.reads[stage as usize][structure as usize].misses += 1;
     }
 
-    /// The reads of a structure in a stage.
+    /// Reads of a structure in a stage.
     #[expect(clippy::indexing_slicing, reason = "stages and structures number the rows and columns")]
     pub fn reads(&self, stage: Stage, structure: Structure) -> Reads {
         self.reads[stage as usize][structure as usize]
     }
 
-    /// The reads of some structures in all stages of tiles: in all but [`Stage::Begin`], which every chip goes through and
-    /// not every tile.
+    /// Reads of the chosen structures in all stages of tiles: all but [`Stage::Begin`].
     pub fn of_tiles(&self, chosen: impl Fn(Structure) -> bool) -> Reads {
         self.sum(|stage, structure| stage != Stage::Begin && chosen(structure))
     }
 
-    /// The reads of some structures in some stages.
+    /// Reads summed over the chosen pairs of stage and structure.
     pub fn sum(&self, chosen: impl Fn(Stage, Structure) -> bool) -> Reads {
         let mut sum = Reads::ZERO;
         for stage in Stage::ALL {

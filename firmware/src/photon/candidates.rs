@@ -1,45 +1,46 @@
-//! Photons near a query, with all that their reflection needs: distances and what the photons carry, each on its own.
+//! Candidates of a search for the nearest photons: squared distances and contents, in separate arrays for vector
+//! instructions.
 
 use core::cell::Cell;
 
 use photoncard_shared::layout::{PHOTON_CONTENT_BYTES, Photon, Rgbe};
 
-/// A photon near a query.
+/// A photon near the query: its squared distance and its content.
 ///
-/// Candidates are in the order of their distance, then of what they carry. So it does not matter in which layout or place
-/// of the map a photon lies: two that are equal add the same to any sum.
+/// Candidates are ordered by distance, then by content. The order is independent of the map's layout and of a photon's
+/// index: candidates that compare equal are interchangeable in any sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
-    /// The squared distance's bits.
+    /// Bits of the squared distance.
     pub(super) distance: u32,
-    /// The photon's content, without an axis, as one number.
+    /// The photon's content as a little-endian number, with the splitting axis cleared.
     pub(super) content: u64,
 }
 
-/// An odd factor, so that of photons at one distance neither the bright nor the dim ones come first.
+/// Odd factor that permutes contents in the order, so that ties favour neither bright nor dim photons.
 const SCRAMBLE: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// The bits of a photon's content that are not its axis.
+/// Mask of a photon's content without the splitting axis.
 const WITHOUT_AXIS: u64 = !(3 << 48);
 
 impl Candidate {
-    /// A photon that carries `content` at a squared distance, m^2, that is not negative.
+    /// The candidate of a photon at a squared distance, m^2, which must not be negative.
     #[inline(always)]
     pub fn new(distance_squared: f32, content: [u8; PHOTON_CONTENT_BYTES]) -> Self {
-        // The bits of non-negative floats are in the order of their values.
+        // Non-negative floats compare like their bits.
         Self { distance: distance_squared.to_bits(), content: u64::from_le_bytes(content) & WITHOUT_AXIS }
     }
 
-    /// The order of candidates.
+    /// Sort key: bits of the squared distance, then the permuted content.
     #[inline(always)]
     pub fn order(&self) -> (u32, u64) {
         (self.distance, self.content.wrapping_mul(SCRAMBLE))
     }
 
-    /// Bits of [`Self::key`].
+    /// Number of bits of [`Self::key`].
     pub(super) const KEY_BITS: u32 = 96;
 
-    /// The same as one number.
+    /// [`Self::order`] as one number.
     #[inline(always)]
     pub(super) fn key(&self) -> u128 {
         let (distance, rest) = self.order();
@@ -52,13 +53,13 @@ impl Candidate {
         f32::from_bits(self.distance)
     }
 
-    /// The photon's power, in photon power units.
+    /// Power of the photon, photon power units.
     #[inline(always)]
     pub fn power(&self) -> Rgbe {
         Rgbe((self.content as u32).to_le_bytes())
     }
 
-    /// Code of the direction the photon came from.
+    /// Code of the photon's incoming direction.
     #[inline(always)]
     pub fn direction(&self) -> [u8; 2] {
         ((self.content >> 32) as u16).to_le_bytes()
@@ -81,14 +82,14 @@ impl Candidate {
         Photon::disc_of_flags(self.flags())
     }
 
-    /// Whether the photon came straight from an emitter.
+    /// Returns whether the photon came straight from a light.
     #[inline(always)]
     pub fn is_direct(&self) -> bool {
         Photon::direct_of_flags(self.flags())
     }
 }
 
-/// Room for `N` candidates.
+/// Buffer of `N` candidates.
 pub struct CandidateBuffer<const N: usize> {
     distances: [u32; N],
     contents: [u64; N],
@@ -101,12 +102,12 @@ impl<const N: usize> Default for CandidateBuffer<N> {
 }
 
 impl<const N: usize> CandidateBuffer<N> {
-    /// Room of which nothing is used.
+    /// A zeroed buffer.
     pub const fn new() -> Self {
         Self { distances: [0; N], contents: [0; N] }
     }
 
-    /// Room that is filled with candidates, and what of it is; without those that there is no room for.
+    /// Copies candidates into the buffer, as many as fit, and returns a view of the copies.
     pub fn fill(&mut self, candidates: &[Candidate]) -> Candidates<'_> {
         let length = candidates.len().min(N);
         let mut view = self.view();
@@ -118,39 +119,39 @@ impl<const N: usize> CandidateBuffer<N> {
         }
     }
 
-    /// The room, whatever its size.
+    /// A view of the whole buffer.
     #[inline(always)]
     pub fn view(&mut self) -> Candidates<'_> {
         Candidates { distances: &mut self.distances, contents: &mut self.contents }
     }
 }
 
-/// Candidates in someone else's room: as many distances as contents.
+/// View of a buffer of candidates: as many distances as contents.
 pub struct Candidates<'a> {
     pub(super) distances: &'a mut [u32],
     pub(super) contents: &'a mut [u64],
 }
 
 impl<'a> Candidates<'a> {
-    /// The same for as long as this is not used.
+    /// Reborrows the view for a shorter lifetime.
     #[inline(always)]
     pub fn reborrow(&mut self) -> Candidates<'_> {
         Candidates { distances: self.distances, contents: self.contents }
     }
 
-    /// How many there is room for.
+    /// Number of candidates in the view.
     #[inline(always)]
     pub fn capacity(&self) -> usize {
         self.distances.len().min(self.contents.len())
     }
 
-    /// All of them.
+    /// All candidates of the view.
     pub fn iter(&self) -> impl Iterator<Item = Candidate> {
         let all = self.distances.iter().zip(&*self.contents);
         all.map(|(&distance, &content)| Candidate { distance, content })
     }
 
-    /// The first so many.
+    /// View of the first `count` candidates; `None` if there are fewer.
     #[inline(always)]
     pub(super) fn first(&mut self, count: usize) -> Option<Candidates<'_>> {
         Some(Candidates {
@@ -159,7 +160,7 @@ impl<'a> Candidates<'a> {
         })
     }
 
-    /// Sets candidate `index`, if there is room for it.
+    /// Sets candidate `index`; no effect out of range.
     #[inline(always)]
     pub(super) fn set(&mut self, index: usize, candidate: Candidate) {
         if let (Some(distance), Some(content)) = (self.distances.get_mut(index), self.contents.get_mut(index))
@@ -168,7 +169,7 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// The same as cells.
+    /// The view as cells.
     #[inline(always)]
     pub(super) fn cells(self) -> CandidateCells<'a> {
         CandidateCells {
@@ -178,7 +179,7 @@ impl<'a> Candidates<'a> {
     }
 }
 
-/// Candidates that can be moved while others look at them.
+/// View of candidates with interior mutability, which allows copies of the view.
 #[derive(Clone, Copy)]
 pub(super) struct CandidateCells<'a> {
     distances: &'a [Cell<u32>],

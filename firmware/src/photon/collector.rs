@@ -1,12 +1,12 @@
-//! What a search of leaves puts what it finds into, and is bounded by.
+//! The interface between a search of leaves and its result: the photons found, and the search radius.
 
 use crate::simd::{Isa, LANES};
 
-/// Keeps what is nearest of what is found.
+/// Collector of the nearest photons or irradiance points, which limits the search radius.
 pub(super) trait Collector {
-    /// The squared distance beyond which nothing is of use, m^2.
+    /// Squared search radius, m^2.
     fn limit(&self) -> f32;
 
-    /// Takes what is of use of the first `count` lanes: the bits of their squared distances, and what they carry.
+    /// Adds those of the first `count` lanes that are within the limit: bits of squared distances, and contents.
     fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]);
 }

@@ -1,8 +1,9 @@
-//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): the host has estimated the irradiance at
-//! points of all surfaces, as a gather there would, and a Lambertian surface takes that of the nearest one.
+//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): the host has estimated the
+//! irradiance at points of all surfaces by the chip's own gathers, and a Lambertian surface takes the irradiance of the
+//! nearest point.
 //!
-//! Points lie in leaves of a tree of their own, of the kind that photons lie in. Only one is looked for, so the limit of the
-//! search is its distance as soon as there is one.
+//! The points lie in a tree of their own, with leaves like photons'. The search is for one point: its distance becomes
+//! the search radius as soon as one is found.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -15,20 +16,20 @@ use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::simd::{self, Isa, Kernel, LANES};
 
-/// The sections of irradiance points: inner nodes, and leaves.
+/// Sections of the nodes and leaves of irradiance points.
 const SECTIONS: [SectionKind; 2] = [SectionKind::IrradianceNodes, SectionKind::IrradianceLeaves];
 
-/// What a search for an irradiance point found.
+/// Result of a search for an irradiance point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundIrradiance {
-    /// Irradiance at the nearest point of the surface, photon power units a square metre; zero without one.
+    /// Irradiance at the nearest point of the surface, photon power units/m^2; 0 if there is none.
     pub irradiance: Vec3,
-    /// Points whose distance was computed.
+    /// Number of points whose distance was computed.
     pub tested: u32,
 }
 
-/// Searches the irradiance point nearest to `position` of the surface that has a normal of this code there, no farther than
-/// `max_distance`, metres. Of several at one distance what they carry decides.
+/// Irradiance at the point nearest to `position`, within `max_distance` metres, on a surface with the `normal` of this
+/// code ([`SameSurface`]). Points' contents break ties between equal distances.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -43,17 +44,17 @@ pub fn nearest_irradiance(
     simd::run(PointSearch { scene, memory, position, normal, max_distance })
 }
 
-/// What [`nearest_irradiance`] does, for any processor.
+/// Kernel of [`nearest_irradiance`].
 pub struct PointSearch<'s, M> {
     /// The scene, with its irradiance points.
     pub scene: &'s SceneImage,
     /// Card memory.
     pub memory: &'s mut M,
-    /// Where to search, metres.
+    /// Query position, metres.
     pub position: Vec3,
-    /// Code of the surface normal there.
+    /// Code of the surface normal at the query position.
     pub normal: u8,
-    /// How far to search, metres.
+    /// Maximum distance, metres.
     pub max_distance: f32,
 }
 
@@ -66,7 +67,7 @@ impl<M: MemoryPort> Kernel for PointSearch<'_, M> {
         let limit = max_distance * max_distance;
         let mut nearest = NearestPoint { surface: SameSurface::new(normal), limit, nearest: None };
         let mut tested = 0;
-        // Without photons there are no points, and no root.
+        // A scene without photons has no points, and the tree no root.
         if scene.header.section(SectionKind::IrradianceLeaves).records > 0 {
             tested = leaves::gather(isa, scene, SECTIONS, memory, position, &mut nearest)?;
         }
@@ -74,10 +75,10 @@ impl<M: MemoryPort> Kernel for PointSearch<'_, M> {
     }
 }
 
-/// The nearest point of a surface so far.
+/// The nearest point of a surface found so far.
 struct NearestPoint {
     surface: SameSurface,
-    /// Its squared distance; without one that of the search, m^2.
+    /// Squared search radius, m^2: the squared distance of `nearest`, if there is one.
     limit: f32,
     nearest: Option<Candidate>,
 }
@@ -85,7 +86,7 @@ struct NearestPoint {
 impl NearestPoint {
     #[inline(always)]
     fn irradiance(&self) -> Vec3 {
-        // A candidate has lost two bits of the normal, which has been looked at.
+        // A candidate has lost two bits of the point's normal, which is no longer needed.
         let read = |point: Candidate| IrradiancePoint::read(point.content.to_le_bytes()).irradiance.into();
         self.nearest.map_or(Vec3::ZERO, read)
     }
@@ -99,7 +100,7 @@ impl Collector for NearestPoint {
 
     #[inline(always)]
     fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]) {
-        // No overflow: the bits of an infinite limit are not the greatest.
+        // No overflow: the bits of infinity are below `u32::MAX`.
         let mut mask = isa.below(distances, self.limit.to_bits() + 1) & !(u32::MAX << count);
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize;

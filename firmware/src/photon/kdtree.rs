@@ -1,5 +1,5 @@
-//! The photon map as Jensen's left-balanced kd-tree (*Realistic Image Synthesis Using Photon Mapping*, 2001, ch. 6):
-//! every node is a photon, the children of node i are 2 i + 1 and 2 i + 2, and no pointer is stored.
+//! The photon map as a left-balanced kd-tree (Jensen 2001, *Realistic Image Synthesis Using Photon Mapping*, chapter
+//! 6): every node is a photon, and the children of node i are 2 i + 1 and 2 i + 2, without pointers.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -15,13 +15,14 @@ use crate::simd::Isa;
 
 const PHOTONS_PER_LINE: u32 = Photon::PER_LINE as u32;
 
-/// A subtree put off: its root, and the squared distance to the plane before it.
+/// A subtree on the stack: its root, and the squared distance to its splitting plane, m^2.
 struct Deferred {
     node: u32,
     distance_squared: f32,
 }
 
-/// Searches the photons nearest to `position` into `nearest`. Returns the number of photons tested, all nodes visited.
+/// Collects the photons nearest to `position` in `nearest`. Returns the number of photons tested, one for each visited
+/// node.
 ///
 /// # Errors
 /// If the image is not sound.

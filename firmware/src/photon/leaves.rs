@@ -1,4 +1,4 @@
-//! The photon map in lines: photons in leaves that fill a line each, and above them nodes of sixteen children each.
+//! The photon map in leaves: leaves of one line each, below inner nodes of up to sixteen children.
 
 use glam::Vec3;
 use photoncard_shared::budget::PHOTON_STACK;
@@ -16,8 +16,8 @@ use crate::wide_tree::{BEYOND, Descent, Order, Stack};
 
 const _: () = assert!(LEAF_LANES == LANES);
 
-/// Searches what the leaves of a tree hold nearest to `position` into `nearest`; `sections` are the tree's nodes and leaves.
-/// Returns the number of photons tested.
+/// Collects the photons or irradiance points nearest to `position` in `nearest`, from the tree with nodes and leaves in
+/// these two sections. Returns the number of photons tested.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -49,7 +49,8 @@ pub(super) fn gather(
     Ok(tested)
 }
 
-/// Lower bounds of the squared distances of what the boxes of a node hold, rounded as those are, up to a limit; as bits.
+/// Bits of the squared distances to the boxes of a node's children, or [`BEYOND`] past the limit. They are computed
+/// like distances to photons, so that rounding keeps them lower bounds.
 #[inline(always)]
 fn distances_to_boxes(
     isa: impl Isa,
@@ -82,7 +83,7 @@ fn distances_to_boxes(
     distances
 }
 
-/// Tests the photons of a leaf. Returns how many there are.
+/// Tests the photons of a leaf. Returns their number.
 #[inline(always)]
 fn test_leaf(
     isa: impl Isa,

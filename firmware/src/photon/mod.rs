@@ -1,4 +1,4 @@
-//! The photon map: the k photons nearest to a point, and the radiance that they reflect; or the irradiance that was estimated near it.
+//! Photon maps: search for the k nearest photons, radiance estimate, precomputed irradiance.
 
 mod candidates;
 mod collector;
@@ -25,14 +25,14 @@ use crate::simd::{self, Isa, Kernel};
 /// One of the two photon maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhotonMap {
-    /// Every arrival at a surface that is not perfectly specular.
+    /// The photon map: every arrival of light at a surface that is not perfectly specular.
     Indirect,
-    /// Light that has met perfectly specular surfaces alone, and one at least.
+    /// The caustic map: photons whose bounces, one at least, were all perfectly specular (`L S+ D`).
     Caustics,
 }
 
 impl PhotonMap {
-    /// Its nodes and leaves.
+    /// Sections of the nodes and leaves.
     #[inline(always)]
     fn sections(self) -> [SectionKind; 2] {
         match self {
@@ -42,8 +42,8 @@ impl PhotonMap {
     }
 }
 
-/// Searches the photons of a map nearest to `position` into `nearest`, in whichever layout the map is: what is found is the same.
-/// Returns the number of photons tested.
+/// Collects the photons of a map nearest to `position` in `nearest`, the same set in either layout of the map. Returns
+/// the number of photons tested.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -58,17 +58,17 @@ pub fn gather(
     simd::run(Search { scene, memory, map, position, nearest })
 }
 
-/// What [`gather`] does, for any processor.
+/// Kernel of [`gather`].
 pub struct Search<'s, 'n, M> {
     /// The scene, with its photon map.
     pub scene: &'s SceneImage,
     /// Card memory.
     pub memory: &'s mut M,
-    /// Which map.
+    /// Photon map to search.
     pub map: PhotonMap,
-    /// Where to search, metres.
+    /// Query position, metres.
     pub position: Vec3,
-    /// Where to put the photons.
+    /// Set of the nearest photons.
     pub nearest: &'s mut NearestPhotons<'n>,
 }
 
@@ -89,19 +89,19 @@ impl<M: MemoryPort> Kernel for Search<'_, '_, M> {
     }
 }
 
-/// The selection of the nearest candidates by itself, for any processor: see [`NearestPhotons`].
+/// Kernel of the selection of the nearest candidates alone: see [`NearestPhotons`].
 pub struct Selection<'a> {
-    /// From which to select.
+    /// Candidates to select from.
     pub candidates: Candidates<'a>,
-    /// How many to select.
+    /// Number of candidates to select.
     pub count: usize,
 }
 
 impl Kernel for Selection<'_> {
     type Output = Option<Candidate>;
 
-    /// Moves the first `count` candidates, in their order, to the front, and returns the last of these. What lies behind
-    /// is no longer of use. `None`, and no change, if there are none or fewer than `count`.
+    /// Moves the `count` nearest candidates to the front, unordered, and returns the farthest of them. The elements
+    /// behind are meaningless afterwards. `None`, without a change, if `count` is 0 or above the number of candidates.
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
         let length = self.candidates.capacity();

@@ -1,25 +1,27 @@
-//! The first k of candidates in their order, selected in place and without an index that could fail.
+//! Selection of the k nearest candidates, in place and without panicking indices.
 //!
-//! Photons on a surface lie so that the squared distance of the k-th grows in proportion to k. So two distances between
-//! which the k-th lies, and few others, are mostly guessed at once; counting tells, and corrects a guess. One pass then
-//! keeps what is nearer than both, and sets aside what lies between, of which the first are added. Where no guess
-//! narrows, as with many candidates at one distance, they are parted by pivots (Hoare 1961), and after
-//! a bounded number of those by one bit after another of what orders them. Nothing of the result depends on the way.
+//! On a surface the squared distance of the k-th photon grows in proportion to k. So an interval of distances that
+//! contains the k-th and few others is guessed by interpolation; counting the candidates below its ends verifies and
+//! corrects the guess. One pass then keeps the candidates below the interval and sets aside those in it, of which the
+//! first fill up the k. Where no guess succeeds, as with many candidates at one distance, quickselect (Hoare 1961)
+//! takes over, and after a bounded number of pivots a radix selection, bit by bit of the sort key. The result is the
+//! same on each of these paths.
 
 use super::candidates::{Candidate, CandidateCells, Candidates};
 use crate::simd::{Isa, LANES};
 
-/// Guesses of the two distances.
+/// Maximum number of guesses of the interval.
 const GUESSES: u32 = 4;
-/// Candidates between the two distances.
+/// Maximum number of candidates in the interval.
 const BETWEEN: usize = 32;
-/// Pivots, before bits are taken.
+/// Maximum number of quickselect's pivots, before the radix selection.
 const PIVOTS: u32 = 16;
-/// So few are sorted by insertion.
+/// Maximum number of candidates sorted by insertion.
 const FEW: usize = 16;
 
-/// Moves the first `count` of `length` candidates, in their order, to the front, and returns the last of these. What lies
-/// behind is no longer of use. `None`, and no change, if there are none or fewer than `count`. Room behind them is used.
+/// Moves the `count` nearest of the first `length` candidates to the front, unordered, and returns the farthest of
+/// them. All elements behind, past `length` too, are meaningless afterwards. `None`, without a change, if `count` is 0
+/// or above `length`.
 #[inline(always)]
 pub(super) fn select(
     isa: impl Isa,
@@ -36,7 +38,8 @@ pub(super) fn select(
     }
 }
 
-/// The bits of two distances: the `count`-th is at the first or beyond it, and nearer than the second, as few others are.
+/// Bits of an interval `low <= d < high` that contains the `count`-th squared distance and at most [`BETWEEN`] in all;
+/// `None` if [`GUESSES`] do not find one.
 #[inline(always)]
 fn guess(distances: &[u32], count: usize) -> Option<[u32; 2]> {
     let farthest = distances.iter().copied().max()?;
@@ -74,7 +77,7 @@ fn count_nearer(distances: &[u32], low: u32, high: u32) -> [usize; 2] {
     nearer.map(|count| count as usize)
 }
 
-/// Selects by two distances that [`guess`] returned.
+/// [`select`] with an interval of [`guess`].
 #[inline(always)]
 fn keep(
     isa: impl Isa,
@@ -87,7 +90,7 @@ fn keep(
     let Candidates { distances, contents } = candidates;
     let mut aside = Aside { distances: [0; BETWEEN + LANES], contents: [0; BETWEEN + LANES], count: 0 };
     let (mut kept, mut first) = (0, 0);
-    // What is kept is written where all has been read.
+    // In place: the write position never passes the read position.
     while let Some(&lanes) = distances.get(first..).and_then(<[u32]>::first_chunk).filter(|_| first < length)
     {
         let &carried = contents.get(first..)?.first_chunk()?;
@@ -117,13 +120,13 @@ fn keep(
     Some(last)
 }
 
-/// So many lanes, at least one, or all.
+/// Mask of the first `count` lanes, `count` at least 1; all lanes above [`LANES`].
 #[inline(always)]
 fn first_lanes(count: usize) -> u32 {
     u32::MAX >> (u32::BITS - count.min(LANES) as u32)
 }
 
-/// Candidates set aside, and room for those that are tested at once.
+/// Candidates set aside: those in the interval, and room for [`LANES`] that are written at once.
 struct Aside {
     distances: [u32; BETWEEN + LANES],
     contents: [u64; BETWEEN + LANES],
@@ -153,7 +156,7 @@ impl Aside {
         Some(())
     }
 
-    /// Moves the first `place` + 1 to the front, and returns the last of these.
+    /// Moves the `place + 1` nearest to the front, unordered, and returns the farthest of them.
     #[inline(always)]
     fn select(&mut self, isa: impl Isa, place: usize) -> Option<Candidate> {
         let Some(index) = self.only_one_at(place) else {
@@ -165,14 +168,14 @@ impl Aside {
         for first in (0..all).step_by(LANES) {
             let &distances = self.distances.get(first..)?.first_chunk()?;
             let &contents = self.contents.get(first..)?.first_chunk()?;
-            // No overflow: it is the distance of a candidate that is nearer than another.
+            // No overflow: distances in the interval are below its upper end.
             let nearer = isa.below(&distances, last.distance + 1);
             self.pack(isa, nearer & first_lanes(all - first), &distances, &contents)?;
         }
         Some(last)
     }
 
-    /// Where the candidate is that `place` others are nearer than; `None` if there are several at one distance.
+    /// Index of the candidate with exactly `place` nearer ones; `None` if it shares its distance with another.
     #[inline(always)]
     fn only_one_at(&self, place: usize) -> Option<usize> {
         let all: &[u32; BETWEEN] = self.distances.first_chunk()?;
@@ -189,7 +192,7 @@ impl Aside {
     }
 }
 
-/// Moves the first `place` + 1 candidates to the front, and returns the last of these.
+/// Moves the `place + 1` nearest candidates to the front, unordered, and returns the farthest of them.
 fn part(mut cells: CandidateCells, mut place: usize) -> Option<Candidate> {
     for _ in 0..PIVOTS {
         if cells.len() <= FEW {
@@ -198,7 +201,7 @@ fn part(mut cells: CandidateCells, mut place: usize) -> Option<Candidate> {
         let pivot = pivot(cells)?;
         let mut less = divide(cells, |candidate| candidate.key() < pivot.key());
         if less == 0 {
-            // Nothing comes before the pivot: what is equal to it is in its place.
+            // The pivot is the minimum: the candidates equal to it come first.
             less = divide(cells, |candidate| candidate.key() <= pivot.key());
             if place < less {
                 return Some(pivot);
@@ -213,18 +216,18 @@ fn part(mut cells: CandidateCells, mut place: usize) -> Option<Candidate> {
     cells.get(place)
 }
 
-/// The part of `cells`, of which the first `less` come before the others, where `place` lies; and the place there.
+/// The side of a partition after the first `less` cells that contains rank `place`, and the rank in that side.
 fn follow(cells: CandidateCells, place: usize, less: usize) -> Option<(CandidateCells, usize)> {
     let (front, back) = cells.split_at(less)?;
     Some(if place < less { (front, place) } else { (back, place - less) })
 }
 
-/// Moves the candidates that are told to come first to the front, and returns how many they are.
+/// Partitions the candidates: moves those of `is_first` to the front, and returns their number.
 #[inline(always)]
 fn divide(cells: CandidateCells, is_first: impl Fn(&Candidate) -> bool) -> usize {
     let mut count = 0;
     for index in 0..cells.len() {
-        // Both are there: no more are counted than were looked at.
+        // Never out of range: `count <= index`.
         if let (Some(candidate), Some(other)) = (cells.get(index), cells.get(count)) {
             cells.set(index, other);
             cells.set(count, candidate);
@@ -249,7 +252,7 @@ fn median(a: Candidate, b: Candidate, c: Candidate) -> Candidate {
     }
 }
 
-/// Sorts, and returns the one at a place.
+/// Insertion sort; returns the candidate of rank `place`.
 fn sort(cells: CandidateCells, place: usize) -> Option<Candidate> {
     for sorted in 1..cells.len() {
         let candidate = cells.get(sorted)?;

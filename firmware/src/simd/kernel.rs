@@ -2,43 +2,44 @@
 
 use photoncard_shared::address::Line;
 
-/// Numbers that are computed at once.
+/// Number of lanes of a kernel.
 pub const LANES: usize = 16;
 /// Half of [`LANES`]: the length of a permutation.
 pub const HALF_LANES: usize = LANES / 2;
 
-/// Instructions of a processor. A value of a type is the proof that the processor has them.
+/// An instruction set. A value of such a type is the proof that the processor has it.
 pub trait Isa: Copy {
-    /// How many lanes to compute if `used` are asked for: all, where they cost no more.
+    /// Number of lanes to compute if `used` are needed: all, where they cost no more.
     fn lanes(self, used: usize) -> usize;
 
-    /// A bit for every lane that is below a bound.
+    /// Mask of the lanes below a bound, lane 0 in the lowest bit.
     fn below(self, values: &[u32; LANES], bound: u32) -> u32;
 
-    /// Moves the lanes of a mask to the front of `packed`, in their order. What lies behind is of no use.
+    /// Moves the lanes of a mask to the front of `packed`, in order. The other lanes of `packed` are meaningless.
     fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]);
 
     /// [`Isa::pack`] for 64-bit lanes.
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]);
 
-    /// The values with these indices, of which the lower four bits count.
+    /// The values with these indices; only the lower four bits of an index count.
     fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES];
 
-    /// Has a line brought near, if the processor can, as it may be read soon.
+    /// Prefetches a line into the processor's cache, if the instruction set can.
     #[inline(always)]
     fn prefetch(self, _: &Line) {}
 }
 
-/// An inner loop that is compiled for every [`Isa`].
+/// An inner loop, compiled for every [`Isa`].
 pub trait Kernel {
-    /// Its result.
+    /// Result of the kernel.
     type Output;
 
-    /// Does it. To be inlined always, as must be all that it calls, or it is compiled for [`Portable`] whatever `isa` is.
+    /// Runs the kernel. This method and all that it calls must be `#[inline(always)]`; otherwise they are compiled
+    /// without the instructions of `isa`.
     fn run(self, isa: impl Isa) -> Self::Output;
 }
 
-/// The instructions of every processor: plain loops.
+/// The fallback without vector intrinsics, for every processor.
 #[derive(Clone, Copy, Debug)]
 pub struct Portable;
 

@@ -1,9 +1,9 @@
-//! What a processor can do with sixteen numbers at once, chosen when the program runs.
+//! Vector instructions on sixteen lanes, chosen at run time.
 //!
-//! A [`Kernel`] is written once, as loops over [`LANES`] lanes in which each lane does what the others do. It is compiled
-//! for each [`Isa`] that the processor may have: the loops become vector instructions, and what loops cannot tell, to
-//! compare and to pack lanes, is a method of the `Isa`. Every lane rounds as a single number does and nothing is
-//! contracted, so all give the same bits; [`Portable`] is the twin that every processor has.
+//! A [`Kernel`] is written once, as loops over [`LANES`] lanes that all do the same. It is compiled for each [`Isa`]
+//! that the processor may have: the loops become vector instructions, and operations that compilers do not find in
+//! loops, to compare and to pack lanes, are methods of the `Isa`. Every lane rounds like a scalar and nothing is
+//! contracted, so that all give the same bits; [`Portable`] is the fallback for every processor.
 
 mod kernel;
 #[cfg(target_arch = "x86_64")]
@@ -15,7 +15,7 @@ mod x86;
 
 pub use self::kernel::{HALF_LANES, Isa, Kernel, LANES, Portable};
 
-/// Runs a kernel with the best instructions that the processor has.
+/// Runs a kernel with the best instruction set of the processor.
 #[inline(always)]
 pub fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -24,28 +24,28 @@ pub fn run<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Portable)
 }
 
-/// The instructions to choose from, for tests that all give the same.
+/// All instruction sets, for tests that they give the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
-    /// Those of every processor.
+    /// [`Portable`].
     Portable,
-    /// Those of x86-64 with AVX2.
+    /// AVX2 of x86-64.
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// Those of x86-64 with AVX-512.
+    /// AVX-512 of x86-64.
     #[cfg(target_arch = "x86_64")]
     Avx512,
 }
 
 impl Level {
-    /// All that there are.
+    /// All instruction sets of this architecture.
     #[cfg(target_arch = "x86_64")]
     pub const ALL: &[Self] = &[Self::Portable, Self::Avx2, Self::Avx512];
-    /// All that there are.
+    /// All instruction sets of this architecture.
     #[cfg(not(target_arch = "x86_64"))]
     pub const ALL: &[Self] = &[Self::Portable];
 
-    /// Runs a kernel with these; `None` if the processor does not have them.
+    /// Runs a kernel with this instruction set; `None` if the processor lacks it.
     pub fn run<K: Kernel>(self, kernel: K) -> Option<K::Output> {
         match self {
             Self::Portable => Some(kernel.run(Portable)),
@@ -63,7 +63,7 @@ mod tests {
 
     use super::*;
 
-    /// What an [`Isa`] does of its own, for one mask.
+    /// Results of all of an [`Isa`]'s own methods for one mask.
     struct All {
         mask: u32,
         bound: u32,

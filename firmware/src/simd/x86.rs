@@ -1,4 +1,4 @@
-//! Instructions of x86-64.
+//! AVX2 and AVX-512 of x86-64.
 #![cfg_attr(not(test), expect(clippy::indexing_slicing, reason = "the tables have an entry for every index"))]
 
 use core::arch::x86_64::{
@@ -19,11 +19,11 @@ cpufeatures::new!(
 );
 cpufeatures::new!(has_avx2, "avx2", "bmi1", "bmi2", "popcnt");
 
-/// Sixteen lanes in one register.
+/// AVX-512: sixteen lanes in one register.
 #[derive(Clone, Copy)]
 struct Avx512(());
 
-/// Eight lanes in one register.
+/// AVX2: eight lanes in one register.
 #[derive(Clone, Copy)]
 struct Avx2(());
 
@@ -80,7 +80,7 @@ pub(super) fn run_with_avx512<K: Kernel>(kernel: K) -> Option<K::Output> {
     Avx512::detect().map(|isa| isa.run(kernel))
 }
 
-/// Bytes that the processor fetches at once.
+/// Cache line of x86-64 processors, bytes.
 const CACHE_LINE_BYTES: usize = 64;
 
 #[inline(always)]
@@ -150,7 +150,7 @@ impl Isa for Avx512 {
     }
 }
 
-/// For every mask of eight lanes, those of it, the first first.
+/// Indices of the lanes in each mask of eight, ascending.
 const LANES_OF: [[u8; 8]; 256] = {
     let mut lanes_of = [[0; 8]; 256];
     let mut mask = 0;
@@ -168,7 +168,7 @@ const LANES_OF: [[u8; 8]; 256] = {
     lanes_of
 };
 
-/// The same for four lanes that are twice as long.
+/// [`LANES_OF`] for four 64-bit lanes, each as two 32-bit halves.
 const LONG_LANES_OF: [[u8; 8]; 16] = {
     let mut lanes_of = [[0; 8]; 16];
     let mut mask = 0;
@@ -187,7 +187,7 @@ const LONG_LANES_OF: [[u8; 8]; 16] = {
     lanes_of
 };
 
-/// The sign of a number, by which an unsigned comparison is a signed one.
+/// Sign bit: flipped in both operands, it makes a signed comparison an unsigned one.
 const SIGN: u32 = 1 << 31;
 
 impl Isa for Avx2 {
@@ -253,7 +253,7 @@ impl Isa for Avx2 {
             let indices = _mm256_loadu_si256(indices.as_ptr().cast());
             let half = |first: *const f32| _mm256_permutevar8x32_ps(_mm256_loadu_ps(first), indices);
             let [lower, upper] = [half(values.as_ptr()), half(values.as_ptr().add(HALF_LANES))];
-            // The fourth bit of an index, as a sign, tells the upper half.
+            // Bit 3 of an index, shifted to the sign bit, selects the upper half.
             let is_upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(indices));
             _mm256_storeu_ps(permuted.as_mut_ptr(), _mm256_blendv_ps(lower, upper, is_upper));
         }
@@ -266,7 +266,7 @@ impl Isa for Avx2 {
     }
 }
 
-/// Which lanes to take, from a byte each.
+/// Lane indices of a permutation, widened from bytes.
 ///
 /// # Safety
 /// The processor must have AVX2.

@@ -1,8 +1,8 @@
-//! What the corners of a triangle have besides their places.
+//! Vertex attributes of triangles: normals, texture coordinates and colours.
 
 use super::{Record, read_f32, read_u32, write_f32, write_u32};
 
-/// Among [`LeafAttributes`]: no triangle of the leaf has any.
+/// Entry of [`LeafAttributes`] of a leaf without attributes.
 pub const NO_ATTRIBUTES: u32 = u32::MAX;
 
 const NO_NORMALS: u32 = u32::MAX;
@@ -12,12 +12,12 @@ const COORDINATES: usize = 12;
 const COLOURS: usize = 36;
 const EMITTER: usize = 60;
 
-/// Where the attributes of a leaf's triangles are: those of all its slots, one after the other.
+/// Position of the attributes of a leaf's triangles: consecutive records, slot by slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeafAttributes {
     /// Index of the first record.
     pub first: u32,
-    /// Whether a slot has two records: the second holds a second set of texture coordinates.
+    /// True if each slot has two records, the second for a second set of texture coordinates.
     pub two_sets: bool,
 }
 
@@ -31,12 +31,13 @@ impl LeafAttributes {
         (entry != NO_ATTRIBUTES).then_some(Self { first: entry & !TWO_SETS, two_sets })
     }
 
-    /// The entry.
+    /// The entry of the leaf, as stored.
     pub fn to_entry(self) -> u32 {
         self.first | if self.two_sets { TWO_SETS } else { 0 }
     }
 
-    /// The index of the record of a slot with its set 0 or 1 of texture coordinates: all else is in that of set 0.
+    /// Index of the record that holds set 0 or 1 of a slot's texture coordinates. The record of set 0 holds the other
+    /// attributes.
     #[inline(always)]
     pub fn record(self, slot: u32, set: u32) -> u32 {
         let index = if self.two_sets { 2 * slot + (set & 1) } else { slot };
@@ -46,21 +47,21 @@ impl LeafAttributes {
 
 /// The attributes of one triangle.
 ///
-/// | bytes | what |
+/// | bytes | contents |
 /// |---|---|
 /// | 0..12 | unit normals, 32 bits each: octahedral, 16 bits an axis |
 /// | 12..36 | texture coordinates, two `f32` each |
 /// | 36..60 | colours, linear RGBA of 16 bits a channel |
-/// | 60..64 | the index of its emitter |
+/// | 60..64 | index of its emitter |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attributes {
-    /// Shading normals of the corners, on the front's side; `None` if the triangle is flat.
+    /// Shading normals of the corners, on the front; `None` for the geometric normal.
     pub normals: Option<[[f32; 3]; 3]>,
     /// Texture coordinates of the corners.
     pub coordinates: [[f32; 2]; 3],
-    /// Linear colours of the corners, red, green, blue and alpha, 0 to 1.
+    /// Vertex colours, linear RGBA, 0 to 1.
     pub colours: [[f32; 4]; 3],
-    /// Index of the emitter that the triangle is, if it is one.
+    /// Index of the triangle's emitter, if it emits.
     pub emitter: Option<u32>,
 }
 
@@ -69,7 +70,7 @@ impl Record for Attributes {
 }
 
 impl Attributes {
-    /// Those of a triangle that has none.
+    /// Attributes of a triangle that has none: no normals, white.
     pub const NONE: Self =
         Self { normals: None, coordinates: [[0.0; 2]; 3], colours: [[1.0; 4]; 3], emitter: None };
 
@@ -92,7 +93,7 @@ impl Attributes {
         }
     }
 
-    /// The texture coordinates of one corner of a record.
+    /// Texture coordinates of one corner, without reading the rest of the record.
     #[inline(always)]
     pub fn coordinate(bytes: &[u8; Self::BYTES], corner: usize) -> [f32; 2] {
         let at = COORDINATES + 8 * corner;
@@ -120,11 +121,12 @@ impl Attributes {
     }
 }
 
-/// Steps of one axis of the octahedron: even, so that the axes are exact; the code of all bits is of none.
+/// Quantisation steps of an octahedral coordinate: even, so that the axes are exact, and below 2^16 - 1, so that no
+/// code is [`NO_NORMALS`].
 const STEPS: f32 = 65534.0;
 
-/// The code of a unit vector: projected on the octahedron, its lower half folded out (Cigolle et al. 2014, *A survey of
-/// efficient representations for independent unit vectors*).
+/// Octahedral code of a unit vector, 16 bits an axis (Cigolle et al. 2014, *A survey of efficient representations for
+/// independent unit vectors*).
 pub(super) fn encode_octahedral([x, y, z]: [f32; 3]) -> u32 {
     let sum = (abs(x) + abs(y) + abs(z)).max(f32::MIN_POSITIVE);
     let [u, v] = [x / sum, y / sum];
@@ -133,7 +135,7 @@ pub(super) fn encode_octahedral([x, y, z]: [f32; 3]) -> u32 {
     u | v << 16
 }
 
-/// A vector along the unit vector of a code, of a length between 0.57 and 1.
+/// The direction of an octahedral code: a vector of length 0.57 to 1.
 #[inline(always)]
 pub(super) fn decode_octahedral(code: u32) -> [f32; 3] {
     let [u, v] = [code & 0xffff, code >> 16].map(|a| a as f32 * (2.0 / STEPS) - 1.0);

@@ -1,52 +1,52 @@
-//! Leaves of the bounding volume hierarchy: some triangles of one place in one line, to be tested at once.
+//! Leaves of the bounding volume hierarchy: neighbouring triangles in one line, which are tested at once.
 //!
-//! A corner that triangles share is there once: of a mesh a line holds eight triangles, of triangles that touch nowhere three.
+//! A shared vertex is stored once: a line holds eight triangles of a mesh, or three separate ones.
 
 use super::{read_f32, read_u32, write_f32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// Triangles that a leaf may have. The index of a triangle is this many times its leaf's and its slot in there.
+/// Maximum number of triangles of a leaf. A triangle's index is `LEAF_TRIANGLES * leaf + slot`.
 pub const LEAF_TRIANGLES: usize = 8;
-/// Vertices that they may have.
+/// Maximum number of vertices of a leaf.
 const LEAF_VERTICES: usize = 9;
-/// Lanes that coordinates are read into, of which the first nine are vertices': whole registers.
+/// Lanes of [`BvhLeaf::coordinates`]: the maximum of nine vertices, rounded up to whole vector registers.
 pub const VERTEX_LANES: usize = 12;
 
 const COORDINATE_BYTES: usize = 4 * LEAF_VERTICES;
 const CORNERS: usize = 3 * COORDINATE_BYTES;
 const MATERIALS: usize = CORNERS + 12;
 const MATERIAL_BYTES: usize = 3;
-/// Materials that the triangles of a leaf may have.
+/// Maximum number of materials of a leaf.
 const LEAF_MATERIALS: usize = 2;
 const SECOND_MATERIAL: usize = MATERIALS + MATERIAL_BYTES * LEAF_MATERIALS;
 const COUNTS: usize = SECOND_MATERIAL + 1;
 const _: () = assert!(COUNTS + 1 == LINE_BYTES && 2 * COORDINATE_BYTES + 4 * VERTEX_LANES <= LINE_BYTES);
 
-/// The indices of materials end here.
+/// Bound of the indices of materials: 2^23.
 pub const MOST_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES - 1);
-/// In the place of a leaf for a material: its triangles may have cut-outs.
+/// Flag in a leaf's material index: its triangles may have cut-outs.
 const CUT_OUT: u32 = MOST_MATERIALS;
 
 /// A leaf, one line.
 ///
-/// | bytes | what |
+/// | bytes | contents |
 /// |---|---|
-/// | 0..108 | nine x, nine y, nine z of vertices, metres |
-/// | 108..120 | the vertices of the first corners, four bits a triangle; of the second; of the third |
-/// | 120..126 | the indices of two materials, the upper bit set if their triangles may have cut-outs |
-/// | 126 | a bit for each triangle that is of the second material |
-/// | 127 | bits 0-3 the number of triangles, 4-7 that of vertices |
+/// | 0..108 | coordinates of nine vertices: all x, all y, all z, metres |
+/// | 108..120 | vertex indices of the triangles' first corners, four bits each; of the second corners; of the third |
+/// | 120..126 | indices of two materials, the highest bit set if their triangles may have cut-outs |
+/// | 126 | bit `i`: triangle `i` has the second material |
+/// | 127 | bits 0-3 number of triangles, 4-7 number of vertices |
 #[derive(Clone, Copy)]
 pub struct BvhLeaf<'a>(pub &'a [u8; LINE_BYTES]);
 
-/// A triangle: three corners, counter-clockwise seen from the front, and its material.
+/// A triangle: corners, counter-clockwise seen from the front, and material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     /// Corners, metres.
     pub vertices: [[f32; 3]; 3],
     /// Index of the material, below [`MOST_MATERIALS`].
     pub material: u32,
-    /// Whether the alpha of a texture or of the corners may cut something out of it.
+    /// True if alpha (of the base texture or the vertex colours) may cut out parts of the triangle: glTF's `MASK`.
     pub cut_out: bool,
 }
 
@@ -63,7 +63,7 @@ impl BvhLeaf<'_> {
         u32::from(self.byte(COUNTS) >> 4).min(LEAF_VERTICES as u32)
     }
 
-    /// A coordinate of all vertices; what is behind the last is none's.
+    /// One coordinate of all vertices, metres; lanes past the last vertex are meaningless.
     #[inline(always)]
     pub fn coordinates(&self, axis: usize) -> [f32; VERTEX_LANES] {
         let bytes: Option<&[u8; 4 * VERTEX_LANES]> =
@@ -71,38 +71,38 @@ impl BvhLeaf<'_> {
         bytes.map_or([0.0; VERTEX_LANES], |bytes| core::array::from_fn(|lane| read_f32(bytes, 4 * lane)))
     }
 
-    /// The vertices that are a corner of each triangle: of nine, whatever their number is.
+    /// Vertex index of one corner of every triangle: below nine, even in an unsound image.
     #[inline(always)]
     pub fn corners(&self, corner: usize) -> [u32; LEAF_TRIANGLES] {
         let vertices = read_u32(self.0, CORNERS + 4 * corner);
-        // More are in unsound images only.
+        // Above the maximum in unsound images only.
         core::array::from_fn(|slot| (vertices >> (4 * slot) & 15).min(LEAF_VERTICES as u32 - 1))
     }
 
-    /// The vertices that are the corners of triangle `slot`, below [`LEAF_TRIANGLES`].
+    /// Vertex indices of triangle `slot`, below [`LEAF_TRIANGLES`].
     #[inline(always)]
     pub fn vertices_of(&self, slot: usize) -> [usize; 3] {
         [0, 1, 2].map(|corner| {
             let vertex = read_u32(self.0, CORNERS + 4 * corner) >> (4 * (slot % LEAF_TRIANGLES)) & 15;
-            // More are in unsound images only.
+            // Above the maximum in unsound images only.
             (vertex as usize).min(LEAF_VERTICES - 1)
         })
     }
 
-    /// A coordinate of a vertex.
+    /// One coordinate of a vertex, metres.
     #[inline(always)]
     pub fn coordinate(&self, vertex: usize, axis: usize) -> f32 {
         read_f32(self.0, COORDINATE_BYTES * axis + 4 * vertex)
     }
 
-    /// Where the material of a triangle is.
+    /// Offset in the line of a triangle's material.
     #[inline(always)]
     fn material_of(&self, slot: usize) -> usize {
         let is_second = self.byte(SECOND_MATERIAL) >> (slot % LEAF_TRIANGLES) & 1;
         MATERIALS + MATERIAL_BYTES * usize::from(is_second)
     }
 
-    /// Whether triangle `slot`, below [`LEAF_TRIANGLES`], may have cut-outs.
+    /// Returns whether triangle `slot`, below [`LEAF_TRIANGLES`], may have cut-outs.
     #[inline(always)]
     pub fn is_cut_out(&self, slot: usize) -> bool {
         self.byte(self.material_of(slot) + MATERIAL_BYTES - 1) & 0x80 != 0
@@ -127,8 +127,8 @@ impl BvhLeaf<'_> {
         self.0.get(index).copied().unwrap_or(0)
     }
 
-    /// The line of some triangles; `None` if there are none, or it does not hold them: too many triangles, vertices or
-    /// materials, or one beyond [`MOST_MATERIALS`].
+    /// The line of a leaf; `None` without triangles, with more triangles, vertices or materials than a leaf can hold,
+    /// or with a material index of [`MOST_MATERIALS`] or more.
     pub fn encode(triangles: &[Triangle]) -> Option<[u8; LINE_BYTES]> {
         if triangles.is_empty() || triangles.len() > LEAF_TRIANGLES {
             return None;
@@ -138,7 +138,8 @@ impl BvhLeaf<'_> {
         let mut materials = Distinct::<u32, LEAF_MATERIALS>::new();
         for (slot, triangle) in triangles.iter().enumerate() {
             for (corner, vertex) in triangle.vertices.iter().enumerate() {
-                // By bits: what a ray meets does not depend on the order of a scene's triangles.
+                // Compared as bits: of 0 and -0 the first to come would replace the other, and hits would depend on the
+                // order.
                 let vertex = vertices.index(vertex.map(f32::to_bits))?;
                 let at = CORNERS + 4 * corner;
                 let before = read_u32(&line, at);
@@ -165,7 +166,7 @@ impl BvhLeaf<'_> {
     }
 }
 
-/// A few different items, in the order in which they came.
+/// A set of at most `MOST` distinct items, in insertion order.
 struct Distinct<T, const MOST: usize> {
     items: [Option<T>; MOST],
     count: usize,
@@ -176,7 +177,7 @@ impl<T: Copy + PartialEq, const MOST: usize> Distinct<T, MOST> {
         Self { items: [None; MOST], count: 0 }
     }
 
-    /// The index of an item, which is added if it is new; `None` if there is no room for it.
+    /// Index of an item, which is added if it is new; `None` if the set is full.
     fn index(&mut self, item: T) -> Option<usize> {
         let index = self.items().position(|other| other == item).unwrap_or(self.count);
         *self.items.get_mut(index)? = Some(item);

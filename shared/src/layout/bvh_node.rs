@@ -1,54 +1,54 @@
 //! Inner nodes of the bounding volume hierarchy: the boxes of sixteen children, in one line.
 //!
-//! Boxes lie on a grid of their own, eight bits each way, whose unit is a power of two on every axis (Ylitie, Karras, Laine
-//! 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*): a child's is never less than what it
-//! holds, and larger by [`MARGIN`] at least, for what a ray caster rounds.
+//! The boxes are quantised to 8 bits an axis on a grid of the node, whose unit is a power of two on every axis (Ylitie,
+//! Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*). A child's box is
+//! larger than its contents by [`MARGIN`] units at least, more than the ray caster's rounding.
 
 use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides};
 use super::{read_vector, write_f32};
 use crate::address::LINE_BYTES;
 
-/// An inner node, one line: a [`WideNode`] whose sides are in units from a corner, and
+/// An inner node of the bounding volume hierarchy, one line: a [`WideNode`] whose sides are in the node's units from
+/// its corner, and
 ///
-/// | bytes | what |
+/// | bytes | contents |
 /// |---|---|
 /// | 0..12 | x, y, z of the corner, metres |
-/// | 22..25 | the units on x, y, z: exponents as in an `f32` |
+/// | 22..25 | units on x, y, z: biased exponents of `f32` |
 #[derive(Clone, Copy)]
 pub struct BvhNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const UNITS: usize = 22;
-/// How much larger than what it holds a box is at least, on both sides, in units.
+/// Minimum distance of a box's side from its contents, in the node's units.
 const MARGIN: f64 = 1.0 / 4096.0;
-/// The exponent of the least unit: far from the least number, so that products with a unit are exact.
+/// Minimum of the biased exponents: 2^-95 m, far above the subnormal numbers, so that products with a unit are exact.
 const LEAST_UNIT: u8 = 32;
 const EXPONENT_SHIFT: u32 = 23;
 
-/// A box around some triangles, metres.
+/// An axis-aligned bounding box, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodeBox {
-    /// The least coordinates.
+    /// Minimum corner, metres.
     pub lower: [f32; 3],
-    /// The greatest coordinates.
+    /// Maximum corner, metres.
     pub upper: [f32; 3],
 }
 
-/// One axis of the boxes of a node: a side of child `i` is at `corner + unit * lower[i]`, the other one at
-/// `corner + unit * upper[i]`.
+/// One axis of the children's boxes: child `i` extends from `corner + unit * lower[i]` to `corner + unit * upper[i]`.
 #[derive(Clone, Copy)]
 pub struct BvhAxis<'a> {
-    /// From where on sides are told, metres.
+    /// Minimum corner of the node's 8-bit grid, metres.
     pub corner: f32,
-    /// Their unit, metres.
+    /// Unit of the node's 8-bit grid, metres: a power of two.
     pub unit: f32,
-    /// Of each child, and of what is no child.
+    /// Lower side of each child's box; lanes past the last child are meaningless.
     pub lower: &'a [u8; NODE_CHILDREN],
-    /// The same.
+    /// Upper side of each child's box; lanes past the last child are meaningless.
     pub upper: &'a [u8; NODE_CHILDREN],
 }
 
 impl<'a> BvhNode<'a> {
-    /// The boxes of the children, by axis.
+    /// Boxes of the children, by axis.
     #[inline(always)]
     pub fn axes(&self) -> [BvhAxis<'a>; 3] {
         let node = WideNode(self.0);
@@ -61,7 +61,7 @@ impl<'a> BvhNode<'a> {
         [axis(0, x), axis(1, y), axis(2, z)]
     }
 
-    /// The box of a child.
+    /// Box of a child, metres.
     pub fn bounds(&self, child: usize) -> Option<NodeBox> {
         let [x, y, z] = self.axes().map(|axis| axis.sides(child));
         let sides = [x?, y?, z?];
@@ -69,7 +69,7 @@ impl<'a> BvhNode<'a> {
         Some(NodeBox { lower: side(|[lower, _]| lower), upper: side(|[_, upper]| upper) })
     }
 
-    /// The line of a node; `None` if there is no child or too many, or a box is not finite.
+    /// The line of a node; `None` if there are no children or too many, or a box is not finite.
     pub fn encode(children: &[NodeBox], links: Links) -> Option<[u8; LINE_BYTES]> {
         let around = children.iter().copied().reduce(NodeBox::union)?;
         let mut line = [0; LINE_BYTES];
@@ -95,7 +95,7 @@ struct Grid {
 }
 
 impl Grid {
-    /// The finest that holds an interval.
+    /// The finest grid that covers an interval.
     fn around(lower: f32, upper: f32) -> Option<Self> {
         if !lower.is_finite() || !upper.is_finite() {
             return None;
@@ -120,14 +120,14 @@ impl Grid {
         (f64::from(place) - f64::from(self.corner)) / self.unit()
     }
 
-    /// The last line of the grid below a place.
+    /// The greatest grid line at least [`MARGIN`] units below a coordinate.
     fn below(&self, place: f32) -> Option<u8> {
         let units = self.units(place) - MARGIN;
-        // Rounds down.
+        // The conversion rounds down.
         (0.0..=255.0).contains(&units).then_some(units as u8)
     }
 
-    /// The first line of the grid above a place.
+    /// The least grid line at least [`MARGIN`] units above a coordinate.
     fn above(&self, place: f32) -> Option<u8> {
         let units = self.units(place) + MARGIN;
         let line = units as u64;
@@ -136,7 +136,7 @@ impl Grid {
 }
 
 impl NodeBox {
-    /// The least box around two.
+    /// The smallest box around two boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         let mut union = self;
@@ -155,7 +155,7 @@ impl NodeBox {
 }
 
 impl BvhAxis<'_> {
-    /// The sides of a child's box, metres.
+    /// Lower and upper side of a child's box, metres.
     pub fn sides(&self, child: usize) -> Option<[f64; 2]> {
         let [lower, upper] = [*self.lower.get(child)?, *self.upper.get(child)?];
         Some([lower, upper].map(|side| f64::from(self.corner) + f64::from(side) * f64::from(self.unit)))
@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// A unit is no more than twice as long as 255 of them need to be, but where a corner cannot be told as finely.
+    /// A unit is at most twice the smallest possible, but where `f32` is too coarse for the corner.
     fn check_units(line: &[u8; LINE_BYTES], boxes: &[NodeBox]) {
         let around = boxes.iter().copied().reduce(NodeBox::union).expect("a child");
         for (axis, coded) in BvhNode(line).axes().iter().enumerate() {

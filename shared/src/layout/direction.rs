@@ -1,33 +1,33 @@
-//! Unit vectors in two bytes and in one, by the octahedral map (Meyer et al. 2010, *On floating-point normal
-//! vectors*): the sphere is projected on the octahedron `|x| + |y| + |z| = 1` and unfolded to a square.
+//! Unit vectors in one or two bytes, by the octahedral map (Meyer et al. 2010, *On floating-point normal vectors*): the
+//! sphere is projected onto the octahedron `|x| + |y| + |z| = 1`, which is unfolded to a square.
 //!
-//! Quantised with an odd number of steps, so that the six axes are exact.
+//! A coordinate has an odd number of codes, so that the six axes are exact.
 
-/// Steps each side of zero in a direction's byte.
+/// Steps on either side of zero in a coordinate of a direction: 8 bits.
 const DIRECTION_STEPS: f32 = 127.0;
-/// Steps each side of zero in a normal's half byte.
+/// Steps on either side of zero in a coordinate of a normal: 4 bits.
 const NORMAL_STEPS: f32 = 7.0;
 
-/// A unit vector in two bytes, to within one degree.
+/// Octahedral code of a unit vector in two bytes; error at most 1 degree.
 pub fn encode_direction(vector: [f32; 3]) -> [u8; 2] {
     let [u, v] = unfold(vector);
     [quantise(u, DIRECTION_STEPS), quantise(v, DIRECTION_STEPS)]
 }
 
-/// A vector along the direction in `bytes`, with `|x| + |y| + |z| = 1`: not of unit length.
+/// The direction of a two-byte octahedral code, not normalised: `|x| + |y| + |z| = 1`.
 #[inline(always)]
 pub fn decode_direction(bytes: [u8; 2]) -> [f32; 3] {
     let [u, v] = bytes.map(|byte| (byte as f32 - DIRECTION_STEPS) / DIRECTION_STEPS);
     fold(u, v)
 }
 
-/// A unit normal in one byte, to within sixteen degrees: enough to tell one surface from its neighbour.
+/// Octahedral code of a unit normal in one byte; error at most 16 degrees: enough to distinguish adjacent surfaces.
 pub fn encode_normal(vector: [f32; 3]) -> u8 {
     let [u, v] = unfold(vector);
     quantise(u, NORMAL_STEPS) << 4 | quantise(v, NORMAL_STEPS)
 }
 
-/// A vector along the normal in `byte`, with `|x| + |y| + |z| = 1`: not of unit length.
+/// The normal of a one-byte octahedral code, not normalised: `|x| + |y| + |z| = 1`.
 #[inline(always)]
 pub fn decode_normal(byte: u8) -> [f32; 3] {
     let [u, v] = [byte >> 4, byte & 15].map(|half| (half as f32 - NORMAL_STEPS) / NORMAL_STEPS);
@@ -40,7 +40,7 @@ fn magnitude(x: f32) -> f32 {
 
 fn unfold([x, y, z]: [f32; 3]) -> [f32; 2] {
     let sum = magnitude(x) + magnitude(y) + magnitude(z);
-    // A zero vector has no direction; any will do, as long as it is a number.
+    // A zero vector has no direction: any finite result will do.
     let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
     let [u, v] = [x * scale, y * scale];
     if z >= 0.0 {
@@ -58,7 +58,7 @@ fn fold(u: f32, v: f32) -> [f32; 3] {
     [inward(u), inward(v), z]
 }
 
-/// `value` in [-1, 1] to the nearest of `2 steps + 1` codes, `steps` standing for zero.
+/// Code 0 to `2 steps` of a value in [-1, 1], rounded to nearest; `steps` is the code of zero.
 fn quantise(value: f32, steps: f32) -> u8 {
     (value * steps + steps + 0.5) as u8
 }

@@ -1,15 +1,15 @@
-//! Distant lights: from infinitely far, of one direction.
+//! Distant lights: parallel light from infinitely far.
 
 use super::{Record, read_u32, read_vector, write_u32, write_vector};
 
-/// A light of one direction (`directional` of `KHR_lights_punctual`).
+/// A distant light (`directional` of glTF's `KHR_lights_punctual`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistantLight {
-    /// Unit vector, the way light goes.
+    /// Unit vector in which the light travels.
     pub direction: [f32; 3],
-    /// Irradiance of a surface that faces it, W/m^2.
+    /// Irradiance of a surface perpendicular to it, W/m^2.
     pub irradiance: [f32; 3],
-    /// The upper end of its share of the probabilities of distant lights, of 2^32; the last is 2^32 - 1.
+    /// Cumulative probability of the distant lights up to this one, in units of 2^-32; 2^32 - 1 at the last.
     pub threshold: u32,
 }
 
@@ -30,7 +30,7 @@ impl DistantLight {
         }
     }
 
-    /// The upper end of its share alone.
+    /// [`Self::threshold`](Self#structfield.threshold) of a record, without reading the rest.
     #[inline(always)]
     pub fn threshold(bytes: &[u8; Self::BYTES]) -> u32 {
         read_u32(bytes, THRESHOLD)

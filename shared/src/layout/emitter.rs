@@ -1,51 +1,51 @@
-//! Emitters: what a light sample is taken of once a descent in the light tree has come to it.
+//! Emitters: the leaves of the light tree, of which light samples are taken.
 
 use super::{DOUBLE_SIDED, Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
-/// A light of finite extent or at a finite place.
+/// An emissive triangle or a punctual light with a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Emitter {
-    /// Where it is, and how its light spreads.
+    /// Shape and directional distribution.
     pub kind: EmitterKind,
-    /// Of a triangle the radiance that it emits, W/(sr m^2), which an emissive texture multiplies; of a point or a spot
-    /// the intensity, W/sr.
+    /// Emitted radiance of a triangle, W/(sr m^2), to be multiplied by its emissive texture; intensity of a point or
+    /// spot light, W/sr.
     pub emission: [f32; 3],
-    /// The way to it from the root of the light tree: of each node the number of the child, two bits, the root's in the
-    /// lowest.
+    /// Bit trail of the emitter: its path from the root of the light tree, two bits a level for the child's index, the
+    /// root's in the lowest.
     pub trail: u32,
 }
 
-/// Where an emitter is, and how its light spreads.
+/// Shape and directional distribution of an emitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EmitterKind {
-    /// A Lambertian area light.
+    /// A Lambertian (diffuse) area light.
     Triangle {
         /// Corners, metres.
         vertices: [[f32; 3]; 3],
-        /// Whether the back emits as the front does.
+        /// True if the back emits like the front.
         double_sided: bool,
         /// Index of the triangle in the image.
         triangle: u32,
-        /// Index of its material.
+        /// Index of the triangle's material.
         material: u32,
-        /// Whether it is not of the same emission all over: a texture of its material tells it, or cut-outs.
+        /// True if the radiance varies over the triangle, by an emissive texture or by alpha cut-outs.
         varies: bool,
     },
-    /// A point that emits to all sides alike.
+    /// An isotropic point light.
     Point {
-        /// The place, metres.
+        /// Position, metres.
         position: [f32; 3],
     },
-    /// A point that emits into a cone: the intensity times `clamp(cos * scale + offset, 0, 1)^2` for the cosine of the angle to
-    /// the axis (`KHR_lights_punctual`).
+    /// A spot light (glTF `KHR_lights_punctual`): intensity times `clamp(cos * scale + offset, 0, 1)^2`, where `cos` is
+    /// the cosine of the angle to the axis.
     Spot {
-        /// The place, metres.
+        /// Position, metres.
         position: [f32; 3],
-        /// Unit vector of the axis, the way light goes.
+        /// Unit vector of the axis, in which the light travels.
         direction: [f32; 3],
-        /// See above.
+        /// `lightAngleScale` of the falloff.
         scale: f32,
-        /// See above.
+        /// `lightAngleOffset` of the falloff.
         offset: f32,
     },
 }
@@ -90,7 +90,7 @@ impl Emitter {
         Self { kind, emission: read_vector(bytes, EMISSION), trail: read_u32(bytes, TRAIL) }
     }
 
-    /// The way to it in the light tree alone.
+    /// The bit trail of a record, without reading the rest.
     #[inline(always)]
     pub fn trail(bytes: &[u8; Self::BYTES]) -> u32 {
         read_u32(bytes, TRAIL)

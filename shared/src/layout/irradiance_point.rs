@@ -1,21 +1,22 @@
-//! What an irradiance point carries besides its position: irradiance and surface normal in the eight bytes that a photon's
-//! content has, so that both lie in the same leaves.
+//! Content of an irradiance point: irradiance and surface normal in eight bytes, the size of a photon's content, so
+//! that both kinds are stored in [`super::PhotonLeaf`]s.
 
 use super::PHOTON_CONTENT_BYTES;
 
-/// The irradiance of a surface at a point.
+/// Irradiance and surface normal at a point of a surface.
 ///
-/// | bits | what |
+/// | bits | contents |
 /// |---|---|
 /// | 0..48 | mantissas of red, green and blue, 16 bits each |
-/// | 48..56 | surface normal, [`super::encode_normal`], on the side that light arrives at |
-/// | 56..64 | the exponent `e` that they share: a component is `mantissa * 2^(e - 143)` |
+/// | 48..56 | surface normal, [`super::encode_normal`], on the lit side |
+/// | 56..64 | shared exponent `e`: a component is `mantissa * 2^(e - 143)` |
 ///
-/// The greatest component's mantissa is at least 2^15, so that every component is right to 2^-16 of the greatest. The eight bits
-/// of [`super::Rgbe`] would not do here: a photon's rounding error is one of a hundred in a sum, this one all there is.
+/// The largest component's mantissa is at least 2^15: the error of every component is at most 2^-16 of the largest. The
+/// 8-bit mantissas of [`super::Rgbe`] would not do: errors average out in a sum over a hundred photons, but not in a
+/// single point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IrradiancePoint {
-    /// Irradiance, photon power units a square metre.
+    /// Irradiance, photon power units/m^2.
     pub irradiance: [f32; 3],
     /// Octahedral code of the surface normal.
     pub normal: u8,
@@ -25,12 +26,12 @@ const MANTISSA_BITS: u32 = 16;
 const MOST_MANTISSA: u32 = (1 << MANTISSA_BITS) - 1;
 const NORMAL_SHIFT: u32 = 3 * MANTISSA_BITS;
 const EXPONENT_SHIFT: u32 = NORMAL_SHIFT + 8;
-/// Of the binary exponent of a mantissa's unit.
+/// Bias of the exponent of a mantissa's unit.
 const EXPONENT_BIAS: i32 = 143;
 
 impl IrradiancePoint {
-    /// The point's bytes, rounded to the nearest. Components that are negative or no number count as zero, what is too large
-    /// as the greatest that there is.
+    /// The point's bytes, rounded to nearest. Negative and NaN components are stored as 0, components above `f32::MAX`
+    /// as `f32::MAX`.
     pub fn to_content(&self) -> [u8; PHOTON_CONTENT_BYTES] {
         let irradiance = self.irradiance.map(|c| if c > 0.0 { c.min(f32::MAX) } else { 0.0 });
         let largest = irradiance.into_iter().fold(0.0, f32::max);
@@ -47,7 +48,7 @@ impl IrradiancePoint {
         bits.to_le_bytes()
     }
 
-    /// Reads a point's bytes; whatever they are, the irradiance is not negative and a finite number.
+    /// Reads a point's bytes; the irradiance is finite and not negative for any bytes.
     #[inline(always)]
     pub fn read(content: [u8; PHOTON_CONTENT_BYTES]) -> Self {
         let bits = u64::from_le_bytes(content);
@@ -57,23 +58,23 @@ impl IrradiancePoint {
         Self { irradiance: [component(0), component(1), component(2)], normal: Self::normal_of(bits) }
     }
 
-    /// The normal's code in a point's bytes, as a little-endian number.
+    /// The normal's code in a point's bytes, read as a little-endian `u64`.
     #[inline(always)]
     pub fn normal_of(bits: u64) -> u8 {
         (bits >> NORMAL_SHIFT) as u8
     }
 }
 
-/// `value * 2^exponent`, finite, for exponents of at most twice what a float has.
+/// `value * 2^exponent`, at most `f32::MAX`, for exponents of -252 to 254.
 #[inline(always)]
 fn scaled(value: f32, exponent: i32) -> f32 {
-    // In two factors: one alone may be no normal number where the product is.
+    // In two factors, as 2^exponent may be out of the range of `f32` where the product is not.
     let half = exponent / 2;
     let product = value * power_of_two(half) * power_of_two(exponent - half);
     if product < f32::MAX { product } else { f32::MAX }
 }
 
-/// `2^exponent` of a normal number.
+/// `2^exponent`, for exponents of -126 to 127.
 #[inline(always)]
 fn power_of_two(exponent: i32) -> f32 {
     f32::from_bits(((exponent + 127) as u32) << 23)

@@ -1,41 +1,42 @@
-//! Nodes of the light tree: bounds of the emitters below each of four children, in one line.
+//! Nodes of the light tree: bounds of the emitters below each of up to four children, in one line.
 
 use super::attributes::{decode_octahedral, encode_octahedral};
 use super::{read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 use crate::address::LINE_BYTES;
 
-/// Children of a node, at most.
+/// Maximum number of children of a light tree node.
 pub const LIGHT_CHILDREN: usize = 4;
-/// Levels of a light tree, at most: as many as an emitter's trail tells.
+/// Maximum depth of a light tree, in levels: the capacity of
+/// [`super::Emitter::trail`](super::Emitter#structfield.trail).
 pub const LIGHT_TREE_LEVELS: usize = 16;
 
 /// Bounds of the emitters below a child of a [`LightNode`].
 ///
-/// | bytes of 32 | what |
+/// | bytes | contents |
 /// |---|---|
-/// | 0..12 | centre of a sphere around them, metres |
-/// | 12..16 | its radius, metres |
-/// | 16..20 | their power over that of the node |
-/// | 20..24 | axis of a cone around the normals that they emit about: octahedral, 16 bits an axis |
+/// | 0..12 | centre of the bounding sphere, metres |
+/// | 12..16 | radius of the bounding sphere, metres |
+/// | 16..20 | emitted power as a fraction of the node's |
+/// | 20..24 | axis of the bounding cone of the emission normals: octahedral, 16 bits an axis |
 /// | 24..28 | cosine of the cone's half angle |
-/// | 28..32 | a leaf's emitter, with the highest bit set, or a node; all bits are set where there is no child |
+/// | 28..32 | index of an emitter, with the highest bit set, or of a node; 2^32 - 1 for an absent child |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightChild {
-    /// Centre of a sphere around them, metres.
+    /// Centre of the emitters' bounding sphere, metres.
     pub centre: [f32; 3],
-    /// Its radius, metres.
+    /// Radius of the emitters' bounding sphere, metres.
     pub radius: f32,
-    /// Their power over that of the node.
+    /// Power of the emitters as a fraction of the node's.
     pub share: f32,
-    /// A vector along the axis of a cone around the normals that they emit about, of a length between 0.57 and 1.
+    /// Axis of the bounding cone of the emission normals; a vector of length 0.57 to 1.
     pub axis: [f32; 3],
-    /// Cosine of the cone's half angle: -1 for all directions, as of points and of double-sided triangles.
+    /// Cosine of the cone's half angle; -1 for all directions, as with point lights and double-sided triangles.
     pub cosine: f32,
-    /// What is below.
+    /// The node or emitter itself.
     pub link: LightLink,
 }
 
-/// What is below a node of the light tree.
+/// Child of a light tree node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightLink {
     /// The node of this index.
@@ -53,7 +54,7 @@ const NO_CHILD: u32 = u32::MAX;
 const LEAF: u32 = 1 << 31;
 
 impl LightNode<'_> {
-    /// A child.
+    /// Child `index`; `None` if absent.
     #[inline(always)]
     pub fn child(&self, index: usize) -> Option<LightChild> {
         let bytes: &[u8; CHILD_BYTES] = self.0.as_chunks().0.get(index)?;

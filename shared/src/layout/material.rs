@@ -1,73 +1,77 @@
-//! Materials: how a surface reflects, transmits and emits.
+//! Materials: reflectance, transmittance and emission of surfaces.
 
 use super::{Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
-/// In [`Material::flags`]: the back does what the front does.
+/// Flag of [`Material::flags`]: the back reflects and emits like the front (glTF `doubleSided`).
 pub const DOUBLE_SIDED: u32 = 1;
-/// In [`Material::flags`], of [`Reflectance::Glass`]: the surface is a thin wall, through which light goes straight on.
+/// Flag of [`Material::flags`] for [`Reflectance::Glass`]: a thin wall, which transmits light without refraction (in
+/// glTF, no `KHR_materials_volume` or one of thickness 0).
 pub const THIN_WALLED: u32 = 2;
-/// In [`Material::flags`]: some of its triangles have [`super::Attributes`].
+/// Flag of [`Material::flags`]: some triangles of the material have [`super::Attributes`].
 pub const HAS_ATTRIBUTES: u32 = 4;
 
 const KIND_SHIFT: u32 = 4;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
 
-/// In the place of a texture's index: there is none.
+/// Code of the index of an absent texture.
 pub const NO_TEXTURE: u16 = u16::MAX;
 
 /// A material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// How it reflects and transmits.
+    /// Model of reflection and transmission.
     pub reflectance: Reflectance,
-    /// Emitted radiance, W/(sr m^2); the emissive texture multiplies it.
+    /// Emitted radiance, W/(sr m^2), to be multiplied by the emissive texture.
     pub emission: [f32; 3],
-    /// [`DOUBLE_SIDED`], [`THIN_WALLED`] and [`HAS_ATTRIBUTES`], or 0.
+    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`] and [`HAS_ATTRIBUTES`].
     pub flags: u32,
-    /// Of triangles with cut-outs: where the alpha of the base texture and of the corners is below this, there is nothing.
+    /// glTF's `alphaCutoff`: triangles with cut-outs are absent where the product of base texture and vertex alpha is
+    /// below it.
     pub cutoff: f32,
-    /// Indices of the textures of base colour or diffuse albedo, of roughness (green) and metalness (blue), and of emission.
+    /// Indices of the textures of base colour (or diffuse albedo), metallic-roughness (roughness in green, metalness in
+    /// blue) and emission; [`NO_TEXTURE`] if absent.
     pub textures: [u16; 3],
 }
 
-/// What a material's colours and numbers mean.
+/// Model of reflection and transmission, with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflectance {
-    /// Lambertian with one Phong lobe.
+    /// A Lambertian part and a Phong lobe.
     Phong {
-        /// Lambertian albedo; the base texture multiplies it.
+        /// Lambertian albedo, to be multiplied by the base texture.
         diffuse: [f32; 3],
         /// Albedo of the Phong lobe.
         specular: [f32; 3],
         /// Exponent of the Phong lobe.
         exponent: f32,
     },
-    /// glTF's metallic-roughness.
+    /// glTF's metallic-roughness model.
     MetallicRoughness {
-        /// Albedo of the dielectric, reflectance of the metal; the base texture multiplies it.
+        /// Base colour: albedo of the dielectric, F0 of the metal; to be multiplied by the base texture.
         base: [f32; 3],
-        /// Reflectance of the dielectric at normal incidence.
+        /// F0 of the dielectric: its reflectance at normal incidence.
         dielectric: [f32; 3],
-        /// Share of metal, 0 to 1.
+        /// Metalness, 0 to 1.
         metallic: f32,
-        /// Roughness, 0 to 1: perfectly specular at 0.
+        /// Roughness, 0 (perfectly specular) to 1.
         roughness: f32,
     },
-    /// A smooth dielectric that light goes through.
+    /// A smooth transparent dielectric (glTF `KHR_materials_transmission`).
     Glass {
-        /// Colour of what goes through; the base texture multiplies it.
+        /// Transmission colour, to be multiplied by the base texture.
         base: [f32; 3],
         /// Absorption coefficient inside, 1/m.
         absorption: [f32; 3],
-        /// Share of what is not reflected that goes through; the rest is reflected by a Lambertian surface of the base
-        /// colour.
+        /// Fraction, 0 to 1, of the light not reflected by the interface that is transmitted; a Lambertian surface of
+        /// the base colour reflects the rest.
         transmission: f32,
         /// Index of refraction.
         ior: f32,
-        /// Of what a dielectric of that index reflects, the share that this one does, 0 to 1 in steps of 1/255.
+        /// Factor of the dielectric's Fresnel reflectance (`specularFactor` of `KHR_materials_specular`), 0 to 1 in
+        /// steps of 1/255.
         specular: f32,
-        /// Share of metal, 0 to 1, which lets nothing through.
+        /// Metalness, 0 to 1; metal transmits nothing.
         metallic: f32,
         /// Roughness of the metal, 0 to 1 in steps of 1/255.
         roughness: f32,

@@ -1,55 +1,56 @@
-//! The photon of Jensen's book, 20 bytes: position, shared-exponent power, direction and flags.
+//! Photons in 20 bytes, after Jensen 2001: position, shared-exponent power, direction and flags.
 
 use super::{Record, read_vector, write_vector};
 
-/// Bytes of what a photon carries besides its position.
+/// Bytes of a photon's content: power, direction and flags.
 pub const PHOTON_CONTENT_BYTES: usize = 8;
 
-/// One photon of the map, a node of the left-balanced kd-tree.
+/// A photon, and a node of the left-balanced kd-tree.
 ///
-/// | bytes | what |
+/// | bytes | contents |
 /// |---|---|
 /// | 0..12 | position, metres |
 /// | 12..16 | power, [`Rgbe`], in units of the image's photon power unit |
-/// | 16..18 | direction towards where the photon came from, [`super::encode_direction`] |
+/// | 16..18 | incoming direction, from the surface towards the origin of the photon, [`super::encode_direction`] |
 /// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-14 disc fraction, 15 direct |
 ///
-/// The *disc fraction* is the area of all open surface that a gather around the photon takes for the photon's own, in the
-/// units of the area of a flat disc of the gather's radius: 1 on a plain wall, less at edges and in corners, more where
-/// surfaces are stacked. A gather divides by that part of the disc's area. Its code is that of [`disc_fraction`].
+/// The *disc fraction* is the area of the surfaces whose photons a gather around this photon sums up, over the area
+/// `pi r^2` of a flat disc of the gather's radius: 1 on a plain wall, less at edges and in corners, more where surfaces
+/// are stacked. The density estimate divides by `pi r^2` times this fraction. It is stored as a code of
+/// [`disc_fraction`].
 ///
-/// A *direct* photon came straight from an emitter: it counts like any other where a final gather ray ends, but says
-/// nothing of where indirect light comes from.
+/// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it, but importance
+/// sampling, which asks for the directions of indirect light, leaves it out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
-    /// Where the photon arrived, metres.
+    /// Position, metres.
     pub position: [f32; 3],
-    /// The power it carries, in photon power units.
+    /// Power, photon power units.
     pub power: Rgbe,
-    /// Octahedral code of the direction it came from.
+    /// Octahedral code of the incoming direction, from the surface towards the origin of the photon.
     pub direction: [u8; 2],
-    /// The axis the kd-tree is split on here: 0, 1 or 2.
+    /// Splitting axis of the kd-tree node: 0, 1 or 2.
     pub axis: u8,
-    /// Octahedral code of the surface normal, on the side the photon arrived at.
+    /// Octahedral code of the surface normal, on the lit side.
     pub normal: u8,
     /// Code of the disc fraction, below [`DISC_CODES`].
     pub disc: u8,
-    /// Whether it came straight from an emitter.
+    /// True if the photon came straight from a light.
     pub direct: bool,
 }
 
-/// Codes of the disc fraction.
+/// Number of codes of the disc fraction.
 pub const DISC_CODES: usize = 1 << 5;
-/// The disc fraction's code of a whole disc: 1.
+/// Code of a disc fraction of 1.
 pub const FULL_DISC: u8 = 22;
 
 const DISC_MASK: u8 = DISC_CODES as u8 - 1;
 const DISC_SHIFT: u32 = 10;
-/// From one code's fraction to the next: nine steps are a factor of four.
+/// Ratio of the fractions of consecutive codes: `4^(1/9)`.
 const DISC_STEP: f64 = 1.166_529_039_576_120_8;
 const DISC_FRACTIONS: [f32; DISC_CODES] = disc_fractions();
 
-/// The steps are equal factors, so that rounding is in proportion, from 0.034 to 4.
+/// Geometric series from 0.034 to 4, so that the relative error of rounding is constant.
 #[expect(clippy::indexing_slicing, reason = "computed when it is compiled")]
 const fn disc_fractions() -> [f32; DISC_CODES] {
     let mut fractions = [1.0; DISC_CODES];
@@ -67,19 +68,20 @@ const fn disc_fractions() -> [f32; DISC_CODES] {
     fractions
 }
 
-/// The disc fraction of a code, of which the lower five bits count.
+/// The disc fraction of a code; only the lower five bits count.
 #[inline(always)]
 pub fn disc_fraction(code: u8) -> f32 {
     DISC_FRACTIONS.get((code & DISC_MASK) as usize).copied().unwrap_or(1.0)
 }
 
-/// A code of a disc fraction: one of the two next to it, of which `dither`, in [0, 1), chooses so that the mean of the
-/// reciprocals over all dithers, by which gathers multiply, is the fraction's. What is beyond the last codes takes those.
+/// Code of a disc fraction, dithered: `dither` in [0, 1) chooses between the two neighbouring codes such that the mean
+/// of `1 / disc_fraction(code)`, the factor of gathers, is `1 / fraction`. Fractions out of range take the first or
+/// last code.
 pub fn encode_disc(fraction: f32, dither: f32) -> u8 {
     let upper = DISC_FRACTIONS.partition_point(|&other| other < fraction).min(DISC_CODES - 1) as u8;
     let lower = upper.saturating_sub(1);
     let [at, lower_at, upper_at] = [fraction, disc_fraction(lower), disc_fraction(upper)].map(f32::recip);
-    // Of a fraction below the first both are that one, and of one beyond the last the share is negative.
+    // Below the first fraction both codes are 0; above the last one the left side is negative.
     if at - upper_at > dither * (lower_at - upper_at) { lower } else { upper }
 }
 
@@ -103,13 +105,13 @@ impl Photon {
         }
     }
 
-    /// The position alone.
+    /// The position of a record, without reading the rest.
     #[inline(always)]
     pub fn position(bytes: &[u8; Self::BYTES]) -> [f32; 3] {
         read_vector(bytes, 0)
     }
 
-    /// The flags alone.
+    /// The flags of a record, without reading the rest.
     #[inline(always)]
     pub fn flags(bytes: &[u8; Self::BYTES]) -> u16 {
         u16::from_le_bytes([bytes[18], bytes[19]])
@@ -121,20 +123,20 @@ impl Photon {
         (flags & 3) as u8
     }
 
-    /// The flags of a photon that is no node of a tree.
+    /// The flags with the splitting axis cleared, as in a leaf.
     #[inline(always)]
     pub fn flags_without_axis(flags: u16) -> u16 {
         flags & !3
     }
 
-    /// What the photon carries besides its position: the record's bytes from the power on.
+    /// The photon's content: the record's last eight bytes, power, direction and flags.
     #[inline(always)]
     pub fn content(bytes: &[u8; Self::BYTES]) -> [u8; PHOTON_CONTENT_BYTES] {
         let [.., a, b, c, d, e, f, g, h] = *bytes;
         [a, b, c, d, e, f, g, h]
     }
 
-    /// What a photon carries, with another disc fraction.
+    /// A photon's content with another code of the disc fraction.
     #[must_use]
     pub fn content_with_disc(content: [u8; PHOTON_CONTENT_BYTES], disc: u8) -> [u8; PHOTON_CONTENT_BYTES] {
         let [a, b, c, d, e, f, low, high] = content;
@@ -155,7 +157,7 @@ impl Photon {
         (flags >> DISC_SHIFT) as u8 & DISC_MASK
     }
 
-    /// Whether the photon came straight from an emitter.
+    /// Returns whether the photon came straight from a light.
     #[inline(always)]
     pub fn direct_of_flags(flags: u16) -> bool {
         flags >> 15 != 0
@@ -176,18 +178,18 @@ impl Photon {
     }
 }
 
-/// Three non-negative numbers with a shared exponent (Ward 1991): `mantissa * 2^(exponent - 136)`.
+/// RGBE (Ward 1991): three non-negative components of 8 bits with a shared exponent, `mantissa * 2^(exponent - 136)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rgbe(pub [u8; 4]);
 
 impl Rgbe {
-    /// What is added to a mantissa's binary exponent to make the fourth byte: 128, and 8 for the mantissa's bits.
+    /// Bias of the fourth byte, the exponent of a mantissa's unit: 128, and 8 for the mantissa's bits.
     pub const EXPONENT_BIAS: i32 = 136;
 
-    /// A representable colour next to this one; negative and non-finite components count as zero.
+    /// The RGBE code of a colour, dithered; negative and non-finite components are encoded as 0.
     ///
     /// The random bits of `dither` choose between the two neighbours of each component, so that the mean over many
-    /// encodings is the colour: rounding to the nearest would err the same way for all photons of one lamp.
+    /// encodings is the colour: rounding to nearest would have the same bias for all photons of one light.
     pub fn encode(colour: [f32; 3], dither: u32) -> Self {
         let colour = colour.map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 });
         let largest = colour.into_iter().fold(0.0_f32, |a, b| if b > a { b } else { a });
@@ -210,7 +212,7 @@ impl Rgbe {
         Self([round(r, 0), round(g, 11), round(b, 22), code.min(255) as u8])
     }
 
-    /// The colour.
+    /// The colour of the code.
     #[inline(always)]
     pub fn decode(self) -> [f32; 3] {
         let [r, g, b, exponent] = self.0;

@@ -1,31 +1,31 @@
-//! The grid that photons' positions are on, so that every layout of the map can tell them exactly.
+//! The grid of the photons' positions: every layout of the photon map stores them exactly.
 
 /// Bits of a coordinate on the grid.
 pub const GRID_BITS: u32 = 20;
 pub(super) const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
-/// Coordinates are whole numbers below this, so that they are exact as `f32`.
+/// Bound of the magnitude of `origin + q`: integers up to 2^24 are exact in `f32`.
 const MOST_COORDINATE: f64 = (1 << 24) as f64;
 
-/// The grid that photons' positions are on: 2^20 cells each way, of which the longest side of the scene takes half or more;
-/// fewer far from the origin, where `f32` is coarser than that. A position is `(origin + q) * cell`, exact in `f32`.
+/// The grid of the photons' positions: `(origin + q) * cell` for grid coordinates `q` below 2^20, exact in `f32`. The
+/// longest side of the scene takes half of the 2^20 cells or more; fewer far from the origin, where `f32` is coarser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonGrid {
-    /// The lower corner, cells.
+    /// Minimum corner, cells.
     pub origin: [i32; 3],
     /// Side of a cell, metres: a power of two.
     pub cell: f32,
 }
 
 impl PhotonGrid {
-    /// Cells of a metre from the origin on.
+    /// The grid with cells of 1 m from the origin.
     pub const UNIT: Self = Self { origin: [0; 3], cell: 1.0 };
 
-    /// The finest grid that holds all places of a box.
+    /// The finest grid that covers a box, metres.
     pub fn around(lower: [f32; 3], upper: [f32; 3]) -> Self {
         let mut least = f64::from(f32::MIN_POSITIVE);
         for (lower, upper) in lower.into_iter().zip(upper) {
             let [lower, upper] = [f64::from(lower), f64::from(upper)];
-            // Two cells are left for rounding at both ends.
+            // Two cells are left for rounding at either end.
             let by_side = (upper - lower) / f64::from(GRID_MASK - 2);
             let by_place = lower.abs().max(upper.abs()) / (MOST_COORDINATE - f64::from(1 << GRID_BITS));
             least = [by_side, by_place].into_iter().filter(|c| c.is_finite()).fold(least, f64::max);
@@ -35,7 +35,7 @@ impl PhotonGrid {
         Self { origin, cell }
     }
 
-    /// The grid point nearest to a place; of a place outside, the one nearest to it on the grid's border.
+    /// The grid point nearest to a position, metres; positions outside the grid are clamped to it.
     pub fn nearest(&self, place: [f32; 3]) -> [u32; 3] {
         let [x, y, z] = place;
         let [a, b, c] = self.origin;
@@ -45,7 +45,7 @@ impl PhotonGrid {
         })
     }
 
-    /// The coordinates of a grid point, metres.
+    /// Position of a grid point, metres.
     #[inline(always)]
     pub fn position(&self, point: [u32; 3]) -> [f32; 3] {
         let [x, y, z] = point;
@@ -53,7 +53,7 @@ impl PhotonGrid {
         [self.metres(a, x), self.metres(b, y), self.metres(c, z)]
     }
 
-    /// One coordinate of a grid point, metres.
+    /// One coordinate of a grid point's position, metres.
     #[inline(always)]
     pub fn coordinate(&self, axis: u8, point: u32) -> f32 {
         let [a, b, c] = self.origin;
@@ -77,9 +77,9 @@ fn floor(value: f64) -> i32 {
     if f64::from(towards_zero) > value { towards_zero - 1 } else { towards_zero }
 }
 
-/// The least power of two that is not below `value`, within the normal numbers of `f32`.
+/// The smallest power of two >= `value`, clamped to the normal numbers of `f32`.
 pub fn power_of_two_above(value: f64) -> f32 {
-    // By the bits, and not by a logarithm, whose last digit differs between systems.
+    // From the exponent bits: the last digit of a logarithm differs between platforms.
     let bits = value.max(f64::MIN_POSITIVE).to_bits();
     let is_power = bits & ((1 << 52) - 1) == 0;
     let exponent = (bits >> 52) as i32 - 1023 + i32::from(!is_power);

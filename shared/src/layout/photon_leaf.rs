@@ -1,23 +1,24 @@
-//! Leaves of the photon map: some photons of one place, in one line.
+//! Leaves of the photon map: neighbouring photons, in one line.
 //!
-//! Nothing is lost against [`super::Photon`]: positions lie on a grid in either layout, and a leaf tells them by sixteen
-//! bits each from its own corner. Coordinates of one axis lie side by side, so that one instruction reads them all.
+//! A leaf is as exact as [`super::Photon`]: positions lie on the [`super::PhotonGrid`] in either layout, and a leaf
+//! stores them as 16-bit offsets from its corner. The offsets of one axis are contiguous, so that one vector
+//! instruction reads them all.
 
 use super::photon::{PHOTON_CONTENT_BYTES, Photon};
 use super::photon_grid::{GRID_BITS, GRID_MASK};
 use super::photon_node::GridBox;
 use crate::address::LINE_BYTES;
 
-/// Some photons, one line.
+/// A leaf of a photon map, one line.
 ///
-/// | bytes | what |
+/// | bytes | contents |
 /// |---|---|
-/// | 0..8 | bits 0-2 which axes vary, 3-6 the number of photons, then the corner's grid coordinates x, y, z |
-/// | 8.. | for each axis that varies, from the corner on, two bytes a photon |
-/// | to 128 | contents, 8 bytes each, the first photon's at the end of the line |
+/// | 0..8 | bits 0-2 varying axes, 3-6 number of photons, then the corner's grid coordinates x, y, z |
+/// | 8.. | for each varying axis, the photons' offsets from the corner, two bytes each |
+/// | ..128 | contents of the photons, 8 bytes each, in reverse: the first photon's at the end of the line |
 ///
-/// A corner's coordinate takes 20 bits, or 17 where the axis varies: a multiple of 8 then. At least one axis is said to
-/// vary. Contents are the last 8 bytes of [`super::Photon`], without an axis.
+/// A coordinate of the corner has 20 bits, or 17 on a varying axis, where it is a multiple of 8. At least one axis is
+/// marked as varying. Contents are the last 8 bytes of [`super::Photon`], without the splitting axis.
 #[derive(Clone, Copy)]
 pub struct PhotonLeaf<'a> {
     line: &'a [u8; LINE_BYTES],
@@ -29,36 +30,36 @@ pub struct PhotonLeaf<'a> {
 #[derive(Clone, Copy)]
 struct LeafAxis {
     corner: u32,
-    /// The byte of the first photon's coordinate.
+    /// Position in the line of the first photon's offset.
     first: u32,
-    /// What of the bytes there is a coordinate: nothing if the axis does not vary.
+    /// Mask of the offsets: all bits, or 0 if the axis does not vary.
     mask: u16,
 }
 
 /// One axis of a leaf's photons: the grid coordinate of photon `i` is `corner + (offsets[i] & mask)`.
 #[derive(Clone, Copy)]
 pub struct LeafCoordinates<'a> {
-    /// What is added to each offset.
+    /// Grid coordinate of the leaf's corner.
     pub corner: u32,
-    /// Of each photon, and of what comes behind the last; little-endian.
+    /// Offset of each photon, little-endian; the lanes past the last photon hold other bytes of the line.
     pub offsets: &'a [[u8; 2]; LEAF_LANES],
-    /// What of an offset counts.
+    /// Mask of the offsets: all bits, or 0 if the axis does not vary.
     pub mask: u16,
 }
 
-/// Photons that a leaf may have.
+/// Maximum number of photons of a leaf.
 pub const LEAF_PHOTONS: usize = 12;
-/// Coordinates that are read at once.
+/// Lanes of [`LeafCoordinates`].
 pub const LEAF_LANES: usize = 16;
 
 const HEADER_BYTES: usize = 8;
 const AXES_BITS: u32 = 3;
 const COUNT_BITS: u32 = 4;
-/// Lower bits that the corner does without where an axis varies.
+/// Low bits of the corner's coordinate that are not stored, and zero, on a varying axis.
 const CORNER_ROUNDING: u32 = 3;
 const _: () = assert!(HEADER_BYTES + 2 * 2 * LEAF_PHOTONS + 2 * LEAF_LANES <= LINE_BYTES);
 
-/// Photons that a leaf has room for if so many axes vary.
+/// Maximum number of photons of a leaf with `axes` varying axes.
 pub const fn leaf_capacity(axes: usize) -> usize {
     let axes = if axes < 1 { 1 } else { axes };
     (LINE_BYTES - HEADER_BYTES) / (PHOTON_CONTENT_BYTES + 2 * axes)
@@ -69,7 +70,7 @@ impl<'a> PhotonLeaf<'a> {
     #[inline(always)]
     pub fn read(line: &'a [u8; LINE_BYTES]) -> Self {
         let header = line.first_chunk().map_or(0, |&bytes| u64::from_le_bytes(bytes));
-        // More are in unsound images only.
+        // Above the maximum in unsound images only.
         let photons = ((header >> AXES_BITS) as u32 & ((1 << COUNT_BITS) - 1)).min(LEAF_PHOTONS as u32);
         let mut bit = AXES_BITS + COUNT_BITS;
         let mut first = HEADER_BYTES as u32;
@@ -92,44 +93,44 @@ impl<'a> PhotonLeaf<'a> {
         self.photons
     }
 
-    /// The coordinates of all photons, by axis.
+    /// Coordinates of all photons, by axis.
     #[inline(always)]
     pub fn coordinates(&self) -> [LeafCoordinates<'a>; 3] {
         const NONE: &[[u8; 2]; LEAF_LANES] = &[[0; 2]; LEAF_LANES];
         self.axes.map(|LeafAxis { corner, first, mask }| {
-            // They are there: three axes of the greatest number of photons end before the line does.
+            // Never out of range: with the maximum number of photons, the lanes of the third axis end within the line.
             let bytes = self.line.get(first as usize..).unwrap_or_default();
             LeafCoordinates { corner, offsets: bytes.as_chunks().0.first_chunk().unwrap_or(NONE), mask }
         })
     }
 
-    /// The grid point of photon `index`.
+    /// Grid point of photon `index`.
     #[inline(always)]
     pub fn point(&self, index: u32) -> [u32; 3] {
         self.coordinates().map(|axis| axis.coordinate(index))
     }
 
-    /// What the photons carry: the first photon's last.
+    /// Contents of the photons, in reverse: the first photon's is the last element.
     #[inline(always)]
     pub fn contents(&self) -> &'a [[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] {
         const NONE: &[[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] = &[[0; PHOTON_CONTENT_BYTES]; LEAF_LANES];
         self.line.as_chunks().0.first_chunk().unwrap_or(NONE)
     }
 
-    /// What photon `index` carries.
+    /// Content of photon `index`.
     #[inline(always)]
     pub fn content(&self, index: u32) -> [u8; PHOTON_CONTENT_BYTES] {
         self.contents().iter().nth_back(index as usize).copied().unwrap_or_default()
     }
 
-    /// Which axes of a leaf vary if its photons have this box: at least one.
+    /// Varying axes of a leaf whose photons have this bounding box; at least one is marked.
     fn varying(bounds: &GridBox) -> [bool; 3] {
         let ([a, b, c], [x, y, z]) = (bounds.lower, bounds.upper);
         let varies = [a != x, b != y, c != z];
         if varies == [false; 3] { [true, false, false] } else { varies }
     }
 
-    /// Whether a line holds so many photons that have this box.
+    /// Returns whether a leaf can hold `photons` photons with this bounding box.
     pub fn fits(bounds: &GridBox, photons: usize) -> bool {
         let varies = Self::varying(bounds);
         let axes = varies.into_iter().filter(|&varies| varies).count();
@@ -140,7 +141,7 @@ impl<'a> PhotonLeaf<'a> {
         photons > 0 && photons <= leaf_capacity(axes) && sides.all(is_near)
     }
 
-    /// The line of some photons; `None` if it cannot hold them, or there is none.
+    /// The line of a leaf; `None` if there are no photons or the leaf cannot hold them ([`Self::fits`]).
     pub fn encode(photons: &[([u32; 3], [u8; PHOTON_CONTENT_BYTES])]) -> Option<[u8; LINE_BYTES]> {
         let bounds = photons.iter().map(|(point, _)| GridBox::of(*point)).reduce(GridBox::union)?;
         if !Self::fits(&bounds, photons.len()) {
@@ -171,7 +172,7 @@ impl<'a> PhotonLeaf<'a> {
         Some(line)
     }
 
-    /// Changes the disc fraction of photon `index` in its line; nothing if there is none.
+    /// Sets the disc fraction's code of photon `index` in the line of a leaf; no effect past the last photon.
     pub fn set_disc(line: &mut [u8; LINE_BYTES], index: u32, disc: u8) {
         if index >= PhotonLeaf::read(line).photons() {
             return;

@@ -1,50 +1,50 @@
 //! Inner nodes of the photon map: the boxes of sixteen children, in one line.
 //!
-//! Boxes lie on a grid of their own, eight bits each way, within the box of the node: a child's is never less than what it
-//! holds. Coordinates of one side of all children lie side by side, so that one instruction reads them all.
+//! The boxes are quantised conservatively to 8 bits an axis on a grid of the node: a child's box contains all its
+//! photons. One side of all children's boxes is contiguous, so that one vector instruction reads it.
 
 use super::photon_grid::GRID_MASK;
 use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides};
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// An inner node, one line: a [`WideNode`] whose sides are in units from a corner, and
+/// An inner node of a photon map, one line: a [`WideNode`] whose sides are in the node's units from its corner, and
 ///
-/// | bytes | what |
+/// | bytes | contents |
 /// |---|---|
-/// | 0..12 | x, y, z of the corner: bits 0-23 the grid coordinate, 24-31 the exponent of the unit of boxes on this axis |
+/// | 0..12 | x, y, z of the corner: bits 0-23 grid coordinate, 24-31 exponent of the unit on this axis |
 #[derive(Clone, Copy)]
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const COORDINATE_BITS: u32 = 24;
-/// The greatest exponent: that of a box as large as the grid.
+/// Maximum of [`NodeCoordinates::exponent`]: the one of a box as large as the grid.
 const MOST_EXPONENT: u32 = 13;
 
-/// A box on the photons' grid: the least and the greatest coordinates, both in it.
+/// An axis-aligned box on the [`super::PhotonGrid`], bounds inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GridBox {
-    /// The least coordinates.
+    /// Minimum corner, grid coordinates.
     pub lower: [u32; 3],
-    /// The greatest coordinates.
+    /// Maximum corner, grid coordinates.
     pub upper: [u32; 3],
 }
 
-/// One axis of the boxes of a node: a side of child `i` is at `corner + (lower[i] << exponent)`, the other one at
+/// One axis of the children's boxes: child `i` extends from `corner + (lower[i] << exponent)` to
 /// `corner + (upper[i] << exponent)`.
 #[derive(Clone, Copy)]
 pub struct NodeCoordinates<'a> {
-    /// The grid coordinate from which on sides are told.
+    /// Grid coordinate of the node's corner.
     pub corner: u32,
-    /// The logarithm of their unit.
+    /// Base-2 logarithm of the unit of `lower` and `upper`, in grid cells.
     pub exponent: u32,
-    /// Of each child, and of what is no child.
+    /// Lower side of each child's box; lanes past the last child are meaningless.
     pub lower: &'a [u8; NODE_CHILDREN],
-    /// The same.
+    /// Upper side of each child's box; lanes past the last child are meaningless.
     pub upper: &'a [u8; NODE_CHILDREN],
 }
 
 impl<'a> PhotonNode<'a> {
-    /// The boxes of the children, by axis.
+    /// Boxes of the children, by axis.
     #[inline(always)]
     pub fn coordinates(&self) -> [NodeCoordinates<'a>; 3] {
         [0, 1, 2].map(|axis| {
@@ -59,7 +59,7 @@ impl<'a> PhotonNode<'a> {
         })
     }
 
-    /// The line of a node; `None` if there is no child or too many.
+    /// The line of a node; `None` if there are no children or too many.
     pub fn encode(children: &[GridBox], links: Links) -> Option<[u8; LINE_BYTES]> {
         let around = children.iter().copied().reduce(GridBox::union)?;
         let mut line = [0; LINE_BYTES];
@@ -69,7 +69,7 @@ impl<'a> PhotonNode<'a> {
             let corner = side(&around.lower);
             let exponent =
                 (side(&around.upper) - corner).checked_ilog2().map_or(0, |bits| (bits + 1).saturating_sub(8));
-            // Of a side that is rounded up the last unit may not do.
+            // Rounding up may take the upper side past 255 units.
             let exponent = if (side(&around.upper) - corner).div_ceil(1 << exponent) > 255 {
                 exponent + 1
             } else {
@@ -87,12 +87,12 @@ impl<'a> PhotonNode<'a> {
 }
 
 impl GridBox {
-    /// The least box around a point.
+    /// The box of one point.
     pub const fn of(point: [u32; 3]) -> Self {
         Self { lower: point, upper: point }
     }
 
-    /// The least box around two.
+    /// The smallest box around two boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         let mut union = self;
@@ -105,14 +105,14 @@ impl GridBox {
         union
     }
 
-    /// Whether all of another box lies in this one.
+    /// Returns whether `other` lies within this box.
     pub fn contains(&self, other: &Self) -> bool {
         self.union(*other) == *self
     }
 }
 
 impl NodeCoordinates<'_> {
-    /// The sides of a child's box.
+    /// Lower and upper side of a child's box, grid coordinates.
     pub fn sides(&self, child: usize) -> Option<[u32; 2]> {
         let [lower, upper] = [*self.lower.get(child)?, *self.upper.get(child)?];
         Some([lower, upper].map(|side| self.corner + (u32::from(side) << self.exponent)))

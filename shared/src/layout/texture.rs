@@ -1,56 +1,56 @@
-//! Textures: how an image lies on surfaces, and where its texels are.
+//! Textures: image, sampler and coordinate transform (glTF `KHR_texture_transform`).
 
 use super::{Record, read_f32, read_u32, write_f32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// Texels of one line: a tile of the image, in rows, so that neighbours share a line.
+/// Texels in one line: a tile of the image, row-major, so that neighbours share a line.
 pub const TEXELS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 /// Columns of a tile.
 pub const TILE_WIDTH: u32 = 8;
 /// Rows of a tile.
 pub const TILE_HEIGHT: u32 = TEXELS_PER_LINE / TILE_WIDTH;
 
-/// A texture. Tiles are in rows, and those of the right and lower border are whole.
+/// A texture. Its tiles are row-major; tiles at the right and lower border are padded to full size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
-    /// The first line of its texels, counted in their section.
+    /// First line of its texels, counted from the start of [`crate::image::SectionKind::Texels`].
     pub first_line: u32,
-    /// Texels in a row and rows: 1 to 65535.
+    /// Width and height, texels: 1 to 65535.
     pub size: [u16; 2],
-    /// What is beyond its edges, to the sides, and above and below.
+    /// Wrap modes of u and v.
     pub wrap: [Wrap; 2],
-    /// Whether the nearest texel is taken, and not a mean of four.
+    /// True for nearest-neighbour filtering, false for bilinear.
     pub nearest: bool,
-    /// Which of a triangle's two sets of texture coordinates it lies by.
+    /// Index of the set of texture coordinates: 0 or 1, of the two that a triangle may have.
     pub set: u32,
-    /// What texels are.
+    /// Encoding of the texels.
     pub format: TexelFormat,
-    /// Rows of the matrix that coordinates are multiplied with.
+    /// Rows of the matrix of the coordinate transform `matrix uv + offset`.
     pub matrix: [[f32; 2]; 2],
-    /// What is added to them then.
+    /// Offset of the coordinate transform `matrix uv + offset`.
     pub offset: [f32; 2],
 }
 
-/// What is beyond the edge of a texture.
+/// Wrap mode of a texture coordinate outside [0, 1], as in a glTF sampler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// The texture again.
+    /// `REPEAT`.
     #[default]
     Repeat,
-    /// The texture mirrored.
+    /// `MIRRORED_REPEAT`.
     Mirror,
-    /// The texel at the edge.
+    /// `CLAMP_TO_EDGE`.
     Clamp,
 }
 
-/// What four bytes of a texel are.
+/// Encoding of a texel, four bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TexelFormat {
-    /// Red, green and blue by the sRGB transfer function, linear alpha.
+    /// RGBA, 8 bits a channel: red, green and blue by the sRGB transfer function, alpha linear.
     Srgb,
-    /// Red, green, blue and alpha, linear.
+    /// RGBA, 8 bits a channel, linear.
     Linear,
-    /// Nine bits each of red, green and blue, five of a shared exponent, as OpenGL's `RGB9_E5`; alpha is 1.
+    /// OpenGL's `RGB9_E5`: red, green and blue of nine bits each, a shared exponent of five; alpha is 1.
     SharedExponent,
 }
 
@@ -77,7 +77,7 @@ impl Texture {
         let number = |index: usize| read_f32(bytes, 12 + 4 * index);
         Self {
             first_line: read_u32(bytes, 0),
-            // None is empty in a sound image.
+            // 0 in unsound images only.
             size: [(size as u16).max(1), ((size >> 16) as u16).max(1)],
             wrap: [wrap(0), wrap(1)],
             nearest: flags & NEAREST != 0,
@@ -112,13 +112,13 @@ impl Texture {
         bytes
     }
 
-    /// Lines of its texels.
+    /// Number of lines of its texels.
     pub fn lines(&self) -> u32 {
         let [width, height] = self.size.map(u32::from);
         width.div_ceil(TILE_WIDTH) * height.div_ceil(TILE_HEIGHT)
     }
 
-    /// The line of a texel, counted in the section, and its place in there.
+    /// Line of a texel, counted from the start of the section, and the texel's index in the line.
     #[inline(always)]
     pub fn locate(&self, column: u32, row: u32) -> (u32, usize) {
         let tiles_across = u32::from(self.size[0]).div_ceil(TILE_WIDTH);

@@ -1,43 +1,44 @@
-//! What inner nodes of both trees of a card image have in common: up to sixteen children, leaves before nodes, each kind
-//! numbered one after the other.
+//! The common part of [`super::BvhNode`] and [`super::PhotonNode`]: an inner node of up to sixteen children. Children
+//! that are leaves come before children that are nodes; the indices of either kind are consecutive.
 
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// Children that a node may have.
+/// Maximum number of children of an inner node.
 pub const NODE_CHILDREN: usize = 16;
 const FIRST_LEAF: usize = 12;
 const FIRST_NODE: usize = 16;
 const LEAVES: usize = 20;
 const CHILDREN: usize = 21;
-/// Where the sides of the children's boxes begin: sixteen bytes each for lower x, y, z, upper x, y, z.
+/// Offset of the children's boxes: sixteen bytes each of lower x, y, z, upper x, y, z.
 const SIDES: usize = 32;
 const _: () = assert!(SIDES + 6 * NODE_CHILDREN == LINE_BYTES);
 
-/// What a node holds.
+/// Child of an inner node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
-    /// A leaf, by its index in the image.
+    /// The leaf of this index.
     Leaf(u32),
-    /// A node, by its index in the image.
+    /// The inner node of this index.
     Node(u32),
 }
 
-/// The children of an inner node.
+/// The common part of inner nodes: children and their boxes.
 ///
-/// | bytes | what |
+/// | bytes | contents |
 /// |---|---|
 /// | 12..16 | index of the first child that is a leaf |
 /// | 16..20 | index of the first child that is a node |
-/// | 20, 21 | children that are leaves, which come first; all children |
-/// | 32..128 | sixteen bytes each: lower x, y, z, upper x, y, z of all children |
+/// | 20 | number of children that are leaves |
+/// | 21 | number of children |
+/// | 32..128 | sides of the children's boxes, sixteen bytes each: lower x, y, z, upper x, y, z |
 #[derive(Clone, Copy)]
 pub struct WideNode<'a>(pub &'a [u8; LINE_BYTES]);
 
-/// Where the children of a node are.
+/// Indices of the children of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Links {
-    /// Children that are leaves, before those that are nodes.
+    /// Number of children that are leaves; they come first.
     pub leaves: u32,
     /// Index of the first leaf.
     pub first_leaf: u32,
@@ -52,7 +53,7 @@ impl<'a> WideNode<'a> {
         u32::from(self.byte(CHILDREN)).min(NODE_CHILDREN as u32)
     }
 
-    /// Where they are.
+    /// Indices of the children.
     #[inline(always)]
     pub fn links(&self) -> Links {
         Links {
@@ -62,7 +63,7 @@ impl<'a> WideNode<'a> {
         }
     }
 
-    /// The lower and the upper sides of all children on an axis, in the units of the node.
+    /// Lower and upper sides of all children's boxes on one axis, in the node's units.
     #[inline(always)]
     pub(super) fn sides(&self, axis: usize) -> [&'a [u8; NODE_CHILDREN]; 2] {
         const NONE: &[u8; NODE_CHILDREN] = &[0; NODE_CHILDREN];
@@ -92,7 +93,7 @@ impl Links {
     }
 }
 
-/// Writes where the children of a node are; `None` if there is no child or too many.
+/// Writes the links of a node; `None` if there are no children or too many.
 pub(super) fn write_links(line: &mut [u8; LINE_BYTES], children: usize, links: Links) -> Option<()> {
     if children == 0 || children > NODE_CHILDREN || links.leaves as usize > children {
         return None;
@@ -104,7 +105,7 @@ pub(super) fn write_links(line: &mut [u8; LINE_BYTES], children: usize, links: L
     Some(())
 }
 
-/// Writes the sides of a child's box on an axis.
+/// Writes the sides of a child's box on one axis, in the node's units.
 pub(super) fn write_sides(
     line: &mut [u8; LINE_BYTES],
     axis: usize,

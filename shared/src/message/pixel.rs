@@ -1,38 +1,40 @@
-//! The pixels of a tile, as the wire carries them.
+//! Pixels of a tile in the wire format.
 
 /// A pixel of a tile: ten `f32`, little-endian.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pixel {
     /// Radiance towards the eye, W/(sr m^2).
     pub radiance: [f32; 3],
-    /// Mean albedo of the surfaces seen, 0 to 1 a channel; 0 of what sees none.
+    /// Mean albedo of the visible surfaces, 0 to 1 a channel; 0 if no sample sees a surface.
     pub albedo: [f32; 3],
-    /// Mean of the unit normals seen, in world space, on the side of the eye; 0 of what sees none.
+    /// Mean of the visible surfaces' unit normals, in world space, on the side of the eye; 0 if no sample sees a
+    /// surface.
     pub normal: [f32; 3],
-    /// Mean distance along the view's axis of the surfaces seen, metres; infinite where none is.
+    /// Mean depth of the visible surfaces, metres along the view axis; infinite if no sample sees a surface.
     pub depth: f32,
 }
 
-/// What a pixel's radiance consists of, and what it took: ten `f32`, little-endian.
+/// Layers of a pixel: the components of its radiance, and its number of final gathers; ten `f32`, little-endian.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelLayers {
-    /// Emission that is seen, light of emitters by shadow rays, and emission that gather rays of the pixel meet, W/(sr m^2).
+    /// Direct light, W/(sr m^2): visible emission, and light of emitters by shadow rays and by the pixel's own gather
+    /// rays.
     pub direct: [f32; 3],
-    /// Light that photons bring at the ends of gather rays, and interpolated irradiance, W/(sr m^2). Emission that the rays of an
-    /// irradiance record met is a part of that irradiance.
+    /// Indirect light, W/(sr m^2): radiance estimates at the ends of gather rays, and interpolated irradiance, which
+    /// includes the emission met by the irradiance records' rays.
     pub indirect: [f32; 3],
-    /// Light that comes through specular surfaces, W/(sr m^2).
+    /// Caustics, W/(sr m^2): radiance estimates in the caustic map.
     pub caustic: [f32; 3],
-    /// How many of the pixel's samples took a final gather of their own, and no interpolated irradiance.
+    /// Number of the pixel's samples with a final gather of their own instead of interpolated irradiance.
     pub gathers: f32,
 }
 
-/// A pixel as the wire carries it: [`Pixel`], and behind it [`PixelLayers`] if the frame has layers.
+/// A pixel in the wire format: [`Pixel`], followed by [`PixelLayers`] if the frame has layers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelRecord {
-    /// What every picture has.
+    /// Radiance, albedo, normal and depth.
     pub pixel: Pixel,
-    /// What a picture with layers has besides.
+    /// Layers; `None` in a picture without layers.
     pub layers: Option<PixelLayers>,
 }
 
@@ -40,10 +42,10 @@ pub struct PixelRecord {
 pub const PIXEL_BYTES: usize = 40;
 /// Bytes of one [`PixelLayers`].
 pub const LAYER_BYTES: usize = 40;
-/// Bytes of pixels that one [`super::Reply::Pixels`] may carry.
+/// Maximum length of the pixels in one [`super::Reply::Pixels`], bytes.
 pub const PIXELS_BYTES: usize = 25 * PIXEL_BYTES;
 
-/// Bytes of one [`PixelRecord`].
+/// Bytes of one [`PixelRecord`] without or with layers.
 pub const fn record_bytes(layers: bool) -> usize {
     if layers { PIXEL_BYTES + LAYER_BYTES } else { PIXEL_BYTES }
 }
@@ -92,7 +94,7 @@ impl PixelLayers {
 }
 
 impl PixelRecord {
-    /// Reads a record of [`record_bytes`]; `None` of any other length.
+    /// Reads a record; `None` if `bytes` is not [`record_bytes`] long.
     pub fn read(bytes: &[u8]) -> Option<Self> {
         let (pixel, rest) = bytes.split_first_chunk()?;
         let layers = if rest.is_empty() { None } else { Some(PixelLayers::read(rest.try_into().ok()?)) };
