@@ -9,13 +9,12 @@ mod fault_injector;
 mod host_port;
 mod listener;
 mod loopback;
+mod serial;
 mod socket;
 mod stream;
 
 #[cfg(unix)]
 mod pty;
-#[cfg(unix)]
-mod serial;
 #[cfg(not(unix))]
 mod unsupported;
 
@@ -24,12 +23,11 @@ pub use fault_injector::{FaultInjector, LineFaults};
 pub use host_port::HostPort;
 pub use listener::{ListenAddress, Listener};
 pub use loopback::{LoopbackPort, loopback};
-#[cfg(unix)]
-pub use serial::open_serial;
+pub use serial::{SerialLink, open_serial};
 pub use socket::connect_tcp;
 #[cfg(unix)]
 pub use socket::connect_unix;
 pub(crate) use socket::{host_name, tcp_address};
 pub use stream::StreamPort;
 #[cfg(not(unix))]
-pub use unsupported::{connect_unix, open_serial};
+pub use unsupported::connect_unix;
