@@ -55,6 +55,8 @@ pub(crate) enum SceneCommand {
 
 #[derive(Subcommand)]
 pub(crate) enum CardCommand {
+    /// List the serial ports of this machine: path, USB name, serial number, and the address for --card
+    List,
     /// Tell what a card can hold
     Info {
         /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH

@@ -79,6 +79,11 @@ impl LinkError {
         Self::new("listen on", address, reason, remedy)
     }
 
+    /// Serial ports that could not be listed.
+    pub(super) fn list(error: &io::Error) -> Self {
+        Self::other("list", "serial ports", error, "give the port's path: --card serial:PATH")
+    }
+
     fn new(action: &'static str, address: impl Display, reason: &str, remedy: &'static str) -> Self {
         Self { action, address: address.to_string(), reason: reason.into(), remedy }
     }

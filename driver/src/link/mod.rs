@@ -1,6 +1,6 @@
 //! Links to cards: ports of bytes.
 //!
-//! A card in this process is on a [`loopback`]; others are reached over serial ports ([`open_serial`]) and sockets
+//! A card in this process is on a [`loopback`]; others are reached over serial ports ([`open_serial`]; [`list_serial_ports`] says which there are) and sockets
 //! ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the other side: where hosts come to a card that this process
 //! emulates, one after another ([`HostPort`]). A [`FaultInjector`] makes any of them a bad one.
 
@@ -10,6 +10,7 @@ mod host_port;
 mod listener;
 mod loopback;
 mod serial;
+mod serial_list;
 mod socket;
 mod stream;
 
@@ -24,6 +25,7 @@ pub use host_port::HostPort;
 pub use listener::{ListenAddress, Listener};
 pub use loopback::{LoopbackPort, loopback};
 pub use serial::{SerialLink, open_serial};
+pub use serial_list::{ListedPort, list_serial_ports};
 pub use socket::connect_tcp;
 #[cfg(unix)]
 pub use socket::connect_unix;
