@@ -5,8 +5,8 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use photoncard_driver::link::{HostPort, ListenAddress, Listener, connect_tcp, open_serial};
@@ -129,6 +129,35 @@ fn terminals_carry_every_byte() {
         drop(host);
         assert_eq!(card.read(&mut [0; 8], SOON), Ok(0));
     }
+}
+
+/// A write of more than the line has room for ends with what went, and one on a full line with nothing.
+#[test]
+fn a_full_serial_line_holds_nobody() {
+    let listener = Listener::new(&ListenAddress::Pty).unwrap();
+    let path = listener.card_address().strip_prefix("serial:").unwrap().to_owned();
+    let mut host = open_serial(path.as_ref(), 921_600).unwrap();
+    let (sender, receiver) = mpsc::channel();
+    std::thread::spawn(move || {
+        let mut sent = 0;
+        while let count @ 1.. = host.write(&[1; 1 << 16], SOON).unwrap() {
+            sent += count;
+        }
+        assert_eq!(host.write(&[1; 8], Duration::ZERO), Ok(0));
+        assert_eq!(host.read(&mut [0; 8], SOON), Ok(0));
+        sender.send((host, sent)).unwrap();
+    });
+    let (mut host, sent) = receiver.recv_timeout(PATIENCE).expect("no write blocks");
+    let mut card = HostPort::new(listener, Arc::default(), |_| {});
+    assert_eq!(heard(&mut card), b"\0");
+    // The byte before is the end of what another may have left.
+    let mut received = 0;
+    while received < sent + 1 {
+        received += heard(&mut card).len();
+    }
+    drop(card);
+    assert_eq!(host.read(&mut [0; 8], PATIENCE), Err(PortError::Closed));
+    assert_eq!(host.write(&[1; 8], PATIENCE), Err(PortError::Closed));
 }
 
 #[test]

@@ -57,6 +57,8 @@ pub(crate) enum SceneCommand {
 
 #[derive(Subcommand)]
 pub(crate) enum CardCommand {
+    /// List the serial ports of this machine: path, USB name, serial number, and the address for --card
+    List,
     /// Tell what a card can hold
     Info {
         /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
@@ -201,8 +203,8 @@ pub(crate) struct RenderOptions {
     /// photon=128K/128/4,scene=75K/128/4]
     #[arg(long, value_name = "CACHES")]
     cache: Option<CacheSettings>,
-    /// Write every read of an emulated chip in Dinero's input format, compressed; a frame has billions: use --crop
-    #[arg(long, value_name = "OUT.din.zst")]
+    /// Write every read of an emulated chip in Dinero's input format, compressed by gzip; a frame has billions: use --crop
+    #[arg(long, value_name = "OUT.din.gz")]
     pub(crate) trace: Option<PathBuf>,
     /// Threads of the host's own work [default: a thread a core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]

@@ -6,6 +6,7 @@
 
 mod arguments;
 mod card;
+mod card_list;
 mod console;
 mod diff;
 mod emulate;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
     let result = match &arguments.command {
         Command::Render(options) => render::run(options),
         Command::Scene(SceneCommand::Info { scene }) => scene::info(scene),
+        Command::Card(CardCommand::List) => card_list::run(),
         Command::Card(CardCommand::Info { card }) => card::info(card),
         Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),
         Command::Emulate(options) => emulate::run(options),

@@ -40,6 +40,28 @@ fn scene_info_tells_of_textures_lights_and_what_is_ignored() {
     }
 }
 
+/// The ports that a machine has are its own; each line gives the address of one, by its path.
+#[test]
+fn card_list_gives_an_address_for_every_serial_port() {
+    let outcome = Room::new().run(&["card", "list"]);
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    if outcome.stdout.is_empty() {
+        assert!(outcome.stderr.contains("no serial port"), "{}", outcome.stderr);
+        return;
+    }
+    assert_eq!(outcome.stderr, "");
+    let (head, ports) = outcome.stdout.split_once('\n').unwrap();
+    assert_eq!(
+        head.split_whitespace().collect::<Vec<_>>(),
+        ["path", "USB", "name", "serial", "number", "--card"]
+    );
+    let paths: Vec<_> = ports.lines().map(|line| line.split_whitespace().next().unwrap()).collect();
+    assert!(!paths.is_empty() && paths.is_sorted(), "{ports}");
+    for (path, line) in paths.iter().zip(ports.lines()) {
+        assert!(line.ends_with(&format!(" serial:{path}@115200")), "{line}");
+    }
+}
+
 #[test]
 fn card_info_tells_what_a_card_holds() {
     for (card, dram) in [("emulated", 536_870_912), ("emulated-micro:2", 16_777_216)] {

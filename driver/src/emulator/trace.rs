@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
@@ -23,9 +25,9 @@ const LONGEST_LINE: usize = 16;
 const READ: u8 = 0;
 const FLUSH: u8 = 4;
 
-/// A trace on its way to a file, compressed by Zstandard. A file appears only when it is finished.
+/// A trace on its way to a file, compressed by gzip. A file appears only when it is finished.
 pub struct TraceFile {
-    encoder: zstd::Encoder<'static, PendingFile>,
+    encoder: GzEncoder<PendingFile>,
     buffer: Vec<u8>,
     path: PathBuf,
     /// The first failure; nothing is written after it.
@@ -39,11 +41,8 @@ impl TraceFile {
     /// # Errors
     /// As [`crate::output::check_writable`].
     pub fn create(path: &Path) -> Result<Self, OutputError> {
-        let file = PendingFile::create(path)?;
-        let encoder = zstd::Encoder::new(file, zstd::DEFAULT_COMPRESSION_LEVEL)
-            .map_err(|source| OutputError::Write { path: path.to_owned(), source })?;
         Ok(Self {
-            encoder,
+            encoder: GzEncoder::new(PendingFile::create(path)?, Compression::fast()),
             buffer: Vec::with_capacity(BUFFER),
             path: path.to_owned(),
             error: None,
@@ -155,6 +154,9 @@ impl<M: CardMemory> CardMemory for Traced<M> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
+    use flate2::read::GzDecoder;
     use photoncard_firmware::memory::Lines;
 
     use super::*;
@@ -162,7 +164,7 @@ mod tests {
     #[test]
     fn a_trace_has_a_flush_for_a_tile_and_a_line_for_a_read_of_it() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("trace.din.zst");
+        let path = folder.path().join("trace.din.gz");
         let lines = [Line::ZERO; 3];
         let mut memory = Traced::new(Lines(&lines), Some(TraceFile::create(&path).unwrap()));
         memory.read(Structure::Header, LineAddress(0), 0..128).unwrap();
@@ -174,7 +176,7 @@ mod tests {
         let trace = memory.take_trace().unwrap();
         assert!(!path.exists());
         trace.finish().unwrap();
-        let text = zstd::decode_all(std::fs::File::open(&path).unwrap()).unwrap();
-        assert_eq!(String::from_utf8(text).unwrap(), "4 0\n0 114\n4 0\n0 94\n");
+        let text = io::read_to_string(GzDecoder::new(fs::File::open(&path).unwrap())).unwrap();
+        assert_eq!(text, "4 0\n0 114\n4 0\n0 94\n");
     }
 }

@@ -14,6 +14,8 @@ pub struct LinkError {
     remedy: &'static str,
 }
 
+const UNIX_ONLY: &str = "only Unix systems have such links";
+
 impl LinkError {
     /// A serial port that could not be opened.
     pub(super) fn open(address: impl Display, error: &io::Error) -> Self {
@@ -30,7 +32,10 @@ impl LinkError {
             ErrorKind::InvalidInput => {
                 ("it does not run at that speed", "choose a speed that both ends have, such as @115200")
             }
-            _ => return Self::other("open", address, error, "check that the path names a serial port"),
+            _ => {
+                let remedy = "check that the path names a serial port, which no other program uses";
+                return Self::other("open", address, error, remedy);
+            }
         };
         Self::new("open", address, reason, remedy)
     }
@@ -50,6 +55,7 @@ impl LinkError {
             ErrorKind::TimedOut | ErrorKind::HostUnreachable | ErrorKind::NetworkUnreachable => {
                 ("it does not answer", "check the network, the address and firewalls")
             }
+            ErrorKind::Unsupported => (UNIX_ONLY, "use a card on a TCP port: tcp:HOST:PORT"),
             _ => return Self::other("connect to", address, error, "check the address"),
         };
         Self::new("connect to", address, reason, remedy)
@@ -67,9 +73,15 @@ impl LinkError {
                 ("no permission to listen there", "choose a port above 1023, or a folder you may write to")
             }
             ErrorKind::NotFound => ("its folder does not exist", "create the folder, or choose another path"),
+            ErrorKind::Unsupported => (UNIX_ONLY, "listen on a TCP port: tcp:PORT"),
             _ => return Self::other("listen on", address, error, "choose another address"),
         };
         Self::new("listen on", address, reason, remedy)
+    }
+
+    /// Serial ports that could not be listed.
+    pub(super) fn list(error: &io::Error) -> Self {
+        Self::other("list", "serial ports", error, "give the port's path: --card serial:PATH")
     }
 
     fn new(action: &'static str, address: impl Display, reason: &str, remedy: &'static str) -> Self {
@@ -78,5 +90,23 @@ impl LinkError {
 
     fn other(action: &'static str, address: impl Display, error: &io::Error, remedy: &'static str) -> Self {
         Self::new(action, address, &error.to_string(), remedy)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_that_a_system_lacks_are_named_with_one_that_it_has() {
+        let lacking = ErrorKind::Unsupported.into();
+        for (error, address) in [
+            (LinkError::connect("unix:card", &lacking), "unix:card"),
+            (LinkError::listen("pty", &lacking), "pty"),
+        ] {
+            let text = error.to_string();
+            assert!(text.contains(address) && text.ends_with("only Unix systems have such links"), "{text}");
+            assert!(error.remedy.contains("tcp:"), "{}", error.remedy);
+        }
     }
 }

@@ -92,7 +92,12 @@ impl Listener {
             #[cfg(unix)]
             ListenAddress::Pty => Self::pty().map_err(|error| LinkError::listen("pty", &error)),
             #[cfg(not(unix))]
-            _ => Err(LinkError::listen("this address", &ErrorKind::Unsupported.into())),
+            ListenAddress::Unix { path } => Err(LinkError::listen(
+                format_args!("unix:{}", path.display()),
+                &ErrorKind::Unsupported.into(),
+            )),
+            #[cfg(not(unix))]
+            ListenAddress::Pty => Err(LinkError::listen("pty", &ErrorKind::Unsupported.into())),
         }
     }
 

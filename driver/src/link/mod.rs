@@ -1,6 +1,6 @@
 //! Links to cards: ports of bytes.
 //!
-//! A card in this process is on a [`loopback`]; others are reached over serial ports ([`open_serial`]) and sockets
+//! A card in this process is on a [`loopback`]; others are reached over serial ports ([`open_serial`]; [`list_serial_ports`] says which there are) and sockets
 //! ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the other side: where hosts come to a card that this process
 //! emulates, one after another ([`HostPort`]). A [`FaultInjector`] makes any of them a bad one.
 
@@ -9,13 +9,13 @@ mod fault_injector;
 mod host_port;
 mod listener;
 mod loopback;
+mod serial;
+mod serial_list;
 mod socket;
 mod stream;
 
 #[cfg(unix)]
 mod pty;
-#[cfg(unix)]
-mod serial;
 #[cfg(not(unix))]
 mod unsupported;
 
@@ -24,12 +24,12 @@ pub use fault_injector::{FaultInjector, LineFaults};
 pub use host_port::HostPort;
 pub use listener::{ListenAddress, Listener};
 pub use loopback::{LoopbackPort, loopback};
-#[cfg(unix)]
-pub use serial::open_serial;
+pub use serial::{SerialLink, open_serial};
+pub use serial_list::{ListedPort, list_serial_ports};
 pub use socket::connect_tcp;
 #[cfg(unix)]
 pub use socket::connect_unix;
 pub(crate) use socket::{host_name, tcp_address};
 pub use stream::StreamPort;
 #[cfg(not(unix))]
-pub use unsupported::{connect_unix, open_serial};
+pub use unsupported::connect_unix;

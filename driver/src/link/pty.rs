@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use rustix::event::PollFlags;
 use rustix::fs::{Mode, OFlags};
+use rustix::io::FdFlags;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{self, OptionalActions};
 
@@ -23,7 +24,8 @@ pub(super) struct Pty {
 impl Pty {
     /// A pseudo terminal for raw bytes, and its path.
     pub(super) fn open() -> io::Result<(Self, PathBuf)> {
-        let controller = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+        let controller = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        rustix::io::fcntl_setfd(&controller, FdFlags::CLOEXEC)?;
         grantpt(&controller)?;
         unlockpt(&controller)?;
         let path = PathBuf::from(OsString::from_vec(ptsname(&controller, Vec::new())?.into_bytes()));

@@ -1,4 +1,4 @@
-//! A port on a stream of the system: a socket, a serial port or a pseudo terminal.
+//! A port on a stream of the system: a socket, or the card's end of a pseudo terminal.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::time::Duration;
@@ -65,7 +65,7 @@ pub(super) fn wait_for(stream: &impl AsFd, events: PollFlags, wait: Duration) ->
 }
 
 /// The bytes that have moved; none if they could not yet.
-fn moved(result: io::Result<usize>) -> Result<usize, PortError> {
+pub(super) fn moved(result: io::Result<usize>) -> Result<usize, PortError> {
     result.or_else(|error| match error.kind() {
         ErrorKind::WouldBlock | ErrorKind::Interrupted => Ok(0),
         ErrorKind::ConnectionReset
@@ -79,9 +79,15 @@ fn moved(result: io::Result<usize>) -> Result<usize, PortError> {
     })
 }
 
+/// Whether the device of a terminal is gone.
+#[cfg(unix)]
 fn is_gone(error: &io::Error) -> bool {
-    cfg!(unix)
-        && rustix::io::Errno::from_io_error(error).is_some_and(|errno| {
-            [rustix::io::Errno::IO, rustix::io::Errno::NODEV, rustix::io::Errno::NXIO].contains(&errno)
-        })
+    use rustix::io::Errno;
+    Errno::from_io_error(error).is_some_and(|errno| [Errno::IO, Errno::NODEV, Errno::NXIO].contains(&errno))
+}
+
+/// Sockets, the only streams elsewhere, say it by the kind of the error.
+#[cfg(not(unix))]
+fn is_gone(_: &io::Error) -> bool {
+    false
 }

@@ -54,6 +54,11 @@ impl Default for CardAddress {
 }
 
 impl CardAddress {
+    /// A card on a serial port, at the speed for which none is given.
+    pub fn serial(path: impl Into<PathBuf>) -> Self {
+        Self::Serial { path: path.into(), baud: DEFAULT_BAUD }
+    }
+
     /// Chips that this process emulates there.
     pub(super) fn emulated_chips(&self) -> usize {
         match *self {

@@ -1,0 +1,78 @@
+//! Serial ports of this machine, where cards may be.
+
+use std::io;
+
+use serialport::SerialPortType;
+
+use super::LinkError;
+
+/// A serial port of this machine.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ListedPort {
+    /// Its path, on Windows its name.
+    pub path: String,
+    /// Manufacturer and product as a USB device tells them, any text at all; empty for other ports.
+    pub usb_name: String,
+    /// The serial number that a USB device tells, any text at all; empty where there is none.
+    pub serial_number: String,
+}
+
+/// The serial ports of this machine, in the order of their paths. Pseudo terminals are not among them.
+///
+/// # Errors
+/// If the system does not tell.
+pub fn list_serial_ports() -> Result<Vec<ListedPort>, LinkError> {
+    let mut ports = available().map_err(|error| LinkError::list(&error))?;
+    ports.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(ports)
+}
+
+fn available() -> io::Result<Vec<ListedPort>> {
+    // Without it, `serialport` panics: a container may have no /sys.
+    if cfg!(target_os = "linux") {
+        std::fs::read_dir("/sys/class/tty")?;
+    }
+    Ok(serialport::available_ports()?.into_iter().map(listed).collect())
+}
+
+fn listed(port: serialport::SerialPortInfo) -> ListedPort {
+    let path = port.port_name;
+    match port.port_type {
+        SerialPortType::UsbPort(usb) => {
+            let names = [usb.manufacturer, usb.product].map(Option::unwrap_or_default);
+            ListedPort {
+                path,
+                usb_name: names.join(" ").trim().to_owned(),
+                serial_number: usb.serial_number.unwrap_or_default(),
+            }
+        }
+        _ => ListedPort { path, ..ListedPort::default() },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serialport::{SerialPortInfo, UsbPortInfo};
+
+    use super::*;
+
+    #[test]
+    fn a_port_has_what_its_device_tells() {
+        let usb = |manufacturer: Option<&str>, product: Option<&str>, serial_number: Option<&str>| {
+            let [manufacturer, product, serial_number] =
+                [manufacturer, product, serial_number].map(|text| text.map(str::to_owned));
+            let info = UsbPortInfo { vid: 1, pid: 2, serial_number, manufacturer, product };
+            listed(SerialPortInfo { port_name: "p".into(), port_type: SerialPortType::UsbPort(info) })
+        };
+        let port = |usb_name: &str, serial_number: &str| ListedPort {
+            path: "p".into(),
+            usb_name: usb_name.into(),
+            serial_number: serial_number.into(),
+        };
+        assert_eq!(usb(Some("ST"), Some("STLINK-V3"), Some("06")), port("ST STLINK-V3", "06"));
+        assert_eq!(usb(None, Some("STLINK-V3"), None), port("STLINK-V3", ""));
+        assert_eq!(usb(Some("ST"), None, None), port("ST", ""));
+        let other = SerialPortInfo { port_name: "p".into(), port_type: SerialPortType::Unknown };
+        assert_eq!(listed(other), port("", ""));
+    }
+}

@@ -1,0 +1,74 @@
+//! `photoncard card list`.
+
+use photoncard_driver::link::{ListedPort, list_serial_ports};
+use photoncard_driver::render::CardAddress;
+
+use crate::console::{print, say};
+use crate::failure::Failure;
+
+const COLUMNS: [&str; 4] = ["path", "USB name", "serial number", "--card"];
+
+/// Prints the serial ports of this machine, a line each, below a line of the columns' names. Without any nothing is printed.
+pub(crate) fn run() -> Result<(), Failure> {
+    let ports = list_serial_ports().map_err(Failure::work)?;
+    if ports.is_empty() {
+        say(format_args!(
+            "photoncard: this machine has no serial port; connect a card, or give its address by --card"
+        ));
+        return Ok(());
+    }
+    print(&table(&ports))
+}
+
+/// Columns that are as wide as their longest entry, two blanks apart; a dash stands for what a port does not tell.
+fn table(ports: &[ListedPort]) -> String {
+    let rows: Vec<[String; 4]> =
+        [COLUMNS.map(str::to_owned)].into_iter().chain(ports.iter().map(row)).collect();
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let [path, name, number] = [0, 1, 2].map(width);
+    rows.iter().map(|[a, b, c, d]| format!("{a:path$}  {b:name$}  {c:number$}  {d}\n")).collect()
+}
+
+fn row(port: &ListedPort) -> [String; 4] {
+    let address = CardAddress::serial(&port.path).to_string();
+    [&port.path, &port.usb_name, &port.serial_number, &address].map(|text| match text.as_str() {
+        "" => "-".into(),
+        text => escaped(text),
+    })
+}
+
+/// Text that a device tells, fit for a terminal: one line, and nothing that steers it.
+fn escaped(text: &str) -> String {
+    text.chars().fold(String::new(), |text, c| match c {
+        '"' | '\'' => text + c.encode_utf8(&mut [0; 4]),
+        c => text + &c.escape_debug().to_string(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ports_are_lines_of_columns_that_nothing_breaks() {
+        let port = |path: &str, usb_name: &str, serial_number: &str| ListedPort {
+            path: path.into(),
+            usb_name: usb_name.into(),
+            serial_number: serial_number.into(),
+        };
+        let ports = [
+            port("/dev/ttyACM0", "Müller's 3\" card", "066BFF"),
+            port("/dev/ttyS0", "", ""),
+            port("/dev/ttyUSB0", "a\u{1b}[2J\nb\u{202e}", "1\t2\\"),
+        ];
+        let expected = r#"
+path          USB name               serial number  --card
+/dev/ttyACM0  Müller's 3" card       066BFF         serial:/dev/ttyACM0@115200
+/dev/ttyS0    -                      -              serial:/dev/ttyS0@115200
+/dev/ttyUSB0  a\u{1b}[2J\nb\u{202e}  1\t2\\         serial:/dev/ttyUSB0@115200
+"#;
+        assert_eq!(format!("\n{}", table(&ports)), expected);
+        let addresses = ports.iter().map(|port| row(port)[3].parse());
+        assert!(addresses.eq(ports.iter().map(|port| Ok(CardAddress::serial(&port.path)))));
+    }
+}
