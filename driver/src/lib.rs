@@ -17,6 +17,7 @@ pub mod pack;
 pub mod partial;
 pub mod photon;
 pub mod preview;
+pub mod printable;
 pub mod render;
 pub mod scene;
 pub mod scheduler;

@@ -260,12 +260,6 @@ fn title() -> String {
     format!("{FAMILY}{VERSION}\n")
 }
 
-/// Text of a file, fit for a terminal.
-fn printable(text: &str) -> String {
-    let escape = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
-    text.chars().map(escape).collect()
-}
-
 /// Every setting that is another, in words.
 fn differences(found: &Value, asked: &Value) -> Vec<String> {
     let empty = Map::new();
@@ -275,6 +269,5 @@ fn differences(found: &Value, asked: &Value) -> Vec<String> {
     let say = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
     differing
         .map(|name| format!("{name} was {} and is {}", say(found.get(name)), say(asked.get(name))))
-        .map(|difference| printable(&difference))
         .collect()
 }

@@ -11,6 +11,7 @@ use photoncard_driver::film::Window;
 use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::photon::PhotonLayout;
+use photoncard_driver::printable::printable;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
@@ -24,6 +25,17 @@ use crate::study::StudyArguments;
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+impl Arguments {
+    /// The arguments of the process. Wrong ones end it, and a message that names them has them escaped.
+    pub(crate) fn parse_printably() -> Self {
+        let given = std::env::args_os();
+        Self::try_parse().unwrap_or_else(|error| {
+            let escaped = given.map(|argument| printable(&argument.to_string_lossy()).into_owned());
+            Self::try_parse_from(escaped).err().unwrap_or(error).exit()
+        })
+    }
 }
 
 #[derive(Subcommand)]

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use miette::{Diagnostic, MietteDiagnostic, Report};
 use photoncard_driver::render::RenderError;
 
-use crate::console::say;
+use crate::console::{say, say_error};
 
 /// Why a command did not do its work.
 pub(crate) enum Failure {
@@ -49,11 +49,11 @@ impl Failure {
     pub(crate) fn report(self) -> ExitCode {
         match self {
             Self::Input(report) => {
-                say(format_args!("{report:?}"));
+                say_error(&report);
                 ExitCode::from(2)
             }
             Self::Work(report) => {
-                say(format_args!("{report:?}"));
+                say_error(&report);
                 ExitCode::from(1)
             }
             Self::Stopped(text) => {

@@ -146,12 +146,6 @@ fn a_file_has_one_render() {
     begin(false, &mut three).unwrap();
 }
 
-#[test]
-fn names_of_settings_are_fit_for_a_terminal() {
-    let said = differences(&json!({ "\u{1b}[2J\u{9b}": "\u{9b}x" }), &json!({}));
-    assert_eq!(said, ["\\u{1b}[2J\\u{9b} was \"\\u{9b}x\" and is nothing"]);
-}
-
 /// A file of nothing but places of the largest tile: each is read and summed for nothing.
 #[test]
 fn a_hostile_file_does_not_take_hours() {

@@ -4,6 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::point::PROGRAM;
 use super::report::Provenance;
+use crate::printable::printable;
 
 impl Provenance {
     /// This program on this machine today, called as `command_line`. Settings are for the study to add.
@@ -12,8 +13,8 @@ impl Provenance {
         Self {
             version: PROGRAM.to_owned(),
             date: date(days),
-            host: host(),
-            command_line,
+            host: printable(&host()).into_owned(),
+            command_line: printable(&command_line).into_owned(),
             settings: Vec::new(),
         }
     }
