@@ -1,6 +1,7 @@
 //! The arguments of every command, and what they mean.
 
 mod picture;
+mod without_effect;
 
 use std::path::PathBuf;
 
@@ -153,8 +154,9 @@ pub(crate) struct RenderOptions {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     caustic_photons: Option<usize>,
     /// Photons that a gather of caustics looks for, at least 8: fewer are sharper, more are smoother
-    #[arg(long, value_name = "K", default_value_t = 50, allow_negative_numbers = true)]
-    caustic_neighbors: u32,
+    /// [default: 50]
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    caustic_neighbors: Option<u32>,
     /// Greatest distance of a gather in metres, or auto: from the photons' density
     #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true)]
     max_distance: MaxDistance,
@@ -180,9 +182,9 @@ pub(crate) struct RenderOptions {
     /// Gather the indirect light of Lambertian surfaces at some places and interpolate between them
     #[arg(long, default_value = "off")]
     irradiance_cache: Switch,
-    /// Relative error that interpolated irradiance may have
-    #[arg(long, value_name = "ERROR", default_value = "0.025", value_parser = ic_error, allow_negative_numbers = true)]
-    ic_error: f32,
+    /// Relative error that interpolated irradiance may have [default: 0.025]
+    #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true)]
+    ic_error: Option<f32>,
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = "sort")]
     order: Order,
@@ -358,7 +360,7 @@ impl RenderOptions {
             photon_layout: self.photon_map.layout(),
             neighbors: self.neighbors,
             caustic_photons: self.caustic_photons,
-            caustic_neighbors: self.caustic_neighbors,
+            caustic_neighbors: self.caustic_neighbors.unwrap_or(DEFAULT_CAUSTIC_NEIGHBORS),
             max_distance: match self.max_distance {
                 MaxDistance::Auto => None,
                 MaxDistance::Metres(distance) => Some(distance),
@@ -371,7 +373,7 @@ impl RenderOptions {
             sampling: self.sampling.sampling(),
             radiance: self.radiance.radiance(),
             irradiance_error: (self.irradiance_cache == Switch::On && self.gather_rays > 0)
-                .then_some(self.ic_error),
+                .then_some(self.ic_error.unwrap_or(DEFAULT_IC_ERROR)),
             order: self.order.gather_order(),
             bins: self.bins,
             queue: self.queue,
@@ -418,6 +420,12 @@ fn crop(text: &str) -> Result<Window, String> {
         _ => Err("a crop is X0,X1,Y0,Y1: four whole numbers, such as 0,64,0,64".into()),
     }
 }
+
+/// Photons that a gather of caustics looks for, unless others are asked for.
+const DEFAULT_CAUSTIC_NEIGHBORS: u32 = 50;
+
+/// Relative error of interpolated irradiance, unless another is asked for.
+const DEFAULT_IC_ERROR: f32 = 0.025;
 
 /// Threads that can be asked for: a system that runs out of them half-way ends the process.
 const MAX_THREADS: usize = 1024;

@@ -106,6 +106,9 @@ fn read_scene(options: &RenderOptions) -> Result<Scene, Failure> {
     }
     scene.check_light().map_err(Failure::input)?;
     if !options.quiet {
+        for notice in options.without_effect(&scene) {
+            say(format_args!("photoncard: {notice}"));
+        }
         for notice in &scene.notices {
             say(format_args!("photoncard: {notice}"));
         }

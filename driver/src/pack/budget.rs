@@ -6,7 +6,7 @@ use photoncard_shared::image::{Section, SectionKind};
 use photoncard_shared::layout::{Photon, Record};
 use photoncard_shared::message::Radiance;
 
-use super::card_image::PHOTON_SECTIONS;
+use super::card_image::{CAUSTIC_SECTIONS, PHOTON_SECTIONS};
 use super::{CardImage, PackError, PackedScene};
 use crate::photon::PhotonLayout;
 
@@ -80,12 +80,11 @@ impl CardImage {
         }
         let (scene, _) = self.view();
         let of = |kind: SectionKind| bytes(scene.header.section(kind), kind);
-        Err(PackError::Dram {
-            needed,
-            photons: PHOTON_SECTIONS.into_iter().map(of).sum(),
-            available,
-            remedy: lower("lower --photons", of(SectionKind::Texels), needed),
-        })
+        let photons: u64 = PHOTON_SECTIONS.into_iter().map(of).sum();
+        let caustics: u64 = CAUSTIC_SECTIONS.into_iter().map(of).sum();
+        let option = if is_most(caustics, photons) { "--caustic-photons" } else { "--photons" };
+        let remedy = lower(&format!("lower {option}"), of(SectionKind::Texels), needed);
+        Err(PackError::Dram { needed, photons, available, remedy })
     }
 }
 
@@ -111,6 +110,8 @@ mod tests {
     use photoncard_shared::budget::REFERENCE;
 
     use super::*;
+    use crate::photon::map_photons;
+    use crate::render::RenderSettings;
     use crate::scene::{Encoding, Image, Material, Reflection, Scene, Texture, Triangle};
 
     /// A triangle, and an image of so many texels a side.
@@ -145,5 +146,26 @@ mod tests {
         let with_photons = remedy(&large, 100_000, 5 << 20);
         assert!(with_photons.starts_with("lower --photons to ") && with_photons.contains("smaller textures"));
         assert!(!remedy(&textured(64), 1_000_000, 5 << 20).contains("textures"));
+    }
+
+    /// Where photons of caustics take the memory, fewer others would not help.
+    #[test]
+    fn the_larger_of_the_photon_maps_is_to_be_lowered() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-spheres.glb");
+        let scene = crate::scene::gltf::load(path.as_ref()).expect("a shipped scene loads");
+        for (photons, caustic_photons, expected) in
+            [(500, 3000, "lower --caustic-photons"), (3000, 500, "lower --photons")]
+        {
+            let settings =
+                RenderSettings { photons, caustic_photons: Some(caustic_photons), ..Default::default() };
+            let packed = PackedScene::new(&scene).expect("it is small");
+            let mapped =
+                map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("it has light");
+            let dram_bytes = mapped.image.bytes() as u32 - 1;
+            match mapped.image.check_budget(&Budget { dram_bytes, ..REFERENCE }) {
+                Err(PackError::Dram { remedy, .. }) => assert!(remedy.starts_with(expected), "{remedy}"),
+                other => panic!("{other:?}"),
+            }
+        }
     }
 }

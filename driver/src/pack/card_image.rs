@@ -25,7 +25,7 @@ pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
     SectionKind::IrradianceLeaves,
 ];
 
-const CAUSTIC_SECTIONS: [SectionKind; 2] = [SectionKind::CausticNodes, SectionKind::CausticLeaves];
+pub(super) const CAUSTIC_SECTIONS: [SectionKind; 2] = [SectionKind::CausticNodes, SectionKind::CausticLeaves];
 const IRRADIANCE_SECTIONS: [SectionKind; 2] = [SectionKind::IrradianceNodes, SectionKind::IrradianceLeaves];
 
 /// A complete card image.
