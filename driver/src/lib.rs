@@ -19,6 +19,7 @@ pub mod partial;
 pub mod photon;
 pub mod photon_map;
 pub mod preview;
+pub mod printable;
 pub mod render;
 pub mod scene;
 pub mod scheduler;

@@ -1,6 +1,6 @@
 //! Output files that appear whole or not at all: written beside their place, then renamed.
 
-use std::fs;
+use std::fs::{self, FileType};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -127,15 +127,41 @@ fn resolve(path: &Path) -> Result<PathBuf, OutputError> {
     if path.file_name().is_none() {
         return Err(OutputError::NoFileName { path: path.to_owned() });
     }
+    let refused = |kind| OutputError::NotAFile { path: path.to_owned(), kind };
     match fs::metadata(path) {
-        Ok(found) if found.is_dir() => Err(OutputError::NotAFile { path: path.to_owned(), kind: "folder" }),
-        // Renaming over a device would replace the device.
-        Ok(found) if !found.is_file() => Err(OutputError::NotAFile { path: path.to_owned(), kind: "device" }),
-        Ok(_) => {
-            fs::canonicalize(path).map_err(|source| OutputError::Write { path: path.to_owned(), source })
-        }
+        // Renaming over a pipe or a device would replace it.
+        Ok(found) => match kind_of(found.file_type()) {
+            Some(kind) => Err(refused(kind)),
+            None => {
+                fs::canonicalize(path).map_err(|source| OutputError::Write { path: path.to_owned(), source })
+            }
+        },
+        Err(_) if path.is_symlink() => Err(refused("broken symbolic link")),
         Err(_) => Ok(path.to_owned()),
     }
+}
+
+/// What something that is no regular file is called.
+pub(crate) fn kind_of(found: FileType) -> Option<&'static str> {
+    if found.is_file() {
+        return None;
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        if found.is_fifo() {
+            return Some("named pipe");
+        } else if found.is_socket() {
+            return Some("socket");
+        }
+    }
+    Some(if found.is_dir() {
+        "folder"
+    } else if found.is_symlink() {
+        "symbolic link"
+    } else {
+        "device"
+    })
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -250,6 +276,37 @@ mod tests {
         assert_eq!(fs::read(&file).unwrap(), b"new");
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         let device = write(Path::new("/dev/null"), b"x");
-        assert!(matches!(device, Err(OutputError::NotAFile { .. })), "{device:?}");
+        assert!(matches!(device, Err(OutputError::NotAFile { kind: "device", .. })), "{device:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_sockets_and_broken_links_are_refused_and_stay() {
+        use std::os::unix::fs::{FileTypeExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        rustix::fs::mkfifoat(rustix::fs::CWD, at("pipe"), rustix::fs::Mode::RWXU).unwrap();
+        let _socket = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
+        symlink(at("absent"), at("broken")).unwrap();
+        symlink(at("loop"), at("loop")).unwrap();
+        symlink(at("pipe"), at("link")).unwrap();
+        let before = names(folder.path());
+        for (name, word) in [
+            ("pipe", "named pipe"),
+            ("link", "named pipe"),
+            ("socket", "socket"),
+            ("broken", "broken symbolic link"),
+            ("loop", "broken symbolic link"),
+        ] {
+            for result in [check_writable(&at(name)), write(&at(name), b"x")] {
+                assert!(
+                    matches!(result, Err(OutputError::NotAFile { kind, .. }) if kind == word),
+                    "{result:?}"
+                );
+            }
+        }
+        assert_eq!(names(folder.path()), before);
+        assert!(fs::symlink_metadata(at("pipe")).unwrap().file_type().is_fifo());
+        assert!(at("broken").is_symlink() && at("loop").is_symlink());
     }
 }

@@ -1,37 +1,40 @@
 //! A render that may be gone on with: finished tiles are kept in a file beside the picture, one after another.
 //!
 //! ```text
-//! photoncard partial render 1\n
+//! photoncard partial render 2\n
 //! { settings as JSON }\n
-//! tile: x, y, width, height: u32 each | its pixels, 40 bytes each, with layers 80 | CRC-32C of both: u32
+//! record: 89 54 49 4c 45 0d 0a 1a | x, y, width, height: u32 each | pixels, 40 bytes each, with layers 80 | CRC-32C: u32
 //! ...
 //! ```
 //!
-//! Numbers are little-endian. A tile that was being written when the process ended is cut off; one that is damaged is skipped.
-//! What a picture does not depend on is not in the settings: tiles, order and cards may be others when it is gone on with.
-//! The file is locked by the render that writes it.
+//! Numbers are little-endian; the checksum is that of all before it in the record. A tile that was being written when the process
+//! ended is cut off. A record that is damaged is skipped: the next one is found by the eight bytes that it begins with. Of two
+//! records of a pixel the later one holds. What a picture does not depend on is not in the settings: tiles, order and cards may be
+//! others when it is gone on with.
+//!
+//! The file is locked by the render that writes it. What is there under its name and is no such file is refused, and stays as it is.
 
+mod file;
 mod records;
 #[cfg(test)]
 mod tests;
 
-use std::fs::{self, File, TryLockError};
-use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::{Map, Value};
 
+use self::file::{FAMILY, Title, read_title};
 use self::records::read_tiles;
 pub(crate) use self::records::record;
 use crate::film::Film;
 
-/// The first line.
-const TITLE: &str = "photoncard partial render 1";
+/// The version of the file's format, in its first line.
+const VERSION: u32 = 2;
 /// Bytes of the settings at the most.
-const MOST_SETTINGS: u64 = 1 << 20;
-/// Times that a file is opened which others remove meanwhile.
-const MOST_TRIES: usize = 16;
+const MAX_SETTINGS: u64 = 1 << 20;
 
 /// Where finished tiles are kept, and whether those of an earlier render are taken over.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,11 +49,29 @@ pub struct PartialSettings {
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum PartialError {
     /// The file is none of this program.
-    #[error("{} is no partial render", path.display())]
-    #[diagnostic(help("remove it, or render without --resume"))]
+    #[error("{} is no partial render of this program, and is left as it is", path.display())]
+    #[diagnostic(help("finished tiles are kept under that name: move it away, or choose another output"))]
     Foreign {
         /// The file.
         path: PathBuf,
+    },
+    /// Something that is not a file of its own is in the way.
+    #[error("cannot keep finished tiles in {}: a {kind} has that name", path.display())]
+    #[diagnostic(help("move it away, or choose another output"))]
+    NotAFile {
+        /// The file.
+        path: PathBuf,
+        /// What is there.
+        kind: &'static str,
+    },
+    /// It is of another version of the program.
+    #[error("{} is a partial render of version {found}, and this program goes on with version {VERSION}", path.display())]
+    #[diagnostic(help("go on with the program that began it, or render without --resume to begin anew"))]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// The version of its format.
+        found: u32,
     },
     /// It is of another picture.
     #[error("{} is of another picture: {}", path.display(), differences.join("; "))]
@@ -103,7 +124,7 @@ impl PartialRender {
     /// what is there, that is written into the film.
     ///
     /// # Errors
-    /// If what is there is of another picture, is another render's, or cannot be read.
+    /// If what is there is no partial render or another render's, cannot be read, or is to be gone on with and of another picture.
     pub(crate) fn begin(
         partial: &PartialSettings,
         settings: Value,
@@ -111,7 +132,7 @@ impl PartialRender {
     ) -> Result<Self, PartialError> {
         let path = partial.path.clone();
         let this = Self { path, settings, state: Mutex::default() };
-        if let Some(file) = this.open(false)? {
+        if let Some(file) = file::open(&this.path, false)? {
             let mut state = this.lock();
             if partial.resume {
                 this.resume(&mut state, &file, film)?;
@@ -119,33 +140,6 @@ impl PartialRender {
             state.file = Some(file);
         }
         Ok(this)
-    }
-
-    /// Opens the file and makes it this render's own. One that is not there is made if `create` says so.
-    fn open(&self, create: bool) -> Result<Option<File>, PartialError> {
-        for _ in 0..MOST_TRIES {
-            // Not cut off before it is locked: it may be another render's.
-            let opened =
-                File::options().read(true).write(true).create(create).truncate(false).open(&self.path);
-            let file = match opened {
-                Err(error) if !create && error.kind() == ErrorKind::NotFound => return Ok(None),
-                opened => opened.map_err(|error| self.error(error))?,
-            };
-            self.check_lock(&file.try_lock())?;
-            // Whoever had it may have removed it before it was locked.
-            if is_at(&file, &self.path).map_err(|error| self.error(error))? {
-                return Ok(Some(file));
-            }
-        }
-        Err(PartialError::Busy { path: self.path.clone() })
-    }
-
-    /// Tells whether another render has the file. Where the system has no locks, or refuses them, nothing is known.
-    fn check_lock(&self, locked: &Result<(), TryLockError>) -> Result<(), PartialError> {
-        match locked {
-            Err(TryLockError::WouldBlock) => Err(PartialError::Busy { path: self.path.clone() }),
-            Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
-        }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -158,6 +152,7 @@ impl PartialRender {
 
     /// Takes the sound tiles of the file into the film, and cuts off what is behind the last.
     fn resume(&self, state: &mut State, mut file: &File, film: &mut Film) -> Result<(), PartialError> {
+        file.rewind().map_err(|error| self.error(error))?;
         let mut reader = BufReader::new(file);
         let Some(head) = self.read_head(&mut reader)? else { return Ok(()) };
         let sound = read_tiles(&mut reader, head, film).and_then(|sound| {
@@ -172,26 +167,23 @@ impl PartialRender {
     /// Compares title and settings. Returns their bytes; `None` if the file ends before theirs do.
     fn read_head(&self, reader: &mut impl BufRead) -> Result<Option<u64>, PartialError> {
         let foreign = || PartialError::Foreign { path: self.path.clone() };
-        let mut line = |expected: &str| -> Result<Option<String>, PartialError> {
-            let mut text = Vec::new();
-            let mut limited = reader.by_ref().take(MOST_SETTINGS);
-            limited.read_until(b'\n', &mut text).map_err(|error| self.error(error))?;
-            let is_cut_off = !text.ends_with(b"\n") && (text.len() as u64) < MOST_SETTINGS;
-            let text = String::from_utf8(text).map_err(|_| foreign())?;
-            if is_cut_off && (text.starts_with(expected) || expected.starts_with(&text)) {
-                return Ok(None);
-            }
-            let is_line = text.ends_with('\n') && text.starts_with(expected);
-            is_line.then_some(Some(text)).ok_or_else(foreign)
-        };
-        let Some(title) = line(TITLE)? else { return Ok(None) };
-        let Some(settings) = line("{")? else { return Ok(None) };
-        let found: Value = serde_json::from_str(&settings).map_err(|_| foreign())?;
+        match read_title(reader).map_err(|error| self.error(error))?.ok_or_else(foreign)? {
+            Title::CutOff => return Ok(None),
+            Title::Version(VERSION) => {}
+            Title::Version(found) => return Err(PartialError::Version { path: self.path.clone(), found }),
+        }
+        let mut settings = Vec::new();
+        let mut limited = reader.take(MAX_SETTINGS);
+        limited.read_until(b'\n', &mut settings).map_err(|error| self.error(error))?;
+        if !settings.ends_with(b"\n") && (settings.len() as u64) < MAX_SETTINGS {
+            return Ok(None);
+        }
+        let found: Value = serde_json::from_slice(&settings).map_err(|_| foreign())?;
         let differences = differences(&found, &self.settings);
         if !differences.is_empty() {
             return Err(PartialError::Differs { path: self.path.clone(), differences });
         }
-        Ok(Some((title.len() + settings.len()) as u64))
+        Ok(Some((title().len() + settings.len()) as u64))
     }
 
     /// Keeps a finished tile's record. What goes wrong is told by [`Self::check`].
@@ -207,7 +199,7 @@ impl PartialRender {
 
     fn append(&self, state: &mut State, record: &[u8]) -> Result<(), PartialError> {
         if state.file.is_none() {
-            state.file = self.open(true)?;
+            state.file = file::open(&self.path, true)?;
         }
         let Some(file) = &mut state.file else { return Ok(()) };
         if !state.is_begun {
@@ -223,7 +215,7 @@ impl PartialRender {
     fn write_head(&self, file: &mut File) -> io::Result<()> {
         file.set_len(0)?;
         file.rewind()?;
-        file.write_all(format!("{TITLE}\n{}\n", self.settings).as_bytes())
+        file.write_all(format!("{}{}\n", title(), self.settings).as_bytes())
     }
 
     /// Removes a file without a tile that cannot be written: there is nothing to go on from.
@@ -231,7 +223,7 @@ impl PartialRender {
         if let Some(file) = state.file.take_if(|_| !state.holds_tiles) {
             // What cannot be removed is empty.
             let _ = file.set_len(0);
-            let _ = fs::remove_file(&self.path);
+            let _ = file::remove(&file, &self.path);
             state.is_begun = false;
         }
     }
@@ -256,38 +248,16 @@ impl PartialRender {
     /// # Errors
     /// If it cannot be removed.
     pub fn remove(self) -> Result<(), PartialError> {
-        if self.lock().file.is_none() {
-            return Ok(());
-        }
-        match fs::remove_file(&self.path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(self.error(error)),
-            _ => Ok(()),
+        match &self.lock().file {
+            Some(file) => file::remove(file, &self.path).map_err(|error| self.error(error)),
+            None => Ok(()),
         }
     }
 }
 
-/// Whether a path still names a file that was opened there.
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> io::Result<bool> {
-    use std::os::unix::fs::MetadataExt;
-    let file = file.metadata()?;
-    match fs::metadata(path) {
-        Ok(named) => Ok((named.dev(), named.ino()) == (file.dev(), file.ino())),
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
-        Err(error) => Err(error),
-    }
-}
-
-/// Elsewhere a file that is open keeps its name.
-#[cfg(not(unix))]
-fn is_at(_: &File, _: &Path) -> io::Result<bool> {
-    Ok(true)
-}
-
-/// Text of a file, fit for a terminal.
-fn printable(text: &str) -> String {
-    let escape = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
-    text.chars().map(escape).collect()
+/// The first line.
+fn title() -> String {
+    format!("{FAMILY}{VERSION}\n")
 }
 
 /// Every setting that is another, in words.
@@ -299,6 +269,5 @@ fn differences(found: &Value, asked: &Value) -> Vec<String> {
     let say = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
     differing
         .map(|name| format!("{name} was {} and is {}", say(found.get(name)), say(asked.get(name))))
-        .map(|difference| printable(&difference))
         .collect()
 }

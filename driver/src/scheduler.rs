@@ -38,6 +38,11 @@ impl GatherOrder {
         }
     }
 
+    /// Whether gathers wait in a chip's queue.
+    pub fn has_queue(self) -> bool {
+        matches!(self, Self::Hash | Self::Sort)
+    }
+
     /// Whether rays are cast by direction bins.
     pub fn has_bins(self) -> bool {
         !matches!(self, Self::Naive | Self::Tiled)

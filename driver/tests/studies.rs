@@ -71,7 +71,7 @@ fn options(out: &Path, studies: &[Study]) -> StudyOptions {
         out: out.to_owned(),
         is_collection: studies.len() > 1,
         threads: Some(2),
-        provenance: Provenance::here("photoncard study".to_owned()),
+        provenance: Provenance::here("photoncard study"),
     }
 }
 

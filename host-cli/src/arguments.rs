@@ -2,6 +2,7 @@
 
 mod picture;
 pub(crate) mod threads;
+mod without_effect;
 
 use std::path::PathBuf;
 
@@ -12,6 +13,7 @@ use photoncard_driver::film::Window;
 use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::photon_map::PhotonLayout;
+use photoncard_driver::printable::printable;
 use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
@@ -26,6 +28,17 @@ use crate::study::StudyArguments;
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+impl Arguments {
+    /// The arguments of the process. Wrong ones end it, and a message that names them has them escaped.
+    pub(crate) fn parse_printably() -> Self {
+        let given = std::env::args_os();
+        Self::try_parse().unwrap_or_else(|error| {
+            let escaped = given.map(|argument| printable(&argument.to_string_lossy()).into_owned());
+            Self::try_parse_from(escaped).err().unwrap_or(error).exit()
+        })
+    }
 }
 
 #[derive(Subcommand)]
@@ -145,8 +158,9 @@ pub(crate) struct RenderOptions {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     caustic_photons: Option<usize>,
     /// Photons that a gather of caustics looks for, at least 8: fewer are sharper, more are smoother
-    #[arg(long, value_name = "K", default_value_t = 50, allow_negative_numbers = true)]
-    caustic_neighbors: u32,
+    /// [default: 50]
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    caustic_neighbors: Option<u32>,
     /// Greatest distance of a gather in metres, or auto: from the photons' density
     #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true)]
     max_distance: MaxDistance,
@@ -172,9 +186,9 @@ pub(crate) struct RenderOptions {
     /// Gather the indirect light of Lambertian surfaces at some places and interpolate between them
     #[arg(long, default_value = "off")]
     irradiance_cache: Switch,
-    /// Relative error that interpolated irradiance may have
-    #[arg(long, value_name = "ERROR", default_value = "0.025", value_parser = ic_error, allow_negative_numbers = true)]
-    ic_error: f32,
+    /// Relative error that interpolated irradiance may have [default: 0.025]
+    #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true)]
+    ic_error: Option<f32>,
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = "sort")]
     order: Order,
@@ -350,7 +364,7 @@ impl RenderOptions {
             photon_layout: self.photon_map.layout(),
             neighbors: self.neighbors,
             caustic_photons: self.caustic_photons,
-            caustic_neighbors: self.caustic_neighbors,
+            caustic_neighbors: self.caustic_neighbors.unwrap_or(DEFAULT_CAUSTIC_NEIGHBORS),
             max_distance: match self.max_distance {
                 MaxDistance::Auto => None,
                 MaxDistance::Metres(distance) => Some(distance),
@@ -363,7 +377,7 @@ impl RenderOptions {
             sampling: self.sampling.sampling(),
             radiance: self.radiance.radiance(),
             irradiance_error: (self.irradiance_cache == Switch::On && self.gather_rays > 0)
-                .then_some(self.ic_error),
+                .then_some(self.ic_error.unwrap_or(DEFAULT_IC_ERROR)),
             order: self.order.gather_order(),
             bins: self.bins,
             queue: self.queue,
@@ -410,6 +424,12 @@ fn crop(text: &str) -> Result<Window, String> {
         _ => Err("a crop is X0,X1,Y0,Y1: four whole numbers, such as 0,64,0,64".into()),
     }
 }
+
+/// Photons that a gather of caustics looks for, unless others are asked for.
+const DEFAULT_CAUSTIC_NEIGHBORS: u32 = 50;
+
+/// Relative error of interpolated irradiance, unless another is asked for.
+const DEFAULT_IC_ERROR: f32 = 0.025;
 
 fn ic_error(text: &str) -> Result<f32, String> {
     match text.parse() {

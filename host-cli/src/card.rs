@@ -41,7 +41,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("shadow rays     {} a sample", budget.shadow_rays),
         format!("samples         {} a pixel", budget.samples),
     ]);
-    print(&(lines.join("\n") + "\n"))
+    print(&lines)
 }
 
 /// What the firmware of a board takes of on-chip memory, as the board has measured it.
@@ -68,17 +68,17 @@ fn sram_rows(kind: ChipKind, sram_bytes: usize) -> [String; 5] {
 /// Says hello to a card some times, and prints how long each answer took.
 pub(crate) fn ping(address: &CardAddress, count: u16) -> Result<(), Failure> {
     let answers = card_ping(address, count.into())?;
-    let mut text = String::new();
+    let mut lines = Vec::new();
     for (number, answer) in (1..).zip(&answers) {
-        text += &format!("hello {number:<9} {}\n", milliseconds(*answer));
+        lines.push(format!("hello {number:<9} {}", milliseconds(*answer)));
     }
     let mean = answers.iter().sum::<Duration>() / u32::from(count.max(1));
     for (name, time) in
         [("least", answers.iter().min()), ("mean", Some(&mean)), ("most", answers.iter().max())]
     {
-        text += &time.map_or_else(String::new, |time| format!("{name:<15} {}\n", milliseconds(*time)));
+        lines.extend(time.map(|time| format!("{name:<15} {}", milliseconds(*time))));
     }
-    print(&text)
+    print(&lines)
 }
 
 fn milliseconds(time: Duration) -> String {

@@ -1,6 +1,7 @@
 //! `photoncard card list`.
 
 use photoncard_driver::link::{ListedPort, list_serial_ports};
+use photoncard_driver::printable::printable;
 use photoncard_driver::render::CardAddress;
 
 use crate::console::{print, say};
@@ -21,27 +22,19 @@ pub(crate) fn run() -> Result<(), Failure> {
 }
 
 /// Columns that are as wide as their longest entry, two blanks apart; a dash stands for what a port does not tell.
-fn table(ports: &[ListedPort]) -> String {
+fn table(ports: &[ListedPort]) -> Vec<String> {
     let rows: Vec<[String; 4]> =
         [COLUMNS.map(str::to_owned)].into_iter().chain(ports.iter().map(row)).collect();
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let [path, name, number] = [0, 1, 2].map(width);
-    rows.iter().map(|[a, b, c, d]| format!("{a:path$}  {b:name$}  {c:number$}  {d}\n")).collect()
+    rows.iter().map(|[a, b, c, d]| format!("{a:path$}  {b:name$}  {c:number$}  {d}")).collect()
 }
 
 fn row(port: &ListedPort) -> [String; 4] {
     let address = CardAddress::serial(&port.path).to_string();
     [&port.path, &port.usb_name, &port.serial_number, &address].map(|text| match text.as_str() {
         "" => "-".into(),
-        text => escaped(text),
-    })
-}
-
-/// Text that a device tells, fit for a terminal: one line, and nothing that steers it.
-fn escaped(text: &str) -> String {
-    text.chars().fold(String::new(), |text, c| match c {
-        '"' | '\'' => text + c.encode_utf8(&mut [0; 4]),
-        c => text + &c.escape_debug().to_string(),
+        text => printable(text).into_owned(),
     })
 }
 
@@ -65,9 +58,9 @@ mod tests {
 path          USB name               serial number  --card
 /dev/ttyACM0  Müller's 3" card       066BFF         serial:/dev/ttyACM0@115200
 /dev/ttyS0    -                      -              serial:/dev/ttyS0@115200
-/dev/ttyUSB0  a\u{1b}[2J\nb\u{202e}  1\t2\\         serial:/dev/ttyUSB0@115200
+/dev/ttyUSB0  a\u{1b}[2J\nb\u{202e}  1\t2\          serial:/dev/ttyUSB0@115200
 "#;
-        assert_eq!(format!("\n{}", table(&ports)), expected);
+        assert_eq!(table(&ports), expected.trim().lines().collect::<Vec<_>>());
         let addresses = ports.iter().map(|port| row(port)[3].parse());
         assert!(addresses.eq(ports.iter().map(|port| Ok(CardAddress::serial(&port.path)))));
     }

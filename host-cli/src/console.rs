@@ -1,32 +1,76 @@
-//! The standard streams, either of which may be closed or full: neither makes the program panic.
+//! The standard streams, either of which may be closed or full: neither makes the program panic. All that is written goes through
+//! here, and text of others is escaped.
 
 use std::fmt::Arguments;
-use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
+use std::io::{ErrorKind, Write, stderr, stdout};
 
-use miette::MietteHandlerOpts;
+use photoncard_driver::printable::printable;
 
 use crate::failure::Failure;
 
-/// Lines of errors are broken on a terminal only: elsewhere a path in a message stays in one piece.
-pub(crate) fn lay_out_errors() {
-    let build = |_: &_| {
-        let options = MietteHandlerOpts::new().wrap_lines(stderr().is_terminal()).break_words(false);
-        Box::new(options.build()) as Box<dyn miette::ReportHandler>
-    };
-    // Only a second hook is refused.
-    let _ = miette::set_hook(Box::new(build));
-}
-
 /// Writes a line for people. If nobody can read it, the work goes on.
 pub(crate) fn say(line: Arguments) {
-    let _ = writeln!(stderr(), "{line}");
+    let _ = writeln!(stderr(), "{}", printable(&line.to_string()));
+}
+
+/// Writes a failure for people, in lines of its own; its report escapes text of others.
+pub(crate) fn say_failure(failure: &Failure) {
+    let _ = writeln!(stderr(), "{failure}");
+}
+
+/// Writes lines to standard output.
+pub(crate) fn print(lines: &[String]) -> Result<(), Failure> {
+    write_out(&lines.iter().map(|line| printable(line) + "\n").collect::<String>())
+}
+
+/// Writes JSON to standard output.
+pub(crate) fn print_json(text: &str) -> Result<(), Failure> {
+    write_out(&(printable_json(text) + "\n"))
+}
+
+/// The same JSON with all escaped that does not print as itself. It is in strings alone, but for the ends of lines.
+pub(crate) fn printable_json(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        let mut bytes = [0; 4];
+        let one = &*character.encode_utf8(&mut bytes);
+        let is_kept = character == '\n' || printable(one) == one;
+        if is_kept {
+            escaped.push(character);
+        } else {
+            let mut units = [0; 2];
+            escaped.extend(character.encode_utf16(&mut units).iter().map(|unit| format!("\\u{unit:04x}")));
+        }
+    }
+    escaped
 }
 
 /// Writes data to standard output. A reader that closes it early has what it wanted.
-pub(crate) fn print(text: &str) -> Result<(), Failure> {
+fn write_out(text: &str) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::output(&error)),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    #[test]
+    fn json_is_the_same_and_prints() {
+        let value = json!({ "a\"b\\\u{9b}": ["\u{202e}\u{e0041}\u{7f}\n", "Größe", 1.5, null] });
+        for text in [value.to_string(), serde_json::to_string_pretty(&value).unwrap()] {
+            let escaped = printable_json(&text);
+            assert_eq!(serde_json::from_str::<Value>(&escaped).unwrap(), value);
+            assert!(escaped.lines().all(|line| printable(line) == line), "{escaped}");
+            assert!(
+                escaped.contains("\\u202e\\udb40\\udc41\\u007f\\n") && escaped.contains("Größe"),
+                "{escaped}"
+            );
+        }
     }
 }

@@ -4,7 +4,7 @@ use photoncard_driver::difference::compare;
 use photoncard_driver::exr::read_rgb;
 
 use crate::arguments::DiffOptions;
-use crate::console::print;
+use crate::console::print_json;
 use crate::failure::Failure;
 
 /// Prints the difference of two pictures as JSON.
@@ -15,5 +15,5 @@ pub(crate) fn run(options: &DiffOptions) -> Result<(), Failure> {
     let difference = compare(&reference, &image, options.block, options.exclude_above)
         .map_err(|error| Failure::input_error(&error))?;
     let text = serde_json::to_string_pretty(&difference).map_err(|error| Failure::work_error(&error))?;
-    print(&(text + "\n"))
+    print_json(&text)
 }

@@ -18,7 +18,7 @@ pub(crate) fn run(options: &EmulateOptions) -> Result<(), Failure> {
             "photoncard: warning: other machines can reach {address}, and the protocol has no authentication"
         ));
     }
-    print(&format!("{}\n", listener.card_address()))?;
+    print(&[listener.card_address().to_owned()])?;
     serve_card(options.card.chip(), HostPort::new(listener, stop, say))
         .map_err(|error| Failure::work_error(&error))?;
     Err(Failure::Stopped("stopped; the card is gone"))

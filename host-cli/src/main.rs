@@ -14,19 +14,18 @@ mod environment;
 mod failure;
 mod progress;
 mod render;
+mod report;
 mod scene;
 mod study;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 use crate::arguments::{Arguments, CardCommand, Command, SceneCommand};
 
 fn main() -> ExitCode {
     // Wrong arguments end here, with status 2.
-    let arguments = Arguments::parse();
-    console::lay_out_errors();
+    let arguments = Arguments::parse_printably();
+    report::lay_out_errors();
     let result = match &arguments.command {
         Command::Render(options) => render::run(options),
         Command::Scene(SceneCommand::Info { scene }) => scene::info(scene),
@@ -40,7 +39,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            console::say(format_args!("{failure}"));
+            console::say_failure(&failure);
             failure.status()
         }
     }

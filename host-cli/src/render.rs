@@ -13,7 +13,7 @@ use photoncard_driver::{exr, output, preview};
 use serde_json::json;
 
 use crate::arguments::RenderOptions;
-use crate::console::say;
+use crate::console::{printable_json, say};
 use crate::environment::EnvironmentOption;
 use crate::failure::Failure;
 use crate::progress::Progress;
@@ -106,6 +106,9 @@ fn read_scene(options: &RenderOptions) -> Result<Scene, Failure> {
     }
     scene.check_light().map_err(Failure::input)?;
     if !options.quiet {
+        for notice in options.without_effect(&scene) {
+            say(format_args!("photoncard: {notice}"));
+        }
         for notice in &scene.notices {
             say(format_args!("photoncard: {notice}"));
         }
@@ -125,7 +128,7 @@ fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) 
 }
 
 fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Rendering) -> Result<(), Failure> {
-    let provenance = provenance(options, settings, rendering).to_string();
+    let provenance = printable_json(&provenance(options, settings, rendering).to_string());
     exr::write(
         &options.output,
         &rendering.film,
@@ -141,7 +144,8 @@ fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Renderi
     if let Some(path) = &options.stats {
         let text = serde_json::to_string_pretty(&rendering.statistics)
             .map_err(|error| Failure::work_error(&error))?;
-        output::write(path, (text + "\n").as_bytes()).map_err(|error| Failure::work_error(&error))?;
+        output::write(path, (printable_json(&text) + "\n").as_bytes())
+            .map_err(|error| Failure::work_error(&error))?;
     }
     Ok(())
 }

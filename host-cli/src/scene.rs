@@ -26,7 +26,7 @@ pub(crate) fn info(path: &Path) -> Result<(), Failure> {
     lines.extend(scene.lights.iter().map(light));
     lines.extend(scene.materials.iter().map(|item| material(item, &scene)));
     lines.extend(scene.notices.iter().map(|notice| format!("ignored    {notice}")));
-    print(&(lines.join("\n") + "\n"))
+    print(&lines)
 }
 
 fn attributes(scene: &Scene) -> String {

@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
         out: arguments.out.clone(),
         is_collection: matches!(arguments.name, StudyName::All),
         threads: arguments.threads,
-        provenance: Provenance::here(command_line()),
+        provenance: Provenance::here(&command_line()),
     };
     let progress = StudyProgress::start(arguments.quiet).map_err(|error| Failure::work_error(&error))?;
     let result = study(&options, &progress);

@@ -251,6 +251,30 @@ fn outputs_that_cannot_be_written() {
     check_refused(&outcome, &["out.exr.partial: it is another output as well", own_name], "partial");
 }
 
+/// No output is written through a name that is no file: a pipe would be waited for, a device or a link replaced.
+#[cfg(unix)]
+#[test]
+fn outputs_that_are_no_files() {
+    use std::os::unix::fs::symlink;
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    assert!(std::process::Command::new("mkfifo").arg(room.path("pipe")).status().unwrap().success());
+    symlink("absent", room.path("broken")).unwrap();
+    for (name, kind) in
+        [("pipe", "a named pipe"), ("broken", "a broken symbolic link"), ("/dev/null", "a device")]
+    {
+        for option in ["-o", "--preview", "--stats", "--trace"] {
+            let mut options = vec!["--card", "emulated:1", option, name];
+            if option != "-o" {
+                options.extend(["-o", "out.exr"]);
+            }
+            check_refused(&room.render("scene.gltf", &options), &[name, kind, "choose another"], option);
+            assert_eq!(room.names(), ["broken", "pipe", "scene.gltf"]);
+            assert!(room.path("broken").is_symlink());
+        }
+    }
+}
+
 #[test]
 fn pictures_that_cannot_be_compared() {
     let room = Room::new();

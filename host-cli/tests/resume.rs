@@ -4,7 +4,7 @@
 mod support;
 
 use std::fs;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use support::{Emulator, Room, shipped};
@@ -12,7 +12,7 @@ use support::{Emulator, Room, shipped};
 /// A picture of 64 tiles that takes a second or two.
 const PICTURE: [&str; 6] = ["--size", "128x128", "--photons", "2000", "--gather-rays", "50"];
 /// Bytes of a tile in the file of finished tiles.
-const TILE_BYTES: u64 = 16 + 40 * 256 + 4;
+const TILE_BYTES: u64 = 8 + 16 + 40 * 256 + 4;
 /// How long anything here may take.
 const PATIENCE: Duration = Duration::from_secs(120);
 
@@ -96,10 +96,45 @@ fn only_the_same_picture_is_gone_on_with() {
     let outcome = room.run(&arguments(&cornell, &["--seed", "7", "--card", "unix:absent"]));
     assert_eq!(outcome.status, Some(1), "{}", outcome.stderr);
     assert!(!outcome.stderr.contains("--resume goes on"), "{}", outcome.stderr);
-    for foreign in [&b"something else"[..], b"x", &[0xff; 100], b"photoncard partial render 1\n{]\n"] {
+    room.write("a.exr.partial", b"photoncard partial render 2\n{]\n");
+    refused(&[], &["is no partial render"]);
+    room.write("a.exr.partial", b"photoncard partial render 1\n{}\n");
+    refused(&[], &["of version 1", "the program that began it", "without --resume"]);
+}
+
+#[test]
+fn what_is_not_a_file_of_finished_tiles_is_left_alone() {
+    use std::os::unix::fs::{FileTypeExt, symlink};
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    let file = room.path("a.exr.partial");
+    room.write("notes", "precious");
+    let refused = |words: &[&str]| {
+        for options in [&["--quiet"][..], &["--quiet", "--resume"]] {
+            let outcome = room.run(&arguments(&cornell, options));
+            assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+            for word in [&["a.exr.partial", "choose another output"], words].concat() {
+                assert!(outcome.stderr.contains(word), "{word}: {}", outcome.stderr);
+            }
+            assert_eq!(room.names(), ["a.exr.partial", "notes"]);
+            assert_eq!(room.read("notes"), b"precious");
+        }
+    };
+    for foreign in [&b"something else"[..], b"x", &[0xff; 100]] {
         room.write("a.exr.partial", foreign);
-        refused(&[], &["is no partial render"]);
+        refused(&["is no partial render"]);
+        assert_eq!(room.read("a.exr.partial"), foreign);
     }
+    fs::remove_file(&file).unwrap();
+    symlink("notes", &file).unwrap();
+    refused(&["symbolic link"]);
+    fs::remove_file(&file).unwrap();
+    fs::hard_link(room.path("notes"), &file).unwrap();
+    refused(&["hard link"]);
+    fs::remove_file(&file).unwrap();
+    assert!(Command::new("mkfifo").arg(&file).status().unwrap().success());
+    refused(&["named pipe"]);
+    assert!(fs::symlink_metadata(&file).unwrap().file_type().is_fifo());
 }
 
 #[test]

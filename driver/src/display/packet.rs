@@ -14,6 +14,8 @@
 
 use photoncard_shared::message::Tile;
 
+use crate::printable::printable;
+
 /// The operation that creates an image, or replaces the one of its name.
 pub const CREATE_IMAGE: u8 = 4;
 /// The operation that replaces the values of a rectangle in some channels.
@@ -55,9 +57,9 @@ impl Packet {
         packet
     }
 
-    /// A zero byte would end a text too soon.
+    /// A zero byte would end a text too soon; it does not print.
     fn text(&mut self, text: &str) {
-        self.0.extend(text.bytes().filter(|&byte| byte != 0).chain([0]));
+        self.0.extend(printable(text).bytes().chain([0]));
     }
 
     /// Sides and places of pictures are far below 2^31.
@@ -108,6 +110,7 @@ mod tests {
         let rectangle = Tile { id: 9, x: 16, y: 256, width: 2, height: 1 };
         let values = [1.0, -2.0, 0.5, 0.0];
         assert_eq!(update_image("a.exr", &rectangle, &["R", "G"], values.into_iter()), updated);
-        assert_eq!(create_image("a.e\0xr", [256, 3], &["R", "albedo.G"]), created);
+        let escaped = create_image("a\\0\\u{1b}", [256, 3], &[]);
+        assert_eq!(create_image("a\0\u{1b}", [256, 3], &[]), escaped);
     }
 }

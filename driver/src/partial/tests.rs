@@ -1,11 +1,17 @@
+use std::fs::{self, TryLockError};
+use std::path::Path;
+
 use photoncard_shared::message::{PIXEL_BYTES, Pixel, PixelLayers, PixelRecord, Tile};
 use serde_json::json;
 
-use super::records::{CHECKSUM_BYTES, PLACE_BYTES, places};
+use super::file::{check_lock, is_at};
+use super::records::{CHECKSUM_BYTES, HEAD_BYTES, MAGIC, places};
 use super::*;
 use crate::film::Window;
 
 const TILES: u32 = 6;
+/// Bytes of a tile's record.
+const RECORD_BYTES: usize = HEAD_BYTES + 12 * PIXEL_BYTES + CHECKSUM_BYTES;
 
 fn film() -> Film {
     Film::new(4 * TILES, 3, Window::full(4 * TILES, 3)).unwrap()
@@ -55,18 +61,47 @@ fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
 fn damage_loses_the_tile_that_it_hits_alone() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = written(&folder);
-    let length = PLACE_BYTES + 12 * PIXEL_BYTES + CHECKSUM_BYTES;
-    let start = bytes.len() - TILES as usize * length;
+    let start = bytes.len() - TILES as usize * RECORD_BYTES;
     assert_eq!(taken_over(&folder, &bytes), [0, 1, 2, 3, 4, 5]);
-    for place in [0, 3, 8, 12, PLACE_BYTES, 200, length - 1] {
+    for place in 0..RECORD_BYTES {
         let mut damaged = bytes.clone();
-        damaged[start + length + place] ^= 0x81;
-        assert_eq!(taken_over(&folder, &damaged), [0, 2, 3, 4, 5], "{place}");
+        damaged[start + 2 * RECORD_BYTES + place] ^= 0x81;
+        assert_eq!(taken_over(&folder, &damaged), [0, 1, 3, 4, 5], "{place}");
     }
-    let mut shorter = bytes.clone();
-    shorter.drain(start + 2 * length + 30..start + 2 * length + 50);
-    assert_eq!(taken_over(&folder, &shorter), [0, 1, 3, 4, 5]);
+    // Bytes that are lost, or come twice.
+    let middle = start + 2 * RECORD_BYTES;
+    for range in [middle + 30..middle + 50, middle..middle + 1, middle..middle + HEAD_BYTES] {
+        let mut shorter = bytes.clone();
+        shorter.drain(range.clone());
+        assert_eq!(taken_over(&folder, &shorter), [0, 1, 3, 4, 5], "{range:?}");
+        let twice = [&bytes[..range.end], &bytes[range.start..]].concat();
+        let taken = taken_over(&folder, &twice);
+        assert!([0, 1, 3, 4, 5].iter().all(|id| taken.contains(id)), "{range:?}: {taken:?}");
+    }
     assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
+}
+
+#[test]
+fn the_later_record_of_a_tile_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bytes = written(&folder);
+    let mut film = film();
+    for (x, y) in places(&tile(1)) {
+        film.write(x, y, Pixel { depth: -1.0, ..Pixel::default() }).unwrap();
+    }
+    bytes.extend(record(&tile(1), &film));
+    let depth = |bytes: &[u8]| {
+        let settings = partial(&folder, true);
+        fs::write(&settings.path, bytes).unwrap();
+        let mut film = self::film();
+        PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
+        assert!(film.is_complete());
+        film.pixel(5, 1).unwrap().depth
+    };
+    assert_eq!(depth(&bytes).to_bits(), (-1.0_f32).to_bits());
+    // Unless it is damaged.
+    *bytes.last_mut().unwrap() ^= 1;
+    assert_eq!(depth(&bytes).to_bits(), (4.0 * TILES as f32 + 5.0).to_bits());
 }
 
 #[test]
@@ -111,12 +146,6 @@ fn a_file_has_one_render() {
     begin(false, &mut three).unwrap();
 }
 
-#[test]
-fn names_of_settings_are_fit_for_a_terminal() {
-    let said = differences(&json!({ "\u{1b}[2J\u{9b}": "\u{9b}x" }), &json!({}));
-    assert_eq!(said, ["\\u{1b}[2J\\u{9b} was \"\\u{9b}x\" and is nothing"]);
-}
-
 /// A file of nothing but places of the largest tile: each is read and summed for nothing.
 #[test]
 fn a_hostile_file_does_not_take_hours() {
@@ -126,7 +155,8 @@ fn a_hostile_file_does_not_take_hours() {
     let side = 64_u32;
     let wide = || Film::new(4 * TILES + side, 2 * side, Window::full(4 * TILES + side, 2 * side)).unwrap();
     let sound = bytes.len() as u64;
-    bytes.extend([4 * TILES, side, side, side].map(u32::to_le_bytes).concat().repeat(4 << 16));
+    let place = [4 * TILES, side, side, side].map(u32::to_le_bytes).concat();
+    bytes.extend([&MAGIC[..], &place].concat().repeat(3 << 16));
     fs::write(&settings.path, bytes).unwrap();
     let mut film = wide();
     let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
@@ -139,7 +169,7 @@ fn a_head_that_is_cut_off_holds_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = written(&folder);
     let head = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(1).unwrap().0;
-    for length in [0, 1, TITLE.len(), TITLE.len() + 1, TITLE.len() + 2, head] {
+    for length in [0, 1, FAMILY.len(), title().len() - 1, title().len(), title().len() + 1, head] {
         assert!(taken_over(&folder, &bytes[..length]).is_empty(), "{length}");
     }
     assert_eq!(taken_over(&folder, &bytes), [0, 1, 2, 3, 4, 5]);
@@ -160,7 +190,7 @@ fn a_file_that_cannot_be_begun_is_not_left() {
     // There is room again: it is begun anew.
     partial.keep(&record(&tile(0), &film));
     partial.check().unwrap();
-    assert!(partial.holds_tiles() && fs::read(&path).unwrap().starts_with(TITLE.as_bytes()));
+    assert!(partial.holds_tiles() && fs::read(&path).unwrap().starts_with(title().as_bytes()));
 }
 
 #[cfg(unix)]
@@ -178,8 +208,94 @@ fn a_file_that_was_removed_is_not_at_its_path() {
 
 #[test]
 fn locks_that_the_system_refuses_hinder_no_render() {
+    let path = Path::new("partial");
+    check_lock(path, &Err(TryLockError::Error(io::Error::other("no locks available")))).unwrap();
+    assert!(check_lock(path, &Err(TryLockError::WouldBlock)).is_err());
+}
+
+/// What is under the name of the file, and is none of this program's, is refused and left as it is.
+#[test]
+fn a_foreign_file_is_refused_and_stays() {
     let folder = tempfile::tempdir().unwrap();
-    let partial = PartialRender::begin(&partial(&folder, false), json!({}), &mut film()).unwrap();
-    partial.check_lock(&Err(TryLockError::Error(io::Error::other("no locks available")))).unwrap();
-    assert!(partial.check_lock(&Err(TryLockError::WouldBlock)).is_err());
+    let path = partial(&folder, false).path;
+    let long = "photoncard partial render of a room\n".repeat(100_000);
+    for foreign in ["notes", "photoncard partial render of", "photoncard partial render 2x\n", "\n", &long] {
+        fs::write(&path, foreign).unwrap();
+        for resume in [false, true] {
+            let begun = PartialRender::begin(&partial(&folder, resume), json!({}), &mut film());
+            assert!(matches!(begun, Err(PartialError::Foreign { .. })), "{foreign}");
+        }
+        assert_eq!(fs::read(&path).unwrap(), foreign.as_bytes());
+    }
+    // One that comes later is not written or removed either.
+    fs::remove_file(&path).unwrap();
+    let film = &mut film();
+    let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
+    fs::write(&path, "notes").unwrap();
+    begun.keep(&record(&tile(0), film));
+    assert!(matches!(begun.check(), Err(PartialError::Foreign { .. })));
+    begun.remove().unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"notes");
+    // Neither is one that has taken the name of a file that was begun.
+    fs::remove_file(&path).unwrap();
+    let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
+    begun.keep(&record(&tile(0), film));
+    begun.check().unwrap();
+    #[cfg(unix)]
+    {
+        fs::write(folder.path().join("notes"), "notes").unwrap();
+        fs::rename(folder.path().join("notes"), &path).unwrap();
+        begun.remove().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"notes");
+    }
+}
+
+#[test]
+fn another_version_is_told_and_begun_anew_without_resume() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = partial(&folder, false).path;
+    let old = b"photoncard partial render 1\n{}\nsomething";
+    fs::write(&path, old).unwrap();
+    let film = &mut film();
+    let begun = PartialRender::begin(&partial(&folder, true), json!({}), film);
+    assert!(matches!(begun, Err(PartialError::Version { found: 1, .. })));
+    assert_eq!(fs::read(&path).unwrap(), old);
+    let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
+    begun.keep(&record(&tile(0), film));
+    begun.check().unwrap();
+    assert!(fs::read(&path).unwrap().starts_with(b"photoncard partial render 2\n{}\n\x89TILE"));
+}
+
+/// Links lead to what is somebody else's, and a pipe would be waited for: neither is opened.
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_of_its_own_is_refused_and_stays() {
+    use std::os::unix::fs::symlink;
+    let folder = tempfile::tempdir().unwrap();
+    let path = partial(&folder, false).path;
+    let own = folder.path().join("own");
+    // Even to a file that could be gone on with.
+    let bytes = written(&folder);
+    fs::rename(&path, &own).unwrap();
+    let make_pipe = || Ok(rustix::fs::mkfifoat(rustix::fs::CWD, &path, rustix::fs::Mode::RWXU)?);
+    let cases: [(&str, &dyn Fn() -> io::Result<()>); 5] = [
+        ("symbolic link", &|| symlink(&own, &path)),
+        ("symbolic link", &|| symlink("absent", &path)),
+        ("file with other hard links", &|| fs::hard_link(&own, &path)),
+        ("named pipe", &make_pipe),
+        ("folder", &|| fs::create_dir(&path)),
+    ];
+    for (expected, make) in cases {
+        make().unwrap();
+        for resume in [false, true] {
+            let begun = PartialRender::begin(&partial(&folder, resume), json!({ "seed": 1 }), &mut film());
+            assert!(
+                matches!(begun, Err(PartialError::NotAFile { kind, .. }) if kind == expected),
+                "{expected}"
+            );
+        }
+        assert_eq!(fs::read(&own).unwrap(), bytes);
+        assert!(fs::remove_file(&path).or_else(|_| fs::remove_dir(&path)).is_ok(), "{expected}");
+    }
+    assert!(!folder.path().join("absent").exists());
 }

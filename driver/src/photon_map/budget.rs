@@ -7,7 +7,7 @@ use photoncard_shared::layout::{Photon, Record};
 use photoncard_shared::message::Radiance;
 
 use super::settings::{PhotonLayout, PhotonSettings};
-use super::store::PHOTON_SECTIONS;
+use super::store::{CAUSTIC_SECTIONS, PHOTON_SECTIONS};
 use crate::pack::{CardImage, PackError, PackedScene};
 
 /// Photons of a line of leaves, the inner nodes' lines counted in, about.
@@ -62,12 +62,12 @@ pub fn check_image(image: &CardImage, budget: &Budget) -> Result<(), PackError> 
     if needed <= available {
         return Ok(());
     }
-    Err(PackError::Dram {
-        needed,
-        photons: PHOTON_SECTIONS.into_iter().map(|kind| bytes(image, kind)).sum(),
-        available,
-        remedy: lower("lower --photons", bytes(image, SectionKind::Texels), needed),
-    })
+    let of = |kind| bytes(image, kind);
+    let photons: u64 = PHOTON_SECTIONS.into_iter().map(of).sum();
+    let caustics: u64 = CAUSTIC_SECTIONS.into_iter().map(of).sum();
+    let option = if is_most(caustics, photons) { "--caustic-photons" } else { "--photons" };
+    let remedy = lower(&format!("lower {option}"), of(SectionKind::Texels), needed);
+    Err(PackError::Dram { needed, photons, available, remedy })
 }
 
 /// The bytes of a section's lines.
@@ -102,6 +102,7 @@ mod tests {
     use photoncard_shared::budget::REFERENCE;
 
     use super::*;
+    use crate::photon_map::map_photons;
     use crate::scene::{Encoding, Image, Material, Reflection, Scene, Texture, Triangle};
 
     /// A triangle, and an image of so many texels a side.
@@ -145,5 +146,33 @@ mod tests {
         let with_photons = remedy(&large, 100_000, 5 << 20);
         assert!(with_photons.starts_with("lower --photons to ") && with_photons.contains("smaller textures"));
         assert!(!remedy(&textured(64), 1_000_000, 5 << 20).contains("textures"));
+    }
+
+    /// Where photons of caustics take the memory, fewer others would not help.
+    #[test]
+    fn the_larger_of_the_photon_maps_is_to_be_lowered() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-spheres.glb");
+        let scene = crate::scene::gltf::load(path.as_ref()).expect("a shipped scene loads");
+        for (photons, caustic_photons, expected) in
+            [(500, 3000, "lower --caustic-photons"), (3000, 500, "lower --photons")]
+        {
+            let settings = PhotonSettings {
+                seed: 0,
+                photons,
+                neighbors: 100,
+                max_distance: None,
+                caustic_photons,
+                caustic_neighbors: 50,
+                layout: PhotonLayout::Lines,
+                radiance: Radiance::Density,
+            };
+            let packed = PackedScene::new(&scene).expect("it is small");
+            let image = map_photons(packed, &settings, &|_| true).expect("it has light").image;
+            let dram_bytes = image.bytes() as u32 - 1;
+            match check_image(&image, &Budget { dram_bytes, ..REFERENCE }) {
+                Err(PackError::Dram { remedy, .. }) => assert!(remedy.starts_with(expected), "{remedy}"),
+                other => panic!("{other:?}"),
+            }
+        }
     }
 }

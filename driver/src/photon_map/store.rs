@@ -18,6 +18,9 @@ pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
     SectionKind::IrradianceLeaves,
 ];
 
+/// The sections of the map of caustics.
+pub(super) const CAUSTIC_SECTIONS: [SectionKind; 2] = [SectionKind::CausticNodes, SectionKind::CausticLeaves];
+
 /// Completes the image of a scene with its photons, in leaves, for searches of about `neighbors` photons.
 ///
 /// # Errors
@@ -49,7 +52,7 @@ pub(super) fn store_caustics(
     image.set_caustic_power_unit(photons.power_unit());
     let radius = typical_radius(&photons, neighbors);
     if let Some(tree) = PhotonTree::new(photons.stored_mut(), radius) {
-        append_tree(&mut image, [SectionKind::CausticNodes, SectionKind::CausticLeaves], &tree)?;
+        append_tree(&mut image, CAUSTIC_SECTIONS, &tree)?;
     }
     Ok(image.finish())
 }

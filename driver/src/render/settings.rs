@@ -1,12 +1,13 @@
 //! What a render is asked to do.
 
+mod check;
+
 use std::path::PathBuf;
 
 use glam::Vec3;
 pub use photoncard_firmware::card::LEAST_IRRADIANCE_ERROR;
-use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_firmware::importance::ENTRIES;
-use photoncard_shared::budget::{Budget, MICRO, MOST_BINS};
+use photoncard_shared::budget::MICRO;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, CausticGather, FrameParameters, Radiance, Sampling};
 use serde_json::{Value, json};
@@ -128,9 +129,6 @@ const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 /// Photons of the caustic map of a scene with anything perfectly specular in it, unless others are asked for.
 pub const DEFAULT_CAUSTIC_PHOTONS: usize = 200_000;
 
-/// Photons that can be asked for.
-const MAX_PHOTONS: usize = 1 << 27;
-
 impl RenderSettings {
     /// All that the pixels depend on, by name.
     pub fn identity(&self, scene: &Scene) -> Value {
@@ -161,73 +159,6 @@ impl RenderSettings {
     /// The part to render.
     pub fn window(&self) -> Window {
         self.crop.unwrap_or(Window::full(self.width, self.height))
-    }
-
-    /// Checks the settings against what a card can hold.
-    ///
-    /// # Errors
-    /// The first setting that is not possible.
-    pub fn check(&self, budget: &Budget) -> Result<(), RenderError> {
-        let within = |option, value: u64, least: u64, most: u64| {
-            if (least..=most).contains(&value) {
-                return Ok(());
-            }
-            let remedy = if value < least {
-                format!("choose {least} or more")
-            } else {
-                format!("choose {most} or less; `photoncard card info` tells what a card can hold")
-            };
-            let reason = format!("it must be {least} to {most} on this card");
-            Err(RenderError::Setting { option, value: value.to_string(), reason, remedy })
-        };
-        within("--size", self.width.max(self.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
-        within("--photons", self.photons as u64, 1, MAX_PHOTONS as u64)?;
-        within("--neighbors", self.neighbors as u64, 2, budget.neighbors as u64)?;
-        within("--caustic-photons", self.caustic_photons.unwrap_or(0) as u64, 0, MAX_PHOTONS as u64)?;
-        within("--caustic-neighbors", self.caustic_neighbors as u64, 8, budget.neighbors as u64)?;
-        within("--gather-rays", self.gather_rays as u64, 0, budget.gather_rays as u64)?;
-        within("--shadow-rays", self.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
-        within("--spp", self.samples as u64, 1, budget.samples as u64)?;
-        within("--bins", self.bins.unwrap_or(1) as u64, 1, MOST_BINS as u64)?;
-        within("--queue", self.queue.unwrap_or(1) as u64, 1, budget.gather_queue as u64)?;
-        within("--tile", self.tile as u64, 1, budget.pixels_of_tile(false).isqrt() as u64)?;
-        self.check_tile_with_layers(budget)?;
-        if let Some(error) = self.irradiance_error
-            && !(LEAST_IRRADIANCE_ERROR..=1.0).contains(&error)
-        {
-            return Err(RenderError::Setting {
-                option: "--ic-error",
-                value: error.to_string(),
-                reason: format!("an error is a share of the irradiance, {LEAST_IRRADIANCE_ERROR} to 1"),
-                remedy: "give a number such as 0.025".into(),
-            });
-        }
-        match self.max_distance {
-            Some(distance) if !(distance.is_finite() && distance > 0.0) => Err(RenderError::Setting {
-                option: "--max-distance",
-                value: distance.to_string(),
-                reason: "a distance is a positive number of metres".into(),
-                remedy: "give a positive number, or `auto`".into(),
-            }),
-            _ => Ok(()),
-        }
-    }
-
-    /// Checks that a chip has room for a tile with layers, if the picture has any of chips.
-    fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
-        let most = budget.pixels_of_tile(self.layers.are_of_chip()).isqrt();
-        if self.tile <= most {
-            return Ok(());
-        }
-        Err(RenderError::Setting {
-            option: "--tile",
-            value: self.tile.to_string(),
-            reason: format!("with --aov {} it must be 1 to {most} on this card", self.layers),
-            remedy: format!(
-                "choose {most} or less, or leave direct, indirect, caustic and gathers out of --aov: with them a chip keeps \
-                 four sums a pixel"
-            ),
-        })
     }
 
     /// The side of a tile where none is asked for, pixels: one that the cards have room for, as far as that is known

@@ -4,16 +4,17 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::point::PROGRAM;
 use super::report::Provenance;
+use crate::printable::printable;
 
 impl Provenance {
     /// This program on this machine today, called as `command_line`. Settings are for the study to add.
-    pub fn here(command_line: String) -> Self {
+    pub fn here(command_line: &str) -> Self {
         let days = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs() / 86_400);
         Self {
             version: PROGRAM.to_owned(),
             date: date(days),
-            host: host(),
-            command_line,
+            host: printable(&host()).into_owned(),
+            command_line: printable(command_line).into_owned(),
             settings: Vec::new(),
         }
     }

@@ -14,7 +14,7 @@ use serde_json::Value;
 use thiserror::Error;
 
 use super::report::name;
-use crate::output::{self, OutputError};
+use crate::output::{self, OutputError, kind_of};
 
 /// The folder of the points in that of the study.
 const POINTS: &str = "points";
@@ -89,10 +89,15 @@ impl PointStore {
     /// [notices](Self::notices).
     pub fn get<T: DeserializeOwned>(&mut self, name: &str, key: &Value) -> Option<T> {
         let path = self.path(name, key).ok()?;
-        let read = match fs::read(&path) {
+        let read = match fs::metadata(&path).map(|found| kind_of(found.file_type())) {
+            // A pipe would be waited for.
+            Ok(Some(kind)) => Err(format!("is a {kind}")),
+            Ok(None) => match fs::read(&path) {
+                Err(error) => Err(format!("cannot be read ({error})")),
+                Ok(bytes) => result(&bytes, key),
+            },
             Err(error) if error.kind() == ErrorKind::NotFound => return None,
             Err(error) => Err(format!("cannot be read ({error})")),
-            Ok(bytes) => result(&bytes, key),
         };
         match read {
             Ok(result) => Some(result),
@@ -243,6 +248,18 @@ mod tests {
         assert_eq!(store.get::<Outcome>("sort", &key("1")), Some(outcome()));
         assert_eq!(store.get::<String>("sort", &key("1")), None);
         assert!(store.notices().last().unwrap().contains("another kind"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_in_a_points_place_is_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut store = PointStore::open(folder.path()).unwrap();
+        let path = store.path("sort", &key("1")).unwrap();
+        rustix::fs::mkfifoat(rustix::fs::CWD, path, rustix::fs::Mode::RWXU).unwrap();
+        assert_eq!(store.get::<Outcome>("sort", &key("1")), None);
+        assert!(store.notices()[0].contains("is a named pipe"), "{:?}", store.notices());
+        assert!(store.put("sort", &key("1"), &outcome()).is_err());
     }
 
     #[test]

@@ -12,6 +12,7 @@ use miette::{NamedSource, SourceSpan};
 
 use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
 use crate::error::{Place, SceneError};
+use crate::printable::printable;
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER: usize = 12;
@@ -207,13 +208,14 @@ fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError 
     let at = char_boundary(line, error.column().saturating_sub(1));
     let start = char_boundary(line, at.saturating_sub(CONTEXT));
     let end = char_boundary(line, at + CONTEXT);
-    let excerpt = line[start..end].to_owned();
-    let length = line[at..].chars().next().map_or(0, char::len_utf8);
+    let next = at + line[at..].chars().next().map_or(0, char::len_utf8);
+    // Shown as it stands, and pointed into: its parts are escaped here.
+    let [before, here, after] = [start..at, at..next, next..end.max(next)].map(|part| printable(&line[part]));
     let file = path.display().to_string();
     SceneError::Json {
         message: error.to_string(),
-        text: Arc::new(NamedSource::new(&file, excerpt)),
-        at: SourceSpan::new((at - start).into(), length),
+        text: Arc::new(NamedSource::new(printable(&file), format!("{before}{here}{after}"))),
+        at: SourceSpan::new(before.len().into(), here.len()),
         file,
     }
 }

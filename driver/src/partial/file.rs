@@ -1,0 +1,139 @@
+//! The file itself, opened with care: no link is followed, no pipe waited for, and nothing written or removed that is not a
+//! file of finished tiles.
+
+use std::fs::{self, File, Metadata, TryLockError};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read};
+use std::path::Path;
+
+use super::PartialError;
+use crate::output::kind_of;
+
+/// What the first line of any version begins with; the version's number follows.
+pub(super) const FAMILY: &str = "photoncard partial render ";
+/// The longest first line: a number of 10 digits and the line's end.
+const MAX_TITLE: u64 = FAMILY.len() as u64 + 11;
+/// Times that a file is opened which others remove meanwhile.
+const MAX_TRIES: usize = 16;
+
+/// The first line of a file of finished tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Title {
+    /// The file ends before the line does: it holds no tile.
+    CutOff,
+    /// The version of what follows.
+    Version(u32),
+}
+
+/// Reads the first line; `None` if the file is not of this program.
+pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>> {
+    let mut line = Vec::new();
+    reader.take(MAX_TITLE).read_until(b'\n', &mut line)?;
+    if FAMILY.as_bytes().starts_with(&line) {
+        return Ok(Some(Title::CutOff));
+    }
+    let number = line.strip_prefix(FAMILY.as_bytes()).and_then(|number| str::from_utf8(number).ok());
+    Ok(number.and_then(|number| match number.strip_suffix('\n') {
+        Some(number) => number.parse().ok().map(Title::Version),
+        None => number.bytes().all(|byte| byte.is_ascii_digit()).then_some(Title::CutOff),
+    }))
+}
+
+/// Opens the file and makes it this render's own. One that is not there is made if `create` says so.
+pub(super) fn open(path: &Path, create: bool) -> Result<Option<File>, PartialError> {
+    let failed = |source| PartialError::File { path: path.to_owned(), source };
+    for _ in 0..MAX_TRIES {
+        let file = match fs::symlink_metadata(path) {
+            Ok(found) => {
+                check_kind(path, &found)?;
+                open_there(path)
+            }
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+            Err(_) if !create => return Ok(None),
+            Err(_) => File::options().read(true).write(true).create_new(true).open(path),
+        };
+        let file = match file {
+            // Made or removed by another meanwhile.
+            Err(error) if [ErrorKind::AlreadyExists, ErrorKind::NotFound].contains(&error.kind()) => continue,
+            file => file.map_err(failed)?,
+        };
+        check_kind(path, &file.metadata().map_err(failed)?)?;
+        check_lock(path, &file.try_lock())?;
+        // Whoever had it may have removed it before it was locked.
+        if is_at(&file, path).map_err(failed)? {
+            let title = read_title(&mut BufReader::new(&file)).map_err(failed)?;
+            let foreign = PartialError::Foreign { path: path.to_owned() };
+            return title.map(|_| Some(file)).ok_or(foreign);
+        }
+    }
+    Err(PartialError::Busy { path: path.to_owned() })
+}
+
+/// Opens what is there for reading and writing, unless it has become a link, and does not wait if it has become a pipe.
+#[cfg(unix)]
+fn open_there(path: &Path) -> io::Result<File> {
+    use rustix::fs::{Mode, OFlags};
+    let flags = OFlags::RDWR | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
+    Ok(rustix::fs::open(path, flags, Mode::empty())?.into())
+}
+
+#[cfg(not(unix))]
+fn open_there(path: &Path) -> io::Result<File> {
+    File::options().read(true).write(true).open(path)
+}
+
+/// Refuses what is no file, or has another name by which somebody else may know it.
+fn check_kind(path: &Path, found: &Metadata) -> Result<(), PartialError> {
+    let linked = has_other_names(found).then_some("file with other hard links");
+    match kind_of(found.file_type()).or(linked) {
+        None => Ok(()),
+        Some(kind) => Err(PartialError::NotAFile { path: path.to_owned(), kind }),
+    }
+}
+
+#[cfg(unix)]
+fn has_other_names(found: &Metadata) -> bool {
+    std::os::unix::fs::MetadataExt::nlink(found) > 1
+}
+
+/// Not every system tells.
+#[cfg(not(unix))]
+fn has_other_names(_: &Metadata) -> bool {
+    false
+}
+
+/// Tells whether another render has the file. Where the system has no locks, or refuses them, nothing is known.
+pub(super) fn check_lock(path: &Path, locked: &Result<(), TryLockError>) -> Result<(), PartialError> {
+    match locked {
+        Err(TryLockError::WouldBlock) => Err(PartialError::Busy { path: path.to_owned() }),
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
+    }
+}
+
+/// Removes the file, unless another has taken its name.
+pub(super) fn remove(file: &File, path: &Path) -> io::Result<()> {
+    if !is_at(file, path)? {
+        return Ok(());
+    }
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Whether a path still names a file that was opened there.
+#[cfg(unix)]
+pub(super) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    let file = file.metadata()?;
+    match fs::symlink_metadata(path) {
+        Ok(named) => Ok((named.dev(), named.ino()) == (file.dev(), file.ino())),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Elsewhere a file that is open keeps its name.
+#[cfg(not(unix))]
+pub(super) fn is_at(_: &File, _: &Path) -> io::Result<bool> {
+    Ok(true)
+}

@@ -1,0 +1,39 @@
+//! Text of others, from scenes, cards, paths or arguments, made fit for a terminal.
+
+use std::borrow::Cow;
+
+/// The same text with all escaped that does not print as itself: control characters, line ends among them, what hides text or turns
+/// its direction round, and code points without a character. Quotes and backslashes stay, so that what is escaped stays as it is.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
+        return Cow::Borrowed(text);
+    }
+    // `escape_debug` knows what prints, but escapes these too.
+    let kept = ['\'', '"', '\\'];
+    let piece = |piece: &str| {
+        let body = piece.trim_end_matches(kept);
+        format!("{}{}", body.escape_debug(), &piece[body.len()..])
+    };
+    text.split_inclusive(kept).map(piece).collect::<String>().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_print_is_escaped_and_all_else_stays() {
+        for (text, expected) in [
+            ("", ""),
+            ("it's \"C:\\x\" \\\\", "it's \"C:\\x\" \\\\"),
+            ("Größe 大 🎨 e\u{301}'e\u{301}", "Größe 大 🎨 e\u{301}'e\u{301}"),
+            ("\u{1b}[2J\0\u{7f}\u{9b}", "\\u{1b}[2J\\0\\u{7f}\\u{9b}"),
+            ("a\r\n\tb", "a\\r\\n\\tb"),
+            ("\u{202e}gnp\u{2066}.exr\u{feff}\u{2028}", "\\u{202e}gnp\\u{2066}.exr\\u{feff}\\u{2028}"),
+            ("\u{e0041}\u{200b}", "\\u{e0041}\\u{200b}"),
+        ] {
+            assert_eq!(printable(text), expected);
+            assert_eq!(printable(expected), expected, "it is not escaped twice");
+        }
+    }
+}
