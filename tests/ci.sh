@@ -91,11 +91,35 @@ for image in "${images[@]}"; do
     refuse_panics "${CARGO_TARGET_DIR:-target}/${target_of[$image]}/card/$image"
 done
 
+# A test that hangs is stopped and named: by nextest one by one, else with its test program.
 step "tests"
-cargo test --workspace --locked
+if cargo nextest --version >/dev/null 2>&1; then
+    cargo nextest run --workspace --locked
+else
+    echo "ci: cargo-nextest is missing: a limit of time holds for each test program, not for each test" >&2
+    host=$(rustc -vV | sed -n 's/^host: //p')
+    export "CARGO_TARGET_$(tr 'a-z-' 'A-Z_' <<<"$host")_RUNNER=$PWD/tests/bounded.sh"
+    cargo test --workspace --locked --lib --bins --tests --examples
+fi
+timeout 900 cargo test --workspace --doc --locked
 
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+
+# Licences and sources are a test as well (tests/tests/dependencies.rs); advisories need the tool, and a database on GitHub.
+step "dependencies"
+skipped_advisories=""
+if ! cargo deny --version >/dev/null 2>&1; then
+    skipped_advisories="cargo-deny is missing; run: cargo install cargo-deny --locked (it takes ten minutes and more to build)"
+else
+    cargo deny --offline check licenses bans sources
+    if timeout 120 cargo deny fetch db; then
+        cargo deny --offline check advisories
+    else
+        skipped_advisories="the advisory database cannot be had (https://github.com/RustSec/advisory-db)"
+    fi
+fi
+[ -z "$skipped_advisories" ] || echo "ci: SKIPPED: advisories of dependencies: $skipped_advisories" >&2
 
 [ ${#unchecked[@]} = 0 ] || echo "ci: SKIPPED: checks for ${unchecked[*]}: rustup cannot add them" >&2
 [ -z "${PHOTONCARD_SKIP_QEMU:-}" ] || echo "ci: SKIPPED: images on QEMU: $PHOTONCARD_SKIP_QEMU" >&2
