@@ -6,7 +6,6 @@
 //! the `exr` crate keeps attributes in a hash map, so several would change the file's bytes from run to run.
 
 use std::io::{self, Cursor};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use exr::meta::BlockDescription;
@@ -19,6 +18,7 @@ use exr::prelude::{
 use thiserror::Error;
 
 use crate::film::Film;
+use crate::foreign;
 use crate::layer::{Channel, Layers};
 use crate::output::{self, OutputError};
 
@@ -216,14 +216,14 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
 
 /// As [`read_rgb`], of a file that holds these bytes, and of at most so many pixels.
 pub(crate) fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
-    // The `exr` crate trusts a file's numbers in places (sums of window sizes, offsets of blocks) and panics on a
-    // malformed one. Nothing is shared with the closure, so nothing can be left half changed.
-    catch_unwind(AssertUnwindSafe(|| decode(path, bytes, most_pixels))).unwrap_or_else(|_| {
-        Err(ExrError::Malformed {
+    // The `exr` crate trusts a file's numbers in places: sums of window sizes, offsets of blocks.
+    foreign::decode(
+        || decode(path, bytes, most_pixels),
+        || ExrError::Malformed {
             path: path.to_owned(),
             reason: "its structure contradicts itself".to_owned(),
-        })
-    })
+        },
+    )
 }
 
 fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {

@@ -9,6 +9,7 @@ pub mod error;
 pub mod exr;
 pub mod film;
 mod fold;
+mod foreign;
 pub mod layer;
 mod light;
 pub mod link;

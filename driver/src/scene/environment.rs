@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::raster::{Fault, check_size};
+use super::raster::{Fault, check_size, walled};
 use super::{BRIGHTEST, MAX_SIDE, radiance};
 use crate::error::SceneError;
 use crate::exr::{self, ExrError};
@@ -55,7 +55,7 @@ impl Environment {
         let read = if bytes.starts_with(EXR_MAGIC) {
             read_exr(path, &bytes)
         } else if bytes.starts_with(radiance::MAGIC) {
-            radiance::read(&bytes).map(|(size, texels)| Self::of(size, texels))
+            walled(|| radiance::read(&bytes)).map(|(size, texels)| Self::of(size, texels))
         } else {
             Err(Fault {
                 reason: "it is neither a Radiance picture nor an OpenEXR picture".to_owned(),

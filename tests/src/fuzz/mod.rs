@@ -9,6 +9,7 @@ mod image;
 mod messages;
 mod mutation;
 mod picture;
+mod png;
 mod random;
 mod run;
 mod session;

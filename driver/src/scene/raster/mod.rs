@@ -8,6 +8,7 @@ mod jpeg;
 mod png;
 
 use super::texture::{MAX_SIDE, MAX_TEXELS};
+use crate::foreign;
 
 /// Why an image is not read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,6 +25,11 @@ impl Fault {
     fn damaged(reason: impl std::fmt::Display) -> Self {
         Self { reason: format!("the image cannot be decoded: {reason}"), remedy: COPY_AGAIN }
     }
+}
+
+/// Runs a decoder; one that panics has found a damaged file.
+pub(super) fn walled<T>(decoder: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
+    foreign::decode(decoder, || Fault::damaged("its structure contradicts itself"))
 }
 
 /// A kind of image file.
@@ -70,10 +76,10 @@ impl Kind {
 
     /// Width and height, from the header, if the limits and the file's length allow them.
     pub(super) fn size(self, bytes: &[u8]) -> Result<[u32; 2], Fault> {
-        let (size, most_texels) = match self {
-            Self::Png => png::size(bytes)?,
-            Self::Jpeg => jpeg::size(bytes)?,
-        };
+        let (size, most_texels) = walled(|| match self {
+            Self::Png => png::size(bytes),
+            Self::Jpeg => jpeg::size(bytes),
+        })?;
         check_size(size)?;
         let [width, height] = size;
         if u64::from(width) * u64::from(height) > most_texels {
@@ -85,10 +91,10 @@ impl Kind {
 
     /// The texels of an image of that size, as [`Kind::size`] has told it, rows from the top.
     pub(super) fn decode(self, bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
-        let texels = match self {
-            Self::Png => png::decode(bytes, size)?,
-            Self::Jpeg => jpeg::decode(bytes, size)?,
-        };
+        let texels = walled(|| match self {
+            Self::Png => png::decode(bytes, size),
+            Self::Jpeg => jpeg::decode(bytes, size),
+        })?;
         let [width, height] = size.map(|side| side as usize);
         if texels.len() == width * height { Ok(texels) } else { Err(Fault::damaged("rows are missing")) }
     }
