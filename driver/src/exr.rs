@@ -17,6 +17,7 @@ use exr::prelude::{
 };
 use thiserror::Error;
 
+use crate::allocation::{self, OutOfMemory};
 use crate::film::Film;
 use crate::foreign;
 use crate::layer::{Channel, Layers};
@@ -98,6 +99,14 @@ pub enum ExrError {
         path: PathBuf,
         /// The compression's name.
         compression: String,
+    },
+    /// The process cannot have the memory that reading takes.
+    #[error("reading {} takes {bytes} bytes of memory, which the system does not give; {}", path.display(), allocation::REMEDY)]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of memory.
+        bytes: u64,
     },
     /// The picture is too large to be read at once.
     #[error("{} has {width} x {height} pixels, more than {MAX_READ_PIXELS}; compare crops of it", path.display())]
@@ -286,6 +295,10 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
     if stated > held {
         return contradiction(format!("{width} x {height} pixels do not fit into {length} bytes"));
     }
+    // The picture, and a block as it is unpacked and put in order.
+    let block = stated.min(header.max_block_byte_size() as u64);
+    allocation::check(pixels.saturating_mul(size_of::<[f32; 3]>() as u64).saturating_add(3 * block))
+        .map_err(|OutOfMemory { bytes }| ExrError::Memory { path: path.to_owned(), bytes })?;
     let BlockDescription::Tiles(tiles) = header.blocks else { return Ok(()) };
     let tile = (tiles.tile_size.width() as u64).saturating_mul(tiles.tile_size.height() as u64);
     if tile > MAX_READ_PIXELS {

@@ -1,6 +1,7 @@
 //! The host half of photoncard.
 #![forbid(unsafe_code)]
 
+mod allocation;
 pub mod bvh;
 pub mod difference;
 pub mod display;

@@ -12,6 +12,7 @@ use photoncard_shared::layout::{
     self, BvhNode, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, WideNode, power_of_two_above,
 };
 
+use crate::allocation::{self, OutOfMemory};
 use crate::bvh::{self, HierarchyError, LeafTriangles};
 use crate::light::{Lights, Sources};
 use crate::photon::leaves::PhotonTree;
@@ -29,6 +30,9 @@ pub use self::card_image::CardImage;
 use self::corners::PackedCorners;
 use self::lines::append;
 
+/// Bytes of memory that packing takes for a triangle beside the scene: binary trees, most of all.
+const BYTES_OF_A_TRIANGLE: u64 = 700;
+
 /// Textures that materials can tell apart.
 const MOST_TEXTURES: usize = layout::NO_TEXTURE as usize;
 
@@ -39,6 +43,15 @@ pub enum PackError {
     #[error(transparent)]
     #[diagnostic(help("simplify the scene's geometry"))]
     Hierarchy(#[from] HierarchyError),
+    /// The process cannot have the memory for packing.
+    #[error("packing {triangles} triangles takes {bytes} bytes of memory, which the system does not give")]
+    #[diagnostic(help("simplify the scene's geometry, or {}", allocation::REMEDY))]
+    Memory {
+        /// Triangles of the scene.
+        triangles: usize,
+        /// Bytes of memory.
+        bytes: u64,
+    },
     /// The image has more lines than an address can tell.
     #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
     #[diagnostic(help("lower --photons, use smaller textures, or simplify the scene"))]
@@ -85,8 +98,10 @@ impl PackedScene {
     /// Packs geometry, materials, textures and lights.
     ///
     /// # Errors
-    /// If the geometry is too much for a chip, or there are more textures or lights than it can tell apart.
+    /// If the geometry is too much for a chip or for this process, or there are more textures or lights than a chip can tell apart.
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
+        allocation::check(BYTES_OF_A_TRIANGLE * scene.triangles.len() as u64)
+            .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles: scene.triangles.len(), bytes })?;
         let lights = Lights::new(scene);
         let cut_out: Vec<bool> =
             scene.materials.iter().map(|material| material.alpha_cutoff.is_some()).collect();

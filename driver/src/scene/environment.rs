@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use super::raster::{Fault, check_size, walled};
 use super::{BRIGHTEST, MAX_SIDE, radiance};
+use crate::allocation::OutOfMemory;
 use crate::error::SceneError;
 use crate::exr::{self, ExrError};
 
@@ -99,6 +100,7 @@ fn read_exr(path: &Path, bytes: &[u8]) -> Result<Environment, Fault> {
             remedy: "store the picture with ZIP compression",
         },
         ExrError::TooLarge { width, height, .. } => too_large([width, height]),
+        ExrError::Memory { bytes, .. } => Fault::memory(OutOfMemory { bytes }),
         other => Fault { reason: other.to_string(), remedy: "export or copy the picture again" },
     })?;
     let size = [image.width, image.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));

@@ -8,7 +8,7 @@ use crate::address::LINE_BYTES;
 /// Triangles that a leaf may have. The index of a triangle is this many times its leaf's and its slot in there.
 pub const LEAF_TRIANGLES: usize = 8;
 /// Vertices that they may have.
-const LEAF_VERTICES: usize = 9;
+pub const LEAF_VERTICES: usize = 9;
 /// Lanes that coordinates are read into, of which the first nine are vertices': whole registers.
 pub const VERTEX_LANES: usize = 12;
 

@@ -96,10 +96,10 @@ impl VertexReader<'_, '_> {
         transforms: &[Cow<'_, Transform>; 3],
         triangle: &Triangle,
     ) -> Result<Option<Attributes>, SceneError> {
-        let is_mapped = self.primitive.coordinates.iter().any(Option::is_some);
-        if !is_mapped && self.primitive.normals.is_none() && self.primitive.colours.is_none() {
+        if !self.primitive.may_have_attributes() {
             return Ok(None);
         }
+        let is_mapped = self.primitive.is_mapped();
         let mut coordinates = Attributes::NONE.coordinates;
         for (set, coordinates) in coordinates.iter_mut().enumerate() {
             for (coordinate, corner) in coordinates.iter_mut().zip(corners) {

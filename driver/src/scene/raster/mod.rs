@@ -8,6 +8,7 @@ mod jpeg;
 mod png;
 
 use super::texture::{MAX_SIDE, MAX_TEXELS};
+use crate::allocation::{self, OutOfMemory};
 use crate::foreign;
 
 /// Why an image is not read.
@@ -21,7 +22,15 @@ pub(super) struct Fault {
 
 const COPY_AGAIN: &str = "export the image again, or copy it again: it is damaged or was cut off on the way";
 
+/// Bytes of memory that decoding takes for a texel: itself, interlaced rows of PNG of 16 bits, or coefficients of progressive JPEG.
+const DECODING_BYTES: u64 = 16;
+
 impl Fault {
+    /// A file for which there is no memory.
+    pub(super) fn memory(error: OutOfMemory) -> Self {
+        Self { reason: format!("decoding it takes much memory: {error}"), remedy: allocation::REMEDY }
+    }
+
     fn damaged(reason: impl std::fmt::Display) -> Self {
         Self { reason: format!("the image cannot be decoded: {reason}"), remedy: COPY_AGAIN }
     }
@@ -91,6 +100,8 @@ impl Kind {
 
     /// The texels of an image of that size, as [`Kind::size`] has told it, rows from the top.
     pub(super) fn decode(self, bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
+        let bytes_needed = DECODING_BYTES * u64::from(size[0]) * u64::from(size[1]);
+        allocation::check(bytes_needed).map_err(Fault::memory)?;
         let texels = walled(|| match self {
             Self::Png => png::decode(bytes, size),
             Self::Jpeg => jpeg::decode(bytes, size),
