@@ -1,7 +1,7 @@
 //! Meshes: triangles placed into the world by each node that shows them.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use glam::{DMat4, Vec3};
@@ -13,7 +13,7 @@ use super::primitive::{Primitive, Topology};
 use super::room::Room;
 use super::skin::Skin;
 use super::transform::Transform;
-use super::vertex::VertexReader;
+use super::vertex::{NotFinite, VertexReader};
 use crate::allocation::OutOfMemory;
 use crate::error::SceneError;
 use crate::scene::{Scene, Triangle};
@@ -49,11 +49,19 @@ pub(super) struct MeshPlacer<'a> {
     placed: BTreeMap<usize, u64>,
     /// Triangles and primitives to be placed, those of zero area too.
     work: u64,
+    /// Meshes that were placed with normals or colours that are not finite.
+    pub(super) not_finite: NotFinite<BTreeSet<usize>>,
 }
 
 impl<'a> MeshPlacer<'a> {
     pub(super) fn new(source: &'a Source<'a>) -> Self {
-        Self { source, prepared: BTreeMap::new(), placed: BTreeMap::new(), work: 0 }
+        Self {
+            source,
+            prepared: BTreeMap::new(),
+            placed: BTreeMap::new(),
+            work: 0,
+            not_finite: NotFinite::default(),
+        }
     }
 
     /// Counts the triangles of so many instances of mesh `index`.
@@ -160,7 +168,7 @@ impl<'a> MeshPlacer<'a> {
         pose: &Pose<'_>,
         scene: &mut Scene,
     ) -> Result<(), SceneError> {
-        let reader = VertexReader { source: self.source, mesh, primitive };
+        let reader = VertexReader { source: self.source, mesh, primitive, not_finite: NotFinite::default() };
         for triangle in 0..primitive.triangles {
             let mut corners = reader.indices(triangle)?;
             let [a, b, c] = corners;
@@ -186,6 +194,9 @@ impl<'a> MeshPlacer<'a> {
                 scene.skipped_triangles += 1;
             }
         }
+        let NotFinite { normals, colours } = &reader.not_finite;
+        self.not_finite.normals.extend(normals.get().then_some(mesh));
+        self.not_finite.colours.extend(colours.get().then_some(mesh));
         Ok(())
     }
 }

@@ -44,7 +44,9 @@ pub(super) fn place(
     };
     nodes.iter().try_for_each(|(index, _)| placer.count(*index, scene))?;
     placer.meshes.reserve(scene, room)?;
-    nodes.into_iter().try_for_each(|(index, world)| placer.place(index, world, scene, notices))
+    nodes.into_iter().try_for_each(|(index, world)| placer.place(index, world, scene, notices))?;
+    notices.not_finite = placer.meshes.not_finite;
+    Ok(())
 }
 
 struct Placer<'a> {
