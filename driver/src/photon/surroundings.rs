@@ -19,6 +19,8 @@ use super::sides::SideTable;
 
 /// Triangles that are tested one by one; of more, a descent for each ray finds the few that matter.
 const MOST_TRIANGLES: usize = 4096;
+/// Beyond this many triangles those in the place of another are left out: thousands in one place are as one.
+const MAX_WITH_TWINS: usize = 512;
 /// Coordinates of corners beyond this, in radii, would round away what is near.
 const MOST_EXTENT: f32 = 1e4;
 /// Triangles of a plain wall within a ball, at the most.
@@ -33,6 +35,15 @@ pub(super) struct Block {
     pub(super) indices: [u32; LANES],
     /// A bit for each whose back is the inside of something.
     pub(super) are_solid: u32,
+}
+
+impl Block {
+    /// Whether one of its triangles has these corners: leaves of triangles in one place follow each other.
+    fn holds(&self, corners: &[Vec3; 3]) -> bool {
+        (0..LANES).any(|lane| {
+            self.corners.iter().zip(corners).all(|(lanes, corner)| at(lanes, lane) == corner.to_array())
+        })
+    }
 }
 
 /// The triangles in a ball.
@@ -122,6 +133,9 @@ impl Surroundings {
             return false;
         }
         let lane = self.triangles % LANES;
+        if self.triangles >= MAX_WITH_TWINS && self.blocks.last().is_some_and(|block| block.holds(corners)) {
+            return true;
+        }
         if lane == 0 {
             self.blocks.push(Block { corners: Default::default(), indices: [0; LANES], are_solid: 0 });
         }
