@@ -49,4 +49,16 @@ mod tests {
         assert_eq!(nested(), Err::<i32, _>("inner"));
         assert_eq!(WALLS.get(), 0);
     }
+
+    /// The other test in a process of its own, the output of which is not kept back.
+    #[test]
+    fn nothing_is_said_of_a_panic_behind_a_wall() {
+        let test = "foreign::tests::a_decoder_that_panics_ends_in_an_error";
+        let program = std::env::current_exe().expect("a program runs");
+        let output = std::process::Command::new(program).args([test, "--exact", "--nocapture"]).output();
+        let output = output.expect("it starts");
+        let [said, errors] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
+        assert!(output.status.success() && said.contains("1 passed"), "{said}{errors}");
+        assert!(!errors.contains("panicked"), "{errors}");
+    }
 }
