@@ -3,7 +3,7 @@
 use super::{Random, mutation};
 
 /// The first bytes of every file.
-pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
+pub(crate) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// A chunk's type and data.
 type Chunk = ([u8; 4], Vec<u8>);
@@ -13,7 +13,7 @@ const TYPES: [&[u8; 4]; 9] =
     [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND", b"gAMA", b"iCCP", b"acTL", b"fcTL"];
 
 /// Makes one edit of the chunks of a file: of the data of one, or of which there are. What is behind them is lost.
-pub(super) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
+pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
     let mut chunks = split(file);
     if chunks.is_empty() {
         return;
@@ -39,7 +39,7 @@ pub(super) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
 }
 
 /// Makes the checksums of chunks right, and leaves all else.
-pub(super) fn mend_checksums(file: &mut [u8]) {
+pub(crate) fn mend_checksums(file: &mut [u8]) {
     let mut at = MAGIC.len();
     while let Some(length) = file.get(at..).and_then(|rest| rest.first_chunk::<4>()) {
         let end = at.saturating_add(8).saturating_add(u32::from_be_bytes(*length) as usize);

@@ -44,6 +44,13 @@ fn scene(image_bytes: usize) -> String {
 
 const TRIANGLE_BYTES: usize = 36;
 
+/// A scene of a triangle with an image file as its base colour.
+pub(crate) fn textured(image: &[u8]) -> Vec<u8> {
+    let triangle = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
+    let bytes = [triangle.as_flattened(), image].concat();
+    glb(scene(image.len()).as_bytes(), &bytes)
+}
+
 impl Textures {
     pub(super) fn new() -> Self {
         let seeds = SEEDS.map(<[u8]>::to_vec).to_vec();
@@ -79,10 +86,7 @@ impl Target for Textures {
     }
 
     fn read(&self, input: &[u8]) -> bool {
-        let triangle = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
-        let bytes = [triangle.as_flattened(), input].concat();
-        fs::write(self.path(), glb(scene(input.len()).as_bytes(), &bytes))
-            .expect("there is room for a scene");
+        fs::write(self.path(), textured(input)).expect("there is room for a scene");
         match gltf::load(&self.path()) {
             Ok(scene) => {
                 let [image] = &scene.images[..] else { panic!("one image is in use") };
