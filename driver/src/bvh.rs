@@ -66,6 +66,9 @@ const MOST_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 /// The cost of a visit of a leaf, of which that of a node is 1.
 const LEAF_COST: f32 = 1.0;
 
+/// Triangles whose boxes have one centre and that the builder may be given one by one.
+const MAX_CONCENTRIC: usize = 64;
+
 /// Builds the hierarchy of some triangles, at least one. The same on every machine: obvhs runs on one thread. `cut_out` says
 /// of each material whether its triangles may have cut-outs; those beyond its end have none.
 ///
@@ -81,15 +84,17 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
     let boxes: Vec<Aabb> = triangles.iter().map(bounding_box).collect();
     // Of corners that are no numbers minima and maxima tell nothing.
     let is_finite = triangles.iter().flat_map(|triangle| triangle.vertices).all(glam::Vec3::is_finite);
-    let around = boxes.iter().fold(Aabb::empty(), |around, bounds| around.union(bounds));
-    if !is_finite || !around.half_area().is_finite() {
+    let all = boxes.iter().fold(Aabb::empty(), |all, bounds| all.union(bounds));
+    if !is_finite || !all.half_area().is_finite() {
         return Err(HierarchyError::NotFinite);
     }
     // Leaves are made when the tree is folded.
     let parameters = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::slow_build() };
-    let binary = build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
+    let parts = Parts::new(&boxes);
+    let around_parts: Vec<Aabb> = parts.iter().map(|part| around(part, &boxes)).collect();
+    let binary = build_bvh2(&around_parts, parameters, &mut std::time::Duration::default());
     let mesh = &Mesh { triangles, cut_out };
-    let mut folded = Folded::new(tree(&binary, mesh));
+    let mut folded = Folded::new(tree(&binary, &parts, &boxes, mesh));
     if folded.stack > BVH_STACK {
         // Halves of halves are not the best of trees, but no deeper than their number asks for.
         let mut indices: Vec<u32> = (0..triangles.len() as u32).collect();
@@ -105,6 +110,46 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
         mesh.encode(indices).unwrap_or_else(|| unreachable!("a leaf of {} triangles", indices.len()))
     });
     Ok(Hierarchy { nodes, leaves: lines.collect(), leaf_triangles: leaves })
+}
+
+/// What the builder is given: triangles whose boxes have a centre in common as one, if they are many, and every other by itself.
+///
+/// Of boxes in one another each is as near as any larger one, so that hardly two choose each other, and the builder would go
+/// through all of them for each pair that it joins.
+struct Parts {
+    crowds: Vec<Vec<u32>>,
+    singles: Vec<u32>,
+}
+
+impl Parts {
+    fn new(boxes: &[Aabb]) -> Self {
+        let centre = |bounds: &Aabb| bounds.center().to_array().map(|value| (value + 0.0).to_bits());
+        let mut keyed: Vec<_> = boxes.iter().map(centre).zip(0_u32..).collect();
+        keyed.sort_unstable();
+        let same = keyed.chunk_by(|(a, _), (b, _)| a == b).filter(|same| same.len() > MAX_CONCENTRIC);
+        let crowds: Vec<Vec<u32>> = same.map(|same| same.iter().map(|(_, index)| *index).collect()).collect();
+        let mut is_single = vec![true; boxes.len()];
+        crowds.iter().flatten().for_each(|&index| is_single[index as usize] = false);
+        Self { crowds, singles: (0..).zip(is_single).filter_map(|(index, is)| is.then_some(index)).collect() }
+    }
+
+    /// The triangles of each part.
+    fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        self.crowds.iter().map(Vec::as_slice).chain(self.singles.chunks(1))
+    }
+
+    /// The triangles of a part.
+    fn triangles(&self, part: u32) -> &[u32] {
+        let part = part as usize;
+        match part.checked_sub(self.crowds.len()) {
+            None => &self.crowds[part],
+            Some(single) => &self.singles[single..=single],
+        }
+    }
+}
+
+fn around(indices: &[u32], boxes: &[Aabb]) -> Aabb {
+    indices.iter().fold(Aabb::empty(), |bounds, &index| bounds.union(&boxes[index as usize]))
 }
 
 fn bounding_box(triangle: &Triangle) -> Aabb {
@@ -129,7 +174,7 @@ impl Mesh<'_> {
 }
 
 /// A tree that may be folded. Whatever a leaf has room for may be one.
-fn tree(binary: &Bvh2, mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
+fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
     // Parents before children.
     let mut order = vec![0];
     let mut next = 0;
@@ -148,8 +193,8 @@ fn tree(binary: &Bvh2, mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
         let bounds = NodeBox { lower: node.aabb().min.to_array(), upper: node.aabb().max.to_array() };
         let area = node.aabb().half_area();
         trees[index as usize] = Some(if node.is_leaf() {
-            let indices = binary.primitive_indices[first..first + node.prim_count as usize].iter().copied();
-            Tree::leaf(indices.collect(), bounds, LEAF_COST * area)
+            // Of one part, as the builder was told.
+            halves(&mut parts.triangles(binary.primitive_indices[first]).to_vec(), boxes, mesh)
         } else {
             let parts = [first, first + 1].map(|part| trees[part].take().unwrap_or_else(missing));
             let leaf = both(&parts, mesh).map(|leaf| (leaf, LEAF_COST * area));
@@ -161,7 +206,7 @@ fn tree(binary: &Bvh2, mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
 
 /// A tree of parts of as many triangles each.
 fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
-    let bounds = indices.iter().fold(Aabb::empty(), |bounds, &index| bounds.union(&boxes[index as usize]));
+    let bounds = around(indices, boxes);
     let area = bounds.half_area();
     let node_box = NodeBox { lower: bounds.min.to_array(), upper: bounds.max.to_array() };
     if let Ok(leaf) = LeafTriangles::from_slice(indices)
@@ -284,6 +329,25 @@ mod tests {
             let mut triangles = triangles(20);
             triangles[7].vertices[1] = Vec3::splat(coordinate);
             assert!(matches!(build(&triangles, &[]), Err(HierarchyError::NotFinite)), "{coordinate}");
+        }
+    }
+
+    /// Squares in one place, or in one another, of which the builder would join two at a time.
+    #[test]
+    fn crowds_of_triangles_are_built_in_no_time_to_speak_of() {
+        for step in [0.0, 1e-5] {
+            let squares = (0..50_000).map(|i| {
+                let side = 1.0 + step * i as f32;
+                let [a, b, c] =
+                    [(-side, -side), (side, -side), (side, side)].map(|(x, z)| Vec3::new(x, 0.0, z));
+                Triangle::new([a, b, c], i % 3)
+            });
+            let begin = std::time::Instant::now();
+            let hierarchy = build(&squares.collect::<Vec<_>>(), &[]).expect("builds");
+            assert!(begin.elapsed().as_secs() < 60, "{:?}", begin.elapsed());
+            let mut found: Vec<u32> = hierarchy.leaf_triangles.iter().flatten().copied().collect();
+            found.sort_unstable();
+            assert!(found.into_iter().eq(0..50_000));
         }
     }
 

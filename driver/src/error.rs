@@ -8,6 +8,8 @@ use std::sync::Arc;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use thiserror::Error;
 
+use crate::allocation::{self, OutOfMemory};
+
 /// A place in a scene: the file, and what in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -197,6 +199,37 @@ pub enum SceneError {
         limit: usize,
     },
 
+    /// The scene cannot be held by a card, whatever else is left out.
+    #[error("{}: {what} take {needed} bytes of a card's memory or more, and the card has {available}", file.display())]
+    #[diagnostic(
+        code(scene::too_large),
+        help(
+            "simplify the meshes, place fewer instances, use fewer materials or smaller textures, or use a card with more memory"
+        )
+    )]
+    TooLarge {
+        /// The file.
+        file: PathBuf,
+        /// What takes it, with what was counted before.
+        what: String,
+        /// Bytes of the card image, at least.
+        needed: u64,
+        /// Bytes of the card's memory.
+        available: u64,
+    },
+
+    /// The process cannot have the memory that a step of loading takes.
+    #[error("{}: {step} takes {bytes} bytes of memory, which the system does not give", file.display())]
+    #[diagnostic(code(scene::memory), help("simplify the scene, or {}", allocation::REMEDY))]
+    Memory {
+        /// The file.
+        file: PathBuf,
+        /// What takes it.
+        step: &'static str,
+        /// How many bytes.
+        bytes: u64,
+    },
+
     /// A material's value is out of its range.
     #[error("{place}: material '{material}': {reason}")]
     #[diagnostic(code(scene::material), help("{remedy}"))]
@@ -292,4 +325,11 @@ pub enum SceneError {
         /// What to do.
         remedy: &'static str,
     },
+}
+
+impl SceneError {
+    /// A step of loading for which there is no memory.
+    pub(crate) fn memory(file: &Path, step: &'static str, OutOfMemory { bytes }: OutOfMemory) -> Self {
+        Self::Memory { file: file.to_owned(), step, bytes }
+    }
 }

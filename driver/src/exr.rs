@@ -6,7 +6,6 @@
 //! the `exr` crate keeps attributes in a hash map, so several would change the file's bytes from run to run.
 
 use std::io::{self, Cursor};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use exr::meta::BlockDescription;
@@ -18,7 +17,9 @@ use exr::prelude::{
 };
 use thiserror::Error;
 
+use crate::allocation::{self, OutOfMemory};
 use crate::film::Film;
+use crate::foreign;
 use crate::layer::{Channel, Layers};
 use crate::output::{self, OutputError};
 
@@ -98,6 +99,14 @@ pub enum ExrError {
         path: PathBuf,
         /// The compression's name.
         compression: String,
+    },
+    /// The process cannot have the memory that reading takes.
+    #[error("reading {} takes {bytes} bytes of memory, which the system does not give; {}", path.display(), allocation::REMEDY)]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of memory.
+        bytes: u64,
     },
     /// The picture is too large to be read at once.
     #[error("{} has {width} x {height} pixels, more than {MAX_READ_PIXELS}; compare crops of it", path.display())]
@@ -216,14 +225,14 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
 
 /// As [`read_rgb`], of a file that holds these bytes, and of at most so many pixels.
 pub(crate) fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
-    // The `exr` crate trusts a file's numbers in places (sums of window sizes, offsets of blocks) and panics on a
-    // malformed one. Nothing is shared with the closure, so nothing can be left half changed.
-    catch_unwind(AssertUnwindSafe(|| decode(path, bytes, most_pixels))).unwrap_or_else(|_| {
-        Err(ExrError::Malformed {
+    // The `exr` crate trusts a file's numbers in places: sums of window sizes, offsets of blocks.
+    foreign::decode(
+        || decode(path, bytes, most_pixels),
+        || ExrError::Malformed {
             path: path.to_owned(),
             reason: "its structure contradicts itself".to_owned(),
-        })
-    })
+        },
+    )
 }
 
 fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
@@ -286,6 +295,10 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
     if stated > held {
         return contradiction(format!("{width} x {height} pixels do not fit into {length} bytes"));
     }
+    // The picture, and a block as it is unpacked and put in order.
+    let block = stated.min(header.max_block_byte_size() as u64);
+    allocation::check(pixels.saturating_mul(size_of::<[f32; 3]>() as u64).saturating_add(3 * block))
+        .map_err(|OutOfMemory { bytes }| ExrError::Memory { path: path.to_owned(), bytes })?;
     let BlockDescription::Tiles(tiles) = header.blocks else { return Ok(()) };
     let tile = (tiles.tile_size.width() as u64).saturating_mul(tiles.tile_size.height() as u64);
     if tile > MAX_READ_PIXELS {

@@ -1,6 +1,7 @@
 //! The host half of photoncard.
 #![forbid(unsafe_code)]
 
+mod allocation;
 pub mod bvh;
 mod density;
 pub mod difference;
@@ -10,6 +11,7 @@ pub mod error;
 pub mod exr;
 pub mod film;
 mod fold;
+mod foreign;
 pub mod layer;
 mod light;
 pub mod link;

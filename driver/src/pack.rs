@@ -11,6 +11,7 @@ use photoncard_shared::layout::{
     self, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, power_of_two_above,
 };
 
+use crate::allocation::{self, OutOfMemory};
 use crate::bvh::{self, LeafTriangles};
 use crate::light::{Lights, Sources};
 use crate::scene::Scene;
@@ -27,6 +28,9 @@ use self::corners::PackedCorners;
 pub use self::error::PackError;
 pub(crate) use self::writer::ImageWriter;
 
+/// Bytes of memory that packing takes for a triangle beside the scene: binary trees, most of all.
+const BYTES_OF_A_TRIANGLE: u64 = 700;
+
 /// The card image of a scene without photons, and the sources that light it.
 pub struct PackedScene {
     image: CardImage,
@@ -39,8 +43,10 @@ impl PackedScene {
     /// Packs geometry, materials, textures and lights.
     ///
     /// # Errors
-    /// If the geometry is too much for a chip, or there are more textures or lights than it can tell apart.
+    /// If the geometry is too much for a chip or for this process, or there are more textures or lights than a chip can tell apart.
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
+        allocation::check(BYTES_OF_A_TRIANGLE * scene.triangles.len() as u64)
+            .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles: scene.triangles.len(), bytes })?;
         let lights = Lights::new(scene);
         Ok(Self {
             image: write(scene, &lights)?,

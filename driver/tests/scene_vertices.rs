@@ -75,6 +75,23 @@ fn normals_that_are_none_or_of_the_other_side_become_the_triangles() {
 }
 
 #[test]
+fn normals_and_colours_that_are_not_finite_are_noticed() {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let scene = with_normals([[bad, 0.0, 1.0], TILTED[1], TILTED[2]], |_| {});
+        let notice = "normals that are not finite are ignored, the triangles' own count: mesh 'panel'";
+        assert_eq!(scene.notices, [notice], "{bad}");
+        let mut scene = Extended::new();
+        let accessor = scene.floats("VEC3", &[[0.5, 0.5, 0.5], [0.5, bad, 0.5], [0.5, 0.5, 0.5]]);
+        scene.primitive()["attributes"]["COLOR_0"] = json!(accessor);
+        let scene = scene.load().unwrap();
+        let notice = "vertex colours that are not finite are 0, or 1 if infinite: mesh 'panel'";
+        assert_eq!(scene.notices, [notice], "{bad}");
+        let expected = if bad == f32::INFINITY { 1.0 } else { 0.0 };
+        assert_eq!(attributes(&scene).colours[1][1], expected, "{bad}");
+    }
+}
+
+#[test]
 fn colours_of_every_format_are_linear_rgba() {
     let shorts: Vec<u8> = [65_535_u16, 0, 13_107].repeat(3).iter().flat_map(|v| v.to_le_bytes()).collect();
     let mut cases: Vec<(Extended, usize, [f32; 4])> = Vec::new();

@@ -5,10 +5,10 @@ use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::render::{
-    MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
+    CardAddress, MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
 };
 use photoncard_driver::scene::Scene;
-use photoncard_driver::scene::gltf::load;
+use photoncard_driver::scene::gltf::load_for;
 use photoncard_driver::{exr, output, preview};
 use serde_json::json;
 
@@ -27,7 +27,7 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     }
     check_distinct(options)?;
     let start = Instant::now();
-    let scene = read_scene(options)?;
+    let scene = read_scene(options, &settings)?;
     let scene_seconds = start.elapsed().as_secs_f64();
     let progress = Progress::start(options.quiet).map_err(|error| Failure::work_error(&error))?;
     let result = on_threads(options.threads, || render(&scene, &settings, &progress))?;
@@ -96,8 +96,10 @@ fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
     Ok(())
 }
 
-fn read_scene(options: &RenderOptions) -> Result<Scene, Failure> {
-    let mut scene = load(&options.scene).map_err(Failure::input)?;
+fn read_scene(options: &RenderOptions, settings: &RenderSettings) -> Result<Scene, Failure> {
+    // An image goes into every card.
+    let dram_bytes = settings.cards.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
+    let mut scene = load_for(&options.scene, dram_bytes).map_err(Failure::input)?;
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
     }

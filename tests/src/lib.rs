@@ -3,6 +3,7 @@
 
 pub mod everything;
 pub mod fuzz;
+pub mod hostile;
 pub mod lru;
 pub mod mapped;
 pub mod shapes;

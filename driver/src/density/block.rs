@@ -14,6 +14,15 @@ pub(super) struct Block {
     pub(super) are_solid: u32,
 }
 
+impl Block {
+    /// True if one of its triangles has these corners.
+    pub(super) fn holds(&self, corners: &[Vec3; 3]) -> bool {
+        (0..LANES).any(|lane| {
+            self.corners.iter().zip(corners).all(|(lanes, corner)| at(lanes, lane) == corner.to_array())
+        })
+    }
+}
+
 /// A triangle as seen from a point: the planes through the point and its edges, and six times the volume of both.
 ///
 /// Of two triangles that share an edge the planes are opposite to the last bit: no ray passes between them.

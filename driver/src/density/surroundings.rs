@@ -20,6 +20,8 @@ use super::sides::SideTable;
 
 /// Triangles that are tested one by one; of more, a descent for each ray finds the few that matter.
 const MAX_TRIANGLES: usize = 4096;
+/// Beyond this many triangles those in the place of another are left out: thousands in one place are as one.
+const MAX_WITH_TWINS: usize = 512;
 /// Coordinates of corners beyond this, in radii, would round away what is near.
 const MAX_EXTENT: f32 = 1e4;
 /// Triangles of a plain wall within a ball, at the most.
@@ -98,6 +100,9 @@ impl Surroundings {
             return false;
         }
         let lane = self.triangles % LANES;
+        if self.triangles >= MAX_WITH_TWINS && self.blocks.last().is_some_and(|block| block.holds(corners)) {
+            return true;
+        }
         if lane == 0 {
             self.blocks.push(Block { corners: Default::default(), indices: [0; LANES], are_solid: 0 });
         }

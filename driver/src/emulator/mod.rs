@@ -54,7 +54,7 @@ impl ChipKind {
         tag_bytes(&self.budget())
     }
 
-    fn budget(self) -> Budget {
+    pub(crate) fn budget(self) -> Budget {
         match self {
             Self::Reference => REFERENCE,
             Self::Micro => MICRO,

@@ -2,6 +2,7 @@
 
 use photoncard_shared::layout::NO_TEXTURE;
 
+use crate::allocation;
 use crate::bvh::HierarchyError;
 
 /// Why a scene does not fit a card.
@@ -11,6 +12,15 @@ pub enum PackError {
     #[error(transparent)]
     #[diagnostic(help("simplify the scene's geometry"))]
     Hierarchy(#[from] HierarchyError),
+    /// The process cannot have the memory for packing.
+    #[error("packing {triangles} triangles takes {bytes} bytes of memory, which the system does not give")]
+    #[diagnostic(help("simplify the scene's geometry, or {}", allocation::REMEDY))]
+    Memory {
+        /// Triangles of the scene.
+        triangles: usize,
+        /// Bytes of memory.
+        bytes: u64,
+    },
     /// More lines than a line address can number.
     #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
     #[diagnostic(help("lower --photons, use smaller textures, or simplify the scene"))]

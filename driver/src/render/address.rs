@@ -68,6 +68,16 @@ impl CardAddress {
     }
 }
 
+impl CardAddress {
+    /// The memory of each card there, bytes; of cards elsewhere the most that a card can state.
+    pub fn dram_bytes(&self) -> u32 {
+        match self {
+            Self::Emulated { kind, .. } => kind.budget().dram_bytes,
+            Self::Serial { .. } | Self::Tcp { .. } | Self::Unix { .. } => u32::MAX,
+        }
+    }
+}
+
 impl fmt::Display for CardAddress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {

@@ -9,9 +9,10 @@ use glam::Vec3;
 use super::limits::BRIGHTEST;
 use super::map_size::{MAX_ENVIRONMENT_TEXELS, check_map_size, too_large};
 use super::radiance;
-use super::raster::Fault;
+use super::raster::{Fault, walled};
 #[cfg(doc)]
 use super::texture::MAX_SIDE;
+use crate::allocation::OutOfMemory;
 use crate::error::SceneError;
 use crate::exr::{self, ExrError};
 
@@ -55,7 +56,7 @@ impl Environment {
         let read = if bytes.starts_with(EXR_MAGIC) {
             read_exr(path, &bytes)
         } else if bytes.starts_with(radiance::MAGIC) {
-            radiance::read(&bytes).map(|(size, texels)| Self::of(size, texels))
+            walled(|| radiance::read(&bytes)).map(|(size, texels)| Self::of(size, texels))
         } else {
             Err(Fault {
                 reason: "it is neither a Radiance picture nor an OpenEXR picture".to_owned(),
@@ -99,6 +100,7 @@ fn read_exr(path: &Path, bytes: &[u8]) -> Result<Environment, Fault> {
             remedy: "store the picture with ZIP compression",
         },
         ExrError::TooLarge { width, height, .. } => too_large([width, height]),
+        ExrError::Memory { bytes, .. } => Fault::memory(OutOfMemory { bytes }),
         other => Fault { reason: other.to_string(), remedy: "export or copy the picture again" },
     })?;
     let size = [image.width, image.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));

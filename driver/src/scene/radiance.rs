@@ -3,6 +3,7 @@
 
 use super::map_size::check_map_size;
 use super::raster::Fault;
+use crate::allocation;
 
 /// The first bytes; the program's name follows.
 pub(super) const MAGIC: &[u8] = b"#?";
@@ -44,6 +45,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<([u32; 2], Vec<[f32; 3]>), Fault> {
     if (width * height) as u64 > TEXELS_OF_A_BYTE * bytes.len() as u64 {
         return Err(damaged(format!("{width} x {height} texels do not fit into {} bytes", bytes.len())));
     }
+    allocation::check((width * height * size_of::<[f32; 3]>()) as u64).map_err(Fault::memory)?;
     let mut texels = vec![[0.0; 3]; width * height];
     let mut row = vec![[0; 4]; width];
     for y in 0..height {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -24,6 +24,17 @@ pub(crate) struct Outcome {
     pub(crate) status: Option<i32>,
     pub(crate) stdout: String,
     pub(crate) stderr: String,
+}
+
+impl Outcome {
+    /// What came out of a process, which may not have panicked.
+    pub(crate) fn of(output: &Output) -> Self {
+        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+        let outcome =
+            Self { status: output.status.code(), stdout: text(&output.stdout), stderr: text(&output.stderr) };
+        assert!(!outcome.stderr.contains("panicked"), "{}", outcome.stderr);
+        outcome
+    }
 }
 
 /// A folder in which commands run.
@@ -66,14 +77,7 @@ impl Room {
     }
 
     pub(crate) fn run(&self, arguments: &[&str]) -> Outcome {
-        let output = self.command().args(arguments).output().unwrap();
-        let outcome = Outcome {
-            status: output.status.code(),
-            stdout: String::from_utf8(output.stdout).unwrap(),
-            stderr: String::from_utf8(output.stderr).unwrap(),
-        };
-        assert!(!outcome.stderr.contains("panicked"), "{arguments:?}: {}", outcome.stderr);
-        outcome
+        Outcome::of(&self.command().args(arguments).output().unwrap())
     }
 
     /// A small render; `options` replace or join those of [`SMALL`].
@@ -206,4 +210,20 @@ fn data_uri(bytes: &[u8]) -> String {
         write!(uri, "%{byte:02x}").unwrap();
         uri
     })
+}
+
+/// A GLB of some JSON and bytes.
+pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
+    let padded = |bytes: &[u8], padding: u8| {
+        let mut chunk = bytes.to_vec();
+        chunk.resize(chunk.len().next_multiple_of(4), padding);
+        chunk
+    };
+    let chunks = [(b"JSON", padded(text, b' ')), (b"BIN\0", padded(bytes, 0))];
+    let length = 12 + chunks.iter().map(|(_, data)| 8 + data.len()).sum::<usize>();
+    let mut file = [&b"glTF"[..], &2_u32.to_le_bytes(), &(length as u32).to_le_bytes()].concat();
+    for (kind, data) in &chunks {
+        file.extend([&(data.len() as u32).to_le_bytes()[..], &kind[..], data].concat());
+    }
+    file
 }

@@ -8,7 +8,7 @@ use crate::address::LINE_BYTES;
 /// Maximum number of triangles of a leaf. A triangle's index is `LEAF_TRIANGLES * leaf + slot`.
 pub const LEAF_TRIANGLES: usize = 8;
 /// Maximum number of vertices of a leaf.
-const LEAF_VERTICES: usize = 9;
+pub const LEAF_VERTICES: usize = 9;
 /// Lanes of [`BvhLeaf::coordinates`]: the maximum of nine vertices, rounded up to whole vector registers.
 pub const VERTEX_LANES: usize = 12;
 

@@ -20,7 +20,7 @@ pub(super) struct Environments {
 const WIDTH: u8 = 12;
 
 /// Pictures in plain rows and in encoded ones.
-fn pictures() -> Vec<Vec<u8>> {
+pub(crate) fn pictures() -> Vec<Vec<u8>> {
     let header = b"#?RADIANCE\nSOFTWARE=any\nEXPOSURE=2.0\nFORMAT=32-bit_rle_rgbe\n\n";
     let mut flat = [&header[..], b"-Y 2 +X 3\n"].concat();
     flat.extend((0..24).map(|byte| if byte % 4 == 3 { 128 } else { byte * 9 }));

@@ -79,7 +79,7 @@ fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
 }
 
 /// A GLB of some JSON and bytes. What its header and chunks say of their lengths is true.
-pub(super) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
+pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let mut text = text.to_vec();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut file = b"glTF".to_vec();
@@ -94,9 +94,24 @@ pub(super) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     file
 }
 
+/// The JSON and the bytes of a GLB of two chunks.
+pub(crate) fn split_glb(file: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
+    let chunk = |at: usize| {
+        let length = u32::from_le_bytes(*file.get(at..)?.first_chunk()?) as usize;
+        file.get(at + 8..at + 8 + length)
+    };
+    let text = chunk(12)?;
+    Some((text.to_vec(), chunk(12 + 8 + text.len())?.to_vec()))
+}
+
+/// A scene of everything that the loader reads, as text.
+pub(crate) fn rich() -> Vec<u8> {
+    with_data(RICH, &triangle_bytes())
+}
+
 impl Scenes {
     pub(super) fn new() -> Self {
-        let rich = with_data(RICH, &triangle_bytes());
+        let rich = rich();
         let texts: Vec<_> = SHIPPED.iter().map(|text| text.to_vec()).chain([rich]).collect();
         let binaries = vec![(RICH.to_vec(), triangle_bytes())];
         let mut files = texts.clone();

@@ -3,17 +3,18 @@
 //! No input may panic, take longer than some seconds, or allocate more than a bound. What that finds is what a coverage
 //! guided fuzzer would be used for; this one needs no other compiler, and a failing input is replayed by its number.
 
-mod environment;
-mod gltf;
+pub(crate) mod environment;
+pub(crate) mod gltf;
 mod image;
 mod messages;
-mod mutation;
-mod picture;
+pub(crate) mod mutation;
+pub(crate) mod picture;
+pub(crate) mod png;
 mod random;
 mod run;
 mod session;
 mod target;
-mod texture;
+pub(crate) mod texture;
 mod transport;
 
 use std::sync::Arc;

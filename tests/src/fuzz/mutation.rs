@@ -63,7 +63,7 @@ fn chunk(bytes: usize, random: &mut Random) -> Range<usize> {
 }
 
 /// Puts a word at the borders of what fields hold, of 1, 2, 4 or 8 bytes, over the bytes from `place` on.
-pub(super) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
+pub(crate) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
     let word = if random.once_in(3) {
         u64::from(random.pick(&FLOATS).to_bits())
     } else {
@@ -82,7 +82,7 @@ pub(super) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
 }
 
 /// Makes one edit of any bytes; chunks come from the bytes themselves and from `others`.
-pub(super) fn edit_bytes(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
+pub(crate) fn edit_bytes(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
     if bytes.is_empty() {
         bytes.push(random.next() as u8);
         return;
@@ -119,7 +119,7 @@ pub(super) fn edit_bytes(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut R
 }
 
 /// Makes some edits of any bytes.
-pub(super) fn edit(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
+pub(crate) fn edit(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
     for _ in 0..random.edits() {
         edit_bytes(bytes, others, random);
     }
@@ -219,7 +219,7 @@ fn value_end(text: &[u8], start: usize) -> usize {
 }
 
 /// Makes one edit of JSON text that leaves most of its structure whole.
-pub(super) fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
+pub(crate) fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     let is_string = random.once_in(3);
     let found = tokens(text, is_string);
     if found.is_empty() {

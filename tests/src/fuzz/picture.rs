@@ -47,29 +47,34 @@ fn picture(compression: Compression, blocks: Blocks, is_half: bool) -> Option<Ve
     Some(bytes.into_inner())
 }
 
+/// A picture of each compression that is written, in rows and in tiles.
+pub(crate) fn pictures() -> Vec<Vec<u8>> {
+    let compressions = [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::ZIP1,
+        Compression::ZIP16,
+        Compression::PIZ,
+        Compression::PXR24,
+        Compression::B44,
+        Compression::B44A,
+        Compression::DWAA(None),
+        Compression::DWAB(None),
+    ];
+    let mut seeds = Vec::new();
+    for compression in compressions {
+        for (blocks, is_half) in
+            [(Blocks::ScanLines, true), (Blocks::ScanLines, false), (Blocks::Tiles(Vec2(8, 8)), true)]
+        {
+            seeds.extend(picture(compression, blocks, is_half));
+        }
+    }
+    seeds
+}
+
 impl Pictures {
     pub(super) fn new() -> Self {
-        let compressions = [
-            Compression::Uncompressed,
-            Compression::RLE,
-            Compression::ZIP1,
-            Compression::ZIP16,
-            Compression::PIZ,
-            Compression::PXR24,
-            Compression::B44,
-            Compression::B44A,
-            Compression::DWAA(None),
-            Compression::DWAB(None),
-        ];
-        let mut seeds = Vec::new();
-        for compression in compressions {
-            for (blocks, is_half) in
-                [(Blocks::ScanLines, true), (Blocks::ScanLines, false), (Blocks::Tiles(Vec2(8, 8)), true)]
-            {
-                seeds.extend(picture(compression, blocks, is_half));
-            }
-        }
-        Self { seeds, folder: tempfile::tempdir().expect("there is room for a folder") }
+        Self { seeds: pictures(), folder: tempfile::tempdir().expect("there is room for a folder") }
     }
 
     fn path(&self) -> PathBuf {

@@ -7,9 +7,9 @@ use photoncard_driver::scene::gltf;
 use tempfile::TempDir;
 
 use super::gltf::glb;
-use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound};
+use super::{mutation, png};
 
 /// The target. An input is an image file.
 pub(super) struct Textures {
@@ -17,14 +17,16 @@ pub(super) struct Textures {
     folder: TempDir,
 }
 
-const SEEDS: [&[u8]; 4] = [
+/// Of all colour types of PNG between them: an edit of a byte makes no palette where there is none.
+const SEEDS: [&[u8]; 7] = [
     include_bytes!("../../../driver/tests/images/texel.png"),
+    include_bytes!("../../../driver/tests/images/palette.png"),
+    include_bytes!("../../../driver/tests/images/deep.png"),
+    include_bytes!("../../../driver/tests/images/interlaced.png"),
     include_bytes!("../../../driver/tests/images/colour.jpg"),
     include_bytes!("../../../driver/tests/images/progressive.jpg"),
     include_bytes!("../../../driver/tests/images/grey.jpg"),
 ];
-
-const PNG_MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// A scene whose second buffer view, of so many bytes, is the base colour of its only triangle.
 fn scene(image_bytes: usize) -> String {
@@ -44,19 +46,11 @@ fn scene(image_bytes: usize) -> String {
 
 const TRIANGLE_BYTES: usize = 36;
 
-/// Makes the checksums of a PNG's chunks right: else most edits would end there.
-fn mend_png(file: &mut [u8]) {
-    let mut at = PNG_MAGIC.len();
-    while let Some(length) = file.get(at..).and_then(|rest| rest.first_chunk::<4>()) {
-        let end = at.saturating_add(8).saturating_add(u32::from_be_bytes(*length) as usize);
-        let Some(chunk) = file.get(at + 4..end) else { return };
-        let sum = chunk.iter().fold(u32::MAX, |sum, &byte| {
-            (0..8).fold(sum ^ u32::from(byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xedb8_8320))
-        });
-        let Some(stored) = file.get_mut(end..end + 4) else { return };
-        stored.copy_from_slice(&(!sum).to_be_bytes());
-        at = end + 4;
-    }
+/// A scene of a triangle with an image file as its base colour.
+pub(crate) fn textured(image: &[u8]) -> Vec<u8> {
+    let triangle = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
+    let bytes = [triangle.as_flattened(), image].concat();
+    glb(scene(image.len()).as_bytes(), &bytes)
 }
 
 impl Textures {
@@ -82,18 +76,19 @@ impl Target for Textures {
 
     fn input(&self, random: &mut Random) -> Vec<u8> {
         let mut file = random.pick(&self.seeds).clone();
+        if file.starts_with(png::MAGIC) && random.once_in(2) {
+            (0..random.edits()).for_each(|_| png::edit_chunks(&mut file, random));
+            return file;
+        }
         mutation::edit(&mut file, &self.seeds, random);
-        if file.starts_with(PNG_MAGIC) && !random.once_in(8) {
-            mend_png(&mut file);
+        if file.starts_with(png::MAGIC) && !random.once_in(8) {
+            png::mend_checksums(&mut file);
         }
         file
     }
 
     fn read(&self, input: &[u8]) -> bool {
-        let triangle = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
-        let bytes = [triangle.as_flattened(), input].concat();
-        fs::write(self.path(), glb(scene(input.len()).as_bytes(), &bytes))
-            .expect("there is room for a scene");
+        fs::write(self.path(), textured(input)).expect("there is room for a scene");
         match gltf::load(&self.path()) {
             Ok(scene) => {
                 let [image] = &scene.images[..] else { panic!("one image is in use") };

@@ -3,11 +3,15 @@
 //! Nothing is allocated: an accessor's count need not be backed by bytes (glTF fills with zeros), so it says nothing
 //! about what a reader can afford.
 
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+
 use gltf::json;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::validation::Checked;
 
 use super::document::Document;
+use super::files::Bytes;
 use crate::error::SceneError;
 
 const REMEDY: &str = "export the scene again; the accessor, its buffer view and its buffer do not fit";
@@ -15,7 +19,9 @@ const REMEDY: &str = "export the scene again; the accessor, its buffer view and 
 /// The buffers of a document and their bytes.
 pub(super) struct Source<'a> {
     pub(super) document: &'a Document,
-    pub(super) buffers: &'a [std::borrow::Cow<'a, [u8]>],
+    buffers: &'a [Bytes<'a>],
+    /// Accessors whose sparse indices were found to increase: many primitives may share one.
+    increasing: RefCell<BTreeSet<usize>>,
 }
 
 /// What an accessor may hold at some place.
@@ -146,11 +152,8 @@ impl<'a> Elements<'a> {
             .buffer_view
             .map(|view| source.strided(view.value(), offset, count, size, &here))
             .transpose()?;
-        let sparse = accessor
-            .sparse
-            .as_ref()
-            .map(|sparse| source.sparse(sparse, count, size, &format!("{here}.sparse")))
-            .transpose()?;
+        let sparse =
+            accessor.sparse.as_ref().map(|sparse| source.sparse(index, sparse, count, size)).transpose()?;
         let is_normalized = match format.integers {
             Integers::Whole => false,
             Integers::Normalized => true,
@@ -203,6 +206,10 @@ impl<'a> Elements<'a> {
 }
 
 impl<'a> Source<'a> {
+    pub(super) fn new(document: &'a Document, buffers: &'a [Bytes<'a>]) -> Self {
+        Self { document, buffers, increasing: RefCell::default() }
+    }
+
     /// The bytes of a buffer view, which `item` refers to.
     pub(super) fn bytes(&self, view: usize, item: &str) -> Result<&'a [u8], SceneError> {
         let (bytes, _) = self.view(view)?;
@@ -263,11 +270,12 @@ impl<'a> Source<'a> {
 
     fn sparse(
         &self,
+        accessor: usize,
         sparse: &json::accessor::sparse::Sparse,
         base_count: u64,
         size: usize,
-        item: &str,
     ) -> Result<Sparse<'a>, SceneError> {
+        let item = format!("accessors[{accessor}].sparse");
         let fault =
             |field: &str, reason: &str| self.document.invalid(format!("{item}{field}"), reason, REMEDY);
         let Checked::Valid(component) = sparse.indices.component_type else {
@@ -292,6 +300,9 @@ impl<'a> Source<'a> {
         // The bytes are there, so the count fits.
         let count = usize::try_from(count).map_err(|_| fault(".count", "it is too large"))?;
         let sparse = Sparse { count, indices, values };
+        if !self.increasing.borrow_mut().insert(accessor) {
+            return Ok(sparse);
+        }
         let mut next = 0;
         for position in 0..count {
             match sparse.index(position) {

@@ -1,7 +1,6 @@
 //! A glTF file as JSON and bytes: GLB's chunks, the JSON, and the rules of glTF that the JSON must keep.
 
-use std::fs;
-use std::io;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -11,8 +10,11 @@ use gltf::json::validation::{Checked, Error as Fault, Validate};
 use miette::{NamedSource, SourceSpan};
 
 use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
+use super::files::{Files, read_file};
+use super::parse_cost;
 use crate::error::{Place, SceneError};
 use crate::printable::printable;
+use crate::{allocation, foreign};
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER: usize = 12;
@@ -24,8 +26,11 @@ const CHUNK_BIN: u32 = u32::from_le_bytes(*b"BIN\0");
 pub(super) struct Document {
     pub(super) path: PathBuf,
     pub(super) root: json::Root,
-    /// The BIN chunk of a GLB.
-    pub(super) blob: Option<Vec<u8>>,
+    /// The file, and where in it the BIN chunk of a GLB is.
+    bytes: Vec<u8>,
+    blob: Option<Range<usize>>,
+    /// The files beside it that were read.
+    pub(super) files: Files,
 }
 
 impl Document {
@@ -33,11 +38,16 @@ impl Document {
         let bytes =
             read_file(path).map_err(|source| SceneError::Unreadable { file: path.to_owned(), source })?;
         let (text, blob) =
-            if bytes.starts_with(GLB_MAGIC) { split_glb(path, &bytes)? } else { (&bytes[..], None) };
-        let blob = blob.map(<[u8]>::to_vec);
-        let document = Self { path: path.to_owned(), root: parse(path, text)?, blob };
+            if bytes.starts_with(GLB_MAGIC) { split_glb(path, &bytes)? } else { (0..bytes.len(), None) };
+        let root = parse(path, &bytes[text])?;
+        let document = Self { path: path.to_owned(), root, bytes, blob, files: Files::default() };
         document.check()?;
         Ok(document)
+    }
+
+    /// The BIN chunk of a GLB.
+    pub(super) fn blob(&self) -> Option<&[u8]> {
+        self.bytes.get(self.blob.clone()?)
     }
 
     /// Whether vertices may be integers.
@@ -105,19 +115,7 @@ impl Document {
     }
 
     fn check_rules(&self) -> Result<(), SceneError> {
-        let mut first = None;
-        self.root.validate(&self.root, json::Path::new, &mut |path, fault| {
-            let path = path();
-            // Bounds are not used, so that files without them load too.
-            let is_bound = path.as_str().ends_with(".min") || path.as_str().ends_with(".max");
-            // An accessor without bytes is of zeros, as exporters write morph targets that move nothing.
-            let is_zeros = fault == Fault::Missing && is_accessors_view(path.as_str());
-            // Which extensions may be required was checked before.
-            if first.is_none() && !is_bound && !is_zeros && fault != Fault::Unsupported {
-                first = Some((path, fault));
-            }
-        });
-        let Some((path, fault)) = first else { return Ok(()) };
+        let Some((path, fault)) = self.first_fault()? else { return Ok(()) };
         let reason = match fault {
             Fault::IndexOutOfBounds => "the index refers to nothing",
             Fault::Invalid => "the value is not one that glTF knows",
@@ -129,6 +127,33 @@ impl Document {
         let item = path.as_str().replace("khrLightsPunctual", "KHR_lights_punctual");
         Err(self.invalid(item, reason, "export the scene again, or correct the file at this place"))
     }
+
+    /// The first rule that is broken and matters, and where.
+    fn first_fault(&self) -> Result<Option<(json::Path, Fault)>, SceneError> {
+        let mut first = None;
+        let mut report = |path: &dyn Fn() -> json::Path, fault| {
+            if first.is_some() {
+                return;
+            }
+            let path = path();
+            // Bounds are not used, so that files without them load too.
+            let is_bound = path.as_str().ends_with(".min") || path.as_str().ends_with(".max");
+            // An accessor without bytes is of zeros, as exporters write morph targets that move nothing.
+            let is_zeros = fault == Fault::Missing && is_accessors_view(path.as_str());
+            // Which extensions may be required was checked before.
+            if !is_bound && !is_zeros && fault != Fault::Unsupported {
+                first = Some((path, fault));
+            }
+        };
+        foreign::decode(
+            || {
+                self.root.validate(&self.root, json::Path::new, &mut report);
+                Ok(())
+            },
+            || SceneError::NotGltf { file: self.path.clone(), reason: CONTRADICTION.to_owned() },
+        )?;
+        Ok(first)
+    }
 }
 
 /// Whether a place is the buffer view of an accessor, not of its sparse elements.
@@ -138,21 +163,13 @@ fn is_accessors_view(path: &str) -> bool {
         .is_some_and(|(_, field)| field == ".bufferView")
 }
 
-/// Reads a regular file; a pipe or a device could go on for ever.
-pub(super) fn read_file(path: &Path) -> io::Result<Vec<u8>> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
-    }
-    fs::read(path)
-}
-
 fn u32_at(bytes: &[u8], offset: usize) -> Option<u32> {
     let word = bytes.get(offset..)?.first_chunk()?;
     Some(u32::from_le_bytes(*word))
 }
 
-/// Splits a GLB into its JSON and its BIN chunk. Chunks of other types are skipped, as the format demands.
-fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), SceneError> {
+/// Where in a GLB its JSON and its BIN chunk are. Chunks of other types are skipped, as the format demands.
+fn split_glb(path: &Path, bytes: &[u8]) -> Result<(Range<usize>, Option<Range<usize>>), SceneError> {
     let truncated = |what, needed: u64, available: usize| SceneError::Truncated {
         file: path.to_owned(),
         what,
@@ -170,23 +187,25 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [
     let Some(contents) = bytes.get(..length as usize) else {
         return Err(truncated("the GLB", length.into(), bytes.len()));
     };
-    let mut chunks = contents.get(GLB_HEADER..).unwrap_or_default();
+    let mut start = GLB_HEADER;
     let (mut text, mut blob) = (None, None);
-    while !chunks.is_empty() {
-        let (Some(size), Some(kind)) = (u32_at(chunks, 0), u32_at(chunks, 4)) else {
-            return Err(truncated("a chunk header", CHUNK_HEADER as u64, chunks.len()));
+    while start < contents.len() {
+        let chunk = &contents[start..];
+        let (Some(size), Some(kind)) = (u32_at(chunk, 0), u32_at(chunk, 4)) else {
+            return Err(truncated("a chunk header", CHUNK_HEADER as u64, chunk.len()));
         };
-        let body = &chunks[CHUNK_HEADER..];
-        let Some(data) = body.get(..size as usize) else {
-            return Err(truncated("a chunk", size.into(), body.len()));
-        };
+        let available = chunk.len() - CHUNK_HEADER;
+        if size as usize > available {
+            return Err(truncated("a chunk", size.into(), available));
+        }
+        let data = start + CHUNK_HEADER..start + CHUNK_HEADER + size as usize;
+        start = data.end;
         match kind {
             CHUNK_JSON if text.is_none() => text = Some(data),
             CHUNK_BIN if blob.is_none() => blob = Some(data),
             _ if text.is_none() => return Err(not_gltf("the first chunk of the GLB is not JSON")),
             _ => {}
         }
-        chunks = &body[size as usize..];
     }
     text.map(|text| (text, blob)).ok_or_else(|| not_gltf("the GLB has no JSON chunk"))
 }
@@ -198,8 +217,21 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<json::Root, SceneError> {
     if text.trim().is_empty() {
         return Err(not_gltf("it is empty"));
     }
-    serde_json::from_str(text).map_err(|error| json_error(path, text, &error))
+    let bytes = parse_cost::estimate(text).ok_or_else(|| SceneError::Invalid {
+        place: Place::new(path, ""),
+        reason: format!(
+            "its {} bytes of JSON would take more than {} bytes of memory",
+            text.len(),
+            parse_cost::limit(text)
+        ),
+        remedy: "leave out what is empty: most of its nodes, materials, meshes or extras say nothing",
+    })?;
+    allocation::check(bytes).map_err(|error| SceneError::memory(path, "reading its JSON", error))?;
+    let parsed = foreign::decode(|| Ok(serde_json::from_str(text)), || not_gltf(CONTRADICTION))?;
+    parsed.map_err(|error| json_error(path, text, &error))
 }
+
+const CONTRADICTION: &str = "its structure contradicts itself";
 
 /// The error with an excerpt of the text: a line of glTF may be a whole buffer in base64.
 fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError {

@@ -1,11 +1,12 @@
 //! The images of a file that its textures refer to, decoded in parallel.
 
-use std::borrow::Cow;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::accessor::Source;
-use super::document::read_file;
+use super::files::Bytes;
+use super::room::Room;
 use super::uri::{INSIDE_FOLDER, decode_data, is_data, locate};
 use crate::error::SceneError;
 use crate::scene::raster::{Fault, Kind};
@@ -17,20 +18,34 @@ const EXPORT_AGAIN: &str = "export the scene again, with its images";
 struct Found<'a> {
     kind: Kind,
     size: [u32; 2],
-    bytes: Cow<'a, [u8]>,
+    bytes: Bytes<'a>,
 }
 
+/// Bytes of all image files together. No texel takes more than eight in either format.
+const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
+
 /// The images of these indices, all of which exist, in these encodings.
-pub(super) fn load(source: &Source<'_>, wanted: &[(usize, Encoding)]) -> Result<Vec<Image>, SceneError> {
-    let mut texels = 0;
+pub(super) fn load(
+    source: &Source<'_>,
+    wanted: &[(usize, Encoding)],
+    room: &mut Room,
+) -> Result<Vec<Image>, SceneError> {
+    let (mut texels, mut bytes) = (0, 0);
     let mut found = Vec::with_capacity(wanted.len());
     for &(index, _) in wanted {
         let image = find(source, index)?;
         texels += u64::from(image.size[0]) * u64::from(image.size[1]);
-        if texels > MAX_TEXELS {
-            let reason = format!("the images up to this one have {texels} texels, more than {MAX_TEXELS}");
+        bytes += image.bytes.len() as u64;
+        let (count, limit, unit) = if texels > MAX_TEXELS {
+            (texels, MAX_TEXELS, "texels")
+        } else {
+            (bytes, MAX_FILE_BYTES, "bytes")
+        };
+        if count > limit {
+            let reason = format!("the images up to this one have {count} {unit}, more than {limit}");
             return Err(fault(source, index, "", reason, "scale the images down, or use fewer"));
         }
+        room.texels(image.size)?;
         found.push(image);
     }
     let decoded: Vec<_> = found
@@ -80,7 +95,7 @@ fn find<'a>(source: &Source<'a>, index: usize) -> Result<Found<'a>, SceneError> 
 type Stated<'a> = Option<(&'static str, &'a str)>;
 
 /// An image's media type, if it is stated, and its bytes.
-fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<(Stated<'a>, Cow<'a, [u8]>), SceneError> {
+fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<(Stated<'a>, Bytes<'a>), SceneError> {
     let document = source.document;
     let image = &document.root.images[index];
     let stated = image.mime_type.as_ref().map(|kind| (".mimeType", kind.0.as_str()));
@@ -89,11 +104,11 @@ fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<(Stated<'a>, Cow<'a, [
         (Some(uri), None) if is_data(uri) => {
             let (kind, bytes) = decode_data(uri).map_err(|reason| fault(".uri", reason, EXPORT_AGAIN))?;
             let in_uri = Some((".uri", kind)).filter(|_| kind.starts_with("image/"));
-            Ok((stated.or(in_uri), Cow::Owned(bytes)))
+            Ok((stated.or(in_uri), Bytes::Shared(Arc::new(bytes))))
         }
         (Some(uri), None) => {
             let file = locate(&document.path, uri).map_err(|reason| fault(".uri", reason, INSIDE_FOLDER))?;
-            let bytes = read_file(&file).map_err(|error| {
+            let bytes = document.files.read(&file).map_err(|error| {
                 let reason = format!("cannot read {}: {error}", file.display());
                 fault(
                     ".uri",
@@ -101,11 +116,11 @@ fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<(Stated<'a>, Cow<'a, [
                     "put the image where the scene looks for it, or export the scene as .glb",
                 )
             })?;
-            Ok((stated, Cow::Owned(bytes)))
+            Ok((stated, bytes))
         }
         (None, Some(view)) => {
             let bytes = source.bytes(view.value(), &format!("images[{index}].bufferView"))?;
-            Ok((stated, Cow::Borrowed(bytes)))
+            Ok((stated, Bytes::Part(bytes)))
         }
         (None, None) => Err(fault("", "it has neither uri nor bufferView".to_owned(), EXPORT_AGAIN)),
         (Some(_), Some(_)) => Err(fault("", "it has both uri and bufferView".to_owned(), EXPORT_AGAIN)),

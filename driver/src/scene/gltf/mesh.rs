@@ -1,6 +1,6 @@
 //! Meshes: triangles placed into the world by each node that shows them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use glam::Vec3;
@@ -10,7 +10,9 @@ use super::limits::MAX_TRIANGLES;
 use super::material;
 use super::pose::Pose;
 use super::primitive::{Primitive, Topology};
-use super::vertex::VertexReader;
+use super::room::Room;
+use super::vertex::{NotFinite, VertexReader};
+use crate::allocation::OutOfMemory;
 use crate::error::SceneError;
 use crate::scene::{Scene, Triangle};
 
@@ -18,13 +20,75 @@ use crate::scene::{Scene, Triangle};
 pub(super) struct MeshPlacer<'a> {
     source: &'a Source<'a>,
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,
-    /// Triangles and primitives placed so far, those of zero area too.
-    work: usize,
+    /// How often each mesh is placed.
+    placed: BTreeMap<usize, u64>,
+    /// Triangles and primitives to be placed, those of zero area too.
+    work: u64,
+    /// Meshes that were placed with normals or colours that are not finite.
+    pub(super) not_finite: NotFinite<BTreeSet<usize>>,
 }
 
 impl<'a> MeshPlacer<'a> {
     pub(super) fn new(source: &'a Source<'a>) -> Self {
-        Self { source, prepared: BTreeMap::new(), work: 0 }
+        Self {
+            source,
+            prepared: BTreeMap::new(),
+            placed: BTreeMap::new(),
+            work: 0,
+            not_finite: NotFinite::default(),
+        }
+    }
+
+    /// Counts the triangles of so many instances of mesh `index`.
+    pub(super) fn count(
+        &mut self,
+        index: usize,
+        instances: u64,
+        scene: &mut Scene,
+    ) -> Result<(), SceneError> {
+        let primitives = self.primitives(index, scene)?;
+        let of_one = primitives
+            .iter()
+            .fold(0_u64, |sum, primitive| sum.saturating_add(primitive.triangles).saturating_add(1));
+        self.work = self.work.saturating_add(of_one.saturating_mul(instances));
+        if self.work > MAX_TRIANGLES as u64 {
+            let file = self.source.document.path.clone();
+            return Err(SceneError::TooManyTriangles { file, limit: MAX_TRIANGLES });
+        }
+        *self.placed.entry(index).or_default() += instances;
+        Ok(())
+    }
+
+    /// Checks that a card has room for all that was counted, and makes room for it here.
+    pub(super) fn reserve(&self, scene: &mut Scene, room: &mut Room) -> Result<(), SceneError> {
+        let file = &self.source.document.path;
+        let (mut triangles, mut with_attributes) = (0, 0);
+        for (primitive, times) in self.placed() {
+            let count = primitive.triangles * times;
+            triangles += count;
+            with_attributes += if primitive.may_have_attributes() { count } else { 0 };
+        }
+        // Where corners meet is looked for only if it matters.
+        if !room.fits_any(triangles) {
+            let mut bytes = 0_u64;
+            for (primitive, times) in self.placed() {
+                let once = primitive.bytes_of_a_card();
+                let once = once.map_err(|error| SceneError::memory(file, "counting its corners", error))?;
+                bytes = bytes.saturating_add(once.saturating_mul(times));
+            }
+            room.triangles(triangles, bytes)?;
+        }
+        reserve(&mut scene.triangles, triangles)
+            .and_then(|()| reserve(&mut scene.attributes, with_attributes))
+            .map_err(|error| SceneError::memory(file, "placing its triangles", error))
+    }
+
+    /// The primitives that were counted, and how often each is placed.
+    fn placed(&self) -> impl Iterator<Item = (&Primitive<'a>, u64)> {
+        self.placed.iter().flat_map(|(mesh, &times)| {
+            let primitives = self.prepared.get(mesh).into_iter().flat_map(|primitives| primitives.iter());
+            primitives.map(move |primitive| (primitive, times))
+        })
     }
 
     /// Adds the triangles of mesh `index` to `scene` in world space.
@@ -79,13 +143,8 @@ impl<'a> MeshPlacer<'a> {
         pose: &Pose<'_>,
         scene: &mut Scene,
     ) -> Result<(), SceneError> {
-        let count = primitive.triangles;
-        let work = usize::try_from(count).ok().and_then(|count| self.work.checked_add(count)?.checked_add(1));
-        self.work = work.filter(|work| *work <= MAX_TRIANGLES).ok_or_else(|| {
-            SceneError::TooManyTriangles { file: self.source.document.path.clone(), limit: MAX_TRIANGLES }
-        })?;
-        let reader = VertexReader { source: self.source, mesh, primitive };
-        for triangle in 0..count {
+        let reader = VertexReader { source: self.source, mesh, primitive, not_finite: NotFinite::default() };
+        for triangle in 0..primitive.triangles {
             let mut corners = reader.indices(triangle)?;
             let [a, b, c] = corners;
             let mut transforms =
@@ -110,6 +169,14 @@ impl<'a> MeshPlacer<'a> {
                 scene.skipped_triangles += 1;
             }
         }
+        let NotFinite { normals, colours } = &reader.not_finite;
+        self.not_finite.normals.extend(normals.get().then_some(mesh));
+        self.not_finite.colours.extend(colours.get().then_some(mesh));
         Ok(())
     }
+}
+
+fn reserve<T>(list: &mut Vec<T>, count: u64) -> Result<(), OutOfMemory> {
+    let refused = OutOfMemory { bytes: count.saturating_mul(size_of::<T>() as u64) };
+    list.try_reserve_exact(usize::try_from(count).map_err(|_| refused)?).map_err(|_| refused)
 }

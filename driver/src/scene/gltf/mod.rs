@@ -9,6 +9,7 @@ mod buffers;
 mod camera;
 mod document;
 mod extensions;
+mod files;
 mod image;
 mod instances;
 mod light;
@@ -17,8 +18,10 @@ mod material;
 mod mesh;
 mod nodes;
 mod notices;
+mod parse_cost;
 mod pose;
 mod primitive;
+mod room;
 mod skin;
 mod texture;
 mod transform;
@@ -27,31 +30,45 @@ mod vertex;
 
 use std::path::Path;
 
+use photoncard_shared::budget::REFERENCE;
+
 use self::accessor::Source;
 use self::document::Document;
 pub use self::limits::MAX_TRIANGLES;
 use self::notices::Notices;
+use self::room::Room;
 use self::texture::Textures;
 use crate::error::SceneError;
 use crate::scene::Scene;
 
-/// Loads the default scene of a glTF file, or its first.
+/// Loads the default scene of a glTF file, or its first, if an emulated chip of the reference kind may hold it.
+///
+/// # Errors
+/// As [`load_for`].
+pub fn load(path: &Path) -> Result<Scene, SceneError> {
+    load_for(path, REFERENCE.dram_bytes)
+}
+
+/// Loads the default scene of a glTF file, or its first, for cards of so much memory.
 ///
 /// What the file holds and the renderer does not use is named in [`Scene::notices`].
 ///
 /// # Errors
-/// If the file, or a file it refers to, cannot be read, breaks a rule of glTF, or holds no triangle with an area. The
-/// error names the place and the remedy. Whether there is light is for [`Scene::check_light`] to say.
-pub fn load(path: &Path) -> Result<Scene, SceneError> {
+/// If the file, or a file it refers to, cannot be read, breaks a rule of glTF, takes more of a card's memory than there is, or
+/// holds no triangle with an area. The error names the place and the remedy. Whether there is light is for
+/// [`Scene::check_light`] to say.
+pub fn load_for(path: &Path, dram_bytes: u32) -> Result<Scene, SceneError> {
     let document = Document::read(path)?;
     let buffers = buffers::load(&document)?;
-    let source = Source { document: &document, buffers: &buffers };
+    let source = Source::new(&document, &buffers);
+    let mut room = Room::new(path, dram_bytes.into());
+    room.materials(document.root.materials.len())?;
     let mut notices = Notices::default();
     let mut textures = Textures::new(&document);
     let materials = material::load(&document, &mut textures)?;
-    let (textures, images) = textures.finish(&source)?;
+    let (textures, images) = textures.finish(&source, &mut room)?;
     let mut scene = Scene { materials, textures, images, ..Scene::default() };
-    nodes::place(&source, &mut scene, &mut notices)?;
+    nodes::place(&source, &mut scene, &mut room, &mut notices)?;
     let file = || path.to_owned();
     match (scene.triangles.is_empty(), scene.skipped_triangles) {
         (true, 0) => return Err(SceneError::NoGeometry { file: file() }),

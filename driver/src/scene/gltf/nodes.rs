@@ -12,6 +12,7 @@ use super::light;
 use super::mesh::MeshPlacer;
 use super::notices::Notices;
 use super::pose::Pose;
+use super::room::Room;
 use super::skin::Skin;
 use super::transform;
 use crate::error::SceneError;
@@ -21,7 +22,14 @@ use crate::scene::Scene;
 const MAX_DEPTH: usize = 1024;
 
 /// Places the meshes, lights and cameras of the scene's nodes.
-pub(super) fn place(source: &Source<'_>, scene: &mut Scene, notices: &mut Notices) -> Result<(), SceneError> {
+///
+/// Triangles are counted before the first is placed.
+pub(super) fn place(
+    source: &Source<'_>,
+    scene: &mut Scene,
+    room: &mut Room,
+    notices: &mut Notices,
+) -> Result<(), SceneError> {
     let document = source.document;
     let nodes = walk(document)?;
     let mut worlds = vec![None; document.root.nodes.len()];
@@ -35,7 +43,11 @@ pub(super) fn place(source: &Source<'_>, scene: &mut Scene, notices: &mut Notice
         skins: BTreeMap::new(),
         worlds,
     };
-    nodes.into_iter().try_for_each(|(index, world)| placer.place(index, world, scene, notices))
+    nodes.iter().try_for_each(|(index, _)| placer.count(*index, scene))?;
+    placer.meshes.reserve(scene, room)?;
+    nodes.into_iter().try_for_each(|(index, world)| placer.place(index, world, scene, notices))?;
+    notices.not_finite = placer.meshes.not_finite;
+    Ok(())
 }
 
 struct Placer<'a> {
@@ -48,6 +60,21 @@ struct Placer<'a> {
 }
 
 impl Placer<'_> {
+    /// Counts the triangles of a node.
+    fn count(&mut self, index: usize, scene: &mut Scene) -> Result<(), SceneError> {
+        let node = &self.source.document.root.nodes[index];
+        let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { return Ok(()) };
+        // Instances count by the triangles and primitives they place: those of nothing would be without a limit.
+        if !self.meshes.has_triangles(mesh, scene)? {
+            return Ok(());
+        }
+        let instances = match node.skin {
+            Some(_) => None,
+            None => Instances::of(self.source, index, node)?,
+        };
+        self.meshes.count(mesh, instances.map_or(1, |instances| instances.count), scene)
+    }
+
     fn place(
         &mut self,
         index: usize,
@@ -80,7 +107,6 @@ impl Placer<'_> {
         world: DMat4,
         scene: &mut Scene,
     ) -> Result<(), SceneError> {
-        // Instances count by the triangles and primitives they place: those of nothing would be without a limit.
         if !self.meshes.has_triangles(mesh, scene)? {
             return Ok(());
         }

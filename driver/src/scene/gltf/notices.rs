@@ -11,6 +11,7 @@ use super::extensions::SUPPORTED_EXTENSIONS;
 use super::light;
 use super::material::{has_dark_texture, is_transmissive};
 use super::primitive::Topology;
+use super::vertex::NotFinite;
 
 /// Names listed in one notice; the others are counted.
 const LISTED: usize = 8;
@@ -22,6 +23,8 @@ pub(super) struct Notices {
     pub(super) orthographic: Vec<String>,
     /// Whether the scene has no camera and was framed.
     pub(super) framed: bool,
+    /// Meshes with normals or colours that are not finite.
+    pub(super) not_finite: NotFinite<BTreeSet<usize>>,
 }
 
 /// `kind 'a', 'b' and 3 more`.
@@ -70,6 +73,16 @@ impl Notices {
         note("points and lines are ignored, only triangles are rendered", "mesh", &other_modes);
         let morphed =
             meshes(root, |primitive| primitive.targets.as_ref().is_some_and(|list| !list.is_empty()));
+        let meshes_of = |indices: &BTreeSet<usize>| -> Vec<String> {
+            indices.iter().map(|&index| mesh_name(root, index)).collect()
+        };
+        let NotFinite { normals, colours } = &self.not_finite;
+        note(
+            "normals that are not finite are ignored, the triangles' own count",
+            "mesh",
+            &meshes_of(normals),
+        );
+        note("vertex colours that are not finite are 0, or 1 if infinite", "mesh", &meshes_of(colours));
         note("morph targets are ignored, the base shape is rendered", "mesh", &morphed);
         let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
         note("animations are ignored, the scene is rendered as it stands", "animation", &moving);

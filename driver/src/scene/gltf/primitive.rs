@@ -6,6 +6,8 @@ use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
 
 use super::accessor::{Elements, Format, Integers, Source};
+use super::room::{self, Room};
+use crate::allocation::OutOfMemory;
 use crate::error::SceneError;
 
 const FLOATS: &[ComponentType] = &[ComponentType::F32];
@@ -191,6 +193,40 @@ impl<'a> Primitive<'a> {
             positions,
             indices,
         })
+    }
+
+    /// Whether its triangles carry more than their places, as far as accessors tell.
+    pub(super) fn may_have_attributes(&self) -> bool {
+        self.is_mapped() || self.normals.is_some() || self.colours.is_some()
+    }
+
+    pub(super) fn is_mapped(&self) -> bool {
+        self.coordinates.iter().any(Option::is_some)
+    }
+
+    /// Bytes of a card's memory that it takes each time it is placed, or less.
+    ///
+    /// # Errors
+    /// If there is no memory for a list of its corners.
+    pub(super) fn bytes_of_a_card(&self) -> Result<u64, OutOfMemory> {
+        let sets = 1 + u64::from(self.coordinates[1].is_some());
+        // Normals may turn out to be those of the triangles, and colours white.
+        let attributes = if self.is_mapped() { room::attributes(self.triangles, sets) } else { 0 };
+        Ok(Room::geometry(self.triangles, self.corners_in_different_places()?) + attributes)
+    }
+
+    fn corners_in_different_places(&self) -> Result<u64, OutOfMemory> {
+        let count = self.triangles * 3;
+        let refused = OutOfMemory { bytes: count * size_of::<[u32; 3]>() as u64 };
+        let mut places = Vec::new();
+        places.try_reserve_exact(usize::try_from(count).map_err(|_| refused)?).map_err(|_| refused)?;
+        for corner in (0..self.triangles).flat_map(|triangle| self.corners(triangle)) {
+            let vertex = self.indices.as_ref().map_or(corner, |indices| indices.unsigned(corner));
+            places.push(self.positions.vec3(vertex).map(f32::to_bits));
+        }
+        places.sort_unstable();
+        places.dedup();
+        Ok(places.len() as u64)
     }
 
     /// The places, in the list of indices or of vertices, of a triangle's corners.

@@ -10,6 +10,7 @@ use gltf::json::validation::Checked;
 use super::accessor::Source;
 use super::document::Document;
 use super::image;
+use super::room::Room;
 use crate::error::SceneError;
 use crate::scene::{Encoding, Image, Texture, Wrap};
 
@@ -91,8 +92,12 @@ impl<'a> Textures<'a> {
     }
 
     /// All textures, and the images that they refer to.
-    pub(super) fn finish(self, source: &Source<'_>) -> Result<(Vec<Texture>, Vec<Image>), SceneError> {
-        Ok((self.textures, image::load(source, &self.images)?))
+    pub(super) fn finish(
+        self,
+        source: &Source<'_>,
+        room: &mut Room,
+    ) -> Result<(Vec<Texture>, Vec<Image>), SceneError> {
+        Ok((self.textures, image::load(source, &self.images, room)?))
     }
 }
 

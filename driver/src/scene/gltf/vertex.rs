@@ -1,6 +1,7 @@
 //! The vertices of a primitive: their indices, their places in the world, and what else they carry.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 
 use glam::{DVec3, Vec2, Vec3};
 
@@ -26,11 +27,20 @@ pub(super) struct VertexReader<'r, 'a> {
     pub(super) source: &'r Source<'a>,
     pub(super) mesh: usize,
     pub(super) primitive: &'r Primitive<'a>,
+    /// Whether any normal or colour that was read was not finite.
+    pub(super) not_finite: NotFinite<Cell<bool>>,
+}
+
+/// Something for each of the attributes that are read even where they are not finite.
+#[derive(Default)]
+pub(super) struct NotFinite<T> {
+    pub(super) normals: T,
+    pub(super) colours: T,
 }
 
 impl VertexReader<'_, '_> {
     fn fault(&self, attribute: &str, vertex: u64, reason: String) -> SceneError {
-        let Self { source, mesh, primitive } = self;
+        let Self { source, mesh, primitive, .. } = self;
         let item = format!("meshes[{mesh}].primitives[{}].attributes.{attribute}", primitive.index);
         SceneError::Vertex {
             place: source.document.place(item),
@@ -96,10 +106,10 @@ impl VertexReader<'_, '_> {
         transforms: &[Cow<'_, Transform>; 3],
         triangle: &Triangle,
     ) -> Result<Option<Attributes>, SceneError> {
-        let is_mapped = self.primitive.coordinates.iter().any(Option::is_some);
-        if !is_mapped && self.primitive.normals.is_none() && self.primitive.colours.is_none() {
+        if !self.primitive.may_have_attributes() {
             return Ok(None);
         }
+        let is_mapped = self.primitive.is_mapped();
         let mut coordinates = Attributes::NONE.coordinates;
         for (set, coordinates) in coordinates.iter_mut().enumerate() {
             for (coordinate, corner) in coordinates.iter_mut().zip(corners) {
@@ -129,6 +139,9 @@ impl VertexReader<'_, '_> {
     fn colour(&self, vertex: u64) -> [f32; 4] {
         let colours = self.primitive.colours.as_ref();
         let colour = colours.map_or([1.0; 4], |colours| colours.floats(vertex, [1.0; 4]));
+        if !colour.iter().all(|channel| channel.is_finite()) {
+            self.not_finite.colours.set(true);
+        }
         // What is not a number becomes 0.
         colour.map(|channel| if channel > 0.0 { channel.min(1.0) } else { 0.0 })
     }
@@ -147,7 +160,11 @@ impl VertexReader<'_, '_> {
         let mut normals = [own.as_vec3(); 3];
         let mut is_smooth = false;
         for ((normal, corner), transform) in normals.iter_mut().zip(corners).zip(transforms) {
-            let stated = transform.normal(Vec3::from(elements.vec3(corner)));
+            let local = Vec3::from(elements.vec3(corner));
+            if !local.is_finite() {
+                self.not_finite.normals.set(true);
+            }
+            let stated = transform.normal(local);
             let Some(stated) = stated.filter(|stated| stated.as_dvec3().dot(own) > 0.0) else { continue };
             is_smooth |= DVec3::distance(stated.as_dvec3(), own) > FLAT_DISTANCE;
             *normal = stated;

@@ -1,7 +1,5 @@
 //! JPEG: baseline and progressive, grey or colour.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
@@ -22,13 +20,6 @@ fn decoder(bytes: &[u8]) -> Decoder<'_> {
     // Strictly: else what is cut off would be grey.
     let options = DecoderOptions::new_safe().set_strict_mode(true).set_max_width(side).set_max_height(side);
     JpegDecoder::new_with_options(ZCursor::new(bytes), options)
-}
-
-/// Runs the decoder. It is written not to panic; should it, the file is a damaged one. Nothing is shared with the
-/// closure, so nothing can be left half changed.
-fn guarded<T>(decode: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
-    catch_unwind(AssertUnwindSafe(decode))
-        .unwrap_or_else(|_| Err(Fault::damaged("its structure contradicts itself")))
 }
 
 /// Width and height, and the most texels that a file of this length can hold.
@@ -64,11 +55,7 @@ fn frame_header(bytes: &[u8]) -> Option<[u32; 2]> {
     }
 }
 
-pub(super) fn decode(bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
-    guarded(|| decode_unguarded(bytes, size))
-}
-
-fn decode_unguarded(bytes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
+pub(super) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
     let mut decoder = decoder(bytes);
     decoder.decode_headers().map_err(|error| Fault::damaged(format!("{error:?}")))?;
     if decoder.dimensions() != Some((width as usize, height as usize)) {

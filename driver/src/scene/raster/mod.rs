@@ -10,6 +10,16 @@ mod png;
 
 pub(super) use self::fault::Fault;
 use super::texture::{MAX_SIDE, MAX_TEXELS};
+use crate::allocation;
+use crate::foreign;
+
+/// Bytes of memory that decoding takes for a texel: itself, interlaced rows of PNG of 16 bits, or coefficients of progressive JPEG.
+const DECODING_BYTES: u64 = 16;
+
+/// Runs a decoder; one that panics has found a damaged file.
+pub(super) fn walled<T>(decoder: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
+    foreign::decode(decoder, || Fault::damaged("its structure contradicts itself"))
+}
 
 /// A kind of image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,10 +65,10 @@ impl Kind {
 
     /// Width and height, from the header, if the limits and the file's length allow them.
     pub(super) fn size(self, bytes: &[u8]) -> Result<[u32; 2], Fault> {
-        let (size, most_texels) = match self {
-            Self::Png => png::size(bytes)?,
-            Self::Jpeg => jpeg::size(bytes)?,
-        };
+        let (size, most_texels) = walled(|| match self {
+            Self::Png => png::size(bytes),
+            Self::Jpeg => jpeg::size(bytes),
+        })?;
         check_size(size)?;
         let [width, height] = size;
         if u64::from(width) * u64::from(height) > most_texels {
@@ -70,10 +80,12 @@ impl Kind {
 
     /// The texels of an image of that size, as [`Kind::size`] has told it, rows from the top.
     pub(super) fn decode(self, bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
-        let texels = match self {
-            Self::Png => png::decode(bytes, size)?,
-            Self::Jpeg => jpeg::decode(bytes, size)?,
-        };
+        let bytes_needed = DECODING_BYTES * u64::from(size[0]) * u64::from(size[1]);
+        allocation::check(bytes_needed).map_err(Fault::memory)?;
+        let texels = walled(|| match self {
+            Self::Png => png::decode(bytes, size),
+            Self::Jpeg => jpeg::decode(bytes, size),
+        })?;
         let [width, height] = size.map(|side| side as usize);
         if texels.len() == width * height { Ok(texels) } else { Err(Fault::damaged("rows are missing")) }
     }

@@ -14,6 +14,12 @@ const TEXELS_OF_A_BYTE: u64 = 1032 * 8;
 /// What the decoder may hold besides rows: chunks of text or colour profiles.
 const ANCILLARY_BYTES: usize = 16 << 20;
 
+/// Bytes of 256 entries of a palette.
+const MAX_PALETTE: usize = 3 * 256;
+
+/// Bytes after the data of a chunk.
+const CHECKSUM: usize = 4;
+
 fn decoder(bytes: &[u8]) -> Decoder<Cursor<&[u8]>> {
     let mut decoder = Decoder::new(Cursor::new(bytes));
     decoder.set_ignore_text_chunk(true);
@@ -27,7 +33,35 @@ fn decoder(bytes: &[u8]) -> Decoder<Cursor<&[u8]>> {
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let mut decoder = decoder(bytes);
     let info = decoder.read_header_info().map_err(Fault::damaged)?;
+    if info.color_type == ColorType::Indexed {
+        check_palette(bytes)?;
+    }
     Ok(([info.width, info.height], TEXELS_OF_A_BYTE * bytes.len() as u64))
+}
+
+/// Refuses a palette of other than 1 to 256 entries of three bytes, which the decoder indexes beyond
+/// (image-rs/image-png issue 682).
+fn check_palette(bytes: &[u8]) -> Result<(), Fault> {
+    let palette = chunks(bytes).take_while(|(kind, _)| kind != b"IDAT").find(|(kind, _)| kind == b"PLTE");
+    match palette {
+        Some((_, length)) if !(3..=MAX_PALETTE).contains(&length) || !length.is_multiple_of(3) => {
+            Err(Fault::damaged(format!("a palette of {length} bytes is not one of 1 to 256 colours")))
+        }
+        // The decoder refuses an image without its palette.
+        _ => Ok(()),
+    }
+}
+
+/// The type and the stated length of each chunk.
+fn chunks(bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], usize)> {
+    let mut rest = bytes.get(MAGIC.len()..).unwrap_or_default();
+    std::iter::from_fn(move || {
+        let (length, after) = rest.split_first_chunk()?;
+        let length = u32::from_be_bytes(*length) as usize;
+        let kind = *after.first_chunk()?;
+        rest = after.get((kind.len() + length).saturating_add(CHECKSUM)..).unwrap_or_default();
+        Some((kind, length))
+    })
 }
 
 pub(super) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {

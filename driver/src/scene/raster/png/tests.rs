@@ -83,6 +83,35 @@ fn interlaced_rows_come_in_order() {
     assert_eq!(decoded(&bytes), [1, 2, 3, 4].map(|value| [value, value, value, 255]));
 }
 
+/// A file of one texel with a palette of so many bytes.
+fn of_palette(length: usize) -> Vec<u8> {
+    let mut file = MAGIC.to_vec();
+    let header = [0, 0, 0, 1, 0, 0, 0, 1, 8, 3, 0, 0, 0];
+    let row = [0x78, 0x01, 0x01, 2, 0, 0xfd, 0xff, 0, 0, 0, 2, 0, 1];
+    for (kind, data) in [(b"IHDR", &header[..]), (b"PLTE", &vec![9; length]), (b"IDAT", &row), (b"IEND", &[])]
+    {
+        let chunk = [&kind[..], data].concat();
+        file.extend((data.len() as u32).to_be_bytes());
+        file.extend(&chunk);
+        file.extend(crc32(&chunk).to_be_bytes());
+    }
+    file
+}
+
+#[test]
+fn palettes_of_whole_colours_are_read_and_others_refused() {
+    for length in 0..800 {
+        let file = of_palette(length);
+        let read = Kind::Png.size(&file).and_then(|size| decode(&file, size));
+        if (3..=768).contains(&length) && length % 3 == 0 {
+            assert_eq!(read, Ok(vec![[9, 9, 9, 255]]), "{length}");
+        } else {
+            let fault = read.unwrap_err();
+            assert!(fault.reason.contains(&format!("palette of {length} bytes")), "{length}: {fault:?}");
+        }
+    }
+}
+
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |sum, &byte| {
         (0..8).fold(sum ^ u32::from(byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xedb8_8320))

@@ -1,0 +1,42 @@
+//! Memory that work of a known size is about to take, asked of the system beforehand: what a process cannot have is an error,
+//! where an allocation that fails in the middle of the work would abort it.
+
+use std::hint::black_box;
+
+/// The process cannot have this memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{bytes} bytes of memory are needed, which the system does not give")]
+pub(crate) struct OutOfMemory {
+    /// Bytes that were asked for.
+    pub(crate) bytes: u64,
+}
+
+/// What to do about it.
+pub(crate) const REMEDY: &str =
+    "close other programs, raise the process's limit (`ulimit -v`), or use a machine with more memory";
+
+/// Checks that the process can have so much memory now, all at once. None of it stays taken.
+///
+/// # Errors
+/// If not.
+pub(crate) fn check(bytes: u64) -> Result<(), OutOfMemory> {
+    let mut probe = Vec::<u8>::new();
+    let all = usize::try_from(bytes).map_err(|_| OutOfMemory { bytes })?;
+    probe.try_reserve_exact(all).map_err(|_| OutOfMemory { bytes })?;
+    // An allocation that nothing looks at would be left out.
+    black_box(probe.as_mut_ptr());
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_machine_has_is_refused() {
+        assert_eq!(check(1 << 20), Ok(()));
+        for bytes in [1 << 60, u64::MAX] {
+            assert_eq!(check(bytes), Err(OutOfMemory { bytes }));
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! The bytes that a scene's buffers and images are made of, and the files beside it, each of which is read once however
+//! often the scene refers to it.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::ops::Deref;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The bytes of a buffer or an image.
+pub(super) enum Bytes<'a> {
+    /// A part of the scene file or of a buffer.
+    Part(&'a [u8]),
+    /// A file, or what a data URI holds.
+    Shared(Arc<Vec<u8>>),
+}
+
+impl Deref for Bytes<'_> {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Part(bytes) => bytes,
+            Self::Shared(bytes) => bytes,
+        }
+    }
+}
+
+/// Files that were read, by their canonical paths.
+#[derive(Default)]
+pub(super) struct Files(RefCell<BTreeMap<PathBuf, Arc<Vec<u8>>>>);
+
+impl Files {
+    /// The bytes of a file.
+    pub(super) fn read(&self, path: &Path) -> io::Result<Bytes<'static>> {
+        let canonical = fs::canonicalize(path)?;
+        if let Some(bytes) = self.0.borrow().get(&canonical) {
+            return Ok(Bytes::Shared(Arc::clone(bytes)));
+        }
+        let bytes = Arc::new(read_file(&canonical)?);
+        self.0.borrow_mut().insert(canonical, Arc::clone(&bytes));
+        Ok(Bytes::Shared(bytes))
+    }
+}
+
+/// Reads a regular file; a pipe or a device could go on for ever.
+pub(super) fn read_file(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
+    }
+    fs::read(path)
+}

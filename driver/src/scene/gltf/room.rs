@@ -1,0 +1,94 @@
+//! The part of a card's memory that a scene takes, counted from accessors, instances and headers before anything is expanded.
+//!
+//! Counts are lower bounds: what is refused here fits no card of the size, and what passes is measured once it is packed
+//! (`pack::budget`). Triangles of a primitive are counted as in the fullest leaves, and without corners that they share
+//! with those of other primitives.
+
+use std::path::{Path, PathBuf};
+
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::layout::{
+    Attributes, LEAF_TRIANGLES, LEAF_VERTICES, Material, NODE_CHILDREN, Record, TILE_HEIGHT, TILE_WIDTH,
+};
+
+use crate::error::SceneError;
+
+/// What is left of a card's memory.
+pub(super) struct Room {
+    file: PathBuf,
+    available: u64,
+    taken: u64,
+}
+
+impl Room {
+    pub(super) fn new(file: &Path, available: u64) -> Self {
+        Self { file: file.to_owned(), available, taken: 0 }
+    }
+
+    pub(super) fn materials(&mut self, count: usize) -> Result<(), SceneError> {
+        self.take((count * Material::BYTES) as u64, || format!("{count} materials"))
+    }
+
+    /// The texels of one more image.
+    pub(super) fn texels(&mut self, [width, height]: [u32; 2]) -> Result<(), SceneError> {
+        let tiles = u64::from(width.div_ceil(TILE_WIDTH)) * u64::from(height.div_ceil(TILE_HEIGHT));
+        self.take(tiles * LINE_BYTES as u64, || "images and materials".to_owned())
+    }
+
+    /// Whether so many triangles fit wherever their corners are.
+    pub(super) fn fits_any(&self, triangles: u64) -> bool {
+        let corners = triangles.saturating_mul(3);
+        self.available - self.taken
+            >= Self::geometry(triangles, corners).saturating_add(attributes(triangles, 2))
+    }
+
+    /// The triangles of a scene: all of them, and bytes of leaves, nodes and attributes.
+    pub(super) fn triangles(&mut self, triangles: u64, bytes: u64) -> Result<(), SceneError> {
+        self.take(bytes, || format!("{triangles} triangles, images and materials"))
+    }
+
+    /// Bytes of leaves, and of the nodes above them, for triangles with so many different corners.
+    pub(super) fn geometry(triangles: u64, corners: u64) -> u64 {
+        let leaves = triangles.div_ceil(LEAF_TRIANGLES as u64).max(corners.div_ceil(LEAF_VERTICES as u64));
+        let nodes = leaves.saturating_sub(1) / (NODE_CHILDREN as u64 - 1);
+        (leaves + nodes).saturating_mul(LINE_BYTES as u64)
+    }
+
+    fn take(&mut self, bytes: u64, what: impl FnOnce() -> String) -> Result<(), SceneError> {
+        let needed = self.taken.saturating_add(bytes);
+        if needed > self.available {
+            let (file, available) = (self.file.clone(), self.available);
+            return Err(SceneError::TooLarge { file, what: what(), needed, available });
+        }
+        self.taken = needed;
+        Ok(())
+    }
+}
+
+/// Bytes of the attributes of triangles with so many sets of texture coordinates.
+pub(super) fn attributes(triangles: u64, sets: u64) -> u64 {
+    triangles.saturating_mul(sets.max(1) * Attributes::BYTES as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_take_a_leaf_for_eight_of_them_or_nine_corners() {
+        assert_eq!(Room::geometry(0, 0), 0);
+        assert_eq!(Room::geometry(8, 9), 128);
+        assert_eq!(Room::geometry(8, 24), 3 * 128);
+        assert_eq!(Room::geometry(8 * 16, 9), (16 + 1) * 128);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_told_with_what_came_before() {
+        let mut room = Room::new(Path::new("scene.gltf"), 128 * 10);
+        assert!(room.materials(2).is_ok() && room.texels([9, 4]).is_ok());
+        assert!(room.fits_any(1) && !room.fits_any(1000));
+        let error = room.triangles(7, 128 * 8).unwrap_err();
+        assert!(matches!(error, SceneError::TooLarge { needed: 1408, available: 1280, .. }), "{error:?}");
+        assert!(room.triangles(7, 128 * 7).is_ok());
+    }
+}

@@ -1,0 +1,112 @@
+//! PNG files taken apart into chunks: edits that leave lengths and checksums right, so that what chunks say is read.
+
+use super::{Random, mutation};
+
+/// The first bytes of every file.
+pub(crate) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// A chunk's type and data.
+type Chunk = ([u8; 4], Vec<u8>);
+
+/// Types of chunks that mean something to a decoder.
+const TYPES: [&[u8; 4]; 9] =
+    [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND", b"gAMA", b"iCCP", b"acTL", b"fcTL"];
+
+/// Makes one edit of the chunks of a file: of the data of one, or of which there are. What is behind them is lost.
+pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
+    let mut chunks = split(file);
+    if chunks.is_empty() {
+        return;
+    }
+    let place = random.below(chunks.len());
+    match random.below(12) {
+        0 => drop(chunks.remove(place)),
+        1 => chunks.insert(place, chunks[random.below(chunks.len())].clone()),
+        2 => chunks.swap(place, 0),
+        3 => chunks[place].0 = **random.pick(&TYPES),
+        4 => {
+            let length = random.below(800);
+            let data = (0..length).map(|_| random.next() as u8).collect();
+            chunks.insert(place, (**random.pick(&TYPES), data));
+        }
+        5 => {
+            let length = random.below(800);
+            chunks[place].1.resize(length, random.next() as u8);
+        }
+        _ => mutation::edit_bytes(&mut chunks[place].1, &[], random),
+    }
+    *file = join(&chunks);
+}
+
+/// Makes the checksums of chunks right, and leaves all else.
+pub(crate) fn mend_checksums(file: &mut [u8]) {
+    let mut at = MAGIC.len();
+    while let Some(length) = file.get(at..).and_then(|rest| rest.first_chunk::<4>()) {
+        let end = at.saturating_add(8).saturating_add(u32::from_be_bytes(*length) as usize);
+        let Some(sum) = file.get(at + 4..end).map(checksum) else { return };
+        let Some(stored) = file.get_mut(end..end.saturating_add(4)) else { return };
+        stored.copy_from_slice(&sum);
+        at = end + 4;
+    }
+}
+
+fn split(file: &[u8]) -> Vec<Chunk> {
+    let mut rest = file.get(MAGIC.len()..).unwrap_or_default();
+    let mut chunks = Vec::new();
+    while let Some((length, after)) = rest.split_first_chunk() {
+        let Some((kind, after)) = after.split_first_chunk() else { break };
+        let length = (u32::from_be_bytes(*length) as usize).min(after.len());
+        chunks.push((*kind, after[..length].to_vec()));
+        rest = after.get(length + 4..).unwrap_or_default();
+    }
+    chunks
+}
+
+fn join(chunks: &[Chunk]) -> Vec<u8> {
+    let mut file = MAGIC.to_vec();
+    for (kind, data) in chunks {
+        let body = [&kind[..], data].concat();
+        file.extend((data.len() as u32).to_be_bytes());
+        file.extend(&body);
+        file.extend(checksum(&body));
+    }
+    file
+}
+
+/// The CRC-32 of a chunk's type and data (PNG, annex D).
+fn checksum(bytes: &[u8]) -> [u8; 4] {
+    let sum = bytes.iter().fold(u32::MAX, |sum, &byte| {
+        (0..8).fold(sum ^ u32::from(byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xedb8_8320))
+    });
+    (!sum).to_be_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: &[u8] = include_bytes!("../../../driver/tests/images/palette.png");
+
+    #[test]
+    fn a_file_is_its_chunks() {
+        let chunks = split(FILE);
+        let types: Vec<_> = chunks.iter().map(|(kind, _)| kind).collect();
+        assert_eq!(types, [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"]);
+        assert_eq!(join(&chunks), FILE);
+        let mut damaged = FILE.to_vec();
+        damaged[30] ^= 1;
+        mend_checksums(&mut damaged);
+        assert_eq!(damaged, FILE);
+    }
+
+    /// Palettes of other lengths than whole colours are among the edits: what a decoder once panicked at.
+    #[test]
+    fn palettes_of_odd_lengths_are_reached() {
+        let odd = |number| {
+            let mut file = FILE.to_vec();
+            edit_chunks(&mut file, &mut Random::new("palettes", 0, number));
+            split(&file).iter().any(|(kind, data)| kind == b"PLTE" && data.len() % 3 != 0)
+        };
+        assert!((0..1000).filter(|number| odd(*number)).count() > 10);
+    }
+}

@@ -1,0 +1,154 @@
+//! Damaged files.
+
+use std::fs;
+use std::path::Path;
+
+use super::Kind;
+use crate::fuzz::{Random, environment, gltf, mutation, picture, png, texture};
+
+/// The longest part of a file that is edited at once.
+const WINDOW: usize = 1 << 12;
+
+/// A file before it is damaged.
+struct Seed {
+    extension: String,
+    bytes: Vec<u8>,
+}
+
+/// The files of a kind.
+pub struct Inputs {
+    kind: Kind,
+    seeds: Vec<Seed>,
+}
+
+const SCENES: [&str; 9] = [
+    "scenes/cornell.gltf",
+    "scenes/cornell-glossy.gltf",
+    "scenes/cornell-uplight.gltf",
+    "scenes/furnace.gltf",
+    "host-cli/tests/scenes/painted.gltf",
+    "scenes/room.glb",
+    "scenes/roughness.glb",
+    "scenes/cornell-spheres.glb",
+    "scenes/atrium.glb",
+];
+
+const IMAGES: [&str; 11] = [
+    "driver/tests/images/texel.png",
+    "driver/tests/images/palette.png",
+    "driver/tests/images/deep.png",
+    "driver/tests/images/interlaced.png",
+    "docs/atrium.png",
+    "driver/tests/images/colour.jpg",
+    "driver/tests/images/progressive.jpg",
+    "driver/tests/images/grey.jpg",
+    "driver/tests/images/cmyk.jpg",
+    "scenes/sky.exr",
+    "tests/references/cornell-spheres-caustics.exr",
+];
+
+impl Inputs {
+    /// The files of a kind that ship, and such pictures as do not.
+    ///
+    /// # Panics
+    /// If one of them is not there.
+    pub fn new(kind: Kind) -> Self {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let shipped = |name: &&str| Seed {
+            extension: name.rsplit('.').next().unwrap_or_default().to_owned(),
+            bytes: fs::read(root.join(name)).expect("the file ships"),
+        };
+        let mut seeds: Vec<_> = match kind {
+            Kind::Images => IMAGES.iter().map(shipped).collect(),
+            Kind::Scenes => SCENES.iter().map(shipped).collect(),
+        };
+        if kind == Kind::Images {
+            let of = |extension: &str, files: Vec<Vec<u8>>| {
+                let extension = extension.to_owned();
+                files.into_iter().map(move |bytes| Seed { extension: extension.clone(), bytes })
+            };
+            seeds.extend(of("hdr", environment::pictures()));
+            seeds.extend(of("exr", picture::pictures()));
+        } else {
+            seeds.push(Seed { extension: "gltf".to_owned(), bytes: gltf::rich() });
+        }
+        Self { kind, seeds }
+    }
+
+    /// Input `number`: the extension of its file, and its bytes.
+    pub fn make(&self, seed: u64, number: u64) -> (&str, Vec<u8>) {
+        let mut random = Random::new(self.kind.name(), seed, number);
+        let chosen = random.pick(&self.seeds);
+        let mut bytes = chosen.bytes.clone();
+        for _ in 0..random.edits() {
+            self.edit(&mut bytes, &chosen.extension, &mut random);
+        }
+        (&chosen.extension, bytes)
+    }
+
+    /// Makes one edit, half of the time one that knows the format.
+    fn edit(&self, bytes: &mut Vec<u8>, extension: &str, random: &mut Random) {
+        match (random.below(8), extension) {
+            (0..=3, "png") => png::edit_chunks(bytes, random),
+            (4, "png") => {
+                edit_window(bytes, random);
+                png::mend_checksums(bytes);
+            }
+            (0..=4, "gltf") => mutation::edit_json(bytes, random),
+            (0..=4, "glb") => edit_glb(bytes, random),
+            (0..=3, "exr" | "hdr" | "jpg") => edit_header(bytes, random),
+            (5, _) => self.splice(bytes, extension, random),
+            (6, _) if random.once_in(4) => bytes.truncate(random.below(bytes.len())),
+            _ => edit_window(bytes, random),
+        }
+    }
+
+    /// Puts a part of another file of the format in the place of a part of this.
+    fn splice(&self, bytes: &mut Vec<u8>, extension: &str, random: &mut Random) {
+        let others: Vec<_> = self.seeds.iter().filter(|seed| seed.extension == extension).collect();
+        let other = &random.pick(&others).bytes;
+        let [from, to] = [random.below(other.len()), random.below(bytes.len())];
+        let length = random.below(other.len() - from + 1);
+        let end = if random.once_in(2) { bytes.len() } else { (to + length).min(bytes.len()) };
+        bytes.splice(to..end, other[from..from + length].iter().copied());
+    }
+}
+
+/// The file that an input is read from, with its extension: of a texture the scene around it.
+pub(super) fn as_file(extension: &str, bytes: Vec<u8>) -> (&str, Vec<u8>) {
+    match extension {
+        "png" | "jpg" => ("glb", texture::textured(&bytes)),
+        _ => (extension, bytes),
+    }
+}
+
+/// Edits a part of a file; its length may change.
+fn edit_window(bytes: &mut Vec<u8>, random: &mut Random) {
+    let start = random.below(bytes.len());
+    let end = (start + WINDOW).min(bytes.len());
+    let mut window = bytes[start..end].to_vec();
+    mutation::edit_bytes(&mut window, &[], random);
+    bytes.splice(start..end, window);
+}
+
+/// Changes a number near the start, where sizes and counts are.
+fn edit_header(bytes: &mut [u8], random: &mut Random) {
+    let place = random.below(bytes.len().min(600));
+    match random.below(3) {
+        0 => mutation::put_word(bytes, place, random),
+        1 if !bytes.is_empty() => bytes[place] ^= 1 << random.below(8),
+        _ if !bytes.is_empty() => bytes[place] = random.next() as u8,
+        _ => {}
+    }
+}
+
+/// Edits the JSON or the binary chunk of a GLB, and makes its lengths right.
+fn edit_glb(bytes: &mut Vec<u8>, random: &mut Random) {
+    let Some((mut text, mut data)) = gltf::split_glb(bytes) else { return };
+    if random.below(4) < 3 {
+        mutation::edit_json(&mut text, random);
+    } else {
+        edit_window(&mut data, random);
+    }
+    *bytes = gltf::glb(&text, &data);
+}

@@ -1,0 +1,88 @@
+//! The process that reads inputs, one after the other.
+
+use std::fs;
+use std::io::{Write as _, stdout};
+use std::path::Path;
+
+use photoncard_driver::difference::compare;
+use photoncard_driver::exr::read_rgb;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::render::{RenderSettings, Unobserved, render};
+use photoncard_driver::scene::{Environment, Scene, gltf};
+
+use super::inputs::as_file;
+use super::{Inputs, Settings};
+
+/// Scenes of more triangles are loaded and packed only once in a while.
+const MAX_RENDERED: usize = 3000;
+
+/// Larger pictures are read only.
+const MAX_COMPARED: usize = 1 << 18;
+
+/// Reads inputs, and tells each on standard output: its number before, and whether it was sound after.
+///
+/// # Panics
+/// As what reads the inputs does; that is what is looked for.
+pub fn read_batch(settings: &Settings) {
+    let inputs = Inputs::new(settings.kind);
+    for number in settings.first..settings.first + settings.inputs {
+        let (extension, bytes) = inputs.make(settings.seed, number);
+        say(format_args!("at {number}"));
+        let is_sound = read(&settings.folder, extension, bytes, number);
+        say(format_args!("{} {number}", if is_sound { "sound" } else { "refused" }));
+    }
+}
+
+/// A supervisor that is gone needs no answer.
+fn say(line: std::fmt::Arguments) {
+    let mut out = stdout().lock();
+    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+}
+
+/// Reads an input as what its extension says. Returns whether it was sound.
+fn read(folder: &Path, extension: &str, bytes: Vec<u8>, number: u64) -> bool {
+    let (kind, file) = as_file(extension, bytes);
+    let path = folder.join(format!("input.{kind}"));
+    fs::write(&path, file).expect("there is room for an input");
+    match extension {
+        "png" | "jpg" => told(gltf::load(&path)).is_some(),
+        "hdr" => told(Environment::load(&path)).is_some(),
+        "exr" => {
+            let environment = told(Environment::load(&path));
+            let picture = told(read_rgb(&path));
+            if let Some(picture) = picture.filter(|picture| picture.pixels.len() <= MAX_COMPARED) {
+                told(compare(&picture, &picture, 16, None));
+            }
+            environment.is_some()
+        }
+        _ => told(gltf::load(&path)).map(|scene| use_scene(scene, number)).is_some(),
+    }
+}
+
+/// What was read, or nothing; an error is written as its message, which must not panic either.
+fn told<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
+    result.inspect_err(|error| drop(error.to_string())).ok()
+}
+
+fn use_scene(mut scene: Scene, number: u64) {
+    if scene.triangles.len() > MAX_RENDERED {
+        if number.is_multiple_of(50) {
+            told(PackedScene::new(&scene));
+        }
+        return;
+    }
+    if scene.check_light().is_err() {
+        scene.environment = Some(Environment::constant(glam::Vec3::ONE));
+    }
+    let settings = RenderSettings {
+        width: 4,
+        height: 4,
+        photons: 200,
+        neighbors: 10,
+        gather_rays: 2,
+        shadow_rays: 1,
+        samples: 1,
+        ..RenderSettings::default()
+    };
+    told(render(&scene, &settings, &Unobserved));
+}

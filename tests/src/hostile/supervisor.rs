@@ -1,0 +1,188 @@
+//! The process that starts those which read, and looks at how they end.
+
+use std::fs;
+use std::io::{self, BufRead, BufReader};
+use std::os::unix::process::ExitStatusExt as _;
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::inputs::as_file;
+use super::{Inputs, Kind, Settings};
+
+/// How often a command that runs is looked at.
+const GLANCE: Duration = Duration::from_millis(2);
+
+/// An input that is not read as it must be.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// Its number.
+    pub number: u64,
+    /// What happened.
+    pub what: String,
+}
+
+/// What came of some inputs.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// Inputs that were read.
+    pub inputs: u64,
+    /// Inputs that were sound.
+    pub sound: u64,
+    /// How often the command ended with status 0, 1 and 2.
+    pub statuses: [u64; 3],
+    /// The longest time that an input took, and its number.
+    pub slowest: (Duration, u64),
+    /// Inputs that ended a process or took too long.
+    pub findings: Vec<Finding>,
+}
+
+/// Reads inputs in processes of limited memory: `reader` is the program that calls [`read_batch`](super::read_batch) when it is
+/// given `read KIND SEED FIRST INPUTS FOLDER`.
+///
+/// # Errors
+/// If a process cannot be started or a file cannot be written.
+pub fn supervise(reader: &Path, settings: &Settings, tell: &dyn Fn(&Report)) -> io::Result<Report> {
+    let mut report = Report::default();
+    fs::create_dir_all(&settings.folder)?;
+    let inputs = Inputs::new(settings.kind);
+    let end = settings.first + settings.inputs;
+    let mut next = settings.first;
+    while next < end {
+        let count = settings.batch.min(end - next);
+        let done = read_some(reader, settings, next, count, &mut report)?;
+        for number in (next..next + done).filter(|number| number.is_multiple_of(settings.every)) {
+            run_command(settings, &inputs, number, &mut report)?;
+        }
+        next += done;
+        report.inputs = next - settings.first;
+        tell(&report);
+    }
+    for finding in &report.findings {
+        let (extension, bytes) = inputs.make(settings.seed, finding.number);
+        let name = format!("{}-{}-{}.{extension}", settings.kind.name(), settings.seed, finding.number);
+        fs::write(settings.folder.join(name), bytes)?;
+    }
+    Ok(report)
+}
+
+/// A program with a limit of address space.
+fn limited(settings: &Settings, program: &Path) -> Command {
+    let mut command = Command::new("sh");
+    let script = format!("ulimit -v {} && exec \"$0\" \"$@\"", settings.kilobytes);
+    command.args(["-c", &script]).arg(program).stdin(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+/// Has a process read inputs until it has read all or ended. Returns how many are done with.
+fn read_some(
+    reader: &Path,
+    settings: &Settings,
+    first: u64,
+    count: u64,
+    report: &mut Report,
+) -> io::Result<u64> {
+    let mut command = limited(settings, reader);
+    command.args(["read", settings.kind.name()]);
+    command.args([settings.seed, first, count].map(|number| number.to_string()));
+    let mut child = command.arg(&settings.folder).stdout(Stdio::piped()).spawn()?;
+    let lines = lines(&mut child);
+    let (mut at, mut begun) = (None, Instant::now());
+    loop {
+        match lines.recv_timeout(settings.patience) {
+            Ok(line) => match line.split_once(' ') {
+                Some(("at", number)) => (at, begun) = (number.parse().ok(), Instant::now()),
+                Some((word, _)) => {
+                    report.sound += u64::from(word == "sound");
+                    report.slowest = report.slowest.max((begun.elapsed(), at.unwrap_or(first)));
+                }
+                None => {}
+            },
+            Err(RecvTimeoutError::Timeout) => {
+                let number = at.unwrap_or(first);
+                child.kill()?;
+                child.wait()?;
+                let what = format!("it takes more than {:?}", settings.patience);
+                report.findings.push(Finding { number, what });
+                return Ok(number + 1 - first);
+            }
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    let status = child.wait()?;
+    if status.success() {
+        return Ok(count);
+    }
+    let number = at.unwrap_or(first);
+    report.findings.push(Finding { number, what: format!("it ends the reader: {status}") });
+    Ok(number + 1 - first)
+}
+
+/// The lines of a process, as they come.
+fn lines(child: &mut Child) -> Receiver<String> {
+    let (sender, receiver) = channel();
+    if let Some(output) = child.stdout.take() {
+        thread::spawn(move || {
+            let lines = BufReader::new(output).lines().map_while(Result::ok);
+            lines.take_while(|line| sender.send(line.clone()).is_ok()).for_each(drop);
+        });
+    }
+    receiver
+}
+
+/// Has the command read an input, as a user would.
+fn run_command(settings: &Settings, inputs: &Inputs, number: u64, report: &mut Report) -> io::Result<()> {
+    let Some(program) = &settings.command else { return Ok(()) };
+    let (extension, bytes) = inputs.make(settings.seed, number);
+    let (kind, file) = as_file(extension, bytes);
+    let path = settings.folder.join(format!("command.{kind}"));
+    fs::write(&path, file)?;
+    let mut command = limited(settings, program);
+    command.stdout(Stdio::null());
+    match (settings.kind, extension) {
+        (_, "exr") => command.arg("diff").args([&path, &path]),
+        (_, "hdr") => {
+            let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell.gltf");
+            render(&mut command, &scene, &settings.folder).arg("--environment").arg(&path)
+        }
+        (Kind::Images, _) => command.args(["scene", "info"]).arg(&path),
+        (Kind::Scenes, _) => render(&mut command, &path, &settings.folder),
+    };
+    let begun = Instant::now();
+    let status = ended(&mut command.spawn()?, settings.patience)?;
+    report.slowest = report.slowest.max((begun.elapsed(), number));
+    match status.map(|status| (status.code(), status.signal())) {
+        Some((Some(code @ 0..=2), _)) => report.statuses[code as usize] += 1,
+        Some((code, signal)) => {
+            let what = format!("it ends the command: status {code:?}, signal {signal:?}");
+            report.findings.push(Finding { number, what });
+        }
+        None => {
+            let what = format!("the command takes more than {:?}", settings.patience);
+            report.findings.push(Finding { number, what });
+        }
+    }
+    Ok(())
+}
+
+/// The smallest of renders.
+fn render<'c>(command: &'c mut Command, scene: &Path, folder: &Path) -> &'c mut Command {
+    let options = "--size 4x4 --photons 200 --neighbors 10 --gather-rays 2 --shadow-rays 1 --spp 1 --quiet";
+    command.arg("render").arg(scene).arg("-o").arg(folder.join("out.exr")).args(options.split(' '))
+}
+
+/// How a process ends within some time; if it does not, it is ended.
+fn ended(child: &mut Child, patience: Duration) -> io::Result<Option<ExitStatus>> {
+    let begun = Instant::now();
+    while begun.elapsed() < patience {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        thread::sleep(GLANCE);
+    }
+    child.kill()?;
+    child.wait()?;
+    Ok(None)
+}
