@@ -79,14 +79,14 @@ pub struct Session<'a> {
     /// Encoded commands that wait for room on the line.
     commands: VecDeque<Vec<u8>>,
     /// The number of the link's present session.
-    number: u16,
+    number: u32,
     clock: Clock,
     failures: Failures,
 }
 
 impl<'a> Session<'a> {
     /// A session that says hello first. `number` tells it from what a line may still hold of another: any will do.
-    pub fn new(number: u16, now: Duration) -> Self {
+    pub fn new(number: u32, now: Duration) -> Self {
         let mut session = Self {
             state: State::Greeting,
             budget: None,

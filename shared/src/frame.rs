@@ -1,7 +1,7 @@
 //! Frames: how bytes stay whole on a line.
 //!
 //! ```text
-//! COBS( kind: u8 | session: u16 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
+//! COBS( kind: u8 | session: u32 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
 //! ```
 //!
 //! Numbers are little-endian. Stuffing ([`crate::stuffing`]) leaves no zero byte inside a frame, so that a receiver finds
@@ -16,7 +16,7 @@ use crate::stuffing::{max_stuffed_bytes, stuff, unstuff};
 /// Bytes of the longest payload: eight lines and the words of their message.
 pub const MAX_PAYLOAD: usize = 8 * crate::address::LINE_BYTES + 32;
 /// Bytes of a frame's header.
-pub const HEADER_BYTES: usize = 8;
+pub const HEADER_BYTES: usize = 10;
 const CHECKSUM_BYTES: usize = 4;
 const MAX_PLAIN: usize = HEADER_BYTES + MAX_PAYLOAD + CHECKSUM_BYTES;
 /// Bytes of the longest frame on the wire, its zero byte included.
@@ -68,7 +68,7 @@ pub struct FrameHeader {
     /// What it is for.
     pub kind: FrameKind,
     /// The session that it belongs to.
-    pub session: u16,
+    pub session: u32,
     /// The number of the frame in its direction; see the kinds.
     pub sequence: u16,
     /// All frames of the other direction before this number have been taken.
@@ -79,14 +79,14 @@ pub struct FrameHeader {
 
 impl FrameHeader {
     fn to_bytes(self) -> [u8; HEADER_BYTES] {
-        let [session, sequence, acknowledged] =
-            [self.session, self.sequence, self.acknowledged].map(u16::to_le_bytes);
-        let [[a, b], [c, d], [e, f]] = [session, sequence, acknowledged];
-        [self.kind as u8, a, b, c, d, e, f, self.held]
+        let [a, b, c, d] = self.session.to_le_bytes();
+        let [[e, f], [g, h]] = [self.sequence, self.acknowledged].map(u16::to_le_bytes);
+        [self.kind as u8, a, b, c, d, e, f, g, h, self.held]
     }
 
-    fn read([kind, a, b, c, d, e, f, held]: [u8; HEADER_BYTES]) -> Option<Self> {
-        let [session, sequence, acknowledged] = [[a, b], [c, d], [e, f]].map(u16::from_le_bytes);
+    fn read([kind, a, b, c, d, e, f, g, h, held]: [u8; HEADER_BYTES]) -> Option<Self> {
+        let session = u32::from_le_bytes([a, b, c, d]);
+        let [sequence, acknowledged] = [[e, f], [g, h]].map(u16::from_le_bytes);
         Some(Self { kind: FrameKind::read(kind)?, session, sequence, acknowledged, held })
     }
 }

@@ -1,10 +1,9 @@
 //! The cards of a render: reached, greeted, and put to work together.
 
+use std::hash::{BuildHasher, RandomState};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU16, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
-use photoncard_firmware::sampler::hash;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::link::{Port, PortError};
@@ -257,9 +256,8 @@ fn greet(
     }
 }
 
-/// A number that another process, or an earlier session of this one, has hardly used on the same line.
-fn session_number() -> u16 {
-    static COUNT: AtomicU16 = AtomicU16::new(0);
-    let time = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.subsec_nanos());
-    hash(time ^ std::process::id()) as u16 ^ COUNT.fetch_add(1, Ordering::Relaxed)
+/// A random number: no card or line holds anything of another session of that number, but by a chance of one in 2^32.
+fn session_number() -> u32 {
+    // The standard library's hashers have random keys.
+    RandomState::new().hash_one(std::process::id()) as u32
 }

@@ -46,7 +46,7 @@ impl<'a> Station<'a> {
     pub(crate) fn new(fixture: &Fixture, random: &mut Random) -> Self {
         Self {
             card: fixture.card(),
-            session: Session::new(random.below(1 << 16) as u16, Duration::ZERO),
+            session: Session::new(random.below(1 << 16) as u32, Duration::ZERO),
             is_lost: false,
             given_up: None,
             health: Health::Well,
