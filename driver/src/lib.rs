@@ -3,6 +3,7 @@
 
 pub mod bvh;
 pub mod difference;
+pub mod dispatcher;
 pub mod display;
 pub mod emulator;
 pub mod error;
@@ -21,4 +22,5 @@ pub mod render;
 pub mod scene;
 pub mod scheduler;
 pub mod session;
+pub mod sink;
 pub mod study;
