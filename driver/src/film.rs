@@ -1,8 +1,13 @@
 //! The picture while it is being rendered: what is known of each pixel of the crop window.
 
+use std::sync::{Mutex, PoisonError};
+
+use photoncard_shared::counters::Counters;
 use photoncard_shared::message::Tile;
 pub use photoncard_shared::message::{Pixel as PixelValue, PixelLayers, PixelRecord};
 use thiserror::Error;
+
+use crate::sink::{FinishedTile, TileSink, places};
 
 /// The most pixels a film may hold: 2^28, about 10 GiB, with layers 20.
 pub const MAX_PIXELS: u64 = 1 << 28;
@@ -99,6 +104,12 @@ pub struct FilmPixel {
     pub pixel: PixelValue,
     /// Zero in a film without layers.
     pub layers: PixelLayers,
+}
+
+impl From<PixelRecord> for FilmPixel {
+    fn from(PixelRecord { pixel, layers }: PixelRecord) -> Self {
+        Self { pixel, layers: layers.unwrap_or_default() }
+    }
 }
 
 /// The pixels of a crop window of a picture.
@@ -242,11 +253,49 @@ impl Film {
         })
     }
 
+    /// The pixels of a tile; `None` unless all were written.
+    pub fn finished(&self, tile: &Tile) -> Option<FinishedTile> {
+        if !self.has(tile) {
+            return None;
+        }
+        let mut records = Vec::new();
+        for (x, y) in places(tile) {
+            let FilmPixel { pixel, layers } = self.all_at(x, y)?;
+            records.extend(pixel.to_bytes());
+            if self.has_layers() {
+                records.extend(layers.to_bytes());
+            }
+        }
+        FinishedTile::new(*tile, records, self.has_layers(), Counters::ZERO)
+    }
+
+    /// Takes a tile's pixels for not written.
+    pub fn erase(&mut self, tile: &Tile) {
+        for index in places(tile).filter_map(|(x, y)| self.index(x, y)).collect::<Vec<_>>() {
+            self.missing += usize::from(std::mem::replace(&mut self.written[index], false));
+        }
+    }
+
     fn index(&self, x: u32, y: u32) -> Option<usize> {
         let Window { x0, y0, .. } = self.window;
         self.window
             .contains(x, y)
             .then(|| (y - y0) as usize * self.window.width() as usize + (x - x0) as usize)
+    }
+}
+
+impl TileSink for Mutex<Film> {
+    fn put(&self, tile: &FinishedTile) {
+        // A thread that panicked holding the lock has left whole pixels.
+        let mut film = self.lock().unwrap_or_else(PoisonError::into_inner);
+        for ((x, y), record) in tile.pixels() {
+            // The tiles of a render lie in its film's window.
+            let _ = film.write_record(x, y, &record);
+        }
+    }
+
+    fn revoke(&self, tile: &Tile) {
+        self.lock().unwrap_or_else(PoisonError::into_inner).erase(tile);
     }
 }
 

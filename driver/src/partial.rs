@@ -19,17 +19,19 @@ mod records;
 #[cfg(test)]
 mod tests;
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use photoncard_shared::message::Tile;
 use serde_json::{Map, Value};
 
 use self::file::{FAMILY, Title, read_title};
-use self::records::read_tiles;
-pub(crate) use self::records::record;
+use self::records::{HEAD_BYTES, read_tiles, record};
 use crate::film::Film;
+use crate::sink::{FinishedTile, TileSink};
 
 /// The version of the file's format, in its first line.
 const VERSION: u32 = 2;
@@ -114,8 +116,12 @@ struct State {
     file: Option<File>,
     /// Whether it begins with title and settings.
     is_begun: bool,
+    /// Whether it holds a tile that this render has taken over.
+    holds_earlier: bool,
     /// Whether it holds a tile that this render has taken over or kept.
     holds_tiles: bool,
+    /// Where the records begin that this render has written, by the number of their tile.
+    records: HashMap<u32, u64>,
     failed: Option<PartialError>,
 }
 
@@ -159,7 +165,8 @@ impl PartialRender {
             file.set_len(sound)?;
             file.seek(SeekFrom::End(0))
         });
-        state.holds_tiles = sound.map_err(|error| self.error(error))? > head;
+        state.holds_earlier = sound.map_err(|error| self.error(error))? > head;
+        state.holds_tiles = state.holds_earlier;
         state.is_begun = true;
         Ok(())
     }
@@ -186,18 +193,7 @@ impl PartialRender {
         Ok(Some((title().len() + settings.len()) as u64))
     }
 
-    /// Keeps a finished tile's record. What goes wrong is told by [`Self::check`].
-    pub(crate) fn keep(&self, record: &[u8]) {
-        let mut state = self.lock();
-        if state.failed.is_none()
-            && let Err(error) = self.append(&mut state, record)
-        {
-            self.discard_empty(&mut state);
-            state.failed = Some(error);
-        }
-    }
-
-    fn append(&self, state: &mut State, record: &[u8]) -> Result<(), PartialError> {
+    fn append(&self, state: &mut State, tile: &FinishedTile) -> Result<(), PartialError> {
         if state.file.is_none() {
             state.file = file::open(&self.path, true)?;
         }
@@ -206,9 +202,29 @@ impl PartialRender {
             self.write_head(file).map_err(|error| self.error(error))?;
             state.is_begun = true;
         }
-        // One call: another process sees a tile whole or cut off.
-        file.write_all(record).map_err(|error| self.error(error))?;
+        let mut write = || {
+            let start = file.stream_position()?;
+            // One call: another process sees a tile whole or cut off.
+            file.write_all(&record(tile))?;
+            Ok(start)
+        };
+        let start = write().map_err(|error| self.error(error))?;
+        state.records.insert(tile.tile().id, start);
         state.holds_tiles = true;
+        Ok(())
+    }
+
+    /// Makes the record of a tile that was kept one that a reader passes over: its magic number goes.
+    fn strike_out(&self, state: &mut State, tile: &Tile) -> Result<(), PartialError> {
+        let start = state.records.remove(&tile.id);
+        let (Some(start), Some(file)) = (start, &mut state.file) else { return Ok(()) };
+        let mut write = || {
+            file.seek(SeekFrom::Start(start))?;
+            file.write_all(&[0; HEAD_BYTES])?;
+            file.seek(SeekFrom::End(0))
+        };
+        write().map_err(|error| self.error(error))?;
+        state.holds_tiles = state.holds_earlier || !state.records.is_empty();
         Ok(())
     }
 
@@ -251,6 +267,26 @@ impl PartialRender {
         match &self.lock().file {
             Some(file) => file::remove(file, &self.path).map_err(|error| self.error(error)),
             None => Ok(()),
+        }
+    }
+}
+
+/// What goes wrong is told by [`PartialRender::check`].
+impl TileSink for PartialRender {
+    fn put(&self, tile: &FinishedTile) {
+        let mut state = self.lock();
+        if state.failed.is_none()
+            && let Err(error) = self.append(&mut state, tile)
+        {
+            self.discard_empty(&mut state);
+            state.failed = Some(error);
+        }
+    }
+
+    fn revoke(&self, tile: &Tile) {
+        let mut state = self.lock();
+        if let Err(error) = self.strike_out(&mut state, tile) {
+            state.failed.get_or_insert(error);
         }
     }
 }

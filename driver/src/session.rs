@@ -1,68 +1,43 @@
-//! The host's side of one card's link: a state machine without I/O, fed with bytes and a clock.
+//! The host's side of one card's link: a state machine without I/O, fed with bytes, tiles and a clock.
 //!
-//! It says hello, loads what the card does not have of the image, sets the frame, keeps the card's credits in use and
-//! collects pixels and counters. A card that was reset is greeted and loaded again; its tiles wait for any card. Threads,
-//! ports and time live outside: [`crate::render`] runs one session a thread, a simulator many in one.
+//! It says hello, loads what the card does not have of the image, sets the frame, has tiles rendered, and checks their
+//! pixels. What comes of that are [`Event`]s. A card that was reset is greeted and loaded again, and its tiles are lost
+//! to it. Threads, ports, time, scheduler and sinks live outside: [`crate::render`] runs one session a thread, a simulator
+//! many in one.
 
 mod clock;
 mod error;
 mod failures;
+mod job;
 mod link_bytes;
 mod load;
-mod picture;
+mod pixel_limits;
+mod state;
 mod tiles;
 
 pub use error::SessionError;
+pub use job::{Assignment, Event, Job};
 pub use link_bytes::LinkBytes;
-pub use picture::Picture;
+pub use pixel_limits::PixelLimits;
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use photoncard_shared::address::Line;
 use photoncard_shared::budget::Budget;
-use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{self, Command, FrameParameters, MemoryUse, PROTOCOL_VERSION, Reply};
-use photoncard_shared::transport::{Event, Transport};
+use photoncard_shared::message::{self, Command, MemoryUse, PROTOCOL_VERSION, Reply};
+use photoncard_shared::transport::{Event as LineEvent, Transport};
 
 use self::clock::Clock;
 use self::error::{check_budget, check_versions};
 use self::failures::Failures;
 use self::load::Load;
+use self::state::State;
 use self::tiles::TilesInFlight;
 
-/// What a card is to do, the same for every card.
-#[derive(Clone, Copy)]
-pub struct Job<'a> {
-    /// The card image.
-    pub image: &'a [Line],
-    /// [`photoncard_shared::checksum::image_checksum`] of the image.
-    pub checksum: u64,
-    /// The frame's parameters.
-    pub frame: &'a FrameParameters,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
-    /// Hello is sent.
-    Greeting,
-    /// The card is known and has nothing to do.
-    Ready,
-    /// It is asked which chunks it has.
-    Comparing,
-    /// Lines are still to be sent.
-    Loading,
-    /// All lines are sent.
-    Accepting,
-    /// The frame's parameters are sent.
-    Framing,
-    Rendering,
-}
-
 /// Tiles that a card may hold at the most, whatever it says: those of a card that holds many come late if it is lost.
-const MOST_CREDITS: u32 = 16;
+const MAX_CREDITS: u32 = 16;
 
 /// The session with one card.
 pub struct Session<'a> {
@@ -73,20 +48,22 @@ pub struct Session<'a> {
     job: Option<Job<'a>>,
     load: Load,
     tiles: TilesInFlight,
-    counters: Counters,
+    events: VecDeque<Event>,
     bytes: LinkBytes,
     transport: Transport,
     /// Encoded commands that wait for room on the line.
     commands: VecDeque<Vec<u8>>,
     /// The number of the link's present session.
-    number: u16,
+    number: u32,
     clock: Clock,
     failures: Failures,
+    /// Whether the card was at a suspect tile when it was greeted last.
+    left_suspect: bool,
 }
 
 impl<'a> Session<'a> {
     /// A session that says hello first. `number` tells it from what a line may still hold of another: any will do.
-    pub fn new(number: u16, now: Duration) -> Self {
+    pub fn new(number: u32, now: Duration) -> Self {
         let mut session = Self {
             state: State::Greeting,
             budget: None,
@@ -95,13 +72,14 @@ impl<'a> Session<'a> {
             job: None,
             load: Load::default(),
             tiles: TilesInFlight::default(),
-            counters: Counters::ZERO,
+            events: VecDeque::new(),
             bytes: LinkBytes::default(),
             transport: Transport::host(),
             commands: VecDeque::new(),
             number,
             clock: Clock::new(now),
             failures: Failures::default(),
+            left_suspect: false,
         };
         session.greet_card();
         session
@@ -131,9 +109,24 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// What the card counted of the tiles that it has completed.
-    pub fn counters(&self) -> &Counters {
-        &self.counters
+    /// What has come of the session since the last call, from the oldest.
+    pub fn next_event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    /// Whether the card has a free credit, and its line room for a command.
+    pub fn wants_tile(&self) -> bool {
+        let credits = self.budget.map_or(1, |budget| budget.tiles.min(MAX_CREDITS) as usize);
+        self.is_loaded()
+            && self.tiles.len() < credits
+            && self.commands.is_empty()
+            && self.transport.can_send()
+    }
+
+    /// Gives a card that wants one a tile.
+    pub fn give(&mut self, assignment: Assignment) {
+        self.tiles.push(assignment);
+        self.send(&Command::RenderTile(assignment.tile));
     }
 
     /// Bytes over the link so far.
@@ -170,41 +163,29 @@ impl<'a> Session<'a> {
     }
 
     /// Makes what there is to send next.
-    pub fn prepare(&mut self, picture: &Picture) {
+    pub fn prepare(&mut self) {
         while self.transport.can_send() {
             if let Some(command) = self.commands.pop_front() {
                 self.transport.send(|bytes| {
                     bytes.get_mut(..command.len())?.copy_from_slice(&command);
                     Some(command.len())
                 });
-            } else if !self.make_command(picture) {
+            } else if !self.load_more() {
                 break;
             }
         }
     }
 
-    /// Makes a command that there is no answer to wait for. Returns whether there was one.
-    fn make_command(&mut self, picture: &Picture) -> bool {
-        match (self.state, self.job) {
-            (State::Loading, Some(job)) => {
-                let sent = self.load.next_lines(job.image, &mut self.transport);
-                self.bytes.payload += sent as u64;
-                if sent == 0 {
-                    self.send(&Command::EndImage);
-                    self.state = State::Accepting;
-                }
-                true
-            }
-            (State::Rendering, _) => {
-                let credits = self.budget.map_or(1, |budget| budget.tiles.min(MOST_CREDITS) as usize);
-                let free = self.tiles.len() < credits;
-                let Some(tile) = free.then(|| picture.scheduler().take()).flatten() else { return false };
-                self.tiles.push(tile);
-                self.send(&Command::RenderTile(tile));
-                true
-            }
-            _ => false,
+    /// Sends the next lines of the image, or says that they were all. Returns whether there was anything to say.
+    fn load_more(&mut self) -> bool {
+        let (State::Loading, Some(job)) = (self.state, self.job) else { return false };
+        let sent = self.load.next_lines(job.image, &mut self.transport);
+        self.bytes.payload += sent as u64;
+        if sent == 0 {
+            self.send(&Command::EndImage);
+            self.state = State::Accepting;
         }
+        true
     }
 
     /// What is to be sent now.
@@ -230,12 +211,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// If it is not what a card of this protocol answers, tells of a fault, or the card has failed too often.
-    pub fn receive(
-        &mut self,
-        mut bytes: &[u8],
-        picture: &Picture,
-        now: Duration,
-    ) -> Result<(), SessionError> {
+    pub fn receive(&mut self, mut bytes: &[u8], now: Duration) -> Result<(), SessionError> {
         self.bytes.wire += bytes.len() as u64;
         while !bytes.is_empty() {
             let passed = self.transport.passed();
@@ -243,10 +219,10 @@ impl<'a> Session<'a> {
             bytes = &bytes[taken..];
             match event {
                 None => {}
-                Some(Event::Heard) => self.clock.heard(now),
-                Some(Event::Unknown) if self.clock.has_heard() => self.reset(picture, now)?,
+                Some(LineEvent::Heard) => self.clock.heard(now),
+                Some(LineEvent::Unknown) if self.clock.has_heard() => self.reset(now)?,
                 // Our hello was lost.
-                Some(Event::Unknown) => self.transport.send_again(),
+                Some(LineEvent::Unknown) => self.transport.send_again(),
             }
             let mut payload = [0; MAX_PAYLOAD];
             while let Some(message) = self.transport.take() {
@@ -256,7 +232,7 @@ impl<'a> Session<'a> {
                     check_versions(versions)?;
                 }
                 let reply = message::decode(payload).ok_or(SessionError::Unexpected("not a reply"))?;
-                self.take(&reply, picture)?;
+                self.take(&reply)?;
             }
             if self.transport.passed() != passed {
                 self.clock.passed(now);
@@ -270,11 +246,12 @@ impl<'a> Session<'a> {
         self.transport.acknowledge();
     }
 
-    /// Asks a card that has been quiet for too long whether it is there. To be called often.
+    /// Asks a card that has been quiet for too long whether it is there. To be called often. `slowest` is the most seconds that
+    /// a ray, or the gather at its end, may take the card, if tiles that were rendered tell.
     ///
     /// # Errors
     /// If the card has been silent, or has come no further, for longer than it may, or has failed too often.
-    pub fn tick(&mut self, picture: &Picture, now: Duration) -> Result<(), SessionError> {
+    pub fn tick(&mut self, slowest: Option<f64>, now: Duration) -> Result<(), SessionError> {
         self.clock.look(now);
         if !self.is_waiting() {
             self.clock.rest(now);
@@ -282,27 +259,28 @@ impl<'a> Session<'a> {
         }
         // A card that holds a session of this very number, of another host, takes the hello for one that came before.
         if self.state == State::Greeting && self.clock.is_greeted_in_vain(now) {
-            return self.reset(picture, now);
+            return self.reset(now);
         }
         if self.clock.must_ask(now) {
             self.transport.probe();
         }
         let rays = self.job.map_or(0, |job| self.tiles.most_rays(job.frame));
-        let result = self.clock.check(rays, now);
+        let result = self.clock.check(rays, slowest, now);
         if matches!(result, Err(SessionError::Standstill(_))) {
-            self.failures.stands_still()?;
+            self.fail()?;
         }
         result
     }
 
-    /// Gives back the tiles that the card has not completed: it is lost, or was reset.
-    pub fn give_back(&mut self, picture: &Picture) {
-        self.tiles.give_back(picture);
+    /// Takes the tiles that the card has not completed from it: it is lost, or was reset.
+    pub fn give_back(&mut self) {
+        self.tiles.give_back(&mut self.events);
     }
 
-    /// Greets the card again and gives back its tiles: its link was closed, or it is silent.
-    pub fn greet_again(&mut self, picture: &Picture, now: Duration) {
-        self.give_back(picture);
+    /// Greets the card again and takes its tiles from it: its link was closed, or it is silent.
+    pub fn greet_again(&mut self, now: Duration) {
+        self.left_suspect = self.tiles.is_at_suspect();
+        self.give_back();
         self.bytes.resets += 1;
         self.number = self.number.wrapping_add(1);
         self.clock = Clock::new(now);
@@ -310,10 +288,16 @@ impl<'a> Session<'a> {
     }
 
     /// Greets a card again that does not know the session, or answers and leaves its greeting without a reply.
-    fn reset(&mut self, picture: &Picture, now: Duration) -> Result<(), SessionError> {
-        self.failures.is_reset()?;
-        self.greet_again(picture, now);
+    fn reset(&mut self, now: Duration) -> Result<(), SessionError> {
+        self.failures.forget_lines();
+        self.fail()?;
+        self.greet_again(now);
         Ok(())
+    }
+
+    /// The card was reset or came no further. That is its fault, unless cards have crashed before at what it was at.
+    fn fail(&mut self) -> Result<(), SessionError> {
+        if self.tiles.is_at_suspect() { Ok(()) } else { self.failures.count() }
     }
 
     fn greet_card(&mut self) {
@@ -345,7 +329,7 @@ impl<'a> Session<'a> {
         self.state = State::Loading;
     }
 
-    fn take(&mut self, reply: &Reply, picture: &Picture) -> Result<(), SessionError> {
+    fn take(&mut self, reply: &Reply) -> Result<(), SessionError> {
         match (self.state, *reply) {
             (State::Greeting, Reply::Hello { budget, written_lines, memory_use, build, .. }) => {
                 build.clone_into(&mut self.build);
@@ -373,16 +357,19 @@ impl<'a> Session<'a> {
             }
             (State::Framing, Reply::FrameAccepted) => {
                 self.state = State::Rendering;
+                self.events.push_back(Event::Ready);
                 Ok(())
             }
             (State::Rendering, Reply::Pixels { tile, first, data }) => {
-                self.tiles.take_pixels(tile, first, data, picture)?;
+                let Some(job) = &self.job else { return Ok(()) };
+                self.tiles.take_pixels(tile, first, data, &job.limits)?;
                 self.bytes.payload += data.len() as u64;
                 Ok(())
             }
             (State::Rendering, Reply::TileDone { tile, counters }) => {
-                self.tiles.complete(tile, picture)?;
-                self.counters.add(&counters);
+                let Some(job) = &self.job else { return Ok(()) };
+                let finished = self.tiles.complete(tile, counters, &job.limits)?;
+                self.events.push_back(Event::TileDone(finished));
                 self.failures.completes_tile();
                 Ok(())
             }
@@ -392,7 +379,9 @@ impl<'a> Session<'a> {
 
     fn greet(&mut self, budget: Budget, written_lines: u32) -> Result<(), SessionError> {
         check_budget(&budget, self.budget.as_ref())?;
-        self.failures.says_hello(written_lines)?;
+        if self.failures.says_hello(written_lines) && !self.left_suspect {
+            self.failures.count()?;
+        }
         self.budget = Some(budget);
         self.state = State::Ready;
         Ok(())

@@ -9,9 +9,8 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use photoncard_driver::render::{Observer, Phase, RenderError, RenderSettings, Rendering, render};
+use photoncard_driver::render::{CardError, Observer, Phase, RenderError, RenderSettings, Rendering, render};
 use photoncard_driver::scene::gltf;
-use photoncard_driver::session::SessionError;
 use photoncard_shared::message::{Command, PROTOCOL_VERSION, Reply};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketType, bind, listen, socket};
 use scripted_card::{Answer, Card, sound};
@@ -38,7 +37,7 @@ impl Observer for Losses {
         self.told.lock().unwrap().len() >= self.most || self.begin.elapsed() > PATIENCE
     }
 
-    fn lost(&self, _: &str, error: &SessionError) {
+    fn lost(&self, _: &str, error: &CardError) {
         self.told.lock().unwrap().push(error.to_string());
     }
 }
@@ -116,4 +115,50 @@ fn a_render_ends_while_a_lost_card_is_tried() {
         assert_eq!(losses.told.lock().unwrap().len(), 1);
         first.join().unwrap();
     });
+}
+
+/// The answers of a card of another version.
+fn other_version(command: &Command) -> Option<Reply<'static>> {
+    match sound(command)? {
+        Reply::Hello { layout, budget, written_lines, memory_use, build, .. } => {
+            let protocol = PROTOCOL_VERSION + 1;
+            Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build })
+        }
+        reply => Some(reply),
+    }
+}
+
+#[test]
+fn a_card_that_fails_its_first_hello_is_lost_beside_another_and_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("card");
+    let listener = UnixListener::bind(&path).unwrap();
+    std::thread::spawn(move || serve(listener.accept().unwrap().0, other_version));
+    for (path, said) in [(path, "speaks protocol"), (folder.path().join("absent"), "absent")] {
+        let losses = Losses::new(usize::MAX);
+        let rendering = render_with(&path, 32, &losses).unwrap();
+        assert!(rendering.film.is_complete());
+        assert_eq!((rendering.statistics.cards, rendering.statistics.cards_given_up), (2, 1));
+        let told = losses.told.into_inner().unwrap();
+        assert!(told.len() == 1 && told[0].contains(said), "{told:?}");
+    }
+}
+
+/// It answers all that the transport asks, and never renders a tile.
+#[test]
+fn a_card_that_never_renders_holds_up_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("card");
+    let listener = UnixListener::bind(&path).unwrap();
+    std::thread::spawn(move || {
+        let mut stream = listener.accept().unwrap().0;
+        let (mut card, mut buffer) = (Card::new(sound), [0; 4096]);
+        while let Ok(count @ 1..) = stream.read(&mut buffer) {
+            let _ = stream.write_all(&card.step(&buffer[..count]));
+        }
+    });
+    let losses = Losses::new(usize::MAX);
+    let rendering = render_with(&path, 64, &losses).unwrap();
+    assert!(rendering.film.is_complete() && losses.begin.elapsed() < PATIENCE / 2);
+    assert!(losses.told.into_inner().unwrap().is_empty());
 }

@@ -4,15 +4,15 @@ mod scripted_card;
 
 use std::time::Duration;
 
-use photoncard_driver::film::{Film, Window};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Camera;
-use photoncard_driver::scheduler::Scheduler;
-use photoncard_driver::session::{Job, Picture, Session, SessionError};
+use photoncard_driver::session::{Assignment, Event, Job, PixelLimits, Session, SessionError};
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Command, FrameParameters, Reply, Tile};
+use photoncard_shared::image::{Header, Lights, SECTIONS, Section};
+use photoncard_shared::layout::PhotonGrid;
+use photoncard_shared::message::{Command, FrameParameters, PIXEL_BYTES, Reply, Tile};
 use photoncard_shared::transport::Transport;
 use scripted_card::{Answer, Card, sound};
 
@@ -35,24 +35,46 @@ fn frame() -> FrameParameters {
 const IMAGE: [Line; 100] = [Line::ZERO; 100];
 const STEP: Duration = Duration::from_millis(100);
 
+/// What pixels can have of an image of which nothing is known.
+fn limits(frame: &FrameParameters) -> PixelLimits {
+    let header = Header {
+        lines: 2,
+        photon_power_unit: 1.0,
+        caustic_power_unit: 1.0,
+        radiance_unit: 1.0,
+        photon_grid: PhotonGrid { origin: [0; 3], cell: 1e-6 },
+        lights: Lights::NONE,
+        sections: [Section::default(); SECTIONS],
+    };
+    PixelLimits::new(&header, frame)
+}
+
 /// A session in virtual time.
 struct Bench<'a> {
     session: Session<'a>,
-    picture: Picture,
+    /// Tiles that wait for the card.
+    waiting: Vec<Tile>,
+    /// What the render knows of how long rays take.
+    slowest: Option<f64>,
+    events: Vec<Event>,
     now: Duration,
 }
 
 impl<'a> Bench<'a> {
     fn new(frame: &'a FrameParameters) -> Self {
-        let film = Film::new(4, 4, Window::full(4, 4)).unwrap();
         let mut session = Session::new(1, Duration::ZERO);
-        session.start(Job { image: &IMAGE, checksum: 0, frame }, Duration::ZERO);
-        Self { session, picture: Picture::new(Scheduler::new(vec![TILE]), film, None), now: Duration::ZERO }
+        session.start(Job { image: &IMAGE, checksum: 0, frame, limits: limits(frame) }, Duration::ZERO);
+        Self { session, waiting: vec![TILE], slowest: None, events: Vec::new(), now: Duration::ZERO }
     }
 
     /// What the host has to say now.
     fn outgoing(&mut self) -> Vec<u8> {
-        self.session.prepare(&self.picture);
+        if self.session.wants_tile()
+            && let Some(tile) = self.waiting.pop()
+        {
+            self.session.give(Assignment { tile, is_suspect: false });
+        }
+        self.session.prepare();
         let bytes = self.session.outgoing().to_vec();
         self.session.sent(bytes.len(), self.now);
         bytes
@@ -61,9 +83,27 @@ impl<'a> Bench<'a> {
     /// Takes what the card says a moment later.
     fn take(&mut self, bytes: &[u8]) -> Result<(), SessionError> {
         self.now += STEP;
-        self.session.receive(bytes, &self.picture, self.now)?;
-        self.session.acknowledge();
-        self.session.tick(&self.picture, self.now)
+        let result = self.session.receive(bytes, self.now).and_then(|()| {
+            self.session.acknowledge();
+            self.session.tick(self.slowest, self.now)
+        });
+        self.collect();
+        result
+    }
+
+    /// Takes what has come of the session: what the card has lost waits again.
+    fn collect(&mut self) {
+        while let Some(event) = self.session.next_event() {
+            if let Event::TileLost { tile, .. } = event {
+                self.waiting.push(tile);
+            }
+            self.events.push(event);
+        }
+    }
+
+    fn greet_again(&mut self) {
+        self.session.greet_again(self.now);
+        self.collect();
     }
 
     /// Lets both ends speak for some time.
@@ -77,14 +117,20 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Runs a session with a card until it fails. Returns why, when, and what is left of the picture then.
-fn fail(answer: Answer) -> (SessionError, Duration, Picture) {
+/// Runs a session with a card until it fails. Returns why, when, and what came of it.
+fn fail(answer: Answer) -> (SessionError, Duration, Vec<Event>) {
+    fail_of_pace(answer, None)
+}
+
+/// Runs a session with a card until it fails, where a ray is known to take so many seconds at the most.
+fn fail_of_pace(answer: Answer, slowest: Option<f64>) -> (SessionError, Duration, Vec<Event>) {
     let frame = frame();
-    let mut bench = Bench::new(&frame);
+    let mut bench = Bench { slowest, ..Bench::new(&frame) };
     let result = bench.go(&mut Card::new(answer), Duration::from_secs(100_000));
     let error = result.expect_err("the session waits for ever");
-    bench.session.give_back(&bench.picture);
-    (error, bench.now, bench.picture)
+    bench.session.give_back();
+    bench.collect();
+    (error, bench.now, bench.events)
 }
 
 /// The answers of a card that keeps what it was loaded with.
@@ -113,11 +159,21 @@ fn a_card_that_comes_no_further_is_not_waited_for_without_end() {
 
 #[test]
 fn a_tile_has_time_for_all_its_rays() {
-    let (error, after, picture) = fail(sound);
+    let (error, after, events) = fail(sound);
     assert!(matches!(error, SessionError::Standstill(_)), "{error}");
     // 16 pixels of 10 samples of a hundred rays and some.
     assert!((120 + 320..120 + 500).contains(&after.as_secs()), "{after:?}");
-    assert_eq!(picture.scheduler().take(), Some(TILE));
+    assert_eq!(events, [Event::Ready, Event::TileLost { tile: TILE, was_at_work: true }]);
+}
+
+#[test]
+fn a_tile_has_no_more_time_than_others_tell() {
+    // 16 pixels of 10 samples of 110 rays with gathers.
+    for (slowest, seconds) in [(1e-6, 30), (0.01, 352)] {
+        let (error, after, _) = fail_of_pace(sound, Some(slowest));
+        assert!(matches!(error, SessionError::Standstill(_)), "{error}");
+        assert!((seconds..seconds + 5).contains(&after.as_secs()), "{after:?}");
+    }
 }
 
 #[test]
@@ -129,13 +185,12 @@ fn a_card_that_never_says_hello_is_given_up() {
 
 #[test]
 fn a_tile_whose_pixels_have_not_come_is_not_done_and_waits_again() {
-    let (error, _, picture) = fail(|command| match command {
+    let (error, _, events) = fail(|command| match command {
         Command::RenderTile(tile) => Some(Reply::TileDone { tile: tile.id, counters: Counters::ZERO }),
         command => sound(command),
     });
     assert!(matches!(error, SessionError::Unexpected(_)), "{error}");
-    assert_eq!(picture.scheduler().take(), Some(TILE));
-    assert!(!picture.scheduler().is_complete());
+    assert_eq!(events, [Event::Ready, Event::TileLost { tile: TILE, was_at_work: true }]);
 }
 
 #[test]
@@ -167,7 +222,7 @@ fn a_flapping_link_is_not_the_cards_fault() {
     for _ in 0..20 {
         bench.go(&mut card, Duration::from_secs(5)).unwrap();
         assert!(bench.session.is_loaded());
-        bench.session.greet_again(&bench.picture, bench.now);
+        bench.greet_again();
     }
 }
 
@@ -178,7 +233,7 @@ fn a_card_that_crashes_at_a_tile_is_given_up_whatever_its_link_does() {
     let mut bench = Bench::new(&frame);
     let ended = (0..20).position(|_| {
         let result = bench.go(&mut Card::new(sound), Duration::from_secs(5));
-        bench.session.greet_again(&bench.picture, bench.now);
+        bench.greet_again();
         matches!(result, Err(SessionError::Failures(_)))
     });
     assert_eq!(ended, Some(5));
@@ -191,7 +246,7 @@ fn a_card_that_comes_no_further_again_and_again_is_given_up() {
     for _ in 0..4 {
         let error = bench.go(&mut card, Duration::from_secs(1000)).unwrap_err();
         assert!(matches!(error, SessionError::Standstill(_)), "{error}");
-        bench.session.greet_again(&bench.picture, bench.now);
+        bench.greet_again();
     }
     let error = bench.go(&mut card, Duration::from_secs(1000)).unwrap_err();
     assert!(matches!(error, SessionError::Failures(5)), "{error}");
@@ -236,4 +291,43 @@ fn a_greeting_has_its_time_from_the_first_answer_on() {
         sent = bench.outgoing();
     }
     assert_eq!(bench.session.link_bytes().resets, 0);
+}
+
+/// The pixels of a tile of which the first one's red has these bits.
+macro_rules! pixels_of_red {
+    ($red:expr) => {{
+        const PIXELS: [u8; PIXEL_BYTES * 16] = {
+            let mut pixels = [0; PIXEL_BYTES * 16];
+            let red = f32::to_le_bytes($red);
+            let mut byte = 0;
+            while byte < 4 {
+                pixels[byte] = red[byte];
+                byte += 1;
+            }
+            pixels
+        };
+        fail(|command| match command {
+            Command::RenderTile(tile) => Some(Reply::Pixels { tile: tile.id, first: 0, data: &PIXELS }),
+            command => sound(command),
+        })
+    }};
+}
+
+#[test]
+fn a_value_that_no_chip_can_render_is_named_with_its_pixel_and_tile() {
+    for (error, _, events) in [
+        pixels_of_red!(f32::NAN),
+        pixels_of_red!(f32::INFINITY),
+        pixels_of_red!(-1e-30),
+        pixels_of_red!(8_388_609.0),
+    ] {
+        let is_of_pixel = matches!(error, SessionError::Value { tile: TILE, x: 0, y: 0, .. });
+        assert!(is_of_pixel && error.lie() == Some(TILE) && !error.may_pass(), "{error}");
+        let said = error.to_string();
+        assert!(said.contains("pixel (0, 0) of the tile 0,4,0,4 has radiance"), "{said}");
+        assert!(!events.iter().any(|event| matches!(event, Event::TileDone(_))));
+    }
+    // The greatest sum of a chip's is possible.
+    let (error, ..) = pixels_of_red!(8_388_608.0);
+    assert!(matches!(error, SessionError::Standstill(_)), "{error}");
 }

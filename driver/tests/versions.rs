@@ -2,16 +2,15 @@
 
 use std::time::Duration;
 
-use photoncard_driver::session::{Picture, Session, SessionError};
+use photoncard_driver::session::{Session, SessionError};
 use photoncard_shared::message::PROTOCOL_VERSION;
 use photoncard_shared::transport::Transport;
 
 /// What a host makes of a card that answers its hello with some bytes.
 fn greeted_with(answer: &[u8]) -> SessionError {
-    let picture = Picture::empty().expect("there is memory for a pixel");
     let mut session = Session::new(1, Duration::ZERO);
     let mut card = Transport::card();
-    session.prepare(&picture);
+    session.prepare();
     let hello = session.outgoing().to_vec();
     card.receive(&hello);
     assert!(card.take().is_some());
@@ -20,7 +19,7 @@ fn greeted_with(answer: &[u8]) -> SessionError {
         Some(answer.len())
     }));
     let answer = card.outgoing().to_vec();
-    session.receive(&answer, &picture, Duration::ZERO).expect_err("it is another version's")
+    session.receive(&answer, Duration::ZERO).expect_err("it is another version's")
 }
 
 #[test]

@@ -202,6 +202,10 @@ pub(crate) struct RenderOptions {
     /// repeated [default: a chip a core]
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
+    /// Have two cards render a share of the tiles, above 0 and up to 1, and compare them bit for bit; of three cards the odd one lies,
+    /// and others render its tiles
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    verify: Option<f64>,
     /// Go on with a render that was stopped or has failed: the tiles it finished are kept beside the picture, in
     /// OUT.exr.partial, until that is written
     #[arg(long)]
@@ -383,6 +387,7 @@ impl RenderOptions {
             queue: self.queue,
             cards,
             faults: self.faults,
+            verify: self.verify,
             partial: Some(PartialSettings { path: self.partial_path(), resume: self.resume }),
             caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
             trace: self.trace.clone(),

@@ -15,7 +15,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     let budget = info.budget;
     let kind = match address {
         CardAddress::Emulated { kind, .. } => Some(*kind),
-        CardAddress::Serial { .. } | CardAddress::Tcp { .. } | CardAddress::Unix { .. } => None,
+        CardAddress::Remote(_) => None,
     };
     let mut lines = vec![
         format!("build           {}", info.build),

@@ -6,8 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use photoncard_driver::display::DisplayError;
-use photoncard_driver::render::{Observer, Phase};
-use photoncard_driver::session::SessionError;
+use photoncard_driver::render::{CardError, Observer, Phase};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::console::say;
@@ -74,7 +73,7 @@ impl Observer for Progress {
         self.kept.store(true, Ordering::Relaxed);
     }
 
-    fn lost(&self, card: &str, error: &SessionError) {
+    fn lost(&self, card: &str, error: &CardError) {
         say(format_args!("photoncard: {card} is lost: {error}; the others render its tiles"));
     }
 

@@ -1,7 +1,7 @@
 //! Frames: units of bytes with a checksum, on a line that damages, loses or repeats bytes.
 //!
 //! ```text
-//! COBS( kind: u8 | session: u16 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
+//! COBS( kind: u8 | session: u32 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
 //! ```
 //!
 //! Numbers are little-endian. Stuffing ([`crate::stuffing`]) leaves no zero byte inside a frame, so that a receiver
@@ -15,7 +15,7 @@ use crate::stuffing::{max_stuffed_bytes, stuff, unstuff};
 /// Maximum payload, bytes: eight lines and the other fields of their message.
 pub const MAX_PAYLOAD: usize = 8 * crate::address::LINE_BYTES + 32;
 /// Bytes of a frame's header.
-pub const HEADER_BYTES: usize = 8;
+pub const HEADER_BYTES: usize = 10;
 const CHECKSUM_BYTES: usize = 4;
 const MAX_PLAIN: usize = HEADER_BYTES + MAX_PAYLOAD + CHECKSUM_BYTES;
 /// Maximum length of a frame on the wire, bytes, its terminating zero included.
@@ -67,7 +67,7 @@ pub struct FrameHeader {
     /// Purpose of the frame.
     pub kind: FrameKind,
     /// Number of the frame's session.
-    pub session: u16,
+    pub session: u32,
     /// Number of the frame in its direction; see [`FrameKind`].
     pub sequence: u16,
     /// All frames of the other direction below this number have been received.
@@ -78,14 +78,14 @@ pub struct FrameHeader {
 
 impl FrameHeader {
     fn to_bytes(self) -> [u8; HEADER_BYTES] {
-        let [session, sequence, acknowledged] =
-            [self.session, self.sequence, self.acknowledged].map(u16::to_le_bytes);
-        let [[a, b], [c, d], [e, f]] = [session, sequence, acknowledged];
-        [self.kind as u8, a, b, c, d, e, f, self.held]
+        let [a, b, c, d] = self.session.to_le_bytes();
+        let [[e, f], [g, h]] = [self.sequence, self.acknowledged].map(u16::to_le_bytes);
+        [self.kind as u8, a, b, c, d, e, f, g, h, self.held]
     }
 
-    fn read([kind, a, b, c, d, e, f, held]: [u8; HEADER_BYTES]) -> Option<Self> {
-        let [session, sequence, acknowledged] = [[a, b], [c, d], [e, f]].map(u16::from_le_bytes);
+    fn read([kind, a, b, c, d, e, f, g, h, held]: [u8; HEADER_BYTES]) -> Option<Self> {
+        let session = u32::from_le_bytes([a, b, c, d]);
+        let [sequence, acknowledged] = [[e, f], [g, h]].map(u16::from_le_bytes);
         Some(Self { kind: FrameKind::read(kind)?, session, sequence, acknowledged, held })
     }
 }

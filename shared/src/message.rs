@@ -28,7 +28,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// The version of this module, of [`crate::transport`] and of [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 8;
+pub const PROTOCOL_VERSION: u16 = 9;
 
 /// Lines that one [`Command::WriteLines`] may carry.
 pub const LINES_PER_WRITE: usize = 8;

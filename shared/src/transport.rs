@@ -2,8 +2,8 @@
 //!
 //! Both ends of a link hold one [`Transport`]. It does no I/O and has no clock: it is fed with bytes and gives bytes.
 //!
-//! - The host begins a session with an [`FrameKind::Open`] frame of number 0 and a session number of its choice; the card
-//!   then forgets any other. A card answers a frame of a session that it does not know with [`FrameKind::Unknown`]: that is
+//! - The host begins a session with an [`FrameKind::Open`] frame of number 0 and a random session number of 32 bits; the
+//!   card then forgets any other. A card answers a frame of a session that it does not know with [`FrameKind::Unknown`]: that is
 //!   how a host learns that the card was reset.
 //! - Messages are numbered from 0 in each direction. At most [`WINDOW`] are on their way: sent and not acknowledged.
 //! - Every frame tells how many messages of the other direction were taken (`acknowledged`), and which of the next ones
@@ -49,7 +49,7 @@ impl Transport {
     }
 
     /// Begins a session; all that is on its way in another is forgotten. Its first message is the next that is sent.
-    pub fn open(&mut self, number: u16) {
+    pub fn open(&mut self, number: u32) {
         self.session.begin(number);
     }
 

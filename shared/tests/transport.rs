@@ -77,7 +77,7 @@ fn message(number: usize, salt: usize) -> Vec<u8> {
 fn converse(count: usize, faults: Faults, seed: u64) -> [LineStatistics; 2] {
     let mut random = Random(seed);
     let (mut host, mut card) = (Transport::host(), Transport::card());
-    host.open(seed as u16);
+    host.open(seed as u32);
     let [mut said, mut heard] = [[0; 2]; 2];
     let mut quiet = 0;
     for _ in 0..200_000 {
@@ -149,7 +149,7 @@ fn more_messages_than_numbers_come_in_order() {
 fn a_message_of_the_greatest_length_fits_a_frame() {
     for byte in [0, 1, 0xff] {
         let mut host = Transport::host();
-        host.open(u16::MAX);
+        host.open(u32::MAX);
         assert!(host.send(fill(&[byte; MAX_PAYLOAD])));
         let length = host.outgoing().len();
         assert!((MAX_PAYLOAD..=MAX_FRAME).contains(&length), "{length}");
@@ -211,6 +211,21 @@ proptest! {
             let length = end.outgoing().len();
             end.sent(length);
             end.take();
+        }
+    }
+}
+
+/// A card in the middle of a session with another host takes a new host's first message, unless the 32 bits of both numbers are equal.
+#[test]
+fn sessions_are_told_apart_by_all_bits_of_their_numbers() {
+    for (bit, is_new) in (0..32).map(|bit| (1 << bit, true)).chain([(0, false)]) {
+        let mut card = Transport::card();
+        for (number, expected) in [(77, true), (77 ^ bit, is_new)] {
+            let mut host = Transport::host();
+            host.open(number);
+            assert!(host.send(fill(&message(1, number as usize))));
+            card.receive(host.outgoing());
+            assert_eq!(card.take().is_some(), expected, "bit {bit:#x}");
         }
     }
 }

@@ -15,7 +15,7 @@ pub struct Wire<'a> {
     /// The card.
     pub card: Box<MicroCard<Dram<'a>>>,
     host: Transport,
-    session: u16,
+    session: u32,
     /// Whether the frame that was begun last has layers.
     layers: bool,
 }

@@ -10,8 +10,9 @@ use photoncard_shared::message::Tile;
 use super::packet::{create_image, update_image};
 use super::state::{SharedState, State};
 use super::{DisplayAddress, DisplayError};
-use crate::film::{Film, Window};
+use crate::film::{Film, FilmPixel, Window};
 use crate::layer::Channel;
+use crate::sink::{FinishedTile, TileSink};
 
 /// How long a connection may take to be made.
 const CONNECT_WAIT: Duration = Duration::from_secs(2);
@@ -81,29 +82,13 @@ impl Display {
         self.channels.iter().map(|channel| channel.name).collect()
     }
 
-    /// Shows a tile of the film, now or, if too much waits to be sent, when it is [finished](Self::finish).
-    pub fn show(&self, tile: &Tile, film: &Film) {
-        if !self.state.lock().is_open() {
-            return;
-        }
-        let packet = self.packet(tile, film);
-        self.state.change(|state| {
-            if state.has_room(packet.len(), self.most_waiting) {
-                state.push(packet);
-            } else {
-                state.missed.push(*tile);
-            }
-        });
-    }
-
-    pub(super) fn packet(&self, tile: &Tile, film: &Film) -> Vec<u8> {
-        let Tile { x, y, width, height, .. } = *tile;
-        let places = (y..y + height).flat_map(|row| (x..x + width).map(move |column| (column, row)));
-        let pixels = places.map(|(x, y)| film.all_at(x, y).unwrap_or_default());
+    pub(super) fn packet(&self, finished: &FinishedTile) -> Vec<u8> {
+        let pixels = finished.pixels().map(|(_, record)| FilmPixel::from(record));
         let values =
             pixels.flat_map(|pixel| self.channels.iter().map(move |channel| (channel.value)(&pixel)));
-        let shown =
-            Tile { x: x.saturating_sub(self.window.x0), y: y.saturating_sub(self.window.y0), ..*tile };
+        let tile = finished.tile();
+        let [x, y] = [tile.x.saturating_sub(self.window.x0), tile.y.saturating_sub(self.window.y0)];
+        let shown = Tile { x, y, ..*tile };
         update_image(&self.settings.image, &shown, &self.names(), values)
     }
 
@@ -117,8 +102,8 @@ impl Display {
     pub fn finish(&self, film: &Film) {
         let missed = std::mem::take(&mut self.state.lock().missed);
         let mut watch = Watch::new();
-        for tile in &missed {
-            let packet = self.packet(tile, film);
+        for finished in missed.iter().filter_map(|tile| film.finished(tile)) {
+            let packet = self.packet(&finished);
             let has_room = |state: &State| state.has_room(packet.len(), self.most_waiting);
             if !watch.wait_until(&self.state, |state| !state.is_open() || has_room(state)) {
                 return self.give_up(missed.len());
@@ -143,6 +128,26 @@ impl Display {
     fn fail(&self, error: DisplayError) {
         self.state.change(|state| state.fail(error));
     }
+}
+
+impl TileSink for Display {
+    /// Shows a tile, now or, if too much waits to be sent, when the picture is [finished](Display::finish).
+    fn put(&self, tile: &FinishedTile) {
+        if !self.state.lock().is_open() {
+            return;
+        }
+        let packet = self.packet(tile);
+        self.state.change(|state| {
+            if state.has_room(packet.len(), self.most_waiting) {
+                state.push(packet);
+            } else {
+                state.missed.push(*tile.tile());
+            }
+        });
+    }
+
+    /// What is shown stays until the tile is put again.
+    fn revoke(&self, _: &Tile) {}
 }
 
 impl Drop for Display {

@@ -10,6 +10,7 @@ use super::packet::create_image;
 use super::*;
 use crate::film::{Film, PixelValue, Window};
 use crate::layer::Layers;
+use crate::sink::TileSink;
 
 /// A film of `tiles` tiles of 64 x 64 in a column, cropped out of a larger picture.
 fn film(tiles: u32) -> (Film, Vec<Tile>) {
@@ -40,7 +41,7 @@ fn packets(mut stream: TcpStream) -> Vec<Vec<u8>> {
 }
 
 fn shown(display: &Display, film: &Film, tiles: &[Tile]) -> Duration {
-    tiles.iter().for_each(|tile| display.show(tile, film));
+    tiles.iter().for_each(|tile| display.put(&film.finished(tile).unwrap()));
     let begun = Instant::now();
     display.finish(film);
     begun.elapsed()
@@ -59,7 +60,8 @@ fn every_tile_is_shown_though_few_have_room_to_wait() {
     let display = Display::with_room_for(100_000, &settings, film.window(), Layers::colour());
     shown(&display, &film, &tiles);
     assert!(display.failure().is_none());
-    let mut expected: Vec<Vec<u8>> = tiles.iter().map(|tile| display.packet(tile, &film)).collect();
+    let mut expected: Vec<Vec<u8>> =
+        tiles.iter().map(|tile| display.packet(&film.finished(tile).unwrap())).collect();
     drop(display);
     let mut shown = viewer.join().unwrap();
     assert!(shown.remove(0) == create_image("film", [64, 576], &["R", "G", "B"]));

@@ -7,7 +7,8 @@ use photoncard_shared::budget::REFERENCE;
 use photoncard_shared::checksum::checksum;
 use photoncard_shared::message::{PixelRecord, Tile, record_bytes};
 
-use crate::film::{Film, FilmPixel};
+use crate::film::Film;
+use crate::sink::{FinishedTile, places};
 
 /// What a record begins with. As of a PNG file, a transfer that alters the ends of lines or the eighth bits is found out.
 pub(super) const MAGIC: [u8; 8] = *b"\x89TILE\r\n\x1a";
@@ -21,28 +22,13 @@ const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
 const MAX_IN_VAIN: u64 = 32 << 20;
 
 /// What is kept of a finished tile.
-pub(crate) fn record(tile: &Tile, film: &Film) -> Vec<u8> {
-    let pixels = tile.pixels() as usize * record_bytes(film.has_layers());
-    let mut bytes = Vec::with_capacity(HEAD_BYTES + pixels + CHECKSUM_BYTES);
-    bytes.extend(MAGIC);
-    for number in [tile.x, tile.y, tile.width, tile.height] {
-        bytes.extend(number.to_le_bytes());
-    }
-    for (x, y) in places(tile) {
-        let FilmPixel { pixel, layers } = film.all_at(x, y).unwrap_or_default();
-        bytes.extend(pixel.to_bytes());
-        if film.has_layers() {
-            bytes.extend(layers.to_bytes());
-        }
-    }
+pub(super) fn record(finished: &FinishedTile) -> Vec<u8> {
+    let Tile { x, y, width, height, .. } = *finished.tile();
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend([x, y, width, height].map(u32::to_le_bytes).as_flattened());
+    bytes.extend(finished.records());
     bytes.extend(checksum(&bytes).to_le_bytes());
     bytes
-}
-
-/// The pixels of a tile, in rows.
-pub(super) fn places(tile: &Tile) -> impl Iterator<Item = (u32, u32)> {
-    let Tile { x, y, width, height, .. } = *tile;
-    (y..y + height).flat_map(move |row| (x..x + width).map(move |column| (column, row)))
 }
 
 /// Reads all sound tiles of a file, from `start` on, into the film. Returns where the last one ends. After what is no sound

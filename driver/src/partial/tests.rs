@@ -1,13 +1,15 @@
 use std::fs::{self, TryLockError};
 use std::path::Path;
 
+use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{PIXEL_BYTES, Pixel, PixelLayers, PixelRecord, Tile};
 use serde_json::json;
 
 use super::file::{check_lock, is_at};
-use super::records::{CHECKSUM_BYTES, HEAD_BYTES, MAGIC, places};
+use super::records::{CHECKSUM_BYTES, HEAD_BYTES, MAGIC};
 use super::*;
 use crate::film::Window;
+use crate::sink::places;
 
 const TILES: u32 = 6;
 /// Bytes of a tile's record.
@@ -19,6 +21,12 @@ fn film() -> Film {
 
 fn tile(id: u32) -> Tile {
     Tile { id, x: 4 * id, y: 0, width: 4, height: 3 }
+}
+
+/// A tile of nothing.
+fn blank(tile: &Tile) -> FinishedTile {
+    let records = vec![0; PIXEL_BYTES * tile.pixels() as usize];
+    FinishedTile::new(*tile, records, false, Counters::ZERO).unwrap()
 }
 
 /// The settings of a file in a folder.
@@ -34,7 +42,7 @@ fn written(folder: &tempfile::TempDir) -> Vec<u8> {
     }
     let settings = partial(folder, false);
     let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
-    (0..TILES).for_each(|id| partial.keep(&record(&tile(id), &film)));
+    (0..TILES).for_each(|id| partial.put(&film.finished(&tile(id)).unwrap()));
     partial.check().unwrap();
     fs::read(settings.path).unwrap()
 }
@@ -48,7 +56,7 @@ fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
     let taken: Vec<u32> = (0..TILES).filter(|&id| film.has(&tile(id))).collect();
     // What is missing is kept behind the rest.
     for id in (0..TILES).filter(|id| !taken.contains(id)) {
-        partial.keep(&record(&tile(id), &film));
+        partial.put(&blank(&tile(id)));
     }
     drop(partial);
     let mut again = self::film();
@@ -81,6 +89,44 @@ fn damage_loses_the_tile_that_it_hits_alone() {
     assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
 }
 
+/// The card that rendered them has lied: until another has rendered them they are not taken over, and then as that one has.
+#[test]
+fn revoked_tiles_are_struck_out_and_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = partial(&folder, true);
+    let begin = |film: &mut Film| PartialRender::begin(&settings, json!({ "seed": 1 }), film).unwrap();
+    let of_depth = |id: u32, depth: f32| {
+        let mut film = film();
+        places(&tile(id)).for_each(|(x, y)| film.write(x, y, Pixel { depth, ..Pixel::default() }).unwrap());
+        film.finished(&tile(id)).unwrap()
+    };
+    let render = begin(&mut film());
+    (0..TILES).for_each(|id| render.put(&of_depth(id, 1.0)));
+    [1, 4].iter().for_each(|&id| render.revoke(&tile(id)));
+    render.put(&of_depth(4, 2.0));
+    render.check().unwrap();
+    drop(render);
+    let mut again = film();
+    let render = begin(&mut again);
+    assert_eq!((0..TILES).filter(|&id| !again.has(&tile(id))).collect::<Vec<_>>(), [1]);
+    let depth = |id: u32| again.pixel(4 * id, 0).unwrap().depth;
+    assert_eq!([depth(3), depth(4), depth(5)], [1.0, 2.0, 1.0]);
+    // What an earlier render has left is not this one's to strike out.
+    render.revoke(&tile(0));
+    render.check().unwrap();
+    assert!(render.holds_tiles());
+}
+
+#[test]
+fn a_file_of_revoked_tiles_holds_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = PartialRender::begin(&partial(&folder, false), json!({}), &mut film()).unwrap();
+    render.put(&blank(&tile(0)));
+    assert!(render.holds_tiles());
+    render.revoke(&tile(0));
+    assert!(!render.holds_tiles());
+}
+
 #[test]
 fn the_later_record_of_a_tile_holds() {
     let folder = tempfile::tempdir().unwrap();
@@ -89,7 +135,7 @@ fn the_later_record_of_a_tile_holds() {
     for (x, y) in places(&tile(1)) {
         film.write(x, y, Pixel { depth: -1.0, ..Pixel::default() }).unwrap();
     }
-    bytes.extend(record(&tile(1), &film));
+    bytes.extend(record(&film.finished(&tile(1)).unwrap()));
     let depth = |bytes: &[u8]| {
         let settings = partial(&folder, true);
         fs::write(&settings.path, bytes).unwrap();
@@ -116,7 +162,7 @@ fn layers_are_kept() {
         film.write_record(x, y, &PixelRecord { pixel, layers }).unwrap();
     }
     let partial = PartialRender::begin(&settings, json!({}), &mut film).unwrap();
-    partial.keep(&record(&tile(0), &film));
+    partial.put(&film.finished(&tile(0)).unwrap());
     drop(partial);
     let mut again = with_layers();
     PartialRender::begin(&settings, json!({}), &mut again).unwrap();
@@ -132,7 +178,7 @@ fn a_file_has_one_render() {
     // Neither has made the file yet.
     let (first, second) = (begin(false, &mut one).unwrap(), begin(false, &mut two).unwrap());
     for partial in [&first, &second] {
-        partial.keep(&record(&tile(0), &one));
+        partial.put(&blank(&tile(0)));
     }
     first.check().unwrap();
     assert!(matches!(second.check(), Err(PartialError::Busy { .. })));
@@ -184,11 +230,11 @@ fn a_file_that_cannot_be_begun_is_not_left() {
     fs::write(&path, b"").unwrap();
     // It takes no byte, as on a disk that is full.
     partial.lock().file = Some(File::open(&path).unwrap());
-    partial.keep(&record(&tile(0), &film));
+    partial.put(&blank(&tile(0)));
     assert!(matches!(partial.check(), Err(PartialError::File { .. })));
     assert!(!path.exists() && !partial.holds_tiles());
     // There is room again: it is begun anew.
-    partial.keep(&record(&tile(0), &film));
+    partial.put(&blank(&tile(0)));
     partial.check().unwrap();
     assert!(partial.holds_tiles() && fs::read(&path).unwrap().starts_with(title().as_bytes()));
 }
@@ -232,14 +278,14 @@ fn a_foreign_file_is_refused_and_stays() {
     let film = &mut film();
     let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
     fs::write(&path, "notes").unwrap();
-    begun.keep(&record(&tile(0), film));
+    begun.put(&blank(&tile(0)));
     assert!(matches!(begun.check(), Err(PartialError::Foreign { .. })));
     begun.remove().unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"notes");
     // Neither is one that has taken the name of a file that was begun.
     fs::remove_file(&path).unwrap();
     let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
-    begun.keep(&record(&tile(0), film));
+    begun.put(&blank(&tile(0)));
     begun.check().unwrap();
     #[cfg(unix)]
     {
@@ -261,7 +307,7 @@ fn another_version_is_told_and_begun_anew_without_resume() {
     assert!(matches!(begun, Err(PartialError::Version { found: 1, .. })));
     assert_eq!(fs::read(&path).unwrap(), old);
     let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
-    begun.keep(&record(&tile(0), film));
+    begun.put(&blank(&tile(0)));
     begun.check().unwrap();
     assert!(fs::read(&path).unwrap().starts_with(b"photoncard partial render 2\n{}\n\x89TILE"));
 }

@@ -17,21 +17,28 @@ pub enum CardAddress {
         /// How many.
         chips: usize,
     },
-    /// A card on a serial port, or a pseudo terminal.
+    /// A card at the other end of a link.
+    Remote(RemoteAddress),
+}
+
+/// The link to a card that is not emulated in this process.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RemoteAddress {
+    /// A serial port, or a pseudo terminal.
     Serial {
         /// The device.
         path: PathBuf,
         /// Bits a second.
         baud: u32,
     },
-    /// A card that listens on a TCP port.
+    /// A TCP port on which the card listens.
     Tcp {
         /// Name or number of the host.
         host: String,
         /// The port.
         port: u16,
     },
-    /// A card that listens on a Unix socket.
+    /// A Unix socket on which the card listens.
     Unix {
         /// The socket's path.
         path: PathBuf,
@@ -56,24 +63,22 @@ impl Default for CardAddress {
 impl CardAddress {
     /// A card on a serial port, at the speed for which none is given.
     pub fn serial(path: impl Into<PathBuf>) -> Self {
-        Self::Serial { path: path.into(), baud: DEFAULT_BAUD }
+        Self::Remote(RemoteAddress::Serial { path: path.into(), baud: DEFAULT_BAUD })
     }
 
     /// Chips that this process emulates there.
     pub(super) fn emulated_chips(&self) -> usize {
         match *self {
             Self::Emulated { chips, .. } => chips,
-            Self::Serial { .. } | Self::Tcp { .. } | Self::Unix { .. } => 0,
+            Self::Remote(_) => 0,
         }
     }
-}
 
-impl CardAddress {
     /// The memory of each card there, bytes; of cards elsewhere the most that a card can state.
     pub fn dram_bytes(&self) -> u32 {
         match self {
             Self::Emulated { kind, .. } => kind.budget().dram_bytes,
-            Self::Serial { .. } | Self::Tcp { .. } | Self::Unix { .. } => u32::MAX,
+            Self::Remote(_) => u32::MAX,
         }
     }
 }
@@ -83,6 +88,14 @@ impl fmt::Display for CardAddress {
         match self {
             Self::Emulated { kind: ChipKind::Reference, chips } => write!(f, "emulated:{chips}"),
             Self::Emulated { kind: ChipKind::Micro, chips } => write!(f, "emulated-micro:{chips}"),
+            Self::Remote(address) => address.fmt(f),
+        }
+    }
+}
+
+impl fmt::Display for RemoteAddress {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
             Self::Serial { path, baud } => write!(f, "serial:{}@{baud}", path.display()),
             Self::Tcp { host, port } => f.write_str(&tcp_address(host, *port)),
             Self::Unix { path } => write!(f, "unix:{}", path.display()),
@@ -98,10 +111,10 @@ impl FromStr for CardAddress {
         match kind {
             "emulated" => emulated(ChipKind::Reference, rest),
             "emulated-micro" => emulated(ChipKind::Micro, rest),
-            "serial" => serial(rest.unwrap_or_default()),
-            "tcp" => tcp(rest.unwrap_or_default()),
+            "serial" => serial(rest.unwrap_or_default()).map(Self::Remote),
+            "tcp" => tcp(rest.unwrap_or_default()).map(Self::Remote),
             "unix" => match rest {
-                Some(path) if !path.is_empty() => Ok(Self::Unix { path: path.into() }),
+                Some(path) if !path.is_empty() => Ok(Self::Remote(RemoteAddress::Unix { path: path.into() })),
                 _ => Err("a card on a Unix socket is unix:PATH".into()),
             },
             _ => Err(format!(
@@ -124,7 +137,7 @@ fn emulated(kind: ChipKind, chips: Option<&str>) -> Result<CardAddress, String> 
     Ok(CardAddress::Emulated { kind, chips })
 }
 
-fn serial(text: &str) -> Result<CardAddress, String> {
+fn serial(text: &str) -> Result<RemoteAddress, String> {
     // A folder's name may have an @ as well.
     let (path, baud) = match text.rsplit_once('@') {
         Some((path, baud)) if !baud.contains('/') => (path, Some(baud)),
@@ -139,7 +152,7 @@ fn serial(text: &str) -> Result<CardAddress, String> {
         None => DEFAULT_BAUD,
         Some(baud) => speed(baud)?,
     };
-    Ok(CardAddress::Serial { path: path.into(), baud })
+    Ok(RemoteAddress::Serial { path: path.into(), baud })
 }
 
 fn speed(text: &str) -> Result<u32, String> {
@@ -152,11 +165,11 @@ fn speed(text: &str) -> Result<u32, String> {
     }
 }
 
-fn tcp(text: &str) -> Result<CardAddress, String> {
+fn tcp(text: &str) -> Result<RemoteAddress, String> {
     let usage = || format!("{text:?} is no TCP address; use tcp:HOST:PORT, such as tcp:localhost:7000");
     let (host, port) = text.rsplit_once(':').ok_or_else(usage)?;
     let port = port.parse().ok().filter(|&port| port > 0).ok_or_else(usage)?;
-    Ok(CardAddress::Tcp { host: host_name(host)?, port })
+    Ok(RemoteAddress::Tcp { host: host_name(host)?, port })
 }
 
 #[cfg(test)]

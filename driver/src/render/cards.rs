@@ -1,24 +1,28 @@
 //! The cards of a render: reached, greeted, and put to work together.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU16, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
-use photoncard_firmware::sampler::hash;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::link::{Port, PortError};
-use photoncard_shared::message::MemoryUse;
 
 use super::address::{CardAddress, MAX_CHIPS};
-use super::card_thread::{self, CardOutcome, Shared};
+use super::card_thread::{CardOutcome, render_on};
+use super::crew::Crew;
+use super::greeting::{GreetedCard, GreetingError, card_name, greet};
 use super::open_card::OpenCard;
-use super::{Observer, RenderError, RenderSettings, Unobserved};
+use super::{CardError, Observer, RenderError, RenderSettings};
+use crate::dispatcher::Dispatcher;
+use crate::display::Display;
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{ChipKind, MemoryModel, SharedImage};
 use crate::pack::CardImage;
-use crate::session::{Job, LinkBytes, Picture, Session, SessionError};
+use crate::partial::PartialRender;
+use crate::scheduler::{Scheduler, Standing, TileCounts};
+use crate::session::{Job, LinkBytes};
+use crate::sink::TileSink;
 
 /// The number of emulated reference chips at some addresses.
 ///
@@ -64,54 +68,19 @@ pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
 
 /// Cards that have said hello.
 pub(super) struct Cards {
-    cards: Vec<Connected>,
+    cards: Vec<(String, GreetedCard)>,
     start: Instant,
     shared: SharedImage,
+    /// Cards that have not said hello.
+    lost: usize,
 }
 
-pub(super) struct Connected {
-    pub(super) card: OpenCard,
-    pub(super) session: Session<'static>,
-    budget: Budget,
-}
-
-/// What a card says of itself.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CardInfo {
-    /// Name and version of its firmware.
-    pub build: String,
-    /// What it can hold.
-    pub budget: Budget,
-    /// What its firmware takes of on-chip memory; `None` of a card that does not measure it.
-    pub memory_use: Option<MemoryUse>,
-}
-
-/// Says hello to the first card at an address.
-///
-/// # Errors
-/// If it cannot be started or reached, or does not answer as it should.
-pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
-    let nothing = Picture::empty()?;
-    let card = OpenCard::open(0, address, None, &SharedImage::default(), None)?;
-    let connected = greet(card, &nothing, Instant::now(), &Unobserved)?;
-    let Connected { session, budget, .. } = connected;
-    Ok(CardInfo { build: session.build().to_owned(), budget, memory_use: session.memory_use() })
-}
-
-/// Says hello to the first card at an address some times. Returns how long each answer took.
-///
-/// # Errors
-/// If it cannot be started or reached, or does not answer as it should.
-pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, RenderError> {
-    let nothing = Picture::empty()?;
-    let mut card = OpenCard::open(0, address, None, &SharedImage::default(), None)?;
-    let mut answers = Vec::with_capacity(count);
-    for _ in 0..count {
-        let start = Instant::now();
-        card = greet(card, &nothing, start, &Unobserved)?.card;
-        answers.push(start.elapsed());
-    }
-    Ok(answers)
+/// What looks on while tiles are finished.
+#[derive(Clone, Copy)]
+pub(super) struct Onlookers<'a> {
+    pub(super) partial: Option<&'a PartialRender>,
+    pub(super) display: Option<&'a Display>,
+    pub(super) observer: &'a dyn Observer,
 }
 
 /// What came of a run.
@@ -122,16 +91,19 @@ pub(super) struct Outcome {
     /// What was read, where memory is modelled.
     pub(super) traffic: Option<MemoryTraffic>,
     pub(super) cards: usize,
+    /// Cards that were given up, or have never said hello.
+    pub(super) cards_given_up: usize,
+    pub(super) tiles: TileCounts,
     pub(super) load_seconds: f64,
     pub(super) render_seconds: f64,
 }
 
-/// How long a port may wait for a byte.
-pub(super) const WAIT: Duration = Duration::from_millis(20);
-
 impl Cards {
-    /// Starts all cards and says hello to each. Their memory is modelled if the settings say so, that of the
-    /// first with `trace`.
+    /// Starts all cards and says hello to each, at the same time. Their memory is modelled if the settings say so, that of the
+    /// first with `trace`. A card that does not say hello is lost.
+    ///
+    /// # Errors
+    /// If fewer are left than are needed.
     pub(super) fn connect(
         settings: &RenderSettings,
         mut trace: Option<TraceFile>,
@@ -139,21 +111,56 @@ impl Cards {
     ) -> Result<Self, RenderError> {
         let start = Instant::now();
         let shared = SharedImage::default();
-        let nothing = Picture::empty()?;
         let RenderSettings { cards: addresses, faults, .. } = settings;
         let caches = settings.modelled_caches();
         check_chips(addresses.iter().map(CardAddress::emulated_chips).sum())?;
-        let each_card = addresses
-            .iter()
-            .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)));
-        let cards: Result<Vec<Connected>, RenderError> = each_card
-            .enumerate()
-            .map(|(index, address)| {
-                let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
-                greet(OpenCard::open(index, address, model, &shared, *faults)?, &nothing, start, observer)
-            })
-            .collect();
-        Ok(Self { cards: cards?, start, shared })
+        let each_card = (addresses.iter())
+            .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)))
+            .enumerate();
+        let results: Vec<(String, Result<GreetedCard, GreetingError>)> = std::thread::scope(|scope| {
+            let shared = &shared;
+            let threads: Vec<_> = each_card
+                .map(|(index, address)| {
+                    let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
+                    let work = move || {
+                        let card = OpenCard::open(index, address, model, shared, *faults)?;
+                        greet(card, start, observer)
+                    };
+                    (card_name(index, address), scope.spawn(work))
+                })
+                .collect();
+            let join = |thread: std::thread::ScopedJoinHandle<_>| {
+                thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            };
+            threads.into_iter().map(|(name, thread)| (name, join(thread))).collect()
+        });
+        let mut this = Self { cards: Vec::new(), start, shared, lost: 0 };
+        let mut errors = Vec::new();
+        for (name, result) in results {
+            match result {
+                Ok(card) => this.cards.push((name, card)),
+                Err(GreetingError::Card(error)) => errors.push((name, error)),
+                Err(GreetingError::Stopped) => return Err(RenderError::Stopped),
+            }
+        }
+        this.lost = errors.len();
+        this.lose(errors, settings.needed_cards(), observer)?;
+        Ok(this)
+    }
+
+    /// Tells of cards that have not said hello.
+    ///
+    /// # Errors
+    /// If too few are left: that of the last.
+    fn lose(
+        &self,
+        mut errors: Vec<(String, CardError)>,
+        needed: usize,
+        observer: &dyn Observer,
+    ) -> Result<(), RenderError> {
+        let last = errors.pop_if(|_| self.cards.len() < needed);
+        errors.iter().for_each(|(card, error)| observer.lost(card, error));
+        last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
     }
 
     /// Tells emulated cards of the image that they will be loaded with, so that they need not copy it.
@@ -163,23 +170,39 @@ impl Cards {
 
     /// What each card can hold.
     pub(super) fn budgets(&self) -> impl Iterator<Item = Budget> {
-        self.cards.iter().map(|card| card.budget)
+        self.cards.iter().map(|(_, card)| card.budget)
     }
 
-    /// Renders a picture on all cards.
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.cards.len()
+    }
+
+    /// Renders a scheduler's tiles on all cards, into sinks.
     pub(super) fn run(
         self,
         job: Job,
-        picture: &Picture,
-        observer: &dyn Observer,
+        scheduler: Scheduler,
+        sinks: Vec<&dyn TileSink>,
+        onlookers: Onlookers,
     ) -> Result<Outcome, RenderError> {
         let begun = self.start.elapsed();
-        let cards = self.cards.len();
-        let shared = Shared::new(picture, observer, self.start, cards);
+        let (names, cards): (Vec<String>, Vec<GreetedCard>) = self.cards.into_iter().unzip();
+        let count = cards.len();
+        let Onlookers { partial, display, observer } = onlookers;
+        let crew = Crew {
+            dispatcher: Dispatcher::new(scheduler, sinks),
+            observer,
+            start: self.start,
+            names,
+            partial,
+            display,
+            failed: AtomicBool::new(false),
+        };
         let results: Vec<Result<CardOutcome, RenderError>> = std::thread::scope(|scope| {
-            let shared = &shared;
-            let threads: Vec<_> = (self.cards.into_iter())
-                .map(|card| scope.spawn(move || card_thread::render_on(card, job, shared)))
+            let crew = &crew;
+            let threads: Vec<_> = (cards.into_iter().enumerate())
+                .map(|(number, card)| scope.spawn(move || render_on(number, card, job, crew)))
                 .collect();
             // A panic of a host thread is a panic of the host.
             threads
@@ -188,78 +211,36 @@ impl Cards {
                 .collect()
         });
         let ended = self.start.elapsed();
-        let mut sum = CardOutcome::default();
-        let mut stopped = false;
-        for result in results {
-            match result {
-                Ok(outcome) => sum.add(&outcome),
-                // The card that failed first made the others stop: its error is the one to tell.
-                Err(RenderError::Stopped) => stopped = true,
-                Err(error) => return Err(error),
-            }
-        }
-        if stopped {
-            return Err(RenderError::Stopped);
-        }
+        let sum = sum_up(results)?;
         let loaded = sum.loaded.max(begun);
+        let scheduler = crew.dispatcher.scheduler();
+        let is_given_up = |&card: &usize| scheduler.standing(card) == Standing::GivenUp;
         Ok(Outcome {
-            counters: sum.counters,
+            counters: scheduler.counters(),
             bytes: sum.bytes,
             traffic: sum.traffic,
-            cards,
+            cards: count + self.lost,
+            cards_given_up: (0..count).filter(is_given_up).count() + self.lost,
+            tiles: scheduler.counts(),
             load_seconds: (loaded - begun).as_secs_f64(),
             render_seconds: (ended - loaded).as_secs_f64(),
         })
     }
 }
 
-/// Moves bytes once in each direction, and waits a little if there are none.
-pub(super) fn exchange(
-    session: &mut Session,
-    port: &mut OpenCard,
-    picture: &Picture,
-    start: Instant,
-) -> Result<(), SessionError> {
-    session.prepare(picture);
-    let sent = match session.outgoing() {
-        [] => 0,
-        outgoing => port.write(outgoing, WAIT).map_err(SessionError::Port)?,
-    };
-    session.sent(sent, start.elapsed());
-    let mut buffer = [0; 8192];
-    let wait = if session.has_more_to_send() || session.is_idle() { Duration::ZERO } else { WAIT };
-    match port.read(&mut buffer, wait).map_err(SessionError::Port)? {
-        0 => session.acknowledge(),
-        received => session.receive(&buffer[..received], picture, start.elapsed())?,
-    }
-    session.tick(picture, start.elapsed())
-}
-
-/// Says hello and waits for the answer.
-fn greet(
-    mut card: OpenCard,
-    picture: &Picture,
-    start: Instant,
-    observer: &dyn Observer,
-) -> Result<Connected, RenderError> {
-    let mut session = Session::new(session_number(), start.elapsed());
-    loop {
-        if let Some(&budget) = session.budget() {
-            return Ok(Connected { card, session, budget });
+/// What came of all cards together.
+///
+/// # Errors
+/// That of the card which failed first: it made the others stop.
+fn sum_up(results: Vec<Result<CardOutcome, RenderError>>) -> Result<CardOutcome, RenderError> {
+    let mut sum = CardOutcome::default();
+    let mut is_stopped = false;
+    for result in results {
+        match result {
+            Ok(outcome) => sum.add(&outcome),
+            Err(RenderError::Stopped) => is_stopped = true,
+            Err(error) => return Err(error),
         }
-        if observer.is_stopped() {
-            return Err(RenderError::Stopped);
-        }
-        exchange(&mut session, &mut card, picture, start).map_err(|source| match source {
-            SessionError::Port(PortError::Closed) => RenderError::Refused { card: card.name() },
-            source => RenderError::Card { card: card.name(), source },
-        })?;
     }
-}
-
-/// A number that another process, or an earlier session of this one, has hardly used on the same line.
-fn session_number() -> u16 {
-    static COUNT: AtomicU16 = AtomicU16::new(0);
-    let time = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.subsec_nanos());
-    hash(time ^ std::process::id()) as u16 ^ COUNT.fetch_add(1, Ordering::Relaxed)
+    if is_stopped { Err(RenderError::Stopped) } else { Ok(sum) }
 }

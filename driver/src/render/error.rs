@@ -12,6 +12,29 @@ use crate::partial::PartialError;
 use crate::photon::PhotonError;
 use crate::session::SessionError;
 
+/// Why a card cannot be used, or no more.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum CardError {
+    /// It could not be started.
+    #[error("it could not be started: {0}")]
+    #[diagnostic(help("use fewer cards"))]
+    Start(#[source] std::io::Error),
+    /// It could not be reached.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Link(#[from] LinkError),
+    /// Its link was closed before it had said hello.
+    #[error("it closed the link before it said hello")]
+    #[diagnostic(help(
+        "another host may be using the card: wait until it is done; or what listens there is no card"
+    ))]
+    Refused,
+    /// It does not do what it should.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Session(#[from] SessionError),
+}
+
 /// Why a render did not end in a picture.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum RenderError {
@@ -48,35 +71,7 @@ pub enum RenderError {
     #[error("the packed card image is not sound: {0}")]
     #[diagnostic(help("this is a fault of the program: please report it with the scene"))]
     Image(Fault),
-    /// A card could not be started.
-    #[error("card {card} could not be started: {source}")]
-    #[diagnostic(help("use fewer cards"))]
-    Start {
-        /// Its number.
-        card: usize,
-        /// The system's error.
-        source: std::io::Error,
-    },
-    /// A card could not be reached.
-    #[error("card {card}: {source}")]
-    Link {
-        /// Its number.
-        card: usize,
-        /// What happened.
-        #[source]
-        #[diagnostic_source]
-        source: LinkError,
-    },
-    /// A card's link was closed before the card had said hello.
-    #[error("{card} closed the link before it said hello")]
-    #[diagnostic(help(
-        "another host may be using the card: wait until it is done; or what listens there is no card"
-    ))]
-    Refused {
-        /// Its number, and its address if it is not emulated.
-        card: String,
-    },
-    /// A card failed.
+    /// A card failed, and none is left.
     #[error("{card}: {source}")]
     Card {
         /// Its number, and its address if it is not emulated.
@@ -84,8 +79,49 @@ pub enum RenderError {
         /// What happened.
         #[source]
         #[diagnostic_source]
-        source: SessionError,
+        source: CardError,
     },
+    /// Cards contradict each other, and there is none to decide.
+    #[error("{cards} render the tile {tile} differently: at least one of them lies")]
+    #[diagnostic(help(
+        "render with a third card, which decides; or with one that you trust. What these have rendered alone is not kept"
+    ))]
+    Disagreement {
+        /// The tile, as `--crop` takes it.
+        tile: String,
+        /// The cards.
+        cards: String,
+    },
+    /// Cards contradict the file of an earlier render.
+    #[error(
+        "the file of finished tiles has another tile {tile} than two cards render: a card has lied to the render that wrote it"
+    )]
+    #[diagnostic(help("render without --resume"))]
+    KeptDiffers {
+        /// The tile, as `--crop` takes it.
+        tile: String,
+    },
+    /// A tile that is to be verified was rendered by one card, and no other is left.
+    #[error("no second card is left to verify the tile {tile}")]
+    #[diagnostic(help("go on with --resume and another card, or without --verify"))]
+    Unverified {
+        /// The tile, as `--crop` takes it.
+        tile: String,
+    },
+    /// Cards crash at some tiles; all others are done.
+    #[error("cards were lost again and again at work on the tiles {tiles}; all others are done")]
+    #[diagnostic(help(
+        "each is X0,X1,Y0,Y1 as --crop takes it: watch the card's own messages while it renders one of them alone, or go on with \
+         --resume and another kind of card"
+    ))]
+    Unrendered {
+        /// The tiles, as `--crop` takes them.
+        tiles: String,
+    },
+    /// The chips of a whole frame could not be started.
+    #[error("the chips could not be started: {0}")]
+    #[diagnostic(help("use fewer cards"))]
+    Chips(rayon::ThreadPoolBuildError),
     /// Finished tiles cannot be kept, or gone on with.
     #[error(transparent)]
     #[diagnostic(transparent)]
@@ -104,7 +140,7 @@ impl From<FrameError> for RenderError {
             FrameError::Stopped => Self::Stopped,
             FrameError::Image(fault) => Self::Image(fault),
             FrameError::Film(error) => Self::Film(error),
-            FrameError::Start(source) => Self::Start { card: 0, source: std::io::Error::other(source) },
+            FrameError::Start(source) => Self::Chips(source),
             FrameError::TooManyGathers { .. } => Self::Setting {
                 option: "--order",
                 value: "hilbert".into(),
@@ -134,10 +170,12 @@ impl RenderError {
             Self::Partial(error) => !matches!(error, PartialError::File { .. }),
             Self::Trace(error) => !matches!(error, OutputError::Write { .. }),
             Self::Image(_)
-            | Self::Start { .. }
-            | Self::Link { .. }
-            | Self::Refused { .. }
             | Self::Card { .. }
+            | Self::Disagreement { .. }
+            | Self::KeptDiffers { .. }
+            | Self::Unverified { .. }
+            | Self::Unrendered { .. }
+            | Self::Chips(_)
             | Self::Stopped => false,
         }
     }

@@ -3,16 +3,20 @@
 mod address;
 mod card_thread;
 mod cards;
+mod crew;
 mod error;
+mod exchange;
+mod greeting;
 mod memory;
 mod open_card;
 mod reopening;
 mod settings;
 mod statistics;
+mod verification;
 
-pub use address::CardAddress;
-pub use cards::{CardInfo, card_info, card_ping};
-pub use error::RenderError;
+pub use address::{CardAddress, RemoteAddress};
+pub use error::{CardError, RenderError};
+pub use greeting::{CardInfo, card_info, card_ping};
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use photoncard_shared::budget::MOST_BINS;
 pub use photoncard_shared::message::MemoryUse;
@@ -20,14 +24,14 @@ pub use photoncard_shared::message::{Radiance, Sampling};
 pub use settings::{DEFAULT_CAUSTIC_PHOTONS, LEAST_IRRADIANCE_ERROR, RenderSettings};
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use photoncard_shared::budget::{Budget, REFERENCE};
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{CausticGather, FrameParameters, Tile};
 
-use self::cards::{Cards, Outcome};
+use self::cards::{Cards, Onlookers, Outcome};
 use crate::display::{Display, DisplayError};
 use crate::emulator::trace::TraceFile;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
@@ -36,8 +40,9 @@ use crate::pack::{CardImage, PackedScene};
 use crate::partial::PartialRender;
 use crate::photon_map::{self, MappedImage, PhotonTimes, map_photons};
 use crate::scene::{Camera, Scene};
-use crate::scheduler::{GatherOrder, Scheduler, tiles};
-use crate::session::{Job, Picture, SessionError};
+use crate::scheduler::{GatherOrder, tiles};
+use crate::session::{Job, PixelLimits};
+use crate::sink::TileSink;
 
 /// What a render is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +72,7 @@ pub trait Observer: Sync {
     fn kept(&self) {}
 
     /// Tells that a card was lost, or is used no more; the others go on with its tiles.
-    fn lost(&self, _card: &str, _error: &SessionError) {}
+    fn lost(&self, _card: &str, _error: &CardError) {}
 
     /// Tells that the picture is not shown on the display server, or no more; the render goes on.
     fn not_shown(&self, _error: &DisplayError) {}
@@ -110,6 +115,7 @@ pub fn render(
     let camera = scene.camera(settings.camera.as_deref())?;
     settings.check_trace()?;
     settings.check_memory_model()?;
+    settings.check_verification()?;
     if settings.order == GatherOrder::Hilbert {
         return render_whole_frame(scene, settings, camera, observer);
     }
@@ -121,25 +127,31 @@ pub fn render(
     // Not before the settings are known to be possible: a film may be large.
     let mut film = settings.film()?;
     let partial = begin_partial(scene, settings, &mut film, observer)?;
-    let mut all = tiles(settings.window(), settings.tile, settings.order);
-    let count = all.len();
-    let display = open_display(settings, &film, &all);
-    all.retain(|tile| !film.has(tile));
-    if all.len() < count {
-        observer.resumed(count - all.len(), count);
+    let tiles = tiles(settings.window(), settings.tile, settings.order);
+    let display = open_display(settings, &film, &tiles);
+    let kept = tiles.iter().filter(|tile| film.has(tile)).count();
+    if kept > 0 {
+        observer.resumed(kept, tiles.len());
     }
     let mut times = Times::default();
     let prepared = prepare(scene, settings, cards.budgets(), &mut times, observer)?;
     cards.share(prepared.image.clone());
     let frame = settings.frame(camera, prepared.max_distance, prepared.caustics);
-    let picture = Picture::new(Scheduler::new(all), film, partial).shown_on(display);
+    let (scene_image, _) = prepared.image.view();
     let job = Job {
         image: prepared.image.lines(),
         checksum: image_checksum(prepared.image.lines()),
         frame: &frame,
+        limits: PixelLimits::new(&scene_image.header, &frame),
     };
-    let outcome = cards.run(job, &picture, observer).inspect_err(|_| {
-        if picture.holds_tiles() {
+    let scheduler = settings.scheduler(tiles, cards.count()).with_kept(&film);
+    let film = Mutex::new(film);
+    let mut sinks: Vec<&dyn TileSink> = vec![&film];
+    sinks.extend(partial.as_ref().map(|partial| partial as &dyn TileSink));
+    sinks.extend(display.as_ref().map(|display| display as &dyn TileSink));
+    let onlookers = Onlookers { partial: partial.as_ref(), display: display.as_ref(), observer };
+    let outcome = cards.run(job, scheduler, sinks, onlookers).inspect_err(|_| {
+        if partial.as_ref().is_some_and(PartialRender::holds_tiles) {
             observer.kept();
         }
     })?;
@@ -147,7 +159,7 @@ pub fn render(
     times.render = outcome.render_seconds;
     times.total = start.elapsed().as_secs_f64();
     let statistics = statistics(settings, &frame, &prepared, &outcome, times);
-    let (film, partial, display) = picture.into_parts();
+    let film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
     finish_display(display.as_ref(), &film, observer);
     Ok(Rendering { film, statistics, partial })
 }
@@ -182,7 +194,7 @@ fn render_whole_frame(
     times.render = begun.elapsed().as_secs_f64();
     times.total = start.elapsed().as_secs_f64();
     if let Some(display) = &display {
-        tiles.iter().for_each(|tile| display.show(tile, &film));
+        show_finished(display, &film, &tiles);
     }
     finish_display(display.as_ref(), &film, observer);
     let traffic = caches.map(|_| traffic);
@@ -209,8 +221,13 @@ fn begin_partial(
 /// Begins to show the picture, with the tiles that are there, if the settings say so.
 fn open_display(settings: &RenderSettings, film: &Film, tiles: &[Tile]) -> Option<Display> {
     let display = Display::open(settings.display.as_ref()?, film.window(), &settings.layers.channels());
-    tiles.iter().filter(|tile| film.has(tile)).for_each(|tile| display.show(tile, film));
+    show_finished(&display, film, tiles);
     Some(display)
+}
+
+/// Shows the tiles that are in a film.
+fn show_finished(display: &Display, film: &Film, tiles: &[Tile]) {
+    tiles.iter().filter_map(|tile| film.finished(tile)).for_each(|tile| display.put(&tile));
 }
 
 /// Shows what is still to be shown.
@@ -292,6 +309,10 @@ fn statistics(
         photon_paths: prepared.paths,
         max_distance: frame.max_distance,
         cards: outcome.cards,
+        cards_given_up: outcome.cards_given_up,
+        verified_tiles: outcome.tiles.verified,
+        repeated_tiles: outcome.tiles.repeated,
+        revoked_tiles: outcome.tiles.revoked,
         time_s,
         rays: Rays {
             eye: counters.eye_rays,

@@ -4,17 +4,16 @@ use std::time::Duration;
 
 use photoncard_shared::link::{Port, PortError};
 
-use super::RenderError;
-use super::address::CardAddress;
-use super::card_thread::Shared;
-use super::reopening::reopen;
-use crate::emulator::{ChipKind, EmulatedCard, MemoryModel, MemoryRecord, SharedImage};
+use super::CardError;
+use super::address::{CardAddress, RemoteAddress};
+use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage};
 use crate::link::{FaultInjector, LineFaults, LinkError, connect_tcp, connect_unix, open_serial};
+
+/// The host's end of a link.
+pub(super) type BoxedPort = Box<dyn Port + Send>;
 
 /// A card that can be talked to.
 pub(super) struct OpenCard {
-    /// Its number.
-    index: usize,
     place: Place,
     injector: Option<FaultInjector>,
 }
@@ -23,53 +22,47 @@ enum Place {
     Emulated(EmulatedCard),
     /// Its port is closed before it is opened again, as a device may have one user at a time.
     Remote {
-        address: CardAddress,
-        port: Option<Box<dyn Port + Send>>,
+        address: RemoteAddress,
+        port: Option<BoxedPort>,
     },
 }
 
 impl OpenCard {
     /// Starts or reaches the card at an address, the first if it has many. One that is emulated may have a model of its
-    /// memory, and shares an image with the host.
+    /// memory, and shares an image with the host. Faults of its line are those of the number `index`.
     pub(super) fn open(
         index: usize,
         address: &CardAddress,
         model: Option<MemoryModel>,
         shared: &SharedImage,
         faults: Option<LineFaults>,
-    ) -> Result<Self, RenderError> {
-        let place = match reach(address) {
-            Err(kind) => {
-                let card = EmulatedCard::start(kind, model, shared.clone());
-                Place::Emulated(card.map_err(|source| RenderError::Start { card: index, source })?)
+    ) -> Result<Self, CardError> {
+        let place = match address {
+            CardAddress::Emulated { kind, .. } => {
+                Place::Emulated(EmulatedCard::start(*kind, model, shared.clone()).map_err(CardError::Start)?)
             }
-            Ok(port) => {
-                let port = port.map_err(|source| RenderError::Link { card: index, source })?;
-                Place::Remote { address: address.clone(), port: Some(port) }
+            CardAddress::Remote(address) => {
+                Place::Remote { address: address.clone(), port: Some(reach(address)?) }
             }
         };
-        let injector = faults.map(|faults| FaultInjector::new(faults, index));
-        Ok(Self { index, place, injector })
+        Ok(Self { place, injector: faults.map(|faults| FaultInjector::new(faults, index)) })
     }
 
-    /// Tries to reach a card again whose link was closed, until it is there or nothing is left to do. Returns whether there is
-    /// any sense in that: an emulated card does not come back.
-    pub(super) fn reopen(&mut self, shared: &Shared) -> Result<bool, RenderError> {
+    /// Closes the link to a card. Returns where it can be reached again: an emulated card does not come back.
+    pub(super) fn close(&mut self) -> Option<RemoteAddress> {
         match &mut self.place {
-            Place::Emulated(_) => Ok(false),
+            Place::Emulated(_) => None,
             Place::Remote { address, port } => {
                 drop(port.take());
-                *port = reopen(address, shared)?;
-                Ok(true)
+                Some(address.clone())
             }
         }
     }
 
-    /// What errors call it: its number, and its address if it is not emulated.
-    pub(super) fn name(&self) -> String {
-        match &self.place {
-            Place::Emulated(_) => format!("card {}", self.index),
-            Place::Remote { address, .. } => format!("card {} ({address})", self.index),
+    /// Goes on with a link that was opened again.
+    pub(super) fn go_on_with(&mut self, opened: BoxedPort) {
+        if let Place::Remote { port, .. } = &mut self.place {
+            *port = Some(opened);
         }
     }
 
@@ -118,17 +111,15 @@ impl Port for OpenCard {
     }
 }
 
-pub(super) type Reached = Result<Box<dyn Port + Send>, LinkError>;
-
-/// Opens the link to a card that is not emulated in this process; of one that is, its kind.
-pub(super) fn reach(address: &CardAddress) -> Result<Reached, ChipKind> {
-    fn boxed(port: Result<impl Port + Send + 'static, LinkError>) -> Reached {
-        port.map(|port| Box::new(port) as Box<dyn Port + Send>)
-    }
+/// Opens the link to a card.
+pub(super) fn reach(address: &RemoteAddress) -> Result<BoxedPort, LinkError> {
     match address {
-        CardAddress::Emulated { kind, .. } => Err(*kind),
-        CardAddress::Serial { path, baud } => Ok(boxed(open_serial(path, *baud))),
-        CardAddress::Tcp { host, port } => Ok(boxed(connect_tcp(host, *port))),
-        CardAddress::Unix { path } => Ok(boxed(connect_unix(path))),
+        RemoteAddress::Serial { path, baud } => open_serial(path, *baud).map(boxed),
+        RemoteAddress::Tcp { host, port } => connect_tcp(host, *port).map(boxed),
+        RemoteAddress::Unix { path } => connect_unix(path).map(boxed),
     }
+}
+
+fn boxed(port: impl Port + Send + 'static) -> BoxedPort {
+    Box::new(port)
 }

@@ -76,6 +76,8 @@ pub struct RenderSettings {
     pub cards: Vec<CardAddress>,
     /// What the links to the cards do to bytes, to try how that is repaired; `None` for nothing.
     pub faults: Option<LineFaults>,
+    /// The share of the tiles that two cards render, to see whether they agree; `None` for no tile.
+    pub verify: Option<f64>,
     /// The caches that a chip's memory is modelled with; `None` to model none, which costs nothing.
     pub caches: Option<CacheSettings>,
     /// Where finished tiles are kept until the picture is written; `None` to keep none. Not with the order `hilbert`, which has
@@ -115,6 +117,7 @@ impl Default for RenderSettings {
             queue: None,
             cards: vec![CardAddress::default()],
             faults: None,
+            verify: None,
             partial: None,
             display: None,
             caches: None,

@@ -24,6 +24,14 @@ pub struct Statistics {
     pub max_distance: f32,
     /// Cards, one chip each.
     pub cards: usize,
+    /// Cards that were given up, or have never said hello.
+    pub cards_given_up: usize,
+    /// Tiles that two cards have rendered alike.
+    pub verified_tiles: usize,
+    /// Tiles that were rendered once more, to verify them or as another card took too long: no other number counts them.
+    pub repeated_tiles: usize,
+    /// Tiles that were rendered again, as their card has lied: counted once.
+    pub revoked_tiles: usize,
     /// Seconds of each phase.
     pub time_s: Times,
     /// Rays cast on the chips.

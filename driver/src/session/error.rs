@@ -5,9 +5,7 @@ use std::time::Duration;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::link::PortError;
-use photoncard_shared::message::{Fault, PROTOCOL_VERSION, Versions};
-
-use crate::film::FilmError;
+use photoncard_shared::message::{Fault, PROTOCOL_VERSION, Tile, Versions};
 
 /// Why a card could not be used.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
@@ -72,9 +70,39 @@ pub enum SessionError {
     /// The link failed.
     #[error("the link to the card is closed ({0:?})")]
     Port(PortError),
-    /// A pixel does not belong to the picture.
-    #[error(transparent)]
-    Film(#[from] FilmError),
+    /// A pixel has a value that no chip can give it.
+    #[error(
+        "the card lies: pixel ({x}, {y}) of the tile {},{},{},{} has {channel} {value}, which no chip can render",
+        .tile.x, .tile.x + .tile.width, .tile.y, .tile.y + .tile.height
+    )]
+    #[diagnostic(help(
+        "the memory of the card may be bad, or its firmware altered: what it has rendered is not used; check it with --verify \
+         beside cards that you trust"
+    ))]
+    Value {
+        /// The tile.
+        tile: Tile,
+        /// The pixel's column.
+        x: u32,
+        /// The pixel's row.
+        y: u32,
+        /// What has the value.
+        channel: &'static str,
+        /// The value.
+        value: f32,
+    },
+    /// Other cards render a tile otherwise.
+    #[error(
+        "the card lies: the tile {},{},{},{} is another than two others render",
+        .tile.x, .tile.x + .tile.width, .tile.y, .tile.y + .tile.height
+    )]
+    #[diagnostic(help(
+        "the memory of the card may be bad, or its firmware altered: what it has rendered is rendered again by others"
+    ))]
+    Outvoted {
+        /// The tile.
+        tile: Tile,
+    },
 }
 
 /// Compares a card's versions with this program's. They are read before the rest of a hello, which another version of the
@@ -101,6 +129,14 @@ pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<()
 }
 
 impl SessionError {
+    /// The tile that the card has lied about, if it has: nothing that it has rendered can be trusted.
+    pub fn lie(&self) -> Option<Tile> {
+        match *self {
+            Self::Value { tile, .. } | Self::Outvoted { tile } => Some(tile),
+            _ => None,
+        }
+    }
+
     /// Whether the card may be used again once it answers: nothing that it has said is wrong.
     pub fn may_pass(&self) -> bool {
         matches!(self, Self::Silent(_) | Self::Standstill(_) | Self::Port(_))

@@ -3,39 +3,35 @@
 use super::SessionError;
 
 /// Times that a card may fail without having completed a tile: what it crashes at, it is given again.
-const MOST_FAILURES: u32 = 4;
+const MAX_FAILURES: u32 = 4;
 
 /// What a card was at fault for.
 #[derive(Default)]
 pub(super) struct Failures {
     /// Times that it was reset or came no further, since it completed a tile.
-    count: u32,
+    failed: u32,
     /// Lines that it has written: fewer in its next hello tell that it was reset.
     written_lines: u32,
 }
 
 impl Failures {
-    /// It came no further.
+    /// It was reset or came no further.
     ///
     /// # Errors
-    /// As all of these: if it has failed too often.
-    pub(super) fn stands_still(&mut self) -> Result<(), SessionError> {
-        self.count += 1;
-        if self.count > MOST_FAILURES { Err(SessionError::Failures(self.count)) } else { Ok(()) }
+    /// If it has failed too often.
+    pub(super) fn count(&mut self) -> Result<(), SessionError> {
+        self.failed += 1;
+        if self.failed > MAX_FAILURES { Err(SessionError::Failures(self.failed)) } else { Ok(()) }
     }
 
-    /// It does not know the session, or leaves its greeting without a reply.
-    pub(super) fn is_reset(&mut self) -> Result<(), SessionError> {
-        // Its next hello tells of the same.
+    /// It is known to have been reset: its next hello tells nothing new.
+    pub(super) fn forget_lines(&mut self) {
         self.written_lines = 0;
-        self.stands_still()
     }
 
-    /// It says hello.
-    pub(super) fn says_hello(&mut self, written_lines: u32) -> Result<(), SessionError> {
-        let was_reset = written_lines < self.written_lines;
-        self.written_lines = written_lines;
-        if was_reset { self.stands_still() } else { Ok(()) }
+    /// It says hello. Returns whether it was reset since it was loaded.
+    pub(super) fn says_hello(&mut self, written_lines: u32) -> bool {
+        std::mem::replace(&mut self.written_lines, written_lines) > written_lines
     }
 
     /// It has an image of so many lines.
@@ -45,6 +41,6 @@ impl Failures {
 
     /// It has completed a tile.
     pub(super) fn completes_tile(&mut self) {
-        self.count = 0;
+        self.failed = 0;
     }
 }

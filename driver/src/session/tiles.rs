@@ -1,17 +1,22 @@
 //! The tiles at a card.
 
-use photoncard_shared::message::{FrameParameters, PixelRecord, Tile, record_bytes};
+use std::collections::VecDeque;
 
-use super::{Picture, SessionError};
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{FrameParameters, PixelRecord};
+
+use super::pixel_limits::{BadValue, PixelLimits};
+use super::{Assignment, Event, SessionError};
+use crate::sink::FinishedTile;
 
 /// The tiles at a card, in the order in which it was given them.
 #[derive(Default)]
 pub(super) struct TilesInFlight(Vec<TileInFlight>);
 
 struct TileInFlight {
-    tile: Tile,
-    /// Pixels that have come.
-    pixels: u64,
+    assignment: Assignment,
+    /// Records of the pixels that have come: all are possible.
+    records: Vec<u8>,
 }
 
 impl TilesInFlight {
@@ -23,58 +28,78 @@ impl TilesInFlight {
         self.0.is_empty()
     }
 
-    pub(super) fn push(&mut self, tile: Tile) {
-        self.0.push(TileInFlight { tile, pixels: 0 });
+    pub(super) fn push(&mut self, assignment: Assignment) {
+        self.0.push(TileInFlight { assignment, records: Vec::new() });
     }
 
-    /// Takes a tile's next pixels, with layers if the film has any.
+    /// Whether the tile that the card is at is one that cards have crashed at.
+    pub(super) fn is_at_suspect(&self) -> bool {
+        self.0.first().is_some_and(|in_flight| in_flight.assignment.is_suspect)
+    }
+
+    /// Takes a tile's next pixels.
     pub(super) fn take_pixels(
         &mut self,
         id: u32,
         first: u32,
         data: &[u8],
-        picture: &Picture,
+        limits: &PixelLimits,
     ) -> Result<(), SessionError> {
-        let in_flight = self.0.iter_mut().find(|in_flight| in_flight.tile.id == id);
+        let in_flight = self.0.iter_mut().find(|in_flight| in_flight.assignment.tile.id == id);
         let in_flight = in_flight.ok_or(SessionError::Unexpected("pixels of another tile"))?;
-        let mut film = picture.film();
-        let pixels = data.chunks_exact(record_bytes(film.has_layers()));
-        let is_whole = pixels.remainder().is_empty();
-        let end = first as u64 + pixels.len() as u64;
-        let are_next = first as u64 == in_flight.pixels && end <= in_flight.tile.pixels();
-        if !are_next || data.is_empty() || !is_whole {
+        let tile = in_flight.assignment.tile;
+        let bytes = limits.record_bytes();
+        let pixels = data.chunks_exact(bytes);
+        let end = u64::from(first) + pixels.len() as u64;
+        let come = (in_flight.records.len() / bytes) as u64;
+        if u64::from(first) != come
+            || end > tile.pixels()
+            || data.is_empty()
+            || !pixels.remainder().is_empty()
+        {
             return Err(SessionError::Unexpected("pixels that are not the next"));
         }
-        in_flight.pixels = end;
-        let Tile { x, y, width, .. } = in_flight.tile;
         for (index, pixel) in (first..).zip(pixels) {
             let record = PixelRecord::read(pixel).unwrap_or_default();
-            film.write_record(x + index % width, y + index / width, &record)?;
+            if let Some(BadValue { channel, value }) = limits.find_bad(&record) {
+                let (x, y) = (tile.x + index % tile.width, tile.y + index / tile.width);
+                return Err(SessionError::Value { tile, x, y, channel, value });
+            }
         }
+        in_flight.records.extend_from_slice(data);
         Ok(())
     }
 
     /// The card is done with a tile: it must have sent all pixels.
-    pub(super) fn complete(&mut self, id: u32, picture: &Picture) -> Result<(), SessionError> {
-        let is_complete =
-            |in_flight: &TileInFlight| in_flight.tile.id == id && in_flight.pixels == in_flight.tile.pixels();
-        let index = self.0.iter().position(is_complete);
-        let index = index.ok_or(SessionError::Unexpected("a tile that is not complete"))?;
-        picture.complete(&self.0.remove(index).tile);
-        Ok(())
+    pub(super) fn complete(
+        &mut self,
+        id: u32,
+        counters: Counters,
+        limits: &PixelLimits,
+    ) -> Result<FinishedTile, SessionError> {
+        let not_complete = SessionError::Unexpected("a tile that is not complete");
+        let index = self.0.iter().position(|in_flight| in_flight.assignment.tile.id == id);
+        let Some(index) = index else { return Err(not_complete) };
+        let TileInFlight { assignment, records } = self.0.remove(index);
+        let tile = assignment.tile;
+        let bytes = tile.pixels() * limits.record_bytes() as u64;
+        if records.len() as u64 != bytes {
+            self.0.insert(index, TileInFlight { assignment, records });
+            return Err(not_complete);
+        }
+        FinishedTile::new(tile, records, limits.has_layers(), counters).ok_or(not_complete)
     }
 
-    /// Gives back all tiles. The one that the card was at is the next to be taken: if it is what the card crashes at, no other
-    /// tile is completed between two crashes.
-    pub(super) fn give_back(&mut self, picture: &Picture) {
-        for in_flight in self.0.drain(..).rev() {
-            picture.scheduler().give_back(in_flight.tile);
+    /// Gives back all tiles, from the last. The one that the card was at comes last.
+    pub(super) fn give_back(&mut self, events: &mut VecDeque<Event>) {
+        while let Some(TileInFlight { assignment, .. }) = self.0.pop() {
+            events.push_back(Event::TileLost { tile: assignment.tile, was_at_work: self.0.is_empty() });
         }
     }
 
     /// The rays of the largest tile, roughly.
     pub(super) fn most_rays(&self, frame: &FrameParameters) -> u64 {
-        let pixels = self.0.iter().map(|in_flight| in_flight.tile.pixels()).max().unwrap_or(0);
+        let pixels = self.0.iter().map(|in_flight| in_flight.assignment.tile.pixels()).max().unwrap_or(0);
         let rays_of_sample = 2 + u64::from(frame.shadow_rays) + u64::from(frame.gather_rays);
         pixels.saturating_mul(u64::from(frame.samples)).saturating_mul(rays_of_sample)
     }

@@ -1,32 +1,37 @@
-//! Whatever befalls cards and links, a render ends in the same picture, or in a clear error when no card is left: real
-//! sessions, real cards, and links whose every step and fault a seed decides, in one thread and in virtual time.
+//! Whatever befalls cards and links, a render ends in the same picture, or in a clear error: real sessions, real cards, and links
+//! whose every step and fault a seed decides, in one thread and in virtual time.
 //!
 //! A seed that fails is run again alone by `PHOTONCARD_SEEDS=SEED cargo test -p photoncard-driver --test simulation`, many
 //! by `PHOTONCARD_SEEDS=1..10000`.
 
-mod conditions;
+mod liar;
+mod lies;
 mod line;
 mod run;
 mod station;
 mod world;
 
 use std::ops::Range;
+use std::sync::Mutex;
 use std::time::Duration;
 
+use photoncard_driver::dispatcher::Dispatcher;
+use photoncard_driver::film::PixelValue;
+use photoncard_driver::scheduler::SchedulerError;
 use photoncard_driver::session::{LinkBytes, Session};
 use photoncard_firmware::sampler::hash;
 
-use self::conditions::Run;
 use self::line::{Faults, Random};
-use self::run::MOST_STEPS;
+use self::run::{End, MAX_STEPS, Run};
 use self::station::Station;
 use self::world::Fixture;
 
 /// Runs of each test, if nothing else is asked for.
 const SEEDS: Range<u32> = 1..300;
+
 /// The seeds to run: those that are asked for.
-fn seeds() -> Range<u32> {
-    let Ok(asked) = std::env::var("PHOTONCARD_SEEDS") else { return SEEDS };
+fn seeds(unasked: Range<u32>) -> Range<u32> {
+    let Ok(asked) = std::env::var("PHOTONCARD_SEEDS") else { return unasked };
     let number = |text: &str| text.parse().expect("PHOTONCARD_SEEDS is a seed, or the first..past the last");
     match asked.split_once("..") {
         Some((first, end)) => number(first)..number(end),
@@ -49,7 +54,7 @@ fn any_delays_end_in_the_same_picture_and_nothing_is_sent_twice() {
         let alone = Run::new(&fixture, 1, 0).go();
         assert!(alone.pixels.as_ref().unwrap().iter().any(|pixel| pixel.radiance[0] > 0.0));
         let (mut shared, mut runs) = (0, 0);
-        for seed in seeds() {
+        for seed in seeds(SEEDS) {
             let cards = 1 + seed as usize % 5;
             let delayed = Run::new(&fixture, cards, seed).go();
             assert!(delayed.pixels == alone.pixels, "seed {seed}: other pixels on {cards} cards");
@@ -77,13 +82,13 @@ fn a_card_that_never_answers_holds_up_no_other() {
 }
 
 #[test]
-fn faults_end_in_the_same_picture_or_with_no_card_left() {
+fn faults_end_in_the_same_picture_or_in_words() {
     with_room_for_a_card(|| {
         let fixture = Fixture::new();
         let alone = Run::new(&fixture, 1, 0).go();
         let mut repaired = LinkBytes::default();
-        let (mut complete, mut runs, mut given_up) = (0, 0, 0);
-        for seed in seeds() {
+        let [mut complete, mut unrendered, mut runs, mut given_up] = [0; 4];
+        for seed in seeds(SEEDS) {
             let cards = 1 + seed as usize % 8;
             let faults = Faults::of(&mut Random(hash(!seed)));
             let outcome = Run { faults, ..Run::new(&fixture, cards, seed) }.go();
@@ -91,26 +96,59 @@ fn faults_end_in_the_same_picture_or_with_no_card_left() {
                 assert!(outcome.pixels.is_some(), "seed {seed}: bad lines end the render, {faults:?}");
                 assert_eq!(outcome.given_up, 0, "seed {seed}: sound cards are given up, {faults:?}");
             }
-            match outcome.pixels {
-                Some(pixels) => {
-                    assert!(Some(pixels) == alone.pixels, "seed {seed}: other pixels, {faults:?}");
+            for (id, tile) in &outcome.tiles {
+                assert!(*tile == alone.tiles[id], "seed {seed}: another tile {id}, {faults:?}");
+            }
+            match outcome.end {
+                End::Complete => {
+                    assert!(outcome.pixels == alone.pixels, "seed {seed}: other pixels, {faults:?}");
+                    assert_eq!(outcome.counters, alone.counters, "seed {seed}: other work, {faults:?}");
                     complete += 1;
                 }
-                None => assert!(
+                End::NoCard => assert!(
                     faults.deaths + faults.stalls > 0 || outcome.given_up > 0,
                     "seed {seed}: no card is left that never stopped, {faults:?}"
                 ),
+                End::Fault(fault) => {
+                    let is_named =
+                        matches!(&fault, SchedulerError::Unrendered { tiles } if !tiles.is_empty());
+                    assert!(
+                        is_named && faults.resets + faults.stalls > 0,
+                        "seed {seed}: {fault}, {faults:?}"
+                    );
+                    unrendered += 1;
+                }
             }
             repaired.add(&outcome.bytes);
             given_up += outcome.given_up;
             runs += 1;
         }
-        println!("{complete} of {runs} runs complete, {given_up} cards given up; repaired: {repaired:?}");
+        println!(
+            "{complete} of {runs} runs complete, {given_up} cards given up, {unrendered} runs with tiles at which cards crash; repaired: {repaired:?}"
+        );
         assert!(4 * complete > 3 * runs, "only {complete} of {runs} runs ended in the picture");
         if runs > 50 {
             assert!(repaired.line.damaged > 0 && repaired.line.repeated > 0 && repaired.resets > 0);
         }
     });
+}
+
+/// Steps a card on its own until the picture is complete. Returns its pixels.
+fn complete_alone<'a>(run: &Run<'a>, station: &mut Station<'a>, random: &mut Random) -> Vec<PixelValue> {
+    let film = Mutex::new(run.fixture.film());
+    let dispatcher = Dispatcher::new(run.fixture.scheduler(1, None, 0), vec![&film]);
+    let mut step = 0;
+    while !dispatcher.scheduler().is_complete() {
+        station.step(run, &dispatcher, step, random).unwrap();
+        step += 1;
+        assert!(
+            step < MAX_STEPS && station.is_used(),
+            "the card is not greeted again: {:?}",
+            station.given_up
+        );
+    }
+    drop(dispatcher);
+    film.into_inner().unwrap().pixels().to_vec()
 }
 
 /// The card is reset while the host is busy with something else, before there is a job.
@@ -121,37 +159,45 @@ fn a_card_that_is_reset_before_the_start_is_greeted_again() {
         let alone = Run::new(&fixture, 1, 0).go();
         let random = &mut Random(7);
         let run = Run::new(&fixture, 1, 7);
-        let mut station = Station::new(&fixture, random);
-        let picture = fixture.picture();
+        let mut station = Station::new(0, &fixture, random);
+        let dispatcher = Dispatcher::new(fixture.scheduler(1, None, 0), Vec::new());
         // Greets, without starting.
         station.started = true;
         let mut step = 0;
         while station.session.budget().is_none() {
-            station.step(&run, &picture, step, random);
+            station.step(&run, &dispatcher, step, random).unwrap();
             step += 1;
         }
         station.card = fixture.card();
         station.started = false;
-        while !picture.scheduler().is_complete() {
-            station.step(&run, &picture, step, random);
-            step += 1;
-            assert!(step < MOST_STEPS && !station.is_lost, "the card is not greeted again");
-        }
-        assert!(Some(picture.film().pixels().to_vec()) == alone.pixels);
+        assert!(Some(complete_alone(&run, &mut station, random)) == alone.pixels);
         assert_eq!(station.session.link_bytes().resets, 1);
     });
 }
 
 #[test]
-fn a_tile_that_crashes_every_card_ends_the_render() {
+fn tiles_at_which_every_card_crashes_are_named_when_all_others_are_done() {
     with_room_for_a_card(|| {
         let fixture = Fixture::new();
+        let alone = Run::new(&fixture, 1, 0).go();
         for seed in 0..20 {
             let cards = 1 + seed as usize % 4;
-            let outcome = Run { crashes: 8, ..Run::new(&fixture, cards, seed) }.go();
-            assert!(outcome.pixels.is_none(), "seed {seed}: the last tiles were rendered");
-            assert_eq!(outcome.given_up, cards, "seed {seed}");
-            assert!(outcome.bytes.resets < 10 * cards as u64, "seed {seed}: {:?}", outcome.bytes);
+            let poison: Vec<u32> = [[3, 4].as_slice(), &[0, 1, 9], &[15]][seed as usize % 3].to_vec();
+            let outcome = Run { poison: poison.clone(), ..Run::new(&fixture, cards, seed) }.go();
+            let End::Fault(SchedulerError::Unrendered { tiles }) = outcome.end else {
+                panic!("seed {seed}: {:?}", outcome.end);
+            };
+            let mut named: Vec<u32> = tiles.iter().map(|tile| tile.id).collect();
+            named.sort_unstable();
+            assert_eq!(named, poison, "seed {seed}");
+            assert_eq!(
+                outcome.tiles.len() + poison.len(),
+                alone.tiles.len(),
+                "seed {seed}: others are missing"
+            );
+            assert!(outcome.tiles.iter().all(|(id, tile)| *tile == alone.tiles[id]), "seed {seed}");
+            assert_eq!(outcome.given_up, 0, "seed {seed}: a card is given up for a tile's fault");
+            assert!(outcome.bytes.resets <= 7 * poison.len() as u64, "seed {seed}: {:?}", outcome.bytes);
         }
     });
 }
@@ -166,23 +212,15 @@ fn a_session_number_that_the_card_holds_is_another_after_a_while() {
         for (seed, moment) in [(1, 50), (2, 3000), (3, 40_000)] {
             let random = &mut Random(seed);
             let run = Run::new(&fixture, 1, seed);
-            let mut station = Station::new(&fixture, random);
+            let mut station = Station::new(0, &fixture, random);
             station.session = Session::new(77, Duration::ZERO);
-            let other = fixture.picture();
+            let other = Dispatcher::new(fixture.scheduler(1, None, 0), Vec::new());
             for step in 0..moment {
-                station.step(&run, &other, step, random);
+                station.step(&run, &other, step, random).unwrap();
             }
             station.session = Session::new(77, Duration::ZERO);
             station.started = false;
-            let picture = fixture.picture();
-            let mut step = 0;
-            while !picture.scheduler().is_complete() {
-                station.step(&run, &picture, step, random);
-                step += 1;
-                let is_used = !station.is_lost && station.given_up.is_none();
-                assert!(step < MOST_STEPS && is_used, "seed {seed}: {:?}", station.given_up);
-            }
-            assert!(Some(picture.film().pixels().to_vec()) == alone.pixels, "seed {seed}");
+            assert!(Some(complete_alone(&run, &mut station, random)) == alone.pixels, "seed {seed}");
             assert!(station.session.link_bytes().resets <= 1, "seed {seed}");
             resets += station.session.link_bytes().resets;
         }

@@ -1,61 +1,154 @@
-//! A run, from cards that were just switched on to the picture, or to no card that is left.
+//! A run, from cards that were just switched on to the picture, or to the error that a render would end with.
 
+use std::collections::HashMap;
+use std::sync::Mutex;
+
+use photoncard_driver::dispatcher::Dispatcher;
 use photoncard_driver::film::PixelValue;
+use photoncard_driver::scheduler::{CardNumber, SchedulerError, TileCounts};
 use photoncard_driver::session::LinkBytes;
+use photoncard_driver::sink::{FinishedTile, TileSink};
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::counters::Counters;
+use photoncard_shared::message::Tile;
 
-use crate::conditions::Run;
-use crate::line::Random;
+use crate::liar::Lie;
+use crate::line::{Faults, Random};
 use crate::station::{Health, Station};
+use crate::world::Fixture;
 
 /// Steps of a run after which it is taken for stuck.
-pub(crate) const MOST_STEPS: u64 = 20_000_000;
+pub(crate) const MAX_STEPS: u64 = 20_000_000;
+
+/// A run.
+#[derive(Clone)]
+pub(crate) struct Run<'a> {
+    pub(crate) fixture: &'a Fixture,
+    pub(crate) faults: Faults,
+    pub(crate) cards: usize,
+    /// Cards, the first ones, that never do anything.
+    pub(crate) stopped: usize,
+    /// The tiles at which every card crashes.
+    pub(crate) poison: Vec<u32>,
+    /// What cards lie, and about one of how many tiles.
+    pub(crate) liars: HashMap<CardNumber, (Lie, u32)>,
+    /// Of how many steps of its work at tiles a card does one; `None` if it does none.
+    pub(crate) lazy: HashMap<CardNumber, Option<usize>>,
+    /// The share of the tiles that is verified.
+    pub(crate) verify: Option<f64>,
+    pub(crate) seed: u32,
+}
+
+/// How a run ends.
+#[derive(Debug, PartialEq)]
+pub(crate) enum End {
+    Complete,
+    /// No card is left.
+    NoCard,
+    Fault(SchedulerError),
+}
 
 /// What came of a run.
 pub(crate) struct Outcome {
-    /// `None` if no card was left.
+    pub(crate) end: End,
+    /// The film's, if it is complete.
     pub(crate) pixels: Option<Vec<PixelValue>>,
-    /// Of all cards.
+    /// The tiles that the sinks have.
+    pub(crate) tiles: HashMap<u32, FinishedTile>,
+    /// Of the tiles of the picture.
     pub(crate) counters: Counters,
+    pub(crate) counts: TileCounts,
     pub(crate) bytes: LinkBytes,
-    /// Cards that rendered a tile.
+    /// Cards of which the picture has tiles.
     pub(crate) working: usize,
-    /// Cards that have failed too often.
+    /// Cards that have failed too often, or have lied.
     pub(crate) given_up: usize,
+    /// Cards that were found to have lied.
+    pub(crate) caught: Vec<CardNumber>,
+    /// Virtual time, in steps.
+    pub(crate) steps: u64,
 }
 
-impl Run<'_> {
-    pub(crate) fn go(&self) -> Outcome {
-        let Self { fixture, cards, stopped, seed, .. } = *self;
-        let random = &mut Random(hash(seed));
-        let mut stations: Vec<_> = (0..cards).map(|_| Station::new(fixture, random)).collect();
-        stations[..stopped].iter_mut().for_each(|station| station.health = Health::Dead);
-        let picture = fixture.picture();
-        let mut step = 0;
-        while !picture.scheduler().is_complete() && stations.iter().any(|station| !station.is_lost) {
-            let station = &mut stations[random.below(cards)];
-            for _ in 0..station.speed {
-                station.step(self, &picture, step, random);
-            }
-            step += 1;
-            assert!(step < MOST_STEPS, "seed {seed}: {cards} cards have not ended, {:?}", self.faults);
+/// Notes which tiles a sink has.
+#[derive(Default)]
+pub(crate) struct Ledger(Mutex<HashMap<u32, FinishedTile>>);
+
+impl TileSink for Ledger {
+    fn put(&self, tile: &FinishedTile) {
+        let before = self.0.lock().unwrap().insert(tile.tile().id, tile.clone());
+        assert_eq!(before, None, "a tile is put twice");
+    }
+
+    fn revoke(&self, tile: &Tile) {
+        assert!(self.0.lock().unwrap().remove(&tile.id).is_some(), "a tile is revoked that was not put");
+    }
+}
+
+impl<'a> Run<'a> {
+    pub(crate) fn new(fixture: &'a Fixture, cards: usize, seed: u32) -> Self {
+        Self {
+            fixture,
+            faults: Faults::default(),
+            cards,
+            stopped: 0,
+            poison: Vec::new(),
+            liars: HashMap::new(),
+            lazy: HashMap::new(),
+            verify: None,
+            seed,
         }
-        let is_complete = picture.scheduler().is_complete();
-        assert!(!is_complete || picture.film().is_complete(), "seed {seed}: pixels are missing");
-        let mut outcome = Outcome {
-            pixels: is_complete.then(|| picture.film().pixels().to_vec()),
-            counters: Counters::ZERO,
-            bytes: LinkBytes::default(),
-            working: 0,
-            given_up: 0,
+    }
+
+    /// The cards of the run, just switched on.
+    fn stations(&self, random: &mut Random) -> Vec<Station<'a>> {
+        let station = |number| {
+            let mut station = Station::new(number, self.fixture, random);
+            station.voice.lie = self.liars.get(&number).copied();
+            station.diligence = self.lazy.get(&number).copied().unwrap_or(Some(1));
+            station.health = if number < self.stopped { Health::Dead } else { Health::Well };
+            station
         };
-        for station in &stations {
-            outcome.counters.add(station.session.counters());
-            outcome.bytes.add(&station.session.link_bytes());
-            outcome.working += usize::from(station.session.counters().eye_rays > 0);
-            outcome.given_up += usize::from(station.given_up.is_some());
+        (0..self.cards).map(station).collect()
+    }
+
+    pub(crate) fn go(&self) -> Outcome {
+        let Self { fixture, cards, seed, .. } = *self;
+        let random = &mut Random(hash(seed));
+        let mut stations = self.stations(random);
+        let (film, ledger) = (Mutex::new(fixture.film()), Ledger::default());
+        let dispatcher = Dispatcher::new(fixture.scheduler(cards, self.verify, seed), vec![&film, &ledger]);
+        let mut steps = 0;
+        let end = loop {
+            if dispatcher.scheduler().is_complete() {
+                break End::Complete;
+            }
+            if !stations.iter().any(Station::is_used) {
+                break End::NoCard;
+            }
+            let station = &mut stations[random.below(cards)];
+            let result = (0..station.speed).try_for_each(|_| station.step(self, &dispatcher, steps, random));
+            if let Err(fault) = result {
+                break End::Fault(fault);
+            }
+            steps += 1;
+            assert!(steps < MAX_STEPS, "seed {seed}: {cards} cards have not ended, {:?}", self.faults);
+        };
+        let scheduler = dispatcher.scheduler();
+        let film = film.lock().unwrap();
+        assert!(end != End::Complete || film.is_complete(), "seed {seed}: pixels are missing");
+        let mut bytes = LinkBytes::default();
+        stations.iter().for_each(|station| bytes.add(&station.session.link_bytes()));
+        Outcome {
+            pixels: (end == End::Complete).then(|| film.pixels().to_vec()),
+            end,
+            tiles: ledger.0.lock().unwrap().clone(),
+            counters: scheduler.counters(),
+            counts: scheduler.counts(),
+            bytes,
+            working: (0..cards).filter(|&card| scheduler.counters_of(card).eye_rays > 0).count(),
+            given_up: stations.iter().filter(|station| station.given_up.is_some()).count(),
+            caught: (0..cards).filter(|&card| scheduler.lie_of(card).is_some()).collect(),
+            steps,
         }
-        outcome
     }
 }

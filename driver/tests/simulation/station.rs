@@ -2,11 +2,16 @@
 
 use std::time::Duration;
 
-use photoncard_driver::session::{Picture, Session, SessionError};
+use photoncard_driver::dispatcher::Dispatcher;
+use photoncard_driver::scheduler::{CardNumber, SchedulerError, Standing};
+use photoncard_driver::session::{Session, SessionError};
 use photoncard_firmware::card::MicroCard;
+use photoncard_shared::frame::{Frame, FrameReader};
+use photoncard_shared::message::{self, Command};
 
-use crate::conditions::Run;
+use crate::liar::Voice;
 use crate::line::{Queue, Random};
+use crate::run::Run;
 use crate::world::{Fixture, Memory};
 
 /// Virtual time of a step.
@@ -26,6 +31,7 @@ pub(crate) enum Health {
 
 /// A card, its link and its session.
 pub(crate) struct Station<'a> {
+    pub(crate) number: CardNumber,
     pub(crate) card: Box<MicroCard<Memory>>,
     pub(crate) session: Session<'a>,
     /// Whether it has been silent for too long, and has not been loaded since.
@@ -34,6 +40,13 @@ pub(crate) struct Station<'a> {
     pub(crate) given_up: Option<SessionError>,
     pub(crate) health: Health,
     pub(crate) started: bool,
+    /// Of how many steps of its work at tiles it does one; `None` if it does none.
+    pub(crate) diligence: Option<usize>,
+    pub(crate) voice: Voice,
+    /// Commands as they come to the card.
+    commands: FrameReader,
+    /// The tiles that it was given and has not done, from the first.
+    tiles: Vec<u32>,
     to_card: Queue,
     to_host: Queue,
     /// Bytes that move in one step at most.
@@ -43,14 +56,19 @@ pub(crate) struct Station<'a> {
 }
 
 impl<'a> Station<'a> {
-    pub(crate) fn new(fixture: &Fixture, random: &mut Random) -> Self {
+    pub(crate) fn new(number: CardNumber, fixture: &Fixture, random: &mut Random) -> Self {
         Self {
+            number,
             card: fixture.card(),
-            session: Session::new(random.below(1 << 16) as u16, Duration::ZERO),
+            session: Session::new(random.below(1 << 16) as u32, Duration::ZERO),
             is_lost: false,
             given_up: None,
             health: Health::Well,
             started: false,
+            diligence: Some(1),
+            voice: Voice::new(),
+            commands: FrameReader::new(),
+            tiles: Vec::new(),
             to_card: Queue::new(random),
             to_host: Queue::new(random),
             burst: 1 << random.below(12),
@@ -58,80 +76,146 @@ impl<'a> Station<'a> {
         }
     }
 
+    /// Whether it may still render a tile.
+    pub(crate) fn is_used(&self) -> bool {
+        !self.is_lost && self.given_up.is_none()
+    }
+
     /// One step of the host, of the card or of its chip: whichever the seed says.
-    pub(crate) fn step(&mut self, run: &Run<'a>, picture: &Picture, step: u64, random: &mut Random) {
+    pub(crate) fn step(
+        &mut self,
+        run: &Run<'a>,
+        dispatcher: &Dispatcher,
+        step: u64,
+        random: &mut Random,
+    ) -> Result<(), SchedulerError> {
         let bytes = 1 + random.below(self.burst);
         let now = STEP * u32::try_from(step).unwrap_or(u32::MAX);
         let what = random.below(5);
         if what < 2 {
-            if self.given_up.is_none() {
-                self.step_of_host(run, picture, (now, bytes, what), random);
-            }
-            return;
+            let is_used = self.given_up.is_none();
+            return if is_used {
+                self.step_of_host(run, dispatcher, (now, bytes, what), random)
+            } else {
+                Ok(())
+            };
         }
         self.befall(run, step, random);
-        if run.is_crash(picture) && self.session.is_loaded() && self.card.is_busy() {
+        let is_at_work = self.session.is_loaded() && self.card.is_busy();
+        if is_at_work && self.tiles.first().is_some_and(|tile| run.poison.contains(tile)) {
             self.reset_card(run);
         }
-        if self.health != Health::Well {
-            return;
+        if self.health == Health::Well {
+            self.step_of_card(run, (bytes, what), random);
         }
+        Ok(())
+    }
+
+    fn step_of_card(&mut self, run: &Run, (bytes, what): (usize, usize), random: &mut Random) {
         match what {
             2 => {
                 let received = self.to_card.pop(bytes);
                 if received.is_empty() {
                     self.card.acknowledge();
                 }
+                self.note_tiles(&received);
                 self.card.feed(&received);
             }
             3 => {
-                let sent = self.to_host.push(self.card.outgoing(), bytes, &run.faults, random);
-                self.card.sent(sent);
+                let outgoing = self.card.outgoing();
+                self.voice.hear(outgoing);
+                let count = outgoing.len();
+                self.card.sent(count);
+                let done = std::mem::take(&mut self.voice.done);
+                self.tiles.retain(|tile| !done.contains(tile));
+                let sent = self.to_host.push(&self.voice.said, bytes, &run.faults, random);
+                self.voice.said.drain(..sent);
             }
-            _ if random.below(TURNS_OF_CHIP) == 0 => self.card.work(),
-            _ => {}
+            _ if random.below(TURNS_OF_CHIP) != 0 => {}
+            _ => {
+                let is_rendering = !self.tiles.is_empty();
+                let works = self.diligence.is_some_and(|one_of| random.below(one_of) == 0);
+                if works || !is_rendering {
+                    self.card.work();
+                }
+            }
+        }
+    }
+
+    /// Notes the tiles that come to the card.
+    fn note_tiles(&mut self, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            let (taken, frame) = self.commands.read(bytes);
+            bytes = &bytes[taken..];
+            let Some(Ok(Frame { payload, .. })) = frame else { continue };
+            match message::decode::<Command>(payload) {
+                Some(Command::RenderTile(tile)) if !self.tiles.contains(&tile.id) => self.tiles.push(tile.id),
+                Some(Command::Hello { .. }) => self.tiles.clear(),
+                _ => {}
+            }
         }
     }
 
     fn step_of_host(
         &mut self,
         run: &Run<'a>,
-        picture: &Picture,
+        dispatcher: &Dispatcher,
         (now, bytes, what): (Duration, usize, usize),
         random: &mut Random,
-    ) {
-        let session = &mut self.session;
+    ) -> Result<(), SchedulerError> {
+        let Self { number, session, .. } = self;
         if session.budget().is_some() && !self.started {
             session.start(run.fixture.job(), now);
             self.started = true;
         }
-        let result = if what == 0 {
-            session.prepare(picture);
-            let sent = self.to_card.push(session.outgoing(), bytes, &run.faults, random);
-            session.sent(sent, now);
-            Ok(())
-        } else {
+        let result = dispatcher.check_card(*number).and_then(|()| {
+            if what == 0 {
+                dispatcher.supply(*number, session, now);
+                session.prepare();
+                let sent = self.to_card.push(session.outgoing(), bytes, &run.faults, random);
+                session.sent(sent, now);
+                return Ok(());
+            }
             let received = self.to_host.pop(bytes);
             if received.is_empty() {
                 session.acknowledge();
             }
-            session.receive(&received, picture, now).and_then(|()| session.tick(picture, now))
-        };
-        let result = result.or_else(|error| {
-            self.is_lost = true;
-            if !error.may_pass() {
-                return Err(error);
-            }
-            session.greet_again(picture, now);
-            Ok(())
+            let slowest = dispatcher.scheduler().slowest(*number);
+            session.receive(&received, now).and_then(|()| session.tick(slowest, now))
         });
-        if let Err(error) = result {
-            assert!(matches!(error, SessionError::Failures(_)), "seed {}: {error}", run.seed);
-            session.give_back(picture);
-            self.given_up = Some(error);
-        } else if session.is_loaded() {
-            self.is_lost = false;
+        dispatcher.collect(*number, session, now)?;
+        self.is_lost &= !session.is_loaded();
+        let Err(error) = result else { return Ok(()) };
+        self.recover(error, run, dispatcher, now)
+    }
+
+    /// What a render does with an error.
+    fn recover(
+        &mut self,
+        error: SessionError,
+        run: &Run,
+        dispatcher: &Dispatcher,
+        now: Duration,
+    ) -> Result<(), SchedulerError> {
+        if let Some(tile) = error.lie() {
+            assert!(self.voice.lie.is_some(), "seed {}: an honest card lies: {error}", run.seed);
+            dispatcher.distrust(self.number, tile);
         }
+        if error.may_pass() {
+            self.is_lost = true;
+            self.session.greet_again(now);
+        } else {
+            self.session.give_back();
+        }
+        dispatcher.collect(self.number, &mut self.session, now)?;
+        let standing = if error.may_pass() { Standing::Lost } else { Standing::GivenUp };
+        dispatcher.scheduler().set_standing(self.number, standing);
+        if !error.may_pass() {
+            let is_expected = error.lie().is_some() || matches!(error, SessionError::Failures(_));
+            assert!(is_expected, "seed {}: {error}", run.seed);
+            self.given_up = Some(error);
+        }
+        Ok(())
     }
 
     /// What happens to the card in a step of its own.
@@ -155,5 +239,7 @@ impl<'a> Station<'a> {
     pub(crate) fn reset_card(&mut self, run: &Run) {
         self.card = run.fixture.card();
         self.to_card.bytes.clear();
+        self.tiles.clear();
+        self.voice.said.clear();
     }
 }

@@ -9,7 +9,7 @@ use photoncard_driver::photon_map::{MappedImage, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
 use photoncard_driver::scheduler::{Scheduler, tiles};
-use photoncard_driver::session::{Job, Picture};
+use photoncard_driver::session::{Job, PixelLimits};
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::memory::{CardMemory, MemoryPort, copy_lines};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
@@ -108,7 +108,13 @@ impl Fixture {
     }
 
     pub(crate) fn job(&self) -> Job<'_> {
-        Job { image: self.mapped.image.lines(), checksum: self.checksum, frame: &self.frame }
+        let (scene, _) = self.mapped.image.view();
+        Job {
+            image: self.mapped.image.lines(),
+            checksum: self.checksum,
+            frame: &self.frame,
+            limits: PixelLimits::new(&scene.header, &self.frame),
+        }
     }
 
     /// A card that was just switched on.
@@ -117,10 +123,17 @@ impl Fixture {
         Box::new(MicroCard::new(MICRO, Memory { lines: vec![Line::ZERO; lines] }))
     }
 
-    pub(crate) fn picture(&self) -> Picture {
-        let RenderSettings { width, height, tile, order, .. } = self.settings;
-        let window = self.settings.window();
-        let film = Film::new(width, height, window).unwrap();
-        Picture::new(Scheduler::new(tiles(window, tile, order)), film, None)
+    pub(crate) fn film(&self) -> Film {
+        self.settings.film().unwrap()
+    }
+
+    /// The tiles of the picture, of which a share is verified.
+    pub(crate) fn scheduler(&self, cards: usize, verify: Option<f64>, seed: u32) -> Scheduler {
+        let RenderSettings { tile, order, .. } = self.settings;
+        let scheduler = Scheduler::new(tiles(self.settings.window(), tile, order), cards).with_helpers();
+        match verify {
+            Some(share) => scheduler.verifying(share, seed),
+            None => scheduler,
+        }
     }
 }

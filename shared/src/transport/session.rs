@@ -63,7 +63,7 @@ pub(super) enum Control {
     Probe,
     Answer,
     /// The session of this number is not known.
-    Unknown(u16),
+    Unknown(u32),
 }
 
 /// Which end of the link it is.
@@ -77,7 +77,7 @@ pub(super) enum End {
 pub(super) struct Session {
     end: End,
     /// `None` before the first.
-    number: Option<u16>,
+    number: Option<u32>,
     /// Whether its first message was sent.
     has_opened: bool,
     /// Messages on their way, at their number modulo [`WINDOW`].
@@ -139,7 +139,7 @@ impl Session {
         }
     }
 
-    pub(super) fn begin(&mut self, number: u16) {
+    pub(super) fn begin(&mut self, number: u32) {
         self.number = Some(number);
         self.has_opened = false;
         [self.oldest, self.next, self.transmissions, self.expected, self.untold] = [0; 5];

@@ -1,15 +1,18 @@
 //! A host's session with a hostile card: replies that it did not ask for, mutated, in any order, and cards that are reset.
 
+use std::sync::Mutex;
 use std::time::Duration;
 
-use photoncard_driver::film::{Film, Window};
+use photoncard_driver::dispatcher::Dispatcher;
+use photoncard_driver::film::{Film, PixelValue, Window};
 use photoncard_driver::scheduler::Scheduler;
-use photoncard_driver::session::{Job, Picture, Session, SessionError};
+use photoncard_driver::session::{Job, PixelLimits, Session, SessionError};
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::{Budget, MICRO};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
-use photoncard_shared::image::LAYOUT_VERSION;
+use photoncard_shared::image::{Header, LAYOUT_VERSION, Lights, SECTIONS, Section};
+use photoncard_shared::layout::PhotonGrid;
 use photoncard_shared::message::{
     self, FrameParameters, PIXELS_BYTES, PROTOCOL_VERSION, Reply, Tile, record_bytes,
 };
@@ -104,6 +107,19 @@ impl Sessions {
     }
 }
 
+/// The header of an image of which nothing is known.
+fn header() -> Header {
+    Header {
+        lines: LINES,
+        photon_power_unit: 1.0,
+        caustic_power_unit: 1.0,
+        radiance_unit: 1.0,
+        photon_grid: PhotonGrid { origin: [0; 3], cell: 1e-6 },
+        lights: Lights::NONE,
+        sections: [Section::default(); SECTIONS],
+    }
+}
+
 /// Appends a record of an input.
 fn put(input: &mut Vec<u8>, what: u8, reply: &[u8]) {
     input.push(what);
@@ -124,7 +140,7 @@ fn next_record<'a>(input: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
 struct Ends<'a> {
     session: Session<'a>,
     card: Transport,
-    picture: Picture,
+    dispatcher: Dispatcher<'a>,
     now: Duration,
 }
 
@@ -132,7 +148,8 @@ impl Ends<'_> {
     /// Lets all pass that either end has to say, and some time.
     fn step(&mut self, is_silent: bool) -> Result<(), SessionError> {
         for _ in 0..MOST_FRAMES {
-            self.session.prepare(&self.picture);
+            self.dispatcher.supply(0, &mut self.session, self.now);
+            self.session.prepare();
             let wire = self.session.outgoing().to_vec();
             assert!(wire.len() <= MAX_FRAME, "more than a frame is sent at once");
             self.session.sent(wire.len(), self.now);
@@ -145,23 +162,24 @@ impl Ends<'_> {
             }
             let answer = if is_silent { Vec::new() } else { self.card.outgoing().to_vec() };
             self.card.sent(answer.len());
-            self.session.receive(&answer, &self.picture, self.now)?;
+            self.session.receive(&answer, self.now)?;
             self.session.acknowledge();
             if wire.is_empty() && answer.is_empty() {
                 break;
             }
         }
         self.now += STEP;
-        self.session.tick(&self.picture, self.now)
+        self.session.tick(self.dispatcher.scheduler().slowest(0), self.now)
     }
 
     /// What a render does with an error. Returns whether it goes on.
     fn goes_on(&mut self, result: &Result<(), SessionError>) -> bool {
         let may_pass = result.as_ref().err().is_some_and(SessionError::may_pass);
         if may_pass {
-            self.session.greet_again(&self.picture, self.now);
+            self.session.greet_again(self.now);
         }
-        may_pass || result.is_ok()
+        let collected = self.dispatcher.collect(0, &mut self.session, self.now);
+        collected.is_ok() && (may_pass || result.is_ok())
     }
 }
 
@@ -196,13 +214,16 @@ impl Target for Sessions {
         let layers = input.split_off_first().is_some_and(|first| first & 1 != 0);
         let new = if layers { Film::with_layers } else { Film::new };
         let film = new(2 * SIDE, SIDE, Window::full(2 * SIDE, SIDE)).expect("a small film");
+        let film = Mutex::new(film);
         let mut ends = Ends {
             session: Session::new(1, Duration::ZERO),
             card: Transport::card(),
-            picture: Picture::new(Scheduler::new(tiles.to_vec()), film, None),
+            dispatcher: Dispatcher::new(Scheduler::new(tiles.to_vec(), 1), vec![&film]),
             now: Duration::ZERO,
         };
-        let job = Job { image: &self.image, checksum: 0, frame: &self.frames[usize::from(layers)] };
+        let frame = &self.frames[usize::from(layers)];
+        let limits = PixelLimits::new(&header(), frame);
+        let job = Job { image: &self.image, checksum: 0, frame, limits };
         ends.session.start(job, ends.now);
         let mut was_loaded = false;
         while let Some((what, reply)) = next_record(&mut input) {
@@ -227,8 +248,13 @@ impl Target for Sessions {
             }
             was_loaded |= ends.session.is_loaded();
         }
-        let is_complete = ends.picture.scheduler().is_complete();
-        assert!(!is_complete || ends.picture.film().is_complete(), "a tile is done without its pixels");
+        let is_complete = ends.dispatcher.scheduler().is_complete();
+        let film = film.lock().expect("no thread has panicked");
+        assert!(!is_complete || film.is_complete(), "a tile is done without its pixels");
+        let is_finite =
+            |pixel: &PixelValue| pixel.radiance.iter().all(|value| value.is_finite() && *value >= 0.0);
+        assert!(film.pixels().iter().all(is_finite), "an impossible value has come into the film");
+        drop(film);
         let ended = (0..MOST_STEPS).any(|_| ends.step(true).is_err());
         assert!(ended || is_complete, "a silent card is waited for without end");
         was_loaded

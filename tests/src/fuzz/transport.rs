@@ -10,7 +10,7 @@ use super::target::{Target, bound};
 use super::{messages, mutation};
 
 /// The session of both ends.
-const SESSION: u16 = 7;
+const SESSION: u32 = 7;
 /// What the messages of the ends are.
 const MESSAGE: &[u8] = b"message";
 /// Frames that an end sends without hearing anything: its messages, and what it tells besides.
@@ -59,7 +59,7 @@ impl Frames {
             2 => header.sequence = header.sequence.wrapping_sub(random.below(6) as u16),
             3 => header.sequence ^= 1 << random.below(16),
             4 => header.acknowledged ^= 1 << random.below(16),
-            5 if random.once_in(4) => header.session = header.session.wrapping_add(random.below(3) as u16),
+            5 if random.once_in(4) => header.session = header.session.wrapping_add(random.below(3) as u32),
             6 => mutation::edit_bytes(&mut payload, &[], random),
             _ => {}
         }

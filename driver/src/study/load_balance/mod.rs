@@ -12,11 +12,14 @@ mod order;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::time::Duration;
 
-use photoncard_shared::message::Tile;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::PIXEL_BYTES;
 
 pub use self::order::TileOrder;
 use crate::scheduler::Scheduler;
+use crate::sink::FinishedTile;
 
 /// The links of all chips, which one host serves, one message at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -122,7 +125,7 @@ pub fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balanc
     }
     let costs: Vec<u128> = costs.iter().map(|&cost| nanoseconds(cost)).collect::<Result<_, _>>()?;
     let mut simulation = Simulation {
-        scheduler: Scheduler::new(order.tiles(&costs)),
+        scheduler: Scheduler::new(order.tiles(&costs), chips),
         credits,
         command: nanoseconds(link.command_seconds)?,
         result: nanoseconds(link.result_seconds)?,
@@ -157,8 +160,8 @@ struct Simulation {
     costs: Vec<u128>,
     chips: Vec<Chip>,
     chip_of_tile: Vec<usize>,
-    /// Results on their way: when they are at the host, of which chip, in order.
-    results: BinaryHeap<Reverse<(u128, usize)>>,
+    /// Results on their way: when they are at the host, of which chip and tile, in order.
+    results: BinaryHeap<Reverse<(u128, usize, u32)>>,
     /// Up to when the host has worked or waited.
     now: u128,
     /// How much of that it has worked.
@@ -172,25 +175,35 @@ impl Simulation {
             self.deal(chip);
         }
         // A result that is still to be made comes after the one that frees its credit: the heap's first is the next.
-        while let Some(Reverse((arrival, chip))) = self.results.pop() {
+        while let Some(Reverse((arrival, chip, id))) = self.results.pop() {
             self.now = self.now.max(arrival) + self.result;
             self.busy += self.result;
             self.chips[chip].tiles -= 1;
-            self.scheduler.complete();
+            self.receive(chip, id);
             self.deal(chip);
+        }
+    }
+
+    /// A result is at the host. What the scheduler knows of time is for cards that are lost or late: here none is.
+    fn receive(&mut self, chip: usize, id: u32) {
+        let finished = FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], false, Counters::ZERO);
+        if let Some(tile) = finished {
+            self.scheduler.answer(chip, tile, Duration::ZERO);
+            self.scheduler.complete(id);
         }
     }
 
     /// Sends tiles to a chip until it has no free credit, as a session does.
     fn deal(&mut self, chip: usize) {
         while self.chips[chip].tiles < self.credits {
-            let Some(Tile { id, .. }) = self.scheduler.take() else { break };
+            let Some(assignment) = self.scheduler.take(chip, Duration::ZERO) else { break };
+            let id = assignment.tile.id;
             self.now += self.command;
             self.busy += self.command;
             let at = &mut self.chips[chip];
             at.tiles += 1;
             at.done = at.done.max(self.now + self.latency) + self.costs[id as usize];
-            self.results.push(Reverse((at.done + self.latency, chip)));
+            self.results.push(Reverse((at.done + self.latency, chip, id)));
             self.chip_of_tile[id as usize] = chip;
         }
         // All that is dealt and not done has a result on its way.

@@ -18,9 +18,7 @@ pub enum TileOrder {
 impl TileOrder {
     /// Tiles of these costs in this order; a tile's number is its place in the picture.
     pub(super) fn tiles(self, costs: &[u128]) -> Vec<Tile> {
-        // Of a tile's place and size nothing is used.
-        let mut tiles: Vec<Tile> =
-            (0_u32..).zip(costs).map(|(id, _)| Tile { id, x: id, y: 0, width: 1, height: 1 }).collect();
+        let mut tiles: Vec<Tile> = (0_u32..).zip(costs).map(|(id, _)| tile(id)).collect();
         match self {
             Self::Picture => {}
             // Numbers of the hash come once each: the number of the tile breaks no tie.
@@ -30,4 +28,9 @@ impl TileOrder {
         }
         tiles
     }
+}
+
+/// The tile of a number: of its rectangle nothing is used.
+pub(super) fn tile(id: u32) -> Tile {
+    Tile { id, x: id, y: 0, width: 1, height: 1 }
 }

@@ -1,0 +1,122 @@
+//! What the threads of all cards share.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::exchange::WAIT;
+use super::{CardError, Observer, RenderError};
+use crate::dispatcher::Dispatcher;
+use crate::display::Display;
+use crate::partial::PartialRender;
+use crate::scheduler::{CardNumber, SchedulerError, Source, Standing, rectangles};
+
+/// What the threads of all cards share.
+pub(super) struct Crew<'a> {
+    pub(super) dispatcher: Dispatcher<'a>,
+    pub(super) observer: &'a dyn Observer,
+    pub(super) start: Instant,
+    /// What errors call each card.
+    pub(super) names: Vec<String>,
+    pub(super) partial: Option<&'a PartialRender>,
+    pub(super) display: Option<&'a Display>,
+    pub(super) failed: AtomicBool,
+}
+
+/// Ends the threads of the other cards if this one panics: they would wait for its tiles without end.
+pub(super) struct EndOthersOnPanic<'a>(pub(super) &'a AtomicBool);
+
+impl Drop for EndOthersOnPanic<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            // No thread waits for longer than a moment without looking at this.
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Crew<'_> {
+    /// Whether there is nothing left to do.
+    ///
+    /// # Errors
+    /// If the observer or the failure of a card has stopped the render.
+    pub(super) fn is_complete(&self) -> Result<bool, RenderError> {
+        if self.failed.load(Ordering::Relaxed) || self.observer.is_stopped() {
+            return Err(RenderError::Stopped);
+        }
+        if let Some(error) = self.display.and_then(Display::failure) {
+            self.observer.not_shown(&error);
+        }
+        if let Some(partial) = self.partial {
+            partial.check().map_err(|error| self.fail(error.into()))?;
+        }
+        Ok(self.dispatcher.scheduler().is_complete())
+    }
+
+    /// Waits until there is nothing left to do, not longer than `longest`. Returns whether that is so.
+    ///
+    /// # Errors
+    /// As [`Self::is_complete`].
+    pub(super) fn wait_for_end(&self, longest: Duration) -> Result<bool, RenderError> {
+        let begin = Instant::now();
+        while !self.is_complete()? {
+            let left = longest.saturating_sub(begin.elapsed());
+            if left.is_zero() {
+                return Ok(false);
+            }
+            // Nothing wakes this thread when the render is stopped.
+            self.dispatcher.wait(left.min(WAIT));
+        }
+        Ok(true)
+    }
+
+    /// Ends the threads of all cards with an error.
+    pub(super) fn fail(&self, error: RenderError) -> RenderError {
+        self.failed.store(true, Ordering::Relaxed);
+        error
+    }
+
+    /// A card is lost, or is used no more; the others go on with its tiles. `was_lost` says that this was told before.
+    ///
+    /// # Errors
+    /// If no other is left.
+    pub(super) fn lose(
+        &self,
+        card: CardNumber,
+        error: CardError,
+        standing: Standing,
+        was_lost: bool,
+    ) -> Result<(), RenderError> {
+        let mut scheduler = self.dispatcher.scheduler();
+        scheduler.set_standing(card, standing);
+        let is_last = !scheduler.has_living();
+        let crashed_at = scheduler.crashed_at();
+        drop(scheduler);
+        let name = self.names[card].clone();
+        if !is_last || was_lost && standing == Standing::Lost {
+            self.observer.lost(&name, &error);
+            return Ok(());
+        }
+        Err(self.fail(if crashed_at.is_empty() {
+            RenderError::Card { card: name, source: error }
+        } else {
+            RenderError::Unrendered { tiles: rectangles(&crashed_at) }
+        }))
+    }
+
+    /// The scheduler sees no way to go on.
+    pub(super) fn end(&self, error: SchedulerError) -> RenderError {
+        let name = |source: &Source| match *source {
+            Source::Card(card) => self.names[card].clone(),
+            Source::Kept => "the file of finished tiles".into(),
+        };
+        self.fail(match error {
+            SchedulerError::Disagreement { tile, sources } => RenderError::Disagreement {
+                tile: rectangles(&[tile]),
+                cards: sources.iter().map(name).collect::<Vec<_>>().join(" and "),
+            },
+            SchedulerError::KeptDiffers { tile } => RenderError::KeptDiffers { tile: rectangles(&[tile]) },
+            SchedulerError::Unverified { tile } => RenderError::Unverified { tile: rectangles(&[tile]) },
+            SchedulerError::Unrendered { tiles } => RenderError::Unrendered { tiles: rectangles(&tiles) },
+        })
+    }
+}

@@ -1,0 +1,32 @@
+//! Bytes between a session and its card's port.
+
+use std::time::{Duration, Instant};
+
+use photoncard_shared::link::Port;
+
+use crate::session::{Session, SessionError};
+
+/// How long a port may wait for a byte.
+pub(super) const WAIT: Duration = Duration::from_millis(20);
+
+/// Moves bytes once in each direction, and waits a little if there are none. `slowest` is what [`Session::tick`] takes.
+pub(super) fn exchange(
+    session: &mut Session,
+    port: &mut impl Port,
+    slowest: Option<f64>,
+    start: Instant,
+) -> Result<(), SessionError> {
+    session.prepare();
+    let sent = match session.outgoing() {
+        [] => 0,
+        outgoing => port.write(outgoing, WAIT).map_err(SessionError::Port)?,
+    };
+    session.sent(sent, start.elapsed());
+    let mut buffer = [0; 8192];
+    let wait = if session.has_more_to_send() || session.is_idle() { Duration::ZERO } else { WAIT };
+    match port.read(&mut buffer, wait).map_err(SessionError::Port)? {
+        0 => session.acknowledge(),
+        received => session.receive(&buffer[..received], start.elapsed())?,
+    }
+    session.tick(slowest, start.elapsed())
+}

@@ -1,0 +1,117 @@
+//! The first words with a card.
+
+use std::hash::{BuildHasher, RandomState};
+use std::time::{Duration, Instant};
+
+use photoncard_shared::budget::Budget;
+use photoncard_shared::link::PortError;
+use photoncard_shared::message::MemoryUse;
+
+use super::exchange::exchange;
+use super::open_card::OpenCard;
+use super::{CardAddress, CardError, Observer, RenderError, Unobserved};
+use crate::emulator::SharedImage;
+use crate::session::{Session, SessionError};
+
+/// A card that has said hello.
+pub(super) struct GreetedCard {
+    pub(super) card: OpenCard,
+    pub(super) session: Session<'static>,
+    pub(super) budget: Budget,
+}
+
+/// Why there is no hello.
+pub(super) enum GreetingError {
+    /// The card is at fault.
+    Card(CardError),
+    /// The observer stopped the render.
+    Stopped,
+}
+
+impl From<CardError> for GreetingError {
+    fn from(error: CardError) -> Self {
+        Self::Card(error)
+    }
+}
+
+/// What a card says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CardInfo {
+    /// Name and version of its firmware.
+    pub build: String,
+    /// What it can hold.
+    pub budget: Budget,
+    /// What its firmware takes of on-chip memory; `None` of a card that does not measure it.
+    pub memory_use: Option<MemoryUse>,
+}
+
+/// Says hello to the first card at an address.
+///
+/// # Errors
+/// If it cannot be started or reached, or does not answer as it should.
+pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
+    let GreetedCard { session, budget, .. } = greet_alone(address, open(address)?, Instant::now())?;
+    Ok(CardInfo { build: session.build().to_owned(), budget, memory_use: session.memory_use() })
+}
+
+/// Says hello to the first card at an address some times. Returns how long each answer took.
+///
+/// # Errors
+/// If it cannot be started or reached, or does not answer as it should.
+pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, RenderError> {
+    let mut card = open(address)?;
+    let mut answers = Vec::with_capacity(count);
+    for _ in 0..count {
+        let start = Instant::now();
+        card = greet_alone(address, card, start)?.card;
+        answers.push(start.elapsed());
+    }
+    Ok(answers)
+}
+
+fn open(address: &CardAddress) -> Result<OpenCard, RenderError> {
+    let card = OpenCard::open(0, address, None, &SharedImage::default(), None);
+    card.map_err(|source| RenderError::Card { card: card_name(0, address), source })
+}
+
+fn greet_alone(address: &CardAddress, card: OpenCard, start: Instant) -> Result<GreetedCard, RenderError> {
+    greet(card, start, &Unobserved).map_err(|error| match error {
+        GreetingError::Card(source) => RenderError::Card { card: card_name(0, address), source },
+        GreetingError::Stopped => RenderError::Stopped,
+    })
+}
+
+/// What errors call a card: its number, and its address if it is not emulated.
+pub(super) fn card_name(index: usize, address: &CardAddress) -> String {
+    match address {
+        CardAddress::Emulated { .. } => format!("card {index}"),
+        CardAddress::Remote(address) => format!("card {index} ({address})"),
+    }
+}
+
+/// Says hello and waits for the answer.
+pub(super) fn greet(
+    mut card: OpenCard,
+    start: Instant,
+    observer: &dyn Observer,
+) -> Result<GreetedCard, GreetingError> {
+    let mut session = Session::new(session_number(), start.elapsed());
+    loop {
+        if let Some(&budget) = session.budget() {
+            return Ok(GreetedCard { card, session, budget });
+        }
+        if observer.is_stopped() {
+            return Err(GreetingError::Stopped);
+        }
+        exchange(&mut session, &mut card, None, start).map_err(|error| match error {
+            SessionError::Port(PortError::Closed) => CardError::Refused,
+            error => CardError::Session(error),
+        })?;
+    }
+}
+
+/// A random number: no card or line holds anything of another session of that number, but by a chance of one in 2^32.
+fn session_number() -> u32 {
+    // The standard library's hashers have random keys.
+    RandomState::new().hash_one(std::process::id()) as u32
+}

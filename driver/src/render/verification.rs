@@ -1,0 +1,48 @@
+//! Tiles that two cards render, to see whether they agree.
+
+use photoncard_shared::message::Tile;
+
+use super::{RenderError, RenderSettings};
+use crate::scheduler::{GatherOrder, Scheduler};
+
+impl RenderSettings {
+    /// Checks that tiles can be verified, if they are to be.
+    ///
+    /// # Errors
+    /// If there are not two cards, the share is none, or reads are counted, which would be those of both cards.
+    pub fn check_verification(&self) -> Result<(), RenderError> {
+        let Some(share) = self.verify else { return Ok(()) };
+        let chips: usize = self.cards.iter().map(|card| card.emulated_chips().max(1)).sum();
+        let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
+            ["a share of the tiles is above 0 and at most 1", "give a number such as 0.02"]
+        } else if self.order == GatherOrder::Hilbert {
+            ["with --order hilbert the host does the gathers, and no card a whole tile", "use --order sort"]
+        } else if chips < 2 {
+            ["a tile is verified by a second card", "give two --card or more, or --card emulated:2"]
+        } else if self.modelled_caches().is_some() {
+            ["memory is counted of each tile once", "leave --counters, --cache and --trace out"]
+        } else {
+            return Ok(());
+        };
+        let (value, reason, remedy) = (share.to_string(), reason.into(), remedy.into());
+        Err(RenderError::Setting { option: "--verify", value, reason, remedy })
+    }
+
+    /// Cards that must have said hello.
+    pub(super) fn needed_cards(&self) -> usize {
+        if self.verify.is_some() { 2 } else { 1 }
+    }
+
+    /// Deals tiles to so many cards. Where memory is modelled each tile is rendered once: all reads are counted.
+    pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
+        let scheduler = Scheduler::new(tiles, cards);
+        if self.modelled_caches().is_some() {
+            return scheduler;
+        }
+        let scheduler = scheduler.with_helpers();
+        match self.verify {
+            Some(share) => scheduler.verifying(share, self.seed),
+            None => scheduler,
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Whether a render can go on.
+
+use std::time::Duration;
+
+use photoncard_shared::message::Tile;
+
+use super::card::Standing;
+use super::dealing::COMPARED_AT_ONCE;
+use super::entry::{Entry, Progress};
+use super::{CRASHES_APART, Scheduler, SchedulerError};
+
+/// How long a card that is lost is waited for where no other can go on.
+const WAIT_FOR_LOST: Duration = Duration::from_secs(30);
+
+impl Scheduler {
+    /// Checks that the render can go on, as far as cards are left.
+    ///
+    /// # Errors
+    /// If cards contradict each other, or none can render the tiles that are left.
+    pub fn check(&mut self, now: Duration) -> Result<(), SchedulerError> {
+        if let Some(error) = self.undecidable() {
+            return Err(error);
+        }
+        if self.can_go_on() {
+            self.stuck_since = None;
+            return Ok(());
+        }
+        let since = *self.stuck_since.get_or_insert(now);
+        let is_any = |standing| self.cards.iter().any(|card| card.standing == standing);
+        let may_come_back = is_any(Standing::Lost) && now.saturating_sub(since) < WAIT_FOR_LOST;
+        if !is_any(Standing::Living) || may_come_back { Ok(()) } else { Err(self.what_is_left()) }
+    }
+
+    /// A tile that cards render differently, with none left to decide.
+    fn undecidable(&self) -> Option<SchedulerError> {
+        let disputed = self.compared.iter().take(COMPARED_AT_ONCE).map(|&index| &self.entries[index]);
+        let can_decide = |entry: &Entry| {
+            let mut cards = self.cards.iter().enumerate();
+            cards.any(|(number, card)| card.standing != Standing::GivenUp && !entry.has_answer_of(number))
+        };
+        let entry = disputed.into_iter().find(|entry| entry.is_disputed() && !can_decide(entry))?;
+        let sources = entry.answers.iter().map(|answer| answer.source).collect();
+        Some(SchedulerError::Disagreement { tile: entry.tile, sources })
+    }
+
+    /// Whether any card is at work, or can have a tile.
+    fn can_go_on(&self) -> bool {
+        let is_at_work = || self.cards.iter().any(|card| !card.tiles.is_empty());
+        if self.is_complete() || !self.waiting.is_empty() || is_at_work() {
+            return true;
+        }
+        let can_compare = || {
+            let mut compared = self.compared.iter();
+            compared.any(|&index| self.living().any(|card| self.is_for(card, index)))
+        };
+        !self.set_apart.is_empty() && self.living().next().is_some() || can_compare()
+    }
+
+    /// Why the tiles that are left cannot be rendered.
+    fn what_is_left(&self) -> SchedulerError {
+        match self.open_entries().find(|entry| !entry.answers.is_empty()) {
+            Some(entry) if entry.is_disputed() => {
+                let sources = entry.answers.iter().map(|answer| answer.source).collect();
+                SchedulerError::Disagreement { tile: entry.tile, sources }
+            }
+            Some(entry) => SchedulerError::Unverified { tile: entry.tile },
+            None => SchedulerError::Unrendered { tiles: self.crashed_at() },
+        }
+    }
+
+    /// The tiles that are left, if cards have crashed at each often enough for it to be set apart.
+    pub fn crashed_at(&self) -> Vec<Tile> {
+        let left = || self.entries.iter().filter(|entry| !matches!(entry.progress, Progress::Done(_)));
+        if left().any(|entry| entry.crashes.len() < CRASHES_APART) {
+            return Vec::new();
+        }
+        left().map(|entry| entry.tile).collect()
+    }
+}

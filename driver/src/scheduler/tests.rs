@@ -1,0 +1,187 @@
+use photoncard_shared::message::PIXEL_BYTES;
+
+use super::*;
+
+const SECOND: Duration = Duration::from_secs(1);
+
+/// A scheduler of so many tiles of a pixel each.
+fn scheduler(tiles: u32, cards: usize) -> Scheduler {
+    Scheduler::new((0..tiles).map(tile).collect(), cards)
+}
+
+fn tile(id: u32) -> Tile {
+    Tile { id, x: id, y: 0, width: 1, height: 1 }
+}
+
+fn finished(id: u32, value: u8) -> FinishedTile {
+    let counters = Counters { eye_rays: 10, drains: u64::from(value), ..Counters::ZERO };
+    FinishedTile::new(tile(id), vec![value; PIXEL_BYTES], false, counters).unwrap()
+}
+
+/// Takes a tile for a card.
+fn take(scheduler: &mut Scheduler, card: CardNumber, now: Duration) -> Option<u32> {
+    scheduler.take(card, now).map(|assignment| assignment.tile.id)
+}
+
+/// Answers with a tile, which the sinks take. Returns who has lied.
+fn answer(scheduler: &mut Scheduler, card: CardNumber, id: u32, value: u8, now: Duration) -> Vec<CardNumber> {
+    let answered = scheduler.answer(card, finished(id, value), now);
+    scheduler.complete(id);
+    answered.liars
+}
+
+#[test]
+fn an_idle_card_takes_what_is_at_another_for_too_long_and_the_first_answer_counts() {
+    let mut scheduler = scheduler(4, 3).with_helpers();
+    for (card, id) in [(0, 0), (1, 1), (1, 2), (2, 3)] {
+        assert_eq!(take(&mut scheduler, card, Duration::ZERO), Some(id));
+    }
+    answer(&mut scheduler, 2, 3, 0, SECOND);
+    // A tile took a second: two are to pass.
+    assert_eq!(take(&mut scheduler, 2, 3 * SECOND / 2), None);
+    assert_eq!(take(&mut scheduler, 2, 2 * SECOND), Some(0));
+    assert_eq!(take(&mut scheduler, 2, 9 * SECOND), None, "it is at work");
+    answer(&mut scheduler, 2, 0, 0, 3 * SECOND);
+    answer(&mut scheduler, 0, 0, 0, 4 * SECOND);
+    assert_eq!((scheduler.counts().repeated, scheduler.counters().eye_rays), (1, 20));
+    // The second tile of a card is not late before the first is done.
+    answer(&mut scheduler, 1, 1, 0, 5 * SECOND);
+    assert_eq!(take(&mut scheduler, 0, 6 * SECOND), None);
+    answer(&mut scheduler, 1, 2, 0, 6 * SECOND);
+    assert!(scheduler.is_complete() && scheduler.counters().eye_rays == 40);
+}
+
+#[test]
+fn without_helpers_no_tile_is_rendered_twice() {
+    let mut scheduler = scheduler(1, 2);
+    assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));
+    assert_eq!(take(&mut scheduler, 1, 1000 * SECOND), None);
+}
+
+#[test]
+fn a_majority_of_three_tells_who_lies_and_all_its_tiles_are_rendered_again() {
+    for liar in 0..3 {
+        let mut scheduler = scheduler(2, 3).verifying(1e-9, 7);
+        let verified = scheduler.entries.iter().position(|entry| entry.is_verified).unwrap() as u32;
+        // The liar renders the tile that is not verified, and differs in the one that is.
+        let [second, third] = [(liar + 1) % 3, (liar + 2) % 3];
+        let [first, other] = if verified == 0 { [second, liar] } else { [liar, second] };
+        assert_eq!(
+            [take(&mut scheduler, first, SECOND), take(&mut scheduler, other, SECOND)],
+            [Some(0), Some(1)]
+        );
+        answer(&mut scheduler, liar, 1 - verified, 1, SECOND);
+        answer(&mut scheduler, second, verified, 0, SECOND);
+        assert_eq!(take(&mut scheduler, liar, SECOND), Some(verified));
+        assert!(answer(&mut scheduler, liar, verified, 1, SECOND).is_empty());
+        assert!(scheduler.check(SECOND).is_ok(), "a third card is left");
+        assert_eq!(take(&mut scheduler, third, SECOND), Some(verified));
+        assert_eq!(answer(&mut scheduler, third, verified, 0, SECOND), [liar]);
+        assert_eq!(scheduler.expel(liar, tile(verified)), [tile(1 - verified)]);
+        assert_eq!((scheduler.progress(), scheduler.lie_of(liar)), ((1, 2), Some(tile(verified))));
+        assert_eq!(
+            [take(&mut scheduler, liar, SECOND), take(&mut scheduler, third, SECOND)],
+            [None, Some(1 - verified)]
+        );
+        answer(&mut scheduler, third, 1 - verified, 0, SECOND);
+        assert!(scheduler.is_complete() && scheduler.counters().eye_rays == 20);
+    }
+}
+
+#[test]
+fn two_cards_that_differ_cannot_be_told_apart() {
+    let mut scheduler = scheduler(1, 2).verifying(1.0, 0);
+    for card in 0..2 {
+        assert!(scheduler.check(SECOND).is_ok());
+        assert_eq!(take(&mut scheduler, card, Duration::ZERO), Some(0));
+        assert!(answer(&mut scheduler, card, 0, card as u8, SECOND).is_empty());
+        assert_eq!(take(&mut scheduler, card, SECOND), None, "a card does not verify itself");
+    }
+    let sources = vec![Source::Card(0), Source::Card(1)];
+    assert_eq!(scheduler.check(SECOND), Err(SchedulerError::Disagreement { tile: tile(0), sources }));
+}
+
+#[test]
+fn work_that_differs_is_a_lie_but_for_how_gathers_wait() {
+    for (counters, agrees) in [
+        (Counters { eye_rays: 10, drains: 7, most_waiting: 9, ..Counters::ZERO }, true),
+        (Counters { eye_rays: 11, ..Counters::ZERO }, false),
+    ] {
+        let mut scheduler = scheduler(1, 2).verifying(1.0, 0);
+        let mut other = finished(0, 0);
+        other.counters = counters;
+        for (card, tile) in [finished(0, 0), other].into_iter().enumerate() {
+            assert_eq!(take(&mut scheduler, card, Duration::ZERO), Some(0));
+            scheduler.answer(card, tile, SECOND);
+            scheduler.complete(0);
+        }
+        assert_eq!(scheduler.is_complete(), agrees);
+    }
+}
+
+#[test]
+fn a_share_of_the_tiles_is_verified_and_one_at_least() {
+    let verified = |share, seed| {
+        let scheduler = scheduler(10_000, 2).verifying(share, seed);
+        scheduler.entries.iter().map(|entry| entry.is_verified).collect::<Vec<_>>()
+    };
+    let count = |share| verified(share, 1).iter().filter(|&&is_verified| is_verified).count();
+    assert_eq!([count(1e-12), count(1.0)], [1, 10_000]);
+    assert!((150..250).contains(&count(0.02)), "{}", count(0.02));
+    assert!(verified(0.02, 1) == verified(0.02, 1) && verified(0.02, 1) != verified(0.02, 2));
+}
+
+#[test]
+fn a_tile_that_has_taken_two_cards_waits_until_all_others_are_done() {
+    let mut scheduler = scheduler(3, 4);
+    for card in 0..2 {
+        assert_eq!(take(&mut scheduler, card, SECOND), Some(0));
+        scheduler.give_back(card, 0, true, SECOND);
+        scheduler.set_standing(card, Standing::GivenUp);
+    }
+    assert_eq!([take(&mut scheduler, 2, SECOND), take(&mut scheduler, 2, SECOND)], [Some(1), Some(2)]);
+    assert_eq!(take(&mut scheduler, 3, SECOND), None);
+    answer(&mut scheduler, 2, 1, 0, SECOND);
+    assert_eq!(take(&mut scheduler, 3, SECOND), None);
+    answer(&mut scheduler, 2, 2, 0, SECOND);
+    for card in [3, 2, 2] {
+        assert!(scheduler.check(SECOND).is_ok());
+        let other = 5 - card;
+        let is_next = scheduler.entries[0].crashes_of(card) <= scheduler.entries[0].crashes_of(other);
+        assert!(is_next && take(&mut scheduler, card, SECOND) == Some(0));
+        scheduler.give_back(card, 0, true, SECOND);
+        if card == 2 {
+            scheduler.set_standing(3, Standing::GivenUp);
+        }
+    }
+    assert_eq!(scheduler.check(SECOND), Err(SchedulerError::Unrendered { tiles: vec![tile(0)] }));
+}
+
+#[test]
+fn kept_tiles_are_verified_by_one_card() {
+    let window = crate::film::Window::full(2, 1);
+    let mut film = Film::new(2, 1, window).unwrap();
+    film.write(0, 0, crate::film::PixelValue::default()).unwrap();
+    film.write(1, 0, crate::film::PixelValue::default()).unwrap();
+    assert!(scheduler(2, 1).with_kept(&film).is_complete());
+    for (values, end) in [([0, 0], None), ([1, 1], Some(SchedulerError::KeptDiffers { tile: tile(0) }))] {
+        let mut scheduler = Scheduler::new(vec![tile(0)], 2).verifying(1.0, 0).with_kept(&film);
+        let mut fault = None;
+        for (card, value) in values.into_iter().enumerate() {
+            if take(&mut scheduler, card, SECOND).is_some() {
+                fault = scheduler.answer(card, finished(0, value), SECOND).fault;
+            }
+        }
+        assert_eq!((fault, scheduler.is_complete()), (end, values == [0, 0]));
+    }
+}
+
+#[test]
+fn a_card_has_time_as_its_own_tiles_or_those_of_others_tell() {
+    let mut scheduler = scheduler(3, 2);
+    assert_eq!(scheduler.slowest(0), None);
+    take(&mut scheduler, 0, Duration::ZERO);
+    answer(&mut scheduler, 0, 0, 0, SECOND);
+    // Ten rays took a second.
+    assert_eq!([scheduler.slowest(0), scheduler.slowest(1)], [Some(0.1 * 50.0), Some(0.1 * 1000.0)]);
+}

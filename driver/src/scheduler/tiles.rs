@@ -1,0 +1,94 @@
+//! The tiles of a picture, and the orders of the gathers in them.
+
+use photoncard_shared::message::{Drain, Tile};
+
+use crate::film::Window;
+
+/// In which order photon gathers are done. The picture is the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GatherOrder {
+    /// Pixels along scanlines, the rays of each in the sampler's order.
+    Naive,
+    /// The same within square tiles.
+    Tiled,
+    /// Within a tile, the rays of one direction bin for all pixels, then those of the next.
+    DirectionBins,
+    /// Rays by direction bins; gathers wait in the queue and are done by a spatial hash of their place.
+    Hash,
+    /// Rays by direction bins; gathers wait in the queue and are done along a Hilbert curve.
+    Sort,
+    /// All gathers of the frame along one Hilbert curve: on emulated cards alone, which leave them to the host.
+    Hilbert,
+}
+
+impl GatherOrder {
+    /// When a chip does its gathers.
+    pub fn drain(self) -> Drain {
+        match self {
+            Self::Naive | Self::Tiled | Self::DirectionBins => Drain::Immediate,
+            Self::Hash => Drain::Hash,
+            Self::Sort | Self::Hilbert => Drain::Sort,
+        }
+    }
+
+    /// Returns whether gathers wait in a chip's queue.
+    pub fn has_queue(self) -> bool {
+        matches!(self, Self::Hash | Self::Sort)
+    }
+
+    /// Returns whether rays are cast by direction bins.
+    pub fn has_bins(self) -> bool {
+        !matches!(self, Self::Naive | Self::Tiled)
+    }
+}
+
+/// The tiles of a window, each at most `side * side` pixels, numbered from 0.
+pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
+    let side = side.max(1);
+    let (tile_width, tile_height) = match order {
+        GatherOrder::Naive => (side.saturating_mul(side), 1),
+        _ => (side, side),
+    };
+    let mut tiles = Vec::new();
+    for y in (window.y0..window.y1).step_by(tile_height as usize) {
+        for x in (window.x0..window.x1).step_by(tile_width as usize) {
+            tiles.push(Tile {
+                id: tiles.len() as u32,
+                x,
+                y,
+                width: tile_width.min(window.x1 - x),
+                height: tile_height.min(window.y1 - y),
+            });
+        }
+    }
+    tiles
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        let window = Window { x0: 3, x1: 40, y0: 5, y1: 22 };
+        for order in [GatherOrder::Naive, GatherOrder::Tiled] {
+            for side in [1, 2, 8, 16, 100] {
+                let mut covered = vec![0; 40 * 22];
+                for tile in tiles(window, side, order) {
+                    assert!(tile.pixels() <= (side * side) as u64);
+                    for y in tile.y..tile.y + tile.height {
+                        for x in tile.x..tile.x + tile.width {
+                            covered[(y * 40 + x) as usize] += 1;
+                        }
+                    }
+                }
+                for y in 0..22 {
+                    for x in 0..40 {
+                        let inside = (3..40).contains(&x) && (5..22).contains(&y);
+                        assert_eq!(covered[y * 40 + x], usize::from(inside));
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Tiles that two cards render, to see whether they agree.
+
+mod support;
+
+use support::{Room, shipped};
+
+const PICTURE: [&str; 8] =
+    ["--size", "64x64", "--photons", "2000", "--gather-rays", "20", "--quiet", "--stats=a.json"];
+
+fn statistics(room: &Room) -> serde_json::Value {
+    serde_json::from_slice(&room.read("a.json")).unwrap()
+}
+
+#[test]
+fn honest_cards_of_any_kind_agree_and_the_picture_is_the_same() {
+    let cornell = shipped("cornell.gltf");
+    let rendered = |options: &[&str]| {
+        let room = Room::new();
+        let outcome = room.run(&[&["render", &cornell, "-o", "a.exr"][..], &PICTURE, options].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        (room.read("a.exr"), statistics(&room))
+    };
+    let (expected, alone) = rendered(&["--card", "emulated:1"]);
+    let cards = ["--card", "emulated:1", "--card", "emulated-micro:1"];
+    for (share, verified) in [("1", 16..=16), ("0.000001", 1..=1)] {
+        for technique in [&[][..], &["--irradiance-cache", "on"]] {
+            let (found, statistics) = rendered(&[&cards[..], technique, &["--verify", share]].concat());
+            assert!(technique.len() > 0 || found == expected, "--verify {share}");
+            let tiles = statistics["verified_tiles"].as_u64().unwrap();
+            assert!(verified.contains(&tiles), "{tiles} tiles are verified");
+            assert!(statistics["repeated_tiles"].as_u64().unwrap() >= tiles);
+            assert_eq!(statistics["cards_given_up"], 0);
+            if technique.is_empty() {
+                assert_eq!(
+                    [&statistics["rays"], &statistics["gathers"]],
+                    [&alone["rays"], &alone["gathers"]]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_verified_is_refused_in_words() {
+    let cornell = shipped("cornell.gltf");
+    for (options, words) in [
+        (&["--verify", "0.5", "--card", "emulated:1"][..], "a second card"),
+        (&["--verify", "0", "--card", "emulated:2"], "above 0 and at most 1"),
+        (&["--verify", "nan", "--card", "emulated:2"], "above 0 and at most 1"),
+        (&["--verify", "1", "--card", "emulated:2", "--counters"], "leave --counters"),
+        (&["--verify", "1", "--card", "emulated:2", "--order", "hilbert"], "--order sort"),
+    ] {
+        let room = Room::new();
+        let outcome = room.run(&[&["render", &cornell, "-o", "a.exr"][..], &PICTURE, options].concat());
+        assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains("--verify") && outcome.stderr.contains(words), "{}", outcome.stderr);
+        assert!(room.names().is_empty());
+    }
+}
