@@ -1,6 +1,6 @@
 //! The photon map: photons, trees above them, caustics and irradiance points as sections of the card image.
 //!
-//! It stands above what it joins: [`crate::pack`] writes sections, [`crate::photon`] traces photons, and [`crate::density`]
+//! It stands above what it joins: [`crate::pack`] writes sections, [`crate::photon`] traces photons, and `density`
 //! measures what a gather on the chip knows beyond them, its greatest distance and the disc fractions.
 
 mod budget;
