@@ -25,7 +25,7 @@ fn honest_cards_of_any_kind_agree_and_the_picture_is_the_same() {
     for (share, verified) in [("1", 16..=16), ("0.000001", 1..=1)] {
         for technique in [&[][..], &["--irradiance-cache", "on"]] {
             let (found, statistics) = rendered(&[&cards[..], technique, &["--verify", share]].concat());
-            assert!(technique.len() > 0 || found == expected, "--verify {share}");
+            assert!(!technique.is_empty() || found == expected, "--verify {share}");
             let tiles = statistics["verified_tiles"].as_u64().unwrap();
             assert!(verified.contains(&tiles), "{tiles} tiles are verified");
             assert!(statistics["repeated_tiles"].as_u64().unwrap() >= tiles);

@@ -20,7 +20,7 @@ impl<'a> Corners<'a> {
     }
 
     /// Error of each corner's record at a surface point, infinite without a record. Radii are clamped by neighbours'
-    /// (Křivánek 2006): by the triangle inequality, R_i <= R_j + |p_i - p_j|.
+    /// (Křivánek 2006): by the triangle inequality, `R_i <= R_j + |p_i - p_j|`.
     pub(super) fn errors(&self, allowed: f32, position: Vec3, normal: Vec3) -> impl Iterator<Item = f32> {
         self.0
             .map(|record| {

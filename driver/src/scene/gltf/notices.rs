@@ -10,8 +10,9 @@ use super::document::Document;
 use super::extensions::SUPPORTED_EXTENSIONS;
 use super::light;
 use super::material::{has_dark_texture, is_transmissive};
+use super::names::mesh_name;
+use super::not_finite::NotFinite;
 use super::primitive::Topology;
-use super::vertex::NotFinite;
 
 /// Names listed in one notice; the others are counted.
 const LISTED: usize = 8;
@@ -100,11 +101,6 @@ impl Notices {
         }
         sentences
     }
-}
-
-/// The mesh's name, or `mesh N`.
-pub(super) fn mesh_name(root: &json::Root, mesh: usize) -> String {
-    root.meshes[mesh].name.clone().unwrap_or_else(|| format!("mesh {mesh}"))
 }
 
 /// What of the materials is not used.

@@ -6,7 +6,8 @@ use std::cell::Cell;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::accessor::Source;
-use super::notices::mesh_name;
+use super::names::mesh_name;
+use super::not_finite::NotFinite;
 use super::pose::Pose;
 use super::primitive::Primitive;
 use super::transform::Transform;
@@ -29,13 +30,6 @@ pub(super) struct VertexReader<'r, 'a> {
     pub(super) primitive: &'r Primitive<'a>,
     /// Whether any normal or colour that was read was not finite.
     pub(super) not_finite: NotFinite<Cell<bool>>,
-}
-
-/// Something for each of the attributes that are read even where they are not finite.
-#[derive(Default)]
-pub(super) struct NotFinite<T> {
-    pub(super) normals: T,
-    pub(super) colours: T,
 }
 
 impl VertexReader<'_, '_> {
