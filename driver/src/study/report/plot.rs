@@ -1,7 +1,7 @@
 //! Plots of lines and markers, drawn as stand-alone SVG.
 //!
 //! A plot has one or several panels side by side over one legend. It is drawn without a font at hand: the room for
-//! text is that of the widest common fonts.
+//! text is sized for the widest common fonts.
 
 mod axis;
 mod data;
@@ -23,20 +23,20 @@ use super::markup::escape;
 /// Space around the drawing and between its parts, in pixels.
 const MARGIN: f64 = 14.0;
 const TITLE_GAP: f64 = 6.0;
-/// The widths of the plotting areas of a lone panel and of one of several, in pixels.
+/// Widths of the plotting area of a single panel, and of one of several, in pixels.
 const LONE_WIDTH: f64 = 560.0;
 const PANEL_WIDTH: f64 = 390.0;
 
-/// A figure: panels side by side that share a legend. Series of the same name look the same in all of them.
+/// A figure: panels side by side that share a legend. Series of one name have one style in all panels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
-    /// What the figure shows.
+    /// Title of the figure.
     pub title: String,
-    /// How to read it; empty if there is nothing to say.
+    /// Caption that explains the figure; may be empty.
     pub caption: String,
-    /// From left to right.
+    /// Panels from left to right.
     pub panels: Vec<Panel>,
-    /// Whether panels of the same vertical scale get the same vertical range.
+    /// True if panels of equal vertical scale share one vertical range.
     pub shares_y_range: bool,
 }
 
@@ -53,68 +53,68 @@ pub struct Panel {
     pub series: Vec<Series>,
 }
 
-/// What is told horizontally.
+/// Horizontal axis of a panel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct XAxis {
-    /// The quantity.
+    /// Name of the quantity.
     pub label: String,
-    /// Its unit; empty where there is none.
+    /// Unit of the quantity; empty where there is none.
     pub unit: String,
-    /// How values map to places.
+    /// Mapping of values to positions.
     pub scale: XScale,
 }
 
-/// How horizontal values map to places.
+/// Mapping of horizontal values to positions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum XScale {
-    /// Evenly.
+    /// Linear.
     Linear,
-    /// By their logarithm, labelled at powers of two.
+    /// Logarithmic, labelled at powers of two.
     Log2,
-    /// By their logarithm, labelled at 1, 2 and 5 times powers of ten.
+    /// Logarithmic, labelled at 1, 2 and 5 times powers of ten.
     Log10,
-    /// By name: a point's `x` is the index of its name.
+    /// Named categories: a point's `x` is the index of its category's name.
     Categories(Vec<String>),
 }
 
-/// What is told vertically.
+/// Vertical axis of a panel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct YAxis {
-    /// The quantity.
+    /// Name of the quantity.
     pub label: String,
-    /// Its unit; empty where there is none.
+    /// Unit of the quantity; empty where there is none.
     pub unit: String,
-    /// How values map to places.
+    /// Mapping of values to positions.
     pub scale: YScale,
 }
 
-/// How vertical values map to places.
+/// Mapping of vertical values to positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum YScale {
-    /// Evenly, over the range of the data.
+    /// Linear over the range of the data.
     Linear,
-    /// Evenly, over a range that holds zero.
+    /// Linear over the range of the data and zero.
     LinearFromZero,
-    /// By their logarithm, labelled at 1, 2 and 5 times powers of ten.
+    /// Logarithmic, labelled at 1, 2 and 5 times powers of ten.
     Log10,
 }
 
 /// A named line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// What the legend calls it; a series without a name is not in the legend.
+    /// Name in the legend; empty leaves the series out of the legend.
     pub name: String,
-    /// In the order in which the line joins them.
+    /// Points in the order in which the line joins them.
     pub points: Vec<Point>,
 }
 
-/// A value, in the units of the axes. Values that are not finite, and those of zero or less on a logarithmic axis,
-/// are left out of the drawing, which says so.
+/// A point of a series, in the units of the axes. Points that are not finite, or not positive on a logarithmic axis,
+/// are left out of the drawing, and a note says so.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Horizontally.
+    /// Horizontal value.
     pub x: f64,
-    /// Vertically.
+    /// Vertical value.
     pub y: f64,
     /// Half the width of the confidence interval of `y`: the extent of the error bar in both directions.
     pub half_width: Option<f64>,
@@ -165,7 +165,7 @@ impl Plot {
         self.document(width, top + MARGIN, &body)
     }
 
-    /// The panels, laid out, and what is left out of them.
+    /// The panels, laid out, and the points that are left out of them.
     fn drawings<'a>(&'a self, names: &[&'a str]) -> (Vec<Drawing<'a>>, Vec<LeftOut<'a>>) {
         let area = if self.panels.len() == 1 { LONE_WIDTH } else { PANEL_WIDTH };
         let (mut all_data, mut all_left_out) = (Vec::new(), Vec::new());
@@ -215,7 +215,7 @@ impl Plot {
         )
     }
 
-    /// What the plot shows, for those who cannot see it.
+    /// Description of the plot for readers who cannot see it: SVG's `desc`.
     fn description(&self) -> String {
         let mut parts = Vec::new();
         if !self.caption.is_empty() {
@@ -239,7 +239,7 @@ impl Plot {
     }
 }
 
-/// The quantity with its unit, and with the power of ten that the tick labels leave out.
+/// Label of an axis: the quantity, the power of ten that the tick labels leave out, and the unit.
 fn axis_label(label: &str, unit: &str, omitted_exponent: i32) -> String {
     let factor = match omitted_exponent {
         0 => String::new(),
@@ -251,7 +251,7 @@ fn axis_label(label: &str, unit: &str, omitted_exponent: i32) -> String {
     }
 }
 
-/// Says which points are missing, and why.
+/// Notes on the points that are left out, with the reasons.
 fn notes(left_out: &[LeftOut]) -> Vec<String> {
     let mut notes = Vec::new();
     for (reason, why) in [
