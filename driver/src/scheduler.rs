@@ -1,7 +1,7 @@
-//! Which card renders which tile.
+//! Scheduler of tiles over cards, and the orders of photon gathers.
 //!
-//! Tiles wait in one queue. A card with a free credit takes the next one; no card waits for another, and results come in
-//! any order. A tile's pixels do not depend on who renders it, nor when.
+//! Tiles wait in one queue. A card with a free credit takes the next one; no card waits for another, and results come
+//! in any order. A tile's pixels depend neither on the card that renders it nor on the time.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -11,25 +11,26 @@ use photoncard_shared::message::{Drain, Tile};
 
 use crate::film::Window;
 
-/// In which order photon gathers are done. The picture is the same.
+/// Order of the photon gathers. It does not change the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GatherOrder {
     /// Pixels along scanlines, the rays of each in the sampler's order.
     Naive,
-    /// The same within square tiles.
+    /// Pixels along the scanlines of square tiles, the rays of each in the sampler's order.
     Tiled,
-    /// Within a tile, the rays of one direction bin for all pixels, then those of the next.
+    /// Within a tile, the rays of one direction bin for all pixels, then the rays of the next bin.
     DirectionBins,
-    /// Rays by direction bins; gathers wait in the queue and are done by a spatial hash of their place.
+    /// Rays by direction bins; gathers wait in the chip's queue and are done in the order of a spatial hash of their
+    /// positions.
     Hash,
-    /// Rays by direction bins; gathers wait in the queue and are done along a Hilbert curve.
+    /// Rays by direction bins; gathers wait in the chip's queue and are done along a Hilbert curve.
     Sort,
-    /// All gathers of the frame along one Hilbert curve: on emulated cards alone, which leave them to the host.
+    /// All gathers of the frame along one Hilbert curve: for emulated cards alone, which leave them to the host.
     Hilbert,
 }
 
 impl GatherOrder {
-    /// When a chip does its gathers.
+    /// Policy by which a chip drains its queue of gathers.
     pub fn drain(self) -> Drain {
         match self {
             Self::Naive | Self::Tiled | Self::DirectionBins => Drain::Immediate,
@@ -38,13 +39,13 @@ impl GatherOrder {
         }
     }
 
-    /// Whether rays are cast by direction bins.
+    /// Returns whether rays are cast by direction bins.
     pub fn has_bins(self) -> bool {
         !matches!(self, Self::Naive | Self::Tiled)
     }
 }
 
-/// The tiles of a window, each at most `side * side` pixels, numbered from 0.
+/// The tiles of a window, numbered from 0: squares of `side`, or in the naive order rows of up to `side * side` pixels.
 pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     let side = side.max(1);
     let (tile_width, tile_height) = match order {
@@ -66,11 +67,11 @@ pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     tiles
 }
 
-/// The tiles of a picture, and how far they are: shared by the threads of all cards.
+/// Queue of a picture's tiles with its progress, shared by the threads of all cards.
 #[derive(Debug)]
 pub struct Scheduler {
     state: Mutex<State>,
-    /// A tile waits again, or all are done.
+    /// Notified when a tile waits again or all are done.
     changed: Condvar,
     total: usize,
 }
@@ -82,7 +83,7 @@ struct State {
 }
 
 impl Scheduler {
-    /// All tiles wait.
+    /// A scheduler with all tiles waiting.
     pub fn new(tiles: Vec<Tile>) -> Self {
         let total = tiles.len();
         let state = Mutex::new(State { waiting: tiles.into(), done: 0 });
@@ -90,16 +91,16 @@ impl Scheduler {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // A thread that panicked holding the lock has left whole tiles.
+        // A thread that panicked with the lock held left no tile half moved.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The next tile for a card with a free credit.
+    /// Takes the next tile, for a card with a free credit; `None` if none waits.
     pub fn take(&self) -> Option<Tile> {
         self.lock().waiting.pop_front()
     }
 
-    /// A tile's pixels are all there.
+    /// Counts a tile as done.
     pub fn complete(&self) {
         let mut state = self.lock();
         state.done += 1;
@@ -108,28 +109,28 @@ impl Scheduler {
         }
     }
 
-    /// A tile waits again: before all others, as it has waited longest.
+    /// Puts a tile back at the front of the queue, as it has waited longest.
     pub fn give_back(&self, tile: Tile) {
         self.lock().waiting.push_front(tile);
         self.changed.notify_all();
     }
 
-    /// Whether all tiles are done.
+    /// Returns whether all tiles are done.
     pub fn is_complete(&self) -> bool {
         self.lock().done == self.total
     }
 
-    /// Tiles that are done, and all of them.
+    /// Number of tiles that are done, and of all tiles.
     pub fn progress(&self) -> (usize, usize) {
         (self.lock().done, self.total)
     }
 
-    /// Waits until a tile waits or all are done, not longer than `most`.
+    /// Blocks until a tile waits or all are done, at most for `most`.
     pub fn wait_for_tile(&self, most: Duration) {
         self.wait_while(most, |state| state.waiting.is_empty() && state.done < self.total);
     }
 
-    /// Waits until all tiles are done, not longer than `most`.
+    /// Blocks until all tiles are done, at most for `most`.
     pub fn wait_for_end(&self, most: Duration) {
         self.wait_while(most, |state| state.done < self.total);
     }
