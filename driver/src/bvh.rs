@@ -1,4 +1,4 @@
-//! The bounding volume hierarchy: built by obvhs as a binary tree, folded into wide nodes for the chip by the surface area
+//! Bounding volume hierarchy: built by obvhs as a binary tree, folded into wide nodes for the chip by the surface area
 //! heuristic.
 
 use obvhs::BvhBuildParams;
@@ -12,18 +12,18 @@ use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, MOST_MAT
 use crate::fold::{Folded, Tree};
 use crate::scene::Triangle;
 
-/// A hierarchy in the chip's records.
+/// A bounding volume hierarchy in the chip's records.
 #[derive(Debug)]
 pub struct Hierarchy {
     /// Nodes, the root first.
     pub nodes: Vec<[u8; LINE_BYTES]>,
     /// Leaves of triangles.
     pub leaves: Vec<[u8; LINE_BYTES]>,
-    /// The triangles of each leaf, by their index, in their order there.
+    /// Indices of the triangles of each leaf, in the leaf's order.
     pub leaf_triangles: Vec<LeafTriangles>,
 }
 
-/// The indices of the triangles of a leaf, in order.
+/// Indices of the triangles of a leaf, in the leaf's order.
 pub type LeafTriangles = heapless::Vec<u32, LEAF_TRIANGLES>;
 
 /// The triangles that a hierarchy is built of.
@@ -32,38 +32,39 @@ struct Mesh<'a> {
     cut_out: &'a [bool],
 }
 
-/// Why there is no hierarchy of these triangles.
+/// Error of [`build`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HierarchyError {
-    /// A descent could need more than the chip's stack.
+    /// A descent could overflow the chip's stack.
     #[error(
         "a descent in the bounding volume hierarchy may put off {entries} parts; the chip's stack holds {BVH_STACK}"
     )]
     TooDeep {
-        /// Entries of the stack that a descent may need.
+        /// Maximum number of stack entries that a descent needs.
         entries: usize,
     },
-    /// More triangles than can be told apart.
+    /// The scene has more triangles than a card can index.
     #[error("the scene has {triangles} triangles; a card can tell {MOST_TRIANGLES} apart")]
     TooMany {
-        /// Triangles of the scene.
+        /// Number of triangles of the scene.
         triangles: usize,
     },
-    /// More materials than can be told apart.
+    /// A triangle's material is beyond the materials that a card can index.
     #[error("a triangle is of material {material}; a card can tell {MOST_MATERIALS} apart")]
     TooManyMaterials {
-        /// The index of one.
+        /// Index of the material.
         material: u32,
     },
-    /// A corner that is not finite, or so far away that the area around the scene is not.
+    /// A triangle has a corner that is not finite, or so far away that the area of the scene's bounding box is not.
     #[error("a triangle has a corner that is not a finite place, or too far away")]
     NotFinite,
 }
 
-/// Each may have a leaf of its own, and its index is that of the leaf times the triangles that may be there.
+/// Maximum number of triangles: each may have a leaf of its own, and its index in the card image is the leaf's times
+/// [`LEAF_TRIANGLES`] plus its slot.
 const MOST_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 
-/// The cost of a visit of a leaf, of which that of a node is 1.
+/// Cost of a visit of a leaf, relative to a visit of a node.
 const LEAF_COST: f32 = 1.0;
 
 /// Triangles whose boxes have one centre and that the builder may be given one by one.
@@ -73,7 +74,8 @@ const MAX_CONCENTRIC: usize = 64;
 /// of each material whether its triangles may have cut-outs; those beyond its end have none.
 ///
 /// # Errors
-/// If the chip could not descend in it.
+/// If the triangles or materials are too many, a corner is not finite or too far away, or a descent could overflow the
+/// chip's stack.
 pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, HierarchyError> {
     if triangles.len() > MOST_TRIANGLES {
         return Err(HierarchyError::TooMany { triangles: triangles.len() });
@@ -82,7 +84,7 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
         return Err(HierarchyError::TooManyMaterials { material: triangle.material });
     }
     let boxes: Vec<Aabb> = triangles.iter().map(bounding_box).collect();
-    // Of corners that are no numbers minima and maxima tell nothing.
+    // Minima and maxima pass over NaN, so the corners are checked themselves.
     let is_finite = triangles.iter().flat_map(|triangle| triangle.vertices).all(glam::Vec3::is_finite);
     let all = boxes.iter().fold(Aabb::empty(), |all, bounds| all.union(bounds));
     if !is_finite || !all.half_area().is_finite() {
@@ -96,7 +98,7 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
     let mesh = &Mesh { triangles, cut_out };
     let mut folded = Folded::new(tree(&binary, &parts, &boxes, mesh));
     if folded.stack > BVH_STACK {
-        // Halves of halves are not the best of trees, but no deeper than their number asks for.
+        // Median splits do not make the best of trees, but one of minimum depth.
         let mut indices: Vec<u32> = (0..triangles.len() as u32).collect();
         folded = Folded::new(halves(&mut indices, &boxes, mesh));
     }
@@ -165,7 +167,7 @@ impl Mesh<'_> {
         layout::Triangle { vertices, material, cut_out }
     }
 
-    /// The line of the leaf of some triangles, if it holds them.
+    /// The line of a leaf of some triangles, if one line holds them.
     fn encode(&self, indices: &[u32]) -> Option<[u8; LINE_BYTES]> {
         let records: heapless::Vec<_, LEAF_TRIANGLES> =
             indices.iter().map(|&index| self.record(&self.triangles[index as usize])).collect();
@@ -204,7 +206,7 @@ fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafT
     trees[0].take().unwrap_or_else(missing)
 }
 
-/// A tree of parts of as many triangles each.
+/// A tree of median splits along the longest axis.
 fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
     let bounds = around(indices, boxes);
     let area = bounds.half_area();
@@ -222,7 +224,7 @@ fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangle
     Tree::node(parts, node_box, area, None)
 }
 
-/// The triangles of two parts, if one leaf holds them.
+/// The triangles of two leaves, if one leaf holds them.
 fn both(parts: &[Tree<LeafTriangles, NodeBox>; 2], mesh: &Mesh) -> Option<LeafTriangles> {
     let mut indices = LeafTriangles::new();
     for part in parts {
@@ -247,7 +249,7 @@ mod tests {
         (0..count).map(|i| Triangle::new(corners(i), i)).collect()
     }
 
-    /// The triangles below a child, each within the boxes that the nodes above give.
+    /// Collects the triangles below a child; asserts that each lies within the boxes of all nodes above.
     fn walk(hierarchy: &Hierarchy, child: Child, room: NodeBox, found: &mut Vec<u32>) {
         let node = match child {
             Child::Leaf(leaf) => {

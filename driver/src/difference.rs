@@ -1,19 +1,19 @@
-//! How far a picture is from a reference: pixel by pixel, and by the means of blocks of pixels.
+//! Difference of a picture from a reference: errors of pixels, and of the means of blocks of pixels.
 //!
 //! Block means average the noise of both pictures away and show bias. Everything is computed in double precision
-//! over all three channels; a *mean* of a pixel or a block is the mean of its channels R, G and B.
+//! over all three channels; the *mean* of a pixel or a block is the mean of its channels R, G and B.
 
 use serde::Serialize;
 use thiserror::Error;
 
 use crate::exr::RgbImage;
 
-/// Keeps relative squared errors of black pixels finite.
+/// Term in the denominator of relative squared errors, which keeps errors of black pixels finite.
 const RELATIVE_FLOOR: f64 = 0.01;
 
-/// The difference of a picture from a reference. The keys are stable.
+/// Difference of a picture from a reference. The JSON keys are stable.
 ///
-/// Where blocks are excluded, all of it is of the pixels and blocks that remain.
+/// Where blocks are excluded, all values are of the pixels and blocks that remain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
     /// Columns of both pictures.
@@ -48,11 +48,11 @@ pub struct Errors {
 /// Errors of block means. A block at the right or lower border that is cut off counts as any other.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BlockErrors {
-    /// The side of a block in pixels.
+    /// Side of a block, pixels.
     pub size: usize,
     /// Blocks that were compared.
     pub count: usize,
-    /// Blocks left out because the reference exceeds the stated radiance in them.
+    /// Blocks that were left out because the reference exceeds the stated radiance in them.
     pub excluded: usize,
     /// Compared blocks whose reference is black; the relative errors leave them out.
     pub black: usize,
@@ -63,11 +63,11 @@ pub struct BlockErrors {
     pub relative_median: Option<f64>,
     /// 95th percentile of the relative errors: the smallest that 95 % of the blocks do not exceed.
     pub relative_p95: Option<f64>,
-    /// Largest relative error.
+    /// Maximum of the relative errors.
     pub relative_max: Option<f64>,
 }
 
-/// Why two pictures cannot be compared.
+/// Error of [`compare`].
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum DifferenceError {
@@ -82,10 +82,10 @@ pub enum DifferenceError {
         /// Width and height of the image.
         image: [usize; 2],
     },
-    /// A block without pixels.
+    /// The block has no pixels.
     #[error("a block of 0 x 0 pixels is not possible; choose a side of at least 1")]
     EmptyBlock,
-    /// A radiance that is infinite or not a number.
+    /// A radiance is infinite or not a number.
     #[error("pixel ({x}, {y}) of the {which} is {value:?}, not a finite radiance; render it again")]
     NotFinite {
         /// `reference` or `image`.
@@ -94,7 +94,7 @@ pub enum DifferenceError {
         x: usize,
         /// The pixel's row.
         y: usize,
-        /// Its channels.
+        /// Red, green and blue of the pixel.
         value: [f32; 3],
     },
     /// The limit leaves nothing to compare.
@@ -103,7 +103,7 @@ pub enum DifferenceError {
         /// The radiance stated.
         limit: f32,
     },
-    /// A limit that is not a number.
+    /// The limit is not a number.
     #[error("blocks cannot be excluded by a radiance of {limit}; state a number")]
     BadLimit {
         /// The radiance stated.
@@ -114,7 +114,7 @@ pub enum DifferenceError {
 /// Compares `image` with `reference` in blocks of `block` x `block` pixels.
 ///
 /// With `exclude`, blocks in which any channel of any pixel of the reference exceeds that radiance are left out of
-/// everything: they see an emitter, whose radiance would outweigh all else. Where the data windows lie does not
+/// everything: they see an emitter, whose radiance would outweigh all else. The positions of the data windows do not
 /// matter, only their sizes.
 ///
 /// # Errors

@@ -1,9 +1,10 @@
-//! Pictures as `OpenEXR` files: writing a film, and reading radiance back to compare it.
+//! `OpenEXR` files: writing of films, and reading of radiance for comparisons.
 //!
-//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; layers are in channels
-//! like `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The data window is the film's crop window,
-//! the display window the full picture. What the picture was made from is JSON in the one attribute `photoncard`:
-//! the `exr` crate keeps attributes in a hash map, so several would change the file's bytes from run to run.
+//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; layers are in
+//! channels like `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The data window is the film's
+//! crop window, the display window the full picture. The picture's provenance is JSON in the one attribute
+//! `photoncard`: the `exr` crate keeps attributes in a hash map, so several would change the file's bytes from run to
+//! run.
 
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
@@ -23,23 +24,23 @@ use crate::foreign;
 use crate::layer::{Channel, Layers};
 use crate::output::{self, OutputError};
 
-/// The attribute that says what the picture was made from.
+/// Name of the attribute that holds the picture's provenance.
 pub const PROVENANCE: &str = "photoncard";
 
-/// The most pixels a picture may have to be read.
+/// Maximum number of pixels of a picture that is read.
 pub const MAX_READ_PIXELS: u64 = 1 << 28;
 
-/// How samples are stored. Depth and gathers are always in single precision.
+/// Pixel type of the stored samples. Depth and gathers are always [`SampleFormat::Float`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SampleFormat {
-    /// 16 bits: three digits, up to 65504; larger finite values are stored as 65504.
+    /// `HALF`, 16 bits: three digits, up to 65504; larger finite values are stored as 65504.
     #[default]
     Half,
-    /// 32 bits: exactly what was rendered.
+    /// `FLOAT`, 32 bits: exactly as rendered.
     Float,
 }
 
-/// Linear RGB radiance read from a file.
+/// Linear RGB radiance of a file's data window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RgbImage {
     /// Columns of the data window.
@@ -52,11 +53,11 @@ pub struct RgbImage {
     pub pixels: Vec<[f32; 3]>,
 }
 
-/// Why a picture cannot be written or read.
+/// Error of [`write()`] and [`read_rgb`].
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ExrError {
-    /// The file's place cannot be written.
+    /// The file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
     /// The encoder refused the picture.
@@ -64,7 +65,7 @@ pub enum ExrError {
     Encode {
         /// The output file.
         path: PathBuf,
-        /// What the encoder says.
+        /// The encoder's error.
         reason: String,
     },
     /// The file cannot be read.
@@ -72,16 +73,16 @@ pub enum ExrError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// The operating system's error.
         #[source]
         source: io::Error,
     },
-    /// The file is not an `OpenEXR` picture, or a damaged one.
+    /// The file is not an `OpenEXR` picture, or it is damaged.
     #[error("{} is not a readable OpenEXR picture: {reason}; render or copy it again", path.display())]
     Malformed {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The decoder's error, or a contradiction in the file.
         reason: String,
     },
     /// The picture has no plain colour channels.
@@ -89,15 +90,15 @@ pub enum ExrError {
     NoColour {
         /// The file.
         path: PathBuf,
-        /// The channels there are.
+        /// Names of the file's channels.
         channels: String,
     },
-    /// The compression is none that can be read safely.
+    /// The file's compression cannot be read safely.
     #[error("{} has {compression}, which is not read; store the picture with ZIP compression", path.display())]
     Compression {
         /// The file.
         path: PathBuf,
-        /// The compression's name.
+        /// Name of the compression.
         compression: String,
     },
     /// The process cannot have the memory that reading takes.
@@ -113,17 +114,17 @@ pub enum ExrError {
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its width.
+        /// Width of the data window, pixels.
         width: usize,
-        /// Its height.
+        /// Height of the data window, pixels.
         height: usize,
     },
 }
 
-/// Writes the film to `path`, whole or not at all, the same bytes for the same film every time.
+/// Writes the film to `path`, whole or not at all; equal films give equal bytes.
 ///
-/// Pixels that were never written are zero, and so are layers that the film does not have. `provenance_json` is stored in the attribute `photoncard`; characters
-/// beyond ASCII are stored as JSON's `\u` escapes.
+/// Pixels that were never written are zero, and so are layers that the film does not have. `provenance_json` is stored
+/// in the attribute [`PROVENANCE`]; characters beyond ASCII are stored as JSON's `\u` escapes.
 ///
 /// # Errors
 /// If the file cannot be written, or the provenance is empty.
@@ -184,13 +185,14 @@ fn channels(film: &Film, layers: &Layers, format: SampleFormat) -> AnyChannels<F
     AnyChannels::sort(list)
 }
 
-/// The nearest half; a light brighter than halves reach stays finite.
+/// The nearest half; finite values beyond its range become plus or minus 65504.
 fn to_half(value: f32) -> f16 {
     let half = f16::from_f32(value);
     if half.is_infinite() && value.is_finite() { f16::MAX.copysign(half) } else { half }
 }
 
-/// JSON with every character beyond ASCII escaped: the attribute is ASCII, and only JSON's strings hold others.
+/// JSON with every character beyond ASCII escaped: the attribute is ASCII, and only strings of JSON hold other
+/// characters.
 fn ascii(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for character in json.chars() {
@@ -211,7 +213,7 @@ fn ascii(json: &str) -> String {
 /// Reads the plain colour channels `R G B` (half, float or unsigned) of the first part that has them.
 ///
 /// # Errors
-/// If the file cannot be read, is malformed, has no such channels, or is larger than [`MAX_READ_PIXELS`]. A file
+/// If the file cannot be read, is malformed, has no such channels, or has more than [`MAX_READ_PIXELS`]. A file
 /// that states a size its length cannot hold is refused before anything is allocated.
 pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
     let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
@@ -223,7 +225,7 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
     decode_rgb(path, &bytes, MAX_READ_PIXELS)
 }
 
-/// As [`read_rgb`], of a file that holds these bytes, and of at most so many pixels.
+/// [`read_rgb`] from the bytes of a file, with at most `most_pixels` pixels.
 pub(crate) fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
     // The `exr` crate trusts a file's numbers in places: sums of window sizes, offsets of blocks.
     foreign::decode(
@@ -259,7 +261,7 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrEr
         )
         .first_valid_layer()
         .all_attributes()
-        // On a worker thread a panic would end the process.
+        // A panic on a worker thread would end the process.
         .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(malformed)?;
@@ -274,7 +276,7 @@ fn has_colour(header: &Header) -> bool {
     has("R") && has("G") && has("B")
 }
 
-/// Refuses sizes that are too large, or that a file of this length cannot hold however well it is compressed.
+/// Refuses sizes that are too large, or that a file of `length` bytes cannot hold at any compression.
 fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Result<(), ExrError> {
     const CHUNK_OVERHEAD: u64 = 16;
     let Vec2(width, height) = header.layer_size;
@@ -307,10 +309,10 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
     Ok(())
 }
 
-/// A bound on the bytes one byte of a file stands for; `None` for what is not read.
+/// Upper bound of the compression ratio; `None` for compressions that are not read.
 ///
-/// Blocks of DWA state the sizes of their parts, and the `exr` crate allocates what they state: a few bytes would end the
-/// process, as no panic can be caught of an allocation that fails.
+/// Blocks of DWA state the sizes of their parts, and the `exr` crate allocates what they state: a few bytes could end
+/// the process, since an allocation that fails aborts and cannot be caught as a panic.
 fn most_compressed(compression: Compression) -> Option<u64> {
     match compression {
         Compression::Uncompressed => Some(1),

@@ -1,4 +1,4 @@
-//! The picture while it is being rendered: what is known of each pixel of the crop window.
+//! Film: the pixels of a picture's crop window, as far as they are rendered.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -12,7 +12,7 @@ use crate::sink::{FinishedTile, TileSink, places};
 /// The most pixels a film may hold: 2^28, about 10 GiB, with layers 20.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
-/// The largest width or height of a picture.
+/// Maximum width and height of a picture, pixels.
 pub const MAX_SIDE: u32 = 1 << 20;
 
 /// A rectangle of pixels, ends exclusive, in coordinates of the full picture: x to the right, y down.
@@ -29,32 +29,32 @@ pub struct Window {
 }
 
 impl Window {
-    /// The window that shows all of a picture.
+    /// The window of a whole picture.
     pub const fn full(width: u32, height: u32) -> Self {
         Self { x0: 0, x1: width, y0: 0, y1: height }
     }
 
-    /// Columns, 0 if the window is turned around.
+    /// Number of columns; 0 if `x1 < x0`.
     pub const fn width(&self) -> u32 {
         self.x1.saturating_sub(self.x0)
     }
 
-    /// Rows, 0 if the window is turned around.
+    /// Number of rows; 0 if `y1 < y0`.
     pub const fn height(&self) -> u32 {
         self.y1.saturating_sub(self.y0)
     }
 
-    /// Whether the pixel lies inside.
+    /// Returns whether the pixel `(x, y)` lies in the window.
     pub const fn contains(&self, x: u32, y: u32) -> bool {
         x >= self.x0 && x < self.x1 && y >= self.y0 && y < self.y1
     }
 }
 
-/// Why a film cannot be made, or a pixel not be written.
+/// Error of making a [`Film`] or writing its pixels.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FilmError {
-    /// A picture without pixels, or of absurd size.
+    /// The picture has no pixels, or a side above [`MAX_SIDE`].
     #[error(
         "a picture of {width} x {height} pixels is not possible: each side must be 1 to {MAX_SIDE}; choose another size"
     )]
@@ -64,7 +64,7 @@ pub enum FilmError {
         /// The height asked for.
         height: u32,
     },
-    /// A crop window that is empty or not inside the picture.
+    /// The crop window is empty or not inside the picture.
     #[error(
         "the crop window {},{},{},{} is empty or not inside the picture of {width} x {height}; X0 < X1 <= width and \
          Y0 < Y1 <= height must hold", window.x0, window.x1, window.y0, window.y1
@@ -77,7 +77,7 @@ pub enum FilmError {
         /// The picture's height.
         height: u32,
     },
-    /// More pixels than are held at once, or than there is memory for.
+    /// The crop window has more than [`MAX_PIXELS`], or more than memory can hold.
     #[error("a film of {width} x {height} pixels does not fit in memory; render it in several crops")]
     Memory {
         /// Columns of the crop window.
@@ -85,7 +85,7 @@ pub enum FilmError {
         /// Rows of the crop window.
         height: u32,
     },
-    /// A pixel outside the crop window.
+    /// The pixel lies outside the crop window.
     #[error("pixel ({x}, {y}) lies outside the crop window {},{},{},{}", window.x0, window.x1, window.y0, window.y1)]
     Outside {
         /// The pixel's column.
@@ -97,12 +97,12 @@ pub enum FilmError {
     },
 }
 
-/// All that a film has of a pixel.
+/// A film's pixel with its layers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FilmPixel {
-    /// What every film has.
+    /// Radiance, albedo, normal and depth.
     pub pixel: PixelValue,
-    /// Zero in a film without layers.
+    /// Layers; zero in a film without layers.
     pub layers: PixelLayers,
 }
 
@@ -119,7 +119,7 @@ pub struct Film {
     height: u32,
     window: Window,
     pixels: Vec<PixelValue>,
-    /// Of each pixel, or nothing.
+    /// Layers of each pixel; empty in a film without layers.
     layers: Vec<PixelLayers>,
     written: Vec<bool>,
     missing: usize,
@@ -150,7 +150,7 @@ impl Film {
         Ok(Self { width, height, window, pixels, layers: Vec::new(), written, missing: count })
     }
 
-    /// The same with layers.
+    /// [`Self::new`] with layers.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -163,22 +163,22 @@ impl Film {
         Ok(film)
     }
 
-    /// Whether there are layers.
+    /// Returns whether the film has layers.
     pub fn has_layers(&self) -> bool {
         !self.layers.is_empty()
     }
 
-    /// Width of the full picture.
+    /// Width of the full picture, pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Height of the full picture.
+    /// Height of the full picture, pixels.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// The crop window: the part of the picture this film holds.
+    /// The crop window: the part of the picture that this film holds.
     pub fn window(&self) -> Window {
         self.window
     }
@@ -193,12 +193,12 @@ impl Film {
         self.index(x, y).map(|index| &self.pixels[index])
     }
 
-    /// All there is of the pixels of the crop window, row by row from the top.
+    /// The pixels of the crop window with their layers, row by row from the top.
     pub fn all(&self) -> impl Iterator<Item = FilmPixel> {
         (0..self.pixels.len()).map(|index| self.all_of(index))
     }
 
-    /// All there is of the pixel at `(x, y)` of the full picture, or `None` outside the crop window.
+    /// The pixel at `(x, y)` of the full picture with its layers, or `None` outside the crop window.
     pub fn all_at(&self, x: u32, y: u32) -> Option<FilmPixel> {
         self.index(x, y).map(|index| self.all_of(index))
     }
@@ -208,7 +208,8 @@ impl Film {
         FilmPixel { pixel: self.pixels[index], layers }
     }
 
-    /// Writes a pixel as a chip tells it. Layers that it or the film does not have are left out.
+    /// Writes the pixel at `(x, y)` of the full picture from a chip's record. Layers that the record or the film lacks
+    /// are left out.
     ///
     /// # Errors
     /// As [`Self::write`].
@@ -235,17 +236,17 @@ impl Film {
         Ok(())
     }
 
-    /// How many pixels of the crop window were never written.
+    /// Number of pixels of the crop window that were never written.
     pub fn missing(&self) -> usize {
         self.missing
     }
 
-    /// Whether every pixel of the crop window was written.
+    /// Returns whether every pixel of the crop window was written.
     pub fn is_complete(&self) -> bool {
         self.missing == 0
     }
 
-    /// Whether every pixel of a tile was written.
+    /// Returns whether every pixel of a tile was written.
     pub fn has(&self, tile: &Tile) -> bool {
         let mut rows = tile.y..tile.y + tile.height;
         rows.all(|y| {

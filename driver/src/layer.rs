@@ -1,20 +1,20 @@
-//! Layers of a picture, and the channels that they are told in: the EXR file and the display server have the same ones.
+//! Layers of a picture (arbitrary output variables) and their channels, in the EXR file and on the display server.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::film::FilmPixel;
 
-/// One channel.
+/// One channel of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Channel {
-    /// Its name, as `OpenEXR` has it: the layer's, a dot, and the component's; without a layer the component's alone.
+    /// Name by the convention of `OpenEXR`: `layer.component`, or `component` in the unnamed layer.
     pub name: &'static str,
-    /// A pixel's number.
+    /// Value of the channel in a pixel.
     pub value: fn(&FilmPixel) -> f32,
 }
 
-/// Radiance, in the unnamed layer: what every viewer shows.
+/// Channels of radiance, in the unnamed layer, which every viewer shows.
 const COLOUR: [Channel; 3] = [
     Channel { name: "R", value: |film| film.pixel.radiance[0] },
     Channel { name: "G", value: |film| film.pixel.radiance[1] },
@@ -55,7 +55,8 @@ pub enum Layer {
     Direct,
     /// Indirect light, W/(sr m^2).
     Indirect,
-    /// Light through specular surfaces, W/(sr m^2). It, direct and indirect light add up to radiance.
+    /// Light from the caustic map, through specular surfaces, W/(sr m^2). Direct, indirect and caustic light add up to
+    /// radiance.
     Caustic,
     /// Mean albedo of the surfaces seen, 0 to 1.
     Albedo,
@@ -63,7 +64,7 @@ pub enum Layer {
     Normal,
     /// Mean distance along the view's axis, metres; infinite where nothing is seen.
     Depth,
-    /// How many of a pixel's samples took a final gather of their own, and no interpolated irradiance.
+    /// Number of a pixel's samples that took a final gather of their own instead of interpolated irradiance.
     Gathers,
 }
 
@@ -72,7 +73,7 @@ impl Layer {
     pub const ALL: [Self; 7] =
         [Self::Direct, Self::Indirect, Self::Caustic, Self::Albedo, Self::Normal, Self::Depth, Self::Gathers];
 
-    /// Its name.
+    /// Name of the layer in channel names and in `--aov`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Direct => "direct",
@@ -85,7 +86,7 @@ impl Layer {
         }
     }
 
-    /// Its channels.
+    /// Channels of the layer.
     pub fn channels(self) -> &'static [Channel] {
         match self {
             Self::Direct => &DIRECT,
@@ -98,23 +99,24 @@ impl Layer {
         }
     }
 
-    /// Whether chips tell it only of frames with layers.
+    /// Returns whether chips send the layer only in frames with layers.
     fn is_of_chip(self) -> bool {
         matches!(self, Self::Direct | Self::Indirect | Self::Caustic | Self::Gathers)
     }
 
-    /// Whether it is always stored in single precision: distances and counts go beyond what halves tell apart.
+    /// Returns whether the layer is always stored in single precision: distances and counts exceed the precision of
+    /// halves.
     pub fn is_always_single(self) -> bool {
         matches!(self, Self::Depth | Self::Gathers)
     }
 }
 
-/// The layers that a picture has besides radiance: an argument of `--aov`.
+/// Layers of a picture besides radiance: the argument of `--aov`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layers(Vec<Layer>);
 
 impl Default for Layers {
-    /// What denoisers and compositors ask for, and what costs nothing: albedo, normals and depth.
+    /// Albedo, normals and depth: denoisers and compositors need them, and they cost nothing.
     fn default() -> Self {
         Self(vec![Layer::Albedo, Layer::Normal, Layer::Depth])
     }
@@ -134,17 +136,17 @@ impl Layers {
         self.0.iter().copied()
     }
 
-    /// Whether chips are to render a frame with layers.
+    /// Returns whether chips must render a frame with layers.
     pub fn are_of_chip(&self) -> bool {
         self.iter().any(Layer::is_of_chip)
     }
 
-    /// The channels of radiance.
+    /// The channels `R G B` of radiance.
     pub fn colour() -> &'static [Channel] {
         &COLOUR
     }
 
-    /// All channels of the picture: those of radiance, then those of the layers.
+    /// All channels of the picture: radiance first, then the layers.
     pub fn channels(&self) -> Vec<Channel> {
         COLOUR.into_iter().chain(self.iter().flat_map(Layer::channels).copied()).collect()
     }

@@ -1,9 +1,9 @@
-//! A picture to look at: PNG, 8 bits a channel, tone-mapped to sRGB.
+//! Preview of a film: PNG, 8 bits per channel, tone-mapped to sRGB.
 //!
 //! Radiance is scaled by `2^exposure`, or without an exposure so that the log-average luminance of the lit pixels
-//! becomes 0.18, middle grey (Reinhard, Stark, Shirley, Ferwerda 2002, *Photographic tone reproduction for digital images*,
-//! equations 1 and 2). A [`ToneCurve`] then compresses it, and it is clipped to 1 and encoded with the sRGB transfer curve.
-//! The picture is the film's crop window alone.
+//! becomes 0.18, middle grey (Reinhard, Stark, Shirley, Ferwerda 2002, *Photographic tone reproduction for digital
+//! images*, equations 1 and 2). A [`ToneCurve`] then compresses it, and it is clipped to 1 and encoded with the sRGB
+//! transfer curve. The picture is the film's crop window alone.
 
 use std::path::{Path, PathBuf};
 
@@ -12,23 +12,23 @@ use thiserror::Error;
 use crate::film::{Film, PixelValue};
 use crate::output::{self, OutputError};
 
-/// What compresses scaled radiance to what a screen can show.
+/// Tone curve that compresses scaled radiance to the range of a screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ToneCurve {
-    /// Nothing does: what is above 1 is clipped.
+    /// No compression: values above 1 are clipped.
     None,
-    /// Reinhard's extended curve (2002, equation 4) of luminance, `L (1 + L / w^2) / (1 + L)` with the white point `w = 4`. The
-    /// colour is scaled along with its luminance.
+    /// Reinhard's extended curve (2002, equation 4) of luminance, `L (1 + L / w^2) / (1 + L)` with the white point `w =
+    /// 4`. The colour is scaled with its luminance.
     #[default]
     Reinhard,
-    /// Narkowicz' fit of the Academy Color Encoding System's filmic curve, of each channel: `x (2.51 x + 0.03) / (x (2.43 x +
-    /// 0.59) + 0.14)` (2016, <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>). It maps 1 to 0.80;
-    /// the Academy's own curve is this one of 0.6 times the radiance.
+    /// Narkowicz' fit of the Academy Color Encoding System's filmic curve, for each channel: `x (2.51 x + 0.03) / (x
+    /// (2.43 x + 0.59) + 0.14)` (2016, <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>).
+    /// It maps 1 to 0.80; the Academy's own curve is this one at 0.6 times the radiance.
     Aces,
 }
 
 impl ToneCurve {
-    /// Compresses scaled radiance, not negative and finite.
+    /// Compresses scaled radiance, which must be finite and not negative.
     fn compress(self, scaled: [f32; 3]) -> [f32; 3] {
         match self {
             Self::None => scaled,
@@ -44,28 +44,29 @@ impl ToneCurve {
     }
 }
 
-/// How radiance becomes what a screen shows.
+/// Mapping of radiance to a screen: exposure and tone curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
-    /// Stops: radiance is doubled so often. `None` chooses by the picture.
+    /// Exposure in stops: radiance is scaled by `2^exposure`. `None` derives the scale from the picture's log-average
+    /// luminance.
     pub exposure: Option<f32>,
-    /// The curve.
+    /// Tone curve.
     pub curve: ToneCurve,
 }
 
-/// Scaled luminance that Reinhard's curve makes white.
+/// White point of Reinhard's curve: the scaled luminance that it maps to 1.
 const WHITE: f32 = 4.0;
-/// Scaled radiance is taken for at most this: its square is a number.
+/// Maximum of scaled radiance, beyond which it is clamped: its square is finite.
 const MOST: f32 = 1e18;
 
-/// What the log-average luminance becomes when no exposure is stated.
+/// Log-average luminance after automatic exposure.
 const MIDDLE_GREY: f64 = 0.18;
 
-/// Why a preview cannot be written.
+/// Error of [`write_png`].
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PreviewError {
-    /// The file's place cannot be written.
+    /// The file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
     /// The encoder refused the picture.
@@ -73,11 +74,11 @@ pub enum PreviewError {
     Encode {
         /// The output file.
         path: PathBuf,
-        /// What the encoder says.
+        /// The encoder's error.
         #[source]
         source: png::EncodingError,
     },
-    /// An exposure that is not a finite number.
+    /// The exposure is not a finite number.
     #[error(
         "an exposure of {exposure} is not possible; state a number of stops, or none for an automatic one"
     )]
@@ -87,7 +88,7 @@ pub enum PreviewError {
     },
 }
 
-/// Writes the film's crop window to `path`, whole or not at all.
+/// Writes the film's crop window to `path` as PNG, whole or not at all.
 ///
 /// # Errors
 /// If the file cannot be written, or the exposure is not finite.
@@ -113,12 +114,12 @@ pub fn write_png(path: &Path, film: &Film, mapping: ToneMapping) -> Result<(), P
     Ok(output::write(path, &bytes)?)
 }
 
-/// Rec. 709 luminance.
+/// Luminance of linear RGB by the weights of Rec. 709.
 fn luminance([red, green, blue]: [f32; 3]) -> f32 {
     0.2126 * red + 0.7152 * green + 0.0722 * blue
 }
 
-/// The factor that brings the log-average luminance of the lit pixels to middle grey; 1 for a black picture.
+/// Factor that brings the log-average luminance of the lit pixels to middle grey; 1 for a black picture.
 fn automatic_scale(film: &Film) -> f32 {
     let (mut sum, mut count) = (0.0, 0u64);
     for pixel in film.pixels() {

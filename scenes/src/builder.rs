@@ -1,4 +1,4 @@
-//! Puts meshes, materials, nodes and cameras together into a glTF file.
+//! Builder of glTF files from meshes, materials, nodes and cameras.
 
 use base64::Engine;
 use glam::{Vec2, Vec3};
@@ -10,7 +10,7 @@ use crate::document::{
 use crate::material::Material;
 use crate::mesh::Mesh;
 
-/// glTF's numbers for the type of a component, the use of a buffer view, and how samples lie between texels.
+/// glTF's constants for component types, targets of buffer views, and the filter of samplers.
 const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
@@ -18,7 +18,7 @@ const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 const LINEAR: u32 = 9729;
 
-/// Vertices and indices already in the file, to be used by any number of meshes.
+/// Vertices and indices that are in the file, for use by any number of meshes.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
     attributes: Attributes,
@@ -26,12 +26,12 @@ pub struct Geometry {
     mode: Option<u32>,
 }
 
-/// How vertices without indices are joined.
+/// Topology of vertices without indices: glTF's `mode`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Joined {
-    /// Each with the two before it, every other triangle turned.
+    /// `TRIANGLE_STRIP`: each vertex with the two before it, every other triangle turned.
     Strip,
-    /// Each with the one before it and the first.
+    /// `TRIANGLE_FAN`: each vertex with the one before it and the first.
     Fan,
 }
 
@@ -44,14 +44,14 @@ impl Joined {
     }
 }
 
-/// Where a texture goes on beyond its image.
+/// Wrap mode of texture coordinates beyond the image's border.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrap {
-    /// The image again.
+    /// The image repeated (`REPEAT`).
     Repeat,
-    /// The image again, every other one turned over.
+    /// The image repeated, every other one mirrored (`MIRRORED_REPEAT`).
     Mirror,
-    /// The texels of the edge.
+    /// The texels at the border (`CLAMP_TO_EDGE`).
     Clamp,
 }
 
@@ -68,11 +68,11 @@ impl Wrap {
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
-    /// Where the eye is, in metres.
+    /// Position of the eye, metres.
     pub eye: Vec3,
-    /// What is in the middle of the picture.
+    /// Point in the centre of the picture, metres.
     pub target: Vec3,
-    /// The vertical field of view, in radians.
+    /// Vertical field of view, radians.
     pub yfov: f64,
     /// Width over height.
     pub aspect_ratio: f64,
@@ -82,7 +82,7 @@ impl Camera {
     /// The node's matrix: a glTF camera looks along its own -z with +y up.
     fn matrix(&self) -> [f32; 16] {
         let back = self.eye - self.target;
-        // Divided rather than normalised: an axis stays exactly an axis.
+        // Divided rather than normalised, so that coordinate axes stay exact.
         let back = back / back.length();
         let right = Vec3::Y.cross(back);
         let right = right / right.length();
@@ -97,7 +97,7 @@ impl Camera {
     }
 }
 
-/// A glTF file in the making.
+/// A glTF file under construction.
 #[derive(Clone, Debug, Default)]
 pub struct SceneBuilder {
     document: Document,
@@ -112,14 +112,14 @@ impl SceneBuilder {
         self.document.materials.len() - 1
     }
 
-    /// Adds an image as it lies in its file, of type "image/png" or "image/jpeg"; returns its index.
+    /// Adds an encoded image of type "image/png" or "image/jpeg"; returns its index.
     pub fn image(&mut self, name: &str, mime_type: &'static str, bytes: Vec<u8>) -> usize {
         let buffer_view = self.view(bytes, None);
         self.document.images.push(ImageEntry { name: name.into(), buffer_view, mime_type });
         self.document.images.len() - 1
     }
 
-    /// Adds a texture of an image, which is interpolated between texels and has no coarser copies; returns its index.
+    /// Adds a texture of an image, with bilinear filter and without mipmaps; returns its index.
     pub fn texture(&mut self, image: usize, [wrap_s, wrap_t]: [Wrap; 2]) -> usize {
         let sampler = Sampler {
             mag_filter: LINEAR,
@@ -133,7 +133,7 @@ impl SceneBuilder {
         self.document.textures.len() - 1
     }
 
-    /// Adds the vertices and indices of a mesh; the indices are as narrow as the vertices allow.
+    /// Adds the vertices and indices of a mesh, with indices of 16 bits if they suffice, else 32.
     pub fn geometry(&mut self, mesh: &Mesh) -> Geometry {
         let attributes = self.attributes(mesh);
         let indices = mesh.triangles.iter().flatten();
@@ -148,13 +148,14 @@ impl SceneBuilder {
         Geometry { attributes, indices, mode: None }
     }
 
-    /// Adds the vertices of a mesh without indices, to be joined in their order; its triangles play no part.
+    /// Adds the vertices of a mesh without indices, joined in their order; the mesh's triangles are ignored.
     pub fn joined(&mut self, mesh: &Mesh, joined: Joined) -> Geometry {
         let attributes = self.attributes(mesh);
         Geometry { attributes, indices: None, mode: Some(joined.mode()) }
     }
 
-    /// Adds what the vertices of a mesh have. Normals that are the positions, as on a unit sphere, are those.
+    /// Adds the attributes of a mesh's vertices. Normals that equal the positions, as on a unit sphere, share their
+    /// accessor.
     fn attributes(&mut self, mesh: &Mesh) -> Attributes {
         let (min, max) = mesh.bounds();
         let position = self.vectors(mesh.positions.iter().map(Vec3::to_array), "VEC3");
@@ -207,7 +208,7 @@ impl SceneBuilder {
         self.document.buffer_views.len() - 1
     }
 
-    /// Adds a mesh made of parts, each a geometry and the index of its material; returns its index.
+    /// Adds a mesh of parts, each a geometry and the index of its material; returns the mesh's index.
     pub fn mesh(&mut self, name: &str, parts: &[(Geometry, usize)]) -> usize {
         let primitives = parts.iter().map(|&(geometry, material)| Primitive {
             attributes: geometry.attributes,
@@ -219,31 +220,31 @@ impl SceneBuilder {
         self.document.meshes.len() - 1
     }
 
-    /// Adds a node that something else will have as its child; returns its index.
+    /// Adds a node that is to be the child of another; returns its index.
     pub fn node(&mut self, node: Node) -> usize {
         self.document.nodes.push(node);
         self.document.nodes.len() - 1
     }
 
-    /// Adds a node at the top of the hierarchy.
+    /// Adds a root node.
     pub fn root(&mut self, node: Node) {
         let index = self.node(node);
         self.roots.push(index);
     }
 
-    /// Adds a node at the top that shows `mesh` in `material`, both under the name of the node.
+    /// Adds a root node with `mesh` in `material`; mesh and node have one name.
     pub fn object(&mut self, name: &str, mesh: &Mesh, material: usize) {
         let geometry = self.geometry(mesh);
         self.placed(name, geometry, material);
     }
 
-    /// The same with a geometry that is in the file.
+    /// [`Self::object`] with a geometry that is in the file.
     pub fn placed(&mut self, name: &str, geometry: Geometry, material: usize) {
         let mesh = Some(self.mesh(name, &[(geometry, material)]));
         self.root(Node { name: name.into(), mesh, ..Node::default() });
     }
 
-    /// Adds a camera and its node, both under the same name.
+    /// Adds a camera and its root node, both with one name.
     pub fn camera(&mut self, name: &str, camera: &Camera) {
         let (aspect_ratio, yfov) = (camera.aspect_ratio, camera.yfov);
         let perspective = Perspective { aspect_ratio, yfov, znear: 0.001, zfar: 1000.0 };
@@ -266,7 +267,7 @@ impl SceneBuilder {
         (self.document, self.binary)
     }
 
-    /// The scene as one `.gltf` file that holds its buffer itself.
+    /// The scene as one `.gltf` file with its buffer embedded.
     pub fn into_gltf(self) -> Vec<u8> {
         let encoded = base64::engine::general_purpose::STANDARD.encode(&self.binary);
         let (document, _) = self.finish(Some(format!("data:application/octet-stream;base64,{encoded}")));

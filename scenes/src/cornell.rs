@@ -1,5 +1,5 @@
-//! The Cornell box, scaled to two metres: the same box with a glossy floor, lit by a lamp that faces the ceiling, and with
-//! a mirror ball and a glass ball in place of its blocks.
+//! The Cornell box, scaled to two metres, and three variants: with a glossy floor, with a lamp that faces the ceiling,
+//! and with a mirror ball and a glass ball in place of its blocks.
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ use crate::material::{Glass, Material};
 use crate::mesh::Mesh;
 use crate::sphere::icosphere;
 
-/// Four corners, counterclockwise from the front.
+/// Corners of a quadrilateral, counterclockwise from the front.
 type Quad = [[f32; 3]; 4];
 
 const LIGHT: Quad = [[-0.23, 0.99, -0.18], [0.23, 0.99, -0.18], [0.23, 0.99, 0.2], [-0.23, 0.99, 0.2]];
@@ -53,26 +53,26 @@ const GREEN: [f64; 3] = [0.105421, 0.37798, 0.076425];
 const RED: [f64; 3] = [0.570068, 0.0430135, 0.0443706];
 const LIGHT_RADIANCE: [f64; 3] = [18.387, 13.9873, 6.75357];
 
-/// A lamp that faces upwards, and the cup around it: its half side, its bottom and its rim.
+/// A lamp that faces upwards, and the cup around it: half its side, and the heights of its bottom and its rim, metres.
 const UPLIGHT: Quad = [[-0.12, 0.72, 0.12], [0.12, 0.72, 0.12], [0.12, 0.72, -0.12], [-0.12, 0.72, -0.12]];
 const CUP: (f32, f32, f32) = (0.14, 0.7, 0.86);
 const CUP_ALBEDO: [f64; 3] = [0.1; 3];
-/// As much power as the ceiling's lamp has in a third of the area.
+/// Radiance at which the lamp emits the power of the ceiling's lamp from a third of its area, W/(sr m^2).
 const UPLIGHT_RADIANCE: [f64; 3] = [56.0, 42.6, 20.6];
 
-/// The balls, which float a little above the floor: their centres and their radius.
+/// Centres and radius of the balls, which float a little above the floor, metres.
 const MIRROR_BALL: [f32; 3] = [-0.45, -0.58, -0.4];
 const GLASS_BALL: [f32; 3] = [0.42, -0.58, 0.3];
 const BALL_RADIUS: f32 = 0.4;
-/// Clear, with a tint of bottle glass where it is thick.
+/// Clear glass with the tint of a bottle where it is thick.
 const GLASS: Glass =
     Glass { ior: 1.5, thickness: 0.8, attenuation_colour: [0.8, 0.93, 0.86], attenuation_distance: 1.0 };
 
-/// The whole open side fills the picture.
+/// A camera whose picture the whole open side fills.
 const FRONT: Camera =
     Camera { eye: Vec3::new(0.0, 0.0, 3.9), target: Vec3::ZERO, yfov: 0.6860487863861751, aspect_ratio: 1.0 };
 
-/// Nearer, looking down, so that the floor fills the picture, from its open edge to the back wall.
+/// A camera that looks down from near, so that the floor fills the picture, from its open edge to the back wall.
 const TOWARDS_FLOOR: Camera = Camera {
     eye: Vec3::new(-0.15, 0.5, 1.75),
     target: Vec3::new(-0.15, -1.0, 0.2),
@@ -101,7 +101,7 @@ fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> Sce
     scene
 }
 
-/// The walls and the lamp; also returns the index of the material of white walls.
+/// The walls and the lamp, and the index of the material of white walls.
 fn empty_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> (SceneBuilder, usize) {
     let mut scene = SceneBuilder::default();
     let white = scene.material(&Material::diffuse("white", WHITE));
@@ -129,12 +129,12 @@ fn add_uplight(scene: &mut SceneBuilder) {
     scene.object("cup", &cup_walls(), cup);
 }
 
-/// All Lambertian, lit by the lamp in the ceiling.
+/// The Lambertian box, lit by the lamp in the ceiling.
 pub(crate) fn lambertian() -> Vec<u8> {
     cornell_box(None, add_ceiling_lamp).into_gltf()
 }
 
-/// The same with a floor that has a Phong lobe.
+/// The box with a floor that has a Phong lobe, lit by the lamp in the ceiling.
 pub(crate) fn glossy_floor() -> Vec<u8> {
     let phong = Phong { specular: [0.35; 3], exponent: 32.0 };
     let floor = Material::diffuse("floor", [0.45, 0.28, 0.14]).with_phong(phong);
@@ -143,13 +143,13 @@ pub(crate) fn glossy_floor() -> Vec<u8> {
     scene.into_gltf()
 }
 
-/// All Lambertian, lit by a lamp in a cup that only a spot of the ceiling sees: nearly all light is indirect, and comes
-/// from there.
+/// The Lambertian box, lit by a lamp in a cup that only a spot of the ceiling sees: nearly all light is indirect, by
+/// way of that spot.
 pub(crate) fn uplight() -> Vec<u8> {
     cornell_box(None, add_uplight).into_gltf()
 }
 
-/// A mirror ball and a glass ball between Lambertian walls: light that a smooth surface sends on to a Lambertian one.
+/// A mirror ball and a glass ball between Lambertian walls: a scene of caustics.
 pub(crate) fn spheres() -> Vec<u8> {
     let (mut scene, _) = empty_box(None, add_ceiling_lamp);
     let mirror = scene.material(&Material::metallic_roughness("mirror", [1.0; 3], 1.0, 0.0));

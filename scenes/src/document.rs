@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-/// The top of a glTF file.
+/// The top-level object of a glTF file.
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Document {
@@ -46,7 +46,7 @@ pub(crate) struct Roots {
     pub(crate) nodes: Vec<usize>,
 }
 
-/// A place in the hierarchy: what stands there, and where.
+/// A node of the hierarchy: a mesh or a camera, with its transform and its children.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Node {
     pub(crate) name: String,
@@ -58,7 +58,7 @@ pub struct Node {
     pub(crate) translation: Option<[f32; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) scale: Option<[f32; 3]>,
-    /// Column by column, as glTF wants it.
+    /// Transform in column-major order.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) matrix: Option<[f32; 16]>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -115,7 +115,7 @@ pub(crate) struct MaterialEntry {
 }
 
 impl MaterialEntry {
-    /// The extension's name if a texture is transformed.
+    /// Name of the extension `KHR_texture_transform`, if the material uses it.
     pub(crate) fn transform_extension(&self) -> Option<&'static str> {
         let textures = [self.pbr_metallic_roughness.base_color_texture, self.emissive_texture];
         let is_there = textures.iter().flatten().any(|texture| texture.extensions.is_some());
@@ -148,7 +148,7 @@ pub(crate) struct Extensions {
 }
 
 impl Extensions {
-    /// The names of those that are there.
+    /// Names of the extensions that are present.
     pub(crate) fn names(&self) -> impl Iterator<Item = &'static str> {
         [
             ("KHR_materials_emissive_strength", self.emissive_strength.is_some()),
@@ -197,7 +197,7 @@ pub(crate) struct Volume {
     pub(crate) attenuation_color: [f64; 3],
 }
 
-/// Which texture a material takes, and how it lies.
+/// Reference of a material to a texture, with its transform (`textureInfo`).
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct TextureInfo {
     pub(crate) index: usize,
@@ -211,14 +211,14 @@ pub(crate) struct TextureExtensions {
     pub(crate) transform: TextureTransform,
 }
 
-/// Coordinates are scaled, then turned, then moved, before the texture is looked up.
+/// `KHR_texture_transform`: coordinates are scaled, then rotated, then offset.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct TextureTransform {
-    /// Added last.
+    /// Offset, in widths and heights of the image.
     pub offset: [f64; 2],
-    /// Radians, counterclockwise where the second coordinate grows downwards.
+    /// Rotation, radians, counterclockwise where the second coordinate grows downwards.
     pub rotation: f64,
-    /// How often the image fits into one unit of each coordinate.
+    /// Scale: repetitions of the image in one unit of each coordinate.
     pub scale: [f64; 2],
 }
 
@@ -258,9 +258,9 @@ pub(crate) struct PhotoncardExtras {
 /// One Phong cosine lobe: `ks (n + 2) / (2 pi) cos^n(alpha)`.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Phong {
-    /// `ks`, red, green and blue.
+    /// `ks`: albedo of the lobe, red, green and blue.
     pub specular: [f64; 3],
-    /// `n`.
+    /// `n`: exponent of the lobe.
     pub exponent: f64,
 }
 

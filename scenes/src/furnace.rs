@@ -1,6 +1,6 @@
-//! A closed cube whose walls all emit and reflect alike.
+//! White furnace test: a closed cube whose walls all emit and reflect alike.
 //!
-//! Radiance is then the same everywhere and in every direction: `L = 1 + 0.5 L`, so `L = 2`.
+//! Radiance is uniform in every position and direction: `L = 1 + 0.5 L`, so `L = 2`.
 
 use glam::Vec3;
 
@@ -8,7 +8,7 @@ use crate::builder::{Camera, SceneBuilder};
 use crate::material::Material;
 use crate::mesh::Mesh;
 
-/// A box between two corners given in the wrong order shows its front to the inside.
+/// The inside of a cube: a box between swapped corners has its front inside.
 fn room() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.cuboid(Vec3::ONE, Vec3::NEG_ONE);

@@ -1,6 +1,6 @@
-//! The scenes that ship with photoncard, made from numbers.
+//! Generators of the scenes that ship with photoncard.
 //!
-//! Every run on every machine makes the same bytes; a test holds the files beside this crate to that.
+//! Every run on every machine makes the same bytes; a test compares them with the files beside this crate.
 #![forbid(unsafe_code)]
 
 mod atrium;
@@ -15,16 +15,16 @@ mod roughness;
 mod sky;
 mod sphere;
 
-/// A scene as it lies on disk.
+/// File of a scene or an environment.
 #[derive(Clone, Debug)]
 pub struct SceneFile {
-    /// The name of the file, without a folder.
+    /// Name of the file, without a folder.
     pub name: &'static str,
-    /// All of the file.
+    /// Contents of the file.
     pub bytes: Vec<u8>,
 }
 
-/// Makes every scene, and the sky that goes with one.
+/// Files of all scenes, and of the sky that lights `atrium-open.glb`.
 pub fn scenes() -> Vec<SceneFile> {
     vec![
         SceneFile { name: "cornell.gltf", bytes: cornell::lambertian() },

@@ -1,4 +1,4 @@
-//! Writes the scenes that ship into the folder given, by default the one they ship in.
+//! Writes the scenes that ship into the folder of the first argument, by default the folder of this crate.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,16 +1,16 @@
-//! What surfaces reflect, let through and emit, and how glTF says it.
+//! Materials: reflection, transmission and emission of surfaces, as glTF states them.
 
 use crate::document::{
     EmissiveStrength, Extensions, Extras, IndexOfRefraction, MaterialEntry, MetallicRoughness, Phong,
     PhotoncardExtras, Specular, TextureExtensions, TextureInfo, TextureTransform, Transmission, Volume,
 };
 
-/// What a surface reflects and emits.
+/// Material of a surface.
 #[derive(Clone, Debug, Default)]
 pub struct Material {
     name: String,
     base_colour: [f64; 3],
-    /// Metallic factor and roughness; none is Lambertian.
+    /// Metallic factor and roughness; `None` is Lambertian.
     microfacets: Option<[f64; 2]>,
     glass: Option<Glass>,
     radiance: [f64; 3],
@@ -21,26 +21,26 @@ pub struct Material {
     alpha_cutoff: Option<f64>,
 }
 
-/// What fills a clear, smooth body.
+/// Medium of a clear, smooth body.
 #[derive(Clone, Copy, Debug)]
 pub struct Glass {
     /// Index of refraction.
     pub ior: f64,
-    /// How thick a body is about, in metres, for renderers that do not trace through it.
+    /// Approximate thickness of the body, metres, for renderers that do not trace through it.
     pub thickness: f64,
-    /// What is left of white light after `attenuation_distance`, red, green and blue.
+    /// Transmittance over `attenuation_distance`, red, green and blue.
     pub attenuation_colour: [f64; 3],
-    /// In metres.
+    /// Distance that `attenuation_colour` is for, metres.
     pub attenuation_distance: f64,
 }
 
 impl Material {
-    /// A purely Lambertian material; `albedo` is the reflected share, red, green and blue.
+    /// A purely Lambertian material of an albedo, red, green and blue.
     pub fn diffuse(name: &str, albedo: [f64; 3]) -> Self {
         Self { name: name.into(), base_colour: albedo, ..Self::default() }
     }
 
-    /// glTF's metallic-roughness model; a metal of roughness 0 is a mirror.
+    /// A material of glTF's metallic-roughness model; a metal of roughness 0 is a mirror.
     pub fn metallic_roughness(name: &str, base_colour: [f64; 3], metallic: f64, roughness: f64) -> Self {
         Self { microfacets: Some([metallic, roughness]), ..Self::diffuse(name, base_colour) }
     }
@@ -50,49 +50,49 @@ impl Material {
         Self { glass: Some(glass), ..Self::metallic_roughness(name, [1.0; 3], 0.0, 0.0) }
     }
 
-    /// The same, emitting `radiance` in W/(sr m^2).
+    /// This material with an emitted radiance, W/(sr m^2).
     #[must_use]
     pub fn emitting(mut self, radiance: [f64; 3]) -> Self {
         self.radiance = radiance;
         self
     }
 
-    /// The same on both sides.
+    /// This material on both sides.
     #[must_use]
     pub fn double_sided(mut self) -> Self {
         self.double_sided = true;
         self
     }
 
-    /// The same with a Phong lobe on top.
+    /// This material with an additional Phong lobe.
     #[must_use]
     pub fn with_phong(mut self, phong: Phong) -> Self {
         self.phong = Some(phong);
         self
     }
 
-    /// The same with its base colour multiplied by a texture.
+    /// This material with its base colour multiplied by a texture.
     #[must_use]
     pub fn textured(mut self, texture: usize, transform: Option<TextureTransform>) -> Self {
         self.base_texture = Some(info(texture, transform));
         self
     }
 
-    /// The same with its radiance multiplied by a texture.
+    /// This material with its radiance multiplied by a texture.
     #[must_use]
     pub fn emission_textured(mut self, texture: usize) -> Self {
         self.emissive_texture = Some(info(texture, None));
         self
     }
 
-    /// The same, but not there where the texture's alpha is below `cutoff`.
+    /// This material, cut out where the base texture's alpha is below `cutoff`.
     #[must_use]
     pub fn cut_out(mut self, cutoff: f64) -> Self {
         self.alpha_cutoff = Some(cutoff);
         self
     }
 
-    /// glTF keeps `emissiveFactor` within one; the rest of the radiance is the strength.
+    /// glTF's `emissiveFactor`, at most 1, and the strength that it is multiplied by for a higher radiance.
     fn emission(&self) -> (Option<[f64; 3]>, Option<EmissiveStrength>) {
         let peak = self.radiance.into_iter().fold(0.0, f64::max);
         if peak == 0.0 {

@@ -1,27 +1,27 @@
-//! Triangle meshes and the few ways in which the scenes' shapes are made.
+//! Triangle meshes, and the operations that the scenes' shapes are made by.
 //!
 //! Front faces are counterclockwise. Shapes share vertices along their inner edges, so they have no
 //! cracks; sines and cosines come from `libm`, so every machine makes the same bits.
 
 use glam::{Vec2, Vec3};
 
-/// Indexed triangles.
+/// A mesh of indexed triangles.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
-    /// Vertices, in metres.
+    /// Positions of the vertices, metres.
     pub positions: Vec<Vec3>,
-    /// Three vertices each, counterclockwise from the front.
+    /// Indices of the three vertices of each triangle, counterclockwise from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// Unit normals of the vertices of a smooth surface; none if it is flat.
+    /// Unit normals of the vertices; empty for a flat surface.
     pub normals: Vec<Vec3>,
-    /// Texture coordinates of the vertices, the second downwards in the image; none without a texture.
+    /// Texture coordinates of the vertices, the second downwards in the image; empty without a texture.
     pub coordinates: Vec<Vec2>,
-    /// Colours of the vertices, linear red, green and blue; none if they are white.
+    /// Colours of the vertices, linear red, green and blue; empty if they are white.
     pub colours: Vec<[f32; 3]>,
 }
 
 impl Mesh {
-    /// The corners of the smallest axis-aligned box around the mesh.
+    /// Lower and upper corner of the mesh's bounding box.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         self.positions.iter().fold(empty, |(min, max), &p| (min.min(p), max.max(p)))
@@ -52,7 +52,7 @@ impl Mesh {
         self.quad_between(corners);
     }
 
-    /// The same with texture coordinates, which a mesh has everywhere or nowhere.
+    /// [`Self::quad`] with texture coordinates, which a mesh has everywhere or nowhere.
     pub fn textured_quad(&mut self, corners: [Vec3; 4], coordinates: [[f32; 2]; 4]) {
         self.quad(corners);
         self.coordinates.extend(coordinates.map(Vec2::from_array));
@@ -92,7 +92,7 @@ impl Mesh {
         self.grid_cut(size, wrap, point, |_, _| false);
     }
 
-    /// The same; where `other_cut` says so a cell is cut along its other diagonal.
+    /// [`Self::grid`] with the cells for which `other_cut` returns true cut along their other diagonal.
     pub fn grid_cut(
         &mut self,
         [columns, rows]: [usize; 2],
@@ -127,7 +127,7 @@ impl Mesh {
         self.fluted_lathe(segments, profile, |_, _| 1.0);
     }
 
-    /// The same with the radius scaled by `flute(segment, row)`.
+    /// [`Self::lathe`] with the radius scaled by `flute(segment, row)`.
     pub fn fluted_lathe(
         &mut self,
         segments: usize,
@@ -178,7 +178,7 @@ impl Mesh {
         self
     }
 
-    /// The volume inside, if the mesh is closed; negative if its front faces inwards.
+    /// Volume of a closed mesh, m^3; negative if its front faces inwards.
     pub fn volume(&self) -> f32 {
         let corner = |index: u32| self.positions[index as usize];
         self.triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c)))).sum::<f32>() / 6.0

@@ -38,7 +38,7 @@ pub(crate) fn roughness() -> Vec<u8> {
     scene.into_glb()
 }
 
-/// The ground, a wall behind, and a lamp above and before them.
+/// Adds the ground, a wall behind the balls, and a lamp above them.
 fn surround(scene: &mut SceneBuilder) {
     let ground = scene.material(&Material::diffuse("ground", [0.5; 3]));
     let lamp = scene.material(&Material::diffuse("lamp", [0.0; 3]).emitting([12.0; 3]));

@@ -1,6 +1,6 @@
 //! A clear sky as an equirectangular map: blue overhead, bright at the horizon, with a soft sun.
 //!
-//! The middle of the map is -z and its top +y, as photoncard's option `--environment` takes it.
+//! The centre of the map is -z and its top +y, as photoncard's option `--environment` takes it.
 
 use std::io::Cursor;
 
@@ -9,12 +9,12 @@ use glam::Vec3;
 
 const SIZE: [usize; 2] = [128, 64];
 
-/// Radiance in W/(sr m^2) straight up, at the horizon, and of the ground below it.
+/// Radiance at the zenith, at the horizon, and of the ground below it, W/(sr m^2).
 const ZENITH: Vec3 = Vec3::new(0.30, 0.62, 1.40);
 const HORIZON: Vec3 = Vec3::new(1.35, 1.50, 1.70);
 const GROUND: Vec3 = Vec3::new(0.22, 0.19, 0.15);
 
-/// Towards the sun; its radiance, and the angle at which a third of that is left, in radians.
+/// Direction of the sun; its radiance at the centre, W/(sr m^2); and the angle at which `1/e` of that is left, radians.
 const SUN: Vec3 = Vec3::new(-0.55, 0.75, -0.6);
 const SUN_RADIANCE: Vec3 = Vec3::new(1100.0, 900.0, 620.0);
 const SUN_WIDTH: f32 = 0.06;
@@ -28,7 +28,7 @@ fn radiance(direction: Vec3) -> Vec3 {
     HORIZON.lerp(ZENITH, from_horizon) + SUN_RADIANCE * libm::expf(-angle * angle)
 }
 
-/// The direction that the middle of a texel shows.
+/// Direction of the centre of a texel.
 fn direction(column: usize, row: usize) -> Vec3 {
     let [u, v] =
         [(column, SIZE[0]), (row, SIZE[1])].map(|(place, count)| (place as f32 + 0.5) / count as f32);

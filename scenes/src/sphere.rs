@@ -1,4 +1,4 @@
-//! A sphere of triangles that are nearly alike.
+//! A sphere of nearly equal triangles.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::mesh::Mesh;
 
-/// The faces of an icosahedron with the corners that [`icosahedron`] gives it, counterclockwise from outside.
+/// Faces of an icosahedron, as indices of the vertices of [`icosahedron`], counterclockwise from outside.
 const FACES: [[u32; 3]; 20] = [
     [0, 11, 5],
     [0, 5, 1],
@@ -77,7 +77,7 @@ mod tests {
         let sphere = icosphere(3);
         assert_eq!(sphere.triangles.len(), 20 * 64);
         assert_eq!(sphere.positions.len(), sphere.triangles.len() / 2 + 2);
-        // A little less than the ball's, as it lies within.
+        // A little less than the ball's volume, as the mesh is inscribed.
         let share = sphere.volume() / (4.0 / 3.0 * core::f32::consts::PI);
         assert!((0.98..1.0).contains(&share), "{share}");
     }

@@ -1,4 +1,4 @@
-//! One small scene of everything that a scene can hold.
+//! One small scene with everything that a scene can hold.
 
 use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{
@@ -18,16 +18,16 @@ const GLASS: u32 = 5;
 const LATTICE: u32 = 6;
 const SCREEN: u32 = 7;
 
-/// A room with a lamp, a point light, a spot and a directional light, with a sky through its open front, textured walls by both sets
-/// of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, and a screen.
+/// A room with a lamp, a point light, a spot and a directional light, a sky through its open front, walls with textures
+/// of both sets of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, and an emissive screen.
 pub fn everything() -> Scene {
     let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
     let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);
-    // The wall behind the eye.
+    // The last wall, behind the eye, is left out.
     scene.triangles.truncate(10);
     add_textures(&mut scene);
     add_lights(&mut scene);
-    // Of the room's walls those of paper and metal have coordinates and colours.
+    // The room's walls of paper and metal have texture coordinates and colours.
     for index in 0..10 {
         let Triangle { vertices, material, .. } = scene.triangles[index];
         if material != WALL {

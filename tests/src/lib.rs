@@ -1,4 +1,4 @@
-//! What the tests of the whole share: small scenes of known radiance, and renders of them.
+//! Shared parts of the tests of the whole: small scenes, renders of them, and a card on a link.
 #![forbid(unsafe_code)]
 
 pub mod everything;
@@ -14,7 +14,7 @@ use photoncard_driver::film::Film;
 use photoncard_driver::render::{RenderSettings, Rendering, Unobserved, render};
 use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
 
-/// A white Lambertian, one-sided material of some albedo that does not emit.
+/// A grey, one-sided Lambertian material of an albedo that does not emit.
 pub fn lambertian(name: &str, albedo: f32) -> Material {
     Material::lambertian(name, Vec3::splat(albedo))
 }
@@ -60,29 +60,29 @@ pub fn scene(triangles: Vec<Triangle>, materials: Vec<Material>, camera: Camera)
     Scene { triangles, materials, cameras: vec![camera], ..Scene::default() }
 }
 
-/// Renders, or panics with the reason.
+/// Renders a scene.
 ///
 /// # Panics
-/// If the render fails.
+/// If the render fails, with the reason.
 pub fn render_or_panic(scene: &Scene, settings: &RenderSettings) -> Rendering {
     render(scene, settings, &Unobserved).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Radiances of a film, row by row.
+/// Radiances of a film's pixels, row by row, W/(sr m^2).
 pub fn radiances(film: &Film) -> Vec<[f32; 3]> {
     film.pixels().iter().map(|pixel| pixel.radiance).collect()
 }
 
-/// Mean over pixels and channels.
+/// Mean of radiances over pixels and channels.
 pub fn mean(radiances: &[[f32; 3]]) -> f64 {
     let sum: f64 = radiances.as_flattened().iter().map(|&channel| channel as f64).sum();
     sum / (3 * radiances.len()) as f64
 }
 
-/// Does some work on a thread with room on its stack for a card's buffers, which are built there.
+/// Does some work on a thread whose stack has room for a card's buffers, which are built there.
 ///
 /// # Panics
-/// If the work does.
+/// If the work panics, or the thread cannot be started.
 pub fn with_room_for_a_card(work: impl FnOnce() + Send) {
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, work);

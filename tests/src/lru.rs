@@ -1,24 +1,24 @@
-//! A cache written down as its definition reads, slow and plain: what the firmware's are compared with.
+//! A set-associative LRU cache in its plainest form, which the firmware's caches are compared with.
 
-/// A cache as its definition reads: for every set the blocks it holds, the one used last at the end.
+/// A set-associative cache with least-recently-used replacement: for every set its blocks, the last used at the end.
 pub struct LruOracle {
     sets: Vec<Vec<u32>>,
     ways: usize,
     lines: u32,
-    /// The set of a block.
+    /// Function from a block to its set.
     set: Box<dyn Fn(u32) -> u32>,
 }
 
 impl LruOracle {
-    /// A cache that holds nothing: `ways` lines to a set, each of `lines` of card memory, in the set that `set` gives.
+    /// An empty cache of `ways` blocks per set, each of `lines` lines of card memory, in the set that `set` gives.
     pub fn new(sets: u32, ways: u32, lines: u32, set: impl Fn(u32) -> u32 + 'static) -> Self {
         Self { sets: vec![Vec::new(); sets as usize], ways: ways as usize, lines, set: Box::new(set) }
     }
 
-    /// Whether a line is there; it is from now on.
+    /// Reads a line: returns whether it hits, and brings its block into the cache if it misses.
     ///
     /// # Panics
-    /// If there is no such set.
+    /// If `set` gives no valid set.
     pub fn hits(&mut self, line: u32) -> bool {
         let block = line / self.lines;
         let set = &mut self.sets[(self.set)(block) as usize];

@@ -1,5 +1,4 @@
-//! Scenes with a photon map that stays as it is while frames change: what differs between two frames is then the gather
-//! alone.
+//! Scenes with one photon map for several frames, so that two frames differ in the gather alone.
 
 use glam::Vec3;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
@@ -20,7 +19,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{CausticGather, FrameParameters, Sampling, Tile};
 use rayon::prelude::*;
 
-/// A scene with its card image.
+/// A scene with its card image and photon map.
 pub struct MappedScene {
     scene: Scene,
     image: CardImage,
@@ -28,19 +27,19 @@ pub struct MappedScene {
     caustics: Option<CausticGather>,
 }
 
-/// The pixels of a frame's window, row by row, and what they took.
+/// A rendered frame: the pixels of its window, and counts of the work.
 pub struct Frame {
-    /// W/(sr m^2).
+    /// Radiance of the pixels, row by row, W/(sr m^2).
     pub radiance: Vec<Vec3>,
-    /// What was counted.
+    /// Counts of the work.
     pub counters: Counters,
 }
 
 impl MappedScene {
-    /// Traces photons and packs the image, as a render of these settings would.
+    /// Traces photons and packs the card image, as a render with these settings does.
     ///
     /// # Panics
-    /// If the scene cannot be packed.
+    /// If the scene cannot be packed, or its photons cannot be traced.
     pub fn new(scene: Scene, settings: &RenderSettings) -> Self {
         let packed = PackedScene::new(&scene).expect("packs");
         let MappedImage { image, max_distance, caustics, .. } =
@@ -48,10 +47,10 @@ impl MappedScene {
         Self { scene, image, max_distance, caustics }
     }
 
-    /// The window of a frame on reference chips of this process, one a thread.
+    /// Renders the window of a frame on reference chips in this process, one per thread.
     ///
     /// # Panics
-    /// If the image is not sound.
+    /// If the scene has no camera of the settings' name, the card image is malformed, or threads cannot be started.
     pub fn frame(&self, settings: &RenderSettings) -> Frame {
         let window = settings.window();
         let camera = self.scene.camera(settings.camera.as_deref()).expect("a camera");
@@ -80,19 +79,19 @@ impl MappedScene {
     }
 }
 
-/// The indirect light of some surface points, gathered without a picture around them.
+/// Indirect light of single surface points, gathered without a render of a picture.
 pub struct IndirectLight<'a> {
     mapped: &'a MappedScene,
     frame: FrameParameters,
-    /// The points, spread evenly over the picture; those whose reflection is black are left out.
+    /// The points, spread evenly over the picture, without points of black reflection.
     pub points: Vec<Surface>,
 }
 
 impl<'a> IndirectLight<'a> {
-    /// What a camera sees at the middles of `side * side` squares of the picture.
+    /// The points that a camera sees at the centres of `side * side` cells of the picture.
     ///
     /// # Panics
-    /// If the image is not sound.
+    /// If the scene has no camera of the settings' name, or the card image is malformed.
     pub fn new(mapped: &'a MappedScene, settings: &RenderSettings, side: u32) -> Self {
         let camera = mapped.scene.camera(settings.camera.as_deref()).expect("a camera");
         let frame = settings.frame(camera, mapped.max_distance, mapped.caustics);
@@ -115,11 +114,11 @@ impl<'a> IndirectLight<'a> {
         Self { mapped, frame, points }
     }
 
-    /// The radiance that each point reflects towards the eye of the light that reaches it from other surfaces, with so
-    /// many rays of a sampling.
+    /// Radiance of indirect light that each point reflects towards the eye, W/(sr m^2), by `rays` gather rays of a
+    /// sampling.
     ///
     /// # Panics
-    /// If the image is not sound.
+    /// If the card image is malformed.
     pub fn radiance(&self, sampling: Sampling, rays: u32, seed: u32) -> Vec<Vec3> {
         let frame = FrameParameters { sampling, ..self.frame };
         let gather = |(index, surface): (usize, &Surface)| {

@@ -1,13 +1,13 @@
-//! Shapes to put into scenes.
+//! Shapes for scenes of tests.
 
 use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{Attributes, Scene, Triangle};
 
 use crate::{quad, room};
 
-/// The outside of a box.
+/// An axis-aligned box that faces outwards, of half sides `half`.
 pub fn cuboid(centre: Vec3, half: Vec3, material: u32) -> Vec<Triangle> {
-    // The room's walls, turned to the outside.
+    // The room's walls, with their fronts turned outwards.
     let mut walls = room([material; 6]);
     for Triangle { vertices, .. } in &mut walls {
         vertices.swap(1, 2);
@@ -16,7 +16,7 @@ pub fn cuboid(centre: Vec3, half: Vec3, material: u32) -> Vec<Triangle> {
     walls
 }
 
-/// Adds a ball of `steps` by `2 steps` quadrilaterals, smooth by the normals of its corners, to a scene.
+/// Adds a ball of `steps` by `2 steps` quadrilaterals with smooth vertex normals to a scene.
 pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, material: u32) {
     let normal = |row: u32, column: u32| {
         let pole = std::f32::consts::PI * row as f32 / steps as f32;
@@ -46,8 +46,8 @@ pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, materi
     }
 }
 
-/// Adds a quadrilateral, its corners counter-clockwise seen from its front, with texture coordinates of the first set at its
-/// corners, to a scene.
+/// Adds a quadrilateral with texture coordinates of the first set to a scene; corners counter-clockwise seen from the
+/// front.
 pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f32; 2]; 4], material: u32) {
     let [a, b, c, d] = coordinates.map(Vec2::from);
     for (triangle, coordinates) in quad(corners, material).into_iter().zip([[a, b, c], [a, c, d]]) {

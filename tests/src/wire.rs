@@ -1,4 +1,4 @@
-//! A card on a wire that loses nothing.
+//! A card on a lossless link, driven command by command.
 
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::memory::Dram;
@@ -10,7 +10,7 @@ use photoncard_shared::message::{
 };
 use photoncard_shared::transport::Transport;
 
-/// A card, the host's end of its link, and whoever gives the commands.
+/// A card, and the host's end of its link, through which a test gives commands.
 pub struct Wire<'a> {
     /// The card.
     pub card: Box<MicroCard<Dram<'a>>>,
@@ -20,36 +20,36 @@ pub struct Wire<'a> {
     layers: bool,
 }
 
-/// A reply, without what it borrows.
+/// A [`Reply`] with owned data, as far as tests need it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// The lines that are written, and what the firmware takes of on-chip memory.
+    /// [`Reply::Hello`]: number of lines that are written, and the firmware's use of on-chip memory.
     Hello(u32, Option<MemoryUse>),
-    /// Their bytes.
+    /// [`Reply::Checksums`]: bytes of the checksums.
     Checksums(Vec<u8>),
-    /// The image is sound.
+    /// [`Reply::ImageAccepted`]: the image is well-formed.
     ImageAccepted,
-    /// Tiles may come.
+    /// [`Reply::FrameAccepted`]: tiles may be sent.
     FrameAccepted,
-    /// Their number.
+    /// [`Reply::Pixels`]: number of pixels.
     Pixels(usize),
-    /// Its number.
+    /// [`Reply::TileDone`]: number of the tile.
     TileDone(u32),
-    /// Why not.
+    /// [`Reply::Fault`]: code of the fault.
     Fault(FaultCode),
 }
 
 impl<'a> Wire<'a> {
-    /// A card that was just switched on, with some memory.
+    /// A card that was just switched on, with `memory` for its DRAM.
     pub fn new(memory: &'a mut [Line]) -> Self {
         let card = Box::new(MicroCard::new(MICRO, Dram::new(memory)));
         Self { card, host: Transport::host(), session: 0, layers: false }
     }
 
-    /// Sends a command and works until the card rests. Returns its answers.
+    /// Sends a command and lets the card work until it is idle. Returns its answers.
     ///
     /// # Panics
-    /// If the card's answers are no replies.
+    /// If the card sends anything but replies.
     pub fn say(&mut self, command: &Command) -> Vec<Answer> {
         if let Command::BeginFrame(frame) = command {
             self.layers = frame.layers;
@@ -58,10 +58,10 @@ impl<'a> Wire<'a> {
         self.work()
     }
 
-    /// Sends bytes that are no command.
+    /// Sends a raw message, which need not be a command, and lets the card work until it is idle. Returns its answers.
     ///
     /// # Panics
-    /// If they do not fit a frame.
+    /// If the message does not fit a frame of the link, or the card sends anything but replies.
     pub fn say_bytes(&mut self, message: &[u8]) -> Vec<Answer> {
         assert!(self.host.send(|bytes| {
             bytes.get_mut(..message.len())?.copy_from_slice(message);
@@ -70,10 +70,10 @@ impl<'a> Wire<'a> {
         self.work()
     }
 
-    /// Works until the card rests. Returns its answers.
+    /// Lets the card work until it is idle. Returns its answers.
     ///
     /// # Panics
-    /// If they are no replies.
+    /// If the card sends anything but replies.
     pub fn work(&mut self) -> Vec<Answer> {
         let mut answers = Vec::new();
         loop {
@@ -101,7 +101,7 @@ impl<'a> Wire<'a> {
         }
     }
 
-    /// Begins a session. Returns the lines that the card has written.
+    /// Begins a session. Returns the number of lines that are written in the card's memory.
     ///
     /// # Panics
     /// If the card does not say hello.
@@ -114,7 +114,7 @@ impl<'a> Wire<'a> {
         }
     }
 
-    /// Loads an image, in an order that is not that of its lines: from the last to the first.
+    /// Loads an image in reverse order of its writes, from the last lines to the first. Returns the card's answers.
     pub fn load(&mut self, lines: &[Line]) -> Vec<Answer> {
         let begin = Command::BeginImage { lines: lines.len() as u32, checksum: image_checksum(lines) };
         let mut answers = self.say(&begin);

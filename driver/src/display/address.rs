@@ -1,19 +1,19 @@
-//! Where a display server is: an argument of `--display-server`.
+//! Address of a display server: the argument of `--display-server`.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::link::host_name;
 
-/// The port that tev listens on unless it is told otherwise.
+/// Default port of tev.
 pub const DEFAULT_PORT: u16 = 14158;
 
-/// Where a display server is.
+/// Address of a display server, `HOST:PORT`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DisplayAddress {
-    /// Name or number of its machine.
+    /// Name or IP address of the machine.
     pub host: String,
-    /// Its TCP port.
+    /// TCP port.
     pub port: u16,
 }
 

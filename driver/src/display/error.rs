@@ -1,37 +1,37 @@
-//! Why a picture is not shown.
+//! Errors of display servers.
 
 use std::io;
 
 use super::DisplayAddress;
 
-/// Why a picture, or a part of it, is not shown. The render does without.
+/// Error that keeps a picture, or a part of it, from being shown. The render goes on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DisplayError {
-    /// There is no connection.
+    /// No connection to the server can be made.
     #[error(
         "cannot reach the display server at {address}: {source}; start tev there, or leave --display-server out"
     )]
     Connect {
-        /// Where it is to be.
+        /// Address of the server.
         address: DisplayAddress,
-        /// What the system says.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// The connection is no more.
+    /// The connection has ended.
     #[error("the display server at {address} is gone: {source}")]
     Gone {
-        /// Where it was.
+        /// Address of the server.
         address: DisplayAddress,
-        /// What the system says.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// It did not take all in time.
+    /// The server did not take all packets in time.
     #[error("the display server at {address} takes no more: {packets} packets of the picture are not shown")]
     Slow {
-        /// Where it is.
+        /// Address of the server.
         address: DisplayAddress,
-        /// Packets that it has not taken.
+        /// Packets that the server has not taken.
         packets: usize,
     },
 }

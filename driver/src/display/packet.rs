@@ -1,7 +1,7 @@
 //! The packets of tev's protocol, as its `README.md` and `src/Ipc.cpp` describe them.
 //!
-//! A packet is its length in bytes (`u32`, itself included), the number of an operation (one byte) and what that takes.
-//! Numbers are little-endian, texts end with a zero byte, a truth value is a byte of 0 or 1.
+//! A packet is its length in bytes (`u32`, itself included), the number of an operation (one byte) and its arguments.
+//! Numbers are little-endian, strings end with a zero byte, a Boolean is a byte of 0 or 1.
 //!
 //! ```text
 //! CreateImage    4   grab focus, image, width i32, height i32, channels i32, the channels' names
@@ -9,8 +9,8 @@
 //!                    offset of each channel i64, stride of each channel i64, f32 ...
 //! ```
 //!
-//! Offsets and strides count `f32`: pixel `p` of the rectangle, in rows, has in channel `c` the value
-//! `offset[c] + p * stride[c]`. Here a pixel's channels lie side by side. `CreateImage` replaces an image of the same name.
+//! Offsets and strides count `f32`: pixel `p` of the rectangle, in rows, has in channel `c` the value `offset[c] + p *
+//! stride[c]`. Here a pixel's channels lie side by side. `CreateImage` replaces an image of equal name.
 
 use photoncard_shared::message::Tile;
 
@@ -18,10 +18,10 @@ use crate::printable::printable;
 
 /// The operation that creates an image, or replaces the one of its name.
 pub const CREATE_IMAGE: u8 = 4;
-/// The operation that replaces the values of a rectangle in some channels.
+/// Operation that replaces the values of a rectangle in some channels.
 pub const UPDATE_IMAGE: u8 = 6;
 
-/// The packet that creates a black image of `width` x `height` pixels and asks for it to be looked at.
+/// Packet that creates a black image of `width` x `height` pixels and gives it the viewer's focus.
 pub fn create_image(image: &str, [width, height]: [u32; 2], channels: &[&str]) -> Vec<u8> {
     let mut packet = Packet::new(CREATE_IMAGE, true, image);
     packet.numbers([width, height]);
@@ -29,7 +29,7 @@ pub fn create_image(image: &str, [width, height]: [u32; 2], channels: &[&str]) -
     packet.end()
 }
 
-/// The packet that replaces a rectangle of an image. `values` are those of its pixels, in rows, of each its channels.
+/// Packet that replaces a rectangle of an image. `values` are the channels of each pixel in turn, row by row.
 pub fn update_image(
     image: &str,
     rectangle: &Tile,
@@ -46,7 +46,7 @@ pub fn update_image(
     packet.end()
 }
 
-/// A packet that is being written, its length still to come.
+/// A packet under construction, whose length [`Self::end`] writes.
 struct Packet(Vec<u8>);
 
 impl Packet {
@@ -62,7 +62,7 @@ impl Packet {
         self.0.extend(printable(text).bytes().chain([0]));
     }
 
-    /// Sides and places of pictures are far below 2^31.
+    /// Appends numbers as `i32`: sides and coordinates of pictures are far below 2^31.
     fn numbers(&mut self, numbers: impl IntoIterator<Item = u32>) {
         self.0.extend(numbers.into_iter().flat_map(u32::to_le_bytes));
     }

@@ -1,4 +1,4 @@
-//! What sends packets to a display server, on a thread of its own.
+//! Sender of packets to a display server, on a thread of its own.
 
 use std::io::{self, ErrorKind, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -14,29 +14,29 @@ use crate::film::{Film, FilmPixel, Window};
 use crate::layer::Channel;
 use crate::sink::{FinishedTile, TileSink};
 
-/// How long a connection may take to be made.
+/// Time limit of a connection attempt.
 const CONNECT_WAIT: Duration = Duration::from_secs(2);
-/// How long a write may wait before its thread looks around.
+/// Time limit of a write, after which its thread looks whether the display was closed.
 const WRITE_WAIT: Duration = Duration::from_millis(100);
-/// Bytes of packets that may wait: those of five million pixels.
+/// Maximum number of bytes of waiting packets: five million RGB pixels.
 const MOST_WAITING: usize = 64 << 20;
-/// How long a display may take no byte when the picture is complete.
+/// Time limit without progress once the picture is complete.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How long it may take in all, from then on.
+/// Time limit for all waiting packets once the picture is complete.
 const MOST_AT_END: Duration = Duration::from_secs(20);
 
-/// Where a picture is to be shown, and as what.
+/// Settings of a display: the server, and the image's name there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DisplaySettings {
-    /// The display server.
+    /// Address of the display server.
     pub address: DisplayAddress,
-    /// The image's name there; one of the same name is replaced.
+    /// Name of the image on the server; an image of equal name is replaced.
     pub image: String,
 }
 
-/// A picture on a display server. It is the crop window of a film.
+/// A picture on a display server: the crop window of a film.
 ///
-/// Dropping it ends its thread, whatever is still to be sent.
+/// Dropping it ends its thread, even if packets are still to be sent.
 pub struct Display {
     settings: DisplaySettings,
     window: Window,
@@ -46,12 +46,12 @@ pub struct Display {
 }
 
 impl Display {
-    /// Begins to show the crop window `window` with some channels. What goes wrong is told by [`Self::failure`].
+    /// Begins to show the crop window `window` with some channels. Errors are reported by [`Self::failure`].
     pub fn open(settings: &DisplaySettings, window: Window, channels: &[Channel]) -> Self {
         Self::with_room_for(MOST_WAITING, settings, window, channels)
     }
 
-    /// The same, with at most so many bytes waiting.
+    /// [`Self::open`] with at most `most_waiting` bytes of waiting packets.
     pub(super) fn with_room_for(
         most_waiting: usize,
         settings: &DisplaySettings,
@@ -70,7 +70,7 @@ impl Display {
         state.lock().push(create_image(&settings.image, size, &display.names()));
         let address = settings.address.clone();
         let work = move || send_packets(&address, &state);
-        // Nobody waits for it: to look up a name may take any time.
+        // The thread is not joined: a look-up of a name may take any time.
         let begun = std::thread::Builder::new().name("display".into()).spawn(work);
         if let Err(source) = begun {
             display.fail(DisplayError::Connect { address: settings.address.clone(), source });
@@ -92,13 +92,13 @@ impl Display {
         update_image(&self.settings.image, &shown, &self.names(), values)
     }
 
-    /// What went wrong, if that was not told before. Nothing is shown from then on.
+    /// The error that ended the display, returned once. After an error nothing more is shown.
     pub fn failure(&self) -> Option<DisplayError> {
         self.state.lock().take_failure()
     }
 
-    /// Shows what found no room before, and waits until all is sent: for some seconds at the most, and for fewer if the display
-    /// takes nothing.
+    /// Sends the tiles that found no room before, and waits until all packets are sent: at most 20 s, at most 2 s
+    /// without progress.
     pub fn finish(&self, film: &Film) {
         let missed = std::mem::take(&mut self.state.lock().missed);
         let mut watch = Watch::new();
@@ -119,7 +119,7 @@ impl Display {
         }
     }
 
-    /// The display takes nothing more: it lacks what waits, and `missed` tiles or fewer.
+    /// Ends the display as too slow: it lacks the waiting packets, and up to `missed` tiles.
     fn give_up(&self, missed: usize) {
         let packets = self.state.lock().left() + missed;
         self.fail(DisplayError::Slow { address: self.settings.address.clone(), packets });
@@ -156,7 +156,7 @@ impl Drop for Display {
     }
 }
 
-/// Looks whether a display still takes bytes.
+/// Watchdog of a display's progress.
 struct Watch {
     begun: Instant,
     moved: Instant,
@@ -169,7 +169,7 @@ impl Watch {
         Self { begun: now, moved: now, sent: 0 }
     }
 
-    /// Waits until the state is as `is_ready` says. Returns whether it is; not if the display takes too long.
+    /// Waits until `is_ready` holds. Returns whether it does; false if the display takes too long.
     fn wait_until(&mut self, state: &SharedState, is_ready: impl Fn(&State) -> bool) -> bool {
         while !state.wait_until(WRITE_WAIT, &is_ready) {
             let sent = state.lock().sent;
@@ -185,7 +185,7 @@ impl Watch {
     }
 }
 
-/// Connects, and sends what there is to send until the display is closed or fails.
+/// Connects, and sends packets until the display is closed or fails.
 fn send_packets(address: &DisplayAddress, state: &SharedState) {
     let result = match connect(address) {
         Ok(mut stream) => send_all(&mut stream, state)
@@ -231,7 +231,7 @@ fn send_all(stream: &mut TcpStream, state: &SharedState) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether a write did nothing and may be tried again.
+/// Returns whether a write that failed may be tried again.
 fn is_passing(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }

@@ -1,4 +1,4 @@
-//! What a display's owner and its thread share: the packets that wait, and how it stands.
+//! State that a display shares with its thread: the waiting packets, progress and failure.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -8,54 +8,54 @@ use photoncard_shared::message::Tile;
 
 use super::DisplayError;
 
-/// Packets on their way from the owner to the thread.
+/// Queue of packets from the display to its thread, with progress and failure.
 #[derive(Default)]
 pub(super) struct State {
     queue: VecDeque<Vec<u8>>,
     /// Bytes in the queue.
     waiting: usize,
-    /// Whether a packet that was taken from the queue is not wholly sent.
+    /// True while a packet that was taken from the queue is not wholly sent.
     is_sending: bool,
-    /// Bytes that were sent.
+    /// Number of bytes sent.
     pub(super) sent: u64,
-    /// Tiles that found no room.
+    /// Tiles that found no room in the queue.
     pub(super) missed: Vec<Tile>,
-    /// Nothing more is to be sent.
+    /// True once the display is dropped: nothing more is to be sent.
     pub(super) is_closed: bool,
-    /// Nothing more can be sent.
+    /// True after a failure: nothing more can be sent.
     has_failed: bool,
-    /// Why, until that is told.
+    /// The failure, until [`Self::take_failure`] returns it.
     failure: Option<DisplayError>,
 }
 
 impl State {
-    /// Whether a packet would still be sent.
+    /// Returns whether packets are still sent.
     pub(super) fn is_open(&self) -> bool {
         !self.is_closed && !self.has_failed
     }
 
-    /// Whether all is sent that is to be.
+    /// Returns whether all packets of the queue are sent.
     pub(super) fn is_empty(&self) -> bool {
         self.queue.is_empty() && !self.is_sending
     }
 
-    /// Packets that are not wholly sent, and tiles that were missed.
+    /// Number of packets that are not wholly sent, and of tiles that found no room.
     pub(super) fn left(&self) -> usize {
         self.queue.len() + usize::from(self.is_sending) + self.missed.len()
     }
 
-    /// Whether so many more bytes may wait, of `most` in all: those of one packet always.
+    /// Returns whether `bytes` more may wait, of `most` in all; a single packet always may.
     pub(super) fn has_room(&self, bytes: usize, most: usize) -> bool {
         self.waiting == 0 || self.waiting + bytes <= most
     }
 
-    /// Puts a packet behind the others.
+    /// Appends a packet to the queue.
     pub(super) fn push(&mut self, packet: Vec<u8>) {
         self.waiting += packet.len();
         self.queue.push_back(packet);
     }
 
-    /// Nothing more can be sent. Tells of the first failure alone.
+    /// Ends the display with an error and drops what waits. Only the first error is kept.
     pub(super) fn fail(&mut self, error: DisplayError) {
         if self.is_open() {
             self.failure = Some(error);
@@ -66,13 +66,13 @@ impl State {
         self.is_sending = false;
     }
 
-    /// What went wrong, if that was not told before.
+    /// The failure, if it was not returned before.
     pub(super) fn take_failure(&mut self) -> Option<DisplayError> {
         self.failure.take()
     }
 }
 
-/// The state with its lock, and who waits for it to change.
+/// The state with its lock, and a condition variable for its changes.
 #[derive(Default)]
 pub(super) struct SharedState {
     state: Mutex<State>,
@@ -81,18 +81,18 @@ pub(super) struct SharedState {
 
 impl SharedState {
     pub(super) fn lock(&self) -> MutexGuard<'_, State> {
-        // No step of a thread that panicked is half done.
+        // A thread that panicked left no change half done.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the state, and tells the other thread.
+    /// Changes the state, and wakes the other thread.
     pub(super) fn change<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
         let result = change(&mut self.lock());
         self.changed.notify_all();
         result
     }
 
-    /// Waits until the state is as `is_ready` says, not longer than `most`. Returns whether it is.
+    /// Waits until `is_ready` holds, at most for `most`. Returns whether it holds.
     pub(super) fn wait_until(&self, most: Duration, is_ready: impl Fn(&State) -> bool) -> bool {
         let is_not_ready = |state: &mut State| !is_ready(state);
         let waited = self.changed.wait_timeout_while(self.lock(), most, is_not_ready);
@@ -100,7 +100,7 @@ impl SharedState {
         is_ready(&state)
     }
 
-    /// The next packet to send; `None` once there will be none.
+    /// The next packet to send, waited for; `None` once the display is closed or has failed.
     pub(super) fn next(&self) -> Option<Vec<u8>> {
         let mut state = self.lock();
         loop {
@@ -116,7 +116,7 @@ impl SharedState {
         }
     }
 
-    /// So many bytes of the present packet were sent. Returns whether to go on with it.
+    /// Counts bytes of the current packet as sent. Returns whether to go on.
     pub(super) fn advance(&self, bytes: usize, is_last: bool) -> bool {
         self.change(|state| {
             state.sent += bytes as u64;

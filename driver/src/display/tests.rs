@@ -53,7 +53,7 @@ fn every_tile_is_shown_though_few_have_room_to_wait() {
     let settings = settings(&listener);
     let (film, tiles) = film(9);
     let viewer = thread::spawn(move || {
-        // All tiles are there before the first is taken.
+        // All tiles wait before the first is taken.
         thread::sleep(Duration::from_millis(200));
         packets(listener.accept().unwrap().0)
     });
@@ -65,7 +65,7 @@ fn every_tile_is_shown_though_few_have_room_to_wait() {
     drop(display);
     let mut shown = viewer.join().unwrap();
     assert!(shown.remove(0) == create_image("film", [64, 576], &["R", "G", "B"]));
-    // Those that had no room come last, and how many had depends on the sender.
+    // Tiles that found no room come last; their number depends on the sender's speed.
     shown.sort_unstable();
     expected.sort_unstable();
     assert!(shown == expected, "{} packets of {}", shown.len(), expected.len());
@@ -80,7 +80,7 @@ fn a_display_that_never_reads_holds_nothing_up_for_long() {
     let took = shown(&display, &film, &tiles);
     assert!(took < Duration::from_secs(10), "{took:?}");
     assert!(matches!(display.failure(), Some(DisplayError::Slow { packets, .. }) if packets > 0));
-    // It is told of once, and nothing is done for it any more.
+    // The failure is reported once, and nothing more is sent.
     assert!(shown(&display, &film, &tiles) < Duration::from_secs(1));
     assert!(display.failure().is_none());
 }

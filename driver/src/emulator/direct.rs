@@ -1,4 +1,5 @@
-//! Chips without cards: tiles rendered straight from an image, for studies and for what no link could carry.
+//! Chips without cards and links: tiles rendered straight from a card image, for studies and for whole-frame
+//! reordering.
 
 use photoncard_firmware::chip::{Progress, ReferenceChip};
 use photoncard_firmware::fixed_point::ColourSum;
@@ -9,22 +10,22 @@ use photoncard_shared::message::{Fault, FaultCode, FrameParameters, Tile};
 
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 
-/// A rendered tile, and what it took.
+/// A rendered tile, with its work and memory traffic.
 pub struct RenderedTile {
-    /// The light of its pixels, row by row, in the image's radiance units: a sum a pixel, or with layers
+    /// Light of the pixels, row by row, in the image's radiance units: one sum per pixel, or with layers
     /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
     pub sums: Vec<ColourSum>,
-    /// What was counted.
+    /// Counts of the work.
     pub counters: Counters,
-    /// What was read, if the memory is modelled.
+    /// Memory traffic; zero for a memory that is not modelled.
     pub traffic: MemoryTraffic,
 }
 
-/// Renders a tile on a chip with a memory of its own. The gathers of its pixels go to `outlet`, if there is one: whoever does
-/// them completes the pixels.
+/// Renders a tile on a chip with a memory of its own. With an `outlet` the gathers of the pixels go there, and the
+/// caller does them and completes the pixels.
 ///
 /// # Errors
-/// If the image is not sound, or the chip has no room for the tile.
+/// If the card image is malformed, or the chip has no room for the tile.
 pub fn render_tile(
     chip: &mut ReferenceChip,
     scene: &SceneImage,
@@ -41,7 +42,7 @@ pub fn render_tile(
     }
     while chip.step(&mut context)? == Progress::Busy {}
     if context.outlet.is_none() {
-        // What a card reads to complete its pixels is counted here as well.
+        // The reads that complete pixels on a card are counted here as well.
         for index in 0..tile.pixels() as usize {
             while chip.complete(&mut context, index)?.is_none() {}
         }

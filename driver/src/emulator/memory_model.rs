@@ -1,4 +1,4 @@
-//! A model of a chip's memory: its caches, and what is counted above and below them.
+//! Model of a chip's memory: its caches, with counters of the traffic above and below them.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,37 +9,37 @@ use photoncard_firmware::memory::{
 };
 use photoncard_shared::address::{LINE_BYTES, Line, Structure};
 
-/// The caches between a chip and its DRAM: an argument of `--cache`.
+/// Caches between a chip and its DRAM: the argument of `--cache`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CacheSettings {
-    /// One for the photon map and one for the scene.
+    /// One cache for the photon map and one for the scene.
     Split {
-        /// Of the photon map.
+        /// Cache of the photon map.
         photon: CacheSpec,
-        /// Of the scene.
+        /// Cache of the scene.
         scene: CacheSpec,
     },
-    /// One for both.
+    /// One cache for both.
     Unified(CacheSpec),
 }
 
-/// The shape of a cache, as it is written.
+/// Shape of a cache: `SIZE/LINE/WAYS` of `--cache`, and the index of sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CacheSpec {
-    /// Bytes it holds.
+    /// Capacity, bytes.
     pub bytes: u32,
-    /// Bytes of one of its lines.
+    /// Size of a cache line, bytes.
     pub line_bytes: u32,
-    /// Lines of a set.
+    /// Associativity: lines of a set.
     pub ways: u32,
-    /// How a line finds its set.
+    /// Function from a line's address to its set.
     pub index: SetIndex,
 }
 
 impl CacheSpec {
     /// The dissertation's cache of the photon map: 128 KB in lines of 128 bytes (section 6.5); 4 ways are our choice.
     pub const PHOTON: Self = Self { bytes: 128 << 10, line_bytes: 128, ways: 4, index: SetIndex::Modulo };
-    /// Its ray caster's: 75 KB (section 7.3.2).
+    /// The dissertation's cache of the ray caster: 75 KB (section 7.3.2), otherwise as [`Self::PHOTON`].
     pub const SCENE: Self = Self { bytes: 75 << 10, ..Self::PHOTON };
 
     fn shape(&self) -> Result<CacheShape, ShapeError> {
@@ -47,7 +47,7 @@ impl CacheSpec {
     }
 
     fn cache(&self) -> LineCache<Vec<CacheEntry>, Vec<Line>> {
-        // `FromStr` and the constants make no other.
+        // `FromStr` and the constants make valid shapes alone.
         let shape = self.shape().unwrap_or_else(|error| unreachable!("{self}: {error:?}"));
         let entries = vec![CacheEntry::EMPTY; shape.entries()];
         let lines = vec![Line::ZERO; shape.lines()];
@@ -91,7 +91,8 @@ impl fmt::Display for CacheSettings {
 impl FromStr for CacheSettings {
     type Err = String;
 
-    /// `photon=128K/128/4,scene=75K/128/4,index=hash`, parts left out as they are by default, or `unified=256K/128/8`.
+    /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash`, where parts left out have their defaults, or
+    /// `unified=256K/128/8`.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut photon = None;
         let mut scene = None;
@@ -170,7 +171,7 @@ fn cache(text: &str) -> Result<CacheSpec, String> {
     }
 }
 
-/// A memory behind caches, counted above and below them.
+/// A memory behind caches, with counters above and below them.
 pub type ModelledMemory<M> = Counted<LineCaches<Counted<M>, Vec<CacheEntry>, Vec<Line>>>;
 
 impl CacheSettings {
@@ -184,44 +185,44 @@ impl CacheSettings {
     }
 }
 
-/// What a chip asked of its memory, and what of that came from DRAM.
+/// Memory traffic of a chip, above and below its caches.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryTraffic {
-    /// Reads by the chip: records and the bytes of each.
+    /// Reads by the chip, above the caches: records and their bytes.
     pub requested: Traffic,
-    /// Reads by its caches: lines of card memory.
+    /// Reads from DRAM, below the caches: lines of card memory.
     pub fetched: Traffic,
 }
 
 impl MemoryTraffic {
-    /// Nothing.
+    /// No traffic.
     pub const ZERO: Self = Self { requested: Traffic::ZERO, fetched: Traffic::ZERO };
 
-    /// Adds another chip's.
+    /// Adds the traffic of another chip.
     pub fn add(&mut self, other: &Self) {
         self.requested.add(&other.requested);
         self.fetched.add(&other.fetched);
     }
 
-    /// What tiles asked of some structures, and what of that came from DRAM.
+    /// Reads of the chosen structures for tiles: requested, and fetched from DRAM.
     pub fn of(&self, chosen: impl Fn(Structure) -> bool) -> [Reads; 2] {
         [self.requested.of_tiles(&chosen), self.fetched.of_tiles(&chosen)]
     }
 
-    /// Bytes from DRAM of the photon map.
+    /// Bytes of the photon map from DRAM, for tiles.
     pub fn photon_map_bytes(&self) -> u64 {
         self.fetched.of_tiles(Structure::is_photon_map).bytes
     }
 
-    /// Bytes from DRAM of the scene.
+    /// Bytes of the scene from DRAM, for tiles.
     pub fn scene_bytes(&self) -> u64 {
         self.fetched.of_tiles(|structure| !structure.is_photon_map()).bytes
     }
 }
 
-/// Memory that tells its traffic, if it is modelled.
+/// Memory that reports its traffic.
 pub trait MeasuredMemory: MemoryPort {
-    /// What was counted since it was made.
+    /// Traffic since the memory was made; zero for a memory that is not modelled.
     fn traffic(&self) -> MemoryTraffic;
 }
 

@@ -1,4 +1,4 @@
-//! Emulated cards: the firmware on threads of this process, one chip a thread, each on a loopback link.
+//! Emulated cards: the firmware on threads of this process, one chip per thread, each on a loopback link.
 
 pub mod direct;
 mod dram;
@@ -23,17 +23,17 @@ use self::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use self::trace::{TraceFile, Traced};
 use crate::link::{LoopbackPort, loopback};
 
-/// The kind of chip on an emulated card.
+/// Kind of the chip on an emulated card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChipKind {
-    /// [`REFERENCE`].
+    /// A chip of the budget [`REFERENCE`].
     Reference,
-    /// [`MICRO`].
+    /// A chip of the budget [`MICRO`].
     Micro,
 }
 
 impl ChipKind {
-    /// On-chip memory that the firmware takes with its caches and stack, bytes.
+    /// On-chip memory of the firmware, its caches and stack included, bytes.
     pub fn sram_bytes(self) -> usize {
         match self {
             Self::Reference => REFERENCE_SRAM_BYTES,
@@ -49,7 +49,7 @@ impl ChipKind {
         }
     }
 
-    /// On-chip memory of the tags of its caches, bytes.
+    /// On-chip memory of the caches' tags, bytes.
     pub fn tag_bytes(self) -> usize {
         tag_bytes(&self.budget())
     }
@@ -61,30 +61,30 @@ impl ChipKind {
         }
     }
 
-    /// On-chip memory of the tile's and the link's buffers, bytes.
+    /// On-chip memory of the buffers of tile and link, bytes.
     pub fn buffer_bytes(self) -> usize {
         self.sram_bytes() - sram_bytes(&self.budget(), 0)
     }
 }
 
-/// Bytes that wait in each direction of a loopback link.
+/// Capacity of a loopback link in each direction, bytes.
 const LINK_CAPACITY: usize = 64 << 10;
-/// Stack of a chip's thread: its buffers are built there before they move to the heap.
+/// Stack of a chip's thread, bytes: the chip's buffers are built there before they move to the heap.
 pub(crate) const THREAD_STACK: usize = 16 << 20;
 
-/// What is modelled of a card's memory.
+/// Model of an emulated card's memory.
 pub struct MemoryModel {
-    /// Its caches.
+    /// Caches between chip and DRAM.
     pub caches: CacheSettings,
-    /// Where its reads are written to.
+    /// File that the chip's reads are written to, if any.
     pub trace: Option<TraceFile>,
 }
 
-/// What a card whose memory is modelled leaves at its end.
+/// Record of a modelled memory at the end of its card.
 pub struct MemoryRecord {
-    /// What was read.
+    /// Traffic of the card's whole life.
     pub traffic: MemoryTraffic,
-    /// The trace, still to be finished.
+    /// Trace of the reads, still to be finished.
     pub trace: Option<TraceFile>,
 }
 
@@ -96,11 +96,11 @@ pub struct EmulatedCard {
 }
 
 impl EmulatedCard {
-    /// Starts a card; without a model its memory costs nothing and tells nothing. Of an image that is loaded into it the
-    /// lines may be those of `shared`.
+    /// Starts a card. Without a model its memory has no caches and no counters. A card that is loaded with the image in
+    /// `shared` keeps no copy of it.
     ///
     /// # Errors
-    /// If the system has no thread for it.
+    /// If the card's thread cannot be started.
     pub fn start(kind: ChipKind, model: Option<MemoryModel>, shared: SharedImage) -> std::io::Result<Self> {
         let (host, mut card) = loopback(LINK_CAPACITY);
         let trace = model.as_ref().and_then(|model| model.trace.as_ref());
@@ -120,15 +120,15 @@ impl EmulatedCard {
         self.port.as_mut().expect("the port lives as long as the card")
     }
 
-    /// Whether its trace cannot be written.
+    /// Returns whether writing the trace has failed.
     pub fn trace_has_failed(&self) -> bool {
         self.trace_has_failed.as_ref().is_some_and(|failed| failed.load(Ordering::Relaxed))
     }
 
-    /// Ends the card. Returns what its memory leaves, if it is modelled.
+    /// Ends the card. Returns the record of its memory, if it is modelled.
     ///
     /// # Panics
-    /// If the chip did.
+    /// If the chip panicked.
     pub fn finish(mut self) -> Option<MemoryRecord> {
         drop(self.port.take());
         let record = self.thread.take()?.join();
@@ -140,19 +140,19 @@ impl Drop for EmulatedCard {
     fn drop(&mut self) {
         drop(self.port.take());
         if let Some(thread) = self.thread.take() {
-            // A chip that panicked has already closed its link, which the session has told.
+            // A chip that panicked has already closed its link, which the session has reported.
             let _ = thread.join();
         }
     }
 }
 
-/// Serves a card on a port that others reach, until the port fails.
+/// Serves an emulated card to a host elsewhere, until the port fails.
 ///
 /// # Errors
-/// If the system has no thread for it.
+/// If the card's thread cannot be started.
 ///
 /// # Panics
-/// If the chip did.
+/// If the chip panicked.
 pub fn serve_card(kind: ChipKind, mut port: impl Port + Send) -> std::io::Result<()> {
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
@@ -182,7 +182,7 @@ fn run(
     }
 }
 
-/// Serves a card with some memory until the host drops its end of the link. Returns what `end` makes of the memory then.
+/// Serves a card with some memory until the host drops its end of the link. Returns the result of `end` on the memory.
 fn serve_on<M: CardMemory, R>(
     kind: ChipKind,
     memory: M,

@@ -1,8 +1,8 @@
 //! All gathers of a frame along one Hilbert curve: the bound that the orders of a chip are compared with.
 //!
-//! No chip can do it: the gathers of a frame are gigabytes. The emulated chips hand theirs to the host, which sorts them
-//! and has them done when all rays are cast (Steinhurst, Coombe, Lastra 2005). Irradiance records are needed before the
-//! pixels and stay on the chips.
+//! No chip can do it: the gathers of a frame are gigabytes. Emulated chips hand their gathers to the host, which sorts
+//! them and has them done when all rays are cast (Steinhurst, Coombe, Lastra 2005). Gathers of irradiance records,
+//! whose results are needed before the pixels, stay on the chips.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -25,38 +25,38 @@ use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::film::{Film, FilmError};
 use crate::pack::CardImage;
 
-/// The most gathers that are kept at once, 32 bytes each: 4.3 GB.
+/// Maximum number of gathers that are kept at once, 32 bytes each: 4.3 GB.
 const MOST_GATHERS: u64 = 1 << 27;
-/// Gathers of the tiles that are cast before the host takes them over, about.
+/// Approximate number of gathers in the tiles of one round of casting, after which the host takes them over.
 const GATHERS_PER_CAST: u64 = 1 << 21;
-/// Gathers that one task does.
+/// Number of gathers of one task.
 const GATHERS_PER_TASK: usize = 4096;
-/// The same where memory is modelled: empty caches at the beginning of each hardly count.
+/// Number of gathers of one task where memory is modelled: so many that the empty caches at its beginning hardly count.
 const GATHERS_PER_COUNTED_TASK: usize = 1 << 22;
-/// Gathers that are done before the host looks around.
+/// Minimum number of gathers between two reports of progress.
 const GATHERS_PER_ROUND: usize = 256 * GATHERS_PER_TASK;
 
-/// Why a frame was not rendered.
+/// Error of [`render_along_curve`].
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
-    /// It might have more gathers than can be kept.
+    /// The frame may have more gathers than can be kept.
     #[error(
         "the frame may have {gathers} gathers, and at most {MOST_GATHERS} are kept at once, as memory allows"
     )]
     TooManyGathers {
-        /// Rays over pixels and samples.
+        /// Gathers that the frame may have: gather rays of all pixels and samples.
         gathers: u64,
     },
     /// The image is not sound.
     #[error("the card image is not sound: {0}")]
     Image(Fault),
-    /// The system has no threads.
+    /// The threads cannot be started.
     #[error("the chips could not be started: {0}")]
     Start(#[from] rayon::ThreadPoolBuildError),
-    /// A tile is not in the film.
+    /// A tile does not lie in the film.
     #[error(transparent)]
     Film(#[from] FilmError),
-    /// It was stopped.
+    /// The caller stopped the render.
     #[error("stopped before the picture was complete")]
     Stopped,
 }
@@ -67,15 +67,16 @@ impl From<Fault> for FrameError {
     }
 }
 
-/// A gather on its way along the curve.
+/// A gather that waits for its turn along the curve.
 #[derive(Clone, Copy)]
 struct Waiting {
-    /// Index in the frame's sums.
+    /// Index of the sum that it adds to, in [`Frame::sums`].
     sum: u32,
     request: GatherRequest,
 }
 
-/// The sums of a frame's pixels, tile after tile, one or some a pixel, and the gathers that are still to be added.
+/// State of a frame: the sums of its pixels, tile after tile, one per pixel or several with layers, and the gathers
+/// that are still to be added to them.
 struct Frame {
     sums: Vec<ColourSum>,
     waiting: Vec<Waiting>,
@@ -83,13 +84,13 @@ struct Frame {
     traffic: MemoryTraffic,
 }
 
-/// What one tile leaves to the host.
+/// A tile whose rays are cast, with the gathers that it leaves to the host.
 struct CastTile {
     tile: RenderedTile,
     waiting: Vec<GatherRequest>,
 }
 
-/// Takes the gathers of a chip.
+/// Collector of a chip's gathers.
 struct Outlet(Vec<GatherRequest>);
 
 impl GatherOutlet for Outlet {
@@ -98,32 +99,32 @@ impl GatherOutlet for Outlet {
     }
 }
 
-/// A frame along the curve: what to render, and on what.
+/// A frame to render along the curve.
 #[derive(Clone, Copy)]
 pub struct CurveJob<'a> {
     /// The card image.
     pub image: &'a CardImage,
     /// The frame's parameters.
     pub frame: &'a FrameParameters,
-    /// The tiles whose rays are cast, one after the other.
+    /// The tiles of the frame, in the order in which their rays are cast.
     pub tiles: &'a [Tile],
-    /// Emulated reference chips.
+    /// Number of emulated reference chips, a thread each.
     pub chips: usize,
 }
 
-/// What a frame took.
+/// Work and memory traffic of a frame.
 pub struct CurveOutcome {
-    /// What was counted.
+    /// Counts of the work.
     pub counters: Counters,
-    /// What was read, if the memory is modelled: caches are empty when a tile begins, and at every 2^22-th gather.
+    /// Memory traffic, if the memory is modelled: caches are empty when a tile begins, and at every 2^22-th gather.
     pub traffic: MemoryTraffic,
 }
 
-/// Renders tiles into a film. `progress` is told how many tiles' worth of the work is done, of how many, and says whether
-/// to go on. With `caches` memory is modelled.
+/// Renders tiles into a film. `progress(done, total)` is called with the work that is done, in tiles, and returns
+/// whether to go on. With `caches` the memory is modelled.
 ///
-/// # Errors
-/// If the frame has too many gathers, the image is not sound, or `progress` says no.
+/// # Errors If the frame has too many gathers, the card image is malformed, the threads cannot be started, a tile does
+/// not lie in the film, or `progress` returns false.
 pub fn render_along_curve(
     job: CurveJob,
     caches: Option<&CacheSettings>,
@@ -148,7 +149,7 @@ fn render_with<'a, M: MeasuredMemory>(
     let CurveJob { frame, tiles, chips, .. } = job;
     let mut all = Frame::with_room_for(frame, tiles)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(chips).stack_size(THREAD_STACK).build()?;
-    // Casting a tile counts as a tenth of it, doing its gathers as the rest.
+    // The rays of a tile count as a tenth of its work, its gathers as the rest.
     let total = tiles.len() as u64;
     let cast = AtomicU64::new(0);
     let go_on = || progress(cast.fetch_add(1, Ordering::Relaxed) / 10, total);
@@ -180,7 +181,7 @@ fn render_with<'a, M: MeasuredMemory>(
     Ok(CurveOutcome { counters: all.counters, traffic: all.traffic })
 }
 
-/// The gather rays of one pixel; with the irradiance cache about.
+/// Number of gather rays per pixel; an estimate with the irradiance cache.
 fn rays_of_pixel(frame: &FrameParameters) -> u64 {
     let samples = frame.samples as u64;
     match frame.irradiance_error {
@@ -209,7 +210,8 @@ impl Frame {
         Ok(all)
     }
 
-    /// Takes over what tiles leave. Only lobes beside an irradiance cache can be more than there was room made for.
+    /// Takes over the sums and gathers of tiles. Only the gathers of glossy lobes beside an irradiance cache can exceed
+    /// the room that is reserved.
     fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), FrameError> {
         for CastTile { tile, waiting } in tiles {
             let gathers = (self.waiting.len() + waiting.len()) as u64;
@@ -251,7 +253,7 @@ fn cast_tiles<'a, M: MeasuredMemory>(
     tiles.par_iter().map_init(new_chip, cast_one).collect()
 }
 
-/// Completes the pixels and writes them.
+/// Completes the pixels and writes them into the film.
 fn complete<'a, M: MeasuredMemory>(
     job: CurveJob<'a>,
     model: &impl Fn(Lines<'a>) -> M,
@@ -276,9 +278,9 @@ fn complete<'a, M: MeasuredMemory>(
     Ok(())
 }
 
-/// What came of some gathers.
+/// Results of some gathers.
 struct Gathered {
-    /// Index of the sum, and what is added there.
+    /// Light to be added, with the index of its sum.
     brought: Vec<(u32, Vec3)>,
     counters: Counters,
     traffic: MemoryTraffic,

@@ -1,4 +1,4 @@
-//! How much an emissive triangle emits: the mean of its texture over it.
+//! Emission of triangles with an emissive texture: the texture's mean over the triangle.
 
 use std::sync::OnceLock;
 
@@ -8,13 +8,13 @@ use super::footprint::Footprint;
 use super::pyramid::{Level, Pyramid, decode};
 use crate::scene::{Attributes, Image, Material, Scene, Triangle};
 
-/// How far from its middle a texel can be seen where texels are interpolated, texels.
+/// Maximum distance from its centre at which a texel contributes to bilinear interpolation, texels.
 const REACH: f64 = 1.0;
 
-/// Emissive textures of a scene: their means over triangles.
+/// Emissive textures of a scene, for their means over triangles.
 pub(super) struct EmissiveTextures<'s> {
     scene: &'s Scene,
-    /// Of each image its pyramid, once it is asked for.
+    /// Pyramid of each image, built at its first use.
     pyramids: Vec<OnceLock<Pyramid>>,
 }
 
@@ -23,7 +23,7 @@ impl<'s> EmissiveTextures<'s> {
         Self { scene, pyramids: scene.images.iter().map(|_| OnceLock::new()).collect() }
     }
 
-    /// The mean radiance over a triangle, W/(sr m^2): about so, and zero only where no texel glows.
+    /// Mean emitted radiance over a triangle, W/(sr m^2): approximate, but zero only if no texel emits.
     pub(super) fn mean_radiance(&self, triangle: &Triangle, material: &Material) -> DVec3 {
         let emission = material.emission.as_dvec3();
         let Some(index) = material.emissive_texture else { return emission };
@@ -38,7 +38,8 @@ impl<'s> EmissiveTextures<'s> {
             * if is_seen { mean.value() } else { self.coarse_mean(texture.image as usize, image, &footprint) }
     }
 
-    /// The mean over a triangle that has too many texels: of the finest level whose cells are few enough, or of all of the image.
+    /// Mean of a texture over a triangle that shows too many texels: of the finest level whose cells are few enough, or
+    /// of the whole image.
     fn coarse_mean(&self, index: usize, image: &Image, footprint: &Footprint) -> DVec3 {
         let levels = &self.pyramids[index].get_or_init(|| Pyramid::new(image)).levels;
         for level in levels {
@@ -66,7 +67,7 @@ impl Mean {
         self.weight += weight;
     }
 
-    /// Zero of nothing.
+    /// The weighted mean; zero without weight.
     fn value(&self) -> DVec3 {
         if self.weight > 0.0 { self.sum / self.weight } else { DVec3::ZERO }
     }
@@ -84,7 +85,7 @@ mod tests {
         scene_of(64, lit)
     }
 
-    /// The same, of a texture with so many texels a side.
+    /// [`scene`] with a texture of `side` x `side` texels.
     fn scene_of(side: u32, lit: usize) -> Scene {
         let mut texels = vec![[0, 0, 0, 255]; side as usize * side as usize];
         texels[lit] = [255; 4];

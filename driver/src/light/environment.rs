@@ -1,4 +1,4 @@
-//! The environment for a card: texels that share an exponent, and the cells that its directions are chosen by.
+//! The environment as a card has it: an `RGB9_E5` texture, and a grid of cells that importance-samples its directions.
 
 use std::f64::consts::PI;
 
@@ -8,43 +8,43 @@ use rayon::prelude::*;
 use super::thresholds::thresholds;
 use crate::scene::Environment;
 
-/// Columns of cells, at most.
+/// Maximum number of columns of cells.
 const MOST_COLUMNS: u32 = 128;
-/// Rows of cells, at most.
+/// Maximum number of rows of cells.
 const MOST_ROWS: u32 = 64;
-/// The part of the choices that is even over the sphere: a cell that hardly any light comes through is not missed.
+/// Share of the choices that is uniform over the sphere, so that cells with hardly any light are not missed.
 const EVEN: f64 = 1.0 / 64.0;
-/// What the brightest texel is at most once it is scaled, of the 65408 that texels can hold.
+/// Upper bound of the brightest texel after scaling; the format holds up to 65408.
 const BRIGHTEST: f32 = 32768.0;
 
-/// An environment as a card has it.
+/// Environment map in the format of a card.
 #[derive(Clone, Debug)]
 pub(crate) struct EnvironmentMap {
-    /// Texels of a row, and rows.
+    /// Width and height of the map, texels.
     size: [u32; 2],
     /// Texels, rows from the top.
     texels: Vec<[u8; 4]>,
-    /// What a texel of 1 stands for, W/(sr m^2).
+    /// Radiance of a texel of value 1, W/(sr m^2).
     pub(crate) radiance: [f32; 3],
-    /// The cells.
+    /// Cells that directions are chosen by.
     pub(crate) cells: Cells,
-    /// Watts a square metre that arrive at a surface from all sides, mean of the channels: radiance over the sphere.
+    /// Fluence rate: integral of the radiance over the sphere, W/m^2, mean of the channels.
     pub(crate) fluence: f64,
-    /// The greatest radiance of any channel, W/(sr m^2).
+    /// Maximum radiance of any channel of any texel, W/(sr m^2).
     pub(crate) brightest: f32,
 }
 
-/// A grid of cells of equal angles, and how much light comes through each.
+/// A grid of cells of equal angles, weighted by the light that comes through each.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
     pub(crate) columns: u32,
     pub(crate) rows: u32,
-    /// Mean radiance of the channels times solid angle, W/m^2, row after row; none of it zero.
+    /// Weights of the cells, row by row: mean radiance of the channels times solid angle, W/m^2; all above 0.
     pub(crate) weights: Vec<f64>,
 }
 
 impl EnvironmentMap {
-    /// That of an environment; `None` if no light comes from it.
+    /// The map of an environment; `None` if the environment is black or not finite.
     pub(super) fn new(environment: &Environment) -> Option<Self> {
         let brightest = environment.texels.as_flattened().iter().copied().fold(0.0, f32::max);
         if !(brightest > 0.0 && brightest.is_finite()) {
@@ -52,7 +52,7 @@ impl EnvironmentMap {
         }
         let cells = Cells::new(environment);
         let (texels, radiance) = match environment.texels[..] {
-            // Exactly.
+            // A constant environment keeps its exact radiance.
             [texel] => (vec![shared_exponent([1.0; 3])], texel),
             _ => {
                 let scale = scale(brightest);
@@ -70,7 +70,7 @@ impl EnvironmentMap {
         })
     }
 
-    /// The record of its texture, whose texels begin at a line of their section.
+    /// Record of the map's texture, whose texels begin at line `first_line` of their section.
     pub(crate) fn texture(&self, first_line: u32) -> layout::Texture {
         layout::Texture {
             first_line,
@@ -90,28 +90,28 @@ impl EnvironmentMap {
     }
 }
 
-/// The power of two that texels are divided by, so that the brightest is near the greatest that they can hold.
+/// The power of two that texels are divided by, so that the brightest is near the maximum of the format.
 fn scale(brightest: f32) -> f32 {
-    // A division by a power of two is exact; that of a subnormal number need not be.
+    // A division by a power of two is exact unless its result is subnormal.
     let exponent = libm::ilogbf(brightest / BRIGHTEST).clamp(-126, 126) + 1;
     libm::ldexpf(1.0, exponent.clamp(-126, 127))
 }
 
-/// The nearest texel of nine bits a channel with a common exponent (OpenGL's `RGB9_E5`: `EXT_texture_shared_exponent`).
+/// The nearest `RGB9_E5` texel: nine bits a channel with a shared exponent (OpenGL's `EXT_texture_shared_exponent`).
 fn shared_exponent(texel: [f32; 3]) -> [u8; 4] {
     const GREATEST: f32 = 65408.0;
     let [red, green, blue] = texel.map(|channel| channel.clamp(0.0, GREATEST));
     let greatest = red.max(green).max(blue);
     let exponent = if greatest > 0.0 { libm::ilogbf(greatest).max(-16) + 16 } else { 0 };
     let mantissa = |channel: f32, exponent: i32| libm::ldexpf(channel, 24 - exponent).round() as u32;
-    // What rounds up to 512 takes the next exponent.
+    // A mantissa that rounds up to 512 takes the next exponent.
     let exponent = if mantissa(greatest, exponent) > 511 { exponent + 1 } else { exponent };
     let [red, green, blue] = [red, green, blue].map(|channel| mantissa(channel, exponent).min(511));
     (red | green << 9 | blue << 18 | (exponent as u32) << 27).to_le_bytes()
 }
 
 impl Cells {
-    /// Those of an environment with some light.
+    /// The cells of an environment that is not black.
     fn new(environment: &Environment) -> Self {
         let Environment { width, height, .. } = *environment;
         let [columns, rows] = [width.min(MOST_COLUMNS), height.min(MOST_ROWS)];
@@ -144,7 +144,7 @@ impl Cells {
         Self { columns, rows, weights }
     }
 
-    /// The thresholds of the rows, then those in each row.
+    /// Thresholds of the rows, then of the cells of each row ([`thresholds`]).
     pub(super) fn thresholds(&self) -> Vec<u32> {
         let rows = self.weights.chunks(self.columns as usize);
         let sums: Vec<f64> = rows.clone().map(|row| row.iter().sum()).collect();
@@ -153,7 +153,7 @@ impl Cells {
         all
     }
 
-    /// Solid angle of a cell in a row, sr.
+    /// Solid angle of a cell of a row, sr.
     pub(crate) fn solid_angle(&self, row: u32) -> f64 {
         solid_angle_of_row(row, self.rows) / f64::from(self.columns)
     }
@@ -165,7 +165,7 @@ fn solid_angle_of_row(row: u32, rows: u32) -> f64 {
     4.0 * PI * libm::sin(f64::from(2 * row + 1) * half) * libm::sin(half)
 }
 
-/// Mean of the channels at a place of the map, interpolated as a card does.
+/// Mean radiance of the channels at texture coordinates `(u, v)`, interpolated bilinearly as on a card, W/(sr m^2).
 fn luminance(environment: &Environment, [u, v]: [f64; 2]) -> f64 {
     let [width, height] = [environment.width, environment.height].map(i64::from);
     let [x, y] = [u * width as f64 - 0.5, v * height as f64 - 0.5];

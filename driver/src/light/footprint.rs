@@ -1,17 +1,17 @@
-//! The texels that show on a triangle.
+//! Footprint of a triangle on its texture: the texels that show on the triangle.
 
 use crate::scene::{Attributes, Texture, Wrap};
 
-/// A triangle on a texture.
+/// A triangle in the coordinates of a texture.
 pub(super) struct Footprint {
     wrap: [Wrap; 2],
-    /// Its corners, in sides of the image from its upper left corner.
+    /// Transformed texture coordinates of the corners: 0 to 1 is the image, from its upper left corner.
     corners: [[f64; 2]; 3],
 }
 
-/// Beyond this a cell is not told from the next.
+/// Bound of the coordinates, cells: beyond it rounding blurs neighbouring cells.
 const FARTHEST: f64 = 1e12;
-/// The most cells of the rectangle around a triangle that are looked at one by one.
+/// Maximum number of cells of the bounding rectangle of a triangle that is visited cell by cell.
 const MOST_CELLS: f64 = 8192.0;
 
 impl Footprint {
@@ -27,9 +27,10 @@ impl Footprint {
         Self { wrap: texture.wrap, corners }
     }
 
-    /// Shows the index of every cell that has a part in what shows on the triangle, and whether its middle does; those of a repeated image
-    /// repeatedly. The image is a grid of so many columns and rows of cells, and each is seen no farther than `reach` cells from its
-    /// middle. `false`, and none, if they are too many.
+    /// Calls `visit` for every cell that contributes to the triangle's surface, with the cell's index and whether its
+    /// centre lies on the triangle; for cells of a repeated image repeatedly. `size` is the image's grid, columns and
+    /// rows; a cell contributes up to `reach` cells from its centre. Returns `false`, and visits none, if the cells are
+    /// too many.
     pub(super) fn for_each_cell(
         &self,
         size: [u32; 2],
@@ -46,7 +47,7 @@ impl Footprint {
         let [[left, right], [top, bottom]] = [side(0), side(1)];
         let all = (right - left + 2.0 * reach) * (bottom - top + 2.0 * reach);
         let is_near = corners.as_flattened().iter().all(|place| place.abs() < FARTHEST);
-        // What is no number is neither.
+        // NaN fails both comparisons.
         let is_seen = is_near && all <= MOST_CELLS;
         if !is_seen {
             return false;
@@ -68,7 +69,7 @@ impl Footprint {
     }
 }
 
-/// How far a triangle goes to the sides between two heights.
+/// The interval `[left, right]` that a triangle covers between `top` and `bottom`; `None` if it does not reach there.
 fn across([a, b, c]: [[f64; 2]; 3], top: f64, bottom: f64) -> Option<[f64; 2]> {
     let mut sides: Option<[f64; 2]> = None;
     let mut include = |x: f64| {
@@ -88,7 +89,7 @@ fn across([a, b, c]: [[f64; 2]; 3], top: f64, bottom: f64) -> Option<[f64; 2]> {
     sides
 }
 
-/// The column or row of the image that lies at a place beyond its borders too.
+/// The column or row of the image at a coordinate that may lie beyond the image's borders.
 fn wrapped(place: i64, size: u32, wrap: Wrap) -> u32 {
     let size = i64::from(size);
     let texel = match wrap {

@@ -1,5 +1,5 @@
-//! The scene's lights for a card: emissive triangles, points and spots in a tree, distant lights, and the environment; how each is
-//! chosen for shadow rays, and how for photons.
+//! The scene's lights as a card has them: emissive triangles, points and spots in a light tree, distant lights, and the
+//! environment; with the probabilities of choosing each for shadow rays and for photons.
 
 mod colour;
 mod emission;
@@ -34,7 +34,7 @@ use crate::scene::{Material, PunctualKind, PunctualLight, Scene, Triangle};
 #[derive(Debug)]
 pub(crate) struct Lights {
     emitters: Vec<SceneEmitter>,
-    /// Of each triangle of the scene its emitter; none if no triangle is one.
+    /// Index of the emitter of each triangle of the scene; empty if no triangle emits.
     of_triangles: Vec<Option<u32>>,
     tree: LightTree,
     distant: Vec<DistantLight>,
@@ -43,19 +43,19 @@ pub(crate) struct Lights {
     power: f64,
 }
 
-/// An emitter, as the tree has it.
+/// A leaf of the light tree: an emissive triangle, a point light or a spot.
 #[derive(Debug)]
 struct SceneEmitter {
-    /// The triangle of the scene, or no index of one.
+    /// Index of the triangle in the scene; `usize::MAX` for a light without extent.
     triangle: usize,
     record: Emitter,
     bounds: Bounds,
-    /// The power of a photon, watts in its strongest channel, if the emitter emitted nothing else.
+    /// Power in the strongest channel, watts; an upper bound, with the emissive texture taken for white.
     strongest: f64,
 }
 
 impl Lights {
-    /// Those of a scene.
+    /// The lights of a scene.
     pub(crate) fn new(scene: &Scene) -> Self {
         let mut emitters = area_emitters(scene);
         let mut of_triangles = Vec::new();
@@ -87,12 +87,12 @@ impl Lights {
         }
     }
 
-    /// The emitter that a triangle of the scene is, if it is one.
+    /// Index of the emitter of a triangle of the scene, if the triangle emits.
     pub(crate) fn of_triangle(&self, triangle: u32) -> Option<u32> {
         self.of_triangles.get(triangle as usize).copied().flatten()
     }
 
-    /// The records of the emitters; `index_in_image` tells where a triangle of the scene is in the card image.
+    /// Records of the emitters; `index_in_image` maps a triangle's index in the scene to its index in the card image.
     pub(crate) fn emitters(
         &self,
         index_in_image: impl Fn(usize) -> u32,
@@ -106,12 +106,12 @@ impl Lights {
         })
     }
 
-    /// The nodes of the light tree, the root first.
+    /// Nodes of the light tree, the root first.
     pub(crate) fn nodes(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
         self.tree.nodes.iter().copied()
     }
 
-    /// The records of distant lights.
+    /// Records of the distant lights.
     pub(crate) fn distant(&self) -> &[DistantLight] {
         &self.distant
     }
@@ -121,12 +121,12 @@ impl Lights {
         self.environment.as_ref()
     }
 
-    /// The thresholds of the environment's cells.
+    /// Thresholds of the environment's cells; none without an environment.
     pub(crate) fn cell_thresholds(&self) -> Vec<u32> {
         self.environment.as_ref().map_or(Vec::new(), |environment| environment.cells.thresholds())
     }
 
-    /// What the header says of lights; `texture` is the index of the environment's.
+    /// The header's part on lights; `texture` is the index of the environment's texture.
     pub(crate) fn header(&self, texture: u32) -> image::Lights {
         let environment = self.environment.as_ref();
         let cells = environment.map_or([1; 2], |map| [map.cells.columns, map.cells.rows]);
@@ -136,12 +136,12 @@ impl Lights {
             distant: self.shares.distant,
             radiance: environment.map_or([0.0; 3], |map| map.radiance),
             texture: environment.map(|_| texture),
-            // At most those of the grid.
+            // At most 128 columns and 64 rows.
             cells: cells.map(|cells| cells as u16),
         }
     }
 
-    /// Power that reaches the scene, watts, mean of the channels.
+    /// Power of all lights that reaches the scene, watts, mean of the channels.
     pub(crate) fn power(&self) -> f64 {
         self.power
     }
@@ -216,23 +216,24 @@ impl SceneEmitter {
     }
 }
 
-/// How a spot's intensity falls off: `clamp(cos * scale + offset, 0, 1)^2`.
+/// Angular falloff of a spot's intensity: `clamp(cos * scale + offset, 0, 1)^2`.
 struct Spot {
     scale: f32,
     offset: f32,
 }
 
 impl Spot {
-    /// As `KHR_lights_punctual` says: between the cosines of the inner and the outer cone.
+    /// The falloff that `KHR_lights_punctual` recommends, between the cosines of the inner and the outer cone.
     fn new(inner_cosine: f32, outer_cosine: f32) -> Self {
         let scale = 1.0 / (inner_cosine - outer_cosine).max(0.001);
         Self { scale, offset: -outer_cosine * scale }
     }
 
-    /// The integral of the share of the intensity over all directions, sr.
+    /// Integral of the falloff over all directions, sr.
     fn solid_angle(&self) -> f64 {
         let [scale, offset] = [self.scale, self.offset].map(f64::from);
-        // From the outer cone to where the whole intensity is reached, or to the axis.
+        // The root of the falloff rises linearly in the cosine, from 0 at the outer cone to `reached` at the inner cone
+        // or at the axis; it is 1 within the inner cone, whose `1 - cos` is `whole`.
         let reached = (scale + offset).clamp(0.0, 1.0);
         let whole = (1.0 - (1.0 - offset) / scale).max(0.0);
         2.0 * PI * (reached * reached * reached / (3.0 * scale) + whole)

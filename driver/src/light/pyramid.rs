@@ -1,5 +1,5 @@
-//! An emissive image at ever coarser resolutions (Williams, "Pyramidal Parametrics", 1983): the mean over many texels is looked up as that of
-//! few cells.
+//! Image pyramids of emissive textures (Williams, "Pyramidal Parametrics", 1983): the mean over many texels as the mean
+//! over few cells.
 
 use glam::Vec3;
 use photoncard_firmware::scene::decode_texel;
@@ -7,31 +7,32 @@ use photoncard_shared::layout::TexelFormat;
 
 use crate::scene::{Encoding, Image};
 
-/// Cells of a level, each way, that become one of the next.
+/// Cells of a level, along each axis, that become one cell of the next level.
 const STEP: u32 = 4;
 
-/// The resolutions of an image, coarser than its own.
+/// An image at coarser resolutions than its own.
 pub(super) struct Pyramid {
-    /// The last is one cell.
+    /// Levels from fine to coarse; the last is one cell.
     pub(super) levels: Vec<Level>,
 }
 
-/// The means of an image over a grid of cells of about the same size.
+/// Means of an image over a grid of cells of about equal size.
 pub(super) struct Level {
-    /// Columns and rows.
+    /// Number of columns and of rows.
     pub(super) size: [u32; 2],
-    /// Linear RGB, rows from the top.
+    /// Linear RGB of the cells, rows from the top.
     pub(super) cells: Vec<Vec3>,
 }
 
 impl Level {
-    /// How far from its middle a cell can be seen, cells: from a texel at its border half a texel farther. Cells of sides that
-    /// [`STEP`] does not divide have the whole cells of the finer level that begin in them; those reach beyond the border by up to 0.67.
+    /// Maximum distance from its centre at which a cell contributes, cells. Interpolation carries a texel at the border
+    /// half a texel farther; and where [`STEP`] does not divide a side, a cell has the whole cells of the finer level
+    /// that begin in it, which reach beyond its border by up to 0.67 cells.
     pub(super) const REACH: f64 = 1.5;
-    /// What a cell counts whose middle does not show: little, but it may be all that glows.
+    /// Weight of a cell whose centre is not on the triangle: small, but not 0, as it may be the only one that emits.
     pub(super) const OUTSIDE: f64 = 1.0 / 16.0;
 
-    /// The means of a finer grid, `finer` of whose size tells its cells by column and row.
+    /// The level above a finer grid of `finer_size` columns and rows; `finer` gives the grid's cells by index.
     fn new(finer_size: [u32; 2], finer: impl Fn(usize) -> Vec3) -> Self {
         let size = finer_size.map(|side| side.div_ceil(STEP));
         let range = |axis: usize, cell: u32| {
@@ -56,7 +57,7 @@ impl Level {
 }
 
 impl Pyramid {
-    /// That of an image.
+    /// The pyramid of an image.
     pub(super) fn new(image: &Image) -> Self {
         let texel = |index: usize| decode(image.encoding, image.texels[index]);
         let mut levels = vec![Level::new([image.width, image.height], texel)];

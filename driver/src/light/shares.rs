@@ -1,4 +1,4 @@
-//! How light samples are shared out between emitters, the environment and distant lights.
+//! Probabilities of light samples for emitters, the environment and distant lights.
 
 use glam::{DVec3, Vec3};
 use photoncard_shared::layout::DistantLight;
@@ -6,7 +6,7 @@ use photoncard_shared::layout::DistantLight;
 use super::{EnvironmentMap, mean};
 use crate::scene::Scene;
 
-/// The three probabilities: their sum is exactly 1, or each is 0.
+/// Probabilities of choosing the emitters, the environment or the distant lights: their sum is exactly 1, or each is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shares {
     pub(super) emitters: f32,
@@ -14,11 +14,12 @@ pub(super) struct Shares {
     pub(super) distant: f32,
 }
 
-/// Shares are whole numbers of parts of 1, so that their sums are exact.
+/// Denominator of the shares, a power of two, so that their sums are exact in `f32`.
 const PARTS: f64 = 65536.0;
 
 impl Shares {
-    /// Half by power, half alike: what is strong for the whole scene may be hidden from most of what is seen.
+    /// Shares `0.5 power / total + 0.5 / kinds`, over the kinds that have power: half of the samples do not follow
+    /// power, since lights that are strong for the whole scene may be hidden from most of what is seen.
     pub(super) fn new(powers: [f64; 3]) -> Self {
         let total: f64 = powers.iter().sum();
         let kinds = powers.iter().filter(|&&power| power > 0.0).count() as f64;
@@ -38,7 +39,7 @@ impl Shares {
     }
 }
 
-/// The power that emitters, the environment and distant lights send into the box around a scene, watts.
+/// Powers of emitters, the environment and distant lights that enter the bounding box of a scene, watts.
 pub(super) fn powers(
     scene: &Scene,
     emitters: f64,
@@ -47,7 +48,7 @@ pub(super) fn powers(
 ) -> [f64; 3] {
     let (lower, upper) = scene.bounds();
     let size = (upper - lower).as_dvec3();
-    // A surface receives from half of the sphere, by the cosine: a quarter of what is around, on a mean.
+    // Cauchy: the mean projected area of a convex body is a quarter of its surface.
     let surface = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
     let environment = environment.map_or(0.0, |map| map.fluence * 0.25 * surface);
     let distant = distant.iter().map(|light| {
@@ -56,13 +57,13 @@ pub(super) fn powers(
     [emitters, environment, distant.sum()]
 }
 
-/// The area that a box of this size shows from a direction, m^2.
+/// Projected area of a box of a size along a direction, m^2.
 pub(super) fn projected_area(size: DVec3, direction: DVec3) -> f64 {
     let DVec3 { x, y, z } = direction.abs();
     x * size.y * size.z + y * size.z * size.x + z * size.x * size.y
 }
 
-/// The mean over all directions of [`projected_area`], m^2.
+/// Mean of [`projected_area`] over all directions, m^2.
 #[cfg(test)]
 fn mean_projected_area(size: DVec3) -> f64 {
     0.5 * (size.y * size.z + size.z * size.x + size.x * size.y)

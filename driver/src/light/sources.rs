@@ -1,4 +1,4 @@
-//! Where photons come from: each source by its power.
+//! Sources of photons, chosen in proportion to their power.
 
 use std::f64::consts::PI;
 
@@ -11,65 +11,68 @@ use super::thresholds::thresholds;
 use super::{Lights, mean};
 use crate::scene::Scene;
 
-/// What a photon may come from.
+/// A source of photons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Source {
-    /// The emitter of this index.
+    /// An emitter, by its index.
     Emitter(u32),
     /// A distant light.
     Distant {
-        /// Unit vector, the way light goes.
+        /// Unit vector in which light travels.
         direction: Vec3,
-        /// Irradiance of a surface that faces it, W/m^2.
+        /// Irradiance of a surface that faces the light, W/m^2.
         irradiance: Vec3,
     },
     /// A cell of the environment, from column 0, row 0 at the upper left.
     Cell {
-        /// How far from the left it begins, and how wide it is, of all the map.
+        /// Left border and width of the cell, as fractions of the map's width.
         across: [f32; 2],
-        /// Cosines of the angles to y of its upper and its lower border.
+        /// Cosines of the polar angles, from +y, of the cell's upper and lower border.
         cosines: [f32; 2],
-        /// sr.
+        /// Solid angle of the cell, sr.
         solid_angle: f32,
     },
 }
 
-/// All sources, and how they are chosen.
+/// All sources of a scene, with the probabilities of choosing them.
 #[derive(Clone, Debug)]
 pub(crate) struct Sources {
     list: Vec<Source>,
     thresholds: Vec<u32>,
-    /// The box that light from infinitely far comes through: a little larger than the scene's.
+    /// Lower and upper corner of the box that light from infinitely far enters through, a little larger than the
+    /// scene's bounds.
     pub(crate) bounds: [Vec3; 2],
-    /// What photons are aimed at; nothing in particular if there are none.
+    /// Targets that photons are aimed at; empty if they are not aimed.
     pub(crate) targets: Targets,
-    /// Watts of all, mean of the channels; 0 if photons are aimed.
+    /// Power of all sources, watts, mean of the channels; 0 if photons are aimed.
     pub(crate) power: f64,
-    /// Watts in the strongest channel of the strongest photon, as if it were the only one.
+    /// Maximum over the sources of power in the strongest channel over probability, watts: the strongest photon, if it
+    /// were the only one.
     pub(crate) strongest: f32,
 }
 
-/// A source that was chosen.
+/// A source chosen by [`Sources::choose`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ChosenSource {
     pub(crate) source: Source,
     pub(crate) probability: f32,
-    /// What is left of the number, in [0, 1).
+    /// Remainder of the random number, rescaled to [0, 1).
     pub(crate) rest: f32,
 }
 
-/// The least share of an emitter's light that is taken to go towards what photons are aimed at.
+/// Minimum share of an emitter's light that is assumed to go towards the targets.
 const LEAST_AIMED_SHARE: f64 = 1e-3;
-/// How much larger the box is than the scene's, of its greatest side and of its greatest coordinate.
+/// Margin of the box beyond the scene's bounds, relative to their longest side or a tenth of their greatest coordinate,
+/// whichever is more.
 const MARGIN: f32 = 1e-4;
 
 impl Sources {
-    /// Those of a scene.
+    /// The sources of a scene, for photons in all directions.
     pub(crate) fn new(scene: &Scene, lights: &Lights) -> Self {
         Self::towards(scene, lights, Targets::default())
     }
 
-    /// The same, for photons that are aimed at what is perfectly specular; `None` if nothing is.
+    /// The sources of a scene, for photons that are aimed at perfectly specular surfaces; `None` if there are none.
     pub(crate) fn aimed(scene: &Scene, lights: &Lights) -> Option<Self> {
         let targets = Targets::new(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
@@ -109,7 +112,7 @@ impl Sources {
         }
     }
 
-    /// The source that belongs to a number of 64 bits, of 2^64; `None` if there are none.
+    /// The source at `number / 2^64` of the cumulative distribution; `None` if there are no sources.
     pub(crate) fn choose(&self, number: u64) -> Option<ChosenSource> {
         let target = (number >> 32) as u32;
         let index = self.thresholds.partition_point(|&threshold| threshold < target);
@@ -125,14 +128,14 @@ impl Sources {
     }
 }
 
-/// About the share of an emitter's light that goes towards what photons are aimed at: not too little for what the spheres show of it
-/// from one place alone.
+/// Approximate share of an emitter's light that goes towards the targets: their solid angle at the emitter's centre
+/// over `4 pi`, and at least [`LEAST_AIMED_SHARE`], as other points of the emitter may see more of them.
 fn aimed_share(targets: &Targets, corners: &[DVec3]) -> f64 {
     let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
     (f64::from(targets.solid_angle(middle.as_vec3())) / (4.0 * PI)).clamp(LEAST_AIMED_SHARE, 1.0)
 }
 
-/// The ends of a share, of 2^32.
+/// Lower and upper threshold of a source, of 2^32.
 fn share(thresholds: &[u32], index: usize) -> (u32, u32) {
     let lower = index.checked_sub(1).map_or(0, |before| thresholds[before]);
     (lower, thresholds[index])
@@ -144,7 +147,7 @@ fn enlarged((lower, upper): (Vec3, Vec3)) -> [Vec3; 2] {
     [lower - margin, upper + margin]
 }
 
-/// Sources with their powers.
+/// Sources with their powers and their powers in the strongest channel, watts, as they are collected.
 #[derive(Default)]
 struct AllSources {
     list: Vec<Source>,
@@ -159,11 +162,12 @@ impl AllSources {
         self.strongest.push(strongest);
     }
 
-    /// Adds the cells of the environment, by the area that is shown this way, or by one that is all the same.
+    /// Adds the cells of the environment, with the power through the area that is `shown` along a cell's direction;
+    /// `same` is that area if it is equal along all directions.
     fn add_cells(&mut self, lights: &Lights, shown: impl Fn(DVec3) -> f64, same: Option<f64>, size: DVec3) {
         let Some(map) = lights.environment() else { return };
         let cells = &map.cells;
-        // On a mean a box shows half of what it shows along its axes together.
+        // The mean projected area of a box is half of the sum of its projected areas along the axes.
         let all_sides = same.map_or(size.y * size.z + size.z * size.x + size.x * size.y, |area| 2.0 * area);
         for row in 0..cells.rows {
             let border = |row: u32| libm::cos(std::f64::consts::PI * f64::from(row) / f64::from(cells.rows));
@@ -172,7 +176,7 @@ impl AllSources {
                 let width = 1.0 / cells.columns as f32;
                 let left = column as f32 * width;
                 let middle = environment_direction(left + 0.5 * width, (0.5 * (upper + lower)) as f32);
-                // A cell that is much of the sphere shows the box from many sides.
+                // Light of a cell that covers much of the sphere meets the box from many sides.
                 let is_wide = cells.columns < 8 || cells.rows < 8;
                 let area = if is_wide { 0.5 * all_sides } else { shown(middle.as_dvec3()) };
                 let weight = cells.weights[(row * cells.columns + column) as usize];

@@ -1,8 +1,8 @@
-//! What photons of caustics are aimed at: spheres around all that reflects or lets light through perfectly specularly.
+//! Targets of caustic photons: spheres around all surfaces that reflect or transmit perfectly specularly.
 //!
-//! A direction is chosen through one of them, each by the solid angle that it is seen under, and evenly within that. Where spheres
-//! overlap a direction may be chosen through any of them: the density of it is that of all together, which is the number
-//! of spheres in that direction over the sum of their solid angles.
+//! A sphere is chosen in proportion to the solid angle that it subtends, and a direction uniformly within that. Where
+//! spheres overlap, a direction may be chosen through any of them: its density is the number of spheres in that
+//! direction over the sum of the solid angles of all spheres.
 
 use std::f32::consts::PI;
 
@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use crate::scene::Scene;
 
-/// A sphere.
+/// A bounding sphere of some triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sphere {
     centre: Vec3,
@@ -18,35 +18,35 @@ pub(crate) struct Sphere {
     radius: f32,
 }
 
-/// Spheres around all specular surfaces of a scene; none if there are no such surfaces.
+/// Bounding spheres of all specular surfaces of a scene; empty if there are none.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Targets {
     spheres: Vec<Sphere>,
 }
 
-/// A direction, or a place, that was chosen evenly among many.
+/// A sampled direction or point, with the inverse of its density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Aim {
-    /// Unit vector of the way, or the place, metres.
+    /// The direction, a unit vector, or the point, metres.
     pub(crate) towards: Vec3,
-    /// One over its density: sr, or m^2.
+    /// Inverse of the density: sr for directions, m^2 for points.
     pub(crate) measure: f32,
 }
 
-/// Spheres, at most.
+/// Maximum number of spheres.
 const MOST_SPHERES: usize = 32;
-/// How much larger a sphere is than what it is around, of its radius and of the greatest coordinate: what is rounded.
+/// Margin of a sphere for rounding: relative to its radius; its square relative to the greatest coordinate.
 const MARGIN: f32 = 1e-3;
 
 impl Targets {
-    /// Those of a scene.
+    /// The targets of a scene.
     pub(super) fn new(scene: &Scene) -> Self {
         let is_specular = |material: u32| scene.materials[material as usize].is_specular();
         let triangles = scene.triangles.iter().filter(|triangle| is_specular(triangle.material));
         let all: Vec<[Vec3; 3]> = triangles.map(|triangle| triangle.vertices).collect();
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
         while parts.len() < MOST_SPHERES {
-            // The largest that two smaller ones are better than.
+            // The largest part that may be split.
             let sizes = parts.iter().enumerate().filter(|(_, part)| part.may_be_split);
             let Some((index, _)) = sizes.max_by(|(_, a), (_, b)| a.sphere.radius.total_cmp(&b.sphere.radius))
             else {
@@ -67,17 +67,17 @@ impl Targets {
         self.spheres.is_empty()
     }
 
-    /// The solid angles of all spheres from a place, sr: those that overlap are counted repeatedly.
+    /// Sum of the solid angles that the spheres subtend at a point, sr; overlaps count repeatedly.
     pub(super) fn solid_angle(&self, from: Vec3) -> f32 {
         self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()).sum()
     }
 
-    /// The areas that all spheres show from afar, m^2.
+    /// Sum of the projected areas of the spheres, `pi r^2`, m^2; overlaps count repeatedly.
     pub(super) fn area(&self) -> f32 {
         self.spheres.iter().map(Sphere::disc_area).sum()
     }
 
-    /// The direction from a place through a sphere that belongs to a point of the unit square.
+    /// Samples a direction from a point through a sphere by a point of the unit square. `None` without spheres.
     pub(crate) fn direction(&self, from: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.solid_angle(from);
         let (index, c) = choose(c, all, self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()))?;
@@ -87,8 +87,8 @@ impl Targets {
         Some(Aim { towards, measure: all / (1 + covering) as f32 })
     }
 
-    /// The place, in the plane through the origin that a direction is the normal of, of a ray of that direction through a
-    /// sphere, that belongs to a point of the unit square.
+    /// Samples a line of a direction through a sphere by a point of the unit square: its point in the plane through the
+    /// origin that is normal to the direction. `None` without spheres.
     pub(crate) fn place(&self, direction: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.area();
         let (index, c) = choose(c, all, self.spheres.iter().map(Sphere::disc_area))?;
@@ -107,7 +107,7 @@ impl Targets {
     }
 }
 
-/// Which of some shares of `all` a number in [0, 1) falls in, and what is left of the number.
+/// Index of the share of `all` that a number in [0, 1) falls in, and the remainder of the number, rescaled to [0, 1).
 fn choose(number: f32, all: f32, shares: impl Iterator<Item = f32>) -> Option<(usize, f32)> {
     let mut left = number * all;
     let mut last = None;
@@ -122,11 +122,11 @@ fn choose(number: f32, all: f32, shares: impl Iterator<Item = f32>) -> Option<(u
     last
 }
 
-/// The directions within an angle of an axis.
+/// All directions within an angle of an axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolidCone {
     pub(crate) axis: Vec3,
-    /// 1 less the cosine of the angle: 0 to 2.
+    /// `1 - cos` of the angle, 0 to 2.
     pub(crate) height: f32,
 }
 
@@ -134,12 +134,12 @@ impl SolidCone {
     /// All directions.
     pub(crate) const ALL: Self = Self { axis: Vec3::Z, height: 2.0 };
 
-    /// sr.
+    /// Solid angle, `2 pi (1 - cos)`, sr.
     pub(crate) fn solid_angle(&self) -> f32 {
         2.0 * PI * self.height
     }
 
-    /// The direction that belongs to a point of the unit square, evenly by solid angle.
+    /// Maps a point of the unit square to a direction, uniformly by solid angle.
     pub(crate) fn direction(&self, [c, d]: [f32; 2]) -> Vec3 {
         let fall = self.height * c;
         let sine = (fall * (2.0 - fall)).max(0.0).sqrt();
@@ -149,13 +149,13 @@ impl SolidCone {
     }
 
     fn holds(&self, direction: Vec3) -> bool {
-        // As `1 - cosine`, without its rounding.
+        // `1 - cos` of the angle between the unit vectors, without cancellation.
         0.5 * (direction - self.axis).length_squared() < self.height
     }
 }
 
 impl Sphere {
-    /// The directions from a place through it: all from within.
+    /// The directions from a point through the sphere: all, from within.
     fn cone(&self, from: Vec3) -> SolidCone {
         let way = self.centre - from;
         let sine_squared = self.radius * self.radius / way.length_squared();
@@ -163,7 +163,7 @@ impl Sphere {
             let cosine = (1.0 - sine_squared).sqrt();
             SolidCone { axis: way.normalize(), height: sine_squared / (1.0 + cosine) }
         } else {
-            // In the very middle it is no number.
+            // Within the sphere; at its centre the quotient is infinite or NaN.
             SolidCone::ALL
         }
     }
@@ -173,7 +173,7 @@ impl Sphere {
     }
 }
 
-/// Some triangles, and the sphere around them.
+/// Some triangles with their bounding sphere.
 struct Part {
     triangles: Vec<[Vec3; 3]>,
     sphere: Sphere,
@@ -192,7 +192,7 @@ impl Part {
         Some(Self { triangles, sphere: Sphere { centre, radius }, may_be_split })
     }
 
-    /// Two parts that show less than this one, if there are such.
+    /// Two halves of the part along its longest axis, if their spheres have less projected area together than its own.
     fn split(&self) -> Option<[Self; 2]> {
         let middle = |[a, b, c]: &[Vec3; 3]| (a + b + c) / 3.0;
         let lower = self.triangles.iter().map(middle).reduce(Vec3::min)?;
@@ -222,7 +222,7 @@ mod tests {
         Targets { spheres: vec![sphere(0.0, 0.0, 1.0), sphere(0.8, 0.0, 0.7), sphere(-3.0, 2.0, 0.5)] }
     }
 
-    /// The measure of all that any of the spheres covers, by uniform numbers over a square.
+    /// Integral over the unit square of the measure that the spheres cover.
     fn covered(is_covered: impl Fn(f32, f32) -> f32) -> f32 {
         let steps = 1500;
         let at = |i: u32| (i as f32 + 0.5) / steps as f32;

@@ -1,8 +1,9 @@
-//! Builds the light tree: which emitters lie together, which way they shine, and how strong they are.
+//! Construction of the light tree: a hierarchy of emitters with bounds of their positions, their directions and their
+//! power.
 //!
-//! Emitters are split in two by the surface area orientation heuristic (Conty Estevez, Kulla 2018, *Importance sampling of many
-//! lights with adaptive tree splitting*), in bins along each axis, and each half again: a node has four children. A split that would make
-//! the tree deeper than a trail tells is put in the middle instead.
+//! Emitters are split in two by the surface area orientation heuristic (Conty Estevez, Kulla 2018, *Importance sampling
+//! of many lights with adaptive tree splitting*), in bins along each axis, and each half again: a node has four
+//! children. A split that would make the tree deeper than a trail can encode is replaced by a split at the median.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -10,31 +11,31 @@ use glam::DVec3;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::layout::{LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode};
 
-/// What the tree has to know of an emitter.
+/// Bounds and power of an emitter.
 #[derive(Clone, Debug)]
 pub(super) struct Bounds {
     /// Corners of a triangle, or a point, metres.
     pub(super) corners: Vec<DVec3>,
-    /// The normals that it emits about.
+    /// Bounding cone of the normals that the emitter emits about.
     pub(super) cone: Cone,
-    /// Watts.
+    /// Power, watts, mean of the channels.
     pub(super) power: f64,
 }
 
-/// A light tree.
+/// A light tree in the records of a card.
 #[derive(Debug, Default)]
 pub(super) struct LightTree {
     /// Nodes, the root first; none without emitters.
     pub(super) nodes: Vec<[u8; LINE_BYTES]>,
-    /// The way to each emitter.
+    /// Trail to each emitter: the number of the child on each level, two bits each, the root's in the lowest bits.
     pub(super) trails: Vec<u32>,
 }
 
 /// Bins of a split along each axis.
 const BINS: usize = 12;
-/// What the axis of a cone and its angle may be rounded, radians.
+/// Margin of a cone's angle for the rounding of its axis and cosine, radians.
 const CONE_MARGIN: f64 = 5e-4;
-/// What a sphere's radius is larger than it need be, of the greatest coordinate.
+/// Margin of a sphere's radius for rounding, relative to the greatest coordinate.
 const SPHERE_MARGIN: f64 = 1e-6;
 
 impl LightTree {
@@ -48,7 +49,7 @@ impl LightTree {
         tree
     }
 
-    /// Appends the node above some emitters, which is on this level and is reached by this trail. Returns its index.
+    /// Appends the node of some emitters, on a level and reached by a trail. Returns the node's index.
     fn node(&mut self, emitters: &[Bounds], order: &mut [u32], level: usize, trail: u32) -> u32 {
         let index = self.nodes.len();
         self.nodes.push([0; LINE_BYTES]);
@@ -73,12 +74,12 @@ impl LightTree {
     }
 }
 
-/// Emitters that a tree of so many levels holds.
+/// Maximum number of emitters in a tree of `levels` levels.
 fn capacity(levels: usize) -> usize {
     LIGHT_CHILDREN.saturating_pow(levels as u32)
 }
 
-/// Some emitters in up to four parts, each of which a tree that holds `most` has room for.
+/// Splits some emitters into up to four parts of at most `most`.
 fn quarters<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o mut [u32]; LIGHT_CHILDREN] {
     let [left, right] = halves(emitters, order, most.saturating_mul(2));
     let [a, b] = halves(emitters, left, most);
@@ -86,7 +87,7 @@ fn quarters<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o 
     [a, b, c, d]
 }
 
-/// Some emitters in two parts of `most` at the most.
+/// Splits some emitters into two parts of at most `most`.
 fn halves<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o mut [u32]; 2] {
     if order.len() < 2 {
         let middle = order.len();
@@ -110,7 +111,7 @@ fn halves<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o mu
 }
 
 impl Bounds {
-    /// The middle of the corners.
+    /// The centre of the bounding box.
     fn middle(&self) -> DVec3 {
         let [lower, upper] = self.sides();
         (lower + upper) * 0.5
@@ -122,7 +123,7 @@ impl Bounds {
     }
 }
 
-/// A split along an axis: bins up to `last` are on one side.
+/// A split along an axis: bins up to and with `last` are on the lower side.
 struct Split {
     axis: usize,
     lower: f64,
@@ -131,7 +132,7 @@ struct Split {
 }
 
 impl Split {
-    /// The split of the least cost; `None` if all emitters are at one place.
+    /// The split of minimum cost; `None` if the centres of all emitters coincide.
     fn best(emitters: &[Bounds], order: &[u32]) -> Option<Self> {
         let middles = || order.iter().map(|&emitter| emitters[emitter as usize].middle());
         let lower = middles().reduce(DVec3::min)?;
@@ -146,7 +147,7 @@ impl Split {
                 let bin = &mut bins[split.bin(bounds.middle())];
                 *bin = bin.union(&Summary::of(bounds));
             }
-            // Thin slices of what is long are dear.
+            // The factor k_r of Conty Estevez and Kulla: splits across the shorter sides of a box cost more.
             let slimness = extent.max_element() / extent[axis];
             for last in 0..BINS - 1 {
                 let part = |bins: &[Summary]| bins.iter().fold(Summary::NONE, |sum, bin| sum.union(bin));
@@ -184,7 +185,7 @@ impl Cone {
         Self { axis, angle }
     }
 
-    /// The least cone around two, but for rounding.
+    /// The smallest cone that contains both, but for rounding.
     fn union(self, other: Self) -> Self {
         let [wide, narrow] = if self.angle >= other.angle { [self, other] } else { [other, self] };
         let between = libm::acos(wide.axis.dot(narrow.axis).clamp(-1.0, 1.0));
@@ -201,7 +202,8 @@ impl Cone {
         Self { axis, angle }
     }
 
-    /// The solid angle that Lambertian light of normals in the cone goes to, weighted by its cosine.
+    /// The orientation measure `M_Omega` of Conty Estevez and Kulla, for Lambertian emission (`theta_e = pi / 2`): the
+    /// solid angle of the emitted directions, weighted by the cosine beyond the cone of normals.
     fn measure(self) -> f64 {
         let reach = (self.angle + FRAC_PI_2).min(PI);
         let (sin, cos) = libm::sincos(self.angle);
@@ -211,13 +213,14 @@ impl Cone {
     }
 }
 
-/// Some emitters together.
+/// Bounds and power of several emitters.
 #[derive(Clone, Copy, Debug)]
 struct Summary {
     count: usize,
     lower: DVec3,
     upper: DVec3,
-    /// Square of the greatest distance of a corner from the box's middle; known of finished ones alone.
+    /// Greatest distance of a corner from the box's centre, metres; computed by [`Self::new`] alone, 0 in partial
+    /// summaries.
     radius: f64,
     cone: Cone,
     power: f64,
@@ -238,7 +241,7 @@ impl Summary {
         Self { count: 1, lower, upper, radius: 0.0, cone: bounds.cone, power: bounds.power }
     }
 
-    /// That of some emitters, with its radius.
+    /// The summary of some emitters, radius included.
     fn new(emitters: &[Bounds], order: &[u32]) -> Self {
         let each = || order.iter().map(|&emitter| &emitters[emitter as usize]);
         let mut summary = each().fold(Self::NONE, |sum, bounds| sum.union(&Self::of(bounds)));
@@ -271,12 +274,12 @@ impl Summary {
             return 0.0;
         }
         let DVec3 { x, y, z } = self.upper - self.lower;
-        // Boxes of points, or of points in a row, have no area, but may be long.
+        // Boxes of a point or of collinear points have no area, but may be long.
         let area = x * y + y * z + z * x + (x * x + y * y + z * z) * 0.01;
         self.power * self.cone.measure() * area
     }
 
-    /// A child of a node of this power.
+    /// The record of the emitters as a child of a node of `power` watts.
     fn child(&self, power: f64, link: LightLink) -> LightChild {
         let middle = self.middle();
         let greatest = self.lower.abs().max(self.upper.abs()).max_element();
@@ -349,7 +352,7 @@ mod tests {
                 let axis = glam::Vec3::from(child.axis).as_dvec3().normalize();
                 assert!(axis.dot(bounds.cone.axis) >= f64::from(child.cosine) || bounds.cone == Cone::ALL);
             });
-            // Six levels are the least.
+            // Six levels are the minimum for 3000 emitters.
             assert!(levels <= 12, "{levels}");
         }
     }

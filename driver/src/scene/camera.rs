@@ -5,15 +5,15 @@ use glam::Vec3;
 /// A perspective camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// The name in the file, or `camera N`.
+    /// Name in the file, or `camera N`.
     pub name: String,
-    /// The place of the pinhole.
+    /// Position of the pinhole, metres.
     pub origin: Vec3,
     /// Unit vector to the right of the picture.
     pub right: Vec3,
     /// Unit vector to the top of the picture.
     pub up: Vec3,
-    /// Unit vector of the view.
+    /// Unit vector of the view direction.
     pub forward: Vec3,
     /// Vertical field of view in radians; the horizontal one follows from the picture's aspect.
     pub vertical_fov: f32,

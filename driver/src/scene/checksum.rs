@@ -1,4 +1,4 @@
-//! A checksum of a scene.
+//! Checksum of a scene.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use photoncard_shared::checksum::Checksum;
 use super::Scene;
 
 impl Scene {
-    /// A checksum of all that a render takes from the scene, as text.
+    /// CRC-32C of everything that a render reads of the scene, as eight hexadecimal digits.
     pub fn checksum(&self) -> String {
         let mut sum = Checksum::default();
         for triangle in &self.triangles {
@@ -31,7 +31,7 @@ impl Scene {
         format!("{:08x}", sum.value())
     }
 
-    /// All but triangles and texels, as text. Floating-point numbers are written so that they read back the same.
+    /// Everything but triangles, attributes and texels, as text with floating-point numbers that read back exactly.
     fn description(&self) -> String {
         let mut text = String::new();
         let _ = write!(text, "{:?}{:?}{:?}{:?}", self.materials, self.cameras, self.textures, self.lights);

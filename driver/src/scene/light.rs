@@ -2,41 +2,41 @@
 
 use glam::Vec3;
 
-/// A light without extent. The photometric units of glTF stand for the radiometric ones of the same geometry, unit for
-/// unit.
+/// A light without extent. glTF's photometric units stand for radiometric ones, unit for unit: candela for W/sr, lux
+/// for W/m^2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PunctualLight {
-    /// The name in the file, or `light N`.
+    /// Name in the file, or `light N`.
     pub name: String,
-    /// Where it is, and where its light goes.
+    /// Kind of the light, with its position and direction.
     pub kind: PunctualKind,
-    /// W/sr of point and spot lights, W/m^2 of directional ones, of each linear RGB channel: colour * intensity.
+    /// Colour times intensity per linear RGB channel: W/sr of point and spot lights, W/m^2 of directional lights.
     pub intensity: Vec3,
 }
 
-/// Where a light without extent is, and where its light goes.
+/// Kind of a light without extent, with its position and direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PunctualKind {
-    /// To all sides from a place.
+    /// Light in all directions from a point.
     Point {
-        /// The place, metres.
+        /// Position, metres.
         position: Vec3,
     },
-    /// From a place into a cone. Between the cones the intensity falls off as `KHR_lights_punctual` recommends:
-    /// `((cos - outer_cosine) / (inner_cosine - outer_cosine))^2`.
+    /// Light from a point into a cone. Between the inner and the outer cone the intensity falls off as
+    /// `KHR_lights_punctual` recommends: `((cos - outer_cosine) / (inner_cosine - outer_cosine))^2`.
     Spot {
-        /// The place, metres.
+        /// Position, metres.
         position: Vec3,
-        /// Unit vector of the cone's axis, the way light goes.
+        /// Unit vector of the cone's axis, in which light travels.
         direction: Vec3,
-        /// Cosine of the angle up to which the intensity is the whole one; above `outer_cosine`.
+        /// Cosine of the angle of the inner cone, within which the intensity is full; above `outer_cosine`.
         inner_cosine: f32,
-        /// Cosine of the angle from which on there is no light.
+        /// Cosine of the angle of the outer cone, beyond which there is no light.
         outer_cosine: f32,
     },
-    /// From infinitely far.
+    /// Parallel light from infinitely far.
     Directional {
-        /// Unit vector, the way light goes.
+        /// Unit vector in which light travels.
         direction: Vec3,
     },
 }

@@ -1,46 +1,48 @@
-//! Materials, and the ranges that their values must keep, however they were stated.
+//! Materials, and the valid ranges of their values.
 
 use glam::Vec3;
 
 use super::limits::EMISSION;
 
-/// How far above 1 the sum of the two albedos may lie: they are often written in three digits.
+/// Tolerance of the sum of the two albedos above 1: they are often written in three digits.
 const SUM_TOLERANCE: f32 = 1e-4;
 
-/// The largest exponent: the lobe is then under a degree wide, and a mirror to the photons.
+/// Maximum Phong exponent: the lobe's half-width at half maximum is then 0.7 degrees, a mirror to the photons.
 pub const MAX_EXPONENT: f32 = 10_000.0;
 
-/// How a surface reflects, transmits and emits, and which of it is there.
+/// Material of a surface: reflection, transmission, emission, textures and cut-outs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// The name in the file, or `material N`.
+    /// Name in the file, or `material N`.
     pub name: String,
-    /// How it reflects and transmits.
+    /// Reflection and transmission.
     pub reflection: Reflection,
     /// Radiance emitted from the front, W/(sr m^2). The emissive texture multiplies it.
     pub emission: Vec3,
-    /// Whether the back reflects and emits as the front does. A one-sided back is black.
+    /// True if the back reflects and emits as the front does. A one-sided back is black.
     pub double_sided: bool,
-    /// Alpha below which the surface is not there (`alphaMode` `MASK`); alpha is `alpha` times the base texture's times
-    /// the corners'.
+    /// Alpha below which the surface is cut out (`alphaMode` `MASK`), of `alpha` times the alphas of the base texture
+    /// and of the corners' colours.
     pub alpha_cutoff: Option<f32>,
     /// Alpha of the base colour factor, 0 to 1.
     pub alpha: f32,
-    /// The texture whose colour multiplies the base colour or the diffuse albedo, and whose alpha multiplies `alpha`;
-    /// sRGB. As those of the other textures, an index into [`Scene::textures`](super::Scene::textures).
+    /// Base colour texture, an index into [`Scene::textures`](super::Scene::textures): its colour (sRGB) multiplies the
+    /// base colour or the diffuse albedo, its alpha multiplies `alpha`.
     pub base_texture: Option<u32>,
-    /// The texture whose green multiplies the roughness, and whose blue multiplies the metalness; linear.
+    /// Metallic-roughness texture, an index into [`Scene::textures`](super::Scene::textures): its green (linear)
+    /// multiplies the roughness, its blue (linear) the metalness.
     pub metallic_roughness_texture: Option<u32>,
-    /// The texture that multiplies the emission; sRGB.
+    /// Emissive texture (sRGB), an index into [`Scene::textures`](super::Scene::textures), which multiplies the
+    /// emission.
     pub emissive_texture: Option<u32>,
 }
 
-/// How a surface reflects and transmits.
+/// Reflection and transmission model of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflection {
     /// A Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2 pi) max(0,
-    /// cos alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`, or, without the lobe, by
-    /// `KHR_materials_specular` with the factor 0 of what neither has a share of metal nor transmits.
+    /// cos alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`; without the lobe also by
+    /// `KHR_materials_specular` with the factor 0 on a material that is neither metallic nor transmissive.
     Phong {
         /// Lambertian albedo, 0 to 1.
         diffuse: Vec3,
@@ -53,28 +55,28 @@ pub enum Reflection {
     MetallicRoughness {
         /// Base colour, 0 to 1: the albedo of the dielectric part, and the reflectance at normal incidence of metal.
         base_colour: Vec3,
-        /// The share of metal, 0 to 1.
+        /// Metalness, 0 to 1.
         metallic: f32,
-        /// Perceptual roughness, 0 to 1: the square root of the width alpha of the distribution of microfacets.
+        /// Perceptual roughness, 0 to 1: `sqrt(alpha)` of the microfacet distribution.
         roughness: f32,
-        /// Reflectance at normal incidence of the dielectric part: `((ior - 1) / (ior + 1))^2` times the colour (the
-        /// product at most 1) and the factor of `KHR_materials_specular`.
+        /// F0 of the dielectric part: `((ior - 1) / (ior + 1))^2` times the colour (the product at most 1) and the
+        /// factor of `KHR_materials_specular`.
         dielectric: Vec3,
-        /// What light passes the surface; `None` for opaque ones.
+        /// Transmission; `None` for opaque surfaces.
         transmission: Option<Transmission>,
     },
 }
 
-/// How light passes a surface.
+/// Transmission of light through a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transmission {
-    /// The share of the dielectric part's light that is transmitted instead of scattered, 0 to 1
+    /// Share of the dielectric part's light that is transmitted instead of scattered, 0 to 1
     /// (`KHR_materials_transmission`).
     pub factor: f32,
     /// Index of refraction, at least 1 (`KHR_materials_ior`; 1.5 without).
     pub ior: f32,
-    /// Whether the surface bounds a volume (`KHR_materials_volume` with a thickness above 0), at which light is
-    /// refracted. Without one the surface is a thin wall, which light passes straight on.
+    /// True if the surface bounds a volume (`KHR_materials_volume` with a thickness above 0), at which light is
+    /// refracted. Otherwise the surface is thin-walled: light passes straight on.
     pub is_volume: bool,
     /// Absorption coefficient, 1/m: `-ln(attenuationColor) / attenuationDistance`; zero without a volume. The scale of
     /// nodes does not change it.
@@ -84,15 +86,15 @@ pub struct Transmission {
 /// A value of a material that is out of its range.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OutOfRange {
-    /// Which value.
+    /// The property that is out of range.
     pub(super) property: Property,
-    /// What is wrong with it.
+    /// The fault, a clause for people.
     pub(super) reason: String,
-    /// What to do.
+    /// The valid range or another remedy, a clause for people.
     pub(super) remedy: &'static str,
 }
 
-/// A value of a material that has a range.
+/// A property of a material that has a range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Property {
     /// The diffuse albedo, or the base colour.
@@ -143,17 +145,17 @@ impl Material {
         Self::phong(name, albedo, Vec3::ZERO, 0.0)
     }
 
-    /// A one-sided material of a Lambertian albedo and a Phong lobe that does not emit.
+    /// A one-sided material with a Lambertian albedo and a Phong lobe that does not emit.
     pub fn phong(name: impl Into<String>, diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
         Self::new(name, Reflection::Phong { diffuse, specular, exponent })
     }
 
-    /// Whether any channel emits.
+    /// Returns whether any channel emits.
     pub fn is_emissive(&self) -> bool {
         self.emission.max_element() > 0.0
     }
 
-    /// Whether it reflects or lets light through perfectly specularly: mirrors, smooth coats, glass.
+    /// Returns whether the material reflects or transmits perfectly specularly: mirrors, smooth coats, glass.
     pub fn is_specular(&self) -> bool {
         match self.reflection {
             Reflection::Phong { .. } => false,
@@ -165,7 +167,7 @@ impl Material {
         }
     }
 
-    /// Whether it reflects in another way than perfectly specularly: photons are stored where it does.
+    /// Returns whether the material reflects other than perfectly specularly: photons are stored where it does.
     pub fn keeps_photons(&self) -> bool {
         match self.reflection {
             Reflection::Phong { diffuse, specular, .. } => (diffuse + specular).max_element() > 0.0,
@@ -179,17 +181,17 @@ impl Material {
         }
     }
 
-    /// Whether it is not metal everywhere: a texture may say otherwise than the factor.
+    /// Returns whether the material may be dielectric somewhere: by the factor, or by a texture of metalness.
     pub(crate) fn may_be_dielectric(&self, metallic: f32) -> bool {
         metallic < 1.0 || self.metallic_roughness_texture.is_some()
     }
 
-    /// The textures in use, as indices into [`Scene::textures`](super::Scene::textures).
+    /// Textures in use, as indices into [`Scene::textures`](super::Scene::textures).
     pub fn textures(&self) -> impl Iterator<Item = u32> {
         [self.base_texture, self.metallic_roughness_texture, self.emissive_texture].into_iter().flatten()
     }
 
-    /// Checks that no value is negative, infinite or not a number, and that no more light leaves than arrives.
+    /// Checks that every value is finite and within its range, and that no more light is reflected than arrives.
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
         self.reflection.check()?;
         let emission = self.emission;

@@ -1,6 +1,6 @@
-//! What a scene is once it is loaded: triangles, materials, textures, lights and cameras in world space.
+//! Loaded scenes: triangles, materials, textures, lights and cameras in world space.
 //!
-//! Right-handed, y up, metres; radiance in W/(sr m^2) per linear RGB channel.
+//! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel.
 
 mod camera;
 mod checksum;
@@ -37,34 +37,34 @@ pub struct Scene {
     pub attributes: Vec<Attributes>,
     /// Materials; the index in [`Triangle::material`] refers to this list.
     pub materials: Vec<Material>,
-    /// How images lie on surfaces; the indices in [`Material`] refer to this list.
+    /// Textures, mappings of images to surfaces; the indices in [`Material`] refer to this list.
     pub textures: Vec<Texture>,
-    /// Images; each is there once for each encoding in use.
+    /// Images, one for each encoding that is in use.
     pub images: Vec<Image>,
     /// Lights without extent.
     pub lights: Vec<PunctualLight>,
-    /// Light from infinitely far. A file never states one.
+    /// Environment light from infinitely far; `None` in a scene from a glTF file.
     pub environment: Option<Environment>,
-    /// Cameras in file order. Never empty: a file without one is framed.
+    /// Cameras in file order. Never empty: a file without cameras gets one that frames the scene.
     pub cameras: Vec<Camera>,
-    /// What the file holds and this renderer does not use, one sentence each, each named once.
+    /// Sentences on contents of the file that the renderer does not use, each once.
     pub notices: Vec<String>,
-    /// Triangles of zero area that were left out.
+    /// Number of triangles of zero area that were left out.
     pub skipped_triangles: usize,
 }
 
 impl Scene {
-    /// The smallest and the largest coordinates of any vertex; both zero for a scene without triangles.
+    /// Lower and upper corner of the scene's bounding box; both zero for a scene without triangles.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let mut vertices = self.triangles.iter().flat_map(|triangle| triangle.vertices);
         let first = vertices.next().unwrap_or(Vec3::ZERO);
         vertices.fold((first, first), |(low, high), vertex| (low.min(vertex), high.max(vertex)))
     }
 
-    /// The camera of that name, or the first one.
+    /// The camera of a name, or the first one for `None`.
     ///
     /// # Errors
-    /// If there is none of that name; the error lists those there are.
+    /// If no camera has the name; the error lists the cameras' names.
     pub fn camera(&self, name: Option<&str>) -> Result<&Camera, SceneError> {
         let found = match name {
             None => self.cameras.first(),
@@ -79,7 +79,7 @@ impl Scene {
         })
     }
 
-    /// Whether any light comes from a triangle, a light without extent, or the environment.
+    /// Returns whether any light comes from a triangle, a light without extent, or the environment.
     pub fn has_light(&self) -> bool {
         let is_light = |triangle: &Triangle| {
             self.materials.get(triangle.material as usize).is_some_and(Material::is_emissive)
@@ -89,7 +89,7 @@ impl Scene {
             || self.triangles.iter().any(is_light)
     }
 
-    /// Whether any triangle reflects or lets light through perfectly specularly.
+    /// Returns whether any triangle reflects or transmits perfectly specularly.
     pub fn is_specular(&self) -> bool {
         let is_specular = |triangle: &Triangle| {
             self.materials.get(triangle.material as usize).is_some_and(Material::is_specular)
@@ -97,7 +97,7 @@ impl Scene {
         self.triangles.iter().any(is_specular)
     }
 
-    /// Whether any triangle reflects in another way than perfectly specularly.
+    /// Returns whether any triangle reflects other than perfectly specularly, so that photons can be stored.
     pub fn keeps_photons(&self) -> bool {
         let keeps = |triangle: &Triangle| {
             self.materials.get(triangle.material as usize).is_some_and(Material::keeps_photons)

@@ -1,4 +1,4 @@
-//! Settings from the command line that replace a value of a material: `floor.exponent=32`.
+//! Assignments from the command line that replace a value of a material: `floor.exponent=32`.
 
 use glam::Vec3;
 
@@ -8,10 +8,10 @@ use crate::error::SceneError;
 const FORM: &str = "write MATERIAL.PROPERTY=VALUE, for example floor.exponent=32 or lamp.emission=18,14,7; the \
                     properties are diffuse, specular, exponent, metallic, roughness and emission";
 
-/// How many names an error proposes.
+/// Maximum number of names that an error proposes.
 const PROPOSED: usize = 5;
 
-/// A value that can be set.
+/// A property that can be set.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Property {
     Diffuse,
@@ -32,7 +32,7 @@ impl Property {
         ("emission", Self::Emission),
     ];
 
-    /// The name of a property that is one number.
+    /// Name of the property in an error, if it is one number.
     fn as_number(self) -> Option<&'static str> {
         match self {
             Self::Exponent => Some("the exponent"),
@@ -44,18 +44,17 @@ impl Property {
 }
 
 impl Scene {
-    /// Applies `MATERIAL.PROPERTY=VALUE` to every material of that name.
+    /// Applies `MATERIAL.PROPERTY=VALUE` to every material of the name.
     ///
     /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material) or
     /// `emission` of any material, `specular` or `exponent` of one that states a Phong lobe or is Lambertian, or
     /// `metallic` or `roughness` of a metallic-roughness one. Colours are `r,g,b` or one number for all three, the
-    /// others one number. Textures go on to multiply what they multiply; an emissive texture of what did
+    /// others one number. Textures keep multiplying the values; the emissive texture of a material that did
     /// not emit was not loaded, as a notice says. The material's name may itself contain dots.
-    /// Whether the scene still has a light is for [`Scene::check_light`] to say once all settings are applied.
+    /// [`Scene::check_light`] checks that the scene still has a light once all assignments are applied.
     ///
-    /// # Errors
-    /// If the form is not kept, no material has that name, it has no such property, or it would then be out of range;
-    /// the scene stays as it was.
+    /// # Errors If the text is not of this form, no material has the name, a material lacks the property, or a value
+    /// would be out of range; the scene stays as it was.
     pub fn apply(&mut self, assignment: &str) -> Result<(), SceneError> {
         let fault = |reason: String, remedy| SceneError::Setting {
             assignment: assignment.to_owned(),
@@ -100,7 +99,10 @@ impl Scene {
 }
 
 impl Material {
-    /// Sets a property, or says why there is none and what to do.
+    /// Sets a property.
+    ///
+    /// # Errors
+    /// If the material lacks the property: the reason and the remedy.
     fn set(&mut self, property: Property, values: &[f32]) -> Result<(), (&'static str, &'static str)> {
         let value = match *values {
             [red, green, blue] => Vec3::new(red, green, blue),
@@ -134,13 +136,13 @@ impl Material {
     }
 }
 
-/// One number or three.
+/// Parses one number, or three with commas between them.
 fn parse(text: &str) -> Option<Vec<f32>> {
     let values: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
     values.filter(|values| matches!(values.len(), 1 | 3))
 }
 
-/// The names nearest to a name that does not exist.
+/// The materials' names nearest to an unknown name, as a list in text.
 fn nearest(name: &str, materials: &[Material]) -> String {
     let mut names: Vec<_> = materials.iter().map(|material| material.name.as_str()).collect();
     names.sort_by_cached_key(|candidate| edit_distance(name, candidate));
@@ -150,7 +152,7 @@ fn nearest(name: &str, materials: &[Material]) -> String {
     if rest == 0 { listed.join(", ") } else { format!("{} ({rest} more)", listed.join(", ")) }
 }
 
-/// Levenshtein's distance of the first characters, case aside.
+/// Levenshtein distance of the first 64 characters, letter case aside.
 fn edit_distance(a: &str, b: &str) -> usize {
     const COMPARED: usize = 64;
     let letters = |text: &str| text.chars().take(COMPARED).flat_map(char::to_lowercase).collect::<Vec<_>>();
@@ -278,7 +280,7 @@ mod tests {
         }
     }
 
-    /// Materials of one name are all changed or none is.
+    /// Either all materials of a name are changed, or none.
     #[test]
     fn materials_of_one_name_change_together() {
         let mut scene = scene();

@@ -1,30 +1,30 @@
-//! Images, and how they lie on surfaces.
+//! Images, and textures that map them to surfaces.
 
-/// The most texels of an image, or of an environment, a side.
+/// Maximum width and height of an image or an environment, texels.
 pub const MAX_SIDE: u32 = 16_384;
 
-/// The most texels of all images of a scene together, and of an environment.
+/// Maximum number of texels of all images of a scene together, and of an environment.
 pub const MAX_TEXELS: u64 = 1 << 28;
 
-/// How an image lies on surfaces.
+/// Mapping of an image to surfaces: transform of coordinates, wrap modes and filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
     /// Index into [`Scene::images`](super::Scene::images).
     pub image: u32,
-    /// Which of the texture coordinates of [`Attributes`](super::Attributes) it takes: 0 or 1.
+    /// Index of the set of texture coordinates in [`Attributes`](super::Attributes): 0 or 1.
     pub set: u32,
-    /// What lies beyond the image's borders, to the sides and above and below.
+    /// Wrap modes of u and v.
     pub wrap: [Wrap; 2],
-    /// Whether the nearest texel is taken (`magFilter` `NEAREST`) instead of a bilinear mean of four.
+    /// True for the nearest texel (`magFilter` `NEAREST`), false for bilinear interpolation.
     pub nearest: bool,
-    /// Rows of the matrix m of `KHR_texture_transform`: coordinates are m (u, v) + offset. The identity without it.
+    /// Rows of the matrix M of `KHR_texture_transform`: coordinates are M (u, v) + offset. The identity without it.
     pub matrix: [[f32; 2]; 2],
-    /// The offset of `KHR_texture_transform`, in images.
+    /// Offset of `KHR_texture_transform`, in widths and heights of the image.
     pub offset: [f32; 2],
 }
 
 impl Texture {
-    /// The whole image once from 0 to 1, repeated, bilinear, by the first set of coordinates.
+    /// A texture of an image by the first set of coordinates, untransformed, repeated and bilinear.
     pub fn new(image: u32) -> Self {
         Self {
             image,
@@ -37,44 +37,44 @@ impl Texture {
     }
 }
 
-/// What lies beyond an image's border.
+/// Wrap mode of texture coordinates beyond the image's border.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrap {
-    /// The image again.
+    /// The image repeated (`REPEAT`).
     Repeat,
-    /// The image mirrored, then again, by turns.
+    /// The image repeated, every other one mirrored (`MIRRORED_REPEAT`).
     Mirror,
-    /// The texel at the border.
+    /// The texels at the border (`CLAMP_TO_EDGE`).
     Clamp,
 }
 
 /// The texels of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// The name in the file, or its file's, or `image N`.
+    /// Name in the scene's file, or of the image's file, or `image N`.
     pub name: String,
-    /// Texels of a row.
+    /// Width, texels.
     pub width: u32,
-    /// Rows.
+    /// Height, texels.
     pub height: u32,
-    /// RGBA, rows from the top.
+    /// RGBA texels, rows from the top.
     pub texels: Vec<[u8; 4]>,
-    /// What red, green and blue stand for.
+    /// Encoding of red, green and blue.
     pub encoding: Encoding,
 }
 
 impl Image {
-    /// Bytes of its texels.
+    /// Size of the texels, bytes.
     pub fn bytes(&self) -> u64 {
         size_of_val(&self.texels[..]) as u64
     }
 }
 
-/// What red, green and blue of a texel stand for. Alpha is always linear.
+/// Encoding of red, green and blue of a texel. Alpha is always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Encoding {
-    /// Values of IEC 61966-2-1: colours.
+    /// sRGB transfer function (IEC 61966-2-1), for colours.
     Srgb,
-    /// Proportional: roughness, metalness.
+    /// Linear, for roughness and metalness.
     Linear,
 }

@@ -1,14 +1,14 @@
-//! Triangles, and what their corners carry beyond a place.
+//! Triangles, and the attributes of their corners.
 
 use glam::{Vec2, Vec3};
 
-/// [`Triangle::attributes`] of a triangle whose corners carry nothing but their places.
+/// [`Triangle::attributes`] of a triangle whose corners have nothing but their positions.
 pub const NO_ATTRIBUTES: u32 = u32::MAX;
 
-/// A triangle in world space, in metres.
+/// A triangle in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
-    /// The three corners.
+    /// Positions of the corners, metres.
     pub vertices: [Vec3; 3],
     /// Index into [`Scene::materials`](super::Scene::materials).
     pub material: u32,
@@ -22,23 +22,23 @@ impl Triangle {
         Self { vertices, material, attributes: NO_ATTRIBUTES }
     }
 
-    /// The cross product of two edges: its direction is the geometric normal's, its length twice the area in m^2.
+    /// Cross product of two edges: the direction of the geometric normal, with twice the area in m^2 for its length.
     pub fn scaled_normal(&self) -> Vec3 {
         let [a, b, c] = self.vertices;
         (b - a).cross(c - a)
     }
 
-    /// The area in m^2.
+    /// Area, m^2.
     pub fn area(&self) -> f32 {
         0.5 * self.scaled_normal().length()
     }
 }
 
-/// What the corners of a triangle carry beyond their places.
+/// Vertex attributes of a triangle's corners beyond their positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attributes {
-    /// Unit shading normals of the corners in world space, on the front's side. `None`: the triangle is flat, also
-    /// where all three equal the geometric normal.
+    /// Unit shading normals of the corners in world space, on the front's side. `None` for a flat triangle, also
+    /// where all three normals equal the geometric normal.
     pub normals: Option<[Vec3; 3]>,
     /// Texture coordinates of the corners, sets 0 and 1 (`TEXCOORD_0` and `TEXCOORD_1`), untransformed; v counts from
     /// the image's top.
@@ -49,6 +49,6 @@ pub struct Attributes {
 }
 
 impl Attributes {
-    /// Flat, at the origin of every texture, white: what a triangle without attributes has.
+    /// Attributes of a triangle that states none: flat, at the origin of every texture, white.
     pub const NONE: Self = Self { normals: None, coordinates: [[Vec2::ZERO; 3]; 2], colours: [[1.0; 4]; 3] };
 }

@@ -1,4 +1,4 @@
-//! Why a study has no report.
+//! Errors of studies.
 
 use std::path::PathBuf;
 
@@ -7,10 +7,10 @@ use super::store::StoreError;
 use crate::error::SceneError;
 use crate::render::RenderError;
 
-/// Why a study has no report.
+/// Error that leaves a study without a report.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum StudyError {
-    /// The folder of scenes lacks one.
+    /// The folder of scenes lacks a scene.
     #[error("cannot find the scene {scene} in the folder {}", folder.display())]
     #[diagnostic(help(
         "give the folder of photoncard's own scenes with --scenes; they are in `scenes` of its sources"
@@ -18,7 +18,7 @@ pub enum StudyError {
     NoScene {
         /// The scene's file.
         scene: &'static str,
-        /// The folder.
+        /// The folder of scenes.
         folder: PathBuf,
     },
     /// A scene cannot be used.
@@ -29,7 +29,7 @@ pub enum StudyError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Render(#[from] RenderError),
-    /// A point cannot be kept, or there is no folder for them.
+    /// A finished point cannot be stored, or the store's folder cannot be made.
     #[error("{0}")]
     #[diagnostic(help("choose another folder with --out, or make room in it"))]
     Store(#[from] StoreError),
@@ -37,17 +37,18 @@ pub enum StudyError {
     #[error("{0}")]
     #[diagnostic(help("choose another folder with --out, or make room in it"))]
     Report(#[from] ReportError),
-    /// The system has no threads.
+    /// The chips' threads cannot be started.
     #[error("the chips' threads could not be started: {0}")]
     #[diagnostic(help("use fewer with --threads"))]
     Threads(#[from] rayon::ThreadPoolBuildError),
-    /// The observer stopped it.
+    /// The observer stopped the study.
     #[error("stopped before the study was complete")]
     Stopped,
 }
 
 impl StudyError {
-    /// Whether the arguments or the scenes are at fault, rather than the work.
+    /// Returns whether the arguments or the scenes are at fault, rather than the work: the command's exit status 2, not
+    /// 1.
     pub fn is_input(&self) -> bool {
         match self {
             Self::NoScene { .. } | Self::Scene(_) | Self::Store(StoreError::Folder { .. }) => true,

@@ -1,4 +1,4 @@
-//! The page that leads to the reports of several studies.
+//! Index page that links the reports of several studies.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use super::error::StudyError;
 use super::report::{self, Block, Provenance, Report, Section};
 use super::studies::Study;
 
-/// Writes `index.html` into the folder that the studies' folders are in.
+/// Writes `index.html` into `folder`, which holds the studies' folders.
 pub(super) fn write(
     folder: &Path,
     reports: &[(Study, Report)],

@@ -1,4 +1,5 @@
-//! Where points are measured: finished ones are found again, and points that share a photon map share it.
+//! Measurement of points: finished ones are read from the store, and points of one card image are measured together, so
+//! that photons are traced once for all of them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -18,24 +19,25 @@ use crate::render::RenderError;
 use crate::scene::Scene;
 use crate::scene::gltf;
 
-/// Watches a study, and can stop it.
+/// Observer of a study's progress, which can stop it.
 pub trait StudyObserver: Sync {
-    /// Tells that so many points of a study are there. `is_new` if the last was measured now, and not found.
+    /// Reports that `done` of a study's `total` points are finished. `is_new` if the last was measured now, false if it
+    /// was read from the store.
     fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
 
-    /// Tells something about finished points that were not usable.
+    /// Reports, as a sentence, why a stored point cannot be used; the point is measured anew.
     fn notice(&self, text: &str);
 
-    /// Whether to stop as soon as that can be.
+    /// Returns whether the study is to stop as soon as possible.
     fn is_stopped(&self) -> bool;
 }
 
-/// What was measured at a point.
+/// Result of the measurement of a point, by its [`Task`].
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub enum Outcome {
-    /// Of [`Task::Traffic`].
+    /// Result of [`Task::Traffic`].
     Traffic(Measurement),
-    /// Of [`Task::Quality`].
+    /// Result of [`Task::Quality`].
     Quality(Quality),
 }
 
@@ -44,10 +46,10 @@ pub enum Outcome {
 pub struct Results(Vec<(Point, Outcome)>);
 
 impl Results {
-    /// The work and traffic of a point.
+    /// Work and memory traffic of a point.
     ///
     /// # Panics
-    /// If it is not one of the points that were measured.
+    /// If the point was not measured, or its task is not [`Task::Traffic`].
     pub fn traffic(&self, point: &Point) -> &Measurement {
         match self.find(point) {
             Some(Outcome::Traffic(measurement)) => measurement,
@@ -55,10 +57,10 @@ impl Results {
         }
     }
 
-    /// The error of a point.
+    /// Error of a point's pixels.
     ///
     /// # Panics
-    /// If it is not one of the points that were measured.
+    /// If the point was not measured, or its task is not [`Task::Quality`].
     pub fn quality(&self, point: &Point) -> Quality {
         match self.find(point) {
             Some(Outcome::Quality(quality)) => *quality,
@@ -71,20 +73,20 @@ impl Results {
     }
 }
 
-/// Measures points, and keeps them.
+/// Measures points, and keeps their outcomes in a [store](super::store).
 pub struct Laboratory<'a> {
     scenes: PathBuf,
     store: PointStore,
     pool: ThreadPool,
     observer: &'a dyn StudyObserver,
     loaded: HashMap<&'static str, LoadedScene>,
-    /// The last image, which the next point may share.
+    /// The last point's card image, which the next point may share.
     last: Option<LastImage>,
 }
 
 struct LoadedScene {
     scene: Scene,
-    /// Stands for its content.
+    /// [`Scene::checksum`], which stands for the scene's content in keys.
     digest: String,
 }
 
@@ -96,10 +98,11 @@ struct LastImage {
 }
 
 impl<'a> Laboratory<'a> {
-    /// Points are kept in `folder`, scenes are in `scenes`; a chip a thread, and a thread a core if none are given.
+    /// A laboratory that keeps finished points in `folder/points` and reads scenes from the folder `scenes`. Each of
+    /// `threads` emulates one chip; `None` is one thread per core.
     ///
     /// # Errors
-    /// If the folder cannot be made, or there are no threads.
+    /// If the folder cannot be made, or the threads cannot be started.
     pub fn new(
         folder: &Path,
         scenes: &Path,
@@ -112,10 +115,10 @@ impl<'a> Laboratory<'a> {
         Ok(Self { scenes: scenes.to_owned(), store, pool, observer, loaded: HashMap::new(), last: None })
     }
 
-    /// Measures what is not there yet.
+    /// Measures the points that the store does not hold yet, and returns the outcomes of all.
     ///
     /// # Errors
-    /// If a scene is missing, a point cannot be measured or kept, or the observer stops it.
+    /// If a scene is missing, a point cannot be measured or kept, or the observer stops the study.
     pub fn measure(&mut self, study: &str, points: &[Point]) -> Result<Results, StudyError> {
         let points = sharing_images(points);
         let total = points.len();
@@ -132,10 +135,10 @@ impl<'a> Laboratory<'a> {
         Ok(results)
     }
 
-    /// The scene of a file, without changes.
+    /// The scene of a file, before a point's assignments.
     ///
     /// # Errors
-    /// If it is missing or cannot be read.
+    /// If the file is missing or cannot be read.
     fn load(&mut self, file: &'static str) -> Result<&LoadedScene, StudyError> {
         if !self.loaded.contains_key(file) {
             let path = self.scenes.join(file);
@@ -192,13 +195,13 @@ impl<'a> Laboratory<'a> {
         Ok(outcome)
     }
 
-    /// The image of a point: the last one, if it is the same.
+    /// The card image of a point: the last one, if their keys are equal.
     fn image(&mut self, point: &Point) -> Result<LastImage, StudyError> {
         let key = point.image_key();
         if let Some(last) = self.last.take_if(|last| last.key == key) {
             return Ok(last);
         }
-        // Two images may not fit into memory.
+        // Dropped first: two images may not fit into memory.
         self.last = None;
         let mut scene = self.load(point.scene)?.scene.clone();
         for assignment in &point.assignments {
@@ -213,7 +216,7 @@ impl<'a> Laboratory<'a> {
     }
 }
 
-/// The points, each once, those that share an image together.
+/// The points without duplicates, sorted so that points of one card image follow each other.
 fn sharing_images(points: &[Point]) -> Vec<Point> {
     let mut images: Vec<(ImageKey, Vec<Point>)> = Vec::new();
     for point in points {

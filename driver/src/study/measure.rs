@@ -1,4 +1,4 @@
-//! What a point takes: the work and the memory traffic of some of a picture's tiles.
+//! Measurement of a point: work and memory traffic of a sample of a picture's tiles.
 
 use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::memory::Lines;
@@ -22,31 +22,31 @@ use crate::scheduler::{GatherOrder, tiles};
 /// Reads of one structure of card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StructureReads {
-    /// Reads by the chip.
+    /// Read requests of the chip.
     pub requests: u64,
-    /// Bytes that they asked for.
+    /// Bytes that the chip requested.
     pub raw_bytes: u64,
-    /// Bytes that caches fetched from DRAM for them.
+    /// Bytes that the caches fetched from DRAM.
     pub dram_bytes: u64,
 }
 
-/// What one tile took.
+/// Work and memory traffic of one tile.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TileMeasurement {
-    /// Its number in the picture.
+    /// The tile's number in the picture.
     pub tile: u32,
-    /// Tiles that it stands for.
+    /// The tile's weight: tiles of the picture that it stands for, itself included.
     pub stands_for: usize,
-    /// Work.
+    /// Counts of the work.
     pub counters: Counters,
-    /// Reads of each structure.
+    /// Reads of each structure, in the order of [`Structure::ALL`].
     pub reads: [StructureReads; STRUCTURES],
 }
 
-/// What a point took.
+/// Work and memory traffic of a point.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// The tiles that were rendered, in the picture's order; one if it was rendered as a whole.
+    /// The rendered tiles, in the picture's order; a single one if the frame was rendered as a whole.
     pub tiles: Vec<TileMeasurement>,
 }
 
@@ -68,7 +68,7 @@ impl TileMeasurement {
         self.reads_of(Structure::is_photon_map)
     }
 
-    /// Reads of everything else.
+    /// Reads of everything but the photon map.
     pub fn scene(&self) -> StructureReads {
         self.reads_of(|structure| !structure.is_photon_map())
     }
@@ -87,18 +87,18 @@ impl TileMeasurement {
 }
 
 impl Measurement {
-    /// A count of the whole picture.
+    /// Estimate of a count's total over the whole picture.
     pub fn total(&self, count: impl Fn(&TileMeasurement) -> f64) -> Estimate {
         let sample: Vec<_> = self.tiles.iter().map(|tile| (count(tile), tile.stands_for)).collect();
         Estimate::of_total(&sample)
     }
 
-    /// Searches of the photon map.
+    /// Gathers: searches of the photon map.
     pub fn gathers(&self) -> Estimate {
         self.total(|tile| tile.counters.gathers as f64)
     }
 
-    /// Bytes of the photon map that chips asked for.
+    /// Bytes of the photon map that chips requested.
     pub fn raw_bytes(&self) -> Estimate {
         self.total(|tile| tile.photon_map().raw_bytes as f64)
     }
@@ -113,38 +113,38 @@ impl Measurement {
         self.total(|tile| tile.scene().dram_bytes as f64)
     }
 
-    /// Bytes from DRAM.
+    /// Bytes from DRAM, of photon map and scene together.
     pub fn dram_bytes(&self) -> Estimate {
         self.total(|tile| (tile.photon_map().dram_bytes + tile.scene().dram_bytes) as f64)
     }
 }
 
-/// A scene with its card image, and the threads that emulate chips.
+/// Test bench of emulated chips: a scene, its card image, and the threads that emulate the chips.
 pub struct Bench<'a> {
     /// The scene.
     pub scene: &'a Scene,
-    /// Its image.
+    /// The scene's card image, with its photon map.
     pub mapped: &'a MappedImage,
-    /// A chip a thread; their stacks must hold a chip while it is built.
+    /// Threads, one chip each; a thread's stack must hold a chip while it is built.
     pub pool: &'a ThreadPool,
-    /// Whether to stop.
+    /// Returns whether to stop; polled before each tile.
     pub is_stopped: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Bench<'_> {
-    /// The parameters of a frame.
+    /// The parameters of a frame with these settings.
     ///
     /// # Errors
-    /// If the scene has no such camera.
+    /// If the scene has no camera of the settings' name.
     pub fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
         let camera = self.scene.camera(settings.camera.as_deref())?;
         Ok(settings.frame(camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders tiles, each on a chip whose memory `model` makes anew.
+    /// Renders tiles, each on a chip with a new memory that `model` makes, so that every tile begins with empty caches.
     ///
     /// # Errors
-    /// If the image is not sound, or it is stopped.
+    /// If the card image is malformed, or the bench is stopped.
     pub fn render<'b, M: MeasuredMemory>(
         &'b self,
         frame: &FrameParameters,
@@ -162,10 +162,11 @@ impl Bench<'_> {
         self.pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
     }
 
-    /// Measures the work and the traffic of a frame.
+    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or, by [`GatherOrder::Hilbert`],
+    /// of the frame as a whole.
     ///
     /// # Errors
-    /// If the scene has no such camera, the image is not sound, or it is stopped.
+    /// If the scene has no camera of the settings' name, the card image is malformed, or the bench is stopped.
     pub fn traffic(
         &self,
         settings: &RenderSettings,

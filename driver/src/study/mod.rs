@@ -1,8 +1,9 @@
-//! Studies: renders of the same scenes with one thing changed, kept and reported, and what they say of chips that no run
-//! here has.
+//! Studies: measurements of the shipped scenes with one setting varied, reports on them, and predictions for machines
+//! that are not at hand.
 //!
-//! A study is a list of [`Point`]s and a function from what was measured there to a [`Report`]. [`run`] measures
-//! the points in a [`Laboratory`], which keeps them, and writes the report.
+//! A study is a list of [`Point`]s and a function from their [`Results`] to a [`Report`]. [`run`] measures the points
+//! in a [`Laboratory`], which keeps their outcomes, and writes the report. [`cost_model`] predicts the chips that a
+//! frame rate takes, [`load_balance`] how evenly tiles load them.
 
 pub mod cost_model;
 mod error;
@@ -31,29 +32,30 @@ pub use self::sample::{Estimate, SampleRate, choose};
 pub use self::scale::Scale;
 pub use self::studies::Study;
 
-/// What to study, and where.
+/// Options of [`run`]: the studies, their scale, and the folders they read and write.
 #[derive(Clone, Debug)]
 pub struct StudyOptions {
     /// The studies, in order.
     pub studies: Vec<Study>,
-    /// How large they are.
+    /// The scale of all studies.
     pub scale: Scale,
     /// The folder of the scenes.
     pub scenes: PathBuf,
     /// The folder of the reports.
     pub out: PathBuf,
-    /// Whether each report has a folder of its own in that, and a page links them all.
+    /// True if each report has a folder of its own in [`Self::out`], and an index page links them.
     pub is_collection: bool,
-    /// Threads; `None` for one a core.
+    /// Number of threads; `None` for one per core.
     pub threads: Option<usize>,
-    /// Where the numbers come from; a report adds its settings.
+    /// Provenance of the numbers; each report adds its settings.
     pub provenance: Provenance,
 }
 
-/// Measures and reports the studies. Finished points are kept in the folder `points` of `out`, and found again.
+/// Measures and reports the studies. Finished points are kept in the folder `points` of [`StudyOptions::out`], where a
+/// later run finds them.
 ///
 /// # Errors
-/// If a scene is missing, a point cannot be measured, a file cannot be written, or the observer stops it.
+/// If a scene is missing, a point cannot be measured, a file cannot be written, or the observer stops the study.
 pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
     let mut laboratory = Laboratory::new(&options.out, &options.scenes, options.threads, observer)?;
     let mut reports: Vec<(Study, Report)> = Vec::new();

@@ -1,4 +1,4 @@
-//! Points: one thing to measure each, with everything that its result depends on.
+//! Points: single measurements, each with everything that its result depends on.
 
 use photoncard_shared::budget::REFERENCE;
 use photoncard_shared::image::LAYOUT_VERSION;
@@ -10,42 +10,42 @@ use crate::photon_map::PhotonLayout;
 use crate::render::{Radiance, RenderSettings, Sampling};
 use crate::scheduler::GatherOrder;
 
-/// Something to measure of a scene.
+/// One measurement of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// The scene's file in the folder of scenes.
+    /// File name of the scene in the folder of scenes.
     pub scene: &'static str,
-    /// Changes to its materials, such as `floor.exponent=8`.
+    /// Assignments to the scene's materials, such as `floor.exponent=8`.
     pub assignments: Vec<String>,
-    /// How it is rendered.
+    /// Settings of the render.
     pub settings: RenderSettings,
-    /// What is measured.
+    /// Quantity that is measured.
     pub task: Task,
 }
 
-/// What is measured at a point.
+/// Quantity that is measured at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Task {
     /// Work and memory traffic of tiles behind caches that are empty when a tile begins.
     Traffic {
-        /// The caches.
+        /// The caches between chip and DRAM.
         caches: CacheSettings,
-        /// The share of the tiles; the order of the whole frame takes all.
+        /// Share of the tiles; [`GatherOrder::Hilbert`] renders the whole frame whatever it is.
         sample: SampleRate,
-        /// The least number of tiles, as far as there are so many.
+        /// Minimum number of tiles, as far as the picture has that many.
         least_tiles: usize,
     },
-    /// The error of pixels against many more gather rays.
+    /// Error of pixels against a reference with many more gather rays.
     Quality {
         /// Tiles of 16x16 pixels that are compared.
         tiles: usize,
-        /// Gather rays of the reference.
+        /// Final gather rays per pixel of the reference.
         reference_rays: u32,
     },
 }
 
 impl Point {
-    /// The name of the point's file: what it is about, not all of its settings.
+    /// Name of the point's file: task, scene and order. Points that differ in other settings share it.
     pub fn name(&self) -> String {
         let task = match self.task {
             Task::Traffic { .. } => "traffic",
@@ -55,7 +55,7 @@ impl Point {
         format!("{task}-{scene}-{}", order_name(self.settings.order))
     }
 
-    /// Everything that the result depends on; `scene` stands for the scene's content.
+    /// Key of the point in the store: everything that the result depends on. `scene` is the scene's checksum.
     pub fn key(&self, scene: &str) -> Value {
         let mut key = json!({
             "program": PROGRAM,
@@ -77,7 +77,7 @@ impl Point {
         key
     }
 
-    /// What the point's card image depends on.
+    /// Key of the point's card image; points of equal keys share the image.
     pub fn image_key(&self) -> ImageKey {
         let settings = &self.settings;
         ImageKey {
@@ -93,10 +93,10 @@ impl Point {
     }
 }
 
-/// The program and its version.
+/// Name and version of this program.
 pub(super) const PROGRAM: &str = concat!("photoncard ", env!("CARGO_PKG_VERSION"));
 
-/// What a card image depends on.
+/// Everything that a point's card image depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageKey {
     scene: &'static str,
@@ -109,7 +109,7 @@ pub struct ImageKey {
     radiance: Radiance,
 }
 
-/// All settings but the cards: a point is always measured on reference chips.
+/// All settings but the cards as JSON: a point is always measured on reference chips.
 fn settings(settings: &RenderSettings) -> Value {
     let crop = settings.crop.map(|window| [window.x0, window.x1, window.y0, window.y1]);
     json!({
@@ -134,7 +134,7 @@ fn settings(settings: &RenderSettings) -> Value {
     })
 }
 
-/// The order as the command line writes it.
+/// An order's name on the command line.
 pub(super) fn order_name(order: GatherOrder) -> &'static str {
     match order {
         GatherOrder::Naive => "naive",
@@ -146,7 +146,7 @@ pub(super) fn order_name(order: GatherOrder) -> &'static str {
     }
 }
 
-/// What tells radiance, as the command line writes it.
+/// The command line's name for a way to estimate radiance.
 pub(super) fn radiance_name(radiance: Radiance) -> &'static str {
     match radiance {
         Radiance::Density => "density",
@@ -154,7 +154,7 @@ pub(super) fn radiance_name(radiance: Radiance) -> &'static str {
     }
 }
 
-/// The sampling as the command line writes it.
+/// The command line's name for a sampling of gather rays.
 pub(super) fn sampling_name(sampling: Sampling) -> &'static str {
     match sampling {
         Sampling::Reflection => "brdf",
@@ -164,7 +164,7 @@ pub(super) fn sampling_name(sampling: Sampling) -> &'static str {
     }
 }
 
-/// The layout as the command line writes it.
+/// The command line's name for a layout of the photon map.
 pub(super) fn layout_name(layout: PhotonLayout) -> &'static str {
     match layout {
         PhotonLayout::Jensen => "jensen",

@@ -1,4 +1,4 @@
-//! Where and when a study was made.
+//! Provenance of a study: program, date and host.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -20,7 +20,7 @@ impl Provenance {
     }
 }
 
-/// The processor, how many threads it has, and the operating system.
+/// The processor's model, its number of hardware threads, and the operating system.
 fn host() -> String {
     let information = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = information.lines().find(|line| line.starts_with("model name"));
@@ -30,7 +30,7 @@ fn host() -> String {
     format!("{processor}, {threads} threads, {}", std::env::consts::OS)
 }
 
-/// The date, as `2007-05-01`, that many days after 1970-01-01, in the Gregorian calendar.
+/// The Gregorian date, as `2007-05-01`, of a number of days after 1970-01-01.
 fn date(days: u64) -> String {
     // Years are counted from March, so that a leap day is the last of its year; 1970-01-01 is day 719,468 from
     // 0000-03-01.

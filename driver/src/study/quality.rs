@@ -1,7 +1,7 @@
-//! How far pixels are from what many more gather rays give.
+//! Error of pixels against a reference with many more gather rays.
 //!
-//! Only the sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels; the order of the gathers, the
-//! tiles, the layout of the photon map and the caches do not.
+//! Only the sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels; the
+//! order of the gathers, the tiles, the layout of the photon map and the caches do not.
 
 use photoncard_shared::message::{Radiance, Sampling, Tile};
 use serde::{Deserialize, Serialize};
@@ -11,23 +11,23 @@ use super::sample::choose;
 use crate::render::{RenderError, RenderSettings};
 use crate::scheduler::{GatherOrder, tiles};
 
-/// The error of some pixels.
+/// Error of a render's pixels against a [`Reference`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
-    /// Root of the mean square error over pixels and channels, over the reference's mean.
+    /// Root mean square error over pixels and channels, relative to the reference's mean.
     pub rmse: f64,
-    /// The pixels' mean over the reference's.
+    /// Mean of the pixels over the mean of the reference; 1 without bias.
     pub mean: f64,
-    /// Pixels compared.
+    /// Number of pixels compared.
     pub pixels: usize,
 }
 
 /// Side of the tiles that are compared, pixels.
 const TILE: u32 = 16;
 
-/// Pixels that show a lit surface and no emitter, each with the radiance that many rays give it.
+/// Reference picture by many gather rays, of the pixels that show a lit surface and no emitter.
 pub struct Reference {
-    /// What was rendered.
+    /// Settings of the reference render.
     settings: RenderSettings,
     tiles: usize,
     /// Radiance, W/(sr m^2); `None` for a pixel that is left out.
@@ -35,11 +35,11 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Renders some tiles with so many gather rays by the combined sampling, without the irradiance cache and with radiance by density. Eye rays and
-    /// the places that shadow rays go to are those of `settings`.
+    /// Renders `tiles` tiles with `rays` gather rays per pixel by combined sampling, without the irradiance cache, and
+    /// with radiance by density estimation. Eye rays and shadow rays are those of `settings`.
     ///
     /// # Errors
-    /// If the scene has no such camera, the image is not sound, or it is stopped.
+    /// If the scene has no camera of the settings' name, the card image is malformed, or the bench is stopped.
     pub fn new(
         bench: &Bench,
         settings: &RenderSettings,
@@ -47,7 +47,7 @@ impl Reference {
         rays: u32,
     ) -> Result<Self, RenderError> {
         let settings = Self::settings(settings, rays);
-        // Without any other ray all that is seen is emission.
+        // Eye rays alone see emission and nothing else.
         let emitters = RenderSettings { gather_rays: 0, shadow_rays: 0, ..settings.clone() };
         let emission = pixels(bench, &emitters, tiles)?;
         let radiance = pixels(bench, &settings, tiles)?;
@@ -58,12 +58,12 @@ impl Reference {
         Ok(Self { pixels: kept.collect(), settings, tiles })
     }
 
-    /// Whether it is the reference that [`Self::new`] would make of the same image.
+    /// Returns whether [`Self::new`] would make this reference from the same card image.
     pub fn is_of(&self, settings: &RenderSettings, tiles: usize, rays: u32) -> bool {
         self.tiles == tiles && self.settings == Self::settings(settings, rays)
     }
 
-    /// What a render is compared with; the layout of the map does not change it.
+    /// Settings of the reference for a render with `settings`.
     fn settings(settings: &RenderSettings, rays: u32) -> RenderSettings {
         RenderSettings {
             gather_rays: rays,
@@ -74,7 +74,7 @@ impl Reference {
         }
     }
 
-    /// The error of a render of the same tiles.
+    /// Renders the reference's tiles with `settings`, and returns their error.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -96,12 +96,12 @@ impl Reference {
     }
 }
 
-/// The settings that make a pixel, in the order that is rendered fastest.
+/// `settings` with tiles, order and queues replaced, which do not change pixels: the fastest order.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
     RenderSettings { tile: TILE, order: GatherOrder::Sort, bins: None, queue: None, ..settings.clone() }
 }
 
-/// Radiances of the pixels of some tiles.
+/// Radiances of the pixels of `count` tiles, W/(sr m^2).
 fn pixels(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<Vec<[f32; 3]>, RenderError> {
     let frame = bench.frame(settings)?;
     let chosen = choose(&tiles(settings.window(), TILE, settings.order), count);

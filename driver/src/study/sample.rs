@@ -1,8 +1,9 @@
-//! A sample of a picture's tiles, and what it says of all of them.
+//! Stratified sample of a picture's tiles, and estimates of totals from it.
 //!
-//! Tiles are sorted along the Z-order curve of their middles and cut into as many stretches as there are tiles to choose,
-//! equal but for one tile; a hash chooses one of each, which stands for its stretch. So a sample is spread over the
-//! picture whatever the shape of the tiles, does not beat with the scene's own regularity, and is the same in every run.
+//! Tiles are sorted along the Z-order curve of their centres and cut into as many strata (*stretches*) as there are
+//! tiles to choose, of equal size but for one tile; a hash chooses one tile of each, which stands for its stretch. So a
+//! sample is spread over the picture whatever the shape of the tiles, does not alias with regular patterns of the
+//! scene, and is the same in every run.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,7 +12,7 @@ use photoncard_firmware::sampler::hash;
 use photoncard_shared::message::Tile;
 use serde::{Deserialize, Serialize};
 
-/// The share of a picture's tiles that is rendered: `1/17`, or `1` for all.
+/// Share of a picture's tiles that is rendered: `1/17`, or `1` for all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleRate {
     numerator: u32,
@@ -22,12 +23,12 @@ impl SampleRate {
     /// All tiles.
     pub const ALL: Self = Self { numerator: 1, denominator: 1 };
 
-    /// `numerator` of `denominator` tiles; `None` if that is no tile, or more than all.
+    /// The share `numerator / denominator`; `None` unless it is above 0 and at most 1.
     pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
         if numerator == 0 || numerator > denominator { None } else { Some(Self { numerator, denominator }) }
     }
 
-    /// How many of `total` tiles that is, rounded up, and at least `least` as far as there are so many.
+    /// Number of tiles out of `total`: the share, rounded up, or `least` if that is more, but at most `total`.
     pub fn count(self, total: usize, least: usize) -> usize {
         let share = (total as u64 * u64::from(self.numerator)).div_ceil(u64::from(self.denominator));
         (share as usize).max(least).min(total)
@@ -57,11 +58,11 @@ impl FromStr for SampleRate {
 pub struct Chosen {
     /// The tile.
     pub tile: Tile,
-    /// Tiles of its stretch.
+    /// Tiles of the picture that the tile stands for: the size of its stretch.
     pub stands_for: usize,
 }
 
-/// Chooses `count` of the tiles, spread over the picture, in the picture's order; all of them if there are no more.
+/// Chooses `count` of the tiles, spread over the picture, in the picture's order; all if `count` is larger.
 pub fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
     let count = count.min(tiles.len());
     let mut sorted = tiles.to_vec();
@@ -82,27 +83,27 @@ pub fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
     chosen
 }
 
-/// The bits of a number with a zero before each.
+/// The bits of a number at the even positions of a number of 64 bits, zeros at the odd ones: half of a Morton code.
 fn spread_bits(number: u32) -> u64 {
     (0..32).map(|bit| (u64::from(number) >> bit & 1) << (2 * bit)).sum()
 }
 
-/// A sum over all tiles, and how sure it is.
+/// Estimate of a sum over all tiles, with its confidence interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
-    /// The sum.
+    /// The estimated sum.
     pub value: f64,
-    /// Half the width of its 95 % confidence interval; 0 if all tiles were rendered.
+    /// Half the width of the 95 % confidence interval; 0 if all tiles were rendered.
     pub half_width: f64,
 }
 
 impl Estimate {
-    /// The sum over a population, of which these values each stand for some: the sum of value times weight `w`,
-    /// `+- t s sqrt(sum w (w - 1))`, with the standard deviation `s` of the `n` values and Student's `t` of `n - 1` degrees
-    /// of freedom. With equal weights that is the interval of a simple random sample of a finite population.
+    /// Estimate of a population's sum from a sample of pairs: value, and weight `w`, the members that it stands for.
     ///
-    /// A sample that is spread over the picture errs less than a random one, so the interval is wide rather than narrow.
-    /// Of one value of several nothing is known: the half-width is infinite.
+    /// The sum of value times weight, `+- t s sqrt(sum w (w - 1))`, with the standard deviation `s` of the `n` values
+    /// and Student's `t` of `n - 1` degrees of freedom. With equal weights that is the interval of a simple random
+    /// sample of a finite population. A sample that is spread over the picture errs less than a random one, so the
+    /// interval is wide rather than narrow. A single value that stands for more than itself has an infinite half-width.
     pub fn of_total(sample: &[(f64, usize)]) -> Self {
         let value = sample.iter().map(|&(value, stands_for)| value * stands_for as f64).sum();
         let spread =
@@ -120,16 +121,16 @@ impl Estimate {
         Self { value, half_width: students_t(sample.len() - 1) * error }
     }
 
-    /// In another unit.
+    /// The estimate times `factor`, for another unit.
     pub fn scaled(self, factor: f64) -> Self {
         Self { value: self.value * factor, half_width: self.half_width * factor.abs() }
     }
 }
 
-/// The 97.5 % quantile of Student's distribution of one to ten degrees of freedom.
+/// 97.5 % quantiles of Student's t-distribution of one to ten degrees of freedom.
 const FEW: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
 
-/// The 97.5 % quantile of Student's distribution; beyond ten degrees of freedom by the expansion of Cornish and Fisher.
+/// The 97.5 % quantile of Student's t-distribution; beyond ten degrees of freedom by the Cornish-Fisher expansion.
 fn students_t(degrees: usize) -> f64 {
     const Z: f64 = 1.959_964;
     FEW.get(degrees.wrapping_sub(1)).copied().unwrap_or_else(|| {
@@ -191,7 +192,7 @@ mod tests {
         assert_eq!(estimate.value, 5.0);
     }
 
-    /// Even, skewed and two-valued populations, in stretches of a shuffled order, drawn again and again.
+    /// Uniform, skewed and two-valued populations, sampled repeatedly in stretches of a shuffled order.
     #[test]
     fn the_interval_covers_the_total_of_a_population_as_often_as_it_says() {
         let uniform = |index: u32| (f64::from(hash(index)) + 0.5) / 4_294_967_296.0;

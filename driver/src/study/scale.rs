@@ -1,4 +1,4 @@
-//! How large a study is: what its renders have in common, and how many values it goes through.
+//! Scale of a study: the settings that its renders have in common, and the number of values that it varies them over.
 
 use photoncard_shared::budget::REFERENCE;
 
@@ -12,28 +12,28 @@ use crate::scheduler::GatherOrder;
 /// Side of the largest tile that the reference chip has room for, pixels.
 pub(super) const WIDEST_TILE: u32 = REFERENCE.tile_pixels.isqrt();
 
-/// What all points of a study have in common, and how many there are.
+/// Settings that all points of a study have in common, and the number of points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scale {
-    /// Pixels of a row, and rows.
+    /// Width and height of the picture, pixels.
     pub side: u32,
     /// Photons in the map.
     pub photons: usize,
-    /// Photons that a gather looks for.
+    /// Photons that a gather searches for, `k`.
     pub neighbors: u32,
-    /// Final gather rays a pixel, where they are not what is studied.
+    /// Final gather rays per pixel, where the study does not vary them.
     pub gather_rays: u32,
-    /// Shadow rays a pixel.
+    /// Shadow rays per pixel.
     pub shadow_rays: u32,
-    /// The share of the tiles that is rendered.
+    /// Share of the tiles that is rendered.
     pub sample: SampleRate,
-    /// Tiles that are rendered at the least.
+    /// Minimum number of tiles that are rendered, as far as the picture has that many.
     pub least_tiles: usize,
     /// Tiles of 16x16 pixels that are compared with a reference.
     pub quality_tiles: usize,
-    /// Gather rays of the reference.
+    /// Final gather rays per pixel of the reference.
     pub reference_rays: u32,
-    /// Whether fewer values are gone through.
+    /// True if studies vary their settings over fewer values: [`Self::pick`].
     pub is_quick: bool,
 }
 
@@ -51,7 +51,7 @@ impl Scale {
         reference_rays: 1600,
         is_quick: false,
     };
-    /// A small picture of the same, to see that all works.
+    /// A small picture and fewer values, as a trial of the whole.
     pub const QUICK: Self = Self {
         side: 128,
         photons: 60_000,
@@ -65,12 +65,12 @@ impl Scale {
         is_quick: true,
     };
 
-    /// With another share of the tiles.
+    /// This scale with another share of the tiles.
     pub fn with_sample(self, sample: SampleRate) -> Self {
         Self { sample, ..self }
     }
 
-    /// The values to go through.
+    /// The values that a study varies a setting over: `quick` if [`Self::is_quick`], else `full`.
     pub fn pick<T: Copy>(&self, full: &[T], quick: &[T]) -> Vec<T> {
         if self.is_quick { quick.to_vec() } else { full.to_vec() }
     }
@@ -91,8 +91,8 @@ impl Scale {
         }
     }
 
-    /// Settings with everything on: gathers sorted over the largest tiles, combined sampling, the irradiance cache, photons
-    /// in line leaves.
+    /// Settings with everything on: gathers sorted over the largest tiles, combined sampling, the irradiance cache,
+    /// photons in line leaves.
     pub fn all_on(&self) -> RenderSettings {
         RenderSettings {
             sampling: Sampling::Product,
@@ -103,17 +103,17 @@ impl Scale {
         }
     }
 
-    /// The same in the dissertation's tiles of 16x16, of which a frame has enough for many chips.
+    /// [`Self::all_on`] in the dissertation's tiles of 16x16 pixels, of which a frame has enough for many chips.
     pub fn all_on_in_small_tiles(&self) -> RenderSettings {
         RenderSettings { tile: RenderSettings::default().tile, ..self.all_on() }
     }
 
-    /// The traffic of sampled tiles behind the nominal caches.
+    /// A point that measures the traffic of sampled tiles behind the nominal caches.
     pub fn traffic(&self, scene: &'static str, settings: RenderSettings) -> Point {
         self.traffic_behind(scene, settings, CacheSettings::default())
     }
 
-    /// The traffic of sampled tiles.
+    /// A point that measures the traffic of sampled tiles behind `caches`.
     pub fn traffic_behind(
         &self,
         scene: &'static str,
@@ -124,18 +124,18 @@ impl Scale {
         Point { scene, assignments: Vec::new(), settings, task }
     }
 
-    /// The traffic of all tiles behind the nominal caches.
+    /// A point that measures the traffic of all tiles behind the nominal caches.
     pub fn whole(&self, scene: &'static str, settings: RenderSettings) -> Point {
         Self { sample: SampleRate::ALL, ..self.clone() }.traffic(scene, settings)
     }
 
-    /// The error of some tiles.
+    /// A point that measures the error of [`Self::quality_tiles`] tiles.
     pub fn quality(&self, scene: &'static str, settings: RenderSettings) -> Point {
         let task = Task::Quality { tiles: self.quality_tiles, reference_rays: self.reference_rays };
         Point { scene, assignments: Vec::new(), settings, task }
     }
 
-    /// What a reader needs to know of all points, as settings of a report.
+    /// Settings that all points share, as names and values for a report's provenance.
     pub fn rows(&self) -> Vec<(String, String)> {
         let settings = self.settings(GatherOrder::Sort);
         [
@@ -156,7 +156,8 @@ impl Scale {
         .to_vec()
     }
 
-    /// Gathers of a frame in which every gather ray of every pixel ends in one: 26.2 million at the nominal values.
+    /// Gathers of a frame in which every gather ray of every pixel ends in one, `side^2 N_FG`: 26.2 million at the
+    /// nominal values.
     pub fn nominal_gathers(&self) -> f64 {
         f64::from(self.side) * f64::from(self.side) * f64::from(self.gather_rays)
     }

@@ -1,8 +1,8 @@
 //! Finished points of a study, kept so that an interrupted study goes on where it stopped.
 //!
-//! A point is one JSON file that holds the settings it was computed with (its *key*) and its result. The key should
-//! name everything that the result depends on, the program's version included: a point is found again only by an equal
-//! key, so what another version computed is computed anew.
+//! A point is one JSON file that holds the settings it was computed with (its *key*) and its result. The key names
+//! everything that the result depends on, the program's version included: a point is found again only by an equal
+//! key, so that a new version computes all points anew.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -16,10 +16,10 @@ use thiserror::Error;
 use super::report::name;
 use crate::output::{self, OutputError, kind_of};
 
-/// The folder of the points in that of the study.
+/// Name of the points' folder within the study's folder.
 const POINTS: &str = "points";
 
-/// Why points cannot be kept.
+/// Error of the store of points.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StoreError {
@@ -28,11 +28,11 @@ pub enum StoreError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// What the operating system says.
+        /// The operating system's error.
         #[source]
         source: io::Error,
     },
-    /// A name that is no file's name on some system.
+    /// The name is not a portable file name.
     #[error(
         "'{name}' cannot name a point; use up to 100 letters, digits, '-' and '.', the first and the last of them no dot"
     )]
@@ -40,12 +40,12 @@ pub enum StoreError {
         /// The name.
         name: String,
     },
-    /// A result that JSON cannot hold.
+    /// JSON cannot hold the result.
     #[error("the result of the point '{name}' cannot be kept as JSON; its maps must have text for keys")]
     NotJson {
         /// The point's name.
         name: String,
-        /// What does not fit.
+        /// The serializer's error.
         #[source]
         source: serde_json::Error,
     },
@@ -66,7 +66,7 @@ pub struct PointStore {
 struct StoredPoint {
     key: Value,
     result: Value,
-    /// Of key and result.
+    /// FNV-1a hash of key and result, hexadecimal.
     checksum: String,
 }
 
@@ -83,7 +83,7 @@ impl PointStore {
         }
     }
 
-    /// The result of the point of that name and key, if it is finished.
+    /// The result of the point of this name and key, if it is finished.
     ///
     /// A file that cannot be read, is damaged or edited, or holds another key counts as absent and adds to the
     /// [notices](Self::notices).
@@ -109,10 +109,10 @@ impl PointStore {
         }
     }
 
-    /// Keeps the result of a point, in place of an earlier one of the same name and key.
+    /// Writes the result of a point; it replaces an earlier one of equal name and key.
     ///
-    /// Numbers come back to the last bit, but JSON has none that are not finite: a result with such a number must use
-    /// an `Option`, or it is not found again.
+    /// Finite numbers are read back to the last bit. JSON has no infinities and no NaN: a result that may have them
+    /// must use an `Option`, or it is not found again.
     ///
     /// # Errors
     /// If the name is not of letters, digits, `-` and `.`, the result is not JSON, or the file cannot be written.
@@ -127,7 +127,7 @@ impl PointStore {
         Ok(output::write(&path, &bytes)?)
     }
 
-    /// What was wrong with the files that were passed over, in sentences for people.
+    /// Sentences for people on the files that [`Self::get`] could not use.
     pub fn notices(&self) -> &[String] {
         &self.notices
     }
@@ -141,7 +141,7 @@ impl PointStore {
     }
 }
 
-/// The result in a point's file, or what is wrong with it.
+/// The result in a point's file, or the fault that makes the file unusable.
 fn result<T: DeserializeOwned>(bytes: &[u8], key: &Value) -> Result<T, String> {
     let point: StoredPoint =
         serde_json::from_slice(bytes).map_err(|error| format!("is damaged ({error})"))?;
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(store.get::<Outcome>("sort", &key("1")), Some(outcome()));
     }
 
-    /// Two keys of one hash would share a file.
+    /// Two keys of one hash share a file name.
     #[test]
     fn a_file_with_another_key_is_not_trusted() {
         let folder = tempfile::tempdir().unwrap();

@@ -16,7 +16,7 @@ pub(super) fn curtain() -> Mesh {
     mesh.grid([columns, ROWS], [false, false], |column, row| {
         let (s, t) = (column as f32 / (columns - 1) as f32, row as f32 / (ROWS - 1) as f32);
         let wave = on_circle(column % PER_FOLD, PER_FOLD);
-        // The second, slower wave makes no two folds alike.
+        // A second, slower wave makes the folds differ.
         let sway = on_circle(column + 3 * row, 2 * columns);
         let depth = 0.03 + 0.05 * t;
         let x = 0.98 * (s - 0.5) * (1.0 - 0.12 * (t * (1.0 - t))) + 0.012 * wave.x * t;
@@ -40,7 +40,7 @@ pub(super) fn curtain_rod() -> Mesh {
 pub(super) fn banner() -> Mesh {
     const PER_SPAN: usize = 2;
     const COLUMNS: usize = 25;
-    // Offset and height of the middle of the cloth, from its end behind the rail to its hem.
+    // Offset and height of the cloth's centre line, from its end behind the rail to its hem.
     let path = [
         [0.19, 5.55],
         [0.18, 5.90],
@@ -70,12 +70,12 @@ pub(super) fn banner() -> Mesh {
     mesh
 }
 
-/// A door of four sunk panels that fills an arched recess up to where its arch begins.
+/// A door of four sunk panels that fills an arched recess up to its springing.
 pub(super) fn door(half_width: f32, bottom: f32, top: f32, offset: f32) -> Mesh {
     let mut mesh = Mesh::default();
     let reach = half_width + EMBED;
     mesh.cuboid(Vec3::new(-reach, bottom - EMBED, offset), Vec3::new(reach, top, offset + 0.12));
-    // Rails stand back a little from stiles, so that the two share no plane.
+    // Rails stand back a little from stiles, so that the two are not coplanar.
     let mut plank = |x: [f32; 2], y: [f32; 2], proud: f32| {
         mesh.cuboid(Vec3::new(x[0], y[0], offset - proud), Vec3::new(x[1], y[1], offset + 0.03));
     };
@@ -166,7 +166,7 @@ pub(super) fn vase() -> Mesh {
     mesh
 }
 
-/// What a vase stands on.
+/// The stand of a vase.
 pub(super) fn vase_stand() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.block(0.24, -EMBED, 0.12);

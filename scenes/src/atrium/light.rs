@@ -1,15 +1,15 @@
 //! The sky over the court and the sun in it.
 //!
-//! Nothing lies beyond the scene but black, so the sky is a wedge that stands on the roof and closes the
-//! opening: low in the north, high in the south. What shape it has cannot be seen, for its radiance is
-//! the same all over; it is small because light that leaves one part of it for another is lost. The sun
-//! hangs in its high corner, so that light falls over the southern eaves slantwise on the northern side.
+//! Space beyond the scene is black, so the sky is a wedge that stands on the roof and closes the opening:
+//! low in the north, high in the south. Its shape cannot be seen, as its radiance is uniform; it is small
+//! because light from one part of it to another is lost. The sun hangs in its high corner, so that light
+//! falls over the southern eaves slantwise on the northern side.
 
 use glam::Vec3;
 
 use crate::mesh::Mesh;
 
-/// Half the width of the sky; its foot, within the roof; its top.
+/// Half the width of the sky; heights of its foot, within the roof, and of its top; its south and north end, metres.
 const SKY_X: f32 = 13.3;
 const SKY_Y: [f32; 2] = [9.2, 12.9];
 const SKY_Z: [f32; 2] = [-7.4, 5.6];

@@ -1,4 +1,4 @@
-//! Walls with arched openings, arch mouldings, vaults, and everything that runs around the court.
+//! Masonry: walls with arched openings, arch mouldings, vaults, mouldings around the court, and paving.
 
 use glam::{Vec2, Vec3};
 
@@ -7,18 +7,18 @@ use crate::mesh::{Mesh, on_circle};
 
 /// A wall panel with one opening, round at its top, centred on x = 0.
 ///
-/// The panel has no ends, top or underside: those lie within its neighbours.
+/// The panel has no ends, top or underside: they would lie within its neighbours.
 pub(super) struct ArchedPanel {
     pub(super) width: f32,
     pub(super) bottom: f32,
     pub(super) springing: f32,
     pub(super) top: f32,
     pub(super) radius: f32,
-    /// Offsets of the two faces.
+    /// Offsets of the front and the back face.
     pub(super) faces: [f32; 2],
-    /// Segments of a quarter of the arch.
+    /// Number of segments of a quarter circle of the arch.
     pub(super) segments: usize,
-    /// Strips between the opening and the outline.
+    /// Number of strips between the opening and the outline.
     pub(super) strips: usize,
 }
 
@@ -90,7 +90,7 @@ pub(super) fn arch_moulding(springing: f32, radii: [f32; 2], offsets: [f32; 2], 
         [inner, back],
     ];
     let mut mesh = Mesh::default();
-    // One more station at either end takes the feet down into what they stand on.
+    // One more station at either end takes the feet down into their supports.
     mesh.grid([segments + 3, profile.len()], [false, true], |station, row| {
         let [radius, offset] = profile[row];
         let drop = if station == 0 || station == segments + 2 { EMBED + 0.01 } else { 0.0 };
@@ -102,10 +102,10 @@ pub(super) fn arch_moulding(springing: f32, radii: [f32; 2], offsets: [f32; 2], 
 
 /// A groin vault over a square bay centred on the y axis: two half cylinders that meet in the diagonals.
 ///
-/// The vault reaches into the walls at either end of z and, with `all_round`, of x too.
+/// The vault reaches into the walls at both ends of z and, with `all_round`, of x too.
 pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh {
     const STEPS: usize = 10;
-    // Height and place of a cylinder's lines; equal angles keep its facets alike.
+    // Position and height of a cylinder's lines, at equal angles, so that its facets are equal.
     let line = |index: usize| on_circle(STEPS - index, 2 * STEPS) * radius;
     let walled = |index: usize| match index {
         0 => Vec2::new(-radius - EMBED, 0.0),
@@ -128,7 +128,7 @@ pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh 
     mesh
 }
 
-/// A profile carried around the court, with mitred corners.
+/// A profile swept around the court, with mitred corners.
 ///
 /// `profile` is a closed polygon of offset and height, counterclockwise with offsets to the right.
 pub(super) fn ring(profile: &[[f32; 2]]) -> Mesh {
@@ -150,7 +150,7 @@ pub(super) fn ring(profile: &[[f32; 2]]) -> Mesh {
     mesh
 }
 
-/// Square slabs of `size` laid on y = 0 from `min` to `max`, those of which `chosen` approves.
+/// Square slabs of side `size` on y = 0, from column and row `min` to `max`, where `chosen` returns true.
 pub(super) fn paving(min: [i32; 2], max: [i32; 2], size: f32, chosen: impl Fn(i32, i32) -> bool) -> Mesh {
     let mut mesh = Mesh::default();
     for column in min[0]..max[0] {

@@ -70,14 +70,14 @@ pub(crate) fn atrium() -> Vec<u8> {
     scene.into_glb()
 }
 
-/// The court without any light, open to surroundings that a renderer is given.
+/// The court without any light, to be lit by an environment map.
 pub(crate) fn open() -> Vec<u8> {
     let (mut scene, _) = court();
     place_cameras(&mut scene);
     scene.into_glb()
 }
 
-/// All that does not shine.
+/// The court without lights and cameras.
 fn court() -> (SceneBuilder, Palette) {
     let mut scene = SceneBuilder::default();
     let colours = Palette::new(&mut scene);
@@ -91,7 +91,7 @@ fn court() -> (SceneBuilder, Palette) {
     (scene, colours)
 }
 
-/// What runs around the whole court: steps, cornices with the floors behind them, rails, outer wall.
+/// Adds the parts that run around the whole court: steps, cornices with the floors behind them, rails, outer wall.
 fn build_rings(scene: &mut SceneBuilder, colours: &Palette) {
     let steps = [[-0.9, -0.1], [0.62, -0.1], [0.62, STEP_TOP], [-0.6, STEP_TOP], [-0.6, 0.08], [-0.9, 0.08]];
     scene.object("steps", &masonry::ring(&steps), colours.trim);
@@ -142,7 +142,7 @@ fn build_rings(scene: &mut SceneBuilder, colours: &Palette) {
     scene.object("hand-rail", &masonry::ring(&hand), colours.trim);
 }
 
-/// Slabs of two stones in the court, of stone and terracotta in the corridors.
+/// Adds slabs of two stones in the court, of stone and terracotta in the corridors.
 fn build_floor(scene: &mut SceneBuilder, colours: &Palette) {
     const SLAB: f32 = 0.75;
     const OUTER: [i32; 2] = [21, 11];
@@ -179,7 +179,7 @@ fn furnish(scene: &mut SceneBuilder, colours: &Palette, parts: &Parts) {
 }
 
 fn place_cameras(scene: &mut SceneBuilder) {
-    // 73 degrees across at 16:9.
+    // A horizontal field of view of 73 degrees at 16:9.
     let (yfov, aspect_ratio) = (0.789, 16.0 / 9.0);
     let court =
         Camera { eye: Vec3::new(-11.2, 2.0, -2.9), target: Vec3::new(-2.0, 3.4, 0.6), yfov, aspect_ratio };

@@ -19,7 +19,7 @@ pub(super) struct Palette {
     pub(super) leaves: usize,
     pub(super) water: usize,
     pub(super) glaze: usize,
-    /// Red, green, blue and gold.
+    /// Cloths in red, green, blue and gold.
     pub(super) cloths: [usize; 4],
     pub(super) sky: usize,
     pub(super) sun: usize,

@@ -1,4 +1,4 @@
-//! Every shape of which the atrium has more than one, once.
+//! Meshes that the atrium instances more than once.
 
 use glam::Vec3;
 
@@ -33,12 +33,13 @@ pub(super) struct Parts {
     pub(super) corner_wall: usize,
     pub(super) vase: usize,
     pub(super) planter: usize,
-    /// Red, green, blue and gold.
+    /// Curtains in red, green, blue and gold.
     pub(super) curtains: [usize; 4],
+    /// Banners in red, green, blue and gold.
     pub(super) banners: [usize; 4],
 }
 
-/// Radius and springing of the openings in the corridors' back walls.
+/// Radius and springing height of the openings in the corridors' back walls, metres.
 const GROUND_NICHE: [f32; 2] = [0.75, 2.05];
 const UPPER_NICHE: [f32; 2] = [0.6, 6.95];
 
@@ -99,7 +100,7 @@ impl Parts {
         parts
     }
 
-    /// The four colours of a cloth share its vertices.
+    /// Makes curtains and banners; the four colours of a cloth share its vertices.
     fn hang_cloths(&mut self, scene: &mut SceneBuilder, colours: &Palette) {
         let curtain = scene.geometry(&furnishing::curtain());
         let rod = scene.geometry(&furnishing::curtain_rod());
@@ -152,7 +153,7 @@ fn upper_moulding() -> Mesh {
     arch_moulding(UPPER_SPRINGING, [radius + 0.015, radius + 0.12], offsets, 12)
 }
 
-/// The arch across the corridor between two vaults, a little lower than they are.
+/// The arch across the corridor between two vaults, a little lower than the vaults.
 fn rib() -> Mesh {
     let radius = BAY / 2.0;
     let arch = arch_moulding(GROUND_SPRINGING, [radius - 0.11, radius + 0.05], [-0.18, 0.18], 16);

@@ -1,4 +1,4 @@
-//! One side of the court: its arcades, the corridors behind them, and what hangs and stands there.
+//! One side of the court: its arcades, the corridors behind them, and their furnishing.
 
 use glam::Vec3;
 
@@ -7,22 +7,23 @@ use super::parts::Parts;
 use crate::builder::SceneBuilder;
 use crate::document::Node;
 
-/// Which cloth hangs in, or below, which of the upper arches: index of the arch, index of the colour.
+/// Cloths in or below the upper arches: index of the arch, index of the colour.
 pub(super) type Hangings = &'static [(usize, usize)];
 
-/// What tells one side from another.
+/// Plan of one side: its name, size, frame and cloths.
 pub(super) struct Plan {
     pub(super) name: &'static str,
     pub(super) bays: usize,
-    /// Where local x and z point in the world; quarter turns only, so that nothing is rounded.
+    /// Local x axis in the world; axes are quarter turns of the world's, so that nothing is rounded.
     pub(super) x_axis: [f32; 3],
+    /// Local z axis in the world.
     pub(super) z_axis: [f32; 3],
     pub(super) origin: [f32; 3],
     pub(super) curtains: Hangings,
     pub(super) banners: Hangings,
 }
 
-/// Builds a side's nodes and puts them under one at the top of the hierarchy.
+/// Builds a side's nodes as children of one root node.
 pub(super) fn build(scene: &mut SceneBuilder, parts: &Parts, plan: &Plan) {
     let half = plan.bays as f32 * BAY / 2.0;
     let mut side = Side { scene, parts, half, bays: plan.bays, children: Vec::new() };
@@ -57,12 +58,12 @@ impl Side<'_> {
         self.children.push(self.scene.node(node));
     }
 
-    /// The middle of an upper arch.
+    /// Local x of the centre of an upper arch.
     fn upper_arch(&self, index: usize) -> f32 {
         BAY / 2.0 * (index as f32 + 0.5) - self.half
     }
 
-    /// Where the arcade's bays meet, and the middle of the gap between the last bay and the corner.
+    /// Local x of the borders between bays, and of the centres of the gaps between the outer bays and the corners.
     fn joints(&self) -> Vec<f32> {
         let end = self.half + CORRIDOR[0] / 2.0;
         let between = (1..self.bays).map(|index| BAY * index as f32 - self.half);
@@ -114,7 +115,7 @@ impl Side<'_> {
         }
     }
 
-    /// The piers and the vault of the corner at the far end of local x, and the walls beyond both ends.
+    /// Adds the piers and the vault of the corner at the far end of local x, and the walls beyond both ends.
     fn corner(&mut self) {
         let parts = self.parts;
         let half = self.half;
@@ -128,7 +129,7 @@ impl Side<'_> {
     }
 }
 
-/// A free-standing thing at a place in the world, scaled.
+/// Adds a free-standing mesh at a position in the world, scaled.
 pub(super) fn stand(scene: &mut SceneBuilder, name: &str, mesh: usize, place: Vec3, scale: f32) {
     let scale = (scale != 1.0).then_some([scale; 3]);
     let translation = Some(place.to_array());

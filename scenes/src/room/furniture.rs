@@ -1,11 +1,11 @@
-//! What stands in the room.
+//! Furniture of the room: plinth, vase and drum.
 
 use glam::{Vec2, Vec3};
 
 use crate::document::Node;
 use crate::mesh::{Mesh, on_circle};
 
-/// Where the plinth stands, x and z, its half width and its height.
+/// The plinth: position in x and z, half width, and height, metres.
 const PLINTH: ([f32; 2], f32, f32) = ([-1.15, -0.95], 0.22, 0.62);
 
 const DRUM: [f32; 3] = [-0.25, 0.0, -0.35];
@@ -13,7 +13,7 @@ const DRUM_RADIUS: f32 = 0.28;
 const DRUM_HEIGHT: f32 = 0.42;
 const DRUM_SEGMENTS: usize = 48;
 
-/// A block whose colour goes from below to above, and from side to side.
+/// A block whose vertex colours change from bottom to top and from left to right.
 pub(super) fn plinth() -> Mesh {
     let ([x, z], half, height) = PLINTH;
     let mut block = Mesh::default();
@@ -60,7 +60,7 @@ pub(super) fn vase() -> Mesh {
     mesh
 }
 
-/// The side of the drum as a strip: above and below in turns, counterclockwise from above, the seam twice.
+/// The side of the drum as a strip: top and bottom vertices in turns, counterclockwise from above, the seam twice.
 pub(super) fn drum_side() -> Mesh {
     let mut mesh = Mesh::default();
     for segment in 0..=DRUM_SEGMENTS {
@@ -76,7 +76,7 @@ pub(super) fn drum_side() -> Mesh {
     mesh
 }
 
-/// The head of the drum as a fan: its middle, then the rim counterclockwise from above.
+/// The head of the drum as a fan: its centre, then the rim counterclockwise from above.
 pub(super) fn drum_head() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.positions.push(Vec3::Y * DRUM_HEIGHT);
@@ -90,7 +90,7 @@ pub(super) fn drum_head() -> Mesh {
     mesh
 }
 
-/// Where the drum stands, as a mirrored node: what is counterclockwise must stay so.
+/// The drum's node. Its scale mirrors the mesh: a reader must keep front faces counterclockwise.
 pub(super) fn drum_node(mesh: usize) -> Node {
     Node {
         name: "drum".into(),

@@ -11,7 +11,7 @@ use crate::document::TextureTransform;
 use crate::material::Material;
 use crate::mesh::Mesh;
 
-/// Half the room in x and z, and its height, in metres.
+/// Half the room's size in x and z, and its height, in metres.
 const HALF: [f32; 2] = [2.0, 1.6];
 const HEIGHT: f32 = 2.6;
 
@@ -19,10 +19,10 @@ const LAMP_RADIANCE: [f64; 3] = [14.0, 12.0, 9.5];
 const WINDOW_RADIANCE: [f64; 3] = [9.0; 3];
 const PLASTER: [f64; 3] = [0.72, 0.70, 0.66];
 
-/// A picture on the wall, as a JPEG file; `painting.py` beside it made it.
+/// A picture on the wall, as a JPEG file made by `painting.py` beside it.
 const PAINTING: &[u8] = include_bytes!("painting.jpg");
 
-/// The whole image on a quadrilateral whose first corner is at the lower left.
+/// Texture coordinates of the whole image on a quadrilateral whose first corner is at the lower left.
 const WHOLE: [[f32; 2]; 4] = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
 
 /// Indices of textures in the file.
@@ -54,7 +54,7 @@ impl Textures {
     }
 }
 
-/// Makes the whole scene.
+/// The whole scene as a `.glb` file.
 pub(crate) fn room() -> Vec<u8> {
     let mut scene = SceneBuilder::default();
     let textures = Textures::new(&mut scene);
@@ -77,7 +77,7 @@ fn textured(corners: [[f32; 3]; 4], coordinates: [[f32; 2]; 4]) -> Mesh {
     mesh
 }
 
-/// Floor, ceiling and walls: the paper is mirrored on one wall and slanted on another.
+/// Adds floor, ceiling and walls: the wallpaper is mirrored on one wall and slanted on another.
 fn build_walls(scene: &mut SceneBuilder, textures: &Textures) {
     let [x, z] = HALF;
     let mut white = |name: &str, texture: usize, transform: Option<TextureTransform>| {
@@ -106,7 +106,7 @@ fn build_walls(scene: &mut SceneBuilder, textures: &Textures) {
     scene.object("plaster", &plain, plaster);
 }
 
-/// The lamp, the window that shines in many colours, and the painting.
+/// Adds the lamp, the window of coloured light, and the painting.
 fn hang(scene: &mut SceneBuilder, textures: &Textures) {
     let lamp = scene.material(&Material::diffuse("lamp", [0.0; 3]).emitting(LAMP_RADIANCE));
     let window =
@@ -127,7 +127,7 @@ fn hang(scene: &mut SceneBuilder, textures: &Textures) {
     scene.object("painting", &textured(canvas, WHOLE), painting);
 }
 
-/// A cut-out screen, a vase on a coloured plinth, and a drum of a strip and a fan.
+/// Adds a cut-out screen, a vase on a coloured plinth, and a drum of a strip and a fan.
 fn furnish(scene: &mut SceneBuilder, textures: &Textures) {
     let lattice = Material::diffuse("lattice", [1.0; 3]).textured(textures.lattice, None).cut_out(0.5);
     let lattice = scene.material(&lattice.double_sided());

@@ -1,10 +1,10 @@
-//! The patterns of the room's textures. None is like its mirror image, so that one that lies wrongly shows.
+//! Patterns of the room's textures. None equals its mirror image, so that a texture that is mapped wrongly shows.
 
 use core::f32::consts::TAU;
 
 use super::picture::Picture;
 
-/// A number of 0 to 255 that depends on all bits of both.
+/// Hash of two numbers, 0 to 255.
 fn hash(a: u32, b: u32) -> u32 {
     let mut value = a.wrapping_mul(0x9e37_79b1) ^ b.wrapping_mul(0x85eb_ca77);
     value = (value ^ (value >> 15)).wrapping_mul(0x2c1b_3c6d);
@@ -17,7 +17,7 @@ fn opaque(colour: [f32; 3]) -> [u8; 4] {
     [red, green, blue, u8::MAX]
 }
 
-/// Eight rows of wooden planks, which repeat without a seam.
+/// Eight rows of wooden planks, which tile without a seam.
 pub(super) fn planks() -> Picture {
     const SIDE: u32 = 512;
     Picture::new([SIDE, SIDE], |column, row| {
@@ -64,7 +64,7 @@ pub(super) fn lattice() -> Picture {
     Picture::new([SIDE, SIDE], |column, row| {
         let [x, y] = [column, row].map(|place| (place as f32 + 0.5) / SIDE as f32);
         let from_slat = |place: f32| libm::fabsf(place - libm::floorf(place) - 0.5);
-        // Distances to the edges, below zero within.
+        // Signed distances to the edges, negative within.
         let rising = from_slat(x + y) - 0.11;
         let falling = 0.6 * from_slat(x - y) - 0.03;
         let [leaf_x, leaf_y] = [x - 0.5, y - 0.03 - if y > 0.53 { 1.0 } else { 0.0 }];
@@ -82,7 +82,7 @@ pub(super) fn lattice() -> Picture {
     })
 }
 
-/// Panes of coloured glass between leads: the cells of scattered points.
+/// Panes of coloured glass between leads: the Voronoi cells of scattered points.
 pub(super) fn stained_glass() -> Picture {
     const SIDE: u32 = 128;
     const CELLS: u32 = 5;

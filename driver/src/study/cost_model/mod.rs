@@ -1,7 +1,8 @@
-//! The cost model of chapter 7: what a frame takes of a chip's arithmetic and memory, and so how many chips it takes.
+//! The dissertation's cost model (chapter 7): a frame's demand of arithmetic and memory, and the chips that meet it.
 //!
-//! [`Symbols`] are Table 7.1, a [`Workload`] is what one frame takes, a [`Cost`] is that in FLOPs and bytes of each unit
-//! of the chip, and a [`Prediction`] is what a [`Machine`] makes of it. Formulas: `docs/scaling.md`.
+//! [`Symbols`] are the parameters of Table 7.1, a [`Workload`] the counts of rays, gathers and bytes of one frame, a
+//! [`Cost`] the FLOPs and bytes that they take of each unit of the chip, and a [`Prediction`] the speed of a
+//! [`Machine`] at that cost. Formulas: `docs/scaling.md`.
 
 mod prediction;
 mod symbols;
@@ -14,7 +15,7 @@ pub use workload::Workload;
 /// Colour channels: a reflection function is evaluated for each.
 const CHANNELS: f64 = 3.0;
 
-/// What one frame takes of one unit, on all chips together.
+/// Cost of one frame in one unit of the chip, summed over all chips.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct UnitCost {
     /// Floating-point operations.
@@ -23,7 +24,7 @@ pub struct UnitCost {
     pub dram_bytes: f64,
 }
 
-/// What one frame takes of each unit of the chip, on all chips together.
+/// Cost of one frame in each unit of the chip, summed over all chips.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
     /// The ray caster: all rays.
@@ -35,7 +36,8 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// With the reflection evaluated in two stages: the first once where a gather ray ends, the second for each photon.
+    /// Cost with the reflection evaluated in two stages: the first once where a gather ray ends, the second for each
+    /// photon.
     pub fn new(workload: &Workload, symbols: &Symbols) -> Self {
         let [stage_1, stage_2] = [symbols.reflection_stage_1, symbols.reflection_stage_2];
         let of_gather = stage_1 + workload.photons_per_gather * stage_2;
@@ -46,19 +48,19 @@ impl Cost {
         }
     }
 
-    /// With the whole reflection function evaluated for every photon, and nothing cached or sampled by importance.
+    /// Cost with the whole reflection function evaluated for every photon, without irradiance cache and importance
+    /// tables.
     ///
-    /// For [`Workload::naive`] this is
-    /// `T P [(1 + N_FG + N_S) C_RayCast + N_FG C_G + (N_FG k + N_FG + N_S) 3 (C_B1 + C_B2)]` a frame, which makes the
-    /// dissertation's 7.4 TFLOPS at 30 frames/s. Its own formula is not in the public excerpts: this one is a
-    /// hypothesis that meets the figure.
+    /// For [`Workload::naive`] this is `T P [(1 + N_FG + N_S) C_RayCast + N_FG C_G + (N_FG k + N_FG + N_S) 3 (C_B1 +
+    /// C_B2)]` FLOPs a frame, the dissertation's 7.4 TFLOPS at 30 frames/s. The dissertation's own formula is not in
+    /// the public excerpts: this one is a hypothesis that meets the figure.
     pub fn naive(workload: &Workload, symbols: &Symbols) -> Self {
         let evaluations = workload.ray_gathers * workload.photons_per_gather + reflected_rays(workload);
         let reflection = evaluations * (symbols.reflection_stage_1 + symbols.reflection_stage_2);
         Self::of_units(workload, symbols, reflection)
     }
 
-    /// `reflection`: FLOPs of all reflection functions, of one channel.
+    /// Cost without the controller. `reflection`: FLOPs of all reflection functions, of one channel.
     fn of_units(workload: &Workload, symbols: &Symbols, reflection: f64) -> Self {
         Self {
             ray_caster: UnitCost {
@@ -73,7 +75,7 @@ impl Cost {
         }
     }
 
-    /// All units together.
+    /// Sum over the units.
     pub fn total(&self) -> UnitCost {
         let units = [self.ray_caster, self.controller, self.gather_unit];
         UnitCost {
@@ -83,12 +85,13 @@ impl Cost {
     }
 }
 
-/// Rays whose light is reflected at the point that the eye sees.
+/// Rays whose light is reflected at the point seen by the eye ray: gather and shadow rays.
 fn reflected_rays(workload: &Workload) -> f64 {
     workload.gather_rays + workload.shadow_rays
 }
 
-/// The dissertation's formula for these is not in the public excerpts: the terms and their FLOPs are ours.
+/// FLOPs of importance tables and irradiance cache. The dissertation's formula is not in the public excerpts: the terms
+/// and their FLOPs are ours.
 fn controller_flops(workload: &Workload, symbols: &Symbols) -> f64 {
     let table = workload.photons_per_gather * symbols.table_photon + symbols.table_cells * symbols.table_cell;
     let interpolation = symbols.records_per_pixel * symbols.interpolation;

@@ -1,15 +1,15 @@
-//! What a machine makes of a frame's cost: tiles a second, frames a second, chips.
+//! Predicted speed of a machine: tiles and frames a second, and chips for a frame rate, from a frame's cost.
 
 use super::{Cost, Workload};
 
-/// What one chip can do, and the host's link that all chips share.
+/// Capacity of one chip, and of the host's link that all chips share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Machine {
-    /// Usable memory bandwidth of a chip, bytes/s.
+    /// Usable DRAM bandwidth of a chip, bytes/s.
     pub bandwidth: f64,
-    /// Floating-point operations of a chip a second.
+    /// Arithmetic of a chip, floating-point operations a second.
     pub flops: f64,
-    /// The host's link, bytes/s each way.
+    /// Bandwidth of the host's link, bytes/s each way.
     pub link: f64,
 }
 
@@ -19,33 +19,33 @@ impl Machine {
     pub const NOMINAL: Self = Self { bandwidth: 90e9, flops: 500e9, link: 4e9 };
 }
 
-/// What keeps a machine from rendering faster.
+/// Resource that limits a machine's frame rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resource {
-    /// The chips' memory.
+    /// Bandwidth of the chips' DRAM.
     Bandwidth,
-    /// The chips' arithmetic.
+    /// Arithmetic of the chips.
     Computation,
-    /// The host's link: more chips do not help.
+    /// Bandwidth of the host's link: more chips do not help.
     HostLink,
 }
 
-/// Chips that a frame rate takes.
+/// Numbers of chips that a frame rate takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChipsNeeded {
-    /// For their memory bandwidth alone.
+    /// Chips needed for memory bandwidth alone.
     pub bandwidth: u64,
-    /// For their arithmetic alone.
+    /// Chips needed for arithmetic alone.
     pub computation: u64,
-    /// For the whole; `None` if the host's link cannot carry the frames of any number of chips.
+    /// Chips needed for both; `None` if the host's link cannot carry the frame rate whatever the number of chips.
     pub overall: Option<u64>,
 }
 
-/// How fast a machine renders a frame of some cost.
+/// Upper bound of the speed at which a machine renders frames of some cost.
 ///
 /// Memory, arithmetic and link work at the same time, as in a pipeline that never waits, and tiles are dealt without
-/// loss: an upper bound, of which [`crate::study::load_balance`] tells how near the dealing of tiles comes to it. What
-/// costs nothing has an infinite rate.
+/// loss; [`crate::study::load_balance`] simulates the loss. The rate of a resource that a frame does not use is
+/// infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// Tiles a second that one chip's memory bandwidth allows.
@@ -54,7 +54,7 @@ pub struct Prediction {
     pub computation_tiles_per_second: f64,
     /// Frames a second that the host's link allows, whatever the number of chips.
     pub link_frames_per_second: f64,
-    /// Tiles of a frame.
+    /// Number of tiles of a frame.
     pub tiles: f64,
 }
 
@@ -62,7 +62,7 @@ pub struct Prediction {
 const ROUNDING: f64 = 1e-9;
 
 impl Prediction {
-    /// Of a frame on a machine.
+    /// Prediction for a frame on a machine.
     pub fn new(workload: &Workload, cost: &Cost, machine: &Machine) -> Self {
         let total = cost.total();
         // The link's directions do not disturb each other: the busier one limits.
@@ -78,17 +78,18 @@ impl Prediction {
         }
     }
 
-    /// Tiles a second of one chip.
+    /// Tiles a second of one chip: the lower of its two rates.
     pub fn tiles_per_second(&self) -> f64 {
         self.bandwidth_tiles_per_second.min(self.computation_tiles_per_second)
     }
 
-    /// Frames a second of some chips, the host's link included.
+    /// Frames a second of `chips` chips, limited by the host's link.
     pub fn frames_per_second(&self, chips: u64) -> f64 {
         self.chips_frames_per_second(chips).min(self.link_frames_per_second)
     }
 
-    /// What limits some chips; of two that limit alike, the one that more chips help.
+    /// The resource that limits `chips` chips. Of equal limits the chips' is named, as more chips help there; of
+    /// bandwidth and arithmetic bandwidth.
     pub fn binding(&self, chips: u64) -> Resource {
         if self.link_frames_per_second < self.chips_frames_per_second(chips) {
             Resource::HostLink
@@ -99,7 +100,8 @@ impl Prediction {
         }
     }
 
-    /// The fewest chips for a frame rate, at least one. A rate that a number of chips meets up to rounding is met.
+    /// Minimum numbers of chips for a frame rate, at least one. A rate that is met but for rounding (relative error
+    /// 1e-9) is met.
     pub fn chips_needed(&self, frames_per_second: f64) -> ChipsNeeded {
         let chips = |tiles_per_second: f64| {
             let ratio = frames_per_second * self.tiles / tiles_per_second;
@@ -111,7 +113,7 @@ impl Prediction {
         ChipsNeeded { bandwidth, computation, overall: is_carried.then(|| bandwidth.max(computation)) }
     }
 
-    /// The share of the host's link that a frame rate takes; above 1 it cannot be carried.
+    /// Share of the host's link that a frame rate takes; above 1 the link cannot carry it.
     pub fn link_load(&self, frames_per_second: f64) -> f64 {
         frames_per_second / self.link_frames_per_second
     }

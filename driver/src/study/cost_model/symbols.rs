@@ -1,21 +1,21 @@
-//! The symbols of Table 7.1, and the few that the table implies or leaves open.
+//! Symbols of the cost model: Table 7.1, and the few symbols that the table implies or leaves open.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::layout::{Photon, Record};
 use photoncard_shared::message::PIXEL_BYTES;
 
-/// Where a symbol's nominal value is from.
+/// Source of a symbol's nominal value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// Table 7.1 of the dissertation.
     Table,
     /// The dissertation or one of its papers, outside the table.
     Published,
-    /// Our choice: nothing that is published states it.
+    /// Our choice: no publication states the value.
     Ours,
 }
 
-/// What a frame, a machine and a scene are like. Counts and ratios are `f64`, as they only ever enter products.
+/// Values of the cost model's symbols. Counts and ratios are `f64`, as they only ever enter products.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Symbols {
     /// `P`: pixels of a tile.
@@ -26,7 +26,7 @@ pub struct Symbols {
     pub frames_per_second: f64,
     /// `N_FG`: final gather rays of a pixel that is not interpolated.
     pub gather_rays: f64,
-    /// `k`: photons that a gather looks for.
+    /// `k`: photons that a gather searches for.
     pub neighbors: f64,
     /// `N_S`: shadow rays of a pixel.
     pub shadow_rays: f64,
@@ -38,13 +38,13 @@ pub struct Symbols {
     pub interpolated_share: f64,
     /// `L_IC`: irradiance records that an interpolated pixel uses.
     pub records_per_pixel: f64,
-    /// `C_B1`: FLOPs of the first stage of the reflection function, once a query and channel.
+    /// `C_B1`: FLOPs of the first stage of the reflection function, for each gather and channel.
     pub reflection_stage_1: f64,
-    /// `C_B2`: FLOPs of its second stage, once a photon and channel.
+    /// `C_B2`: FLOPs of the second stage of the reflection function, for each photon and channel.
     pub reflection_stage_2: f64,
-    /// `C_RayCast`: FLOPs of a ray through the scene.
+    /// `C_RayCast`: FLOPs of the intersection of a ray with the scene.
     pub ray_cast: f64,
-    /// `C_G`: FLOPs of finding the k nearest photons, for k = 100: it does not follow another `k`.
+    /// `C_G`: FLOPs of a search for the nearest 100 photons. A constant: it does not scale with `k`.
     pub gather: f64,
     /// `S_B`: bytes of a partially evaluated reflection function.
     pub reflection_bytes: f64,
@@ -73,8 +73,8 @@ pub struct Symbols {
 }
 
 impl Symbols {
-    /// Table 7.1's nominal values. Of `N_PM` the public excerpts of the table give the range alone: its lower end is
-    /// taken, which is also what the driver renders with by default.
+    /// Nominal values of Table 7.1. The public excerpts of the table give only a range for `N_PM`: its lower end is
+    /// taken, which is also the driver's default.
     pub const NOMINAL: Self = Self {
         tile_pixels: 256.0,
         tiles: 1024.0,
@@ -93,7 +93,7 @@ impl Symbols {
         reflection_bytes: 13.0,
         photon_bytes: Photon::BYTES as f64,
         line_bytes: LINE_BYTES as f64,
-        // 24 GB and 11 TB/s / 30, each over the 512 x 512 x 100 gathers of a frame.
+        // 24 GB a frame, and 11 TB/s at 30 frames/s, each over the 512 x 512 x 100 gathers of a frame.
         gather_dram: 24e9 / GATHERS,
         naive_gather_dram: 11e12 / 30.0 / GATHERS,
         // 1 GB/s for 100 M rays/s.
@@ -106,36 +106,36 @@ impl Symbols {
         command_bytes: 32.0,
     };
 
-    /// `R_FG = 1 - R_IC`: share of the pixels that gather for themselves.
+    /// `R_FG = 1 - R_IC`: share of the pixels with a final gather of their own.
     pub fn gathering_share(&self) -> f64 {
         1.0 - self.interpolated_share
     }
 
-    /// Pixels of a picture, `T P`.
+    /// `T P`: pixels of a picture.
     pub fn pixels(&self) -> f64 {
         self.tiles * self.tile_pixels
     }
 
-    /// Bytes of the photon map in card memory: whole lines of as many photons as fit in one.
+    /// `ceil(N_PM / floor(S_L / S_P)) S_L`: bytes of the photon map in card memory, in whole lines.
     pub fn photon_map_bytes(&self) -> f64 {
         let photons_per_line = (self.line_bytes / self.photon_bytes).floor().max(1.0);
         (self.photons / photons_per_line).ceil() * self.line_bytes
     }
 
-    /// Bytes on chip for the partially evaluated reflections of all gathers of a tile, `P R_FG N_FG S_B`.
+    /// `P R_FG N_FG S_B`: bytes on chip for the partially evaluated reflection functions of all gathers of a tile.
     pub fn tile_reflection_bytes(&self) -> f64 {
         self.tile_pixels * self.gathering_share() * self.gather_rays * self.reflection_bytes
     }
 
-    /// All symbols with their values here, in the table's order.
+    /// All symbols with their values, in the table's order.
     pub fn rows(&self) -> impl Iterator<Item = (&'static Symbol, f64)> + '_ {
         SYMBOLS.iter().map(|symbol| (symbol, (symbol.get)(self)))
     }
 
-    /// Sets one symbol as a text such as `R_IC=0.5` says.
+    /// Sets one symbol by an assignment such as `R_IC=0.5`.
     ///
-    /// # Errors
-    /// If it is no such text, names no symbol, or gives a value that the symbol cannot have.
+    /// # Errors If the text is not of the form `NAME=VALUE`, names no symbol, or has a value out of the symbol's
+    /// [range](Symbol::range).
     pub fn set(&mut self, assignment: &str) -> Result<(), SymbolError> {
         let Some((name, value)) = assignment.split_once('=') else {
             return Err(SymbolError::Form(assignment.to_owned()));
@@ -158,60 +158,61 @@ impl Symbols {
     }
 }
 
-/// Gathers of the frames that the published bandwidths are of: 512 x 512 pixels, 100 rays each.
+/// Gathers of a frame in the published bandwidths: 512 x 512 pixels of 100 rays each.
 const GATHERS: f64 = 512.0 * 512.0 * 100.0;
 
-/// Why a symbol was not set.
+/// Error of [`Symbols::set`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SymbolError {
-    /// Not of the form `NAME=VALUE`.
+    /// The text is not of the form `NAME=VALUE`.
     #[error("{0:?} sets no symbol; write it as in R_IC=0.5")]
     Form(String),
-    /// There is no symbol of that name.
+    /// No symbol has the name.
     #[error("there is no symbol {name:?}; the symbols are {valid}")]
     Unknown {
         /// The name.
         name: String,
-        /// The names there are.
+        /// The names of all symbols.
         valid: String,
     },
-    /// The symbol cannot have that value.
+    /// The value is no number, or out of the symbol's range.
     #[error("{name} cannot be {value:?}; give a number from {least} to {most}")]
     Value {
-        /// The symbol.
+        /// The symbol's notation.
         name: &'static str,
-        /// The value.
+        /// The value as it was given.
         value: String,
-        /// The least possible.
+        /// Minimum of the range.
         least: f64,
-        /// The greatest possible.
+        /// Maximum of the range.
         most: f64,
     },
 }
 
-/// What one symbol means.
+/// Description of one symbol.
 #[derive(Debug)]
 pub struct Symbol {
-    /// As the dissertation writes it, subscripts after `_`.
+    /// The dissertation's notation, subscripts after `_`.
     pub notation: &'static str,
-    /// What it is.
+    /// Meaning of the symbol.
     pub description: &'static str,
-    /// Of what its value is a number; empty for a ratio.
+    /// Unit of the value; empty for a ratio.
     pub unit: &'static str,
-    /// Where its nominal value is discussed.
+    /// Chapter, publication or code that discusses the nominal value.
     pub reference: &'static str,
-    /// Where its nominal value is from.
+    /// Source of the nominal value.
     pub origin: Origin,
-    /// The least and the greatest value that it may be given.
+    /// Minimum and maximum of the value.
     pub range: [f64; 2],
     get: fn(&Symbols) -> f64,
     set: fn(&mut Symbols, f64),
 }
 
-/// Any cost, size or number that may be nothing.
+/// Range of a cost, size or count that may be zero.
 const ANY: [f64; 2] = [0.0, 1e15];
-/// A number of which there is at least one.
+/// Range of a count that is at least one.
 const SOME: [f64; 2] = [1.0, 1e15];
+/// Range of a share of a whole.
 const RATIO: [f64; 2] = [0.0, 1.0];
 
 macro_rules! symbol {

@@ -1,21 +1,22 @@
-//! What one frame takes, by the symbols or as a run counted it.
+//! Workload of one frame: the counts that Table 7.1's symbols imply, or that a run measured.
 
 use photoncard_shared::counters::Counters;
 
 use super::Symbols;
 
-/// What one frame takes, on all chips together. A run fills it with what it counted, Table 7.1 with what it expects.
+/// Counts of rays, gathers, samples and bytes of one frame, summed over all chips. *Nominal* is the value that Table
+/// 7.1's symbols imply.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Workload {
     /// Rays from the eye. Nominal: `T P`.
     pub eye_rays: f64,
     /// Rays towards emitters. Nominal: `T P N_S`.
     pub shadow_rays: f64,
-    /// Final gather rays, those of irradiance records included. Nominal: `T P R_FG N_FG`.
+    /// Final gather rays, also of irradiance records. Nominal: `T P R_FG N_FG`.
     pub gather_rays: f64,
-    /// Rays that survey the surroundings of irradiance records. Nominal: none, the table knows of no survey.
+    /// Rays that survey the surroundings of irradiance records. Nominal: 0, the table has no survey.
     pub survey_rays: f64,
-    /// Searches of the photon map where a gather ray ends. Nominal: one a gather ray.
+    /// Searches of the photon map where a gather ray ends. Nominal: `T P R_FG N_FG`, one a gather ray.
     pub ray_gathers: f64,
     /// Searches of the photon map that fill an importance table. Nominal: `T P R_FG`, one a pixel that gathers.
     pub table_gathers: f64,
@@ -25,20 +26,20 @@ pub struct Workload {
     pub interpolated_samples: f64,
     /// Irradiance records that are made. Nominal: `T P R_FG`: every pixel that gathers leaves one.
     pub records: f64,
-    /// Bytes from DRAM for the photon map. Nominal: `B_G` a gather of either kind.
+    /// Bytes of the photon map from DRAM. Nominal: `B_G` a gather of either kind.
     pub photon_map_bytes: f64,
-    /// Bytes from DRAM for the scene. Nominal: `B_R` a ray.
+    /// Bytes of the scene from DRAM. Nominal: `B_R` a ray.
     pub scene_bytes: f64,
     /// Tiles of the picture. Nominal: `T`.
     pub tiles: f64,
-    /// Bytes over the host's link to the host: pixels. Nominal: `T P B_P`.
+    /// Bytes from the chips to the host: pixels. Nominal: `T P B_P`.
     pub bytes_to_host: f64,
-    /// Bytes over the host's link from the host: tile commands. Nominal: `T B_T`. The image is loaded before the frame.
+    /// Bytes from the host to the chips: tile commands. Nominal: `T B_T`. The card image is loaded before the frame.
     pub bytes_from_host: f64,
 }
 
 impl Workload {
-    /// What Table 7.1 expects of a frame with all three techniques: `T P (1 + R_FG N_FG + N_S)` rays.
+    /// Workload of Table 7.1's nominal frame, with all three techniques: `T P (1 + R_FG N_FG + N_S)` rays.
     pub fn nominal(symbols: &Symbols) -> Self {
         let pixels = symbols.pixels();
         let gathering_pixels = pixels * symbols.gathering_share();
@@ -55,8 +56,8 @@ impl Workload {
         workload
     }
 
-    /// What Table 7.1 expects of a frame with none of the techniques: every pixel gathers with all its rays, and each
-    /// gather takes `B_N` bytes.
+    /// Workload of a frame without the techniques, by Table 7.1: every pixel has a final gather of `N_FG` rays, and
+    /// each photon gather reads `B_N` bytes.
     pub fn naive(symbols: &Symbols) -> Self {
         let rays = symbols.pixels() * symbols.gather_rays;
         let mut workload = Self { gather_rays: rays, ray_gathers: rays, ..Self::of_pixels(symbols) };
@@ -65,7 +66,7 @@ impl Workload {
         workload
     }
 
-    /// What every pixel takes, gather or not.
+    /// The part that every pixel takes, interpolated or not.
     fn of_pixels(symbols: &Symbols) -> Self {
         let pixels = symbols.pixels();
         Self {
@@ -79,7 +80,7 @@ impl Workload {
         }
     }
 
-    /// The work that chips counted; bytes and tiles are not counted there and left at zero.
+    /// Workload that chips counted. Bytes and tiles, which [`Counters`] lack, are zero.
     pub fn counted(counters: &Counters) -> Self {
         Self {
             eye_rays: counters.eye_rays as f64,
@@ -100,7 +101,7 @@ impl Workload {
         self.eye_rays + self.shadow_rays + self.gather_rays + self.survey_rays
     }
 
-    /// Searches of the photon map of both kinds.
+    /// Searches of the photon map: where gather rays end, and for importance tables.
     pub fn gathers(&self) -> f64 {
         self.ray_gathers + self.table_gathers
     }

@@ -1,12 +1,12 @@
-//! How evenly tiles load many chips: a simulation of the scheduler over the costs of a picture's tiles.
+//! Load balance of many chips: a simulation of the scheduler over the costs of a picture's tiles.
 //!
 //! Tiles are dealt by [`Scheduler`] itself, under the policy of [`crate::session`]: one queue; when the host turns to a
-//! card, it sends it as many tiles as the card has free credits; a chip works its tiles in the order they came; a tile
-//! frees its credit when its result is at the host. A chip is done with a tile once it has rendered it: what it takes to
+//! card, it sends as many tiles as the card has free credits; a chip renders its tiles in the order of arrival; a tile
+//! frees its credit when its result is at the host. A chip is done with a tile once it has rendered it: the time to
 //! send the result is the link's.
 //!
-//! Time is kept in whole nanoseconds, and what happens at the same time happens in the order of the chips, so a
-//! simulation gives the same result wherever it runs.
+//! Times are whole nanoseconds, and simultaneous events happen in the order of the chips, so that a simulation gives
+//! the same result on every machine.
 
 mod order;
 
@@ -21,95 +21,96 @@ pub use self::order::TileOrder;
 use crate::scheduler::Scheduler;
 use crate::sink::FinishedTile;
 
-/// The links of all chips, which one host serves, one message at a time.
+/// Model of the chips' links, all served by one host, one message at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkModel {
-    /// Seconds of the host for one tile command.
+    /// Time that the host takes for one tile command, seconds.
     pub command_seconds: f64,
-    /// Seconds of the host for one tile's result: its pixels and the message that ends them.
+    /// Time that the host takes for one tile's result, pixels and final message, seconds.
     pub result_seconds: f64,
-    /// Seconds that any message is on its way.
+    /// Latency of any message, seconds.
     pub latency_seconds: f64,
 }
 
-/// The chips that render, and how they are reached.
+/// Number of chips, their credits and their links.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     /// Number of chips.
     pub chips: usize,
-    /// Tile commands that may be unanswered on a chip; [`Budget::tiles`](photoncard_shared::budget::Budget::tiles).
+    /// Maximum of unanswered tile commands per chip; [`Budget::tiles`](photoncard_shared::budget::Budget::tiles).
     pub credits: usize,
-    /// The links.
+    /// Model of the links.
     pub link: LinkModel,
 }
 
-/// Why nothing was simulated.
+/// Error of [`simulate`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LoadBalanceError {
-    /// No tile.
+    /// There are no tiles.
     #[error("there are no tiles to deal; give the cost of one at least")]
     NoTiles,
-    /// No chip, or none that may have a tile.
+    /// There are no chips, or no credits.
     #[error("{chips} chips of {credits} credits render nothing; give one of each at least")]
     NoChips {
         /// Number of chips.
         chips: usize,
-        /// Tile commands that may be unanswered on a chip.
+        /// Maximum of unanswered tile commands per chip.
         credits: usize,
     },
-    /// A time that is none.
+    /// A time is negative, above [`MOST_SECONDS`] or no number.
     #[error("{0} is no time; give seconds from 0 to {MOST_SECONDS}")]
     Time(f64),
 }
 
-/// The longest time of a tile or of a message, seconds: their sums stay whole.
+/// Maximum time of a tile or of a message, seconds: sums of nanoseconds stay exact.
 pub const MOST_SECONDS: f64 = 1e9;
 
-/// How a picture's tiles were dealt, and how long that took. Times are seconds from when the host begins to deal.
+/// Result of a simulation. Times are seconds since the host began to deal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Balance {
-    /// When the host has the last result.
+    /// Time at which the host has the last result, seconds.
     pub makespan_seconds: f64,
-    /// All tiles on one chip, without links.
+    /// Time of all tiles on one chip, without links, seconds.
     pub work_seconds: f64,
-    /// When each chip is done with its last tile; 0 for a chip that got none.
+    /// Time at which each chip is done with its last tile, seconds; 0 for a chip without tiles.
     pub chip_seconds: Vec<f64>,
-    /// Seconds that the host was at work on messages.
+    /// Time that the host spent on messages, seconds.
     pub host_seconds: f64,
-    /// The most tiles that were unanswered at one time, on all chips.
+    /// Maximum number of tiles dealt and unanswered at one time, over all chips.
     pub most_in_flight: usize,
-    /// The chip that rendered each tile, in the picture's order.
+    /// Index of the chip that rendered each tile, in the picture's order.
     pub chip_of_tile: Vec<usize>,
 }
 
 impl Balance {
-    /// How many times faster than one chip without links.
+    /// Speed-up over one chip without links, `work / makespan`.
     pub fn speedup(&self) -> f64 {
         if self.makespan_seconds > 0.0 { self.work_seconds / self.makespan_seconds } else { 1.0 }
     }
 
-    /// The share of all chips' time until the makespan in which they render.
+    /// Parallel efficiency, `speedup / chips`: share of the chips' time until the makespan that they spend on
+    /// rendering.
     pub fn efficiency(&self) -> f64 {
         self.speedup() / self.chip_seconds.len() as f64
     }
 
-    /// The rest of that time: chips wait for tiles, or for the last of the others.
+    /// Idle share, `1 - efficiency`: chips wait for tiles, or for the last chip.
     pub fn idle_share(&self) -> f64 {
         1.0 - self.efficiency()
     }
 
-    /// When the slowest chip is done, seconds.
+    /// Time at which the slowest chip is done, seconds.
     pub fn slowest_chip_seconds(&self) -> f64 {
         self.chip_seconds.iter().copied().fold(0.0, f64::max)
     }
 
-    /// When a chip is done on average, seconds.
+    /// Mean over the chips of the time at which they are done, seconds.
     pub fn mean_chip_seconds(&self) -> f64 {
         self.chip_seconds.iter().sum::<f64>() / self.chip_seconds.len() as f64
     }
 }
 
-/// Deals a picture's tiles to chips.
+/// Simulates the dealing of a picture's tiles to chips.
 ///
 /// `costs` are the seconds that a chip takes for each tile, in the picture's order.
 ///
@@ -144,13 +145,13 @@ pub fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balanc
 
 #[derive(Clone, Copy, Default)]
 struct Chip {
-    /// Tiles that are unanswered.
+    /// Tiles dealt and unanswered.
     tiles: usize,
-    /// When it is done with what it has.
+    /// Time at which the chip is done with its tiles.
     done: u128,
 }
 
-/// Times are nanoseconds.
+/// State of the simulation; times are nanoseconds.
 struct Simulation {
     scheduler: Scheduler,
     credits: usize,
@@ -164,7 +165,7 @@ struct Simulation {
     results: BinaryHeap<Reverse<(u128, usize, u32)>>,
     /// Up to when the host has worked or waited.
     now: u128,
-    /// How much of that it has worked.
+    /// Time that the host has spent on messages.
     busy: u128,
     most_in_flight: usize,
 }
@@ -206,7 +207,7 @@ impl Simulation {
             self.results.push(Reverse((at.done + self.latency, chip, id)));
             self.chip_of_tile[id as usize] = chip;
         }
-        // All that is dealt and not done has a result on its way.
+        // Every tile that is dealt and unanswered has a result on its way.
         self.most_in_flight = self.most_in_flight.max(self.results.len());
     }
 

@@ -6,24 +6,24 @@ use photoncard_shared::message::Tile;
 /// The order in which tiles wait to be dealt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TileOrder {
-    /// As in the picture, row by row: what the driver does.
+    /// The picture's order, row by row, as the driver deals.
     #[default]
     Picture,
-    /// Shuffled by a seed.
+    /// An order shuffled by a seed.
     Random(u32),
-    /// The longest first (Graham 1969). It needs the costs before the tiles are rendered, so it is a bound and no policy.
+    /// The longest first (Graham 1969). Costs are known only after the render, so this is a bound and no policy.
     LongestFirst,
 }
 
 impl TileOrder {
-    /// Tiles of these costs in this order; a tile's number is its place in the picture.
+    /// Tiles of these costs in this order; a tile's number is its index in `costs`.
     pub(super) fn tiles(self, costs: &[u128]) -> Vec<Tile> {
         let mut tiles: Vec<Tile> = (0_u32..).zip(costs).map(|(id, _)| tile(id)).collect();
         match self {
             Self::Picture => {}
-            // Numbers of the hash come once each: the number of the tile breaks no tie.
+            // The hash is a bijection: there are no ties for the tile's number to break.
             Self::Random(seed) => tiles.sort_by_key(|tile| (hash(hash(seed) ^ tile.id), tile.id)),
-            // The sort is stable: of equal ones the first in the picture is the first.
+            // The sort is stable: tiles of equal cost stay in the picture's order.
             Self::LongestFirst => tiles.sort_by_key(|tile| std::cmp::Reverse(costs[tile.id as usize])),
         }
         tiles

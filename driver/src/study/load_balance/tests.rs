@@ -8,7 +8,7 @@ fn balance(costs: &[f64], order: TileOrder, chips: usize, credits: usize, link: 
     simulate(costs, order, &Setup { chips, credits, link }).unwrap()
 }
 
-/// Whole milliseconds, so that sums are exact in nanoseconds.
+/// Costs in whole milliseconds, so that sums are exact in nanoseconds.
 fn costs() -> impl Strategy<Value = Vec<f64>> {
     proptest::collection::vec((0..1000_u32).prop_map(|cost| cost as f64 / 1000.0), 1..200)
 }
@@ -25,7 +25,7 @@ fn longest(costs: &[f64]) -> f64 {
     costs.iter().copied().fold(0.0, f64::max)
 }
 
-/// The least makespan of all ways to give tiles to chips.
+/// The minimum makespan over all assignments of tiles to chips.
 fn best_makespan(costs: &[f64], chips: usize) -> f64 {
     let ways = chips.pow(costs.len() as u32);
     let makespan = |mut way: usize| {
@@ -39,7 +39,7 @@ fn best_makespan(costs: &[f64], chips: usize) -> f64 {
     (0..ways).map(makespan).fold(f64::INFINITY, f64::min)
 }
 
-/// A tenth of a nanosecond: what conversions to and from seconds leave.
+/// Tolerance for conversions to and from seconds: a tenth of a nanosecond.
 const ROUNDING: f64 = 1e-10;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Reports: one page that tells what was studied, what came out, and how to get it again.
+//! Reports as HTML: one page with the results and the provenance that reproduces them.
 
 use std::fmt::Write;
 
@@ -11,13 +11,13 @@ const STYLE: &str = include_str!("style.css");
 /// A report on a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// What was studied.
+    /// Title of the page.
     pub title: String,
     /// Paragraphs before the first section.
     pub introduction: Vec<String>,
-    /// In the order of reading.
+    /// Sections in reading order.
     pub sections: Vec<Section>,
-    /// Where the numbers come from.
+    /// Provenance of the numbers.
     pub provenance: Provenance,
 }
 
@@ -26,7 +26,7 @@ pub struct Report {
 pub struct Section {
     /// The heading.
     pub heading: String,
-    /// In the order of reading.
+    /// Blocks in reading order.
     pub blocks: Vec<Block>,
 }
 
@@ -37,9 +37,9 @@ pub enum Block {
     Paragraph(String),
     /// A link to a page in this folder or one below.
     Link {
-        /// What it says.
+        /// Text of the link.
         text: String,
-        /// The page, relative to this one.
+        /// Path of the linked page, relative to this one.
         target: String,
     },
     /// A table, which is also the file `<name>.csv` beside the page.
@@ -58,23 +58,23 @@ pub enum Block {
     },
 }
 
-/// Where a report's numbers come from.
+/// Provenance of a report's numbers: program, date, machine, command line and settings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance {
     /// The program and its version.
     pub version: String,
-    /// When the study was made.
+    /// Date of the study, `YYYY-MM-DD`.
     pub date: String,
     /// The processor and the operating system.
     pub host: String,
-    /// What was typed.
+    /// Command line of the study.
     pub command_line: String,
     /// Every setting and its value.
     pub settings: Vec<(String, String)>,
 }
 
 impl Report {
-    /// The report as one HTML page that needs nothing else, but links to the tables and plots beside it. It is also
+    /// The report as one self-contained HTML page, with links to the tables and plots beside it. The page is also
     /// well-formed XML.
     pub fn to_html(&self) -> String {
         let title = escape(&self.title);
@@ -99,7 +99,7 @@ impl Report {
 }
 
 impl Block {
-    /// The name of the file beside the page and what is in it, if there is one.
+    /// Name and content of the block's file beside the page, if it has one.
     pub(super) fn file(&self) -> Option<(String, String)> {
         match self {
             Self::Paragraph(_) | Self::Link { .. } => None,
@@ -165,7 +165,7 @@ fn link(name: &str, extension: &str) -> String {
     format!("<a href=\"{file}\" download=\"{file}\">{file}</a>")
 }
 
-/// A plot that shrinks with the page, though never so far that its text becomes too small to read.
+/// A plot that shrinks with the page, but not below the size at which its text can be read.
 fn sized(plot: &Plot) -> String {
     format!("<div style=\"--panels: {}\">\n{}</div>\n", plot.panels.len().max(1), plot.to_svg())
 }

@@ -1,4 +1,4 @@
-//! Text inside HTML and SVG.
+//! Escapes of text in HTML and SVG.
 
 /// `text` as content or as an attribute's value in double quotes. Characters that XML cannot hold become U+FFFD.
 pub(super) fn escape(text: &str) -> String {
@@ -18,7 +18,7 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// A reader of the markup that reports write, strict enough to find what is malformed.
+/// A strict reader of the markup that reports write, which panics on malformed documents.
 #[cfg(test)]
 pub(super) mod reader {
     /// A start or empty tag, and the text up to the next tag.

@@ -1,6 +1,6 @@
 //! Reports of studies: tables, plots and one page that holds them all.
 //!
-//! [`write()`] puts a [`Report`] into a folder: `index.html`, which needs nothing beside it, every table as CSV and every
+//! [`write()`] puts a [`Report`] into a folder: `index.html`, which is self-contained, every table as CSV and every
 //! plot as SVG.
 
 mod html;
@@ -25,11 +25,11 @@ use crate::output::{self, OutputError};
 /// The page's file name.
 const PAGE: &str = "index.html";
 
-/// Why a report cannot be written.
+/// Error of [`write()`].
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// A name that is no file's name on some system.
+    /// The name of a table or plot is not a portable file name.
     #[error(
         "'{name}' cannot name a table or plot; use up to 100 letters, digits, '-' and '.', the first and the last of them \
          no dot"
@@ -38,7 +38,7 @@ pub enum ReportError {
         /// The name.
         name: String,
     },
-    /// Two tables, or two plots, of one name.
+    /// Two tables or two plots have one name, letter case aside.
     #[error(
         "two files of the report would be named {file}, in some case; give each table and each plot its own name"
     )]
@@ -51,7 +51,7 @@ pub enum ReportError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// What the operating system says.
+        /// The operating system's error.
         #[source]
         source: io::Error,
     },

@@ -1,9 +1,10 @@
 //! Names of files that the caller chooses.
 
-/// Longest name in bytes; an extension and a hash still fit into what file systems take.
+/// Maximum length of a name, bytes: with an extension and a hash it stays within the 255 bytes of common file systems.
 const LONGEST: usize = 100;
 
-/// Whether `name` is a file's name on every system: letters, digits, `-` and `.`, not starting or ending with a dot.
+/// Returns whether `name` is a valid file name on every system: 1 to 100 letters, digits, `-` and `.`, not starting or
+/// ending with a dot.
 pub(in crate::study) fn is_portable(name: &str) -> bool {
     let is_allowed = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'.';
     (1..=LONGEST).contains(&name.len())

@@ -1,6 +1,6 @@
-//! Numbers as people read them, and as programs do.
+//! Numbers as text: rounded for people, in full precision for programs.
 
-/// Digits of the exponent raised as in print.
+/// Superscript digits.
 const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
 /// `value` with at most `digits` significant digits, thousands separators and a true minus sign. Values that would
@@ -23,7 +23,7 @@ pub(in crate::study) fn human(value: f64, digits: usize) -> String {
     grouped(trim_zeros(&format!("{rounded:.decimals$}")))
 }
 
-/// `value` with that many decimals, thousands separators and a true minus sign.
+/// `value` with `decimals` decimals, thousands separators and a true minus sign.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     grouped(&format!("{value:.decimals$}"))
 }
@@ -47,7 +47,7 @@ pub(super) fn grouped(decimal: &str) -> String {
     text
 }
 
-/// `base` raised to `exponent`, as in print.
+/// `base` with `exponent` in superscript digits.
 pub(super) fn power(base: u32, exponent: i32) -> String {
     let mut text = base.to_string();
     if exponent < 0 {

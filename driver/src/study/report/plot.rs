@@ -1,7 +1,7 @@
 //! Plots of lines and markers, drawn as stand-alone SVG.
 //!
 //! A plot has one or several panels side by side over one legend. It is drawn without a font at hand: the room for
-//! text is that of the widest common fonts.
+//! text is sized for the widest common fonts.
 
 mod axis;
 mod content;
@@ -26,20 +26,20 @@ use super::markup::escape;
 /// Space around the drawing and between its parts, in pixels.
 const MARGIN: f64 = 14.0;
 const TITLE_GAP: f64 = 6.0;
-/// The widths of the plotting areas of a lone panel and of one of several, in pixels.
+/// Widths of the plotting area of a single panel, and of one of several, in pixels.
 const LONE_WIDTH: f64 = 560.0;
 const PANEL_WIDTH: f64 = 390.0;
 
-/// A figure: panels side by side that share a legend. Series of the same name look the same in all of them.
+/// A figure: panels side by side that share a legend. Series of one name have one style in all panels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
-    /// What the figure shows.
+    /// Title of the figure.
     pub title: String,
-    /// How to read it; empty if there is nothing to say.
+    /// Caption that explains the figure; may be empty.
     pub caption: String,
-    /// From left to right.
+    /// Panels from left to right.
     pub panels: Vec<Panel>,
-    /// Whether panels of the same vertical scale get the same vertical range.
+    /// True if panels of equal vertical scale share one vertical range.
     pub shares_y_range: bool,
 }
 
@@ -76,7 +76,7 @@ impl Plot {
         self.document(width, top + MARGIN, &body)
     }
 
-    /// The panels, laid out, and what is left out of them.
+    /// The panels, laid out, and the points that are left out of them.
     fn drawings<'a>(&'a self, names: &[&'a str]) -> (Vec<Drawing<'a>>, Vec<LeftOut<'a>>) {
         let area = if self.panels.len() == 1 { LONE_WIDTH } else { PANEL_WIDTH };
         let (mut all_data, mut all_left_out) = (Vec::new(), Vec::new());
@@ -126,7 +126,7 @@ impl Plot {
         )
     }
 
-    /// What the plot shows, for those who cannot see it.
+    /// Description of the plot for readers who cannot see it: SVG's `desc`.
     fn description(&self) -> String {
         let mut parts = Vec::new();
         if !self.caption.is_empty() {

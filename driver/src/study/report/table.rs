@@ -1,4 +1,4 @@
-//! Tables, written for programs as CSV and for people as HTML.
+//! Tables: CSV for programs, HTML for people.
 
 use std::fmt::Write;
 
@@ -9,7 +9,7 @@ use super::number;
 const DIGITS: usize = 4;
 const HALF_WIDTH_DIGITS: usize = 2;
 
-/// A titled table with one unit a column.
+/// A titled table with one unit per column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     title: String,
@@ -20,18 +20,18 @@ pub struct Table {
 /// The head of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// What the column holds.
+    /// Name of the quantity.
     pub name: String,
-    /// Its unit; empty where there is none.
+    /// Unit of the quantity; empty where there is none.
     pub unit: String,
 }
 
 /// One entry of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
-    /// Nothing was measured.
+    /// No value.
     Empty,
-    /// Words.
+    /// Text.
     Text(String),
     /// A count or a setting, shown with all its digits.
     Integer(i128),
@@ -45,7 +45,7 @@ pub enum Cell {
 }
 
 impl Column {
-    /// A column of that name and unit.
+    /// A column of a name and a unit.
     pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { name: name.into(), unit: unit.into() }
     }
@@ -136,7 +136,7 @@ impl Table {
     /// Adds a row below the others.
     ///
     /// # Panics
-    /// If it has not one cell for every column.
+    /// If the row does not have one cell for every column.
     pub fn push(&mut self, row: Vec<Cell>) {
         assert_eq!(row.len(), self.columns.len(), "a row of the table '{}'", self.title);
         self.rows.push(row);
@@ -157,10 +157,10 @@ impl Table {
         &self.rows
     }
 
-    /// The table as RFC 4180 has it, with a header `name (unit)` and numbers in full precision.
+    /// The table as CSV (RFC 4180), with a header `name (unit)` and numbers in full precision.
     ///
-    /// A column with half-widths is followed by one of its half-widths. Values that are not finite are written `NaN`,
-    /// `inf` and `-inf`.
+    /// A column with half-widths is followed by a column of the half-widths. Values that are not finite are written
+    /// `NaN`, `inf` and `-inf`.
     pub fn to_csv(&self) -> String {
         let with_half_width: Vec<bool> =
             (0..self.columns.len()).map(|column| self.has_half_width(column)).collect();
@@ -242,7 +242,7 @@ mod tests {
     use super::super::markup::reader;
     use super::*;
 
-    /// Reads RFC 4180.
+    /// A reader of CSV as RFC 4180 defines it.
     fn parse(csv: &str) -> Vec<Vec<String>> {
         let (mut records, mut record, mut field) = (Vec::new(), Vec::new(), String::new());
         let mut characters = csv.chars().peekable();

@@ -13,7 +13,7 @@ use super::scenes::GLOSSY;
 use crate::render::{RenderSettings, Sampling};
 use crate::scheduler::GatherOrder::{self, DirectionBins, Hash, Naive, Sort, Tiled};
 
-/// The lines of the figure.
+/// Lines of the figure: order of the gathers and sampling of the rays.
 const LINES: [(GatherOrder, Sampling); 7] = [
     (Naive, Sampling::Reflection),
     (Tiled, Sampling::Reflection),
@@ -23,7 +23,7 @@ const LINES: [(GatherOrder, Sampling); 7] = [
     (DirectionBins, Sampling::Product),
     (Hash, Sampling::Product),
 ];
-/// Its panels: without and with the irradiance cache.
+/// Panels of the figure: without and with the irradiance cache.
 const PANELS: [(bool, &str); 2] =
     [(false, "without the irradiance cache"), (true, "with the irradiance cache")];
 
@@ -132,14 +132,14 @@ fn traffic(scale: &Scale, results: &Results) -> Table {
     table
 }
 
-/// Bytes from DRAM at all exponents.
+/// Bytes of the photon map from DRAM at each exponent.
 fn curve(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cached: bool) -> Vec<Estimate> {
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent)).photon_map_bytes();
     exponents(scale).into_iter().map(of).collect()
 }
 
-/// By how much the bytes from DRAM fall from the first to the last exponent. The same tiles are rendered at both, so their
-/// differences are sampled: what tiles have in common does not blur it.
+/// Decrease of the bytes from DRAM from the first to the last exponent. Both renders have the same tiles, so it is
+/// estimated from the differences of each tile (paired samples): the variance between tiles cancels.
 fn fall(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cached: bool) -> Estimate {
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
     let exponents = exponents(scale);
@@ -156,7 +156,7 @@ fn change(curve: &[Estimate]) -> f64 {
     curve.last().zip(curve.first()).map_or(f64::NAN, |(last, first)| last.value / first.value)
 }
 
-/// Its greatest value over its least.
+/// The greatest value of a curve over its least.
 fn spread(curve: &[Estimate]) -> f64 {
     let greatest = curve.iter().map(|estimate| estimate.value).fold(0.0, f64::max);
     greatest / curve.iter().map(|estimate| estimate.value).fold(f64::INFINITY, f64::min)

@@ -1,4 +1,4 @@
-//! Table 7.1: what its symbols and measured counts say of the chips that a frame rate takes.
+//! Study of Table 7.1: chips that a frame rate takes, by the table's symbols and by measured counts.
 
 use super::super::cost_model::{Cost, Machine, Origin, Prediction, Resource, Symbols, Workload};
 use super::super::laboratory::Results;
@@ -12,7 +12,7 @@ use super::scenes::SCENES;
 use super::workload::{cost, of_frame, tile_seconds};
 use crate::scheduler::GatherOrder;
 
-/// Chips of the plots.
+/// Maximum number of chips in the plots.
 const MOST_CHIPS: usize = 1024;
 
 /// A frame of the cost model.
@@ -32,12 +32,12 @@ fn naive(scale: &Scale, scene: &'static str) -> Point {
     scale.traffic(scene, scale.settings(GatherOrder::Naive))
 }
 
-/// Every tile, for the balance of their times.
+/// All techniques on, in the largest tiles; every tile is rendered.
 fn all_on(scale: &Scale, scene: &'static str) -> Point {
     scale.whole(scene, scale.all_on())
 }
 
-/// The tiles that are dealt to chips.
+/// All techniques on, in tiles of 16x16 pixels, which are dealt to chips; every tile is rendered.
 fn dealt(scale: &Scale, scene: &'static str) -> Point {
     scale.whole(scene, scale.all_on_in_small_tiles())
 }
@@ -48,7 +48,7 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
     SCENES.iter().flat_map(of_scene).collect()
 }
 
-/// The table's symbols, with what this scale changes of them.
+/// Table 7.1's symbols with the scale's numbers of tiles, rays, neighbours and photons.
 pub(super) fn symbols(scale: &Scale) -> Symbols {
     let tile_pixels = Symbols::NOMINAL.tile_pixels;
     Symbols {
@@ -268,7 +268,7 @@ fn frame_rates(frames: &[Frame]) -> Block {
     plot("frame-rates", "Frame rate by the number of chips", caption, vec![axes])
 }
 
-/// The dissertation's demand of naive photon mapping, with measured counts.
+/// Paragraph that compares the dissertation's demand of naive photon mapping with measured counts.
 fn discussion(frames: &[Frame]) -> String {
     let demand = |frame: &Frame| {
         let total = frame.cost.total();

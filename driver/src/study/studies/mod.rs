@@ -1,4 +1,4 @@
-//! The studies: each a list of points, and a report on what was measured there.
+//! The studies: each a list of points, and a report on their outcomes.
 
 mod balance;
 mod glossy_floor;
@@ -15,18 +15,18 @@ use super::point::Point;
 use super::report::Report;
 use super::scale::Scale;
 
-/// A study.
+/// A study that the program offers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Study {
     /// Memory traffic by order, cache and layout.
     Reordering,
-    /// Memory traffic over the exponent of a glossy floor, as figure 6.17 of the dissertation.
+    /// Memory traffic over the exponent of a glossy floor: figure 6.17 of the dissertation.
     Figure617,
     /// The cost model of table 7.1, with nominal and measured counts.
     Table71,
-    /// Each technique alone and all together, at as many rays and at equal quality.
+    /// Each technique alone and all together, at equal numbers of rays and at equal quality.
     Techniques,
-    /// Photons, tile sides, queues and chips.
+    /// Memory traffic over photons, tile sides and queue sizes; time over chips.
     Scaling,
 }
 
@@ -35,7 +35,7 @@ impl Study {
     pub const ALL: [Self; 5] =
         [Self::Reordering, Self::Figure617, Self::Table71, Self::Techniques, Self::Scaling];
 
-    /// The name, which is also that of its folder.
+    /// The study's name on the command line, also the name of its folder.
     pub fn name(self) -> &'static str {
         match self {
             Self::Reordering => "reordering",
@@ -46,7 +46,7 @@ impl Study {
         }
     }
 
-    /// What it measures.
+    /// The points that the study measures.
     pub fn points(self, scale: &Scale) -> Vec<Point> {
         match self {
             Self::Reordering => reordering::points(scale),
@@ -57,7 +57,7 @@ impl Study {
         }
     }
 
-    /// What it says of the results, without provenance.
+    /// The report on the results, without provenance.
     ///
     /// # Panics
     /// If `results` lack one of the [points](Self::points) of this scale.

@@ -1,4 +1,4 @@
-//! What the reports of all studies are made of.
+//! Building blocks of the studies' reports.
 
 use super::super::report::number::human;
 use super::super::report::{
@@ -21,12 +21,12 @@ pub(super) fn cell(estimate: Estimate, unit: f64) -> Cell {
     Cell::interval(estimate.value, estimate.half_width)
 }
 
-/// Gigabytes.
+/// A number of bytes with its confidence interval, in gigabytes.
 pub(super) fn gigabytes(estimate: Estimate) -> Cell {
     cell(estimate, GIGA)
 }
 
-/// A point of a plot, in gigabytes.
+/// A point of a plot: bytes with their confidence interval, in gigabytes.
 pub(super) fn gigabyte_point(x: f64, estimate: Estimate) -> Point {
     let estimate = estimate.scaled(1.0 / GIGA);
     Point::with_half_width(x, estimate.value, estimate.half_width)
@@ -83,7 +83,7 @@ pub(super) fn series(name: impl Into<String>, points: Vec<Point>) -> Series {
     Series { name: name.into(), points }
 }
 
-/// What every study says of how it counts.
+/// The paragraph on counting that every report has in its introduction.
 pub(super) fn how_it_counts() -> String {
     "Raw bytes are what the chip asks of the photon map; bytes from DRAM are the lines that miss the cache, times a line's \
      bytes. Sampled tiles are rendered on an emulated chip whose caches are empty when a tile begins; each stands for \

@@ -18,7 +18,7 @@ use crate::photon_map::PhotonLayout;
 use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 
-/// Orders that a chip can gather in.
+/// Orders of the gathers that a chip can keep.
 const ORDERS: [GatherOrder; 5] = [
     GatherOrder::Naive,
     GatherOrder::Tiled,
@@ -29,15 +29,15 @@ const ORDERS: [GatherOrder; 5] = [
 const LAYOUTS: [PhotonLayout; 2] = [PhotonLayout::Jensen, PhotonLayout::Lines];
 /// Sides of tiles, pixels: the dissertation's, and what the reference chip has room for.
 const TILES: [u32; 3] = [16, 32, WIDEST_TILE];
-/// Raw bytes of the naive order, bytes of the practical ones and of the frame along a Hilbert curve (Graphics
-/// Interface 2005).
+/// Published bytes of a frame (Graphics Interface 2005): raw in the naive order, from DRAM in the practical orders, and
+/// from DRAM along a Hilbert curve.
 const PUBLISHED: [f64; 3] = [196e9, 24e9, 15e6];
 
 fn sizes(scale: &Scale) -> Vec<u32> {
     scale.pick(&[32, 64, 128, 256, 512], &[32, 128, 512])
 }
 
-/// Sets of 1, 4 and 32 lines, the last also with a hashed index.
+/// Photon caches of 1, 4 and 32 ways, the last also with hashed sets, by name.
 fn associativities() -> [(String, CacheSettings); 4] {
     let of = |ways, index| behind(CacheSpec { ways, index, ..CacheSpec::PHOTON });
     [
@@ -61,7 +61,7 @@ fn point(scale: &Scale, order: GatherOrder, layout: PhotonLayout, caches: CacheS
     scale.traffic_behind(CORNELL, settings, caches)
 }
 
-/// Sorted gathers in tiles of a side.
+/// A point of sorted gathers in tiles of `tile` x `tile` pixels.
 fn sorted(scale: &Scale, layout: PhotonLayout, tile: u32) -> Point {
     let settings = RenderSettings { photon_layout: layout, tile, ..scale.settings(GatherOrder::Sort) };
     scale.traffic(CORNELL, settings)
@@ -141,7 +141,7 @@ fn orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -
     })
 }
 
-/// Sorted gathers by the side of a tile: each tile reads about the whole map once.
+/// A table of sorted gathers by the side of a tile: each tile reads about the whole map once.
 fn by_tile<'a>(
     scale: &Scale,
     results: &Results,
@@ -213,7 +213,7 @@ fn plot_of_orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measur
     )
 }
 
-/// How many rays end in a gather, and what that means for the published figures.
+/// Paragraph on the share of the rays that end in a gather, which the published figures are to be scaled by.
 fn comparison<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> String {
     let naive = nominal(GatherOrder::Naive, PhotonLayout::Jensen);
     let gathers = naive.gathers().value;
@@ -269,7 +269,7 @@ fn published<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> 
     table
 }
 
-/// One row an order, one column a cache.
+/// A table with a row for each order and a column for each cache.
 fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, CacheSettings)]) -> Table {
     let mut heads = vec![Column::new("order", "")];
     heads.extend(caches.iter().map(|(name, _)| Column::new(name.as_str(), "GB")));
@@ -285,7 +285,7 @@ fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, C
     table
 }
 
-/// A line an order over some caches at these places.
+/// A line for each order over caches at their positions `x`.
 fn lines_by_caches(scale: &Scale, results: &Results, caches: &[(f64, CacheSettings)]) -> Vec<Series> {
     let line = |order: GatherOrder| {
         let points = caches.iter().map(|&(x, caches)| {

@@ -19,7 +19,7 @@ use crate::photon_map::PhotonLayout;
 use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 
-/// Settings with one thing left open.
+/// A line of a plot: its name, and settings of which a sweep varies one.
 type Line = (&'static str, fn(&Scale) -> RenderSettings);
 
 const NAIVE: Line = ("naive", |scale| scale.settings(GatherOrder::Naive));
@@ -31,9 +31,9 @@ const SORT_LINES: Line = ("sort, lines", |scale| RenderSettings {
 });
 const ALL_ON: Line = ("all techniques", Scale::all_on);
 
-/// Something that is changed, and what is measured with it.
+/// A setting that is varied, and the lines that are measured over its values.
 struct Sweep {
-    /// The name of its files.
+    /// Name of the sweep's files, without extension.
     name: &'static str,
     heading: &'static str,
     axis: &'static str,
@@ -74,7 +74,7 @@ const SWEEPS: [Sweep; 3] = [
     },
 ];
 
-/// Powers of two times `least`, up to `most`.
+/// `least` times the powers of two, up to `most`.
 fn powers(least: u32, most: u32) -> Vec<u32> {
     std::iter::successors(Some(least), |value| value.checked_mul(2))
         .take_while(|&value| value <= most)
@@ -140,7 +140,7 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     page("Scaling", introduction, sections)
 }
 
-/// Chips of the plot.
+/// Maximum number of chips in the plot.
 const MOST_CHIPS: usize = 64;
 
 fn chips(scale: &Scale, results: &Results) -> Vec<Block> {

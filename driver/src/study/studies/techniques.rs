@@ -1,4 +1,4 @@
-//! Each technique alone and all together: rays, traffic and error, at as many rays and at equal quality.
+//! Each technique alone and all together: rays, traffic and error, at equal numbers of rays and at equal quality.
 
 use super::super::laboratory::Results;
 use super::super::point::Point;
@@ -17,7 +17,7 @@ struct Technique {
     name: &'static str,
     order: GatherOrder,
     sampling: Sampling,
-    /// The error that the irradiance cache allows; `None` without it.
+    /// Error bound of the irradiance cache; `None` without the cache.
     irradiance_error: Option<f32>,
     radiance: Radiance,
     layout: PhotonLayout,
@@ -46,7 +46,7 @@ const ALL: Technique = Technique {
 };
 const ALL_IN_LINES: Technique =
     Technique { name: "all techniques, lines", layout: PhotonLayout::Lines, ..ALL };
-/// The irradiance cache needs square tiles: rows share few records.
+/// The combinations that are measured. The irradiance cache has square tiles: rows of pixels share few records.
 const TECHNIQUES: [Technique; 11] = [
     NAIVE,
     Technique { name: "sort", order: GatherOrder::Sort, ..NAIVE },
@@ -100,7 +100,8 @@ impl Technique {
         scale.traffic(scene, self.settings(scale, rays))
     }
 
-    /// Order and layout do not change pixels: techniques that differ in them alone share their errors.
+    /// The point of the technique's error. Order, layout and tiles do not change pixels: techniques that differ in them
+    /// alone share the point.
     fn quality(&self, scale: &Scale, scene: &'static str, rays: u32) -> Point {
         let settings = self.settings(scale, rays);
         let shared = scale.settings(GatherOrder::Sort);
@@ -113,12 +114,12 @@ impl Technique {
         scale.quality(scene, settings)
     }
 
-    /// Whether its pixels are not those of the naive render.
+    /// Returns whether the technique's pixels differ from those of the naive render.
     fn changes_pixels(&self) -> bool {
         self.irradiance_error.is_some() || self.sampling != NAIVE.sampling || self.radiance != NAIVE.radiance
     }
 
-    /// Gather rays that it is measured with, from few to many.
+    /// Numbers of gather rays that the technique is measured with, ascending.
     fn sweep(&self, scale: &Scale) -> Vec<u32> {
         if !self.changes_pixels() {
             return vec![scale.gather_rays];
@@ -144,22 +145,22 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
     points
 }
 
-/// What a technique takes at the error that is asked for.
+/// Rays and bytes that a technique takes to reach an error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum AtQuality {
-    /// It meets the error with these rays and bytes.
+    /// The error is reached with these rays and bytes.
     Met { rays: f64, bytes: f64 },
-    /// It meets it with the fewest rays that were tried: fewer may do.
+    /// The error is already reached with the fewest rays that were measured: fewer may do.
     AtMost { rays: f64, bytes: f64 },
-    /// It does not meet it with the most rays that were tried.
+    /// The error is not reached with the most rays that were measured.
     Missed { rays: f64, bytes: f64 },
 }
 
 /// A point of the curve of a technique: gather rays, RMSE, bytes from DRAM.
 type OnCurve = [f64; 3];
 
-/// Where a curve, in order of rays, first comes down to an error, between its points along a line through the
-/// logarithms.
+/// First crossing of an error by a curve in ascending order of rays, interpolated linearly in the logarithms; `None`
+/// for an empty curve.
 fn at_quality(curve: &[OnCurve], rmse: f64) -> Option<AtQuality> {
     let &[rays, first, bytes] = curve.first()?;
     if first <= rmse {

@@ -1,4 +1,4 @@
-//! Measured counts in the terms of the cost model.
+//! Measured counts as workloads of the cost model.
 
 use super::super::cost_model::{Cost, Machine, Symbols, Workload};
 use super::super::measure::{Measurement, TileMeasurement};
@@ -6,14 +6,15 @@ use crate::scheduler::GatherOrder;
 
 type Count<'a> = &'a dyn Fn(&TileMeasurement) -> f64;
 
-/// What one frame took, scaled to all tiles. Bytes on the host's link are the table's: they do not depend on the scene.
+/// Workload of one frame, estimated from its sample of tiles. Bytes on the host's link are the table's: they do not
+/// depend on the scene.
 pub(super) fn of_frame(measured: &Measurement, pixels: f64, symbols: &Symbols) -> Workload {
     let total = |count: Count| measured.total(count).value;
-    // Tiles of the table's size, so that rates of frames in tiles of any can be compared.
+    // Tiles of the table's size, so that tile rates of frames in tiles of any size can be compared.
     of(&total, pixels / symbols.tile_pixels, pixels, symbols)
 }
 
-/// What one tile took.
+/// Workload of one tile.
 fn of_tile(tile: &TileMeasurement, symbols: &Symbols) -> Workload {
     of(&|count: Count| count(tile), 1.0, symbols.tile_pixels, symbols)
 }
@@ -40,12 +41,13 @@ fn of(total: &dyn Fn(Count) -> f64, tiles: f64, pixels: f64, symbols: &Symbols) 
     }
 }
 
-/// The cost of a measured frame. A naive one evaluates the whole reflection for every photon, as the dissertation's does.
+/// Cost of a measured frame. In the naive order the whole reflection function is evaluated for every photon, as in the
+/// dissertation's naive frame.
 pub(super) fn cost(workload: &Workload, symbols: &Symbols, order: GatherOrder) -> Cost {
     if order == GatherOrder::Naive { Cost::naive(workload, symbols) } else { Cost::new(workload, symbols) }
 }
 
-/// Seconds that a chip takes for each tile: for its bytes from DRAM or its arithmetic, whichever takes longer.
+/// Seconds that a chip takes for each tile: `max(bytes from DRAM / bandwidth, FLOPs / FLOPS)`.
 pub(super) fn tile_seconds(measured: &Measurement, symbols: &Symbols, machine: &Machine) -> Vec<f64> {
     let seconds = |tile: &TileMeasurement| {
         let cost = Cost::new(&of_tile(tile, symbols), symbols).total();

@@ -1,30 +1,30 @@
-//! Axes: where a value lies, and which values are labelled.
+//! Axes: positions of values, and ticks with their labels.
 
 use super::super::number;
 
-/// Most intervals between the ticks of a linear axis, before its ends are made round.
+/// Maximum number of intervals between the ticks of a linear axis, before its ends are rounded outward.
 const INTERVALS: f64 = 10.0;
-/// Most tick labels of an axis.
+/// Maximum number of tick labels of an axis.
 const MOST_TICKS: usize = 12;
-/// A logarithmic axis over at most that many steps of 1-2-5 labels all of them, else whole decades.
+/// Maximum length, in steps of 1-2-5, of a logarithmic axis that ends at any step; a longer one ends at whole decades.
 const MOST_STEPS: i32 = 9;
-/// Values of a linear axis that are all nearer to zero than that are taken for zeros.
+/// Bound below which a linear axis takes its values for zeros, if the magnitudes of all are below it.
 const SMALLEST: f64 = 1e-290;
-/// Slack for logarithms that should be whole.
+/// Tolerance for rounding of logarithms that should be whole numbers.
 const WHOLE: f64 = 1e-9;
 
-/// Maps values to places from 0 to 1 along an axis.
+/// A mapping of values to positions from 0 to 1 along an axis.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     kind: Kind,
-    /// The ends in the axis' own measure: values, logarithms, or indices of categories.
+    /// The axis' ends in its own measure: values, logarithms, or indices of categories.
     low: f64,
     high: f64,
 }
 
 #[derive(Clone, Debug)]
 enum Kind {
-    /// Ticks at multiples of 1, 2 or 5 times that power of ten.
+    /// Linear, with ticks at multiples of `step`.
     Linear {
         step: Step,
     },
@@ -33,15 +33,15 @@ enum Kind {
     Categories(Vec<String>),
 }
 
-/// A labelled place.
+/// A labelled position.
 #[derive(Clone, Debug)]
 pub(super) struct Tick {
-    /// From 0 to 1 along the axis.
+    /// Position along the axis, 0 to 1.
     pub(super) place: f64,
     pub(super) label: String,
 }
 
-/// `digit * 10^exponent`, where the digit is 1, 2 or 5.
+/// The step `digit * 10^exponent` with the digit 1, 2 or 5, as `3 exponent` plus the digit's index.
 #[derive(Clone, Copy, Debug)]
 struct Step(i32);
 
@@ -115,7 +115,7 @@ impl Axis {
         Self { kind: Kind::Categories(names), low: -0.5, high }
     }
 
-    /// Where `value` lies, held between 0 and 1.
+    /// Position of `value` along the axis, clamped to 0 to 1.
     pub(super) fn place(&self, value: f64) -> f64 {
         let measure = match self.kind {
             Kind::Linear { .. } | Kind::Categories(_) => value,
@@ -125,7 +125,7 @@ impl Axis {
         self.place_of_measure(measure)
     }
 
-    /// Whether the axis has a place for `value`.
+    /// Returns whether `value` is not below the lower end of the axis.
     pub(super) fn holds(&self, value: f64) -> bool {
         match self.kind {
             Kind::Log2 => value > 0.0 && value.log2() > self.low - WHOLE,
@@ -134,7 +134,7 @@ impl Axis {
         }
     }
 
-    /// The power of ten that the labels leave out, other than 0 where they would need many zeros.
+    /// Exponent of the power of ten that the labels leave out: 0 unless they would need many zeros.
     pub(super) fn omitted_exponent(&self) -> i32 {
         let size = self.low.abs().max(self.high.abs());
         match self.kind {
@@ -143,7 +143,7 @@ impl Axis {
         }
     }
 
-    /// The ticks, in rising order, as dense as `fits` lets them be.
+    /// The ticks in ascending order, as dense as `fits` admits.
     pub(super) fn ticks(&self, fits: impl Fn(&[Tick]) -> bool) -> Vec<Tick> {
         if matches!(self.kind, Kind::Categories(_)) {
             return self.candidate(0);
@@ -158,7 +158,7 @@ impl Axis {
         ticks
     }
 
-    /// The ticks when `sparsity` denser choices did not fit.
+    /// The ticks after `sparsity` denser choices did not fit.
     fn candidate(&self, sparsity: i32) -> Vec<Tick> {
         match &self.kind {
             Kind::Linear { step } => self.linear_ticks(Step(step.0 + sparsity)),
@@ -203,7 +203,7 @@ impl Axis {
         exponents.filter(|exponent| exponent % every == 0).map(tick).collect()
     }
 
-    /// Every 1, 2 and 5 times a power of ten, unless those are too many.
+    /// Ticks at 1, 2 and 5 times each power of ten.
     fn steps(&self) -> Vec<Tick> {
         let mut step = Step::at_least(10_f64.powf(self.low));
         let is_plain = self.low >= -4.0 && self.high <= 6.0;

@@ -1,16 +1,16 @@
-//! What of the data can be drawn.
+//! Data that can be drawn, the points that cannot, and the axes over them.
 
 use super::axis::Axis;
 use super::content::{Panel, Point, XScale, YScale};
 
-/// Values beyond that, in either direction, have no place on an axis.
+/// Maximum magnitude of a value that is drawn.
 const LARGEST: f64 = 1e300;
-/// Positive values below that count as zero on a logarithmic axis.
+/// Minimum of the values that are drawn on a logarithmic axis.
 const SMALLEST: f64 = 1e-300;
-/// An error bar extends a logarithmic axis downward to no less than that share of its value.
+/// Share of a value below which its error bar does not extend a logarithmic axis.
 const BAR_SHARE: f64 = 0.1;
 
-/// The points of one series that can be drawn, in stretches that a line joins.
+/// The points of one series that can be drawn, in runs that a line joins.
 pub(super) struct Drawable<'a> {
     pub(super) name: &'a str,
     pub(super) runs: Vec<Vec<Mark>>,
@@ -23,7 +23,7 @@ pub(super) struct Mark {
     pub(super) bar: Option<[f64; 2]>,
 }
 
-/// Why a point is not drawn.
+/// Reason that a point is not drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Reason {
     NotFinite,
@@ -38,8 +38,7 @@ pub(super) struct LeftOut<'a> {
     pub(super) count: usize,
 }
 
-/// Sorts the points of a panel into those that are drawn and those that are not. A point that is not drawn
-/// interrupts its line.
+/// Separates the points of a panel that can be drawn from the ones that cannot, which interrupt their lines.
 pub(super) fn clean(panel: &Panel) -> (Vec<Drawable<'_>>, Vec<LeftOut<'_>>) {
     let mut left_out: Vec<LeftOut> = Vec::new();
     let mut drawable = Vec::new();
@@ -110,7 +109,7 @@ pub(super) fn x_axis(panel: &Panel, drawable: &[Drawable]) -> Axis {
     }
 }
 
-/// The vertical axis of a panel of that scale over all of the series.
+/// The vertical axis of a scale over all of the series, error bars included.
 pub(super) fn y_axis<'a>(scale: YScale, drawable: impl Iterator<Item = &'a Drawable<'a>>) -> Axis {
     let marks = drawable.flat_map(|series| series.runs.iter().flatten());
     let values = |mark: &Mark| {

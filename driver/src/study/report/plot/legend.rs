@@ -4,16 +4,16 @@ use super::style::Style;
 use super::svg::{self, Anchor};
 use super::text;
 
-/// Width of the sample of a line, and of the gap between it and the name, in pixels.
+/// Width of the sample of a line, and of the gap between sample and name, in pixels.
 const SAMPLE: f64 = 46.0;
 const GAP: f64 = 8.0;
 /// The space between columns, and above and below the legend, in pixels.
 const COLUMN_GAP: f64 = 22.0;
 const PADDING: f64 = 8.0;
-/// The least distance of rows, in pixels.
+/// Minimum distance of rows, in pixels.
 const ROW: f64 = 20.0;
 
-/// Samples and names in columns of one width.
+/// The legend, laid out: samples and names in columns of equal width.
 pub(super) struct Legend {
     /// Index and wrapped name of each series with a name.
     entries: Vec<(usize, Vec<String>)>,
@@ -22,7 +22,7 @@ pub(super) struct Legend {
 }
 
 impl Legend {
-    /// Lays the named among the series out within `room` pixels.
+    /// Lays out the series that have names within a width of `room` pixels.
     pub(super) fn new(names: &[&str], room: f64) -> Self {
         let name_room = room - SAMPLE - GAP;
         let entries: Vec<_> = names
@@ -38,13 +38,13 @@ impl Legend {
         Self { entries, columns, column_width }
     }
 
-    /// In pixels.
+    /// Height of the legend, in pixels.
     pub(super) fn height(&self) -> f64 {
         let padding = if self.entries.is_empty() { 0.0 } else { 2.0 * PADDING };
         self.rows().map(row_height).sum::<f64>() + padding
     }
 
-    /// The legend with its upper left corner there.
+    /// SVG of the legend with its upper left corner at `[left, top]`.
     pub(super) fn draw(&self, [left, top]: [f64; 2]) -> String {
         let mut drawn = String::new();
         let mut row_top = top + PADDING;

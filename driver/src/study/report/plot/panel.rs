@@ -9,24 +9,24 @@ use super::text::{self, LABEL, TICK};
 
 /// The height of a plotting area, in pixels.
 const AREA_HEIGHT: f64 = 290.0;
-/// Space between the frame and the first and last place, so that markers lie inside, in pixels.
+/// Space between the frame and the ends of an axis, so that markers lie inside, in pixels.
 const INSET: f64 = 12.0;
-/// Length of a tick, space between the parts around the frame, least space between tick labels, in pixels.
+/// Length of a tick, space between the parts around the frame, minimum space between tick labels, in pixels.
 const TICK_LENGTH: f64 = 5.0;
 const GAP: f64 = 6.0;
 const LABEL_GAP: f64 = 8.0;
-/// The most room for the name of a category that is written slantwise, in pixels.
+/// Maximum length of the name of a category that is written slantwise, in pixels.
 const SLANTED_ROOM: f64 = 220.0;
-/// The least distance of categories whose names are written slantwise, in pixels.
+/// Minimum distance of categories whose names are written slantwise, in pixels.
 const SLANTED_PITCH: f64 = 24.0;
 /// Half the width of an error bar's cap, in pixels.
 const CAP: f64 = 3.5;
 
-/// A panel laid out.
+/// A panel, laid out.
 pub(super) struct Drawing<'a> {
     panel: &'a Panel,
     data: Vec<Drawable<'a>>,
-    /// Of each of the series in `data`.
+    /// Style of each series in `data`.
     styles: Vec<Style>,
     x: Axis,
     y: Axis,
@@ -43,8 +43,8 @@ pub(super) struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    /// Lays a panel out over a plotting area that is `area` pixels wide, or wider if its categories ask for it.
-    /// `names` are the series of the legend.
+    /// Lays out a panel with a plotting area that is `area` pixels wide, or wider if its categories need it.
+    /// `names` are the names of all series of the plot, which select their styles.
     pub(super) fn new(panel: &'a Panel, data: Vec<Drawable<'a>>, y: Axis, names: &[&str], area: f64) -> Self {
         let area = match &panel.x.scale {
             XScale::Categories(names) => area.max(SLANTED_PITCH * names.len() as f64),
@@ -84,7 +84,7 @@ impl<'a> Drawing<'a> {
         drawing
     }
 
-    /// The panel's whole width in pixels.
+    /// Width of the whole panel, in pixels.
     pub(super) fn width(&self) -> f64 {
         self.left + self.area + self.right
     }
@@ -99,7 +99,7 @@ impl<'a> Drawing<'a> {
         AREA_HEIGHT + self.x_tick_room() + text::height(self.x_label.len(), LABEL) + GAP
     }
 
-    /// The panel, its left side there and the top of its plotting area there.
+    /// SVG of the panel, with its left side at `left` and the top of its plotting area at `top`.
     pub(super) fn draw(&self, [left, top]: [f64; 2]) -> String {
         let frame = Frame {
             left: left + self.left,
@@ -128,7 +128,7 @@ impl<'a> Drawing<'a> {
         drawn + "</g>\n"
     }
 
-    /// The room left and right of the plotting area.
+    /// The room left and right of the plotting area, in pixels.
     fn side_room(&self) -> [f64; 2] {
         let widest = self.y_ticks.iter().map(|tick| text::width(&tick.label, TICK)).fold(0.0, f64::max);
         let labels = text::height(self.y_label.len(), LABEL) + GAP + widest + GAP + TICK_LENGTH;
@@ -148,7 +148,7 @@ impl<'a> Drawing<'a> {
         [left, right]
     }
 
-    /// The height of the horizontal axis' ticks and their labels.
+    /// The height of the horizontal axis' ticks and their labels, in pixels.
     fn x_tick_room(&self) -> f64 {
         let widest = self.x_ticks.iter().map(|tick| text::width(&tick.label, TICK)).fold(0.0, f64::max);
         let labels = if self.is_slanted { 0.71 * (widest + TICK) } else { text::height(1, TICK) };
@@ -207,7 +207,7 @@ impl<'a> Drawing<'a> {
 
     fn draw_series(&self, frame: &Frame, series: &Drawable, style: &Style) -> String {
         let place = |mark: &Mark| [frame.x(self.x.place(mark.x)), frame.y(self.y.place(mark.y))];
-        // Names have no order that a slope could tell, so the line between them is only a guide.
+        // Categories have no order, so the slope of a line means nothing: the line is thin, a guide for the eye.
         let width = if matches!(self.panel.x.scale, XScale::Categories(_)) { 1.0 } else { 1.75 };
         let mut drawn = "<g class=\"series\">\n".to_owned();
         for run in &series.runs {
@@ -256,7 +256,7 @@ impl Frame {
     }
 }
 
-/// Whether labels centred at ticks along `length` pixels keep apart.
+/// Returns whether labels that are centred at ticks along `length` pixels keep apart.
 fn fit_side_by_side(ticks: &[Tick], length: f64) -> bool {
     let is_apart = |pair: &[Tick]| {
         let half_widths = 0.5 * (text::width(&pair[0].label, TICK) + text::width(&pair[1].label, TICK));
@@ -265,7 +265,7 @@ fn fit_side_by_side(ticks: &[Tick], length: f64) -> bool {
     ticks.windows(2).all(is_apart)
 }
 
-/// Whether labels at ticks along `length` pixels upward keep apart.
+/// Returns whether labels at ticks along `length` pixels upward keep apart.
 fn fit_above_each_other(ticks: &[Tick], length: f64) -> bool {
     let line = text::height(1, TICK);
     ticks.windows(2).all(|pair| (pair[1].place - pair[0].place) * length >= line)

@@ -1,4 +1,4 @@
-//! How series are told apart: by dashes and markers in black and white, and by colours too.
+//! Styles of series: dashes and markers, which differ in black and white too, and colours.
 
 use std::fmt::Write;
 
@@ -7,10 +7,10 @@ use super::svg::px;
 /// Half the extent of a marker, in pixels.
 pub(super) const MARKER: f64 = 4.5;
 
-/// Dashes and gaps, in pixels.
+/// Lengths of dashes and gaps, in pixels: SVG's `stroke-dasharray`; empty for a solid line.
 const DASHES: [&str; 7] = ["", "8 4", "2 3", "10 3 2 3", "16 4", "5 2", "10 3 2 3 2 3"];
 
-/// Shapes, and whether they are filled.
+/// Shapes of markers; true if filled.
 const MARKERS: [(Shape, bool); 12] = [
     (Shape::Circle, true),
     (Shape::Square, false),
@@ -45,7 +45,7 @@ enum Shape {
     Star,
 }
 
-/// The look of one series. Dash and marker together are unique among the first 84, the marker among the first 12.
+/// Style of one series. Dash and marker together are unique among the first 84 series, the marker among the first 12.
 #[derive(Clone, Copy)]
 pub(super) struct Style {
     dash: &'static str,
@@ -55,7 +55,7 @@ pub(super) struct Style {
 }
 
 impl Style {
-    /// The look of the series of that index.
+    /// The style of the series of an index.
     pub(super) fn of(index: usize) -> Self {
         let (shape, is_filled) = MARKERS[index % MARKERS.len()];
         Self { dash: DASHES[index % DASHES.len()], shape, is_filled, colour: COLOURS[index % COLOURS.len()] }

@@ -8,7 +8,7 @@ use super::text;
 pub(super) const FRAME: &str = "#777777";
 pub(super) const GRID: &str = "#dddddd";
 
-/// Which part of a text its position is.
+/// Part of a text that lies at its position: SVG's `text-anchor`.
 #[derive(Clone, Copy)]
 pub(super) enum Anchor {
     Start,
@@ -16,7 +16,7 @@ pub(super) enum Anchor {
     End,
 }
 
-/// A line of text: what, where its base line is, and how.
+/// A line of text, at the position of its base line.
 pub(super) struct Text<'a> {
     pub(super) class: &'a str,
     pub(super) text: &'a str,
@@ -24,7 +24,7 @@ pub(super) struct Text<'a> {
     pub(super) y: f64,
     pub(super) size: f64,
     pub(super) anchor: Anchor,
-    /// Degrees, clockwise, about the position.
+    /// Rotation about the position, degrees clockwise.
     pub(super) turn: f64,
     pub(super) is_bold: bool,
 }
@@ -35,7 +35,7 @@ impl<'a> Text<'a> {
         Self { class, text, x, y, size, anchor, turn: 0.0, is_bold: false }
     }
 
-    /// The element.
+    /// The SVG element.
     pub(super) fn draw(&self) -> String {
         let anchor = match self.anchor {
             Anchor::Start => "start",
@@ -77,7 +77,7 @@ pub(super) fn segment(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], colou
     )
 }
 
-/// A coordinate in hundredths of a pixel.
+/// A coordinate, rounded to hundredths of a pixel.
 pub(super) fn px(value: f64) -> String {
     number::full((value * 100.0).round() / 100.0 + 0.0)
 }

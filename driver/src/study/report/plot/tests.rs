@@ -30,7 +30,7 @@ fn names(names: &[&str]) -> XScale {
 
 const ORDERS: [&str; 6] = ["naive", "tiled", "dirbin", "hash", "sort", "hilbert"];
 
-/// Data that reports meet, and data that they should not.
+/// Common, degenerate and invalid data.
 fn nasty_points() -> Vec<Vec<(f64, f64)>> {
     let (nan, infinity) = (f64::NAN, f64::INFINITY);
     vec![
@@ -89,7 +89,7 @@ fn view_box(svg: &[Element]) -> [f64; 2] {
     [numbers[2], numbers[3]]
 }
 
-/// Left, top, right and bottom of a text, by the same bound of its width that it was laid out with.
+/// Left, top, right and bottom of a text, by the upper bound of its width that it is laid out with.
 fn text_box(element: &Element) -> [f64; 4] {
     let [x, y, size] = ["x", "y", "font-size"].map(|name| element.number(name).unwrap());
     let width = text::width(&element.text.trim_end_matches('\n').replace('\n', " "), size);
@@ -123,7 +123,7 @@ fn text_box(element: &Element) -> [f64; 4] {
     bounds
 }
 
-/// The points of an element, as far as they are stated.
+/// The points of an element that its attributes state.
 fn coordinates(element: &Element) -> Vec<[f64; 2]> {
     let number = |name: &str| element.number(name).unwrap();
     match element.tag.as_str() {
@@ -174,7 +174,7 @@ fn of_class<'a>(svg: &'a [Element], class: &str) -> Vec<&'a Element> {
     svg.iter().filter(|element| element.get("class") == Some(class)).collect()
 }
 
-/// Distance of two parallel lines of text across their direction, or of their boxes along it.
+/// Returns whether two parallel lines of text do not overlap: across their direction, or by their boxes.
 fn are_apart(a: &Element, b: &Element) -> bool {
     let (p, q) = (text_box(a), text_box(b));
     if a.get("transform").is_some() {
@@ -226,7 +226,7 @@ fn twelve() -> Plot {
     plot(vec![panel(XScale::Log2, YScale::LinearFromZero, series)])
 }
 
-/// The look of a marker apart from its place and colour.
+/// The shape of a marker, relative to its first point, and whether it is hollow.
 fn shape(marker: &Element) -> (Vec<[i32; 2]>, bool) {
     let points = coordinates(marker);
     let first = points[0];

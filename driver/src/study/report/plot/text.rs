@@ -1,14 +1,14 @@
-//! The room that text takes. Plots are drawn without a font at hand, so widths are those of the widest common fonts.
+//! Size of text. Plots are drawn without a font at hand, so widths are those of the widest common fonts.
 
-/// Size of the text of titles, of labels and of tick labels, in pixels.
+/// Font sizes of titles, of labels and of tick labels, in pixels.
 pub(super) const TITLE: f64 = 16.0;
 pub(super) const LABEL: f64 = 13.0;
 pub(super) const TICK: f64 = 12.0;
 
-/// The width of bold text over that of other text, at most.
+/// Upper bound of the width of bold text over the width of regular text.
 pub(super) const BOLD: f64 = 1.12;
 
-/// Distance of two lines of text over the text's size.
+/// Distance of two lines of text over the font size.
 const LEADING: f64 = 1.3;
 
 /// An upper bound of the width of `text` at `size`, in pixels.
@@ -21,7 +21,7 @@ pub(super) fn height(lines: usize, size: f64) -> f64 {
     lines as f64 * size * LEADING
 }
 
-/// `text` in lines of at most `room` pixels each, broken at spaces, and inside words that are longer than a line.
+/// `text` in lines of at most `room` pixels, broken at spaces, and within words that are longer than a line.
 pub(super) fn wrap(text: &str, size: f64, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -36,7 +36,7 @@ pub(super) fn wrap(text: &str, size: f64, room: f64) -> Vec<String> {
     lines
 }
 
-/// `text`, or as much of its start as fits into `room` pixels with an ellipsis.
+/// `text`, or its longest prefix that fits into `room` pixels with an ellipsis.
 pub(super) fn shorten(text: &str, size: f64, room: f64) -> String {
     if width(text, size) <= room {
         return text.to_owned();
@@ -67,7 +67,7 @@ fn break_word(word: &str, size: f64, room: f64) -> Vec<String> {
     pieces
 }
 
-/// The width of a character over the size of the text; that of `DejaVu Sans`, rounded up.
+/// Width of a character over the font size, in `DejaVu Sans`, rounded up.
 fn advance(character: char) -> f64 {
     match character {
         ' ' | '.' | ',' | ':' | ';' | '\'' | '|' | 'i' | 'j' | 'l' | 'I' => 0.36,
