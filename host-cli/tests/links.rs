@@ -136,9 +136,20 @@ fn cards_that_are_not_there() {
         ("serial:/dev/null@9600", ["serial:/dev/null", "names a serial port"]),
         ("serial:file", ["serial:file", "names a serial port"]),
     ] {
-        let words = [words[0], words[1], card.split('@').next().unwrap(), "card 1", "help:"];
-        let options = ["-o", "a.exr", "--stats", "a.json", "--card", "emulated:1", "--card", card];
+        let name = card.split('@').next().unwrap();
+        let words = [words[0], words[1], name, "card 0", "help:"];
+        let options = ["-o", "a.exr", "--stats", "a.json", "--card", card];
         check_failed(&room, &room.render(&cornell, &options), &words, &["file"]);
+        // Beside another it is a card that is lost.
+        let options = [&options[..], &["--card", "emulated:1"]].concat();
+        let outcome = room.render(&cornell, &options);
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        let told: Vec<_> = outcome.stderr.lines().filter(|line| line.contains("is lost")).collect();
+        assert!(
+            told.len() == 1 && [words[0], name, "card 0"].iter().all(|word| told[0].contains(word)),
+            "{told:?}"
+        );
+        ["a.exr", "a.json"].iter().for_each(|name| std::fs::remove_file(room.path(name)).unwrap());
     }
 }
 

@@ -190,7 +190,6 @@ fn a_card_that_freezes_leaves_its_tiles_to_the_other() {
     frozen.signal("-CONT");
     let said = String::from_utf8(outcome.stderr).unwrap();
     assert_eq!(outcome.status.code(), Some(0), "{said}");
-    assert!(said.contains("has not answered for 10 s"), "{said}");
     assert!(room.read("a.exr") == expected);
 }
 
