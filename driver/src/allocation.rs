@@ -11,6 +11,20 @@ pub(crate) struct OutOfMemory {
     pub(crate) bytes: u64,
 }
 
+impl OutOfMemory {
+    /// A list of so many elements that cannot grow to twice as many.
+    pub(crate) fn doubling<T>(elements: usize) -> Self {
+        Self { bytes: 2 * (elements * size_of::<T>()) as u64 }
+    }
+}
+
+/// Appends to a list if there is memory for it.
+pub(crate) fn push<T>(list: &mut Vec<T>, element: T) -> Result<(), OutOfMemory> {
+    list.try_reserve(1).map_err(|_| OutOfMemory::doubling::<T>(list.len()))?;
+    list.push(element);
+    Ok(())
+}
+
 /// What to do about it.
 pub(crate) const REMEDY: &str =
     "close other programs, raise the process's limit (`ulimit -v`), or use a machine with more memory";

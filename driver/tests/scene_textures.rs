@@ -9,7 +9,7 @@ use std::path::Path;
 use miette::Diagnostic;
 use photoncard_driver::error::SceneError;
 use photoncard_driver::scene::{Encoding, Scene, Wrap, gltf};
-use scene_support::{Extended, push};
+use scene_support::{Extended, glb, push};
 use serde_json::{Value, json};
 
 /// One texel: (255, 128, 0, 51).
@@ -250,7 +250,13 @@ fn sizes_are_refused_by_the_header() {
     push(&mut two.json, "images", json!({"bufferView": view}));
     push(&mut two.json, "textures", json!({"source": 1}));
     two.json["materials"][0]["emissiveTexture"] = json!({"index": 1});
-    check(&two.load().unwrap_err(), &["images[1]", "268435457 texels"]);
+    let words = ["images and materials take 1073741888 bytes", "the card has 536870912"];
+    check(&two.load().unwrap_err(), &words);
+    // A card of the greatest memory has room for them.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.glb");
+    fs::write(&path, glb(two.json, &two.bytes)).unwrap();
+    check(&gltf::load_for(&path, u32::MAX).unwrap_err(), &["images[1]", "268435457 texels"]);
     for (size, part) in [
         ([1, 100_000], "1 x 100000 texels, more than 16384"),
         ([16_385, 1], "16385 x 1"),

@@ -86,8 +86,8 @@ impl Target for Pictures {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // Deflate makes a byte at most 1032: of halves of three channels, which are read as floats twice that.
-        bound(input, 4096)
+        // Deflate makes a byte at most 1100: of halves of three channels, which are read as floats twice that, and three blocks.
+        bound(input, 8192)
     }
 
     fn input(&self, random: &mut Random) -> Vec<u8> {

@@ -68,8 +68,8 @@ impl Target for Textures {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // Deflate makes a byte at most 1032, of eight texels each if they are of one bit, and a texel four bytes.
-        bound(input, 1032 * 8 * 5)
+        // Deflate makes a byte at most 1032, of eight texels each if they are of one bit, and 16 bytes are asked for to decode one.
+        bound(input, 1032 * 8 * 17)
     }
 
     fn input(&self, random: &mut Random) -> Vec<u8> {

@@ -79,6 +79,7 @@ fn use_scene(mut scene: Scene, number: u64) {
         height: 4,
         photons: 200,
         neighbors: 10,
+        caustic_photons: Some(50),
         gather_rays: 2,
         shadow_rays: 1,
         samples: 1,

@@ -14,7 +14,7 @@ use super::room::Room;
 use super::skin::Skin;
 use super::transform::Transform;
 use super::vertex::{NotFinite, VertexReader};
-use crate::allocation::OutOfMemory;
+use crate::allocation;
 use crate::error::SceneError;
 use crate::scene::{Scene, Triangle};
 
@@ -84,28 +84,22 @@ impl<'a> MeshPlacer<'a> {
         Ok(())
     }
 
-    /// Checks that a card has room for all that was counted, and makes room for it here.
-    pub(super) fn reserve(&self, scene: &mut Scene, room: &mut Room) -> Result<(), SceneError> {
-        let file = &self.source.document.path;
-        let (mut triangles, mut with_attributes) = (0, 0);
-        for (primitive, times) in self.placed() {
-            let count = primitive.triangles * times;
-            triangles += count;
-            with_attributes += if primitive.may_have_attributes() { count } else { 0 };
-        }
+    /// Checks that a card has room for all that was counted.
+    pub(super) fn check_room(&self, room: &mut Room) -> Result<(), SceneError> {
+        let triangles = self.placed().map(|(primitive, times)| primitive.triangles * times).sum();
         // Where corners meet is looked for only if it matters.
-        if !room.fits_any(triangles) {
-            let mut bytes = 0_u64;
-            for (primitive, times) in self.placed() {
-                let once = primitive.bytes_of_a_card();
-                let once = once.map_err(|error| SceneError::memory(file, "counting its corners", error))?;
-                bytes = bytes.saturating_add(once.saturating_mul(times));
-            }
-            room.triangles(triangles, bytes)?;
+        if room.fits_any(triangles) {
+            return Ok(());
         }
-        reserve(&mut scene.triangles, triangles)
-            .and_then(|()| reserve(&mut scene.attributes, with_attributes))
-            .map_err(|error| SceneError::memory(file, "placing its triangles", error))
+        let mut bytes = 0_u64;
+        for (primitive, times) in self.placed() {
+            let once = primitive.bytes_of_a_card();
+            let once = once.map_err(|error| {
+                SceneError::memory(&self.source.document.path, "counting its corners", error)
+            })?;
+            bytes = bytes.saturating_add(once.saturating_mul(times));
+        }
+        room.triangles(triangles, bytes)
     }
 
     /// The primitives that were counted, and how often each is placed.
@@ -169,6 +163,8 @@ impl<'a> MeshPlacer<'a> {
         scene: &mut Scene,
     ) -> Result<(), SceneError> {
         let reader = VertexReader { source: self.source, mesh, primitive, not_finite: NotFinite::default() };
+        let source = self.source;
+        let no_memory = |error| SceneError::memory(&source.document.path, "placing its triangles", error);
         for triangle in 0..primitive.triangles {
             let mut corners = reader.indices(triangle)?;
             let [a, b, c] = corners;
@@ -187,9 +183,9 @@ impl<'a> MeshPlacer<'a> {
             if placed.area() > 0.0 {
                 if let Some(attributes) = reader.attributes(corners, &transforms, &placed)? {
                     placed.attributes = scene.attributes.len() as u32;
-                    scene.attributes.push(attributes);
+                    allocation::push(&mut scene.attributes, attributes).map_err(no_memory)?;
                 }
-                scene.triangles.push(placed);
+                allocation::push(&mut scene.triangles, placed).map_err(no_memory)?;
             } else {
                 scene.skipped_triangles += 1;
             }
@@ -199,9 +195,4 @@ impl<'a> MeshPlacer<'a> {
         self.not_finite.colours.extend(colours.get().then_some(mesh));
         Ok(())
     }
-}
-
-fn reserve<T>(list: &mut Vec<T>, count: u64) -> Result<(), OutOfMemory> {
-    let refused = OutOfMemory { bytes: count.saturating_mul(size_of::<T>() as u64) };
-    list.try_reserve_exact(usize::try_from(count).map_err(|_| refused)?).map_err(|_| refused)
 }

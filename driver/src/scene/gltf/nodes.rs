@@ -43,7 +43,7 @@ pub(super) fn place(
         worlds,
     };
     nodes.iter().try_for_each(|(index, _)| placer.count(*index, scene))?;
-    placer.meshes.reserve(scene, room)?;
+    placer.meshes.check_room(room)?;
     nodes.into_iter().try_for_each(|(index, world)| placer.place(index, world, scene, notices))?;
     notices.not_finite = placer.meshes.not_finite;
     Ok(())
