@@ -14,6 +14,7 @@
 //!
 //! The file is locked by the render that writes it. What is there under its name and is no such file is refused, and stays as it is.
 
+mod error;
 mod file;
 mod records;
 #[cfg(test)]
@@ -28,13 +29,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use photoncard_shared::message::Tile;
 use serde_json::{Map, Value};
 
+pub use self::error::PartialError;
+use self::error::VERSION;
 use self::file::{FAMILY, Title, read_title};
 use self::records::{HEAD_BYTES, read_tiles, record};
 use crate::film::Film;
 use crate::sink::{FinishedTile, TileSink};
 
-/// The version of the file's format, in its first line.
-const VERSION: u32 = 2;
 /// Bytes of the settings at the most.
 const MAX_SETTINGS: u64 = 1 << 20;
 
@@ -45,62 +46,6 @@ pub struct PartialSettings {
     pub path: PathBuf,
     /// Whether to go on with what it holds.
     pub resume: bool,
-}
-
-/// Why a partial render cannot be gone on with, or kept.
-#[derive(Debug, thiserror::Error, miette::Diagnostic)]
-pub enum PartialError {
-    /// The file is none of this program.
-    #[error("{} is no partial render of this program, and is left as it is", path.display())]
-    #[diagnostic(help("finished tiles are kept under that name: move it away, or choose another output"))]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Something that is not a file of its own is in the way.
-    #[error("cannot keep finished tiles in {}: a {kind} has that name", path.display())]
-    #[diagnostic(help("move it away, or choose another output"))]
-    NotAFile {
-        /// The file.
-        path: PathBuf,
-        /// What is there.
-        kind: &'static str,
-    },
-    /// It is of another version of the program.
-    #[error("{} is a partial render of version {found}, and this program goes on with version {VERSION}", path.display())]
-    #[diagnostic(help("go on with the program that began it, or render without --resume to begin anew"))]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// The version of its format.
-        found: u32,
-    },
-    /// It is of another picture.
-    #[error("{} is of another picture: {}", path.display(), differences.join("; "))]
-    #[diagnostic(help("render with the same settings, or without --resume to begin anew"))]
-    Differs {
-        /// The file.
-        path: PathBuf,
-        /// What differs.
-        differences: Vec<String>,
-    },
-    /// Another render writes it.
-    #[error("another render is writing {}", path.display())]
-    #[diagnostic(help("wait until it is done, or choose another output"))]
-    Busy {
-        /// The file.
-        path: PathBuf,
-    },
-    /// It cannot be read or written.
-    #[error("cannot keep finished tiles in {}: {source}", path.display())]
-    #[diagnostic(help("check the folder's permissions and the free space"))]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What happened.
-        #[source]
-        source: io::Error,
-    },
 }
 
 /// The file of a render's finished tiles. It is made when there is one.

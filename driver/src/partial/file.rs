@@ -5,7 +5,7 @@ use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
 
-use super::PartialError;
+use super::error::PartialError;
 use crate::output::kind_of;
 
 /// What the first line of any version begins with; the version's number follows.

@@ -5,6 +5,9 @@ use std::time::Duration;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::Tile;
 
+/// A card, by its place among those of a render.
+pub type CardNumber = usize;
+
 /// Whether a card can have tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {

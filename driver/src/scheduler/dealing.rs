@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::card::Standing;
+use super::card::{CardNumber, Standing};
 use super::entry::{Copy, Entry};
-use super::{CRASHES_APART, CardNumber, Scheduler};
+use super::{CRASHES_APART, Scheduler};
 use crate::session::Assignment;
 
 /// How long a tile is left to a card, in mean times of tiles, before an idle one takes it as well.

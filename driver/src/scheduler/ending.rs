@@ -43,10 +43,12 @@ impl Scheduler {
         Some(SchedulerError::Disagreement { tile: entry.tile, sources })
     }
 
-    /// Whether any card is at work, or can have a tile.
+    /// Returns whether a tile is on its way to the sinks, any card is at work, or can have a tile.
     fn can_go_on(&self) -> bool {
         let is_at_work = || self.cards.iter().any(|card| !card.tiles.is_empty());
-        if self.is_complete() || !self.waiting.is_empty() || is_at_work() {
+        // Another thread has a tile that is found: not done yet, and nobody's to render.
+        let is_found = || self.entries.iter().any(|entry| matches!(entry.progress, Progress::Found(_)));
+        if self.is_complete() || !self.waiting.is_empty() || is_at_work() || is_found() {
             return true;
         }
         let can_compare = || {

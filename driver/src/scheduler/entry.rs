@@ -5,7 +5,8 @@ use std::time::Duration;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::Tile;
 
-use super::{CardNumber, Source};
+use super::card::CardNumber;
+use super::error::Source;
 use crate::sink::FinishedTile;
 
 /// How far a tile is.

@@ -4,7 +4,7 @@ use std::fmt;
 
 use photoncard_shared::message::Tile;
 
-use super::CardNumber;
+use super::card::CardNumber;
 
 /// Who has rendered a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -21,7 +21,7 @@ mod error;
 mod tests;
 mod tiles;
 
-pub use self::card::Standing;
+pub use self::card::{CardNumber, Standing};
 pub(crate) use self::error::rectangles;
 pub use self::error::{SchedulerError, Source};
 pub use self::tiles::{GatherOrder, tiles};
@@ -37,9 +37,6 @@ use self::card::{Card, TileTimes};
 use self::entry::{Answer, Entry, Judgement, Progress};
 use crate::film::Film;
 use crate::sink::FinishedTile;
-
-/// A card, by its place among those of a render.
-pub type CardNumber = usize;
 
 /// Crashes after which a tile is set apart.
 const CRASHES_APART: usize = 2;

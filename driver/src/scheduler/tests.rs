@@ -52,6 +52,20 @@ fn an_idle_card_takes_what_is_at_another_for_too_long_and_the_first_answer_count
 }
 
 #[test]
+fn a_render_goes_on_while_its_last_tile_is_on_its_way_to_the_sinks() {
+    let mut scheduler = scheduler(1, 2);
+    for card in 0..2 {
+        scheduler.set_standing(card, Standing::Living);
+    }
+    assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));
+    assert!(scheduler.answer(0, finished(0, 0), SECOND).found.is_some());
+    // The other card's thread looks before the sinks have the tile.
+    scheduler.check(SECOND).unwrap();
+    scheduler.complete(0);
+    scheduler.check(SECOND).unwrap();
+}
+
+#[test]
 fn without_helpers_no_tile_is_rendered_twice() {
     let mut scheduler = scheduler(1, 2);
     assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));

@@ -6,9 +6,10 @@ use std::ops::Range;
 use photoncard_driver::scheduler::{CardNumber, SchedulerError, Source};
 use photoncard_firmware::sampler::hash;
 
+use crate::conditions::Run;
 use crate::liar::Lie;
 use crate::line::{Faults, Random};
-use crate::run::{End, Outcome, Run};
+use crate::run::{End, Outcome};
 use crate::world::Fixture;
 use crate::{seeds, with_room_for_a_card};
 

@@ -4,6 +4,7 @@
 //! A seed that fails is run again alone by `PHOTONCARD_SEEDS=SEED cargo test -p photoncard-driver --test simulation`, many
 //! by `PHOTONCARD_SEEDS=1..10000`.
 
+mod conditions;
 mod liar;
 mod lies;
 mod line;
@@ -21,8 +22,9 @@ use photoncard_driver::scheduler::SchedulerError;
 use photoncard_driver::session::{LinkBytes, Session};
 use photoncard_firmware::sampler::hash;
 
+use self::conditions::Run;
 use self::line::{Faults, Random};
-use self::run::{End, MAX_STEPS, Run};
+use self::run::{End, MAX_STEPS};
 use self::station::Station;
 use self::world::Fixture;
 

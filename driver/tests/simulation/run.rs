@@ -12,32 +12,12 @@ use photoncard_firmware::sampler::hash;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::Tile;
 
-use crate::liar::Lie;
-use crate::line::{Faults, Random};
+use crate::conditions::Run;
+use crate::line::Random;
 use crate::station::{Health, Station};
-use crate::world::Fixture;
 
 /// Steps of a run after which it is taken for stuck.
 pub(crate) const MAX_STEPS: u64 = 20_000_000;
-
-/// A run.
-#[derive(Clone)]
-pub(crate) struct Run<'a> {
-    pub(crate) fixture: &'a Fixture,
-    pub(crate) faults: Faults,
-    pub(crate) cards: usize,
-    /// Cards, the first ones, that never do anything.
-    pub(crate) stopped: usize,
-    /// The tiles at which every card crashes.
-    pub(crate) poison: Vec<u32>,
-    /// What cards lie, and about one of how many tiles.
-    pub(crate) liars: HashMap<CardNumber, (Lie, u32)>,
-    /// Of how many steps of its work at tiles a card does one; `None` if it does none.
-    pub(crate) lazy: HashMap<CardNumber, Option<usize>>,
-    /// The share of the tiles that is verified.
-    pub(crate) verify: Option<f64>,
-    pub(crate) seed: u32,
-}
 
 /// How a run ends.
 #[derive(Debug, PartialEq)]
@@ -85,20 +65,6 @@ impl TileSink for Ledger {
 }
 
 impl<'a> Run<'a> {
-    pub(crate) fn new(fixture: &'a Fixture, cards: usize, seed: u32) -> Self {
-        Self {
-            fixture,
-            faults: Faults::default(),
-            cards,
-            stopped: 0,
-            poison: Vec::new(),
-            liars: HashMap::new(),
-            lazy: HashMap::new(),
-            verify: None,
-            seed,
-        }
-    }
-
     /// The cards of the run, just switched on.
     fn stations(&self, random: &mut Random) -> Vec<Station<'a>> {
         let station = |number| {

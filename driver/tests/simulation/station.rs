@@ -9,9 +9,9 @@ use photoncard_firmware::card::MicroCard;
 use photoncard_shared::frame::{Frame, FrameReader};
 use photoncard_shared::message::{self, Command};
 
+use crate::conditions::Run;
 use crate::liar::Voice;
 use crate::line::{Queue, Random};
-use crate::run::Run;
 use crate::world::{Fixture, Memory};
 
 /// Virtual time of a step.
