@@ -74,7 +74,7 @@ impl Observer for Progress {
     }
 
     fn lost(&self, card: &str, error: &CardError) {
-        say(format_args!("photoncard: {card} is lost: {error}; the others render its tiles"));
+        say(format_args!("photoncard: {card} is lost: {error}; any others go on"));
     }
 
     fn not_shown(&self, error: &DisplayError) {

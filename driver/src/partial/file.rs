@@ -34,7 +34,12 @@ pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>>
     let number = line.strip_prefix(FAMILY.as_bytes()).and_then(|number| str::from_utf8(number).ok());
     Ok(number.and_then(|number| match number.strip_suffix('\n') {
         Some(number) => number.parse().ok().map(Title::Version),
-        None => number.bytes().all(|byte| byte.is_ascii_digit()).then_some(Title::CutOff),
+        // A longer line is no title, cut off or not.
+        None => {
+            let is_cut_off =
+                (line.len() as u64) < MAX_TITLE && number.bytes().all(|byte| byte.is_ascii_digit());
+            is_cut_off.then_some(Title::CutOff)
+        }
     }))
 }
 

@@ -265,7 +265,14 @@ fn a_foreign_file_is_refused_and_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = partial(&folder, false).path;
     let long = "photoncard partial render of a room\n".repeat(100_000);
-    for foreign in ["notes", "photoncard partial render of", "photoncard partial render 2x\n", "\n", &long] {
+    for foreign in [
+        "notes",
+        "photoncard partial render of",
+        "photoncard partial render 2x\n",
+        "photoncard partial render 99999999999999\n",
+        "\n",
+        &long,
+    ] {
         fs::write(&path, foreign).unwrap();
         for resume in [false, true] {
             let begun = PartialRender::begin(&partial(&folder, resume), json!({}), &mut film());

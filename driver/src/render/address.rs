@@ -83,6 +83,16 @@ impl CardAddress {
     }
 }
 
+/// Returns whether there is one chip at some addresses, and it is emulated.
+pub(super) fn is_one_emulated_chip(addresses: &[CardAddress]) -> bool {
+    matches!(addresses, [CardAddress::Emulated { chips: 1, .. }])
+}
+
+/// The first card among some addresses that is not emulated in this process.
+pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
+    addresses.iter().find(|address| !matches!(address, CardAddress::Emulated { .. }))
+}
+
 impl fmt::Display for CardAddress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {

@@ -56,16 +56,6 @@ fn check_chips(chips: usize) -> Result<(), RenderError> {
     })
 }
 
-/// Whether there is one chip at some addresses, and it is emulated.
-pub(super) fn is_one_emulated_chip(addresses: &[CardAddress]) -> bool {
-    matches!(addresses, [CardAddress::Emulated { chips: 1, .. }])
-}
-
-/// The first card among some addresses that is not emulated in this process.
-pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
-    addresses.iter().find(|address| !matches!(address, CardAddress::Emulated { .. }))
-}
-
 /// Cards that have said hello.
 pub(super) struct Cards {
     cards: Vec<(String, GreetedCard)>,
@@ -148,10 +138,10 @@ impl Cards {
         Ok(this)
     }
 
-    /// Tells of cards that have not said hello.
+    /// Reports cards that have not said hello to the observer.
     ///
     /// # Errors
-    /// If too few are left: that of the last.
+    /// If too few are left: the last card's.
     fn lose(
         &self,
         mut errors: Vec<(String, CardError)>,

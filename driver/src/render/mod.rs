@@ -8,6 +8,7 @@ mod error;
 mod exchange;
 mod greeting;
 mod memory;
+mod observer;
 mod open_card;
 mod reopening;
 mod settings;
@@ -18,6 +19,7 @@ pub use address::{CardAddress, RemoteAddress};
 pub use error::{CardError, RenderError};
 pub use greeting::{CardInfo, card_info, card_ping};
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
+pub use observer::{Observer, Phase, Unobserved};
 pub use photoncard_shared::budget::MOST_BINS;
 pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Radiance, Sampling};
@@ -32,7 +34,7 @@ use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{CausticGather, FrameParameters, Tile};
 
 use self::cards::{Cards, Onlookers, Outcome};
-use crate::display::{Display, DisplayError};
+use crate::display::Display;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 use crate::film::Film;
@@ -43,51 +45,6 @@ use crate::scene::{Camera, Scene};
 use crate::scheduler::{GatherOrder, tiles};
 use crate::session::{Job, PixelLimits};
 use crate::sink::TileSink;
-
-/// What a render is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phase {
-    /// Tracing photons: progress in photons.
-    Photons,
-    /// Building the photon map and the card image: no progress.
-    Pack,
-    /// Loading the image into the cards: progress in bytes.
-    Load,
-    /// Rendering: progress in tiles.
-    Tiles,
-}
-
-/// Watches a render, and can stop it.
-pub trait Observer: Sync {
-    /// Tells how far a phase is.
-    fn progress(&self, phase: Phase, done: u64, total: u64);
-
-    /// Whether the render is to stop as soon as it can.
-    fn is_stopped(&self) -> bool;
-
-    /// Tells that so many of all tiles were rendered before.
-    fn resumed(&self, _done: usize, _total: usize) {}
-
-    /// Tells that finished tiles are kept, so that a render that ends early can be gone on with.
-    fn kept(&self) {}
-
-    /// Tells that a card was lost, or is used no more; the others go on with its tiles.
-    fn lost(&self, _card: &str, _error: &CardError) {}
-
-    /// Tells that the picture is not shown on the display server, or no more; the render goes on.
-    fn not_shown(&self, _error: &DisplayError) {}
-}
-
-/// Watches nothing and never stops.
-pub struct Unobserved;
-
-impl Observer for Unobserved {
-    fn progress(&self, _: Phase, _: u64, _: u64) {}
-
-    fn is_stopped(&self) -> bool {
-        false
-    }
-}
 
 /// A finished picture.
 pub struct Rendering {

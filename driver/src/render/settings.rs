@@ -12,7 +12,8 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, CausticGather, FrameParameters, Radiance, Sampling};
 use serde_json::{Value, json};
 
-use super::{CardAddress, RenderError, cards};
+use super::address::{CardAddress, first_remote, is_one_emulated_chip};
+use super::error::RenderError;
 use crate::display::DisplaySettings;
 use crate::emulator::ChipKind;
 use crate::emulator::memory_model::CacheSettings;
@@ -208,7 +209,7 @@ impl RenderSettings {
                 "use another --order, such as sort",
             );
         }
-        if !cards::is_one_emulated_chip(&self.cards) {
+        if !is_one_emulated_chip(&self.cards) {
             return refuse(
                 "several chips read in no one order, and a chip that is not emulated tells nothing of its reads",
                 "use --card emulated:1 or --card emulated-micro:1",
@@ -222,7 +223,7 @@ impl RenderSettings {
     /// # Errors
     /// If a card is not emulated in this process.
     pub fn check_memory_model(&self) -> Result<(), RenderError> {
-        match cards::first_remote(&self.cards).filter(|_| self.modelled_caches().is_some()) {
+        match first_remote(&self.cards).filter(|_| self.modelled_caches().is_some()) {
             None => Ok(()),
             Some(address) => Err(RenderError::Setting {
                 option: "--counters",

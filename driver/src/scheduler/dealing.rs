@@ -11,7 +11,7 @@ use crate::session::Assignment;
 const HELP_AFTER: u32 = 2;
 /// How long a tile is left to a card before any tile is done.
 const HELP_WITHOUT_MEAN: Duration = Duration::from_secs(1);
-/// Tiles that wait to be compared of which a card looks for one that it has not rendered.
+/// Tiles that wait to be compared among which a card looks for one that it has not rendered, while any other tile waits.
 pub(super) const COMPARED_AT_ONCE: usize = 256;
 
 impl Scheduler {
@@ -28,6 +28,7 @@ impl Scheduler {
         let is_idle = tiles.is_empty();
         let index = (self.next_compared(card))
             .or_else(|| self.next_waiting(is_idle))
+            .or_else(|| self.compared_for(card, usize::MAX))
             .or_else(|| if is_idle { self.next_set_apart(card) } else { None })
             .or_else(|| self.next_to_help(card, now))?;
         let entry = &mut self.entries[index];
@@ -52,7 +53,12 @@ impl Scheduler {
         while self.compared.front().is_some_and(|&index| !self.entries[index].is_open()) {
             self.compared.pop_front();
         }
-        self.compared.iter().take(COMPARED_AT_ONCE).copied().find(|&index| self.is_for(card, index))
+        self.compared_for(card, COMPARED_AT_ONCE)
+    }
+
+    /// The first of so many compared tiles that a card can verify.
+    fn compared_for(&self, card: CardNumber, tiles: usize) -> Option<usize> {
+        self.compared.iter().take(tiles).copied().find(|&index| self.is_for(card, index))
     }
 
     /// Whether a card can verify a tile that no other is at.
@@ -96,7 +102,7 @@ impl Scheduler {
         self.next_help = now + patience;
         for &index in self.cards.iter().flat_map(|card| &card.tiles) {
             let entry = &self.entries[index];
-            if !entry.is_open() || entry.concerns(card) || !entry.crashes.is_empty() {
+            if !entry.is_open() || entry.concerns(card) || entry.crashes.len() >= CRASHES_APART {
                 continue;
             }
             let [first, last] = [entry.copies.first()?, entry.copies.last()?].map(|copy| copy.since);

@@ -66,6 +66,36 @@ fn a_render_goes_on_while_its_last_tile_is_on_its_way_to_the_sinks() {
 }
 
 #[test]
+fn a_card_finds_what_it_can_verify_behind_many_tiles_of_its_own() {
+    const TILES: u32 = 300;
+    let mut scheduler = scheduler(TILES, 2).verifying(1.0, 0);
+    for card in 0..2 {
+        scheduler.set_standing(card, Standing::Living);
+    }
+    assert_eq!(take(&mut scheduler, 1, SECOND), Some(0));
+    for id in 1..TILES {
+        assert_eq!(take(&mut scheduler, 0, SECOND), Some(id));
+        answer(&mut scheduler, 0, id, 0, SECOND);
+    }
+    assert_eq!(take(&mut scheduler, 0, SECOND), None);
+    answer(&mut scheduler, 1, 0, 0, SECOND);
+    scheduler.set_standing(1, Standing::GivenUp);
+    assert_eq!(take(&mut scheduler, 0, SECOND), Some(0));
+    answer(&mut scheduler, 0, 0, 0, SECOND);
+    // Nobody is left to verify the others.
+    assert!(matches!(scheduler.check(SECOND), Err(SchedulerError::Unverified { .. })));
+}
+
+#[test]
+fn a_tile_that_a_card_has_crashed_at_is_helped_as_well() {
+    let mut scheduler = scheduler(1, 3).with_helpers();
+    assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));
+    scheduler.give_back(0, 0, true, SECOND);
+    assert_eq!(take(&mut scheduler, 1, SECOND), Some(0));
+    assert_eq!(take(&mut scheduler, 2, 9 * SECOND), Some(0));
+}
+
+#[test]
 fn without_helpers_no_tile_is_rendered_twice() {
     let mut scheduler = scheduler(1, 2);
     assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));

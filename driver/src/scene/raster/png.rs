@@ -45,7 +45,9 @@ fn check_palette(bytes: &[u8]) -> Result<(), Fault> {
     let palette = chunks(bytes).take_while(|(kind, _)| kind != b"IDAT").find(|(kind, _)| kind == b"PLTE");
     match palette {
         Some((_, length)) if !(3..=MAX_PALETTE).contains(&length) || !length.is_multiple_of(3) => {
-            Err(Fault::damaged(format!("a palette of {length} bytes is not one of 1 to 256 colours")))
+            Err(Fault::damaged(format!(
+                "a palette of {length} bytes: three for each of 1 to 256 colours are possible"
+            )))
         }
         // The decoder refuses an image without its palette.
         _ => Ok(()),
