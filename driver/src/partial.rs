@@ -216,7 +216,7 @@ impl PartialRender {
     }
 }
 
-/// What goes wrong is told by [`PartialRender::check`].
+/// Failures are kept for the render loop, which asks for them.
 impl TileSink for PartialRender {
     fn put(&self, tile: &FinishedTile) {
         let mut state = self.lock();

@@ -6,7 +6,7 @@
 //! - A tile that is to be verified is rendered by a second card as soon as one is free. If they differ, a third decides; what
 //!   the odd one has rendered alone is rendered again.
 //! - A tile that two cards have crashed at is set apart until all others are done, then goes to the cards that have crashed at
-//!   it least, and is abandoned after [`MAX_CRASHES`].
+//!   it least, and is abandoned after five crashes.
 //! - When nothing waits, an idle card takes the tile that has been at another for the longest time, if that is longer than tiles
 //!   take. The first answer wins.
 //!
