@@ -25,7 +25,7 @@ pub(crate) fn push<T>(list: &mut Vec<T>, element: T) -> Result<(), OutOfMemory> 
     Ok(())
 }
 
-/// What to do about it.
+/// Remedy for memory that the system does not give.
 pub(crate) const REMEDY: &str =
     "close other programs, raise the process's limit (`ulimit -v`), or use a machine with more memory";
 

@@ -114,7 +114,7 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
     Ok(Hierarchy { nodes, leaves: lines.collect(), leaf_triangles: leaves })
 }
 
-/// What the builder is given: triangles whose boxes have a centre in common as one, if they are many, and every other by itself.
+/// Input of the builder: one box for many triangles whose boxes have a common centre, one for each other triangle.
 ///
 /// Of boxes in one another each is as near as any larger one, so that hardly two choose each other, and the builder would go
 /// through all of them for each pair that it joins.

@@ -9,7 +9,7 @@ use crate::scheduler::{Answered, CardNumber, Scheduler, SchedulerError, Standing
 use crate::session::{Event, Session, SessionError};
 use crate::sink::{FinishedTile, TileSink};
 
-/// What the sessions of a render share, each on a thread of its own or all on one.
+/// State shared by the sessions of a render, each on a thread of its own or all on one.
 pub struct Dispatcher<'a> {
     scheduler: Mutex<Scheduler>,
     /// A tile waits again, a card is given up, or all tiles are done.
@@ -101,7 +101,7 @@ impl<'a> Dispatcher<'a> {
         self.changed.notify_all();
     }
 
-    /// What other cards have found a card to be, if it is used no more.
+    /// Verdict of other cards on a card that is used no more.
     ///
     /// # Errors
     /// If it has lied.

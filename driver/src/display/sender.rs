@@ -146,7 +146,7 @@ impl TileSink for Display {
         });
     }
 
-    /// What is shown stays until the tile is put again.
+    /// Pixels shown stay until the tile is put again.
     fn revoke(&self, _: &Tile) {}
 }
 
