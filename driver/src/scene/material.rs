@@ -1,14 +1,12 @@
 //! Materials, and the valid ranges of their values.
 
 use glam::Vec3;
+use photoncard_shared::layout::MAX_PHONG_EXPONENT;
 
 use super::limits::EMISSION;
 
 /// Tolerance of the sum of the two albedos above 1: they are often written in three digits.
 const SUM_TOLERANCE: f32 = 1e-4;
-
-/// Maximum Phong exponent: the lobe's half-width at half maximum is then 0.7 degrees, a mirror to the photons.
-pub const MAX_EXPONENT: f32 = 10_000.0;
 
 /// Material of a surface: reflection, transmission, emission, textures and cut-outs.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +46,7 @@ pub enum Reflection {
         diffuse: Vec3,
         /// Albedo of the Phong lobe, 0 to 1.
         specular: Vec3,
-        /// Exponent of the Phong lobe, at least 0.
+        /// Exponent of the Phong lobe, 0 to [`MAX_PHONG_EXPONENT`].
         exponent: f32,
     },
     /// The metallic-roughness reflection of glTF 2.0 (appendix B).
@@ -237,7 +235,7 @@ fn check_phong(diffuse: Vec3, specular: Vec3, exponent: f32) -> Result<(), OutOf
         let remedy = "lower one of the two until no channel's sum exceeds 1";
         return fault(Property::Specular, reason, remedy);
     }
-    if !(0.0..=MAX_EXPONENT).contains(&exponent) {
+    if !(0.0..=MAX_PHONG_EXPONENT).contains(&exponent) {
         let reason = format!("the Phong exponent is {exponent}");
         return fault(Property::Exponent, reason, "the exponent is 0 to 10000");
     }

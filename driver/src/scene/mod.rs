@@ -23,7 +23,7 @@ pub use self::environment::Environment;
 pub use self::light::{PunctualKind, PunctualLight};
 pub use self::limits::BRIGHTEST;
 pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
-pub use self::material::{MAX_EXPONENT, Material, Reflection, Transmission};
+pub use self::material::{Material, Reflection, Transmission};
 pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
 pub use self::triangle::{Attributes, NO_ATTRIBUTES, Triangle};
 use crate::error::SceneError;

@@ -18,13 +18,11 @@
 //! What that costs against GGX is measured in `docs/accuracy.md`.
 
 use glam::Vec3;
+use photoncard_shared::layout::MAX_PHONG_EXPONENT;
 
 use super::material::Reflection;
 use super::specular::Specular;
 use crate::vector::{max, max_component, min};
-
-/// The greatest exponent of a lobe.
-const MOST_EXPONENT: f32 = 10_000.0;
 
 /// What of the reflectance at normal incidence makes that at grazing incidence 1: 1 / 0.04, of an index of refraction of 1.5.
 const GRAZING: f32 = 25.0;
@@ -68,7 +66,7 @@ impl MetallicRoughness {
         Reflection {
             diffuse: diffuse.min(Vec3::ONE - specular),
             specular,
-            exponent: min(max(exponent, 0.0), MOST_EXPONENT),
+            exponent: min(max(exponent, 0.0), MAX_PHONG_EXPONENT),
         }
     }
 
@@ -120,7 +118,7 @@ mod tests {
             let Reflection { diffuse, specular, exponent } = surface.reflection();
             assert!((diffuse + specular).max_element() <= 1.000_001, "{surface:?}");
             assert!(diffuse.min_element() >= 0.0 && specular.min_element() >= 0.0);
-            assert!((0.0..=MOST_EXPONENT).contains(&exponent));
+            assert!((0.0..=MAX_PHONG_EXPONENT).contains(&exponent));
             for cosine in [0.0, 0.1, 0.5, 1.0] {
                 let (reflection, specular) = surface.smooth(cosine);
                 assert!((reflection.diffuse + specular.reflected).max_element() <= 1.000_001, "{surface:?}");

@@ -14,6 +14,9 @@ const KIND_SHIFT: u32 = 4;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
 
+/// Maximum exponent `n` of a Phong lobe: `cos^n alpha` is 1/2 at 0.7 degrees, a mirror to photons.
+pub const MAX_PHONG_EXPONENT: f32 = 10_000.0;
+
 /// Code of the index of an absent texture.
 pub const NO_TEXTURE: u16 = u16::MAX;
 
@@ -43,7 +46,7 @@ pub enum Reflectance {
         diffuse: [f32; 3],
         /// Albedo of the Phong lobe.
         specular: [f32; 3],
-        /// Exponent of the Phong lobe.
+        /// Exponent of the Phong lobe, 0 to [`MAX_PHONG_EXPONENT`].
         exponent: f32,
     },
     /// glTF's metallic-roughness model.
