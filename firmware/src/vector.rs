@@ -14,6 +14,12 @@ pub(crate) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// The mirror direction of a unit vector about a unit normal.
+#[inline(always)]
+pub(crate) fn mirror(direction: Vec3, normal: Vec3) -> Vec3 {
+    normal * (2.0 * normal.dot(direction)) - direction
+}
+
 /// Two unit vectors that form a right-handed frame with a unit normal (Duff et al. 2017, *Building an orthonormal
 /// basis, revisited*).
 #[inline(always)]

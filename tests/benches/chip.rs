@@ -14,7 +14,6 @@ use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::chip::{Progress, ReferenceChip};
-use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::render::Context;
@@ -96,7 +95,7 @@ impl Prepared {
                 let eye = Ray::new(camera.origin, direction);
                 let hit = closest_hit(&scene, &mut memory, &eye).expect("sound")?;
                 let surface = read_surface(&scene, &mut memory, &eye, &hit).expect("sound");
-                let sampled = sample_reflection(&surface, [random(i, 3), random(i, 4)])?;
+                let sampled = surface.reflector().sample([random(i, 3), random(i, 4)])?;
                 Some(Ray::new(surface.offset_origin(), sampled.direction))
             })
             .take(count as usize)

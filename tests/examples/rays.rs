@@ -11,7 +11,6 @@ use std::path::{Path, PathBuf};
 
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::scene::{Scene, gltf};
-use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::{Counted, Lines, MemoryPort};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{Ray, SceneImage, closest_hit, is_occluded, read_surface};
@@ -39,7 +38,7 @@ fn bounces(scene: &Scene, packed: &PackedScene, count: u32) -> Vec<Ray> {
         let eye = Ray::new(camera.origin, direction.normalize());
         let hit = closest_hit(&image, &mut memory, &eye).expect("sound")?;
         let surface = read_surface(&image, &mut memory, &eye, &hit).expect("sound");
-        let sampled = sample_reflection(&surface, [random(i, 3), random(i, 4)])?;
+        let sampled = surface.reflector().sample([random(i, 3), random(i, 4)])?;
         Some(Ray::new(surface.offset_origin(), sampled.direction))
     };
     // Four of five of the shipped scenes' rays bounce; none do where the camera sees nothing.

@@ -5,9 +5,8 @@ use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::{Material, Scene, Triangle};
-use photoncard_firmware::gather::PartialReflection;
 use photoncard_firmware::photon::{CandidateBuffer, Estimate, NearestPhotons, PhotonMap, gather};
-use photoncard_firmware::scene::{Reflection, Surface};
+use photoncard_firmware::scene::{PartialReflection, Reflection, Surface};
 use photoncard_firmware::simd::Level;
 use photoncard_tests::{camera, lambertian, quad, room, scene};
 
@@ -44,11 +43,14 @@ impl Map {
         let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, self.max_distance);
         gather(&scene, &mut memory, PhotonMap::Indirect, position, &mut nearest).unwrap();
         let surface = Surface {
-            reflection: Reflection { diffuse: Vec3::splat(ALBEDO), ..Reflection::BLACK },
+            reflection: Reflection::lambertian(Vec3::splat(ALBEDO)),
             ..Surface::white(position, normal, 1.0)
         };
-        let reflection =
-            PartialReflection::new(&surface, Vec3::splat(scene.header.photon_power_unit), 1 << 31);
+        let reflection = PartialReflection::encode(
+            &surface.reflector(),
+            Vec3::splat(scene.header.photon_power_unit),
+            1 << 31,
+        );
         let estimate = || Estimate { nearest: &nearest, position, reflection: &reflection };
         let mut radiances = Level::ALL.iter().filter_map(|level| level.run(estimate()));
         let radiance = radiances.next().expect("what every processor has");

@@ -7,7 +7,6 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::light::{
@@ -198,7 +197,7 @@ fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Opti
     let normal = if is_back { -point.normal } else { point.normal };
     // A white Lambertian surface reflects by the cosine, as the emitter emits.
     let white = Surface::white(point.position, normal, point.magnitude);
-    sample_reflection(&white, [c, d]).map(|sampled| Emission {
+    white.reflector().sample([c, d]).map(|sampled| Emission {
         ray: Ray::new(white.offset_origin(), sampled.direction),
         power: point.emission * (PI * sides),
     })

@@ -1,7 +1,6 @@
 //! Photon paths: Russian roulette on the albedo, every arrival at a surface that is not perfectly specular stored.
 
 use glam::Vec3;
-use photoncard_firmware::importance::sample_reflection;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::render::specular_path::{Arrival, Carried, SpecularPath};
 use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit, read_surface};
@@ -211,7 +210,7 @@ impl Tracer<'_> {
                     if self.purpose == Purpose::Caustics {
                         break;
                     }
-                    let Some(sampled) = sample_reflection(&surface, random.point()) else { break };
+                    let Some(sampled) = surface.reflector().sample(random.point()) else { break };
                     match survive(arrived, arrived * sampled.weight, random.survival()) {
                         Some(reflected) => power = reflected,
                         None => break,

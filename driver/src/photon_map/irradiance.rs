@@ -5,10 +5,10 @@
 //! is to know that none is on the way, which is one less: of photons that lie at random the mean is right.
 
 use glam::Vec3;
-use photoncard_firmware::gather::{PartialReflection, Place};
+use photoncard_firmware::gather::Place;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather, reflected_radiance};
-use photoncard_firmware::scene::SceneImage;
+use photoncard_firmware::scene::{PartialReflection, SceneImage};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::{REFERENCE, gather_candidates};
 use photoncard_shared::image::SectionKind;

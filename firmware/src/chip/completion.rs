@@ -42,7 +42,7 @@ impl Completion {
             let sight = eye::view(context, PixelSample { x, y, sample })?;
             let Some(view) = sight.surface() else { continue };
             let surface = &view.surface;
-            self.albedo += surface.reflection.diffuse + surface.reflection.specular;
+            self.albedo += surface.reflector().albedo();
             self.normal += surface.normal;
             self.depth += view.depth;
             self.surfaces += 1;

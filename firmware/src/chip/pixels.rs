@@ -84,7 +84,7 @@ impl<
         let (share, target) = (sample_share(context), index as u16);
         add_light(&mut self.sums, frame, target, Component::Direct, surface.emission * share);
         let Some(light) = interpolated else { return Purpose::Sample };
-        let reflected = surface.reflection.diffuse * light;
+        let reflected = surface.reflector().lambertian_albedo() * light;
         add_light(&mut self.sums, frame, target, Component::Indirect, reflected * share);
         Purpose::Lobe
     }

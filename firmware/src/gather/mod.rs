@@ -16,4 +16,4 @@ mod request;
 
 pub use order::{Place, hilbert_cell, hilbert_index};
 pub use queue::GatherQueue;
-pub use request::{GatherRequest, PartialReflection};
+pub use request::GatherRequest;

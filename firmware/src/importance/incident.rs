@@ -12,13 +12,12 @@ use photoncard_shared::message::Sampling;
 
 use super::cell_of;
 use super::hemisphere::CELLS;
-use super::reflection::lobe_direction;
-use super::table::{DirectionTable, Reflector};
+use super::table::DirectionTable;
 use crate::fixed_point::Sum;
 use crate::photon::{NearestPhotons, SameSurface};
 use crate::sampler::radical_inverse;
-use crate::scene::{Reflection, mirror};
-use crate::vector::{max, max_component, unit};
+use crate::scene::Reflector;
+use crate::vector::{max, unit};
 
 /// Of a product's cells this share is divided evenly, however sure the photons are: light varies within a cell as well,
 /// which only many rays in all cells tell. It bounds the weight of a ray by twice the albedo, where the photons missed
@@ -29,7 +28,7 @@ const EMPTY_CELL: f32 = 0.1;
 /// Points of the lobe whose cells are looked up.
 const LOBE_POINTS: u32 = 32;
 /// Exponent of a lobe of which a cell holds one half: its solid angle is about that of two cells.
-const HALF_HELD_EXPONENT: f32 = 16.0;
+const HALF_HELD_SHARPNESS: f32 = 16.0;
 /// At the least this part of the lobe's albedo's share goes to the lobe's entry.
 const LOBE_PART: f32 = 0.25;
 
@@ -80,23 +79,23 @@ impl IncidentFlux {
     /// The table of a sampling for a point where the reflection is not black.
     pub fn table(&self, sampling: Sampling, reflector: &Reflector) -> DirectionTable {
         match sampling {
-            Sampling::Reflection => DirectionTable::of_reflection(&reflector.reflection),
+            Sampling::Reflection => DirectionTable::of_reflection(reflector),
             Sampling::Photon => {
                 let cells = self.raw();
                 let least = EMPTY_CELL * mean(&cells);
                 DirectionTable::new(&cells.map(|cell| max(cell, least)), 0.0)
             }
             Sampling::Product => product(&self.shrunk(), reflector),
-            Sampling::Mixture => mixture(&self.shrunk(), &reflector.reflection),
+            Sampling::Mixture => mixture(&self.shrunk(), reflector),
         }
     }
 }
 
 impl DirectionTable {
     /// The table of the reflection alone.
-    pub fn of_reflection(reflection: &Reflection) -> Self {
-        let [diffuse, specular] = albedos(reflection);
-        Self::new(&[diffuse * (1.0 / CELLS as f32); CELLS], specular)
+    pub fn of_reflection(reflector: &Reflector) -> Self {
+        let [diffuse, lobe] = reflector.albedos();
+        Self::new(&[diffuse * (1.0 / CELLS as f32); CELLS], lobe)
     }
 }
 
@@ -104,30 +103,25 @@ fn mean(cells: &[f32; CELLS]) -> f32 {
     cells.iter().sum::<f32>() * (1.0 / CELLS as f32)
 }
 
-/// The greatest channels of both albedos.
-fn albedos(reflection: &Reflection) -> [f32; 2] {
-    [max_component(reflection.diffuse), max_component(reflection.specular)]
-}
-
 /// The flux of each cell, reflected: by the Lambertian part, and by what of the lobe cells can hold.
 fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
-    let [diffuse, specular] = albedos(&reflector.reflection);
+    let [diffuse, specular] = reflector.albedos();
     let even = EVEN_SHARE * mean(flux);
     let flux = flux.map(|flux| even + (1.0 - EVEN_SHARE) * flux);
     let mut cells = flux.map(|flux| flux * diffuse);
     if specular <= 0.0 {
         return DirectionTable::new(&cells, 0.0);
     }
-    let exponent = reflector.reflection.exponent;
-    let held = HALF_HELD_EXPONENT / (HALF_HELD_EXPONENT + exponent);
+    let held = HALF_HELD_SHARPNESS / (HALF_HELD_SHARPNESS + reflector.lobe_sharpness());
     let mut lobe = 0.0;
     let scale = specular * (CELLS as f32 / LOBE_POINTS as f32);
-    for (cell, cosine) in lobe_points(reflector) {
+    for (cell, direction) in lobe_points(reflector) {
         let (Some(reflected), Some(flux)) = (cells.get_mut(cell as usize), flux.get(cell as usize)) else {
             continue;
         };
         // The radiance of the cell, over the lobe's point of it; the factor of a projected solid angle of 1 is 1.
-        let brought = scale * flux * cosine * ((exponent + 2.0) / (exponent + 1.0));
+        let cosine = reflector.normal.dot(direction);
+        let brought = scale * flux * cosine * reflector.lobe_gain(direction);
         *reflected += held * brought;
         lobe += (1.0 - held) * brought;
     }
@@ -137,21 +131,18 @@ fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
 }
 
 /// Points of the lobe, each with the cell it lies in and its cosine to the normal; those below the surface are left out.
-fn lobe_points(reflector: &Reflector) -> impl Iterator<Item = (u8, f32)> {
-    let Reflector { normal, outgoing, reflection } = *reflector;
-    let mirror = mirror(outgoing, normal);
+fn lobe_points(reflector: &Reflector) -> impl Iterator<Item = (u8, Vec3)> {
     (0..LOBE_POINTS).filter_map(move |index| {
         let point = [radical_inverse(index), (index as f32 + 0.5) / LOBE_POINTS as f32];
-        let direction = lobe_direction(mirror, reflection.exponent, point);
-        cell_of(normal, direction).map(|cell| (cell, normal.dot(direction)))
+        let direction = reflector.sample_lobe(point);
+        cell_of(reflector.normal, direction).map(|cell| (cell, direction))
     })
 }
 
 /// Half of the rays by the reflection, half by the flux.
-fn mixture(flux: &[f32; CELLS], reflection: &Reflection) -> DirectionTable {
-    let [diffuse, specular] = albedos(reflection);
+fn mixture(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     let all: f32 = flux.iter().sum();
-    let diffuse_share = diffuse / (diffuse + specular);
+    let diffuse_share = reflector.diffuse_share();
     let even = diffuse_share * (1.0 / CELLS as f32);
     DirectionTable::new(&flux.map(|flux| 0.5 * (even + flux / all)), 0.5 * (1.0 - diffuse_share))
 }
@@ -159,6 +150,7 @@ fn mixture(flux: &[f32; CELLS], reflection: &Reflection) -> DirectionTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Reflection;
 
     fn flux_of(cells: [f32; CELLS], photons: u32) -> IncidentFlux {
         let all: f32 = cells.iter().sum();
@@ -190,7 +182,7 @@ mod tests {
         let reflector = |exponent| Reflector {
             normal: Vec3::Y,
             outgoing: Vec3::Y,
-            reflection: Reflection { diffuse: Vec3::splat(0.3), specular: Vec3::splat(0.3), exponent },
+            reflection: Reflection::phong(Vec3::splat(0.3), Vec3::splat(0.3), exponent),
         };
         // The first row is around the normal, where the lobe points.
         let mut bright = [0.1; CELLS];

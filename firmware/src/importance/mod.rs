@@ -16,14 +16,12 @@
 
 mod hemisphere;
 mod incident;
-mod reflection;
 mod table;
 
 pub use hemisphere::{CELLS, COLUMNS, ROWS, cell_of};
 pub(crate) use hemisphere::{cell_at, cell_centre, direction_in};
 pub use incident::IncidentFlux;
-pub use reflection::{ReflectedDirection, sample_reflection};
-pub use table::{DirectionTable, ENTRIES, Reflector};
+pub use table::{DirectionTable, ENTRIES};
 
 use glam::Vec3;
 

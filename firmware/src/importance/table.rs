@@ -1,15 +1,14 @@
 //! The table of one surface point: how many of its gather rays go which way.
 
-use core::f32::consts::{FRAC_1_PI, PI};
+use core::f32::consts::FRAC_1_PI;
 use core::ops::Range;
 
 use glam::Vec3;
 
 use super::hemisphere::{CELLS, direction_in};
-use super::reflection::lobe_direction;
 use super::{GatherDirection, cell_of};
 use crate::sampler::Pattern;
-use crate::scene::{Reflection, lobe_power, mirror};
+use crate::scene::Reflector;
 use crate::vector::max;
 
 /// Entries of a table: the cells of the hemisphere along their walk, then the lobe.
@@ -23,17 +22,6 @@ const LOBE: usize = CELLS;
 pub struct DirectionTable {
     cells: [u8; CELLS],
     lobe: u16,
-}
-
-/// The reflection at a point, as seen from where the rays that it sends go.
-#[derive(Clone, Copy, Debug)]
-pub struct Reflector {
-    /// Unit normal on the side of the rays.
-    pub normal: Vec3,
-    /// Unit vector towards the eye.
-    pub outgoing: Vec3,
-    /// What is reflected.
-    pub reflection: Reflection,
 }
 
 impl Default for DirectionTable {
@@ -145,10 +133,10 @@ impl DirectionTable {
         count: u32,
     ) -> Option<GatherDirection> {
         let (entry, point) = self.entry(pattern, index, count);
-        let Reflector { normal, outgoing, reflection } = reflector;
+        let Reflector { normal, .. } = reflector;
         let direction = if entry == LOBE {
             let [along, across] = point;
-            lobe_direction(mirror(*outgoing, *normal), reflection.exponent, [across, along])
+            reflector.sample_lobe([across, along])
         } else {
             direction_in(*normal, entry as u8, point)
         };
@@ -158,10 +146,9 @@ impl DirectionTable {
         if cosine <= 0.0 {
             return None;
         }
-        let power = self.lobe_power(reflector, direction);
-        let lobe = reflection.specular * ((reflection.exponent + 2.0) * 0.5 * FRAC_1_PI * power);
-        let density = self.mixture_density(reflection, cell, cosine, power);
-        let weight = (reflection.lambertian() + lobe) * (cosine / density);
+        let (value, lobe_density) = reflector.sampled(direction);
+        let density = self.mixture_density(cell, cosine, lobe_density);
+        let weight = value * (cosine / density);
         (density > 0.0).then_some(GatherDirection { direction, weight, density, cell })
     }
 
@@ -169,25 +156,14 @@ impl DirectionTable {
     #[inline(always)]
     pub fn density(&self, reflector: &Reflector, direction: Vec3) -> f32 {
         let Some(cell) = cell_of(reflector.normal, direction) else { return 0.0 };
-        let power = self.lobe_power(reflector, direction);
-        self.mixture_density(&reflector.reflection, cell, reflector.normal.dot(direction), power)
+        self.mixture_density(cell, reflector.normal.dot(direction), reflector.lobe_density(direction))
     }
 
     #[inline(always)]
-    fn lobe_power(&self, reflector: &Reflector, direction: Vec3) -> f32 {
-        if !reflector.reflection.has_lobe() {
-            return 0.0;
-        }
-        let mirror = mirror(reflector.outgoing, reflector.normal);
-        lobe_power(mirror.dot(direction), reflector.reflection.exponent)
-    }
-
-    #[inline(always)]
-    fn mixture_density(&self, reflection: &Reflection, cell: u8, cosine: f32, lobe_power: f32) -> f32 {
+    fn mixture_density(&self, cell: u8, cosine: f32, lobe_density: f32) -> f32 {
         let per_share = 1.0 / self.total() as f32;
         let cell_share = self.share(cell as usize) as f32 * per_share;
         let lobe_share = self.lobe as f32 * per_share;
-        let lobe_density = (reflection.exponent + 1.0) / (2.0 * PI) * lobe_power;
         cell_share * CELLS as f32 * FRAC_1_PI * cosine + lobe_share * lobe_density
     }
 }
@@ -214,16 +190,18 @@ fn part(of: u64, size: u64) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use core::f32::consts::PI;
+
     use super::*;
     use crate::sampler::Dimension;
+    use crate::scene::Reflection;
 
     fn pattern(seed: u32) -> Pattern {
         Pattern::new(seed, 3, 4, 0, Dimension::Gather)
     }
 
     fn reflector(diffuse: f32, specular: f32, exponent: f32, outgoing: Vec3) -> Reflector {
-        let reflection =
-            Reflection { diffuse: Vec3::splat(diffuse), specular: Vec3::splat(specular), exponent };
+        let reflection = Reflection::phong(Vec3::splat(diffuse), Vec3::splat(specular), exponent);
         Reflector { normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
     }
 

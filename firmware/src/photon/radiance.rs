@@ -21,7 +21,7 @@ use photoncard_shared::layout::{decode_normal, disc_fraction};
 
 use super::{Candidate, NearestPhotons};
 use crate::fixed_point::ColourSum;
-use crate::gather::PartialReflection;
+use crate::scene::{DecodedLobe, PartialReflection, magnitude};
 use crate::simd::{self, Isa, Kernel};
 use crate::vector::{max, unit};
 
@@ -63,7 +63,7 @@ impl Kernel for Estimate<'_, '_> {
         };
         let Some((closest, sums)) = sum(nearest, farthest, reflection) else { return Vec3::ZERO };
         let fraction = disc_fraction(closest.disc());
-        let least = MIN_RADIUS_SHARE * crate::scene::magnitude(&[position]);
+        let least = MIN_RADIUS_SHARE * magnitude(&[position]);
         let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
         sums.reflected() * (1.0 / area)
     }
@@ -99,7 +99,7 @@ fn sum<'a>(
 ) -> Option<(Candidate, Sums<'a>)> {
     let (_, contents) = nearest.columns();
     let mut sums = Sums::new(reflection);
-    if !reflection.has_lobe() && are_all_of(reflection.normal(), contents) {
+    if reflection.is_lambertian() && are_all_of(reflection.normal(), contents) {
         // What is alone is the farthest.
         if farthest.is_some() && contents.len() < 2 {
             return None;
@@ -142,7 +142,7 @@ const NORMAL_SHIFT: u32 = 50;
 /// The photons' power, and the lobe's share of it.
 struct Sums<'a> {
     reflection: &'a PartialReflection,
-    mirror: Vec3,
+    decoded: DecodedLobe,
     power: ColourSum,
     lobe: ColourSum,
 }
@@ -150,22 +150,22 @@ struct Sums<'a> {
 impl<'a> Sums<'a> {
     #[inline(always)]
     fn new(reflection: &'a PartialReflection) -> Self {
-        let mirror = if reflection.has_lobe() { reflection.mirror() } else { Vec3::ZERO };
-        Self { reflection, mirror, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
+        let decoded = reflection.decode_lobe();
+        Self { reflection, decoded, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
     }
 
     #[inline(always)]
     fn add(&mut self, photon: &Candidate) {
         self.power.add_rgbe(photon.power());
-        if self.reflection.has_lobe() {
-            let share = self.reflection.lobe_share(self.mirror, photon.direction());
-            self.lobe.add(Vec3::from_array(photon.power().decode()) * share);
+        if !self.reflection.is_lambertian() {
+            let factor = self.reflection.lobe_factor(&self.decoded, photon.direction());
+            self.lobe.add(Vec3::from_array(photon.power().decode()) * factor);
         }
     }
 
     #[inline(always)]
     fn reflected(&self) -> Vec3 {
-        self.reflection.diffuse() * self.power.value() + self.reflection.lobe() * self.lobe.value()
+        self.reflection.reflected(&self.power, &self.lobe)
     }
 }
 

@@ -8,9 +8,9 @@ use photoncard_shared::message::{CausticGather, Fault};
 
 use super::search::search;
 use super::{Context, GatherPoint};
-use crate::gather::PartialReflection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, reflected_radiance};
+use crate::scene::PartialReflection;
 
 /// Radiance that a point reflects of the light of caustics, in the image's radiance units.
 ///
@@ -36,7 +36,8 @@ pub fn reflected<M: MemoryPort>(
     let unit = header.caustic_power_unit / header.radiance_unit;
     // Light is reflected by the smooth normal, photons lie on the triangle.
     let surface = &point.surface;
-    let reflection = PartialReflection::new(surface, Vec3::splat(unit), point.pattern.dither(0))
-        .among(encode_normal(surface.geometric_normal.to_array()));
+    let reflection =
+        PartialReflection::encode(&surface.reflector(), Vec3::splat(unit), point.pattern.dither(0))
+            .among(encode_normal(surface.geometric_normal.to_array()));
     Ok(reflected_radiance(&nearest, position, &reflection))
 }

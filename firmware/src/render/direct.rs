@@ -85,13 +85,13 @@ fn from_light<M: MemoryPort>(
         let by_gather_rays = (point.rays, point.directions.density(&reflector, direction));
         balance((context.frame.shadow_rays, density), by_gather_rays)
     });
-    let shared = reflector.reflection.evaluate(surface.normal, surface.outgoing, direction);
+    let shared = reflector.evaluate(direction);
     let mut reflected = shared * weight;
     if point.purpose == Purpose::Lobe {
         let weight = density.map_or(1.0, |density| {
             power(shadow_rays_for_records(context, density), rays_of_record(context, cosine))
         });
-        reflected += surface.reflection.lambertian() * weight;
+        reflected += surface.reflector().lambertian() * weight;
     }
     Ok(reflected * irradiance * cosine)
 }

@@ -8,12 +8,12 @@ use photoncard_shared::message::{Fault, Radiance};
 
 use super::specular_path::{Carried, PathEnd, SpecularPath};
 use super::{Context, GatherPoint, direct};
-use crate::gather::{GatherRequest, PartialReflection, Place};
+use crate::gather::{GatherRequest, Place};
 use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
 use crate::scene::light::environment_radiance;
-use crate::scene::{Ray, closest_hit, read_surface};
+use crate::scene::{PartialReflection, Ray, closest_hit, read_surface};
 
 /// What the end of a final gather ray brings.
 #[derive(Clone, Copy, Debug)]
@@ -71,8 +71,8 @@ pub fn cast<M: MemoryPort>(
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
         place: Place::new(&header.photon_grid, met.position.to_array()),
-        reflection: PartialReflection::new(
-            &met,
+        reflection: PartialReflection::encode(
+            &met.reflector(),
             weight * (header.photon_power_unit / header.radiance_unit),
             point.pattern.dither(index),
         ),
@@ -121,8 +121,10 @@ pub fn gathered<M: MemoryPort>(
     context.memory.enter(Stage::Gather);
     let position = request.place.position(&context.scene.header.photon_grid).into();
     // Irradiance does not tell where the light came from, which a lobe asks for.
-    if context.frame.radiance == Radiance::Precomputed && !request.reflection.has_lobe() {
-        return Ok(request.reflection.diffuse() * irradiance(context, position, request.reflection.normal())?);
+    if context.frame.radiance == Radiance::Precomputed && request.reflection.is_lambertian() {
+        return Ok(
+            request.reflection.lambertian() * irradiance(context, position, request.reflection.normal())?
+        );
     }
     let nearest = nearest_photons(context, position, candidates)?;
     Ok(reflected_radiance(&nearest, position, &request.reflection))

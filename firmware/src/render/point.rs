@@ -1,17 +1,15 @@
 //! Gather points: where final gather rays start, what they are for and how they are spread.
 
-use glam::Vec3;
 use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{Fault, Sampling};
 
 use super::Context;
 use super::search::search;
-use crate::importance::{DirectionTable, IncidentFlux, Reflector};
+use crate::importance::{DirectionTable, IncidentFlux};
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap};
 use crate::sampler::Pattern;
-use crate::scene::{Reflection, Surface};
-use crate::vector::max_component;
+use crate::scene::{Reflector, Surface};
 
 /// The start of some gather rays.
 #[derive(Clone, Copy, Debug)]
@@ -53,13 +51,7 @@ impl GatherPoint {
 
     /// A point for the lobe of a surface, with the lobe's share of the rays.
     pub fn lobe(surface: Surface, pattern: Pattern, rays: u32) -> Self {
-        let Reflection { diffuse, specular, .. } = surface.reflection;
-        let [diffuse, specular] = [max_component(diffuse), max_component(specular)];
-        let rays = if specular > 0.0 {
-            libm::ceilf(rays as f32 * (specular / (diffuse + specular))) as u32
-        } else {
-            0
-        };
+        let rays = libm::ceilf(rays as f32 * surface.reflector().lobe_share()) as u32;
         Self { surface, pattern, rays, directions: DirectionTable::COSINE, purpose: Purpose::Lobe }
     }
 
@@ -67,8 +59,9 @@ impl GatherPoint {
     #[inline(always)]
     pub fn reflector(&self) -> Reflector {
         let Surface { normal, outgoing, reflection, .. } = self.surface;
-        let diffuse = if self.purpose == Purpose::Lobe { Vec3::ZERO } else { reflection.diffuse };
-        Reflector { normal, outgoing, reflection: Reflection { diffuse, ..reflection } }
+        let is_of_lobe = self.purpose == Purpose::Lobe;
+        let reflection = if is_of_lobe { reflection.without_lambertian() } else { reflection };
+        Reflector { normal, outgoing, reflection }
     }
 
     /// Chooses the directions, from the photons nearest to the point if the sampling asks for them.
@@ -86,7 +79,7 @@ impl GatherPoint {
         let reflector = self.reflector();
         let sampling = context.frame.sampling;
         self.directions = if sampling == Sampling::Reflection {
-            DirectionTable::of_reflection(&reflector.reflection)
+            DirectionTable::of_reflection(&reflector)
         } else {
             context.counters.tables += 1;
             context.memory.enter(Stage::Table);
@@ -95,9 +88,8 @@ impl GatherPoint {
             let mut nearest = NearestPhotons::new(candidates, frame.neighbors, frame.max_distance);
             let tested = search(context, PhotonMap::Indirect, position, &mut nearest)?;
             context.counters.count_gather(tested, nearest.taken(), nearest.selected(), nearest.len() as u32);
-            let colour = reflector.reflection.diffuse + reflector.reflection.specular;
-            IncidentFlux::new(&nearest, normal, encode_normal(geometric_normal.to_array()), colour)
-                .table(sampling, &reflector)
+            let code = encode_normal(geometric_normal.to_array());
+            IncidentFlux::new(&nearest, normal, code, reflector.albedo()).table(sampling, &reflector)
         };
         Ok(())
     }

@@ -12,7 +12,7 @@ use photoncard_shared::message::Fault;
 
 use super::Context;
 use crate::memory::MemoryPort;
-use crate::scene::{Hit, Ray, Reflection, Surface, closest_hit, read_surface};
+use crate::scene::{Hit, Ray, Surface, closest_hit, read_surface};
 use crate::vector::{max, max_component};
 
 /// The least chance to stay where anything besides is reflected, of that to go on.
@@ -95,10 +95,9 @@ impl SpecularPath {
         if specular.is_none() {
             return Arrival::Ends;
         }
-        let Reflection { diffuse, specular: lobe, .. } = surface.reflection;
         let [reflected, transmitted] = [specular.reflected, specular.transmitted].map(max_component);
         let goes = reflected + transmitted;
-        let stays = max_component(diffuse + lobe);
+        let stays = max_component(surface.reflector().albedo());
         // Not so seldom that a path that stays is a firefly; an emitter is seen half of the time.
         let stays = if stays > 0.0 { max(stays, goes * LEAST_STAY) } else { 0.0 };
         let stays = if max_component(surface.emission) > 0.0 { max(stays, goes) } else { stays };

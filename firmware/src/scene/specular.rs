@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use super::material::mirror;
-use crate::vector::{max, unit};
+use crate::vector::{max, mirror, unit};
 
 /// What leaves a surface in one direction, or in two.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,14 +3,14 @@
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Record, Reflectance, THIN_WALLED, Triangle,
+    DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Record, Reflectance, Triangle,
 };
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
-use super::metallic_roughness::MetallicRoughness;
-use super::specular::{Glass, Specular};
-use super::{Hit, Ray, Reflection, SceneImage, magnitude, offset_origin};
+use super::reflection::{Scattering, Texel, View, scattering};
+use super::specular::Specular;
+use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origin};
 use crate::memory::MemoryPort;
 use crate::vector::{max_component, unit};
 
@@ -53,7 +53,7 @@ impl Surface {
             normal,
             geometric_normal: normal,
             outgoing: normal,
-            reflection: Reflection { diffuse: Vec3::ONE, ..Reflection::BLACK },
+            reflection: Reflection::lambertian(Vec3::ONE),
             specular: Specular::NONE,
             absorption: Vec3::ZERO,
             emission: Vec3::ZERO,
@@ -70,11 +70,17 @@ impl Surface {
         Self { normal: self.geometric_normal, ..self }
     }
 
+    /// The reflection seen from the ray's origin.
+    #[inline(always)]
+    pub fn reflector(&self) -> Reflector {
+        let Self { normal, outgoing, reflection, .. } = *self;
+        Reflector { normal, outgoing, reflection }
+    }
+
     /// The same with its light dimmed, before it gets to whoever looks.
     #[inline(always)]
     pub fn dimmed(mut self, throughput: Vec3) -> Self {
-        self.reflection.diffuse *= throughput;
-        self.reflection.specular *= throughput;
+        self.reflection = self.reflection.dimmed(throughput);
         self.emission *= throughput;
         self
     }
@@ -159,7 +165,7 @@ pub(super) fn surface_of(
     if let Reflectance::Phong { diffuse, specular, exponent } = material.reflectance
         && is_plain(&material)
     {
-        let reflection = Reflection { diffuse: diffuse.into(), specular: specular.into(), exponent };
+        let reflection = Reflection::phong(diffuse.into(), specular.into(), exponent);
         let is_visible = is_front || double_sided;
         return Ok(Surface {
             reflection: if is_visible { reflection } else { Reflection::BLACK },
@@ -194,25 +200,27 @@ fn finished(
     let mut surface = Surface { emission, ..bare };
     let has_corners = material.flags & HAS_ATTRIBUTES != 0;
     let corners = if has_corners { Corners::read(scene, memory, index, weights)? } else { None };
-    let mut colour = [1.0; 4];
-    let mut roughness = [1.0; 4];
+    let mut texel = Texel::WHITE;
     if let Some(corners) = &corners {
         let [base, metallic_roughness, emissive] = material.textures;
-        let [of_texture, of_corners] = [corners.texture(scene, memory, base)?, corners.colour()];
-        colour.iter_mut().zip(of_texture).zip(of_corners).for_each(|((colour, a), b)| *colour = a * b);
-        roughness = corners.texture(scene, memory, metallic_roughness)?;
+        texel.colour = rgb(corners.texture(scene, memory, base)?) * rgb(corners.colour());
+        [_, texel.roughness, texel.metallic, _] = corners.texture(scene, memory, metallic_roughness)?;
         if max_component(surface.emission) > 0.0 {
-            let [red, green, blue, _] = corners.texture(scene, memory, emissive)?;
-            surface.emission *= Vec3::new(red, green, blue);
+            surface.emission *= rgb(corners.texture(scene, memory, emissive)?);
             surface.emitter = corners.emitter();
         }
         if let Some(normal) = corners.normal() {
             surface.normal = shading_normal(if is_front { normal } else { -normal }, &bare);
         }
     }
-    let [red, green, blue, _] = colour;
-    surface.reflect(material, Vec3::new(red, green, blue), roughness, is_front);
-    Ok(surface)
+    let Surface { normal, geometric_normal, outgoing, .. } = surface;
+    let view = View { outgoing, normals: [normal, geometric_normal], is_front };
+    let Scattering { reflection, specular, absorption } = scattering(material, &texel, &view);
+    Ok(Surface { reflection, specular, absorption, ..surface })
+}
+
+fn rgb([red, green, blue, _]: [f32; 4]) -> Vec3 {
+    Vec3::new(red, green, blue)
 }
 
 /// The cosine to the viewer that a shading normal has at the least.
@@ -226,48 +234,4 @@ fn shading_normal(normal: Vec3, bare: &Surface) -> Vec3 {
     let turned = unit(turned);
     // What has no direction, or is on the wrong side after all, is flat.
     if turned.dot(bare.geometric_normal) > 0.0 { turned } else { bare.geometric_normal }
-}
-
-impl Surface {
-    /// Takes what a material reflects, its colour multiplied by `colour`, its metalness and roughness by those of a texel.
-    fn reflect(&mut self, material: &Material, colour: Vec3, [_, green, blue, _]: [f32; 4], is_front: bool) {
-        let cosine = self.normal.dot(self.outgoing);
-        match material.reflectance {
-            Reflectance::Phong { diffuse, specular, exponent } => {
-                let diffuse = Vec3::from(diffuse) * colour;
-                self.reflection = Reflection { diffuse, specular: specular.into(), exponent };
-            }
-            Reflectance::MetallicRoughness { base, dielectric, metallic, roughness } => {
-                let surface = MetallicRoughness {
-                    base: Vec3::from(base) * colour,
-                    dielectric: dielectric.into(),
-                    metallic: metallic * blue,
-                    roughness: roughness * green,
-                };
-                if roughness > 0.0 {
-                    self.reflection = surface.reflection();
-                } else {
-                    (self.reflection, self.specular) = surface.smooth(cosine);
-                }
-            }
-            Reflectance::Glass { base, absorption, transmission, ior, specular, metallic, roughness } => {
-                let is_thin = material.flags & THIN_WALLED != 0;
-                let (base, absorption) = (Vec3::from(base) * colour, Vec3::from(absorption));
-                let glass = Glass { base, absorption, transmission, ior, specular, is_thin };
-                let normals = [self.normal, self.geometric_normal];
-                let (diffuse, specular) = glass.at(self.outgoing, normals, !is_front);
-                // Metal lets nothing through.
-                let [metallic, roughness] = [metallic * blue, roughness * green];
-                let metal = MetallicRoughness { base, dielectric: Vec3::ZERO, metallic: 1.0, roughness };
-                let metal = metal.reflection();
-                self.reflection = Reflection {
-                    diffuse: diffuse * (1.0 - metallic),
-                    specular: metal.specular * metallic,
-                    exponent: metal.exponent,
-                };
-                self.specular = specular.dimmed(1.0 - metallic);
-                self.absorption = if is_front || is_thin { Vec3::ZERO } else { absorption };
-            }
-        }
-    }
 }

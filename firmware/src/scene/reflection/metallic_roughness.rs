@@ -20,8 +20,9 @@
 use glam::Vec3;
 use photoncard_shared::layout::MAX_PHONG_EXPONENT;
 
-use super::material::Reflection;
-use super::specular::Specular;
+use super::Reflection;
+use super::phong::PhongLobe;
+use crate::scene::specular::Specular;
 use crate::vector::{max, max_component, min};
 
 /// What of the reflectance at normal incidence makes that at grazing incidence 1: 1 / 0.04, of an index of refraction of 1.5.
@@ -49,29 +50,38 @@ impl MetallicRoughness {
         min(max_component(self.dielectric) * GRAZING, 1.0)
     }
 
-    /// Both coats' reflectances for a share of the way from normal to grazing incidence.
-    fn coats(&self, share: f32) -> [Vec3; 2] {
-        let towards = |normal: Vec3, grazing: f32| normal + (Vec3::splat(grazing) - normal) * share;
-        [towards(self.dielectric, self.grazing()), towards(self.base, 1.0)]
+    /// The dielectric's reflectance for a share of the way from F0 to F90, and the Lambertian albedo of the base beneath.
+    #[inline(never)]
+    fn dielectric_and_base(&self, share: f32) -> [Vec3; 2] {
+        let dielectric = towards(self.dielectric, self.grazing(), share);
+        [dielectric, self.base * ((1.0 - self.metallic) * (1.0 - max_component(dielectric)))]
     }
 
     /// The reflection, without its perfectly specular part.
     pub(super) fn reflection(&self) -> Reflection {
-        let alpha = self.roughness * self.roughness;
-        let squared = alpha * alpha;
-        let specular = self.lobe(alpha);
-        let [dielectric, _] = self.coats(MEAN_OF_PAIRS);
-        let diffuse = self.base * ((1.0 - self.metallic) * (1.0 - max_component(dielectric)));
-        let exponent = 0.4 / max(squared, f32::MIN_POSITIVE) - 0.4;
-        Reflection {
-            diffuse: diffuse.min(Vec3::ONE - specular),
-            specular,
-            exponent: min(max(exponent, 0.0), MAX_PHONG_EXPONENT),
-        }
+        let [_, diffuse] = self.dielectric_and_base(MEAN_OF_PAIRS);
+        let lobe = self.lobe();
+        Reflection { diffuse: diffuse.min(Vec3::ONE - lobe.albedo), lobe }
     }
 
-    /// The albedo of the lobe, at most 1.
-    fn lobe(&self, alpha: f32) -> Vec3 {
+    /// A share of the lobe, beside a Lambertian part of another albedo.
+    pub(super) fn lobe_beside(&self, diffuse: Vec3, share: f32) -> Reflection {
+        let PhongLobe { albedo, exponent } = self.lobe();
+        Reflection::phong(diffuse, albedo * share, exponent)
+    }
+
+    /// The lobe, of an albedo of at most 1.
+    #[inline(never)]
+    fn lobe(&self) -> PhongLobe {
+        let alpha = self.roughness * self.roughness;
+        let squared = alpha * alpha;
+        let exponent = 0.4 / max(squared, f32::MIN_POSITIVE) - 0.4;
+        let exponent = min(max(exponent, 0.0), MAX_PHONG_EXPONENT);
+        PhongLobe { albedo: self.lobe_albedo(alpha), exponent }
+    }
+
+    #[inline(always)]
+    fn lobe_albedo(&self, alpha: f32) -> Vec3 {
         let normal = 20.0 / 21.0 / (1.0 + 1.6 * alpha * alpha);
         let grazing = 1.0 / 21.0 / (1.0 + (1.5 + 19.5 * alpha) * alpha);
         let dielectric = self.dielectric * normal + Vec3::splat(self.grazing() * grazing);
@@ -85,16 +95,27 @@ impl MetallicRoughness {
     pub(super) fn smooth(&self, cosine: f32) -> (Reflection, Specular) {
         let rest = 1.0 - cosine;
         let squared = rest * rest;
-        let [dielectric, metal] = self.coats(squared * squared * rest);
-        let diffuse = self.base * ((1.0 - self.metallic) * (1.0 - max_component(dielectric)));
+        let share = squared * squared * rest;
+        let [dielectric, diffuse] = self.dielectric_and_base(share);
+        let metal = towards(self.base, 1.0, share);
         let reflected = dielectric * (1.0 - self.metallic) + metal * self.metallic;
-        (Reflection { diffuse, ..Reflection::BLACK }, Specular::mirror(reflected))
+        (Reflection::lambertian(diffuse), Specular::mirror(reflected))
     }
+}
+
+/// The reflectance for a share of the way from F0 to F90.
+fn towards(normal: Vec3, grazing: f32, share: f32) -> Vec3 {
+    normal + (Vec3::splat(grazing) - normal) * share
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The Lambertian albedo, the lobe's, and the lobe's exponent.
+    fn parts(reflection: &Reflection) -> (Vec3, Vec3, f32) {
+        (reflection.diffuse, reflection.lobe.albedo, reflection.lobe.exponent)
+    }
 
     fn each() -> impl Iterator<Item = MetallicRoughness> {
         let steps = [0.0, 0.04, 0.3, 0.8, 1.0];
@@ -115,7 +136,7 @@ mod tests {
     #[test]
     fn no_more_light_leaves_than_arrives() {
         for surface in each() {
-            let Reflection { diffuse, specular, exponent } = surface.reflection();
+            let (diffuse, specular, exponent) = parts(&surface.reflection());
             assert!((diffuse + specular).max_element() <= 1.000_001, "{surface:?}");
             assert!(diffuse.min_element() >= 0.0 && specular.min_element() >= 0.0);
             assert!((0.0..=MAX_PHONG_EXPONENT).contains(&exponent));
@@ -134,11 +155,9 @@ mod tests {
             metallic: 0.0,
             roughness: 1.0,
         };
-        let reflection = paper.reflection();
-        assert_eq!(reflection.exponent, 0.0);
-        assert!(
-            (reflection.diffuse.x - 0.765).abs() < 0.001 && (reflection.specular.x - 0.0168).abs() < 0.0005
-        );
+        let (diffuse, specular, exponent) = parts(&paper.reflection());
+        assert_eq!(exponent, 0.0);
+        assert!((diffuse.x - 0.765).abs() < 0.001 && (specular.x - 0.0168).abs() < 0.0005);
         let gold = MetallicRoughness { metallic: 1.0, roughness: 0.0, ..paper };
         let (rest, specular) = gold.smooth(1.0);
         assert!(rest.is_black());
@@ -156,7 +175,7 @@ mod tests {
                 metallic: 1.0,
                 roughness,
             };
-            let gain = metal.reflection().specular.x / albedo;
+            let gain = parts(&metal.reflection()).1.x / albedo;
             assert!((gain - METAL_GAIN).abs() < 0.02, "{roughness}: {gain}");
         }
     }
@@ -165,7 +184,7 @@ mod tests {
     fn bright_metals_keep_their_hue() {
         let base = Vec3::new(1.0, 0.766, 0.336);
         let gold = MetallicRoughness { base, dielectric: Vec3::splat(0.04), metallic: 1.0, roughness: 0.3 };
-        let Reflection { specular, .. } = gold.reflection();
+        let (_, specular, _) = parts(&gold.reflection());
         assert!(specular.x <= 1.000_001 && (specular.y / specular.x - 0.766).abs() < 0.02);
     }
 
@@ -178,6 +197,6 @@ mod tests {
             roughness: 0.0,
         };
         assert_eq!(dull.smooth(0.0).1.reflected, Vec3::ZERO);
-        assert_eq!(dull.reflection().specular, Vec3::ZERO);
+        assert_eq!(parts(&dull.reflection()).1, Vec3::ZERO);
     }
 }

@@ -1,0 +1,91 @@
+//! Phong's cosine lobe, normalised (Lafortune, Willems 1994, *Using the modified Phong reflectance model for physically based
+//! rendering*): `f = ks (n + 2) / (2 pi) max(0, cos alpha)^n`, alpha measured from the mirror direction. Its directions are
+//! sampled with the density `p = (n + 1) / (2 pi) max(0, cos alpha)^n`.
+//!
+//! `1 / (2 pi)` is a quotient in [`PhongLobe::evaluate`] and [`PhongLobe::density`], a product in
+//! [`PhongLobe::sampled_value`], [`PhongLobe::sampled_density`] and [`PhongLobe::factor`]: the two may differ by one unit in the
+//! last place, and pictures depend on either.
+
+use core::f32::consts::{FRAC_1_PI, PI};
+
+use glam::Vec3;
+
+use crate::vector::{from_frame, max, max_component};
+
+/// A lobe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PhongLobe {
+    /// `ks`, 0 to 1: the albedo at normal incidence.
+    pub(super) albedo: Vec3,
+    /// `n`, 0 to [`MAX_PHONG_EXPONENT`](photoncard_shared::layout::MAX_PHONG_EXPONENT).
+    pub(super) exponent: f32,
+}
+
+impl PhongLobe {
+    /// A lobe that reflects nothing.
+    pub(super) const BLACK: Self = Self { albedo: Vec3::ZERO, exponent: 0.0 };
+
+    /// `ks > 0` in some channel.
+    #[inline(always)]
+    pub(super) fn reflects(&self) -> bool {
+        max_component(self.albedo) > 0.0
+    }
+
+    /// `max(0, cos alpha)^n` for two unit vectors.
+    #[inline(always)]
+    pub(super) fn power(&self, mirror: Vec3, direction: Vec3) -> f32 {
+        power(mirror.dot(direction), self.exponent)
+    }
+
+    /// `f`, 1/sr, for a [`Self::power`].
+    #[inline(always)]
+    pub(super) fn evaluate(&self, power: f32) -> Vec3 {
+        self.albedo * ((self.exponent + 2.0) / (2.0 * PI) * power)
+    }
+
+    /// `p`, 1/sr, for a [`Self::power`].
+    #[inline(always)]
+    pub(super) fn density(&self, power: f32) -> f32 {
+        (self.exponent + 1.0) / (2.0 * PI) * power
+    }
+
+    /// `f`, 1/sr, of a sampled direction.
+    #[inline(always)]
+    pub(super) fn sampled_value(&self, power: f32) -> Vec3 {
+        self.albedo * (Self::factor(self.exponent) * power)
+    }
+
+    /// `p`, 1/sr, of a sampled direction.
+    #[inline(always)]
+    pub(super) fn sampled_density(&self, power: f32) -> f32 {
+        (self.exponent + 1.0) * 0.5 * FRAC_1_PI * power
+    }
+
+    /// `(n + 2) / (2 pi)`, 1/sr.
+    #[inline(always)]
+    pub(super) fn factor(exponent: f32) -> f32 {
+        (exponent + 2.0) * 0.5 * FRAC_1_PI
+    }
+
+    /// `f / (ks p)`, without unit.
+    #[inline(always)]
+    pub(super) fn gain(&self) -> f32 {
+        (self.exponent + 2.0) / (self.exponent + 1.0)
+    }
+
+    /// A direction of density `p` about the mirror direction: the inverse of the cumulative distribution, at a point of the unit
+    /// square.
+    #[inline(always)]
+    pub(super) fn direction(&self, mirror: Vec3, [u, v]: [f32; 2]) -> Vec3 {
+        let cosine = libm::powf(1.0 - v, 1.0 / (self.exponent + 1.0));
+        let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
+        let angle = 2.0 * PI * u;
+        from_frame(mirror, sine * libm::cosf(angle), sine * libm::sinf(angle), cosine)
+    }
+}
+
+/// `max(0, cosine)^exponent`; 0 at and below the lobe's horizon for every exponent, 0 among them.
+#[inline(always)]
+pub(super) fn power(cosine: f32, exponent: f32) -> f32 {
+    if cosine > 0.0 { libm::powf(cosine, exponent) } else { 0.0 }
+}

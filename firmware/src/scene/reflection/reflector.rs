@@ -1,0 +1,227 @@
+//! A reflection seen from one direction: its values, densities and samples.
+//!
+//! A sample's point of the unit square becomes a direction by a map that keeps neighbours together, so that a stratified pattern
+//! stays stratified on the hemisphere. The Lambertian part and the lobe share the samples by their albedos, and the density of the
+//! mixture weights either's (the balance heuristic: Veach, Guibas 1995), which bounds the weight by the sum of the albedos: no
+//! fireflies.
+
+use core::f32::consts::{FRAC_1_PI, PI};
+
+use glam::Vec3;
+
+use super::Reflection;
+use crate::vector::{from_frame, max, max_component, mirror};
+
+/// A direction that is reflected to, and its weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReflectedDirection {
+    /// Unit vector away from the surface.
+    pub direction: Vec3,
+    /// `f cos(theta) / p`, without unit: the factor of what arrived.
+    pub weight: Vec3,
+}
+
+/// The reflection at a point, seen from one direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Reflector {
+    /// Unit shading normal on the side of `outgoing`.
+    pub normal: Vec3,
+    /// Unit vector to where the light is reflected to: the eye's side of a path.
+    pub outgoing: Vec3,
+    /// The reflection.
+    pub reflection: Reflection,
+}
+
+impl Reflector {
+    /// `f`, 1/sr, for light from a unit vector on the normal's side.
+    #[inline(always)]
+    pub fn evaluate(&self, incident: Vec3) -> Vec3 {
+        if self.reflection.is_lambertian() {
+            return self.lambertian();
+        }
+        self.lambertian() + self.reflection.lobe.evaluate(self.lobe_power(incident))
+    }
+
+    /// The Lambertian part of `f`, 1/sr.
+    #[inline(always)]
+    pub fn lambertian(&self) -> Vec3 {
+        self.reflection.diffuse * FRAC_1_PI
+    }
+
+    /// The Lambertian albedo, 0 to 1: the radiance reflected of an irradiance over pi.
+    #[inline(always)]
+    pub fn lambertian_albedo(&self) -> Vec3 {
+        self.reflection.diffuse
+    }
+
+    /// The albedo, 0 to 1.
+    #[inline(always)]
+    pub fn albedo(&self) -> Vec3 {
+        self.reflection.diffuse + self.reflection.lobe.albedo
+    }
+
+    /// The greatest channels of the Lambertian albedo and of the lobe's.
+    #[inline(always)]
+    pub fn albedos(&self) -> [f32; 2] {
+        [max_component(self.reflection.diffuse), max_component(self.reflection.lobe.albedo)]
+    }
+
+    /// The Lambertian part's share of [`Self::albedos`], 1 without a lobe.
+    #[inline(always)]
+    pub fn diffuse_share(&self) -> f32 {
+        let [diffuse, lobe] = self.albedos();
+        if lobe <= 0.0 { 1.0 } else { diffuse / (diffuse + lobe) }
+    }
+
+    /// The lobe's share of [`Self::albedos`], 0 without a lobe.
+    #[inline(always)]
+    pub fn lobe_share(&self) -> f32 {
+        let [diffuse, lobe] = self.albedos();
+        if lobe > 0.0 { lobe / (diffuse + lobe) } else { 0.0 }
+    }
+
+    /// The lobe's sharpness: the exponent `n` of the lobe `cos^n alpha` that is as wide.
+    #[inline(always)]
+    pub fn lobe_sharpness(&self) -> f32 {
+        self.reflection.lobe.exponent
+    }
+
+    /// The direction of the lobe's own sampling at a point of the unit square.
+    #[inline(always)]
+    pub fn sample_lobe(&self, point: [f32; 2]) -> Vec3 {
+        self.reflection.lobe.direction(mirror(self.outgoing, self.normal), point)
+    }
+
+    /// The lobe's `f / p` over its albedo, without unit, at a direction of [`Self::sample_lobe`].
+    #[inline(always)]
+    pub fn lobe_gain(&self, _direction: Vec3) -> f32 {
+        self.reflection.lobe.gain()
+    }
+
+    /// The probability density of [`Self::sample_lobe`], 1/sr; 0 without a lobe.
+    #[inline(always)]
+    pub fn lobe_density(&self, direction: Vec3) -> f32 {
+        self.reflection.lobe.density(self.lobe_power_or_zero(direction))
+    }
+
+    /// `f` and [`Self::lobe_density`], both 1/sr, of a sampled direction: cheaper together.
+    #[inline(always)]
+    pub fn sampled(&self, direction: Vec3) -> (Vec3, f32) {
+        let Reflection { lobe, .. } = &self.reflection;
+        let power = self.lobe_power_or_zero(direction);
+        (self.lambertian() + lobe.sampled_value(power), lobe.density(power))
+    }
+
+    /// The direction at a point of the unit square; `None` below the surface, where the weight is zero.
+    pub fn sample(&self, [u, v]: [f32; 2]) -> Option<ReflectedDirection> {
+        let Self { normal, outgoing, reflection } = *self;
+        let diffuse_share = self.diffuse_share();
+        if diffuse_share >= 1.0 {
+            let direction = cosine_direction(normal, [u, v]);
+            return Some(ReflectedDirection { direction, weight: reflection.diffuse });
+        }
+        let lobe = reflection.lobe;
+        let mirror = mirror(outgoing, normal);
+        let direction = if v < diffuse_share {
+            cosine_direction(normal, [u, v / diffuse_share])
+        } else {
+            lobe.direction(mirror, [u, (v - diffuse_share) / (1.0 - diffuse_share)])
+        };
+        let cosine = normal.dot(direction);
+        if cosine <= 0.0 {
+            return None;
+        }
+        let power = lobe.power(mirror, direction);
+        let density =
+            diffuse_share * cosine * FRAC_1_PI + (1.0 - diffuse_share) * lobe.sampled_density(power);
+        let weight = (self.lambertian() + lobe.sampled_value(power)) * (cosine / density);
+        (density > 0.0).then_some(ReflectedDirection { direction, weight })
+    }
+
+    #[inline(always)]
+    fn lobe_power(&self, direction: Vec3) -> f32 {
+        self.reflection.lobe.power(mirror(self.outgoing, self.normal), direction)
+    }
+
+    #[inline(always)]
+    fn lobe_power_or_zero(&self, direction: Vec3) -> f32 {
+        if self.reflection.is_lambertian() { 0.0 } else { self.lobe_power(direction) }
+    }
+}
+
+/// A direction of density `cos(theta) / pi`: the square on the disc (Shirley, Chiu 1997), the disc lifted to the
+/// hemisphere.
+#[inline(always)]
+fn cosine_direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
+    let [a, b] = [2.0 * u - 1.0, 2.0 * v - 1.0];
+    if a == 0.0 && b == 0.0 {
+        return normal;
+    }
+    let (radius, angle) =
+        if a * a > b * b { (a, (PI / 4.0) * (b / a)) } else { (b, (PI / 2.0) - (PI / 4.0) * (a / b)) };
+    let (x, y) = (radius * libm::cosf(angle), radius * libm::sinf(angle));
+    from_frame(normal, x, y, libm::sqrtf(max(1.0 - x * x - y * y, 0.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reflector(diffuse: f32, specular: f32, exponent: f32, outgoing: Vec3) -> Reflector {
+        let reflection = Reflection::phong(Vec3::splat(diffuse), Vec3::splat(specular), exponent);
+        Reflector { normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
+    }
+
+    fn mean_weight(reflector: &Reflector, side: u32) -> f32 {
+        let points = (0..side * side).map(|i| {
+            let [i, j] = [i % side, i / side];
+            [(i as f32 + 0.5) / side as f32, (j as f32 + 0.5) / side as f32]
+        });
+        points.filter_map(|p| reflector.sample(p)).map(|d| d.weight.x as f64).sum::<f64>() as f32
+            / (side * side) as f32
+    }
+
+    #[test]
+    fn the_mean_weight_of_a_lambertian_surface_is_its_albedo() {
+        let mean = mean_weight(&reflector(0.7, 0.0, 0.0, Vec3::new(1.0, 1.0, 0.0)), 10);
+        assert!((mean - 0.7).abs() < 1e-5, "{mean}");
+    }
+
+    #[test]
+    fn the_mean_weight_at_normal_incidence_is_the_sum_of_the_albedos() {
+        // The integral of (n + 2) / (2 pi) cos^n cos is 1 where the lobe's axis is the normal.
+        for exponent in [1.0, 8.0, 32.0, 128.0, 1000.0] {
+            let mean = mean_weight(&reflector(0.4, 0.35, exponent, Vec3::Y), 200);
+            assert!((mean - 0.75).abs() < 2e-3, "{exponent}: {mean}");
+        }
+    }
+
+    #[test]
+    fn the_mean_weight_is_the_integral_of_the_reflection() {
+        let reflector = reflector(0.2, 0.5, 20.0, Vec3::new(2.0, 1.0, 0.5));
+        let side = 1000;
+        let mut integral = 0.0_f64;
+        for i in 0..side {
+            for j in 0..side {
+                let [u, v] = [(i as f32 + 0.5) / side as f32, (j as f32 + 0.5) / side as f32];
+                let direction = cosine_direction(Vec3::Y, [u, v]);
+                let f = reflector.evaluate(direction);
+                integral += (f.x * PI) as f64 / (side * side) as f64;
+            }
+        }
+        let mean = mean_weight(&reflector, 400);
+        assert!((mean as f64 - integral).abs() < 1e-3, "{mean} {integral}");
+    }
+
+    #[test]
+    fn no_weight_is_above_the_bound() {
+        let reflector = reflector(0.3, 0.6, 500.0, Vec3::new(5.0, 0.4, 0.0));
+        for i in 0..10_000 {
+            let point = [(i % 100) as f32 / 100.0, (i / 100) as f32 / 100.0];
+            if let Some(direction) = reflector.sample(point) {
+                assert!(direction.weight.x <= 0.9 * 2.0, "{direction:?}");
+                assert!((direction.direction.length() - 1.0).abs() < 1e-4);
+            }
+        }
+    }
+}
