@@ -48,11 +48,13 @@ impl PackedScene {
         allocation::check(BYTES_OF_A_TRIANGLE * scene.triangles.len() as u64)
             .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles: scene.triangles.len(), bytes })?;
         let lights = Lights::new(scene);
+        let image = write(scene, &lights)?;
+        let keeps_photons = materials::keep_photons(scene, image.view());
         Ok(Self {
-            image: write(scene, &lights)?,
+            image,
             sources: Sources::new(scene, &lights),
             aimed_sources: Sources::aimed(scene, &lights),
-            keeps_photons: scene.keeps_photons(),
+            keeps_photons,
         })
     }
 

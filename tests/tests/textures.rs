@@ -81,6 +81,17 @@ fn between_two_texels_there_is_their_mean_of_light() {
     assert_eq!((row[0], row[47]), (0.0, 2.0));
 }
 
+/// A closed room whose walls have texture coordinates.
+fn textured_room(wall: Material) -> Scene {
+    let view = camera(Vec3::new(0.1, 0.05, 0.6), Vec3::new(-0.3, -0.2, -1.0));
+    let mut scene = scene(Vec::new(), vec![wall], view);
+    for pair in room([0; 6]).as_chunks::<2>().0 {
+        let [[a, b, c], [_, _, d]] = pair.map(|triangle| triangle.vertices);
+        add_textured_quad(&mut scene, [a, b, c, d], [[-1., 2.], [3., 2.], [3., -2.], [-1., -2.]], 0);
+    }
+    scene
+}
+
 /// A closed room whose walls reflect what a texture, colours of corners, or both say.
 fn furnace(albedo: f32, texel: u8, colour: f32) -> Scene {
     let wall = Material {
@@ -88,12 +99,7 @@ fn furnace(albedo: f32, texel: u8, colour: f32) -> Scene {
         base_texture: Some(0),
         ..Material::lambertian("wall", Vec3::splat(albedo))
     };
-    let view = camera(Vec3::new(0.1, 0.05, 0.6), Vec3::new(-0.3, -0.2, -1.0));
-    let mut scene = scene(Vec::new(), vec![wall], view);
-    for pair in room([0; 6]).as_chunks::<2>().0 {
-        let [[a, b, c], [_, _, d]] = pair.map(|triangle| triangle.vertices);
-        add_textured_quad(&mut scene, [a, b, c, d], [[-1., 2.], [3., 2.], [3., -2.], [-1., -2.]], 0);
-    }
+    let mut scene = textured_room(wall);
     for attributes in &mut scene.attributes {
         attributes.colours = [[colour, colour, colour, 1.0]; 3];
     }
@@ -143,6 +149,35 @@ fn roughness_and_metalness_follow_their_texture() {
     let [normal, grazing] = coat(1.0);
     let dull = colour * (0.96 * (1.0 - 0.0037)) + 0.04 * normal + grazing;
     assert!((albedo(37) - dull).abs().max_element() < 1e-3, "{}", albedo(37));
+}
+
+/// A mirror by its factors, of which a texture leaves no metal, is Lambertian: photons lie on it, and the areas of their discs are
+/// measured. One of which a texture leaves all is a mirror.
+#[test]
+fn a_texture_decides_what_a_mirror_is() {
+    let film = |metallic, texture: Option<u8>| {
+        let reflection = Reflection::MetallicRoughness {
+            base_colour: Vec3::splat(0.8),
+            metallic,
+            roughness: 0.0,
+            dielectric: Vec3::ZERO,
+            transmission: None,
+        };
+        let wall = Material {
+            emission: Vec3::ONE,
+            metallic_roughness_texture: texture.map(|_| 0),
+            ..Material::new("wall", reflection)
+        };
+        let image = image(2, Encoding::Linear, vec![[0, 255, texture.unwrap_or(0), 255]; 2]);
+        let nearest = Texture { nearest: true, ..Texture::new(0) };
+        let mut scene = with_texture(textured_room(wall), image, nearest);
+        scene.materials.push(lambertian("floor", 0.5));
+        let floor = scene.triangles.iter_mut().filter(|triangle| triangle.vertices.iter().all(|v| v.y < 0.0));
+        floor.for_each(|triangle| triangle.material = 1);
+        radiances(&render_or_panic(&scene, &RenderSettings { samples: 1, ..settings() }).film)
+    };
+    assert_eq!(film(1.0, Some(0)), film(0.0, None), "no metal is left");
+    assert_eq!(film(1.0, Some(255)), film(1.0, None), "all metal is left");
 }
 
 /// A lattice before a lamp: what is cut out lets eye rays, shadow rays, gather rays and photons through.

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use glam::Vec3;
+use photoncard_firmware::scene::keeps_photons;
 use photoncard_shared::address::Line;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
@@ -44,18 +45,6 @@ struct Finish {
     is_double_sided: bool,
 }
 
-/// True if photons are stored on surfaces of a reflectance: where not all light is reflected perfectly specularly.
-fn keeps_photons(reflectance: &Reflectance) -> bool {
-    let any = |colour: &[f32; 3]| colour.iter().any(|albedo| *albedo > 0.0);
-    match reflectance {
-        Reflectance::Phong { diffuse, specular, .. } => any(diffuse) || any(specular),
-        Reflectance::MetallicRoughness { base, dielectric, metallic, roughness } => {
-            any(base) && (*metallic < 1.0 || *roughness > 0.0) || any(dielectric) && *roughness > 0.0
-        }
-        Reflectance::Glass { base, transmission, .. } => any(base) && *transmission < 1.0,
-    }
-}
-
 impl SideTable {
     /// # Errors
     /// If the image is not sound.
@@ -69,12 +58,12 @@ impl SideTable {
                     SectionKind::Materials,
                     index,
                 )?;
-                let Material { reflectance, emission, flags, .. } = Material::read(bytes);
+                let material = Material::read(bytes);
                 Ok(Finish {
-                    reflects: keeps_photons(&reflectance),
-                    is_glass: matches!(reflectance, Reflectance::Glass { .. }),
-                    emits: emission.into_iter().any(|radiance| radiance > 0.0),
-                    is_double_sided: flags & DOUBLE_SIDED != 0,
+                    reflects: keeps_photons(&scene, &mut memory, &material)?,
+                    is_glass: matches!(material.reflectance, Reflectance::Glass { .. }),
+                    emits: material.emission.into_iter().any(|radiance| radiance > 0.0),
+                    is_double_sided: material.flags & DOUBLE_SIDED != 0,
                 })
             })
             .collect();

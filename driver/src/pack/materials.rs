@@ -1,6 +1,8 @@
 //! Materials as records of the card image.
 
 use glam::Vec3;
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::scene::{SceneImage, keeps_photons};
 use photoncard_shared::layout::{
     self, DOUBLE_SIDED, HAS_ATTRIBUTES, NO_TEXTURE, Record, Reflectance, THIN_WALLED,
 };
@@ -22,6 +24,20 @@ pub(super) fn records(scene: &Scene, lights: &Lights) -> impl ExactSizeIterator<
         .iter()
         .zip(has_attributes)
         .map(|(material, has_attributes)| record(material, has_attributes))
+}
+
+/// True if photons are stored on some triangle, as the chip reads its material from the image.
+pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Lines)) -> bool {
+    let mut is_used = vec![false; scene.materials.len()];
+    for triangle in &scene.triangles {
+        is_used[triangle.material as usize] = true;
+    }
+    let mut used = scene.materials.iter().zip(is_used).filter(|(_, is_used)| *is_used);
+    used.any(|(material, _)| {
+        let material = layout::Material::read(&record(material, true));
+        // The image is our own. Were it not sound, tracing photons would say so.
+        keeps_photons(&image, &mut memory, &material).unwrap_or(true)
+    })
 }
 
 /// The record of a material, some of whose triangles may have attributes. Its textures are as many as the scene's, which `u16`

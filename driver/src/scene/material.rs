@@ -165,21 +165,7 @@ impl Material {
         }
     }
 
-    /// Returns whether the material reflects other than perfectly specularly: photons are stored where it does.
-    pub fn keeps_photons(&self) -> bool {
-        match self.reflection {
-            Reflection::Phong { diffuse, specular, .. } => (diffuse + specular).max_element() > 0.0,
-            Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
-                let is_opaque = transmission.is_none_or(|transmission| transmission.factor < 1.0);
-                let has_base =
-                    base_colour.max_element() > 0.0 && self.may_be_dielectric(metallic) && is_opaque;
-                let has_lobe = roughness > 0.0 && (dielectric + base_colour * metallic).max_element() > 0.0;
-                has_base || has_lobe
-            }
-        }
-    }
-
-    /// Returns whether the material may be dielectric somewhere: by the factor, or by a texture of metalness.
+    /// True if the material is not metal everywhere: by the factor, or by a texture of metalness.
     pub(crate) fn may_be_dielectric(&self, metallic: f32) -> bool {
         metallic < 1.0 || self.metallic_roughness_texture.is_some()
     }

@@ -97,14 +97,6 @@ impl Scene {
         self.triangles.iter().any(is_specular)
     }
 
-    /// Returns whether any triangle reflects other than perfectly specularly, so that photons can be stored.
-    pub fn keeps_photons(&self) -> bool {
-        let keeps = |triangle: &Triangle| {
-            self.materials.get(triangle.material as usize).is_some_and(Material::keeps_photons)
-        };
-        self.triangles.iter().any(keeps)
-    }
-
     /// Checks that the scene has a light, once settings were applied and an environment was added.
     ///
     /// # Errors

@@ -13,7 +13,9 @@ mod texture;
 mod triangle;
 
 pub use bvh::{AnyHit, ClosestHit, closest_hit, is_occluded};
-pub use reflection::{DecodedLobe, PartialReflection, ReflectedDirection, Reflection, Reflector};
+pub use reflection::{
+    DecodedLobe, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,
+};
 pub use seen::Seen;
 pub use specular::Specular;
 pub use surface::{Surface, read_surface};

@@ -7,7 +7,7 @@ use photoncard_shared::message::{Fault, FaultCode};
 
 use super::SceneImage;
 use crate::memory::MemoryPort;
-use crate::vector::min;
+use crate::vector::{max, min};
 
 const TEXTURES_PER_LINE: u32 = Texture::PER_LINE as u32;
 
@@ -119,6 +119,28 @@ fn texel(
     let texel = bytes.as_chunks().0.get(place);
     let texel = *texel.ok_or(Fault { code: FaultCode::Record, detail: line })?;
     Ok(decode_texel(texture.format, texel))
+}
+
+/// The least and the greatest value of each channel over all texels: linear red, green, blue and alpha.
+///
+/// # Errors
+/// If the image is not sound.
+pub(super) fn channel_ranges(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    texture: &Texture,
+) -> Result<[[f32; 2]; 4], Fault> {
+    let mut ranges = [[f32::INFINITY, f32::NEG_INFINITY]; 4];
+    let [columns, rows] = texture.size.map(u32::from);
+    for row in 0..rows {
+        for column in 0..columns {
+            let texel = texel(scene, memory, texture, [column, row])?;
+            for ([least, greatest], channel) in ranges.iter_mut().zip(texel) {
+                (*least, *greatest) = (min(channel, *least), max(channel, *greatest));
+            }
+        }
+    }
+    Ok(ranges)
 }
 
 /// What a texel stands for: linear red, green, blue and alpha.

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | is anything reflected; is there a Lambertian part | [`Reflection`] |
 //! | `f`, densities, sampled directions, albedos, seen from one direction | [`Reflector`] |
+//! | are photons stored on a material's surfaces | [`keeps_photons`] |
 //! | the record of a gather that waits, and the photons that it reflects | [`PartialReflection`] |
 //!
 //! A reflection is a Lambertian part and one lobe. Callers name neither the lobe's model nor its parameters: a model is a file
@@ -15,6 +16,7 @@ mod phong;
 mod record;
 mod reflector;
 
+pub use material::keeps_photons;
 pub(super) use material::{Scattering, Texel, View, scattering};
 pub use record::{DecodedLobe, PartialReflection};
 pub use reflector::{ReflectedDirection, Reflector};
