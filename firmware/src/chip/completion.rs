@@ -1,7 +1,6 @@
-//! The completion of a pixel: what a picture tells of it besides its light.
+//! The completion of a pixel: its albedo, normal and depth.
 //!
-//! It is looked up again, over all samples: no chip has room to keep it. A pixel may have thousands of samples, so it is
-//! done in steps.
+//! They are computed again from all samples, as no chip has room to keep them; in steps, as a pixel may have thousands.
 
 use glam::Vec3;
 use photoncard_shared::message::{Fault, Pixel, PixelLayers, PixelRecord};
@@ -11,10 +10,10 @@ use crate::fixed_point::ColourSum;
 use crate::memory::MemoryPort;
 use crate::render::{Context, PixelSample, eye};
 
-/// Samples that one step looks at.
+/// Samples of one step.
 const SAMPLES_PER_STEP: u32 = 64;
 
-/// What is known of a pixel so far.
+/// Sums over the samples of a pixel so far.
 #[derive(Clone, Copy)]
 pub struct Completion {
     albedo: Vec3,
@@ -27,11 +26,11 @@ pub struct Completion {
 }
 
 impl Completion {
-    /// Nothing is known.
+    /// Sums of no sample.
     pub const NOTHING: Self =
         Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, depth: 0.0, surfaces: 0, next: 0 };
 
-    /// Looks at the next samples of the pixel in column `x` and row `y` of the picture. Returns whether they were the last.
+    /// Adds the next samples of the pixel in column `x` and row `y` of the picture. `true` if they were the last.
     ///
     /// # Errors
     /// If the image is not sound.

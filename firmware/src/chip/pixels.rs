@@ -15,7 +15,7 @@ use crate::scene::{Seen, Surface};
 /// The gather point of a sample, its directions not yet chosen.
 fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpose: Purpose) -> GatherPoint {
     let pattern = pattern(frame, at);
-    // With the cache the rays of Lambertian surfaces are those of a record, and of a pixel; without it those of a sample.
+    // With the cache, a Lambertian surface's gather rays are a pixel's in number, without it a sample's.
     let is_of_pixel = allowed_error(frame).is_some() && surface.reflection.has_lambertian();
     let rays = if is_of_pixel { frame.gather_rays.div_ceil(frame.samples.max(1)) } else { frame.gather_rays };
     if purpose == Purpose::Lobe {
@@ -33,7 +33,7 @@ impl<
     const GATHERED: usize,
 > Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
 {
-    /// What the present pixel sees in the present sample, and what of that goes straight into the picture.
+    /// Casts the eye ray of the present sample; adds the light that needs no other ray.
     pub(super) fn look<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
         let mut stored = StoredPoint::NOTHING;
@@ -65,7 +65,7 @@ impl<
         Ok(())
     }
 
-    /// Adds what needs no ray: emission and interpolated light. Returns what is left to gather rays.
+    /// Adds emission and interpolated irradiance, which need no ray. Returns the purpose of the gather rays.
     fn light_at_once<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -76,7 +76,7 @@ impl<
         let frame = context.frame;
         let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
         let sample = SeenSample { pixel: [at.x, at.y], place: eye::place(context, at), surface };
-        // What is seen by way of other surfaces is not where the records are.
+        // Records lie where eye rays meet surfaces, not behind mirrors and glass.
         let allowed = allowed_error(frame).filter(|_| is_lambertian && seen.is_some());
         let interpolated = allowed.and_then(|allowed| self.cache.interpolate(&sample, allowed));
         context.counters.lambertian_samples += u64::from(is_lambertian);
@@ -89,7 +89,7 @@ impl<
         Purpose::Lobe
     }
 
-    /// What shadow rays and caustics bring the present pixel.
+    /// Adds the light of shadow rays and caustics to the present pixel.
     pub(super) fn light_directly<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
         context.memory.enter(MemoryStage::Shadow);
@@ -109,8 +109,8 @@ impl<
         Ok(())
     }
 
-    /// Goes on to the next pixel of the present row that has rays, or to the row's last one: where irradiance is interpolated
-    /// few pixels have any, and they are looked for in every direction bin.
+    /// Goes on to the next pixel of the present row that has rays, or to the row's last one. Where irradiance is interpolated
+    /// few pixels have any, and every direction bin looks for them.
     fn skip_pixels_without_rays(&mut self) {
         let [column, row] = self.block.pixel(self.position.index);
         let first = (row * self.tile.width + column) as usize;
@@ -120,7 +120,7 @@ impl<
         self.position.index += skipped.unwrap_or(left.saturating_sub(1)) as u32;
     }
 
-    /// Gather rays of the present bin and of the next pixel of the row that has any.
+    /// Casts gather rays of the present bin, of the next pixel of the row that has any.
     pub(super) fn cast_for_pixel<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         self.skip_pixels_without_rays();
         let (index, at) = self.present();
@@ -163,7 +163,7 @@ impl<
     }
 }
 
-/// From the radiance of a sample to its part of the pixel's sum.
+/// The factor from a sample's radiance, W/(sr m^2), to its term in the pixel's sum.
 #[inline(always)]
 fn sample_share<M>(context: &Context<M>) -> f32 {
     1.0 / (context.frame.samples.max(1) as f32 * context.scene.header.radiance_unit)

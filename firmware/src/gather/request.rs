@@ -1,18 +1,18 @@
-//! A gather that waits: its place, what of its reflection is known before any photon is, and its pixel.
+//! The record of a waiting gather: place, partially evaluated reflection, pixel.
 
 use super::Place;
 use crate::scene::PartialReflection;
 
-/// A gather: where, how the photons found there are reflected, and whose sum the result goes to.
+/// A gather of photons at a place, reflected into a gather point's sum; 24 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherRequest {
     /// The place.
     pub place: Place,
     /// The reflection, times the gather ray's weight, from photon power units to radiance units.
     pub reflection: PartialReflection,
-    /// Whose sum it is: the number of a gather point on the chip.
+    /// Number of the gather point on the chip whose sum takes the result.
     pub target: u16,
-    /// The cell of the hemisphere above the gather point that the ray went through.
+    /// Cell of the hemisphere above the gather point that the ray went through.
     pub cell: u8,
 }
 

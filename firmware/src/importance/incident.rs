@@ -1,10 +1,10 @@
-//! Where the indirect light at a point comes from, as the photons nearest to it tell, and the tables made of it.
+//! Directions of the indirect light at a point, estimated from the nearest photons, and the tables made of them.
 //!
 //! The flux of the photons that came through each cell is summed, those straight from an emitter left out: their light is
 //! there already, by shadow rays. With k = 100 photons a cell holds a few, and its flux is uncertain by half of itself.
 //! A table of raw sums would cost more variance than it saves wherever light comes from all around. So the sums are
-//! drawn towards their mean by as much of their spread as the photons' number explains (James, Stein 1961): where
-//! nothing is known but noise the table is the cosine's, where few cells hold the light it is theirs.
+//! drawn towards their mean by as much of their spread as the photons' number explains (James, Stein 1961, *Estimation with
+//! quadratic loss*): a spread of noise alone gives the cosine's table, light in few cells theirs.
 
 use glam::Vec3;
 use photoncard_shared::layout::decode_direction;
@@ -19,29 +19,29 @@ use crate::sampler::radical_inverse;
 use crate::scene::Reflector;
 use crate::vector::{max, unit};
 
-/// Of a product's cells this share is divided evenly, however sure the photons are: light varies within a cell as well,
-/// which only many rays in all cells tell. It bounds the weight of a ray by twice the albedo, where the photons missed
-/// where light comes from. Measured: `docs/techniques.md`.
+/// Share of a product's cells that is divided evenly, however sure the photons are: light varies within a cell as well, and
+/// only many rays in all cells sample that. It bounds the weight of a ray by twice the albedo where light comes from a cell
+/// without photons. Measured: `docs/techniques.md`.
 const EVEN_SHARE: f32 = 0.55;
-/// Jensen's small energy of an empty cell, over the mean.
+/// Flux of an empty cell over the mean: Jensen's small energy.
 const EMPTY_CELL: f32 = 0.1;
 /// Points of the lobe whose cells are looked up.
 const LOBE_POINTS: u32 = 32;
-/// Exponent of a lobe of which a cell holds one half: its solid angle is about that of two cells.
+/// Sharpness of a lobe of which a cell holds one half: its solid angle is about that of two cells.
 const HALF_HELD_SHARPNESS: f32 = 16.0;
-/// At the least this part of the lobe's albedo's share goes to the lobe's entry.
+/// Least share of the lobe's entry, over the lobe's share of the albedos.
 const LOBE_PART: f32 = 0.25;
 
 /// Flux through the cells of the hemisphere: the photons' power weighted by a colour, in photon power units.
 pub struct IncidentFlux {
     cells: [Sum; CELLS],
-    /// Of the squares of the photons' powers.
+    /// Sum of the squares of the photons' powers.
     squares: Sum,
 }
 
 impl IncidentFlux {
-    /// Of the photons nearest to a point, of its surface, that did not come straight from an emitter; each channel of
-    /// their power is weighted by that of `colour`, which is at most about 1. `normal_code` is the code of `normal`.
+    /// The flux of the photons nearest to a point, on its surface, that did not come straight from an emitter. `colour`, at most
+    /// about 1, weights the channels of their power. `normal_code` is the code of `normal`.
     pub fn new(nearest: &NearestPhotons, normal: Vec3, normal_code: u8, colour: Vec3) -> Self {
         let mut flux = Self { cells: [Sum::ZERO; CELLS], squares: Sum::ZERO };
         let mut same_surface = SameSurface::new(normal_code);
@@ -119,7 +119,7 @@ fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
         let (Some(reflected), Some(flux)) = (cells.get_mut(cell as usize), flux.get(cell as usize)) else {
             continue;
         };
-        // The radiance of the cell, over the lobe's point of it; the factor of a projected solid angle of 1 is 1.
+        // The cell's radiance at the lobe's point, where f / p weights it.
         let cosine = reflector.normal.dot(direction);
         let brought = scale * flux * cosine * reflector.lobe_gain(direction);
         *reflected += held * brought;
@@ -130,7 +130,7 @@ fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     DirectionTable::new(&cells, max(lobe, least))
 }
 
-/// Points of the lobe, each with the cell it lies in and its cosine to the normal; those below the surface are left out.
+/// Directions of the lobe, each with its cell; directions below the surface are left out.
 fn lobe_points(reflector: &Reflector) -> impl Iterator<Item = (u8, Vec3)> {
     (0..LOBE_POINTS).filter_map(move |index| {
         let point = [radical_inverse(index), (index as f32 + 0.5) / LOBE_POINTS as f32];

@@ -1,16 +1,16 @@
-//! Which way a final gather ray goes: importance sampling of the reflection function, of the photons, or of both.
+//! Directions of final gather rays: importance sampling of the reflection function, of the photons, or of both.
 //!
-//! Every surface point that gather rays start from has a [`DirectionTable`]: 4x8 cells of the hemisphere and the Phong
-//! lobe as one more entry, each with a share of the rays. A stratified pattern is sent through the table's inverse
+//! Every surface point that gather rays start from has a [`DirectionTable`]: 4x8 cells of the hemisphere and the
+//! reflection's lobe as one more entry, each with a share of the rays. A stratified pattern is sent through the table's inverse
 //! cumulative distribution, and the density of the whole mixture weights each ray, so that no choice of shares biases
-//! the picture. What differs between the samplings is only where the shares come from:
+//! the picture. The samplings differ in the source of the shares alone:
 //!
 //! | sampling | share of a cell | share of the lobe |
 //! |---|---|---|
-//! | reflection | the Lambertian albedo's, all cells alike | the lobe's albedo's |
+//! | reflection | the Lambertian albedo, all cells alike | the lobe's albedo |
 //! | photon (Jensen 1995, *Importance driven path tracing using the photon map*) | the flux of the photons that came through it | none |
-//! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | that flux, reflected | what of the lobe a cell cannot hold |
-//! | mixture | the mean of reflection and photon | half the lobe's albedo's |
+//! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | that flux, reflected | the part of the lobe that is narrower than a cell |
+//! | mixture | the mean of reflection and photon | half the lobe's albedo |
 //!
 //! Table entries are the direction bins of generative reordering as well: see [`DirectionTable::rays`].
 
@@ -25,12 +25,12 @@ pub use table::{DirectionTable, ENTRIES};
 
 use glam::Vec3;
 
-/// A direction and what the radiance from there counts.
+/// A direction of a gather ray, and the weight of the radiance from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherDirection {
     /// Unit vector away from the surface.
     pub direction: Vec3,
-    /// `f cos(theta) / p`, without unit: what the radiance from this direction is multiplied with.
+    /// `f cos(theta) / p`, without unit: the factor of the radiance from this direction.
     pub weight: Vec3,
     /// Probability density of the direction, 1/sr.
     pub density: f32,

@@ -1,4 +1,4 @@
-//! The table of one surface point: how many of its gather rays go which way.
+//! The table of one surface point: shares of its gather rays by direction.
 
 use core::f32::consts::FRAC_1_PI;
 use core::ops::Range;
@@ -31,7 +31,7 @@ impl Default for DirectionTable {
 }
 
 impl DirectionTable {
-    /// All cells alike: the cosine's density.
+    /// Equal cells: the density `cos(theta) / pi`.
     pub const COSINE: Self = Self { cells: [1; CELLS], lobe: 0 };
 
     /// A table in proportion to `cells` and `lobe`, which are finite and not negative; no cell is left empty unless all
@@ -43,7 +43,7 @@ impl DirectionTable {
         }
         let scale = u8::MAX as f32 / greatest;
         let cells = cells.map(|cell| ((cell * scale + 0.5) as u8).max(1));
-        // The conversion takes what is above the greatest number as that.
+        // The conversion saturates.
         let lobe = if lobe > 0.0 { ((lobe * scale + 0.5) as u16).max(1) } else { 0 };
         Self { cells, lobe }
     }
@@ -53,7 +53,7 @@ impl DirectionTable {
         self.cells.iter().map(|&share| share as u32).sum::<u32>() + self.lobe as u32
     }
 
-    /// The part of all rays that goes to a cell by itself, not counting what of the lobe's goes there.
+    /// The share of all rays that a cell's own entry has, without the lobe's rays through the cell.
     pub(crate) fn cell_share(&self, cell: usize) -> f32 {
         self.cells.get(cell).map_or(0.0, |&share| share as f32) / self.total() as f32
     }
@@ -83,12 +83,12 @@ impl DirectionTable {
         self.first_ray(pattern, count, bin, bins)..self.first_ray(pattern, count, bin + 1, bins)
     }
 
-    /// The first ray that is not before the beginning of a bin.
+    /// The first ray at or behind the beginning of a bin.
     fn first_ray(&self, pattern: Pattern, count: u32, bin: u32, bins: u32) -> u32 {
         let [entry, part] = [bin * ENTRIES as u32 / bins, bin * ENTRIES as u32 % bins];
-        // In units of 1 / bins of a share, so that all is whole.
+        // In units of 1 / bins of a share: whole numbers.
         let beginning = (self.before(entry as usize) * bins + self.share(entry as usize) * part) as u64;
-        // No table is without a share, but the compiler does not know.
+        // Every table has a share; the compiler cannot see it.
         let total = (self.total() * bins).max(1) as u64;
         let ray = (beginning * count as u64 / total) as u32;
         let is_before = ray < count && stratum_point(pattern, ray) * total < beginning * whole(count);
@@ -301,7 +301,7 @@ mod tests {
                 integral += (table.density(&reflector, direction) * solid_angle) as f64;
             }
         }
-        // What of the lobe lies below the surface is lost: hardly anything here.
+        // The part of the lobe below the surface is lost: hardly any here.
         assert!((integral - 1.0).abs() < 5e-3, "{integral}");
     }
 

@@ -9,10 +9,10 @@
 //!   of a thin wall, and those on the other wall of a corner.
 //! - `c` is the area of all surface whose photons the search finds and the sum takes, in units of the disc's: without it
 //!   every edge and corner darkens, and stacked surfaces glow. The host measures it around each photon, for about that
-//!   photon's own distance to its k-th neighbour; the nearest photon of the same surface tells it here. At the distance of
+//!   photon's own distance to its k-th neighbour; here the nearest photon of the surface carries it. At the distance of
 //!   the nearest of k photons, about r / sqrt(k), c has hardly changed.
 //!
-//! What is left is the estimate's blur: the radiance is a mean over the disc.
+//! The estimate's blur remains: the radiance is a mean over the disc.
 
 use core::f32::consts::PI;
 
@@ -25,27 +25,27 @@ use crate::scene::{DecodedLobe, PartialReflection, magnitude};
 use crate::simd::{self, Isa, Kernel};
 use crate::vector::{max, unit};
 
-/// Photons whose surface normal is at a lesser cosine to the query's belong to another surface.
+/// Least cosine between the surface normals of a photon and of the query on one surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
 
-/// The radius of a disc is at least this share of the place's greatest coordinate, about its rounding: photons in one
-/// point have no density.
+/// Least radius of a disc over the place's greatest coordinate, about the rounding of the place: photons in one point have
+/// no density.
 const MIN_RADIUS_SHARE: f32 = 1e-6;
 
-/// What a gather at a position adds to its pixel, in the units of the reflection: the photons' power over the area of their
-/// disc, reflected.
+/// The radiance of a gather at a position, in the units of the reflection: the photons' power over the area of their disc,
+/// reflected.
 #[inline(always)]
 pub fn reflected_radiance(nearest: &NearestPhotons, position: Vec3, reflection: &PartialReflection) -> Vec3 {
     simd::run(Estimate { nearest, position, reflection })
 }
 
-/// What [`reflected_radiance`] does, for any processor.
+/// The [`Kernel`] of [`reflected_radiance`].
 pub struct Estimate<'a, 'n> {
     /// The photons nearest to a place.
     pub nearest: &'a NearestPhotons<'n>,
     /// The place, metres.
     pub position: Vec3,
-    /// How the surface there reflects.
+    /// The reflection there.
     pub reflection: &'a PartialReflection,
 }
 
@@ -69,7 +69,7 @@ impl Kernel for Estimate<'_, '_> {
     }
 }
 
-/// The first or the last candidate, as `choose` tells of distances and `is_better` of candidates.
+/// The first or the last candidate: `choose` orders distances, `is_better` candidates of one distance.
 #[inline(always)]
 fn extreme(
     nearest: &NearestPhotons,
@@ -90,7 +90,7 @@ fn extreme(
     best
 }
 
-/// The closest of the photons of the same surface, and the sums of those; without the farthest of all, if it is given.
+/// The closest photon of the surface, and the sums over its photons; `farthest`, if given, is left out.
 #[inline(always)]
 fn sum<'a>(
     nearest: &NearestPhotons,
@@ -100,7 +100,7 @@ fn sum<'a>(
     let (_, contents) = nearest.columns();
     let mut sums = Sums::new(reflection);
     if reflection.is_lambertian() && are_all_of(reflection.normal(), contents) {
-        // What is alone is the farthest.
+        // A single photon is the farthest itself.
         if farthest.is_some() && contents.len() < 2 {
             return None;
         }
@@ -112,7 +112,7 @@ fn sum<'a>(
         return Some((closest, sums));
     }
     let mut same_surface = SameSurface::new(reflection.normal());
-    // Of several that are equal to the farthest one is left out.
+    // Of several photons equal to the farthest, one is left out.
     let mut excluded = farthest;
     let mut closest: Option<Candidate> = None;
     for candidate in nearest.candidates() {
@@ -128,7 +128,7 @@ fn sum<'a>(
     Some((closest?, sums))
 }
 
-/// Whether all photons have a normal of this code.
+/// `true` if every photon has a normal of this code.
 #[inline(always)]
 fn are_all_of(normal: u8, contents: &[u64]) -> bool {
     let differ =
@@ -136,10 +136,10 @@ fn are_all_of(normal: u8, contents: &[u64]) -> bool {
     differ & 0xff << NORMAL_SHIFT == 0
 }
 
-/// Where a normal's code is in what a photon carries.
+/// First bit of the normal's code in a photon's contents.
 const NORMAL_SHIFT: u32 = 50;
 
-/// The photons' power, and the lobe's share of it.
+/// The sum of the photons' power, and the lobe's sum.
 struct Sums<'a> {
     reflection: &'a PartialReflection,
     decoded: DecodedLobe,
@@ -169,21 +169,21 @@ impl<'a> Sums<'a> {
     }
 }
 
-/// Tells the photons of one surface; neighbours mostly have the normal of the one before.
+/// The test for photons of one surface. Neighbours mostly have the normal of the one before, whose answer is kept.
 pub struct SameSurface {
     normal: Vec3,
     last: (u8, bool),
 }
 
 impl SameSurface {
+    /// The test for a surface whose normal has this code.
     #[inline(always)]
-    /// Photons whose surface normal is near the one that this code stands for.
     pub fn new(code: u8) -> Self {
         Self { normal: unit(decode_normal(code).into()), last: (code, true) }
     }
 
+    /// `true` for a photon of the surface, by its normal's code.
     #[inline(always)]
-    /// Whether a photon of this normal's code is one.
     pub fn holds(&mut self, code: u8) -> bool {
         if self.last.0 != code {
             let other = unit(decode_normal(code).into());

@@ -12,7 +12,7 @@ use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, reflected_radiance};
 use crate::scene::PartialReflection;
 
-/// Radiance that a point reflects of the light of caustics, in the image's radiance units.
+/// Radiance of reflected caustics at a point, in the image's radiance units.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -34,7 +34,7 @@ pub fn reflected<M: MemoryPort>(
     search(context, PhotonMap::Caustics, position, &mut nearest)?;
     let header = &context.scene.header;
     let unit = header.caustic_power_unit / header.radiance_unit;
-    // Light is reflected by the smooth normal, photons lie on the triangle.
+    // The shading normal reflects; photons carry the triangle's.
     let surface = &point.surface;
     let reflection =
         PartialReflection::encode(&surface.reflector(), Vec3::splat(unit), point.pattern.dither(0))

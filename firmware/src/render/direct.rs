@@ -29,10 +29,10 @@ use crate::scene::light::{
 use crate::scene::{Ray, Surface, is_occluded};
 use crate::vector::max_component;
 
-/// A shadow ray ends this share short of its target, for the rounding of its length.
+/// Length of a shadow ray over the distance of its target: it ends short of it by the rounding.
 const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
 
-/// Radiance, W/(sr m^2), that a point reflects of the light that comes straight from lights: the shadow rays' share.
+/// Reflected direct light at a point, W/(sr m^2): the share of shadow rays.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -61,7 +61,7 @@ pub fn reflected<M: MemoryPort>(
     Ok(sum / frame.shadow_rays as f32)
 }
 
-/// What one sample of the lights adds.
+/// Reflected radiance of one light sample, W/(sr m^2).
 fn from_light<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
@@ -80,7 +80,7 @@ fn from_light<M: MemoryPort>(
     }
     let cosine = surface.normal.dot(direction);
     let reflector = point.reflector();
-    // What has no extent is found by light samples alone.
+    // Lights without extent are found by light samples alone.
     let weight = density.map_or(1.0, |density| {
         let by_gather_rays = (point.rays, point.directions.density(&reflector, direction));
         balance((context.frame.shadow_rays, density), by_gather_rays)
@@ -112,7 +112,7 @@ pub fn seen_by_gather_ray<M: MemoryPort>(
     if max_component(met.emission) <= 0.0 {
         return Ok(Vec3::ZERO);
     }
-    // Light samples are of emitters alone: what is too dark to be one is met by gather rays only.
+    // Light samples are of emitters alone; surfaces too dark to be one are met by gather rays only.
     let density = match met.emitter {
         Some(emitter) => {
             let receiver = Receiver::new(&point.surface);
@@ -180,14 +180,14 @@ fn balance(way: (u32, f32), other: (u32, f32)) -> f32 {
     1.0 / (1.0 + ratio(other, way))
 }
 
-/// The same by the power heuristic with the exponent 2.
+/// [`balance`] by the power heuristic with the exponent 2 (Veach, Guibas 1995).
 #[inline(always)]
 fn power(way: (u32, f32), other: (u32, f32)) -> f32 {
     let ratio = ratio(other, way);
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// How many times more of a path's samples are found one way than the other; a way without rays finds none.
+/// Expected samples of a path one way over the other; a way without rays has none.
 #[inline(always)]
 fn ratio((rays, density): (u32, f32), (other_rays, other_density): (u32, f32)) -> f32 {
     if rays == 0 {

@@ -1,7 +1,6 @@
 //! The final gather: rays over the hemisphere, each ending in a gather of the photons nearest to its end.
 //!
-//! What a ray meets may emit as well: that is direct light, weighted against the shadow rays that bring it too
-//! ([`super::direct`]).
+//! Emission at a ray's end is direct light, weighted against the shadow rays that bring it too ([`super::direct`]).
 
 use glam::Vec3;
 use photoncard_shared::message::{Fault, Radiance};
@@ -15,19 +14,19 @@ use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irrad
 use crate::scene::light::environment_radiance;
 use crate::scene::{PartialReflection, Ray, closest_hit, read_surface};
 
-/// What the end of a final gather ray brings.
+/// The light at the end of a final gather ray.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherRayEnd {
     /// The cell of the hemisphere that the ray went through.
     pub cell: u8,
     /// Direct light of the emitter or the environment it met, weighted, in the image's radiance units.
     pub direct: Vec3,
-    /// The gather of what is reflected there, if anything is.
+    /// The gather of reflected light; `None` at a black surface.
     pub request: Option<GatherRequest>,
 }
 
-/// Casts ray `index` of a gather point; `None` if it meets nothing, the environment neither. What it brings is its share of the mean over all
-/// rays of the point, times `share`; the request's results go to `target`.
+/// Casts ray `index` of a gather point; `None` if it meets neither a surface nor the environment. Its light is its term of the
+/// mean over all rays of the point, times `share`; the request's result goes to `target`.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -82,7 +81,7 @@ pub fn cast<M: MemoryPort>(
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct: emitted * weight * unit, request }))
 }
 
-/// What a gather ray brings of the environment, if there is one, where it leaves the scene.
+/// The environment's light where a gather ray leaves the scene; `None` without an environment.
 #[inline(never)]
 fn escaped<M: MemoryPort>(
     context: &mut Context<M>,
@@ -109,7 +108,7 @@ fn beyond_specular<M>(context: &Context<M>) -> f32 {
     if context.frame.caustics.is_none() { 1.0 } else { 0.0 }
 }
 
-/// Does a gather: what it adds to its target, in the image's radiance units.
+/// Does a gather. Returns its radiance, in the image's radiance units.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -120,7 +119,7 @@ pub fn gathered<M: MemoryPort>(
 ) -> Result<Vec3, Fault> {
     context.memory.enter(Stage::Gather);
     let position = request.place.position(&context.scene.header.photon_grid).into();
-    // Irradiance does not tell where the light came from, which a lobe asks for.
+    // A lobe needs the directions of light, which irradiance does not hold.
     if context.frame.radiance == Radiance::Precomputed && request.reflection.is_lambertian() {
         return Ok(
             request.reflection.lambertian() * irradiance(context, position, request.reflection.normal())?

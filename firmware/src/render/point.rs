@@ -1,4 +1,4 @@
-//! Gather points: where final gather rays start, what they are for and how they are spread.
+//! Gather points: origin, purpose and directions of final gather rays.
 
 use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{Fault, Sampling};
@@ -11,34 +11,34 @@ use crate::photon::{Candidates, NearestPhotons, PhotonMap};
 use crate::sampler::Pattern;
 use crate::scene::{Reflector, Surface};
 
-/// The start of some gather rays.
+/// The origin of gather rays.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherPoint {
-    /// The surface; its reflection is all of it.
+    /// The surface, with its whole reflection whatever the purpose.
     pub surface: Surface,
-    /// Where the rays' random numbers come from.
+    /// The rays' random numbers.
     pub pattern: Pattern,
-    /// Number of rays; with none, direct light is left to shadow rays.
+    /// Number of rays; with 0, direct light is left to shadow rays.
     pub rays: u32,
-    /// Which way they go.
+    /// Shares of the rays by direction.
     pub directions: DirectionTable,
-    /// What they are for.
+    /// The purpose of the rays.
     pub purpose: Purpose,
 }
 
-/// What the gather rays of a point are for.
+/// The purpose of a point's gather rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// All light that a sample reflects.
     Sample,
-    /// What the Phong lobe of a sample reflects, as irradiance records light the Lambertian part.
+    /// Light that the lobe of a sample reflects; irradiance records light its Lambertian part.
     Lobe,
     /// The irradiance of a record, which many samples share.
     Record,
 }
 
 impl GatherPoint {
-    /// A point for all that a sample reflects.
+    /// A point for all light that a sample reflects.
     pub fn sample(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = if surface.reflection.is_black() { 0 } else { rays };
         Self { surface, pattern, rays, directions: DirectionTable::COSINE, purpose: Purpose::Sample }
@@ -49,13 +49,13 @@ impl GatherPoint {
         Self { surface, pattern, rays, directions: DirectionTable::COSINE, purpose: Purpose::Record }
     }
 
-    /// A point for the lobe of a surface, with the lobe's share of the rays.
+    /// A point for the lobe of a surface, with [`Reflector::lobe_share`] of the rays.
     pub fn lobe(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = libm::ceilf(rays as f32 * surface.reflector().lobe_share()) as u32;
         Self { surface, pattern, rays, directions: DirectionTable::COSINE, purpose: Purpose::Lobe }
     }
 
-    /// The reflection that the rays bring light for, seen from where they go.
+    /// The reflection that the rays serve, seen from the eye.
     #[inline(always)]
     pub fn reflector(&self) -> Reflector {
         let Surface { normal, outgoing, reflection, .. } = self.surface;
@@ -64,7 +64,7 @@ impl GatherPoint {
         Reflector { normal, outgoing, reflection }
     }
 
-    /// Chooses the directions, from the photons nearest to the point if the sampling asks for them.
+    /// Chooses the directions; samplings by photons search those nearest to the point.
     ///
     /// # Errors
     /// If the image is not sound.

@@ -1,10 +1,10 @@
 //! Paths through perfectly specular surfaces: mirrors, smooth coats, smooth glass.
 //!
-//! Where a ray meets such a surface one of its directions is taken at random, in proportion to what it carries: it is
-//! reflected, goes through, or stays for what the surface does besides. A path is that of one ray; many samples of a
-//! pixel take all of its ways. It ends, black, after [`SPECULAR_BOUNCES`].
+//! Where a ray meets such a surface, one way is taken at random, in proportion to its share of the light: the path is
+//! reflected, transmitted, or stays for the rest of the reflection. The samples of a pixel take all ways. A path ends, black,
+//! after [`SPECULAR_BOUNCES`].
 //!
-//! Absorption is by Beer and Lambert, of the glass that the path has entered last; glass in glass is not kept track of.
+//! Absorption follows the law of Beer and Lambert in the glass entered last; glass within glass is not kept track of.
 
 use glam::Vec3;
 use photoncard_shared::budget::SPECULAR_BOUNCES;
@@ -15,28 +15,28 @@ use crate::memory::MemoryPort;
 use crate::scene::{Hit, Ray, Surface, closest_hit, read_surface};
 use crate::vector::{max, max_component};
 
-/// The least chance to stay where anything besides is reflected, of that to go on.
+/// Least probability to stay over that to go on, where the reflection is not black.
 const LEAST_STAY: f32 = 1.0 / 16.0;
 
-/// A path on its way.
+/// A path through specular surfaces, up to its present ray.
 #[derive(Clone, Copy, Debug)]
 pub struct SpecularPath {
-    /// The present part of it.
+    /// The present ray.
     pub ray: Ray,
-    /// What of light along the ray is brought to the path's origin, or the other way.
+    /// Throughput between the path's origin and the present ray, without unit.
     pub throughput: Vec3,
-    /// Specular surfaces behind.
+    /// Specular surfaces passed.
     pub bounces: u32,
-    /// How far the first of them was, metres.
+    /// Distance of the first of them from the origin, metres.
     pub first_distance: f32,
-    /// What is carried along it.
+    /// The quantity that is carried.
     carried: Carried,
     /// Absorption coefficient around the ray, 1/m.
     absorption: Vec3,
 }
 
-/// What a path carries: across the surface of glass radiance changes with the square of the index of refraction, and power
-/// does not.
+/// The quantity that a path carries. At the surface of glass, radiance changes with the square of the index of refraction
+/// (Veach 1997, section 5.2); power does not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Carried {
     /// Radiance, against the way that the path is followed.
@@ -45,7 +45,7 @@ pub enum Carried {
     Power,
 }
 
-/// How a path goes on at a surface.
+/// The continuation of a path at a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
     /// It ends there.
@@ -56,14 +56,14 @@ pub enum Arrival {
     Lost,
 }
 
-/// Where a path has ended.
+/// The end of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathEnd {
     /// On a surface.
     Surface,
-    /// Nowhere: it left the scene.
+    /// Outside the scene.
     Escaped,
-    /// It was lost on its way.
+    /// Lost: see [`Arrival::Lost`].
     Lost,
 }
 
@@ -74,7 +74,7 @@ impl SpecularPath {
         Self { ray, throughput: Vec3::ONE, bounces: 0, first_distance: 0.0, carried, absorption: Vec3::ZERO }
     }
 
-    /// Arrives at a surface; `random` in [0, 1) says which way to go.
+    /// Arrives at a surface; `random` in [0, 1) chooses the way.
     #[inline(always)]
     pub fn arrive(&mut self, surface: &Surface, random: f32) -> Arrival {
         if surface.specular.is_none() && self.absorption == Vec3::ZERO {
@@ -98,7 +98,7 @@ impl SpecularPath {
         let [reflected, transmitted] = [specular.reflected, specular.transmitted].map(max_component);
         let goes = reflected + transmitted;
         let stays = max_component(surface.reflector().albedo());
-        // Not so seldom that a path that stays is a firefly; an emitter is seen half of the time.
+        // Often enough that a path that stays is no firefly; at an emitter half of the time.
         let stays = if stays > 0.0 { max(stays, goes * LEAST_STAY) } else { 0.0 };
         let stays = if max_component(surface.emission) > 0.0 { max(stays, goes) } else { stays };
         let all = goes + stays;
@@ -123,8 +123,8 @@ impl SpecularPath {
         Arrival::GoesOn
     }
 
-    /// Follows the path from a perfectly specular surface that it has come to, to its end: what is met there takes the place of
-    /// `surface` and `hit`. `random` gives a number in [0, 1) for each bounce.
+    /// Follows the path from a perfectly specular surface to its end, which replaces `surface` and `hit`. `random` gives a number
+    /// in [0, 1) for each bounce.
     ///
     /// # Errors
     /// If the image is not sound.

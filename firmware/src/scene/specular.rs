@@ -1,26 +1,26 @@
-//! The perfectly specular part of a surface: what mirrors, smooth coats and smooth glass do with light.
+//! The perfectly specular part of a surface: mirrors, smooth coats, smooth glass.
 
 use glam::Vec3;
 
 use crate::vector::{max, mirror, unit};
 
-/// What leaves a surface in one direction, or in two.
+/// Light that leaves a surface in one direction, or in two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Specular {
-    /// The share that is reflected to the mirror direction.
+    /// Reflectance, to the mirror direction, 0 to 1.
     pub reflected: Vec3,
-    /// The share that goes through.
+    /// Transmittance, 0 to 1.
     pub transmitted: Vec3,
-    /// Where that goes: a unit vector behind the surface.
+    /// Direction of transmitted light: a unit vector behind the surface.
     pub behind: Vec3,
-    /// Absorption coefficient of what is behind, 1/m.
+    /// Absorption coefficient behind the surface, 1/m.
     pub absorption: Vec3,
-    /// Radiance in front over that behind, of light that comes through whole: the inverse square of the index of refraction.
+    /// Radiance in front over radiance behind at a transmittance of 1: `1 / n^2`, n the index of refraction.
     pub radiance_scale: f32,
 }
 
 impl Specular {
-    /// Nothing is reflected perfectly specularly.
+    /// No perfectly specular part.
     pub const NONE: Self = Self {
         reflected: Vec3::ZERO,
         transmitted: Vec3::ZERO,
@@ -34,18 +34,18 @@ impl Specular {
         Self { reflected, ..Self::NONE }
     }
 
-    /// A share of it.
+    /// Both shares times another.
     pub(super) fn dimmed(self, share: f32) -> Self {
         Self { reflected: self.reflected * share, transmitted: self.transmitted * share, ..self }
     }
 
-    /// Whether there is none.
+    /// `true` if nothing is reflected or transmitted perfectly specularly.
     #[inline(always)]
     pub fn is_none(&self) -> bool {
         self.reflected == Vec3::ZERO && self.transmitted == Vec3::ZERO
     }
 
-    /// The mirror direction of `outgoing` about a shading normal; if that is behind the surface, about its geometric one.
+    /// The mirror direction of `outgoing` about a shading normal; about the geometric one where that is behind the surface.
     pub(crate) fn reflected_direction(outgoing: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
         let direction = mirror(outgoing, normal);
         if direction.dot(geometric_normal) > 0.0 { direction } else { mirror(outgoing, geometric_normal) }
@@ -61,14 +61,14 @@ pub(super) struct Glass {
     pub(super) transmission: f32,
     /// Index of refraction.
     pub(super) ior: f32,
-    /// Of what such a dielectric reflects, the share that this one does.
+    /// Factor of the reflectance: `KHR_materials_specular`.
     pub(super) specular: f32,
     pub(super) is_thin: bool,
 }
 
 impl Glass {
-    /// What it does with light, and the albedo of its Lambertian part. Normals are on the side of `outgoing`, which is the
-    /// inside if `is_inside`.
+    /// The albedo of the Lambertian part, and the specular part. Normals are on the side of `outgoing`, which is the inside if
+    /// `is_inside`.
     pub(super) fn at(
         &self,
         outgoing: Vec3,
@@ -78,9 +78,9 @@ impl Glass {
         let cosine = max(normal.dot(outgoing), 0.0);
         let index = if is_inside && !self.is_thin { 1.0 / self.ior } else { self.ior };
         let (reflectance, cosine_behind) = fresnel(cosine, index);
-        // Where nothing is refracted all is reflected.
+        // Total reflection where nothing is refracted.
         let reflectance = if cosine_behind > 0.0 { reflectance * self.specular } else { reflectance };
-        // Of a thin wall both faces reflect, again and again (Stokes 1862).
+        // Both faces of a thin wall reflect, again and again (Stokes 1862).
         let reflectance = if self.is_thin { 2.0 * reflectance / (1.0 + reflectance) } else { reflectance };
         let refracted = unit(normal * (cosine / index - cosine_behind) - outgoing * (1.0 / index));
         let behind =
@@ -103,7 +103,7 @@ impl Glass {
 fn fresnel(cosine: f32, index: f32) -> (f32, f32) {
     let sine_squared = (1.0 - cosine * cosine) / (index * index);
     let cosine_squared = 1.0 - sine_squared;
-    // An index that is no number refracts nothing.
+    // An index of NaN refracts nothing.
     if cosine_squared.is_nan() || cosine_squared <= 0.0 {
         return (1.0, 0.0);
     }

@@ -1,4 +1,4 @@
-//! What a ray finds where it meets a triangle: its material there, textures applied, seen from the ray's side.
+//! Surfaces: a triangle's material at the point where a ray meets it, textures applied, seen from the ray's side.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -27,21 +27,21 @@ pub struct Surface {
     pub geometric_normal: Vec3,
     /// Unit vector back along the ray.
     pub outgoing: Vec3,
-    /// How this side reflects, its perfectly specular part apart; black on the back of a one-sided surface.
+    /// The reflection of this side, without its perfectly specular part; black on the back of a one-sided surface.
     pub reflection: Reflection,
-    /// What of light it reflects or lets through perfectly specularly.
+    /// The perfectly specular part.
     pub specular: Specular,
-    /// Absorption coefficient of what the ray came through, 1/m, where the surface is the inside of glass.
+    /// Absorption coefficient of the glass that the ray came through, 1/m; zero in air.
     pub absorption: Vec3,
     /// Radiance that this side emits, W/(sr m^2).
     pub emission: Vec3,
     /// Index of the emitter that the surface belongs to, if it is one.
     pub emitter: Option<u32>,
-    /// Whether the other side does the same.
+    /// `true` if the other side reflects and emits as well.
     pub double_sided: bool,
     /// Distance along the ray, metres.
     pub distance: f32,
-    /// The greatest coordinate that the point was computed from, metres: its rounding is in proportion.
+    /// Greatest coordinate that the point was computed from, metres: its rounding is in proportion.
     pub magnitude: f32,
 }
 
@@ -64,7 +64,7 @@ impl Surface {
         }
     }
 
-    /// The same without smooth shading: what photons are stored at, and gathers look for.
+    /// The surface without smooth shading, as photons are stored on it and gathers search them.
     #[inline(always)]
     pub fn flat(self) -> Self {
         Self { normal: self.geometric_normal, ..self }
@@ -77,7 +77,7 @@ impl Surface {
         Reflector { normal, outgoing, reflection }
     }
 
-    /// The same with its light dimmed, before it gets to whoever looks.
+    /// The surface seen through a throughput: reflection and emission times it.
     #[inline(always)]
     pub fn dimmed(mut self, throughput: Vec3) -> Self {
         self.reflection = self.reflection.dimmed(throughput);
@@ -91,25 +91,25 @@ impl Surface {
         offset_origin(self.position, self.geometric_normal, self.magnitude)
     }
 
-    /// The same on the other side.
+    /// [`Self::offset_origin`] on the other side.
     pub fn offset_behind(&self) -> Vec3 {
         offset_origin(self.position, -self.geometric_normal, self.magnitude)
     }
 
-    /// Whether a direction is on the side that the surface is seen from, by both of its normals: light from elsewhere does
-    /// not reach it, however it is shaded.
+    /// `true` for a direction on the viewer's side by both normals: light from elsewhere does not reach the surface, however it
+    /// is shaded.
     #[inline(always)]
     pub fn is_above(&self, direction: Vec3) -> bool {
         self.normal.dot(direction) > 0.0 && self.geometric_normal.dot(direction) > 0.0
     }
 
-    /// Unit vector to where light that came along the ray is mirrored.
+    /// The mirror direction of the ray, a unit vector away from the surface.
     pub fn mirrored(&self) -> Vec3 {
         Specular::reflected_direction(self.outgoing, self.normal, self.geometric_normal)
     }
 }
 
-/// Reads what a ray finds where it meets a triangle.
+/// Reads the surface where a ray meets a triangle.
 ///
 /// # Errors
 /// If the triangle's material is not in the image.
@@ -176,7 +176,7 @@ pub(super) fn surface_of(
     finished(scene, memory, bare, (index, weights, is_front), &material)
 }
 
-/// Whether a material is all that there is to its surfaces.
+/// `true` for a material whose surfaces have neither textures nor attributes.
 #[inline(always)]
 fn is_plain(material: &Material) -> bool {
     material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0
@@ -223,15 +223,14 @@ fn rgb([red, green, blue, _]: [f32; 4]) -> Vec3 {
     Vec3::new(red, green, blue)
 }
 
-/// The cosine to the viewer that a shading normal has at the least.
-const LEAST_COSINE: f32 = 0.01;
+/// Least cosine between a shading normal and the direction to the viewer.
+const MIN_COSINE: f32 = 0.01;
 
-/// A shading normal turned towards the viewer where it is turned away, as it may be at the edge of what is round.
+/// A shading normal, turned towards the viewer where it points away, as it may at a silhouette.
 fn shading_normal(normal: Vec3, bare: &Surface) -> Vec3 {
     let cosine = normal.dot(bare.outgoing);
-    let turned =
-        if cosine < LEAST_COSINE { normal + bare.outgoing * (LEAST_COSINE - cosine) } else { normal };
+    let turned = if cosine < MIN_COSINE { normal + bare.outgoing * (MIN_COSINE - cosine) } else { normal };
     let turned = unit(turned);
-    // What has no direction, or is on the wrong side after all, is flat.
+    // Without a direction, or on the wrong side still: flat.
     if turned.dot(bare.geometric_normal) > 0.0 { turned } else { bare.geometric_normal }
 }

@@ -25,13 +25,13 @@ use super::phong::PhongLobe;
 use crate::scene::specular::Specular;
 use crate::vector::{max, max_component, min};
 
-/// What of the reflectance at normal incidence makes that at grazing incidence 1: 1 / 0.04, of an index of refraction of 1.5.
-const GRAZING: f32 = 25.0;
+/// F90 = min(25 F0, 1). 25 = 1 / 0.04, the F0 of an index of refraction of 1.5.
+const F90_OVER_F0: f32 = 25.0;
 
-/// What of the way from normal to grazing incidence is the mean over pairs of directions, each distributed by the cosine.
+/// Mean of Schlick's `(1 - cos)^5` over pairs of directions, each distributed by the cosine.
 const MEAN_OF_PAIRS: f32 = 0.0037;
 
-/// The albedo of a metal's lobe over the mean that GGX reflects.
+/// The albedo of a metal's lobe over the mean albedo of GGX.
 const METAL_GAIN: f32 = 1.1;
 
 /// A metallic-roughness surface at one place, textures applied.
@@ -44,10 +44,9 @@ pub(super) struct MetallicRoughness {
 }
 
 impl MetallicRoughness {
-    /// The reflectance of the dielectric at grazing incidence: 1, and less where the material asks for less than a
-    /// dielectric's.
+    /// F90 of the dielectric.
     fn grazing(&self) -> f32 {
-        min(max_component(self.dielectric) * GRAZING, 1.0)
+        min(max_component(self.dielectric) * F90_OVER_F0, 1.0)
     }
 
     /// The dielectric's reflectance for a share of the way from F0 to F90, and the Lambertian albedo of the base beneath.
@@ -86,12 +85,12 @@ impl MetallicRoughness {
         let grazing = 1.0 / 21.0 / (1.0 + (1.5 + 19.5 * alpha) * alpha);
         let dielectric = self.dielectric * normal + Vec3::splat(self.grazing() * grazing);
         let metal = self.base * normal + Vec3::splat(grazing);
-        // As a whole, so that its hue stays. No division by less than one half.
+        // All channels alike: the hue stays. No division by less than one half.
         let metal = metal * min(METAL_GAIN, 1.0 / max(max_component(metal), 0.5));
         (dielectric * (1.0 - self.metallic) + metal * self.metallic).min(Vec3::ONE)
     }
 
-    /// Both parts of a smooth surface, of roughness 0, seen at a cosine to its normal.
+    /// The Lambertian and the perfectly specular part at roughness 0, seen at a cosine to the normal.
     pub(super) fn smooth(&self, cosine: f32) -> (Reflection, Specular) {
         let rest = 1.0 - cosine;
         let squared = rest * rest;

@@ -1,14 +1,15 @@
-//! Reflection: every question that light asks of a surface, perfectly specular parts ([`super::Specular`]) apart.
+//! Reflection, without perfectly specular parts ([`super::Specular`]): one room for values, densities, samples, and the records
+//! of gathers.
 //!
 //! | question | face |
 //! |---|---|
-//! | is anything reflected; is there a Lambertian part | [`Reflection`] |
-//! | `f`, densities, sampled directions, albedos, seen from one direction | [`Reflector`] |
-//! | are photons stored on a material's surfaces | [`keeps_photons`] |
-//! | the record of a gather that waits, and the photons that it reflects | [`PartialReflection`] |
+//! | which parts there are | [`Reflection`] |
+//! | `f`, albedos, sampled directions and their densities, seen from one direction | [`Reflector`] |
+//! | materials that photons are stored on | [`keeps_photons`] |
+//! | the record of a waiting gather, and its sums over photons | [`PartialReflection`] |
 //!
 //! A reflection is a Lambertian part and one lobe. Callers name neither the lobe's model nor its parameters: a model is a file
-//! here, as `phong` is, and a case in these three.
+//! here, as `phong` is, and a case in [`Reflection`], [`Reflector`] and [`PartialReflection`].
 
 mod material;
 mod metallic_roughness;
@@ -26,7 +27,7 @@ use glam::Vec3;
 use crate::vector::max_component;
 use phong::PhongLobe;
 
-/// A reflection function's parameters.
+/// The parameters of a reflection function `f`: a Lambertian part and a lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflection {
     /// Lambertian albedo, 0 to 1.
@@ -49,19 +50,19 @@ impl Reflection {
         Self { diffuse, lobe: PhongLobe { albedo: specular, exponent } }
     }
 
-    /// `f = 0` everywhere.
+    /// `true` if `f = 0` everywhere.
     #[inline(always)]
     pub fn is_black(&self) -> bool {
         !self.has_lambertian() && self.is_lambertian()
     }
 
-    /// A Lambertian part, which irradiance tells all of.
+    /// `true` with a Lambertian part, whose light is the irradiance alone.
     #[inline(always)]
     pub fn has_lambertian(&self) -> bool {
         max_component(self.diffuse) > 0.0
     }
 
-    /// No lobe.
+    /// `true` without a lobe.
     #[inline(always)]
     pub fn is_lambertian(&self) -> bool {
         !self.lobe.reflects()

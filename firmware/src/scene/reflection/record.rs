@@ -1,4 +1,4 @@
-//! The reflection that a waiting gather keeps, and the photons that it reflects.
+//! The reflection in the record of a waiting gather, and its sums over photons.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode_normal};
@@ -8,8 +8,7 @@ use super::phong::{self, PhongLobe};
 use crate::fixed_point::ColourSum;
 use crate::vector::{from_upper_half, mirror, unit, upper_half};
 
-/// A reflection function with all evaluated that does not depend on a photon: 13 bytes, the dissertation's `S_B`
-/// (section 7.4).
+/// A reflection function, evaluated but for what depends on a photon: 13 bytes, the dissertation's `S_B` (section 7.4).
 ///
 /// Stage one, [`Self::encode`], is done once a query: albedos, weight, units and the lobe's factor become two colours.
 /// Stage two is done once a photon: [`Self::lobe_factor`]. Colours are rounded to a shared exponent, directions to
@@ -26,8 +25,9 @@ pub struct PartialReflection {
 const _: () = assert!(size_of::<PartialReflection>() == 13);
 
 impl PartialReflection {
-    /// The reflection of a reflector towards its outgoing direction, times `weight`. Random bits in `dither` make the
-    /// rounding unbiased.
+    /// The record of a reflector's `f` towards its outgoing direction, times `weight`. Random bits in `dither` make the rounding
+    /// unbiased.
+    // One copy for final gathers and caustics: code is memory on a chip.
     #[inline(never)]
     pub fn encode(reflector: &Reflector, weight: Vec3, dither: u32) -> Self {
         let Reflector { normal, outgoing, reflection } = reflector;
@@ -43,20 +43,20 @@ impl PartialReflection {
         }
     }
 
-    /// The reflection among photons of another surface normal, of this code.
+    /// The record for photons of another surface normal, of this code.
     #[must_use]
     pub fn among(self, normal: u8) -> Self {
         Self { normal, ..self }
     }
 
-    /// A white diffuser, which reflects the irradiance itself: its factor is 1. `normal` is its surface normal's code.
+    /// The record of a white diffuser of factor 1, which reflects the irradiance itself. `normal` is its surface normal's code.
     pub fn diffuser(normal: u8) -> Self {
         // 1 is a power of two: nothing is rounded.
         let diffuse = Rgbe::encode([1.0; 3], 0);
         Self { diffuse, lobe: Rgbe::default(), mirror: [0; 2], exponent: [0; 2], normal }
     }
 
-    /// No lobe: irradiance is enough, wherever the photons came from.
+    /// `true` without a lobe: irradiance is enough, whatever the photons' directions.
     #[inline(always)]
     pub fn is_lambertian(&self) -> bool {
         self.lobe == Rgbe::default()
@@ -68,7 +68,7 @@ impl PartialReflection {
         self.diffuse.decode().into()
     }
 
-    /// Decodes the lobe.
+    /// Decodes the lobe, once for all photons of a gather.
     #[inline(always)]
     pub fn decode_lobe(&self) -> DecodedLobe {
         let mirror =
@@ -83,7 +83,7 @@ impl PartialReflection {
         Vec3::splat(phong::power(cosine, decode_exponent(self.exponent)))
     }
 
-    /// The photons' power reflected, in the units of the weight, of the sum of their powers and the lobe's sum.
+    /// The reflected power of photons, in the units of `weight`, from the sum of their powers and the lobe's sum.
     #[inline(always)]
     pub fn reflected(&self, power: &ColourSum, lobe: &ColourSum) -> Vec3 {
         self.lambertian() * power.value() + Vec3::from_array(self.lobe.decode()) * lobe.value()
@@ -96,7 +96,7 @@ impl PartialReflection {
     }
 }
 
-/// The lobe of a [`PartialReflection`] decoded as far as no photon is asked: once for all photons of a gather.
+/// The lobe of a [`PartialReflection`], decoded.
 #[derive(Clone, Copy, Debug)]
 pub struct DecodedLobe {
     /// Unit mirror direction; zero without a lobe.
