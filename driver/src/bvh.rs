@@ -7,7 +7,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::BVH_STACK;
-use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, MOST_MATERIALS, NodeBox};
+use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, MAX_MATERIALS, NodeBox};
 
 use crate::fold::{Folded, Tree};
 use crate::scene::Triangle;
@@ -44,13 +44,13 @@ pub enum HierarchyError {
         entries: usize,
     },
     /// The scene has more triangles than a card can index.
-    #[error("the scene has {triangles} triangles; a card can tell {MOST_TRIANGLES} apart")]
+    #[error("the scene has {triangles} triangles; a card can tell {MAX_TRIANGLES} apart")]
     TooMany {
         /// Number of triangles of the scene.
         triangles: usize,
     },
     /// A triangle's material is beyond the materials that a card can index.
-    #[error("a triangle is of material {material}; a card can tell {MOST_MATERIALS} apart")]
+    #[error("a triangle is of material {material}; a card can tell {MAX_MATERIALS} apart")]
     TooManyMaterials {
         /// Index of the material.
         material: u32,
@@ -62,7 +62,7 @@ pub enum HierarchyError {
 
 /// Maximum number of triangles: each may have a leaf of its own, and its index in the card image is the leaf's times
 /// [`LEAF_TRIANGLES`] plus its slot.
-const MOST_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
+const MAX_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 
 /// Cost of a visit of a leaf, relative to a visit of a node.
 const LEAF_COST: f32 = 1.0;
@@ -77,10 +77,10 @@ const MAX_CONCENTRIC: usize = 64;
 /// If the triangles or materials are too many, a corner is not finite or too far away, or a descent could overflow the
 /// chip's stack.
 pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, HierarchyError> {
-    if triangles.len() > MOST_TRIANGLES {
+    if triangles.len() > MAX_TRIANGLES {
         return Err(HierarchyError::TooMany { triangles: triangles.len() });
     }
-    if let Some(triangle) = triangles.iter().find(|triangle| triangle.material >= MOST_MATERIALS) {
+    if let Some(triangle) = triangles.iter().find(|triangle| triangle.material >= MAX_MATERIALS) {
         return Err(HierarchyError::TooManyMaterials { material: triangle.material });
     }
     let boxes: Vec<Aabb> = triangles.iter().map(bounding_box).collect();

@@ -9,7 +9,7 @@ mod load;
 
 use heapless::Deque;
 use photoncard_shared::budget::{
-    Budget, MICRO, MOST_BINS, MOST_GATHER_RAYS, REFERENCE, TechniqueMemory, gather_candidates,
+    Budget, MAX_BINS, MAX_GATHER_RAYS, MICRO, REFERENCE, TechniqueMemory, gather_candidates,
 };
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::{Header, LAYOUT_VERSION, SectionKind};
@@ -381,7 +381,7 @@ fn check_frame(budget: &Budget, header: &Header, frame: &FrameParameters) -> Res
         (Parameter::Neighbors, neighbors(frame.neighbors)),
         (Parameter::MaxDistance, is_length(frame.max_distance)),
         (Parameter::IrradianceError, frame.irradiance_error.is_none_or(is_irradiance_error)),
-        (Parameter::Bins, within(frame.bins, MOST_BINS)),
+        (Parameter::Bins, within(frame.bins, MAX_BINS)),
         (Parameter::Queue, frame.queue >= 1),
         (Parameter::Radiance, frame.radiance == Radiance::Density || has_irradiance(header)),
         (
@@ -396,7 +396,7 @@ fn check_frame(budget: &Budget, header: &Header, frame: &FrameParameters) -> Res
 }
 
 fn is_irradiance_error(error: f32) -> bool {
-    (LEAST_IRRADIANCE_ERROR..=1.0).contains(&error)
+    (MIN_IRRADIANCE_ERROR..=1.0).contains(&error)
 }
 
 /// Whether an image has irradiance points, or no photons that they could be of.
@@ -406,7 +406,7 @@ fn has_irradiance(header: &Header) -> bool {
 }
 
 /// The least error that interpolated irradiance may be allowed: what is below asks for more than rounding gives.
-pub const LEAST_IRRADIANCE_ERROR: f32 = 1e-6;
+pub const MIN_IRRADIANCE_ERROR: f32 = 1e-6;
 
 /// Pixels in a row or a column of a picture: `f32` tells them apart with room for the place in the pixel.
 pub const MAX_PICTURE_SIDE: u32 = 1 << 16;
@@ -441,6 +441,6 @@ const _: () = assert!(MICRO_SRAM_BYTES <= MICRO.sram_bytes as usize);
 const _: () = assert!(ReferenceChip::TECHNIQUES.is_within(&TechniqueMemory::REFERENCE));
 const _: () = assert!(MicroChip::TECHNIQUES.is_within(&TechniqueMemory::MICRO));
 const _: () = assert!(REFERENCE.tile_pixels <= 1 << 16 && MICRO.tile_pixels <= 1 << 16);
-const _: () = assert!(REFERENCE.gather_rays <= MOST_GATHER_RAYS && MICRO.gather_rays <= MOST_GATHER_RAYS);
+const _: () = assert!(REFERENCE.gather_rays <= MAX_GATHER_RAYS && MICRO.gather_rays <= MAX_GATHER_RAYS);
 const _: () = assert!(REFERENCE.tiles as usize <= TILE_QUEUE);
 const _: () = assert!(MICRO.tiles as usize <= TILE_QUEUE);

@@ -14,7 +14,7 @@ use photoncard_driver::link::{LineFaults, ListenAddress};
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::printable::printable;
-use photoncard_driver::render::{CardAddress, LEAST_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
+use photoncard_driver::render::{CardAddress, MIN_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
 pub(crate) use self::picture::PictureOptions;
@@ -438,10 +438,10 @@ const DEFAULT_IC_ERROR: f32 = 0.025;
 
 fn ic_error(text: &str) -> Result<f32, String> {
     match text.parse() {
-        Ok(error) if (LEAST_IRRADIANCE_ERROR..=1.0).contains(&error) => Ok(error),
-        _ => Err(format!(
-            "an error is a share of the irradiance, {LEAST_IRRADIANCE_ERROR} to 1, such as 0.025"
-        )),
+        Ok(error) if (MIN_IRRADIANCE_ERROR..=1.0).contains(&error) => Ok(error),
+        _ => {
+            Err(format!("an error is a share of the irradiance, {MIN_IRRADIANCE_ERROR} to 1, such as 0.025"))
+        }
     }
 }
 

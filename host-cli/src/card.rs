@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use photoncard_driver::emulator::ChipKind;
-use photoncard_driver::render::{CardAddress, MOST_BINS, MemoryUse, card_info, card_ping};
+use photoncard_driver::render::{CardAddress, MAX_BINS, MemoryUse, card_info, card_ping};
 
 use crate::console::print;
 use crate::failure::Failure;
@@ -32,7 +32,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("tile            {} pixels, {} tiles at once", budget.tile_pixels, budget.tiles),
         format!("neighbors       {}", budget.neighbors),
         format!("gather rays     {} a sample", budget.gather_rays),
-        format!("bins            {MOST_BINS} of directions"),
+        format!("bins            {MAX_BINS} of directions"),
         format!("gather queue    {} gathers", budget.gather_queue),
         format!(
             "records         {} of irradiance, {} gathered at once",

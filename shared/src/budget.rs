@@ -63,7 +63,7 @@ pub const REFERENCE: Budget = Budget {
     stack_bytes: 16 << 10,
     tile_pixels: 4096,
     neighbors: 256,
-    gather_rays: MOST_GATHER_RAYS,
+    gather_rays: MAX_GATHER_RAYS,
     gather_queue: 12_640,
     irradiance_records: 512,
     gathered_records: 512,
@@ -81,7 +81,7 @@ pub const MICRO: Budget = Budget {
     stack_bytes: 24 << 10,
     tile_pixels: 256,
     neighbors: 128,
-    gather_rays: MOST_GATHER_RAYS,
+    gather_rays: MAX_GATHER_RAYS,
     gather_queue: 1024,
     irradiance_records: 128,
     gathered_records: 128,
@@ -118,14 +118,14 @@ impl TechniqueMemory {
 }
 
 /// Maximum of [`Budget::gather_rays`] over all chips.
-pub const MOST_GATHER_RAYS: u32 = 1 << 14;
+pub const MAX_GATHER_RAYS: u32 = 1 << 14;
 
 /// Maximum number of perfectly specular bounces of a path; a path that would take more is black. In a clear glass ball
 /// less than 1e-20 of the light is left by then.
 pub const SPECULAR_BOUNCES: u32 = 16;
 
 /// Maximum number of direction bins of generative reordering.
-pub const MOST_BINS: u32 = 256;
+pub const MAX_BINS: u32 = 256;
 
 /// Stack entries of a traversal of the bounding volume hierarchy; a host refuses a hierarchy that needs more.
 pub const BVH_STACK: usize = 160;
@@ -139,9 +139,9 @@ pub const PHOTON_STACK: usize = 160;
 /// Number of candidates at which a search for the `neighbors` nearest photons selects them: a trade-off, as a lower
 /// number shrinks the search radius sooner but selects more often.
 pub const fn selected_candidates(neighbors: u32) -> usize {
-    const LEAST_BEYOND: usize = 32;
+    const MIN_BEYOND: usize = 32;
     let beyond = neighbors as usize * 3 / 5;
-    neighbors as usize + if beyond < LEAST_BEYOND { LEAST_BEYOND } else { beyond }
+    neighbors as usize + if beyond < MIN_BEYOND { MIN_BEYOND } else { beyond }
 }
 
 /// Candidates that a search for `neighbors` photons needs room for: [`selected_candidates`], and the photons of one

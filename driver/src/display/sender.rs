@@ -19,11 +19,11 @@ const CONNECT_WAIT: Duration = Duration::from_secs(2);
 /// Time limit of a write, after which its thread looks whether the display was closed.
 const WRITE_WAIT: Duration = Duration::from_millis(100);
 /// Maximum number of bytes of waiting packets: five million RGB pixels.
-const MOST_WAITING: usize = 64 << 20;
+const MAX_WAITING: usize = 64 << 20;
 /// Time limit without progress once the picture is complete.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Time limit for all waiting packets once the picture is complete.
-const MOST_AT_END: Duration = Duration::from_secs(20);
+const MAX_AT_END: Duration = Duration::from_secs(20);
 
 /// Settings of a display: the server, and the image's name there.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub struct Display {
 impl Display {
     /// Begins to show the crop window `window` with some channels. Errors are reported by [`Self::failure`].
     pub fn open(settings: &DisplaySettings, window: Window, channels: &[Channel]) -> Self {
-        Self::with_room_for(MOST_WAITING, settings, window, channels)
+        Self::with_room_for(MAX_WAITING, settings, window, channels)
     }
 
     /// [`Self::open`] with at most `most_waiting` bytes of waiting packets.
@@ -177,7 +177,7 @@ impl Watch {
                 self.sent = sent;
                 self.moved = Instant::now();
             }
-            if self.moved.elapsed() >= PATIENCE || self.begun.elapsed() >= MOST_AT_END {
+            if self.moved.elapsed() >= PATIENCE || self.begun.elapsed() >= MAX_AT_END {
                 return false;
             }
         }

@@ -161,12 +161,12 @@ fn cache(text: &str) -> Result<CacheSpec, String> {
         Ok(_) => Ok(spec),
         Err(ShapeError::LineBytes) => Err(format!(
             "a cache's line is {LINE_BYTES} bytes, as card memory's, or a multiple up to {}; {line} is none",
-            CacheShape::MOST_LINE_BYTES
+            CacheShape::MAX_LINE_BYTES
         )),
         Err(ShapeError::Ways) => Err(format!("a cache of {text} has no {ways} ways; use 1 to all its lines")),
         Err(ShapeError::Bytes) => Err(format!(
             "{size} is no whole number of sets of {ways} lines of {line} bytes, or above {} bytes",
-            CacheShape::MOST_BYTES
+            CacheShape::MAX_BYTES
         )),
     }
 }

@@ -26,7 +26,7 @@ use crate::film::{Film, FilmError};
 use crate::pack::CardImage;
 
 /// Maximum number of gathers that are kept at once, 32 bytes each: 4.3 GB.
-const MOST_GATHERS: u64 = 1 << 27;
+const MAX_GATHERS: u64 = 1 << 27;
 /// Approximate number of gathers in the tiles of one round of casting, after which the host takes them over.
 const GATHERS_PER_CAST: u64 = 1 << 21;
 /// Number of gathers of one task.
@@ -41,7 +41,7 @@ const GATHERS_PER_ROUND: usize = 256 * GATHERS_PER_TASK;
 pub enum FrameError {
     /// The frame may have more gathers than can be kept.
     #[error(
-        "the frame may have {gathers} gathers, and at most {MOST_GATHERS} are kept at once, as memory allows"
+        "the frame may have {gathers} gathers, and at most {MAX_GATHERS} are kept at once, as memory allows"
     )]
     TooManyGathers {
         /// Gathers that the frame may have: gather rays of all pixels and samples.
@@ -196,7 +196,7 @@ impl Frame {
         let gathers = pixels * rays_of_pixel(frame);
         let too_many = || FrameError::TooManyGathers { gathers };
         let sums = pixels * u64::from(sums_of_pixel(frame.layers));
-        if gathers > MOST_GATHERS || sums > u32::MAX as u64 {
+        if gathers > MAX_GATHERS || sums > u32::MAX as u64 {
             return Err(too_many());
         }
         let mut all = Self {
@@ -216,7 +216,7 @@ impl Frame {
         for CastTile { tile, waiting } in tiles {
             let gathers = (self.waiting.len() + waiting.len()) as u64;
             let too_many = || FrameError::TooManyGathers { gathers };
-            if gathers > MOST_GATHERS {
+            if gathers > MAX_GATHERS {
                 return Err(too_many());
             }
             self.waiting.try_reserve(waiting.len()).map_err(|_| too_many())?;

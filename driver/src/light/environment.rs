@@ -9,9 +9,9 @@ use super::thresholds::thresholds;
 use crate::scene::Environment;
 
 /// Maximum number of columns of cells.
-const MOST_COLUMNS: u32 = 128;
+const MAX_COLUMNS: u32 = 128;
 /// Maximum number of rows of cells.
-const MOST_ROWS: u32 = 64;
+const MAX_ROWS: u32 = 64;
 /// Share of the choices that is uniform over the sphere, so that cells with hardly any light are not missed.
 const EVEN: f64 = 1.0 / 64.0;
 /// Upper bound of the brightest texel after scaling; the format holds up to 65408.
@@ -114,7 +114,7 @@ impl Cells {
     /// The cells of an environment that is not black.
     fn new(environment: &Environment) -> Self {
         let Environment { width, height, .. } = *environment;
-        let [columns, rows] = [width.min(MOST_COLUMNS), height.min(MOST_ROWS)];
+        let [columns, rows] = [width.min(MAX_COLUMNS), height.min(MAX_ROWS)];
         // Two samples to a texel, each way, see every texel that interpolation brings into a cell.
         let [across, down] = [width.div_ceil(columns), height.div_ceil(rows)].map(|texels| 2 * texels);
         let mut weights: Vec<f64> = (0..rows)

@@ -12,7 +12,7 @@ pub(super) struct Footprint {
 /// Bound of the coordinates, cells: beyond it rounding blurs neighbouring cells.
 const FARTHEST: f64 = 1e12;
 /// Maximum number of cells of the bounding rectangle of a triangle that is visited cell by cell.
-const MOST_CELLS: f64 = 8192.0;
+const MAX_CELLS: f64 = 8192.0;
 
 impl Footprint {
     pub(super) fn new(texture: &Texture, attributes: &Attributes) -> Self {
@@ -48,7 +48,7 @@ impl Footprint {
         let all = (right - left + 2.0 * reach) * (bottom - top + 2.0 * reach);
         let is_near = corners.as_flattened().iter().all(|place| place.abs() < FARTHEST);
         // NaN fails both comparisons.
-        let is_seen = is_near && all <= MOST_CELLS;
+        let is_seen = is_near && all <= MAX_CELLS;
         if !is_seen {
             return false;
         }

@@ -61,7 +61,7 @@ pub(crate) struct ChosenSource {
 }
 
 /// Minimum share of an emitter's light that is assumed to go towards the targets.
-const LEAST_AIMED_SHARE: f64 = 1e-3;
+const MIN_AIMED_SHARE: f64 = 1e-3;
 /// Margin of the box beyond the scene's bounds, relative to their longest side or a tenth of their greatest coordinate,
 /// whichever is more.
 const MARGIN: f32 = 1e-4;
@@ -129,10 +129,10 @@ impl Sources {
 }
 
 /// Approximate share of an emitter's light that goes towards the targets: their solid angle at the emitter's centre
-/// over `4 pi`, and at least [`LEAST_AIMED_SHARE`], as other points of the emitter may see more of them.
+/// over `4 pi`, and at least [`MIN_AIMED_SHARE`], as other points of the emitter may see more of them.
 fn aimed_share(targets: &Targets, corners: &[DVec3]) -> f64 {
     let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
-    (f64::from(targets.solid_angle(middle.as_vec3())) / (4.0 * PI)).clamp(LEAST_AIMED_SHARE, 1.0)
+    (f64::from(targets.solid_angle(middle.as_vec3())) / (4.0 * PI)).clamp(MIN_AIMED_SHARE, 1.0)
 }
 
 /// Lower and upper threshold of a source, of 2^32.

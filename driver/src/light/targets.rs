@@ -34,7 +34,7 @@ pub(crate) struct Aim {
 }
 
 /// Maximum number of spheres.
-const MOST_SPHERES: usize = 32;
+const MAX_SPHERES: usize = 32;
 /// Margin of a sphere for rounding: relative to its radius; its square relative to the greatest coordinate.
 const MARGIN: f32 = 1e-3;
 
@@ -45,7 +45,7 @@ impl Targets {
         let triangles = scene.triangles.iter().filter(|triangle| is_specular(triangle.material));
         let all: Vec<[Vec3; 3]> = triangles.map(|triangle| triangle.vertices).collect();
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
-        while parts.len() < MOST_SPHERES {
+        while parts.len() < MAX_SPHERES {
             // The largest part that may be split.
             let sizes = parts.iter().enumerate().filter(|(_, part)| part.may_be_split);
             let Some((index, _)) = sizes.max_by(|(_, a), (_, b)| a.sphere.radius.total_cmp(&b.sphere.radius))
@@ -286,7 +286,7 @@ mod tests {
         let triangles: Vec<_> = (0..100).map(|i| triangle(i as f32)).collect();
         let scene = Scene { triangles, materials: vec![mirror], ..Scene::default() };
         let targets = Targets::new(&scene);
-        assert_eq!(targets.spheres.len(), MOST_SPHERES);
+        assert_eq!(targets.spheres.len(), MAX_SPHERES);
         assert!(targets.spheres.iter().all(|sphere| sphere.radius < 4.0));
         for corner in scene.triangles.iter().flat_map(|triangle| triangle.vertices) {
             assert!(targets.spheres.iter().any(|sphere| sphere.centre.distance(corner) <= sphere.radius));

@@ -51,7 +51,7 @@ pub(super) const MAX_CHIPS: usize = 1024;
 const DEFAULT_BAUD: u32 = 115_200;
 /// A card acknowledges two whole frames at a time, and is silent meanwhile. Even if one acknowledgement is lost the next is
 /// to come within the 10 s after which a card is taken for lost.
-const LEAST_BAUD: u32 = 4800;
+const MIN_BAUD: u32 = 4800;
 
 impl Default for CardAddress {
     /// One emulated reference chip.
@@ -167,9 +167,9 @@ fn serial(text: &str) -> Result<RemoteAddress, String> {
 
 fn speed(text: &str) -> Result<u32, String> {
     match text.parse() {
-        Ok(baud) if baud >= LEAST_BAUD => Ok(baud),
+        Ok(baud) if baud >= MIN_BAUD => Ok(baud),
         Ok(baud) if baud > 0 => Err(format!(
-            "{baud} bits a second are too slow: a card would be taken for silent; use {LEAST_BAUD} or more, such as 115200"
+            "{baud} bits a second are too slow: a card would be taken for silent; use {MIN_BAUD} or more, such as 115200"
         )),
         _ => Err(format!("{text:?} is no speed in bits a second; use one such as 115200")),
     }

@@ -20,10 +20,10 @@ pub use error::{CardError, RenderError};
 pub use greeting::{CardInfo, card_info, card_ping};
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use observer::{Observer, Phase, Unobserved};
-pub use photoncard_shared::budget::MOST_BINS;
+pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Radiance, Sampling};
-pub use settings::{DEFAULT_CAUSTIC_PHOTONS, LEAST_IRRADIANCE_ERROR, RenderSettings};
+pub use settings::{DEFAULT_CAUSTIC_PHOTONS, MIN_IRRADIANCE_ERROR, RenderSettings};
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
 use std::sync::{Arc, Mutex, PoisonError};

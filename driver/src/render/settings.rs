@@ -5,7 +5,7 @@ mod check;
 use std::path::PathBuf;
 
 use glam::Vec3;
-pub use photoncard_firmware::card::LEAST_IRRADIANCE_ERROR;
+pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::MICRO;
 use photoncard_shared::image::LAYOUT_VERSION;

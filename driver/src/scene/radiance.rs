@@ -9,7 +9,7 @@ use crate::allocation;
 pub(super) const MAGIC: &[u8] = b"#?";
 
 /// No header is longer.
-const MOST_HEADER: usize = 1 << 16;
+const MAX_HEADER: usize = 1 << 16;
 
 /// Two bytes stand for up to 127 values of one of four channels.
 const TEXELS_OF_A_BYTE: u64 = 16;
@@ -107,7 +107,7 @@ fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
 
 /// Takes a line of the header off the bytes.
 fn next_line(rest: &mut &[u8]) -> Result<String, Fault> {
-    let header = rest.get(..MOST_HEADER.min(rest.len())).unwrap_or_default();
+    let header = rest.get(..MAX_HEADER.min(rest.len())).unwrap_or_default();
     let end =
         header.iter().position(|&byte| byte == b'\n').ok_or_else(|| damaged("its header has no end"))?;
     let line = String::from_utf8_lossy(&header[..end]).trim_end_matches('\r').to_owned();

@@ -32,7 +32,7 @@ const CONTROL_ENABLE: u32 = 3;
 const CONTROL_RECEIVE_INTERRUPT: u32 = 8;
 const INTERRUPT_RECEIVED: u32 = 2;
 /// The least divisor that the UART takes: the fastest.
-const LEAST_DIVISOR: u32 = 16;
+const MIN_DIVISOR: u32 = 16;
 
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
 
@@ -49,7 +49,7 @@ impl Board for Mps2An386 {
         TIMER_VALUE.write(0);
         // On, with an exception, by the processor's clock.
         TIMER_CONTROL.write(7);
-        UART_DIVISOR.write(LEAST_DIVISOR);
+        UART_DIVISOR.write(MIN_DIVISOR);
         Self::listen(true);
         INTERRUPT_ENABLE.write(1 << UART_RECEIVED);
     }

@@ -67,7 +67,7 @@ pub struct Chip<
     cache: IrradianceCache<RECORDS, GATHERED>,
     tile: Tile,
     /// Blocks of the tile that have not begun, the next on top.
-    blocks: Vec<Block, MOST_BLOCKS>,
+    blocks: Vec<Block, MAX_BLOCKS>,
     block: Block,
     position: Position,
     /// State of [`Self::complete`] for the current pixel.
@@ -75,7 +75,7 @@ pub struct Chip<
 }
 
 /// Capacity of the stack of blocks: enough for all halvings of a tile.
-const MOST_BLOCKS: usize = 32;
+const MAX_BLOCKS: usize = 32;
 
 /// Number of rays and gathers after which a step ends.
 const WORK_OF_STEP: u64 = 16;

@@ -3,7 +3,7 @@
 use photoncard_shared::message::Fault;
 
 use super::position::{Position, Stage};
-use super::{Chip, MOST_BLOCKS, allowed_error};
+use super::{Chip, MAX_BLOCKS, allowed_error};
 use crate::irradiance_cache::{Full, Window};
 use crate::memory::MemoryPort;
 use crate::render::{Context, GatherPoint, final_gather};
@@ -32,7 +32,7 @@ impl<
     /// Replaces the block, whose records do not fit into the cache, by its two halves. A block of one pixel always
     /// fits.
     fn divide_block(&mut self) {
-        let Some([first, second]) = self.block.halves().filter(|_| self.blocks.len() + 2 <= MOST_BLOCKS)
+        let Some([first, second]) = self.block.halves().filter(|_| self.blocks.len() + 2 <= MAX_BLOCKS)
         else {
             // Never reached: the cache has room for one pixel, and the stack of blocks for all halvings of a tile.
             // Every sample would then do its own final gather.

@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use photoncard_shared::budget::MOST_GATHER_RAYS;
+use photoncard_shared::budget::MAX_GATHER_RAYS;
 use photoncard_shared::message::{Fault, FrameParameters};
 
 use crate::importance::DirectionTable;
@@ -27,7 +27,7 @@ const _: () = assert!(size_of::<StoredPoint>() == 48);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StoredRays(u16);
 
-const _: () = assert!(MOST_GATHER_RAYS < StoredRays::OF_LOBE as u32 - 1);
+const _: () = assert!(MAX_GATHER_RAYS < StoredRays::OF_LOBE as u32 - 1);
 
 impl StoredRays {
     const OF_LOBE: u16 = 1 << 15;

@@ -73,8 +73,8 @@ impl DirectionTable {
     /// The rays, of `count` in all, that belong to direction bin `bin` of `bins`: bins divide the walk through the
     /// entries evenly. One bin holds all rays; the ranges of all bins follow each other.
     ///
-    /// `count` is at most [`MOST_GATHER_RAYS`](photoncard_shared::budget::MOST_GATHER_RAYS), `bins` at most
-    /// [`MOST_BINS`](photoncard_shared::budget::MOST_BINS).
+    /// `count` is at most [`MAX_GATHER_RAYS`](photoncard_shared::budget::MAX_GATHER_RAYS), `bins` at most
+    /// [`MAX_BINS`](photoncard_shared::budget::MAX_BINS).
     #[inline]
     pub fn rays(&self, pattern: Pattern, count: u32, bin: u32, bins: u32) -> Range<u32> {
         if bins <= 1 {

@@ -9,7 +9,7 @@ use crate::scene::Surface;
 use crate::vector::min;
 
 /// Minimum sum of the weights of a sample's records.
-const LEAST_WEIGHT: f32 = 0.05;
+const MIN_WEIGHT: f32 = 0.05;
 
 /// Records at the corners of a cell, where there are any.
 pub(super) struct Corners<'a>([Option<&'a Record>; 4]);
@@ -82,7 +82,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
             // Continuous: 0 at the error bound.
             *weight *= if error < allowed { 1.0 - error / allowed } else { 0.0 };
         }
-        (weights.iter().sum::<f32>() >= LEAST_WEIGHT).then_some(Weights { cell, weights })
+        (weights.iter().sum::<f32>() >= MIN_WEIGHT).then_some(Weights { cell, weights })
     }
 
     /// Interpolated indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample needs a final gather of

@@ -47,16 +47,16 @@ use crate::sampler::{Dimension, Pattern};
 use crate::vector::{from_upper_half, max, upper_half};
 
 /// Maximum number of coarsest cells that a block may overlap.
-const MOST_ROOTS: usize = 16;
+const MAX_ROOTS: usize = 16;
 /// Maximum number of records of a block of one pixel: 4 corners, and 5 more for each division.
-const LEAST_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
+const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
 /// Irradiance records of a block: up to `RECORDS`, a power of two, of which up to `GATHERED` are gathered at once.
 pub struct IrradianceCache<const RECORDS: usize, const GATHERED: usize> {
     /// Records by lattice point; `None` where no surface with a Lambertian part is seen.
     records: FnvIndexMap<LatticePoint, Option<Record>, RECORDS>,
     /// Coarsest cells, each with a bit mask of the divided cells in its quadtree ([`lattice::Cell::tree_number`]).
-    roots: Vec<(LatticePoint, u32), MOST_ROOTS>,
+    roots: Vec<(LatticePoint, u32), MAX_ROOTS>,
     survey: Survey,
     gathered: Vec<GatheredRecord, GATHERED>,
     /// Index of the first record that is not yet gathered or being gathered.
@@ -86,7 +86,7 @@ impl<const RECORDS: usize, const GATHERED: usize> Default for IrradianceCache<RE
 
 impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
     const SUFFICES: () = {
-        assert!(RECORDS >= LEAST_RECORDS, "a block of one pixel must fit");
+        assert!(RECORDS >= MIN_RECORDS, "a block of one pixel must fit");
         assert!(GATHERED > 0 && GATHERED <= 1 << 16, "a gather's target is told in 16 bits");
     };
 

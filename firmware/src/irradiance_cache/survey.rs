@@ -19,7 +19,7 @@ use crate::sampler::{Dimension, Pattern, unit_interval};
 use crate::scene::{Ray, Surface, closest_hit};
 
 /// Minimum reach of a record, pixels.
-const LEAST_REACH: f32 = 3.0;
+const MIN_REACH: f32 = 3.0;
 
 impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
     /// Does the next piece of the survey: one lattice cell, or one ray of one record. Returns whether it was the last.
@@ -160,7 +160,7 @@ fn new_record<M: MemoryPort>(
     // A surface seen in a mirror or through glass is not where the lattice point is.
     let surface = seen.filter(|surface| surface.reflection.has_lambertian() && surface.specular.is_none());
     Ok(surface.map(|surface| {
-        let least = LEAST_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
+        let least = MIN_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
         Record::new(&surface, least)
     }))
 }

@@ -35,19 +35,19 @@ pub struct CacheShape {
 /// Invalid parameter of a [`CacheShape`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShapeError {
-    /// The cache line is not a whole number of card memory lines from 1 line to [`CacheShape::MOST_LINE_BYTES`].
+    /// The cache line is not a whole number of card memory lines from 1 line to [`CacheShape::MAX_LINE_BYTES`].
     LineBytes,
     /// The number of ways is 0 or above the number of cache lines.
     Ways,
-    /// The size is 0, not a whole number of sets, or above [`CacheShape::MOST_BYTES`].
+    /// The size is 0, not a whole number of sets, or above [`CacheShape::MAX_BYTES`].
     Bytes,
 }
 
 impl CacheShape {
     /// Maximum size of a cache, bytes.
-    pub const MOST_BYTES: u32 = 64 << 20;
+    pub const MAX_BYTES: u32 = 64 << 20;
     /// Maximum size of a cache line, bytes.
-    pub const MOST_LINE_BYTES: u32 = 4096;
+    pub const MAX_LINE_BYTES: u32 = 4096;
 
     /// Shape of a cache of `bytes` in lines of `line_bytes`, `ways` in each set.
     ///
@@ -55,10 +55,10 @@ impl CacheShape {
     /// The first invalid parameter.
     pub const fn new(bytes: u32, line_bytes: u32, ways: u32, index: SetIndex) -> Result<Self, ShapeError> {
         let lines = line_bytes / LINE_BYTES as u32;
-        if lines == 0 || !line_bytes.is_multiple_of(LINE_BYTES as u32) || line_bytes > Self::MOST_LINE_BYTES {
+        if lines == 0 || !line_bytes.is_multiple_of(LINE_BYTES as u32) || line_bytes > Self::MAX_LINE_BYTES {
             return Err(ShapeError::LineBytes);
         }
-        if bytes == 0 || bytes > Self::MOST_BYTES || !bytes.is_multiple_of(line_bytes) {
+        if bytes == 0 || bytes > Self::MAX_BYTES || !bytes.is_multiple_of(line_bytes) {
             return Err(ShapeError::Bytes);
         }
         let entries = bytes / line_bytes;

@@ -16,7 +16,7 @@ use crate::scene::{Hit, Ray, Surface, closest_hit, read_surface};
 use crate::vector::{max, max_component};
 
 /// Least probability to stay over that to go on, where the reflection is not black.
-const LEAST_STAY: f32 = 1.0 / 16.0;
+const MIN_STAY: f32 = 1.0 / 16.0;
 
 /// A path through specular surfaces, up to its present ray.
 #[derive(Clone, Copy, Debug)]
@@ -99,7 +99,7 @@ impl SpecularPath {
         let goes = reflected + transmitted;
         let stays = max_component(surface.reflector().albedo());
         // Often enough that a path that stays is no firefly; at an emitter half of the time.
-        let stays = if stays > 0.0 { max(stays, goes * LEAST_STAY) } else { 0.0 };
+        let stays = if stays > 0.0 { max(stays, goes * MIN_STAY) } else { 0.0 };
         let stays = if max_component(surface.emission) > 0.0 { max(stays, goes) } else { stays };
         let all = goes + stays;
         let chosen = random * all;

@@ -30,7 +30,7 @@ struct SlabAxis {
 const MARGIN: f32 = 8.0 * f32::EPSILON;
 
 /// A component of a direction that is less than this would overflow products: one that small is as good.
-const LEAST_COMPONENT: f32 = 1e-20;
+const MIN_COMPONENT: f32 = 1e-20;
 
 impl Slabs {
     #[inline(always)]
@@ -62,7 +62,7 @@ impl Slabs {
 impl SlabAxis {
     #[inline(always)]
     fn new(origin: f32, direction: f32) -> Self {
-        let inverse = 1.0 / if direction.abs() < LEAST_COMPONENT { LEAST_COMPONENT } else { direction };
+        let inverse = 1.0 / if direction.abs() < MIN_COMPONENT { MIN_COMPONENT } else { direction };
         Self { origin, inverse }
     }
 

@@ -23,9 +23,9 @@ const COUNTS: usize = SECOND_MATERIAL + 1;
 const _: () = assert!(COUNTS + 1 == LINE_BYTES && 2 * COORDINATE_BYTES + 4 * VERTEX_LANES <= LINE_BYTES);
 
 /// Bound of the indices of materials: 2^23.
-pub const MOST_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES - 1);
+pub const MAX_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES - 1);
 /// Flag in a leaf's material index: its triangles may have cut-outs.
-const CUT_OUT: u32 = MOST_MATERIALS;
+const CUT_OUT: u32 = MAX_MATERIALS;
 
 /// A leaf, one line.
 ///
@@ -44,7 +44,7 @@ pub struct BvhLeaf<'a>(pub &'a [u8; LINE_BYTES]);
 pub struct Triangle {
     /// Corners, metres.
     pub vertices: [[f32; 3]; 3],
-    /// Index of the material, below [`MOST_MATERIALS`].
+    /// Index of the material, below [`MAX_MATERIALS`].
     pub material: u32,
     /// True if alpha (of the base texture or the vertex colours) may cut out parts of the triangle: glTF's `MASK`.
     pub cut_out: bool,
@@ -128,7 +128,7 @@ impl BvhLeaf<'_> {
     }
 
     /// The line of a leaf; `None` without triangles, with more triangles, vertices or materials than a leaf can hold,
-    /// or with a material index of [`MOST_MATERIALS`] or more.
+    /// or with a material index of [`MAX_MATERIALS`] or more.
     pub fn encode(triangles: &[Triangle]) -> Option<[u8; LINE_BYTES]> {
         if triangles.is_empty() || triangles.len() > LEAF_TRIANGLES {
             return None;
@@ -145,7 +145,7 @@ impl BvhLeaf<'_> {
                 let before = read_u32(&line, at);
                 write_u32(&mut line, at, before | (vertex as u32) << (4 * slot));
             }
-            if triangle.material >= MOST_MATERIALS {
+            if triangle.material >= MAX_MATERIALS {
                 return None;
             }
             let material = triangle.material | if triangle.cut_out { CUT_OUT } else { 0 };
@@ -255,9 +255,9 @@ mod tests {
     #[test]
     fn a_leaf_tells_two_materials_of_eight_million_apart() {
         let of = |material| Triangle { material, ..apart(1) };
-        survive(&[of(MOST_MATERIALS - 1), of(0), of(MOST_MATERIALS - 1)]);
+        survive(&[of(MAX_MATERIALS - 1), of(0), of(MAX_MATERIALS - 1)]);
         assert!(BvhLeaf::encode(&[of(0), of(1), of(2)]).is_none());
-        assert!(BvhLeaf::encode(&[of(MOST_MATERIALS)]).is_none());
+        assert!(BvhLeaf::encode(&[of(MAX_MATERIALS)]).is_none());
     }
 
     #[test]

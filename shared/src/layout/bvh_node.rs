@@ -22,7 +22,7 @@ const UNITS: usize = 22;
 /// Minimum distance of a box's side from its contents, in the node's units.
 const MARGIN: f64 = 1.0 / 4096.0;
 /// Minimum of the biased exponents: 2^-95 m, far above the subnormal numbers, so that products with a unit are exact.
-const LEAST_UNIT: u8 = 32;
+const MIN_UNIT: u8 = 32;
 const EXPONENT_SHIFT: u32 = 23;
 
 /// An axis-aligned bounding box, metres.
@@ -102,7 +102,7 @@ impl Grid {
         }
         let span = (f64::from(upper) - f64::from(lower)) / 255.0;
         let least = ((span as f32).to_bits() >> EXPONENT_SHIFT) as u8;
-        (least.max(LEAST_UNIT)..u8::MAX).find_map(|exponent| {
+        (least.max(MIN_UNIT)..u8::MAX).find_map(|exponent| {
             let mut grid = Self { corner: lower, exponent };
             grid.corner = (f64::from(lower) - MARGIN * grid.unit()) as f32;
             if grid.below(lower).is_none() {

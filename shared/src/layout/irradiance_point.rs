@@ -23,7 +23,7 @@ pub struct IrradiancePoint {
 }
 
 const MANTISSA_BITS: u32 = 16;
-const MOST_MANTISSA: u32 = (1 << MANTISSA_BITS) - 1;
+const MAX_MANTISSA: u32 = (1 << MANTISSA_BITS) - 1;
 const NORMAL_SHIFT: u32 = 3 * MANTISSA_BITS;
 const EXPONENT_SHIFT: u32 = NORMAL_SHIFT + 8;
 /// Bias of the exponent of a mantissa's unit.
@@ -39,7 +39,7 @@ impl IrradiancePoint {
         if largest >= f32::MIN_POSITIVE {
             // largest = m 2^e with m in [1, 2); its mantissa is in [2^15, 2^16), and is not rounded up to 2^16.
             let unit = (largest.to_bits() >> 23) as i32 - 127 - 15;
-            let mantissa = |c: f32| ((scaled(c, -unit) + 0.5) as u32).min(MOST_MANTISSA);
+            let mantissa = |c: f32| ((scaled(c, -unit) + 0.5) as u32).min(MAX_MANTISSA);
             for (shift, component) in (0..).step_by(MANTISSA_BITS as usize).zip(irradiance) {
                 bits |= u64::from(mantissa(component)) << shift;
             }
@@ -54,7 +54,7 @@ impl IrradiancePoint {
         let bits = u64::from_le_bytes(content);
         let unit = (bits >> EXPONENT_SHIFT) as i32 - EXPONENT_BIAS;
         let component =
-            |index: u32| scaled((bits >> (index * MANTISSA_BITS) & u64::from(MOST_MANTISSA)) as f32, unit);
+            |index: u32| scaled((bits >> (index * MANTISSA_BITS) & u64::from(MAX_MANTISSA)) as f32, unit);
         Self { irradiance: [component(0), component(1), component(2)], normal: Self::normal_of(bits) }
     }
 

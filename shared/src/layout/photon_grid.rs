@@ -4,7 +4,7 @@
 pub const GRID_BITS: u32 = 20;
 pub(super) const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
 /// Bound of the magnitude of `origin + q`: integers up to 2^24 are exact in `f32`.
-const MOST_COORDINATE: f64 = (1 << 24) as f64;
+const MAX_COORDINATE: f64 = (1 << 24) as f64;
 
 /// The grid of the photons' positions: `(origin + q) * cell` for grid coordinates `q` below 2^20, exact in `f32`. The
 /// longest side of the scene takes half of the 2^20 cells or more; fewer far from the origin, where `f32` is coarser.
@@ -27,7 +27,7 @@ impl PhotonGrid {
             let [lower, upper] = [f64::from(lower), f64::from(upper)];
             // Two cells are left for rounding at either end.
             let by_side = (upper - lower) / f64::from(GRID_MASK - 2);
-            let by_place = lower.abs().max(upper.abs()) / (MOST_COORDINATE - f64::from(1 << GRID_BITS));
+            let by_place = lower.abs().max(upper.abs()) / (MAX_COORDINATE - f64::from(1 << GRID_BITS));
             least = [by_side, by_place].into_iter().filter(|c| c.is_finite()).fold(least, f64::max);
         }
         let cell = power_of_two_above(least);

@@ -18,7 +18,7 @@ pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const COORDINATE_BITS: u32 = 24;
 /// Maximum of [`NodeCoordinates::exponent`]: the one of a box as large as the grid.
-const MOST_EXPONENT: u32 = 13;
+const MAX_EXPONENT: u32 = 13;
 
 /// An axis-aligned box on the [`super::PhotonGrid`], bounds inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ impl<'a> PhotonNode<'a> {
             let [lower, upper] = WideNode(self.0).sides(axis);
             NodeCoordinates {
                 corner: corner & GRID_MASK,
-                exponent: (corner >> COORDINATE_BITS).min(MOST_EXPONENT),
+                exponent: (corner >> COORDINATE_BITS).min(MAX_EXPONENT),
                 lower,
                 upper,
             }

@@ -12,7 +12,7 @@ use super::random::Random;
 use super::target::{Target, bound};
 
 /// Scenes of more triangles are loaded only.
-const MOST_PACKED: usize = 2000;
+const MAX_PACKED: usize = 2000;
 
 /// The target.
 pub(super) struct Scenes {
@@ -178,7 +178,7 @@ impl Target for Scenes {
                 return false;
             }
         };
-        if scene.triangles.len() <= MOST_PACKED
+        if scene.triangles.len() <= MAX_PACKED
             && let Err(error) = PackedScene::new(&scene)
         {
             let _ = error.to_string();

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::random::Random;
 
 /// No edit makes an input longer.
-const MOST_BYTES: usize = 1 << 17;
+const MAX_BYTES: usize = 1 << 17;
 /// The longest chunk that is inserted, deleted, repeated or taken from another input.
 const CHUNK: usize = 256;
 
@@ -115,7 +115,7 @@ pub(crate) fn edit_bytes(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut R
             bytes[range].fill(value);
         }
     }
-    bytes.truncate(MOST_BYTES);
+    bytes.truncate(MAX_BYTES);
 }
 
 /// Makes some edits of any bytes.
@@ -264,5 +264,5 @@ pub(crate) fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
             drop(text.splice(place, nested));
         }
     }
-    text.truncate(MOST_BYTES);
+    text.truncate(MAX_BYTES);
 }

@@ -20,7 +20,7 @@ use super::target::{Target, bound};
 /// Columns and rows of the pictures.
 const SIZE: [usize; 2] = [20, 36];
 /// Larger pictures are read only.
-const MOST_COMPARED: usize = 1 << 16;
+const MAX_COMPARED: usize = 1 << 16;
 
 /// The target.
 pub(super) struct Pictures {
@@ -120,7 +120,7 @@ impl Target for Pictures {
             }
         };
         assert_eq!(image.pixels.len(), image.width * image.height);
-        if image.pixels.len() <= MOST_COMPARED {
+        if image.pixels.len() <= MAX_COMPARED {
             let _ = compare(&image, &image, 8, Some(2.0));
         }
         true

@@ -24,7 +24,7 @@ const STACK: usize = 16 << 20;
 /// How often the watch looks.
 const GLANCE: Duration = Duration::from_millis(100);
 /// Failures after which a run ends.
-const MOST_FAILURES: usize = 20;
+const MAX_FAILURES: usize = 20;
 
 /// What to run.
 #[derive(Clone, Debug)]
@@ -147,8 +147,7 @@ fn run(target: &dyn Target, settings: &Settings, at: &AtomicU64) -> Report {
         settings.folder.join(format!("{}-{}-from-{}.at", target.name(), settings.seed, settings.first));
     let file = std::fs::create_dir_all(&settings.folder).and_then(|()| File::create(&trace)).ok();
     for number in settings.first..settings.first.saturating_add(settings.inputs) {
-        if report.failures.len() >= MOST_FAILURES || settings.time.is_some_and(|time| begin.elapsed() > time)
-        {
+        if report.failures.len() >= MAX_FAILURES || settings.time.is_some_and(|time| begin.elapsed() > time) {
             break;
         }
         at.store(number, Ordering::Relaxed);

@@ -29,9 +29,9 @@ const SIDE: u32 = 6;
 /// Time of a step.
 const STEP: Duration = Duration::from_millis(50);
 /// Frames that the ends send each other in a step at the most.
-const MOST_FRAMES: usize = 64;
+const MAX_FRAMES: usize = 64;
 /// Steps in which a session fails of which the card is silent.
-const MOST_STEPS: usize = 400;
+const MAX_STEPS: usize = 400;
 
 /// What the card does in a step: the first byte of each record of an input, of which the first byte of all says whether the frame
 /// has layers. Any other sends the reply that follows.
@@ -147,7 +147,7 @@ struct Ends<'a> {
 impl Ends<'_> {
     /// Lets all pass that either end has to say, and some time.
     fn step(&mut self, is_silent: bool) -> Result<(), SessionError> {
-        for _ in 0..MOST_FRAMES {
+        for _ in 0..MAX_FRAMES {
             self.dispatcher.supply(0, &mut self.session, self.now);
             self.session.prepare();
             let wire = self.session.outgoing().to_vec();
@@ -255,7 +255,7 @@ impl Target for Sessions {
             |pixel: &PixelValue| pixel.radiance.iter().all(|value| value.is_finite() && *value >= 0.0);
         assert!(film.pixels().iter().all(is_finite), "an impossible value has come into the film");
         drop(film);
-        let ended = (0..MOST_STEPS).any(|_| ends.step(true).is_err());
+        let ended = (0..MAX_STEPS).any(|_| ends.step(true).is_err());
         assert!(ended || is_complete, "a silent card is waited for without end");
         was_loaded
     }

@@ -14,7 +14,7 @@ const SESSION: u32 = 7;
 /// What the messages of the ends are.
 const MESSAGE: &[u8] = b"message";
 /// Frames that an end sends without hearing anything: its messages, and what it tells besides.
-const MOST_FRAMES: usize = WINDOW + 4;
+const MAX_FRAMES: usize = WINDOW + 4;
 
 /// The target.
 pub(super) struct Frames {
@@ -98,7 +98,7 @@ fn read_frames(input: &[u8], step: usize) -> bool {
 
 /// Sends all that an end has to send: bounded, and whole frames.
 fn drain(end: &mut Transport) {
-    for _ in 0..MOST_FRAMES {
+    for _ in 0..MAX_FRAMES {
         let wire = end.outgoing();
         if wire.is_empty() {
             return;
@@ -108,7 +108,7 @@ fn drain(end: &mut Transport) {
         let length = wire.len();
         end.sent(length);
     }
-    panic!("more than {MOST_FRAMES} frames are sent unasked");
+    panic!("more than {MAX_FRAMES} frames are sent unasked");
 }
 
 fn send(end: &mut Transport) -> bool {

@@ -1,9 +1,9 @@
 //! The settings against what a card can hold.
 
 use photoncard_firmware::card::MAX_PICTURE_SIDE;
-use photoncard_shared::budget::{Budget, MOST_BINS};
+use photoncard_shared::budget::{Budget, MAX_BINS};
 
-use super::{LEAST_IRRADIANCE_ERROR, RenderSettings};
+use super::{MIN_IRRADIANCE_ERROR, RenderSettings};
 use crate::render::RenderError;
 
 /// Photons that a gather of caustics looks for at the least.
@@ -29,19 +29,19 @@ impl RenderSettings {
         within("--gather-rays", self.gather_rays as u64, 0, budget.gather_rays as u64)?;
         within("--shadow-rays", self.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
         within("--spp", self.samples as u64, 1, budget.samples as u64)?;
-        within("--bins", self.bins.unwrap_or(1) as u64, 1, MOST_BINS as u64)?;
+        within("--bins", self.bins.unwrap_or(1) as u64, 1, MAX_BINS as u64)?;
         if self.queue.is_some() || self.order.has_queue() {
             within("--queue", self.queue.unwrap_or(1) as u64, 1, budget.gather_queue as u64)?;
         }
         within("--tile", self.tile as u64, 1, budget.pixels_of_tile(false).isqrt() as u64)?;
         self.check_tile_with_layers(budget)?;
         if let Some(error) = self.irradiance_error
-            && !(LEAST_IRRADIANCE_ERROR..=1.0).contains(&error)
+            && !(MIN_IRRADIANCE_ERROR..=1.0).contains(&error)
         {
             return Err(RenderError::Setting {
                 option: "--ic-error",
                 value: error.to_string(),
-                reason: format!("an error is a share of the irradiance, {LEAST_IRRADIANCE_ERROR} to 1"),
+                reason: format!("an error is a share of the irradiance, {MIN_IRRADIANCE_ERROR} to 1"),
                 remedy: "give a number such as 0.025".into(),
             });
         }

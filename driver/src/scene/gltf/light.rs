@@ -11,7 +11,7 @@ use crate::scene::{PunctualKind, PunctualLight, Scene};
 
 /// The narrowest step, in cosines, between the two cones of a spot light, as `KHR_lights_punctual` recommends.
 /// Exporters write equal angles for a sharp edge.
-const LEAST_PENUMBRA: f32 = 0.001;
+const MIN_PENUMBRA: f32 = 0.001;
 
 /// How far beyond a right angle a spot light's rounded outer angle may lie.
 const ANGLE_TOLERANCE: f32 = 1e-4;
@@ -78,5 +78,5 @@ fn cones(light: &Light) -> Option<(f32, f32)> {
         return None;
     }
     let (inner, outer) = (libm::cosf(inner), libm::cosf(outer.min(right)));
-    Some((inner, outer.min(inner - LEAST_PENUMBRA)))
+    Some((inner, outer.min(inner - MIN_PENUMBRA)))
 }

@@ -143,7 +143,7 @@ fn check_extensions(extensions: Option<&json::extensions::material::Material>) -
 const IOR: f32 = 1.5;
 
 /// Beyond this, 1/m, nothing is seen through a film of atoms.
-const MOST_ABSORPTION: f32 = 1e12;
+const MAX_ABSORPTION: f32 = 1e12;
 
 /// glTF's reflection, with the extensions for dielectrics.
 fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection {
@@ -200,8 +200,8 @@ fn transmission(extensions: Option<&json::extensions::material::Material>, ior: 
         let distance = volume.attenuation_distance.0;
         let coefficient = |colour: f32| match -libm::logf(colour) / distance {
             // Black, or white without a distance.
-            infinite if infinite == f32::INFINITY => MOST_ABSORPTION,
-            coefficient => coefficient.min(MOST_ABSORPTION),
+            infinite if infinite == f32::INFINITY => MAX_ABSORPTION,
+            coefficient => coefficient.min(MAX_ABSORPTION),
         };
         Vec3::from(volume.attenuation_color.0.map(coefficient))
     });

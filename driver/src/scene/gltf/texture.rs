@@ -15,7 +15,7 @@ use crate::error::SceneError;
 use crate::scene::{Encoding, Image, Texture, Wrap};
 
 /// The largest number of a transform: in single precision, coordinates beyond it tell texels apart no more.
-const MOST_TRANSFORM: f32 = 1e6;
+const MAX_TRANSFORM: f32 = 1e6;
 
 /// Textures as materials ask for them.
 pub(super) struct Textures<'a> {
@@ -113,7 +113,7 @@ fn affine(transform: &TextureTransform) -> Option<Affine> {
     let (offset, [width, height]) = (transform.offset.0, transform.scale.0);
     let angle = transform.rotation.0;
     let numbers = [offset[0], offset[1], width, height, angle];
-    if !numbers.iter().all(|number| number.abs() <= MOST_TRANSFORM) {
+    if !numbers.iter().all(|number| number.abs() <= MAX_TRANSFORM) {
         return None;
     }
     let (sine, cosine) = (libm::sin(angle.into()), libm::cos(angle.into()));

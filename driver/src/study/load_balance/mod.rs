@@ -57,13 +57,13 @@ pub enum LoadBalanceError {
         /// Maximum of unanswered tile commands per chip.
         credits: usize,
     },
-    /// A time is negative, above [`MOST_SECONDS`] or no number.
-    #[error("{0} is no time; give seconds from 0 to {MOST_SECONDS}")]
+    /// A time is negative, above [`MAX_SECONDS`] or no number.
+    #[error("{0} is no time; give seconds from 0 to {MAX_SECONDS}")]
     Time(f64),
 }
 
 /// Maximum time of a tile or of a message, seconds: sums of nanoseconds stay exact.
-pub const MOST_SECONDS: f64 = 1e9;
+pub const MAX_SECONDS: f64 = 1e9;
 
 /// Result of a simulation. Times are seconds since the host began to deal.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,7 +115,7 @@ impl Balance {
 /// `costs` are the seconds that a chip takes for each tile, in the picture's order.
 ///
 /// # Errors
-/// If there are no tiles, no chips or no credits, or a time is negative, above [`MOST_SECONDS`] or no number.
+/// If there are no tiles, no chips or no credits, or a time is negative, above [`MAX_SECONDS`] or no number.
 pub fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balance, LoadBalanceError> {
     let &Setup { chips, credits, link } = setup;
     if costs.is_empty() {
@@ -224,7 +224,7 @@ impl Simulation {
 }
 
 fn nanoseconds(seconds: f64) -> Result<u128, LoadBalanceError> {
-    if !(0.0..=MOST_SECONDS).contains(&seconds) {
+    if !(0.0..=MAX_SECONDS).contains(&seconds) {
         return Err(LoadBalanceError::Time(seconds));
     }
     Ok((seconds * 1e9).round() as u128)

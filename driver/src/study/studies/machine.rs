@@ -13,7 +13,7 @@ use super::workload::{cost, of_frame, tile_seconds};
 use crate::scheduler::GatherOrder;
 
 /// Maximum number of chips in the plots.
-const MOST_CHIPS: usize = 1024;
+const MAX_CHIPS: usize = 1024;
 
 /// A frame of the cost model.
 struct Frame {
@@ -253,7 +253,7 @@ fn chips(frames: &[Frame]) -> Table {
 fn frame_rates(frames: &[Frame]) -> Block {
     let line = |frame: &Frame| {
         let prediction = frame.prediction();
-        let points = chip_counts(MOST_CHIPS)
+        let points = chip_counts(MAX_CHIPS)
             .into_iter()
             .map(|chips| report::Point::new(chips as f64, prediction.frames_per_second(chips as u64)));
         series(frame.name.as_str(), points.collect())
@@ -299,7 +299,7 @@ fn load_balance(scale: &Scale, results: &Results) -> Vec<Block> {
         (name, tile_seconds(measured, &symbols(scale), &Machine::NOMINAL))
     });
     let mut add = |file: &str, title: &str, dealings: &[_], value: (&str, YScale, fn(&Balance) -> f64)| {
-        let panels = scenes.iter().map(|(name, seconds)| curves(name, seconds, MOST_CHIPS, dealings, value));
+        let panels = scenes.iter().map(|(name, seconds)| curves(name, seconds, MAX_CHIPS, dealings, value));
         blocks.push(plot(file, title, "All techniques on; every tile measured.", panels.collect()));
     };
     let speedup: (&str, YScale, fn(&Balance) -> f64) = ("speed-up", YScale::Log10, Balance::speedup);
@@ -325,7 +325,7 @@ fn balance_table(scenes: &[(&str, Vec<f64>)]) -> Table {
     let mut table = Table::new("Speed-up and idle share", columns(&heads));
     for (name, seconds) in scenes {
         for dealing in CREDITS.into_iter().chain(ORDERS.into_iter().skip(1)) {
-            for chips in chip_counts(MOST_CHIPS).into_iter().step_by(2) {
+            for chips in chip_counts(MAX_CHIPS).into_iter().step_by(2) {
                 let Some(balance) = deal(seconds, chips, dealing) else { continue };
                 table.push(vec![
                     (*name).into(),

@@ -141,17 +141,17 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
 }
 
 /// Maximum number of chips in the plot.
-const MOST_CHIPS: usize = 64;
+const MAX_CHIPS: usize = 64;
 
 fn chips(scale: &Scale, results: &Results) -> Vec<Block> {
     let measured = results.traffic(&chips_point(scale));
     let seconds = tile_seconds(measured, &symbols(scale), &Machine::NOMINAL);
     let speedup = ("speed-up", YScale::Log10, Balance::speedup as fn(&Balance) -> f64);
-    let axes = curves("", &seconds, MOST_CHIPS, &CREDITS, speedup);
+    let axes = curves("", &seconds, MAX_CHIPS, &CREDITS, speedup);
     let heads =
         [("chips", ""), ("speed-up", ""), ("idle share", ""), ("photon map from DRAM, all chips", "GB")];
     let mut rows = Table::new("Chips, one credit each, tiles in the picture's order", columns(&heads));
-    for count in chip_counts(MOST_CHIPS) {
+    for count in chip_counts(MAX_CHIPS) {
         let Some(balance) = deal(&seconds, count, CREDITS[0]) else { continue };
         rows.push(vec![
             count.into(),

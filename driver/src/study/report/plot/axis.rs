@@ -5,9 +5,9 @@ use super::super::number;
 /// Maximum number of intervals between the ticks of a linear axis, before its ends are rounded outward.
 const INTERVALS: f64 = 10.0;
 /// Maximum number of tick labels of an axis.
-const MOST_TICKS: usize = 12;
+const MAX_TICKS: usize = 12;
 /// Maximum length, in steps of 1-2-5, of a logarithmic axis that ends at any step; a longer one ends at whole decades.
-const MOST_STEPS: i32 = 9;
+const MAX_STEPS: i32 = 9;
 /// Bound below which a linear axis takes its values for zeros, if the magnitudes of all are below it.
 const SMALLEST: f64 = 1e-290;
 /// Tolerance for rounding of logarithms that should be whole numbers.
@@ -102,7 +102,7 @@ impl Axis {
         if low_step.0 + 1 == high_step.0 && high_step.value() <= high * (1.0 + WHOLE) {
             high_step.0 += 1;
         }
-        if high_step.0 - low_step.0 > MOST_STEPS {
+        if high_step.0 - low_step.0 > MAX_STEPS {
             low_step.0 = 3 * low_step.0.div_euclid(3);
             high_step.0 = -3 * (-high_step.0).div_euclid(3);
         }
@@ -151,7 +151,7 @@ impl Axis {
         let mut ticks = Vec::new();
         for sparsity in 0..1000 {
             ticks = self.candidate(sparsity);
-            if ticks.len() <= 1 || ticks.len() <= MOST_TICKS && fits(&ticks) {
+            if ticks.len() <= 1 || ticks.len() <= MAX_TICKS && fits(&ticks) {
                 break;
             }
         }
@@ -248,9 +248,9 @@ mod tests {
         assert_eq!(labels(&Axis::log10(3.0, 70.0)), ["2", "5", "10", "20", "50", "100"]);
         assert_eq!(labels(&Axis::log10(0.003, 800.0)), ["0.001", "0.01", "0.1", "1", "10", "100", "1,000"]);
         let wide = labels(&Axis::log10(1e-300, 1e300));
-        assert!(wide.len() <= MOST_TICKS && wide.contains(&"10⁰".to_owned()), "{wide:?}");
+        assert!(wide.len() <= MAX_TICKS && wide.contains(&"10⁰".to_owned()), "{wide:?}");
         let log2 = labels(&Axis::log2(1.0, 2_f64.powi(30)));
-        assert!(log2.len() <= MOST_TICKS && log2.contains(&"2³⁰".to_owned()), "{log2:?}");
+        assert!(log2.len() <= MAX_TICKS && log2.contains(&"2³⁰".to_owned()), "{log2:?}");
     }
 
     #[test]
@@ -285,7 +285,7 @@ mod tests {
             }
             for axis in axes {
                 let ticks = axis.ticks(|_| true);
-                assert!((2..=MOST_TICKS).contains(&ticks.len()), "{axis:?}: {ticks:?}");
+                assert!((2..=MAX_TICKS).contains(&ticks.len()), "{axis:?}: {ticks:?}");
                 assert!(ticks.windows(2).all(|pair| pair[0].place < pair[1].place), "{axis:?}: {ticks:?}");
                 let ends = [axis.place(low), axis.place(high)];
                 assert!(ends.iter().all(|end| (0.0..=1.0).contains(end)) && axis.holds(low), "{axis:?}");
