@@ -28,7 +28,7 @@ pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
 pub use self::triangle::{Attributes, NO_ATTRIBUTES, Triangle};
 use crate::error::SceneError;
 
-/// A scene in world space, every instance resolved.
+/// A scene in world space, every instance resolved. [`gltf::load`] reads one from a file.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Triangles of non-zero area, in file order, counter-clockwise seen from the front.
