@@ -1,6 +1,6 @@
 //! The photon mapping renderer of one rendering chip.
 //!
-//! No allocator, no I/O, every buffer sized at compile time by [`photoncard_shared::budget`]. From the memory to the
+//! No allocator, no I/O, every buffer sized at compile time by a [`kind`] of chip. From the memory to the
 //! wire:
 //!
 //! | module | contents |
@@ -12,8 +12,9 @@
 //! | [`gather`] | queue of photon gathers, and their order |
 //! | [`importance`] | importance sampling of final gather directions |
 //! | [`irradiance_cache`] | indirect irradiance, gathered at few points and interpolated between them |
-//! | [`render`] | eye rays, direct light, final gather: the stages of a tile |
-//! | [`chip`] | state of a tile; one method for each stage |
+//! | [`render`] | eye rays, direct light, final gather: the passes of a tile |
+//! | [`kind`] | kinds of chip: budgets and the capacities of buffers |
+//! | [`chip`] | state of a tile; one method for each pass |
 //! | [`card`] | protocol of a card: commands in, replies out |
 //! | [`serve`] | main loop of a card on a port |
 //!
@@ -58,6 +59,7 @@ pub mod fixed_point;
 pub mod gather;
 pub mod importance;
 pub mod irradiance_cache;
+pub mod kind;
 pub mod memory;
 pub mod photon;
 pub mod render;

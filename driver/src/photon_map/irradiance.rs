@@ -6,11 +6,12 @@
 
 use glam::Vec3;
 use photoncard_firmware::gather::Place;
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather, reflected_radiance};
 use photoncard_firmware::scene::{PartialReflection, SceneImage};
 use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::budget::{REFERENCE, gather_candidates};
+use photoncard_shared::budget::gather_candidates;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{IrradiancePoint, PHOTON_CONTENT_BYTES, Photon, PhotonLeaf, Record};
 use photoncard_shared::message::Fault;

@@ -29,7 +29,8 @@ pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use photoncard_shared::budget::{Budget, REFERENCE};
+use photoncard_firmware::kind::REFERENCE;
+use photoncard_shared::budget::Budget;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{CausticGather, FrameParameters, Tile};
 

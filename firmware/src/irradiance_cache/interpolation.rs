@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::lattice::Cell;
 use super::record::{Content, Record};
 use super::{IrradianceCache, LatticePoint};
+use crate::kind::{Capacity, Map};
 use crate::scene::Surface;
 use crate::vector::min;
 
@@ -52,7 +53,7 @@ struct Weights {
     weights: [f32; 4],
 }
 
-impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
+impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
     pub(super) fn corners(&self, cell: &Cell) -> Corners<'_> {
         Corners(cell.corners().map(|corner| self.records.get(&corner).and_then(Option::as_ref)))
     }

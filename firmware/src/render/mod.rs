@@ -1,4 +1,4 @@
-//! The stages of a tile, each a function of one pixel or one ray.
+//! The passes of a tile, each a function of one pixel or one ray.
 
 pub mod caustic;
 pub mod direct;
@@ -16,7 +16,7 @@ use photoncard_shared::message::FrameParameters;
 use crate::gather::GatherRequest;
 use crate::scene::SceneImage;
 
-/// What every stage needs: the scene in its memory, the frame, and what is counted.
+/// Context of a pass: the scene in its memory, the frame, and the counters.
 pub struct Context<'a, M> {
     /// Where the records lie.
     pub scene: &'a SceneImage,

@@ -1,6 +1,6 @@
 //! Traffic over the number of photons, the side of tiles and the size of the queue; time over the number of chips.
 
-use photoncard_shared::budget::REFERENCE;
+use photoncard_firmware::kind::REFERENCE;
 
 use super::super::cost_model::Machine;
 use super::super::laboratory::Results;
