@@ -12,7 +12,7 @@ use crate::vector::min;
 /// Minimum sum of the weights of a sample's records.
 const MIN_WEIGHT: f32 = 0.05;
 
-/// Records at the corners of a cell, where there are any.
+/// Records at the corners of a cell; `None` at a corner without one.
 pub(super) struct Corners<'a>([Option<&'a Record>; 4]);
 
 impl<'a> Corners<'a> {
@@ -36,7 +36,7 @@ impl<'a> Corners<'a> {
     }
 }
 
-/// Surface that a sample sees, and the sample's position in the picture.
+/// A sample: the surface that it sees, and its position in the picture.
 #[derive(Clone, Copy, Debug)]
 pub struct SeenSample<'a> {
     /// Column and row of its pixel.
@@ -47,7 +47,7 @@ pub struct SeenSample<'a> {
     pub surface: &'a Surface,
 }
 
-/// Weights of a sample's cell's four corners.
+/// Weights of the four corners of a sample's cell.
 struct Weights {
     cell: Cell,
     weights: [f32; 4],

@@ -129,7 +129,7 @@ impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
         self.next = 0;
     }
 
-    /// Begins the gather of the next records, at most `most`. Returns their number; 0 if all records are gathered.
+    /// Begins the gather of the next records, up to `most`. Returns their number; 0 if all records are gathered.
     pub fn begin_gather(&mut self, most: usize) -> u32 {
         self.gathered.view_mut().clear();
         while self.gathered.view().len() < most.min(G::ENTRIES) {

@@ -42,7 +42,7 @@ impl PhotonMap {
     }
 }
 
-/// Collects the photons of a map nearest to `position` in `nearest`, the same set in either layout of the map. Returns
+/// Collects the photons of a map nearest to `position` in `nearest`; both layouts of the map give equal sets. Returns
 /// the number of photons tested.
 ///
 /// # Errors

@@ -4,8 +4,8 @@
 //! contains the k-th and few others is guessed by interpolation; counting the candidates below its ends verifies and
 //! corrects the guess. One pass then keeps the candidates below the interval and sets aside those in it, of which the
 //! first fill up the k. Where no guess succeeds, as with many candidates at one distance, quickselect (Hoare 1961)
-//! takes over, and after a bounded number of pivots a radix selection, bit by bit of the sort key. The result is the
-//! same on each of these paths.
+//! takes over, and after a bounded number of pivots a radix selection, bit by bit of the sort key. All of these give
+//! equal sets.
 
 use super::candidates::{Candidate, CandidateCells, Candidates};
 use crate::simd::{Isa, LANES};

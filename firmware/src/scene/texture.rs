@@ -1,4 +1,4 @@
-//! Textures: texels of card memory, interpolated linearly between the four nearest.
+//! Textures: bilinear interpolation of texels in card memory.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
@@ -14,7 +14,7 @@ const TEXTURES_PER_LINE: u32 = Texture::PER_LINE as u32;
 /// Bytes of a texel.
 const TEXEL_BYTES: u32 = 4;
 
-/// Texture `index`.
+/// Reads texture `index`.
 ///
 /// # Errors
 /// If there is none.
@@ -24,7 +24,7 @@ pub fn read_texture(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
     Ok(Texture::read(bytes))
 }
 
-/// What a texture holds at some coordinates: linear red, green, blue and alpha.
+/// Value of a texture at texture coordinates: linear red, green, blue and alpha.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -57,18 +57,18 @@ pub fn sample_texture(
     Ok(sum)
 }
 
-/// A place along one axis of a texture, between the middles of two texels.
+/// Position along one axis of a texture, between the centres of two texels.
 struct Place {
-    /// The texels, the first before the second.
+    /// Indices of the two texels.
     texels: [u32; 2],
-    /// How far it is from the middle of the first to that of the second.
+    /// Weight of the second texel, 0 to 1.
     fraction: f32,
 }
 
 impl Place {
     fn new(coordinate: f32, size: u16, wrap: Wrap) -> Self {
         let texels = u32::from(size.max(1));
-        // The period in texels; what is clamped has none.
+        // Period in texels; unused by clamping.
         let period = if wrap == Wrap::Mirror { 2 * texels } else { texels };
         let turns = match wrap {
             Wrap::Clamp => coordinate,
@@ -76,11 +76,11 @@ impl Place {
             Wrap::Mirror => (coordinate * 0.5 - libm::floorf(coordinate * 0.5)) * 2.0,
         };
         let half_outside = 0.5 / texels as f32;
-        // What is no number becomes the first texel.
+        // NaN becomes the first texel.
         let turns = if turns > -half_outside { turns } else { -half_outside };
         let turns = min(turns, period as f32 / texels as f32 + half_outside);
         let at = turns * texels as f32 + 0.5;
-        // Counted from the texel before the first.
+        // Texel indices here start at 1: 0 is the texel before the first.
         let first = at as u32;
         let wrapped = |texel: u32| match wrap {
             Wrap::Clamp => texel.saturating_sub(1).min(texels - 1),
@@ -121,7 +121,7 @@ fn texel(
     Ok(decode_texel(texture.format, texel))
 }
 
-/// The least and the greatest value of each channel over all texels: linear red, green, blue and alpha.
+/// Minimum and maximum of each channel over all texels: linear red, green, blue and alpha.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -143,7 +143,7 @@ pub(super) fn channel_ranges(
     Ok(ranges)
 }
 
-/// What a texel stands for: linear red, green, blue and alpha.
+/// Value of an encoded texel: linear red, green, blue and alpha.
 pub fn decode_texel(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
     let linear = |channel: u8| f32::from(channel) * (1.0 / 255.0);
     let [red, green, blue, alpha] = texel;
