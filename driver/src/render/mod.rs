@@ -24,7 +24,7 @@ pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Radiance, Sampling};
 pub use settings::{DEFAULT_CAUSTIC_PHOTONS, MIN_IRRADIANCE_ERROR, RenderSettings};
-pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
+pub use statistics::{LinkStatistics, Rays, Statistics, Times};
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -34,6 +34,7 @@ use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{CausticGather, FrameParameters, Tile};
 
 use self::cards::{Cards, Onlookers, Outcome};
+use crate::cost_model::Flops;
 use crate::display::Display;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
@@ -292,7 +293,7 @@ fn statistics(
         points_tested: counters.points_tested,
         drains: counters.drains,
         most_waiting: counters.most_waiting,
-        flops: Flops::new(counters, frame),
+        flops: Flops::counted(counters, frame.gather_rays),
         image_bytes: prepared.image.bytes(),
         link: LinkStatistics {
             payload_bytes: outcome.bytes.payload,

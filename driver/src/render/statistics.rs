@@ -1,11 +1,9 @@
 //! What a render took: the keys of `--stats`.
 
-use photoncard_shared::counters::Counters;
-use photoncard_shared::message::FrameParameters;
 use serde::Serialize;
 
 use super::MemoryStatistics;
-use crate::study::cost_model::{Cost, Symbols, Workload};
+use crate::cost_model::Flops;
 
 /// The contents of the statistics file. Keys are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -117,30 +115,6 @@ pub struct Rays {
     pub survey: u64,
     /// From perfectly specular surfaces, on the way of any of these but shadow rays.
     pub specular: u64,
-}
-
-/// Floating-point operations of each unit of the chip, on all chips together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Flops {
-    /// All rays.
-    pub ray_caster: f64,
-    /// Importance tables and the irradiance cache.
-    pub controller: f64,
-    /// Searches of the photon map and all reflection.
-    pub gather_unit: f64,
-}
-
-impl Flops {
-    /// Of the work that was counted, each piece at its nominal cost.
-    pub(super) fn new(counters: &Counters, frame: &FrameParameters) -> Self {
-        let symbols = Symbols { gather_rays: frame.gather_rays as f64, ..Symbols::NOMINAL };
-        let cost = Cost::new(&Workload::counted(counters), &symbols);
-        Self {
-            ray_caster: cost.ray_caster.flops,
-            controller: cost.controller.flops,
-            gather_unit: cost.gather_unit.flops,
-        }
-    }
 }
 
 /// Bytes over all links.
