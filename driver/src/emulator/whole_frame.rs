@@ -157,7 +157,7 @@ fn render_with<'a, M: MeasuredMemory>(
     for tiles in tiles.chunks(tiles_per_round) {
         all.add(frame, pool.install(|| cast_tiles(job, model, tiles, &go_on))?)?;
     }
-    pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.request.place));
+    pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.request.position));
     let mut done = 0;
     for waiting in all.waiting.chunks(GATHERS_PER_ROUND.max(chips * gathers_per_task)) {
         let parts: Result<Vec<_>, Fault> = pool.install(|| {

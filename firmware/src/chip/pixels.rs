@@ -69,7 +69,7 @@ impl<K: ChipKind> Chip<K> {
     ) -> Purpose {
         let frame = context.frame;
         let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
-        let sample = SeenSample { pixel: [at.x, at.y], place: eye::place(context, at), surface };
+        let sample = SeenSample { pixel: [at.x, at.y], film: eye::film_position(context, at), surface };
         // Records lie where eye rays meet surfaces, not behind mirrors and glass.
         let allowed = allowed_error(frame).filter(|_| is_lambertian && seen.is_some());
         let interpolated = allowed.and_then(|allowed| self.cache.interpolate(&sample, allowed));

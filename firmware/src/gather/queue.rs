@@ -1,5 +1,5 @@
 //! The gather queue of deferred reordering: requests are kept until the queue is full or their results are needed, and
-//! are then done in the order of [`super::Place::key`]. A full queue is drained before the next request; nothing is
+//! are then done in the order of [`super::HilbertCode::key`]. A full queue is drained before the next request; nothing is
 //! lost.
 
 use photoncard_shared::message::Drain;
@@ -57,7 +57,7 @@ impl<C: Capacity> GatherQueue<C> {
     /// Begins a drain: sorts the requests in the order of `drain`.
     pub fn begin_drain(&mut self, drain: Drain) {
         // In descending order, as requests are popped from the end.
-        self.waiting.view_mut().sort_unstable_by_key(|request| u64::MAX - request.place.key(drain));
+        self.waiting.view_mut().sort_unstable_by_key(|request| u64::MAX - request.position.key(drain));
         self.draining = true;
     }
 

@@ -42,7 +42,7 @@ pub struct SeenSample<'a> {
     /// Column and row of its pixel.
     pub pixel: [u32; 2],
     /// Position in the picture, pixels from the upper left corner.
-    pub place: [f32; 2],
+    pub film: [f32; 2],
     /// Visible surface.
     pub surface: &'a Surface,
 }
@@ -70,11 +70,11 @@ impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
 
     /// Weights of the records for a sample; `None` if it cannot be interpolated.
     fn weights(&self, sample: &SeenSample, allowed: f32) -> Option<Weights> {
-        let SeenSample { pixel, place, surface } = *sample;
-        // By pixel, as rounding may move `place` to the border of the next pixel.
+        let SeenSample { pixel, film, surface } = *sample;
+        // By pixel, as rounding may move `film` to the border of the next pixel.
         let cell = self.undivided_cell(pixel)?;
         let part = |at: f32, from: u32| (at - from as f32) / cell.side() as f32;
-        let [x, y] = [part(place[0], cell.corner.x), part(place[1], cell.corner.y)];
+        let [x, y] = [part(film[0], cell.corner.x), part(film[1], cell.corner.y)];
         let bilinear = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
         let corners = self.corners(&cell);
         let errors = corners.errors(allowed, surface.position, surface.normal);

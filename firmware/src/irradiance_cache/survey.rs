@@ -134,7 +134,7 @@ impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
             return Ok(false);
         }
         for point in cell.middles() {
-            let seen = eye::see(context, point.place())?;
+            let seen = eye::see(context, point.film_position())?;
             if !seen.is_some_and(|surface| covers(surface.position, surface.normal)) {
                 return Ok(false);
             }
@@ -157,7 +157,7 @@ fn new_record<M: MemoryPort>(
     point: LatticePoint,
     allowed: f32,
 ) -> Result<Option<Record>, Fault> {
-    let seen = eye::see(context, point.place())?;
+    let seen = eye::see(context, point.film_position())?;
     // A surface seen in a mirror or through glass is not where the lattice point is.
     let surface = seen.filter(|surface| surface.reflection.has_lambertian() && surface.specular.is_none());
     Ok(surface.map(|surface| {
@@ -176,8 +176,8 @@ fn distance_in<M: MemoryPort>(
 ) -> Result<f32, Fault> {
     context.memory.enter(Stage::Survey);
     context.counters.survey_rays += 1;
-    let place = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];
-    let ray = Ray::new(surface.offset_origin(), direction_in(surface.normal, cell, place));
+    let square = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];
+    let ray = Ray::new(surface.offset_origin(), direction_in(surface.normal, cell, square));
     let hit = closest_hit(context.scene, context.memory, &ray)?;
     Ok(hit.map_or(f32::INFINITY, |hit| hit.intersection.distance))
 }
