@@ -15,7 +15,6 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use photoncard_shared::counters::Counters;
 use photoncard_shared::message::Tile;
 pub use photoncard_shared::message::{Pixel as PixelValue, PixelLayers, PixelRecord};
 use thiserror::Error;
@@ -272,15 +271,9 @@ impl Film {
         if !self.has(tile) {
             return None;
         }
-        let mut records = Vec::new();
-        for (x, y) in places(tile) {
-            let FilmPixel { pixel, layers } = self.all_at(x, y)?;
-            records.extend(pixel.to_bytes());
-            if self.has_layers() {
-                records.extend(layers.to_bytes());
-            }
-        }
-        FinishedTile::new(*tile, records, self.has_layers(), Counters::ZERO)
+        let pixels = places(tile).filter_map(|(x, y)| self.all_at(x, y));
+        let records = pixels.map(|FilmPixel { pixel, layers }| PixelRecord { pixel, layers: Some(layers) });
+        FinishedTile::of_pixels(*tile, records, self.has_layers())
     }
 
     /// Takes a tile's pixels for not written.

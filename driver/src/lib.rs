@@ -121,6 +121,7 @@
 
 mod allocation;
 pub mod bvh;
+pub mod cost_model;
 mod density;
 pub mod difference;
 pub mod dispatcher;

@@ -21,6 +21,23 @@ impl FinishedTile {
         (records.len() as u64 == bytes).then_some(Self { tile, records, has_layers, counters })
     }
 
+    /// A tile of these pixels, row by row, whose work is counted elsewhere; `None` unless there is one for each pixel.
+    /// Layers that a pixel lacks are zero.
+    pub fn of_pixels(
+        tile: Tile,
+        pixels: impl IntoIterator<Item = PixelRecord>,
+        has_layers: bool,
+    ) -> Option<Self> {
+        let mut records = Vec::new();
+        for PixelRecord { pixel, layers } in pixels {
+            records.extend(pixel.to_bytes());
+            if has_layers {
+                records.extend(layers.unwrap_or_default().to_bytes());
+            }
+        }
+        Self::new(tile, records, has_layers, Counters::ZERO)
+    }
+
     /// Its rectangle of the picture.
     pub fn tile(&self) -> &Tile {
         &self.tile

@@ -1,6 +1,6 @@
 //! The photon mapping renderer of one rendering chip.
 //!
-//! No allocator, no I/O, every buffer sized at compile time by [`photoncard_shared::budget`]. An emulated card, a machine of QEMU and a
+//! No allocator, no I/O, every buffer sized at compile time by a [`kind`] of chip. An emulated card, a machine of QEMU and a
 //! board run the same code. Terms are defined in `docs/glossary.md`.
 //!
 //! # Layers
@@ -17,9 +17,10 @@
 //! | [`photon`] | search for the k nearest photons, density estimate, precomputed irradiance |
 //! | [`gather`] | queue of photon gathers, and their order |
 //! | [`importance`] | importance sampling of final gather directions |
-//! | [`render`] | stages of a tile: eye rays, direct light, caustics, final gather |
+//! | [`render`] | passes of a tile: eye rays, direct light, caustics, final gather |
 //! | [`irradiance_cache`] | indirect irradiance, gathered at few points and interpolated between them |
-//! | [`chip`] | state of a tile; one method for each stage |
+//! | [`kind`] | kinds of chip: budgets, and capacities of buffers |
+//! | [`chip`] | state of a tile; one method for each pass |
 //! | [`card`] | protocol of a card: commands in, replies out |
 //! | [`serve`] | main loop of a card on a port |
 //!
@@ -67,6 +68,7 @@ pub mod fixed_point;
 pub mod gather;
 pub mod importance;
 pub mod irradiance_cache;
+pub mod kind;
 pub mod memory;
 pub mod photon;
 pub mod render;

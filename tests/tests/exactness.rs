@@ -5,7 +5,7 @@ use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{CardAddress, Radiance, RenderSettings, Sampling, Unobserved, render};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
-use photoncard_shared::budget::{MICRO, REFERENCE};
+use photoncard_firmware::kind::{MICRO, REFERENCE};
 use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
 

@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
 
-use photoncard_shared::budget::REFERENCE;
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::checksum::checksum;
 use photoncard_shared::message::{PixelRecord, Tile, record_bytes};
 

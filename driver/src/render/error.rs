@@ -139,7 +139,6 @@ impl From<FrameError> for RenderError {
         match error {
             FrameError::Stopped => Self::Stopped,
             FrameError::Image(fault) => Self::Image(fault),
-            FrameError::Film(error) => Self::Film(error),
             FrameError::Start(source) => Self::Chips(source),
             FrameError::TooManyGathers { .. } => Self::Setting {
                 option: "--order",

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
-use photoncard_shared::budget::MICRO;
+use photoncard_firmware::kind::MICRO;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, CausticGather, FrameParameters, Radiance, Sampling};
 use serde_json::{Value, json};

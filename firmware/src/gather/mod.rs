@@ -13,6 +13,6 @@ mod order;
 mod queue;
 mod request;
 
-pub use order::{Place, hilbert_cell, hilbert_index};
+pub use order::{HilbertCode, hilbert_cell, hilbert_index};
 pub use queue::GatherQueue;
 pub use request::GatherRequest;

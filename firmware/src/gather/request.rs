@@ -1,13 +1,13 @@
 //! The record of a waiting gather: position, partial reflection, pixel.
 
-use super::Place;
+use super::HilbertCode;
 use crate::scene::PartialReflection;
 
 /// Gather of photons at a position, whose radiance is added to a gather point's sum; 24 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherRequest {
     /// Position, on the photons' grid.
-    pub place: Place,
+    pub position: HilbertCode,
     /// Partial reflection times the gather ray's weight, from photon power units to radiance units.
     pub reflection: PartialReflection,
     /// Index of the gather point whose sum takes the result.

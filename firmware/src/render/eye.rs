@@ -13,7 +13,7 @@ use crate::vector::unit;
 
 /// Position of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over
 /// its square (box filter).
-pub fn place<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
+pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     let PixelSample { x, y, sample } = pixel;
     let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Pixel);
     let [jitter_x, jitter_y] = pattern.point(sample, context.frame.samples);
@@ -57,7 +57,7 @@ impl Sight {
 pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Sight, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
-    let ray = eye_ray(context, place(context, pixel));
+    let ray = eye_ray(context, film_position(context, pixel));
     let PixelSample { x, y, sample } = pixel;
     let samples = context.frame.samples;
     let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Specular);
@@ -97,10 +97,10 @@ fn background<M: MemoryPort>(context: &mut Context<M>, path: &SpecularPath) -> R
 ///
 /// # Errors
 /// If the image is not sound.
-pub fn look<M: MemoryPort>(context: &mut Context<M>, place: [f32; 2]) -> Result<Option<Seen>, Fault> {
+pub fn look<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Seen>, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
-    let hit = closest_hit(context.scene, context.memory, &eye_ray(context, place))?;
+    let hit = closest_hit(context.scene, context.memory, &eye_ray(context, film))?;
     Ok(hit.map(|hit| Seen::new(&hit)))
 }
 
@@ -111,19 +111,19 @@ pub fn look<M: MemoryPort>(context: &mut Context<M>, place: [f32; 2]) -> Result<
 #[inline(always)]
 pub fn surface<M: MemoryPort>(
     context: &mut Context<M>,
-    place: [f32; 2],
+    film: [f32; 2],
     seen: &Seen,
 ) -> Result<Surface, Fault> {
-    seen.surface(context.scene, context.memory, &eye_ray(context, place))
+    seen.surface(context.scene, context.memory, &eye_ray(context, film))
 }
 
 /// Surface at the hit of the eye ray at a position of the picture.
 ///
 /// # Errors
 /// If the image is not sound.
-pub fn see<M: MemoryPort>(context: &mut Context<M>, place: [f32; 2]) -> Result<Option<Surface>, Fault> {
-    match look(context, place)? {
-        Some(seen) => surface(context, place, &seen).map(Some),
+pub fn see<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Surface>, Fault> {
+    match look(context, film)? {
+        Some(seen) => surface(context, film, &seen).map(Some),
         None => Ok(None),
     }
 }

@@ -7,7 +7,7 @@ use photoncard_shared::message::{Fault, Radiance};
 
 use super::specular_path::{Carried, PathEnd, SpecularPath};
 use super::{Context, GatherPoint, direct};
-use crate::gather::{GatherRequest, Place};
+use crate::gather::{GatherRequest, HilbertCode};
 use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
@@ -69,7 +69,7 @@ pub fn cast<M: MemoryPort>(
     let unit = 1.0 / context.scene.header.radiance_unit;
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
-        place: Place::new(&header.photon_grid, met.position.to_array()),
+        position: HilbertCode::new(&header.photon_grid, met.position.to_array()),
         reflection: PartialReflection::encode(
             &met.reflector(),
             weight * (header.photon_power_unit / header.radiance_unit),
@@ -118,7 +118,7 @@ pub fn gathered<M: MemoryPort>(
     candidates: Candidates,
 ) -> Result<Vec3, Fault> {
     context.memory.enter(Stage::Gather);
-    let position = request.place.position(&context.scene.header.photon_grid).into();
+    let position = request.position.position(&context.scene.header.photon_grid).into();
     // Irradiance has no directions, which a lobe needs.
     if context.frame.radiance == Radiance::Precomputed && request.reflection.is_lambertian() {
         return Ok(

@@ -1,4 +1,4 @@
-//! Stages of a tile, each a function of one pixel or one ray: eye ray, direct light, caustics, final gather.
+//! Passes of a tile, each a function of one pixel or one ray: eye ray, direct light, caustics, final gather.
 
 pub mod caustic;
 pub mod direct;
@@ -16,7 +16,7 @@ use photoncard_shared::message::FrameParameters;
 use crate::gather::GatherRequest;
 use crate::scene::SceneImage;
 
-/// Arguments of every stage: scene, memory, frame parameters and counters.
+/// Arguments of every pass: scene, memory, frame parameters and counters.
 pub struct Context<'a, M> {
     /// Sections of the card image.
     pub scene: &'a SceneImage,

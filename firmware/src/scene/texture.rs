@@ -39,7 +39,7 @@ pub fn sample_texture(
     let place = |axis: usize, size: u16, wrap: Wrap| {
         let [[a, b], [c, d]] = texture.matrix;
         let [x, y] = texture.offset;
-        Place::new(if axis == 0 { a * u + b * v + x } else { c * u + d * v + y }, size, wrap)
+        TexelPair::new(if axis == 0 { a * u + b * v + x } else { c * u + d * v + y }, size, wrap)
     };
     let [across, down] = texture.wrap;
     let [across, down] = [place(0, columns, across), place(1, rows, down)];
@@ -58,14 +58,14 @@ pub fn sample_texture(
 }
 
 /// Position along one axis of a texture, between the centres of two texels.
-struct Place {
+struct TexelPair {
     /// Indices of the two texels.
     texels: [u32; 2],
     /// Weight of the second texel, 0 to 1.
     fraction: f32,
 }
 
-impl Place {
+impl TexelPair {
     fn new(coordinate: f32, size: u16, wrap: Wrap) -> Self {
         let texels = u32::from(size.max(1));
         // Period in texels; unused by clamping.
@@ -222,7 +222,7 @@ mod tests {
 
     #[track_caller]
     fn between(coordinate: f32, wrap: Wrap) -> [(u32, f32); 2] {
-        Place::new(coordinate, 4, wrap).texels()
+        TexelPair::new(coordinate, 4, wrap).texels()
     }
 
     #[test]
@@ -255,7 +255,7 @@ mod tests {
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
             for size in [1, 2, 3, 16_384, u16::MAX] {
                 for &coordinate in &coordinates {
-                    let place = Place::new(coordinate, size, wrap);
+                    let place = TexelPair::new(coordinate, size, wrap);
                     assert!(place.texels.into_iter().all(|texel| texel < u32::from(size)));
                     assert!(
                         (0.0..=1.0).contains(&place.fraction),

@@ -32,7 +32,7 @@ mod vertex;
 
 use std::path::Path;
 
-use photoncard_shared::budget::REFERENCE;
+use photoncard_firmware::kind::REFERENCE;
 
 use self::accessor::Source;
 use self::document::Document;
