@@ -5,21 +5,20 @@
 //!
 //! # Layers
 //!
-//! Modules from bottom to top. A module imports modules above it in this table, never below it.
+//! Modules from bottom to top. A module imports modules of its own row and of rows above it in this table, never of rows below it.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `vector`, [`fixed_point`], [`simd`] | arithmetic with equal bits on every processor; sums independent of order; vector kernels |
 //! | [`sampler`] | stratified random numbers, functions of (seed, pixel, sample, dimension) |
 //! | [`memory`] | 128-byte lines of card DRAM; caches and counters |
-//! | `wide_tree` | traversal of trees of sixteen-wide nodes |
-//! | [`scene`] | ray caster, surfaces, reflection, textures and lights, read from card memory |
+//! | [`scene`], `wide_tree` | ray caster, surfaces, reflection, textures and lights, read from card memory; traversal of trees of sixteen-wide nodes |
 //! | [`photon`] | search for the k nearest photons, density estimate, precomputed irradiance |
+//! | [`kind`] | kinds of chip: budgets, and capacities of buffers |
 //! | [`gather`] | queue of photon gathers, and their order |
 //! | [`importance`] | importance sampling of final gather directions |
 //! | [`render`] | passes of a tile: eye rays, direct light, caustics, final gather |
 //! | [`irradiance_cache`] | indirect irradiance, gathered at few points and interpolated between them |
-//! | [`kind`] | kinds of chip: budgets, and capacities of buffers |
 //! | [`chip`] | state of a tile; one method for each pass |
 //! | [`card`] | protocol of a card: commands in, replies out |
 //! | [`serve`] | main loop of a card on a port |
