@@ -1,4 +1,17 @@
 //! Film: the pixels of a picture's crop window, as far as they are rendered.
+//!
+//! ```
+//! use photoncard_driver::film::{Film, PixelValue, Window};
+//!
+//! # fn main() -> Result<(), photoncard_driver::film::FilmError> {
+//! let mut film = Film::new(640, 480, Window { x0: 0, x1: 2, y0: 0, y1: 1 })?;
+//! film.write(1, 0, PixelValue { radiance: [0.5; 3], ..PixelValue::default() })?;
+//! assert_eq!((film.missing(), film.is_complete()), (1, false));
+//! assert_eq!(film.pixel(1, 0).map(|pixel| pixel.radiance), Some([0.5; 3]));
+//! assert_eq!(film.pixel(2, 0), None);
+//! # Ok(())
+//! # }
+//! ```
 
 use std::sync::{Mutex, PoisonError};
 
@@ -8,7 +21,7 @@ use thiserror::Error;
 
 use crate::sink::{FinishedTile, TileSink, pixel_positions};
 
-/// The most pixels a film may hold: 2^28, about 10 GiB, with layers 20.
+/// Maximum number of pixels of a film: 2^28, about 10 GiB, or 20 GiB with layers.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Maximum width and height of a picture, pixels.

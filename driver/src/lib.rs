@@ -101,8 +101,9 @@
 //! | cards | [`emulator`] | chips on threads of this process, memory models and traces |
 //! | tiles to cards | [`scheduler`], [`dispatcher`] | which card renders which tile; finished tiles to the sinks |
 //! | sinks | [`partial`], [`display`] | the file of finished tiles, for `--resume`; the client of a display server |
+//! | cost model | [`cost_model`] | FLOPs and DRAM bytes of a frame by Table 7.1 |
 //! | render | [`render`] | one render from a scene to a complete film; settings, statistics, card addresses |
-//! | studies | [`study`] | measurements and reports. `study::cost_model` stands below [`render`], whose statistics count FLOPs by it |
+//! | studies | [`study`] | measurements of shipped scenes, and reports |
 //!
 //! Below all of them are [`photoncard_shared`] (formats of memory and wire) and [`photoncard_firmware`]. `pack`, `light`,
 //! `photon`, `density`, `photon_map` and `emulator` import the firmware, so that photons, chords and irradiance points are

@@ -28,7 +28,7 @@ pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
 pub use self::triangle::{NO_ATTRIBUTES, Triangle, VertexAttributes};
 use crate::error::SceneError;
 
-/// A scene in world space, every instance resolved.
+/// A scene in world space, every instance resolved. [`gltf::load`] reads one from a file.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Triangles of non-zero area, in file order, counter-clockwise seen from the front.
