@@ -116,8 +116,8 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
 
 /// Input of the builder: one box for many triangles whose boxes have a common centre, one for each other triangle.
 ///
-/// Of boxes in one another each is as near as any larger one, so that hardly two choose each other, and the builder would go
-/// through all of them for each pair that it joins.
+/// Concentric boxes, each in the next, are all at one distance from the smallest: hardly two of them are each other's
+/// nearest, and the builder would search all of them for each pair that it joins.
 struct Parts {
     crowds: Vec<Vec<u32>>,
     singles: Vec<u32>,

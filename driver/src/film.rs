@@ -19,7 +19,7 @@ use photoncard_shared::message::Tile;
 pub use photoncard_shared::message::{Pixel as PixelValue, PixelLayers, PixelRecord};
 use thiserror::Error;
 
-use crate::sink::{FinishedTile, TileSink, places};
+use crate::sink::{FinishedTile, TileSink, pixel_positions};
 
 /// Maximum number of pixels of a film: 2^28, about 10 GiB, or 20 GiB with layers.
 pub const MAX_PIXELS: u64 = 1 << 28;
@@ -271,14 +271,14 @@ impl Film {
         if !self.has(tile) {
             return None;
         }
-        let pixels = places(tile).filter_map(|(x, y)| self.all_at(x, y));
+        let pixels = pixel_positions(tile).filter_map(|(x, y)| self.all_at(x, y));
         let records = pixels.map(|FilmPixel { pixel, layers }| PixelRecord { pixel, layers: Some(layers) });
         FinishedTile::of_pixels(*tile, records, self.has_layers())
     }
 
     /// Takes a tile's pixels for not written.
     pub fn erase(&mut self, tile: &Tile) {
-        for index in places(tile).filter_map(|(x, y)| self.index(x, y)).collect::<Vec<_>>() {
+        for index in pixel_positions(tile).filter_map(|(x, y)| self.index(x, y)).collect::<Vec<_>>() {
             self.missing += usize::from(std::mem::replace(&mut self.written[index], false));
         }
     }

@@ -51,12 +51,12 @@ impl FinishedTile {
     /// Column and row of each pixel, and its record.
     pub fn pixels(&self) -> impl Iterator<Item = ((u32, u32), PixelRecord)> {
         let records = self.records.chunks_exact(record_bytes(self.has_layers));
-        places(&self.tile).zip(records.map(|record| PixelRecord::read(record).unwrap_or_default()))
+        pixel_positions(&self.tile).zip(records.map(|record| PixelRecord::read(record).unwrap_or_default()))
     }
 }
 
 /// Columns and rows of a tile's pixels, row by row.
-pub fn places(tile: &Tile) -> impl Iterator<Item = (u32, u32)> + use<> {
+pub fn pixel_positions(tile: &Tile) -> impl Iterator<Item = (u32, u32)> + use<> {
     let Tile { x, y, width, height, .. } = *tile;
     (y..y + height).flat_map(move |row| (x..x + width).map(move |column| (column, row)))
 }

@@ -18,7 +18,7 @@ mod session;
 
 use heapless::Vec;
 
-use self::session::{Control, End, Session};
+use self::session::{Control, End, LinkSession};
 pub use self::session::{Event, LineStatistics, WINDOW};
 #[cfg(doc)]
 use crate::frame::{FrameKind, MAX_PAYLOAD};
@@ -30,12 +30,12 @@ pub struct Transport {
     wire: Vec<u8, MAX_FRAME>,
     /// Number of bytes of `wire` that are sent.
     sent: usize,
-    session: Session,
+    session: LinkSession,
 }
 
 impl Transport {
     const fn new(end: End) -> Self {
-        Self { reader: FrameReader::new(), wire: Vec::new(), sent: 0, session: Session::new(end) }
+        Self { reader: FrameReader::new(), wire: Vec::new(), sent: 0, session: LinkSession::new(end) }
     }
 
     /// The host's end, without a session.

@@ -24,7 +24,7 @@ use super::THREAD_STACK;
 use super::direct::{RenderedTile, render_tile};
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::pack::CardImage;
-use crate::sink::{FinishedTile, TileSink, places};
+use crate::sink::{FinishedTile, TileSink, pixel_positions};
 
 /// Maximum number of gathers that are kept at once, 32 bytes each: 4.3 GB.
 const MAX_GATHERS: u64 = 1 << 27;
@@ -267,7 +267,7 @@ fn complete<'a, M: MeasuredMemory>(
     let sums_of_pixel = sums_of_pixel(job.frame.layers) as usize;
     let mut sums = all.sums.chunks_exact(sums_of_pixel);
     for tile in job.tiles {
-        let pixels: Result<Vec<PixelRecord>, Fault> = (places(tile).zip(sums.by_ref()))
+        let pixels: Result<Vec<PixelRecord>, Fault> = (pixel_positions(tile).zip(sums.by_ref()))
             .map(|((x, y), sums)| {
                 let mut completion = Completion::NOTHING;
                 while !completion.step(&mut context, x, y)? {}

@@ -74,7 +74,7 @@ pub(super) enum End {
 }
 
 /// The state of one session.
-pub(super) struct Session {
+pub(super) struct LinkSession {
     end: End,
     /// Number of the session; `None` before the first.
     number: Option<u32>,
@@ -119,7 +119,7 @@ fn slot<T>(slots: &mut [T; WINDOW], number: u16) -> &mut T {
     }
 }
 
-impl Session {
+impl LinkSession {
     pub(super) const fn new(end: End) -> Self {
         Self {
             end,
