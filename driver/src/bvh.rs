@@ -44,19 +44,21 @@ pub enum HierarchyError {
         entries: usize,
     },
     /// The scene has more triangles than a card can index.
-    #[error("the scene has {triangles} triangles; a card can tell {MAX_TRIANGLES} apart")]
+    #[error("the scene has {triangles} triangles; a card image can index at most {MAX_TRIANGLES}")]
     TooMany {
         /// Number of triangles of the scene.
         triangles: usize,
     },
     /// A triangle's material is beyond the materials that a card can index.
-    #[error("a triangle is of material {material}; a card can tell {MAX_MATERIALS} apart")]
+    #[error(
+        "a triangle has the material of index {material}; a card image can index at most {MAX_MATERIALS} materials"
+    )]
     TooManyMaterials {
         /// Index of the material.
         material: u32,
     },
     /// A triangle has a corner that is not finite, or so far away that the area of the scene's bounding box is not.
-    #[error("a triangle has a corner that is not a finite place, or too far away")]
+    #[error("a triangle has a corner whose position is not finite, or too far from the origin")]
     NotFinite,
 }
 

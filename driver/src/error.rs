@@ -76,7 +76,10 @@ pub enum SceneError {
 
     /// The text is not JSON, or not JSON of glTF's shape.
     #[error("{file} is not glTF JSON: {message}")]
-    #[diagnostic(code(scene::json), help("correct the JSON at the place shown, or export the scene again"))]
+    #[diagnostic(
+        code(scene::json),
+        help("correct the JSON at the position shown, or export the scene again")
+    )]
     Json {
         /// The file's name.
         file: String,

@@ -125,7 +125,7 @@ impl Document {
         };
         // The types' names of the extension's fields are not those of the file.
         let item = path.as_str().replace("khrLightsPunctual", "KHR_lights_punctual");
-        Err(self.invalid(item, reason, "export the scene again, or correct the file at this place"))
+        Err(self.invalid(item, reason, "export the scene again, or correct this item of the file"))
     }
 
     /// The first rule that is broken and matters, and where.
