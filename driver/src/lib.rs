@@ -3,6 +3,7 @@
 
 mod allocation;
 pub mod bvh;
+pub mod choice;
 mod density;
 pub mod difference;
 pub mod dispatcher;

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use photoncard_driver::choice::Choice;
 use photoncard_driver::render::{RenderSettings, Unobserved, render};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
@@ -95,7 +96,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 #[test]
 fn studies_report_and_a_second_run_renders_nothing_and_says_the_same() {
     let folder = tempfile::tempdir().unwrap();
-    let options = options(folder.path(), &Study::ALL);
+    let options = options(folder.path(), Study::ALL);
     let first = Counting::up_to(usize::MAX);
     run(&options, &first).unwrap();
     assert!(first.measured() > 100, "{}", first.measured());

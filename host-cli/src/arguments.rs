@@ -1,12 +1,13 @@
 //! The arguments of every command, and what they mean.
 
+pub(crate) mod choice;
 mod picture;
 pub(crate) mod threads;
 mod without_effect;
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgAction, Args, Parser, Subcommand};
 use photoncard_driver::emulator::ChipKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::film::Window;
@@ -17,6 +18,7 @@ use photoncard_driver::printable::printable;
 use photoncard_driver::render::{CardAddress, MIN_IRRADIANCE_ERROR, Radiance, RenderSettings, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 
+use self::choice::{choice, switch};
 pub(crate) use self::picture::PictureOptions;
 use self::threads::threads;
 use crate::environment::EnvironmentOption;
@@ -95,27 +97,8 @@ pub(crate) struct EmulateOptions {
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) listen: ListenAddress,
     /// The kind of card
-    #[arg(long, value_enum, default_value = "emulated")]
-    pub(crate) card: CardKind,
-}
-
-/// Kinds of cards that can be served.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum CardKind {
-    /// The reference chip
-    Emulated,
-    /// The micro chip
-    EmulatedMicro,
-}
-
-impl CardKind {
-    /// The kind of its chip.
-    pub(crate) fn chip(self) -> ChipKind {
-        match self {
-            Self::Emulated => ChipKind::Reference,
-            Self::EmulatedMicro => ChipKind::Micro,
-        }
-    }
+    #[arg(long, default_value = "emulated", value_parser = choice::<ChipKind>())]
+    pub(crate) card: ChipKind,
 }
 
 #[derive(Args)]
@@ -148,8 +131,8 @@ pub(crate) struct RenderOptions {
     #[arg(long, default_value_t = 500_000, allow_negative_numbers = true)]
     photons: usize,
     /// Layout of the photon map in card memory; it never changes the picture
-    #[arg(long, default_value = "lines")]
-    photon_map: PhotonMapOption,
+    #[arg(long, default_value = "lines", value_parser = choice::<PhotonLayout>())]
+    photon_map: PhotonLayout,
     /// Photons that a gather looks for
     #[arg(long, default_value_t = 100, allow_negative_numbers = true)]
     neighbors: u32,
@@ -178,20 +161,20 @@ pub(crate) struct RenderOptions {
     #[arg(long, allow_negative_numbers = true)]
     tile: Option<u32>,
     /// What the directions of gather rays are chosen by; it never changes what the picture converges to
-    #[arg(long, default_value = "combined")]
-    sampling: SamplingOption,
+    #[arg(long, default_value = "combined", value_parser = choice::<Sampling>())]
+    sampling: Sampling,
     /// What tells the radiance of a Lambertian surface at the end of a gather ray; one with a Phong lobe is always by density
-    #[arg(long, default_value = "density")]
-    radiance: RadianceOption,
+    #[arg(long, default_value = "density", value_parser = choice::<Radiance>())]
+    radiance: Radiance,
     /// Gather the indirect light of Lambertian surfaces at some places and interpolate between them
-    #[arg(long, default_value = "off")]
-    irradiance_cache: Switch,
+    #[arg(long, default_value = "off", value_parser = switch(), action = ArgAction::Set)]
+    irradiance_cache: bool,
     /// Relative error that interpolated irradiance may have [default: 0.025]
     #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true)]
     ic_error: Option<f32>,
     /// Order of the photon gathers; it never changes the picture
-    #[arg(long, default_value = "sort")]
-    order: Order,
+    #[arg(long, default_value = "sort", value_parser = choice::<GatherOrder>())]
+    order: GatherOrder,
     /// Direction bins of the gather rays, for the orders that have any [default: 99]
     #[arg(long)]
     bins: Option<u32>,
@@ -251,102 +234,6 @@ pub(crate) struct DiffOptions {
     pub(crate) exclude_above: Option<f32>,
 }
 
-/// Orders of the photon gathers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Order {
-    /// Pixels along scanlines
-    Naive,
-    /// Pixels along the scanlines of a tile
-    Tiled,
-    /// Rays of one direction bin for all pixels of a tile, then those of the next
-    Dirbin,
-    /// By direction bins; gathers wait and are done by a spatial hash of their place
-    Hash,
-    /// By direction bins; gathers wait and are done along a Hilbert curve
-    Sort,
-    /// All gathers of the frame along a Hilbert curve, on emulated cards alone: the bound to compare with
-    Hilbert,
-}
-
-impl Order {
-    fn gather_order(self) -> GatherOrder {
-        match self {
-            Self::Naive => GatherOrder::Naive,
-            Self::Tiled => GatherOrder::Tiled,
-            Self::Dirbin => GatherOrder::DirectionBins,
-            Self::Hash => GatherOrder::Hash,
-            Self::Sort => GatherOrder::Sort,
-            Self::Hilbert => GatherOrder::Hilbert,
-        }
-    }
-}
-
-/// What the directions of gather rays are chosen by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum SamplingOption {
-    /// The reflection function
-    Brdf,
-    /// The photons that arrive at the point
-    Photon,
-    /// The product of both
-    Combined,
-    /// The mean of both
-    Mixture,
-}
-
-impl SamplingOption {
-    fn sampling(self) -> Sampling {
-        match self {
-            Self::Brdf => Sampling::Reflection,
-            Self::Photon => Sampling::Photon,
-            Self::Combined => Sampling::Product,
-            Self::Mixture => Sampling::Mixture,
-        }
-    }
-}
-
-/// What tells the radiance at the end of a gather ray.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum RadianceOption {
-    /// The density of the photons nearest to it
-    Density,
-    /// An approximation: the irradiance that the host has estimated at the nearest photon of the surface
-    Precomputed,
-}
-
-impl RadianceOption {
-    fn radiance(self) -> Radiance {
-        match self {
-            Self::Density => Radiance::Density,
-            Self::Precomputed => Radiance::Precomputed,
-        }
-    }
-}
-
-/// Layouts of the photon map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum PhotonMapOption {
-    /// A left-balanced kd-tree of 20-byte photons
-    Jensen,
-    /// Leaves that fill a line of memory each
-    Lines,
-}
-
-impl PhotonMapOption {
-    fn layout(self) -> PhotonLayout {
-        match self {
-            Self::Jensen => PhotonLayout::Jensen,
-            Self::Lines => PhotonLayout::Lines,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Switch {
-    On,
-    Off,
-}
-
 #[derive(Clone, Copy)]
 enum MaxDistance {
     Auto,
@@ -365,7 +252,7 @@ impl RenderOptions {
             camera: self.camera.clone(),
             seed: self.seed,
             photons: self.photons,
-            photon_layout: self.photon_map.layout(),
+            photon_layout: self.photon_map,
             neighbors: self.neighbors,
             caustic_photons: self.caustic_photons,
             caustic_neighbors: self.caustic_neighbors.unwrap_or(DEFAULT_CAUSTIC_NEIGHBORS),
@@ -378,11 +265,11 @@ impl RenderOptions {
             samples: self.spp,
             tile: self.tile.unwrap_or_else(|| RenderSettings::default_tile(&self.picture.aov, &cards)),
             layers: self.picture.aov.clone(),
-            sampling: self.sampling.sampling(),
-            radiance: self.radiance.radiance(),
-            irradiance_error: (self.irradiance_cache == Switch::On && self.gather_rays > 0)
+            sampling: self.sampling,
+            radiance: self.radiance,
+            irradiance_error: (self.irradiance_cache && self.gather_rays > 0)
                 .then_some(self.ic_error.unwrap_or(DEFAULT_IC_ERROR)),
-            order: self.order.gather_order(),
+            order: self.order,
             bins: self.bins,
             queue: self.queue,
             cards,
@@ -400,16 +287,6 @@ impl RenderOptions {
         let mut name = self.output.clone().into_os_string();
         name.push(".partial");
         name.into()
-    }
-
-    /// The name of the sampling.
-    pub(crate) fn sampling_name(&self) -> Option<String> {
-        self.sampling.to_possible_value().map(|value| value.get_name().to_owned())
-    }
-
-    /// What tells radiance, as it was given.
-    pub(crate) fn radiance_name(&self) -> Option<String> {
-        self.radiance.to_possible_value().map(|value| value.get_name().to_owned())
     }
 }
 

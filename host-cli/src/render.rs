@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
+use photoncard_driver::choice::Choice;
 use photoncard_driver::render::{
     CardAddress, MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
 };
@@ -136,7 +137,7 @@ fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Renderi
         &rendering.film,
         &options.picture.aov,
         &provenance,
-        options.picture.sample_format(),
+        options.picture.sample_type,
     )
     .map_err(|error| Failure::work_error(&error))?;
     if let Some(path) = &options.picture.preview {
@@ -171,8 +172,8 @@ fn provenance(
         "gather_rays": settings.gather_rays,
         "shadow_rays": settings.shadow_rays,
         "spp": settings.samples,
-        "sampling": options.sampling_name(),
+        "sampling": settings.sampling.name(),
         "ic_error": settings.irradiance_error,
-        "radiance": options.radiance_name(),
+        "radiance": settings.radiance.name(),
     })
 }

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use crate::choice::Choice;
 use crate::emulator::ChipKind;
 use crate::link::{host_name, tcp_address};
 
@@ -96,8 +97,7 @@ pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
 impl fmt::Display for CardAddress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Emulated { kind: ChipKind::Reference, chips } => write!(f, "emulated:{chips}"),
-            Self::Emulated { kind: ChipKind::Micro, chips } => write!(f, "emulated-micro:{chips}"),
+            Self::Emulated { kind, chips } => write!(f, "{}:{chips}", kind.name()),
             Self::Remote(address) => address.fmt(f),
         }
     }
@@ -118,9 +118,10 @@ impl FromStr for CardAddress {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (kind, rest) = text.split_once(':').map_or((text, None), |(kind, rest)| (kind, Some(rest)));
+        if let Ok(kind) = ChipKind::of_name(kind) {
+            return emulated(kind, rest);
+        }
         match kind {
-            "emulated" => emulated(ChipKind::Reference, rest),
-            "emulated-micro" => emulated(ChipKind::Micro, rest),
             "serial" => serial(rest.unwrap_or_default()).map(Self::Remote),
             "tcp" => tcp(rest.unwrap_or_default()).map(Self::Remote),
             "unix" => match rest {

@@ -5,10 +5,10 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Value, json};
 
 use super::sample::SampleRate;
+use crate::choice::Choice;
 use crate::emulator::memory_model::CacheSettings;
 use crate::photon_map::PhotonLayout;
-use crate::render::{Radiance, RenderSettings, Sampling};
-use crate::scheduler::GatherOrder;
+use crate::render::{Radiance, RenderSettings};
 
 /// One measurement of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub enum Task {
     Traffic {
         /// The caches between chip and DRAM.
         caches: CacheSettings,
-        /// Share of the tiles; [`GatherOrder::Hilbert`] renders the whole frame whatever it is.
+        /// Share of the tiles; [`Hilbert`](crate::scheduler::GatherOrder::Hilbert) renders the whole frame whatever it is.
         sample: SampleRate,
         /// Minimum number of tiles, as far as the picture has that many.
         least_tiles: usize,
@@ -52,7 +52,7 @@ impl Point {
             Task::Quality { .. } => "quality",
         };
         let scene = self.scene.split('.').next().unwrap_or_default();
-        format!("{task}-{scene}-{}", order_name(self.settings.order))
+        format!("{task}-{scene}-{}", self.settings.order.name())
     }
 
     /// Key of the point in the store: everything that the result depends on. `scene` is the scene's checksum.
@@ -118,56 +118,18 @@ fn settings(settings: &RenderSettings) -> Value {
         "camera": settings.camera,
         "seed": settings.seed,
         "photons": settings.photons,
-        "photon_map": layout_name(settings.photon_layout),
+        "photon_map": settings.photon_layout.name(),
         "neighbors": settings.neighbors,
         "max_distance": settings.max_distance,
         "gather_rays": settings.gather_rays,
         "shadow_rays": settings.shadow_rays,
         "spp": settings.samples,
         "tile": settings.tile,
-        "sampling": sampling_name(settings.sampling),
+        "sampling": settings.sampling.name(),
         "ic_error": settings.irradiance_error,
-        "radiance": radiance_name(settings.radiance),
-        "order": order_name(settings.order),
+        "radiance": settings.radiance.name(),
+        "order": settings.order.name(),
         "bins": settings.bins,
         "queue": settings.queue,
     })
-}
-
-/// An order's name on the command line.
-pub(super) fn order_name(order: GatherOrder) -> &'static str {
-    match order {
-        GatherOrder::Naive => "naive",
-        GatherOrder::Tiled => "tiled",
-        GatherOrder::DirectionBins => "dirbin",
-        GatherOrder::Hash => "hash",
-        GatherOrder::Sort => "sort",
-        GatherOrder::Hilbert => "hilbert",
-    }
-}
-
-/// The command line's name for a way to estimate radiance.
-pub(super) fn radiance_name(radiance: Radiance) -> &'static str {
-    match radiance {
-        Radiance::Density => "density",
-        Radiance::Precomputed => "precomputed",
-    }
-}
-
-/// The command line's name for a sampling of gather rays.
-pub(super) fn sampling_name(sampling: Sampling) -> &'static str {
-    match sampling {
-        Sampling::Reflection => "brdf",
-        Sampling::Photon => "photon",
-        Sampling::Product => "combined",
-        Sampling::Mixture => "mixture",
-    }
-}
-
-/// The command line's name for a layout of the photon map.
-pub(super) fn layout_name(layout: PhotonLayout) -> &'static str {
-    match layout {
-        PhotonLayout::Jensen => "jensen",
-        PhotonLayout::Lines => "lines",
-    }
 }

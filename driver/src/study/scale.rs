@@ -2,8 +2,9 @@
 
 use photoncard_shared::budget::REFERENCE;
 
-use super::point::{Point, Task, layout_name};
+use super::point::{Point, Task};
 use super::sample::SampleRate;
+use crate::choice::Choice;
 use crate::emulator::memory_model::CacheSettings;
 use crate::photon_map::PhotonLayout;
 use crate::render::{RenderSettings, Sampling};
@@ -146,7 +147,7 @@ impl Scale {
             ("shadow rays a pixel", self.shadow_rays.to_string()),
             ("tiles", format!("{0}x{0} pixels; in the naive order rows of as many pixels", settings.tile)),
             ("sampling of gather rays", "brdf, unless said otherwise".to_owned()),
-            ("photon map", format!("{}, unless said otherwise", layout_name(settings.photon_layout))),
+            ("photon map", format!("{}, unless said otherwise", settings.photon_layout.name())),
             ("error of the irradiance cache, where it is on", IRRADIANCE_ERROR.to_string()),
             ("caches, unless said otherwise", CacheSettings::default().to_string()),
             ("share of the tiles rendered", format!("{}, at least {}", self.sample, self.least_tiles)),

@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use photoncard_driver::display::{DisplayAddress, DisplaySettings};
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::layer::Layers;
 use photoncard_driver::preview::{ToneCurve, ToneMapping};
+
+use super::choice::choice;
 
 #[derive(Args)]
 pub(crate) struct PictureOptions {
@@ -15,8 +17,8 @@ pub(crate) struct PictureOptions {
     #[arg(long, value_name = "LIST", default_value_t = Layers::default())]
     pub(crate) aov: Layers,
     /// Type of the picture's samples; Z and gathers are always float
-    #[arg(long, default_value = "float")]
-    sample_type: SampleType,
+    #[arg(long, default_value = "float", value_parser = choice::<SampleFormat>())]
+    pub(crate) sample_type: SampleFormat,
     /// Write a tone-mapped PNG as well
     #[arg(long, value_name = "OUT.png")]
     pub(crate) preview: Option<PathBuf>,
@@ -31,28 +33,17 @@ pub(crate) struct PictureOptions {
     )]
     exposure: Exposure,
     /// What compresses the radiance of that PNG
-    #[arg(long = "tonemap", value_name = "CURVE", requires = "preview", default_value = "reinhard")]
-    tone_curve: ToneCurveOption,
+    #[arg(
+        long = "tonemap",
+        value_name = "CURVE",
+        requires = "preview",
+        default_value = "reinhard",
+        value_parser = choice::<ToneCurve>()
+    )]
+    tone_curve: ToneCurve,
     /// Show tiles as they land, in tev or another viewer that speaks its protocol; port 14158 without one
     #[arg(long, value_name = "HOST:PORT")]
     display_server: Option<DisplayAddress>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum SampleType {
-    Half,
-    Float,
-}
-
-/// Tone curves of the PNG.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ToneCurveOption {
-    /// Nothing: what is above 1 is clipped
-    None,
-    /// Reinhard's extended curve of luminance, with the white point 4; it keeps hues
-    Reinhard,
-    /// Narkowicz' fit of the filmic curve of ACES, of each channel
-    Aces,
 }
 
 #[derive(Clone, Copy)]
@@ -76,19 +67,7 @@ impl PictureOptions {
                 Exposure::Auto => None,
                 Exposure::Stops(stops) => Some(stops),
             },
-            curve: match self.tone_curve {
-                ToneCurveOption::None => ToneCurve::None,
-                ToneCurveOption::Reinhard => ToneCurve::Reinhard,
-                ToneCurveOption::Aces => ToneCurve::Aces,
-            },
-        }
-    }
-
-    /// The type of the picture's samples.
-    pub(crate) fn sample_format(&self) -> SampleFormat {
-        match self.sample_type {
-            SampleType::Half => SampleFormat::Half,
-            SampleType::Float => SampleFormat::Float,
+            curve: self.tone_curve,
         }
     }
 }

@@ -1,17 +1,18 @@
 //! Options that are given and change nothing, as others that they need are not.
 
-use clap::ValueEnum;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::Scene;
+use photoncard_driver::scheduler::GatherOrder;
 
-use super::{Order, RadianceOption, RenderOptions, Switch};
+use super::RenderOptions;
 
 impl RenderOptions {
     /// A sentence on each option that has no effect on the render of a scene.
     pub(crate) fn without_effect(&self, scene: &Scene) -> Vec<String> {
-        let order = self.order.gather_order();
-        let name =
-            self.order.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-        let is_cached = self.irradiance_cache == Switch::On;
+        let order = self.order;
+        let name = order.name();
+        let is_cached = self.irradiance_cache;
         let without_specular = "without a caustic map: nothing in the scene is perfectly specular".to_owned();
         let without_map = if self.caustic_photons == Some(0) {
             "with --caustic-photons 0".to_owned()
@@ -23,7 +24,7 @@ impl RenderOptions {
             (self.ic_error.is_some() && !is_cached, "--ic-error", "without --irradiance-cache on".to_owned()),
             (is_cached && self.gather_rays == 0, "--irradiance-cache on", "with --gather-rays 0".to_owned()),
             (
-                self.radiance == RadianceOption::Precomputed && self.gather_rays == 0,
+                self.radiance == Radiance::Precomputed && self.gather_rays == 0,
                 "--radiance precomputed",
                 "with --gather-rays 0".to_owned(),
             ),
@@ -44,7 +45,7 @@ impl RenderOptions {
             ),
             (self.caustic_neighbors.is_some() && !has_map, "--caustic-neighbors", without_map),
             (
-                self.faults.is_some() && self.order == Order::Hilbert,
+                self.faults.is_some() && order == GatherOrder::Hilbert,
                 "--faults",
                 "with --order hilbert, which sends nothing over links".to_owned(),
             ),
