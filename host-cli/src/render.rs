@@ -21,8 +21,7 @@ use crate::progress::Progress;
 
 /// Renders a scene and writes the picture and what else was asked for.
 pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
-    let settings =
-        options.settings().map_err(|text| Failure::Input(Report::new(MietteDiagnostic::new(text))))?;
+    let settings = options.settings();
     for path in outputs(options) {
         output::check_writable(path).map_err(|error| Failure::input_error(&error))?;
     }
@@ -72,10 +71,15 @@ fn tell_memory(memory: &MemoryStatistics, statistics: &Statistics) {
 }
 
 fn outputs(options: &RenderOptions) -> impl Iterator<Item = &Path> {
-    [Some(&options.output), options.picture.preview.as_ref(), options.stats.as_ref(), options.trace.as_ref()]
-        .into_iter()
-        .flatten()
-        .map(AsRef::as_ref)
+    [
+        Some(&options.output),
+        options.outputs.preview.as_ref(),
+        options.outputs.stats.as_ref(),
+        options.cards.trace.as_ref(),
+    ]
+    .into_iter()
+    .flatten()
+    .map(AsRef::as_ref)
 }
 
 /// Checks that no output replaces the scene, the environment or another output.
@@ -99,7 +103,7 @@ fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
 
 fn read_scene(options: &RenderOptions, settings: &RenderSettings) -> Result<Scene, Failure> {
     // An image goes into every card.
-    let dram_bytes = settings.cards.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
+    let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
     let mut scene = load_for(&options.scene, dram_bytes).map_err(Failure::input)?;
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
@@ -137,14 +141,14 @@ fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Renderi
         &rendering.film,
         &options.picture.aov,
         &provenance,
-        options.picture.sample_type,
+        options.outputs.sample_type,
     )
     .map_err(|error| Failure::work_error(&error))?;
-    if let Some(path) = &options.picture.preview {
-        preview::write_png(path, &rendering.film, options.picture.tone_mapping())
+    if let Some(path) = &options.outputs.preview {
+        preview::write_png(path, &rendering.film, options.outputs.tone_mapping())
             .map_err(|error| Failure::work_error(&error))?;
     }
-    if let Some(path) = &options.stats {
+    if let Some(path) = &options.outputs.stats {
         let text = serde_json::to_string_pretty(&rendering.statistics)
             .map_err(|error| Failure::work_error(&error))?;
         output::write(path, (printable_json(&text) + "\n").as_bytes())
@@ -164,16 +168,16 @@ fn provenance(
         "scene": options.scene.file_name().map(|name| name.to_string_lossy()),
         "set": options.assignments,
         "environment": options.environment.as_ref().map(EnvironmentOption::name),
-        "camera": settings.camera,
-        "seed": settings.seed,
-        "photons": settings.photons,
-        "neighbors": settings.neighbors,
+        "camera": settings.picture.camera,
+        "seed": settings.integrator.seed,
+        "photons": settings.photons.count,
+        "neighbors": settings.photons.neighbors,
         "max_distance": rendering.statistics.max_distance,
-        "gather_rays": settings.gather_rays,
-        "shadow_rays": settings.shadow_rays,
-        "spp": settings.samples,
-        "sampling": settings.sampling.name(),
-        "ic_error": settings.irradiance_error,
-        "radiance": settings.radiance.name(),
+        "gather_rays": settings.integrator.gather_rays,
+        "shadow_rays": settings.integrator.shadow_rays,
+        "spp": settings.integrator.samples,
+        "sampling": settings.integrator.sampling.name(),
+        "ic_error": settings.integrator.irradiance_error,
+        "radiance": settings.photons.radiance.name(),
     })
 }

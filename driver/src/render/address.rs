@@ -62,6 +62,12 @@ impl Default for CardAddress {
 }
 
 impl CardAddress {
+    /// Chips of a kind in this process, one for each of its processor's cores.
+    pub fn emulated(kind: ChipKind) -> Self {
+        let chips = std::thread::available_parallelism().map_or(1, usize::from);
+        Self::Emulated { kind, chips }
+    }
+
     /// A card on a serial port, at the speed for which none is given.
     pub fn serial(path: impl Into<PathBuf>) -> Self {
         Self::Remote(RemoteAddress::Serial { path: path.into(), baud: DEFAULT_BAUD })
@@ -137,14 +143,9 @@ impl FromStr for CardAddress {
 }
 
 fn emulated(kind: ChipKind, chips: Option<&str>) -> Result<CardAddress, String> {
-    let chips = match chips {
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-        Some(chips) => chips
-            .parse()
-            .ok()
-            .filter(|count| (1..=MAX_CHIPS).contains(count))
-            .ok_or_else(|| format!("{chips:?} is no number of chips; use 1 to {MAX_CHIPS}"))?,
-    };
+    let Some(text) = chips else { return Ok(CardAddress::emulated(kind)) };
+    let chips = text.parse().ok().filter(|count| (1..=MAX_CHIPS).contains(count));
+    let chips = chips.ok_or_else(|| format!("{text:?} is no number of chips; use 1 to {MAX_CHIPS}"))?;
     Ok(CardAddress::Emulated { kind, chips })
 }
 

@@ -12,7 +12,7 @@ use super::card_thread::{CardOutcome, render_on};
 use super::crew::Crew;
 use super::greeting::{GreetedCard, GreetingError, card_name, greet};
 use super::open_card::OpenCard;
-use super::{CardError, Observer, RenderError, RenderSettings};
+use super::{CardError, CardSet, Observer, RenderError, RenderSettings};
 use crate::dispatcher::Dispatcher;
 use crate::display::Display;
 use crate::emulator::memory_model::MemoryTraffic;
@@ -101,7 +101,7 @@ impl Cards {
     ) -> Result<Self, RenderError> {
         let start = Instant::now();
         let shared = SharedImage::default();
-        let RenderSettings { cards: addresses, faults, .. } = settings;
+        let CardSet { addresses, faults, .. } = &settings.cards;
         let caches = settings.modelled_caches();
         check_chips(addresses.iter().map(CardAddress::emulated_chips).sum())?;
         let each_card = (addresses.iter())

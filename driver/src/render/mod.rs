@@ -23,7 +23,10 @@ pub use observer::{Observer, Phase, Unobserved};
 pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Radiance, Sampling};
-pub use settings::{DEFAULT_CAUSTIC_PHOTONS, MIN_IRRADIANCE_ERROR, RenderSettings};
+pub use settings::{
+    CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, Outputs, PROGRAM,
+    PhotonMaps, Picture, RenderSettings, Schedule,
+};
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -69,14 +72,14 @@ pub fn render(
     observer: &dyn Observer,
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
-    let camera = scene.camera(settings.camera.as_deref())?;
+    let camera = scene.camera(settings.picture.camera.as_deref())?;
     settings.check_trace()?;
     settings.check_memory_model()?;
     settings.check_verification()?;
-    if settings.order == GatherOrder::Hilbert {
+    if settings.schedule.order == GatherOrder::Hilbert {
         return render_whole_frame(scene, settings, camera, observer);
     }
-    let trace = settings.trace.as_deref().map(TraceFile::create).transpose()?;
+    let trace = settings.cards.trace.as_deref().map(TraceFile::create).transpose()?;
     let cards = Cards::connect(settings, trace, observer)?;
     for budget in cards.budgets() {
         settings.check(&budget)?;
@@ -84,7 +87,7 @@ pub fn render(
     // Not before the settings are known to be possible: a film may be large.
     let mut film = settings.film()?;
     let partial = begin_partial(scene, settings, &mut film, observer)?;
-    let tiles = tiles(settings.window(), settings.tile, settings.order);
+    let tiles = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
     let display = open_display(settings, &film, &tiles);
     let kept = tiles.iter().filter(|tile| film.has(tile)).count();
     if kept > 0 {
@@ -130,14 +133,14 @@ fn render_whole_frame(
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
     settings.check_resume()?;
-    let chips = cards::reference_chips(&settings.cards)?;
+    let chips = cards::reference_chips(&settings.cards.addresses)?;
     settings.check(&REFERENCE)?;
     let mut film = settings.film()?;
     let partial = begin_partial(scene, settings, &mut film, observer)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, std::iter::once(REFERENCE), &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance, prepared.caustics);
-    let tiles = tiles(settings.window(), settings.tile, settings.order);
+    let tiles = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
     let display = open_display(settings, &film, &tiles);
     let progress = |done: u64, total: u64| {
         observer.progress(Phase::Tiles, done, total);
@@ -168,7 +171,7 @@ fn begin_partial(
     observer: &dyn Observer,
 ) -> Result<Option<PartialRender>, RenderError> {
     let begin = |partial| PartialRender::begin(partial, settings.identity(scene), film);
-    let partial = settings.partial.as_ref().map(begin).transpose()?;
+    let partial = settings.outputs.partial.as_ref().map(begin).transpose()?;
     if partial.as_ref().is_some_and(PartialRender::holds_tiles) {
         observer.kept();
     }
@@ -177,7 +180,8 @@ fn begin_partial(
 
 /// Begins to show the picture, with the tiles that are there, if the settings say so.
 fn open_display(settings: &RenderSettings, film: &Film, tiles: &[Tile]) -> Option<Display> {
-    let display = Display::open(settings.display.as_ref()?, film.window(), &settings.layers.channels());
+    let display =
+        Display::open(settings.outputs.display.as_ref()?, film.window(), &settings.picture.layers.channels());
     show_finished(&display, film, tiles);
     Some(display)
 }
@@ -228,7 +232,7 @@ fn prepare(
     for budget in &budgets {
         photon_map::check_packed(&packed, &photon_settings, budget)?;
     }
-    let total = settings.photons as u64;
+    let total = settings.photons.count as u64;
     let progress = |stored: usize| {
         observer.progress(Phase::Photons, stored as u64, total);
         if stored as u64 == total {
@@ -262,7 +266,7 @@ fn statistics(
         width: frame.width,
         height: frame.height,
         samples: frame.samples,
-        photons: settings.photons as u64,
+        photons: settings.photons.count as u64,
         photon_paths: prepared.paths,
         max_distance: frame.max_distance,
         cards: outcome.cards,

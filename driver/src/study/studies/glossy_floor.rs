@@ -11,7 +11,7 @@ use super::present::{
 };
 use super::scenes::GLOSSY;
 use crate::choice::Choice;
-use crate::render::{RenderSettings, Sampling};
+use crate::render::Sampling;
 use crate::scheduler::GatherOrder::{self, DirectionBins, Hash, Naive, Sort, Tiled};
 
 /// Lines of the figure: order of the gathers and sampling of the rays.
@@ -40,12 +40,11 @@ fn line_name((order, sampling): (GatherOrder, Sampling)) -> String {
 }
 
 fn point(scale: &Scale, (order, sampling): (GatherOrder, Sampling), is_cached: bool, exponent: u32) -> Point {
-    let settings = RenderSettings {
-        camera: Some("floor".to_owned()),
-        sampling,
-        irradiance_error: scale.all_on().irradiance_error.filter(|_| is_cached),
-        ..scale.settings(order)
-    };
+    let settings = scale.settings(order).with(|s| {
+        s.picture.camera = Some("floor".to_owned());
+        s.integrator.sampling = sampling;
+        s.integrator.irradiance_error = scale.all_on().integrator.irradiance_error.filter(|_| is_cached);
+    });
     let assignments = vec![format!("floor.exponent={exponent}")];
     Point { assignments, ..scale.traffic(GLOSSY, settings) }
 }

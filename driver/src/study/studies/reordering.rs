@@ -16,7 +16,6 @@ use super::scenes::CORNELL;
 use crate::choice::Choice;
 use crate::emulator::memory_model::{CacheSettings, CacheSpec};
 use crate::photon_map::PhotonLayout;
-use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 
 /// Orders of the gathers that a chip can keep.
@@ -58,13 +57,16 @@ fn behind(photon: CacheSpec) -> CacheSettings {
 }
 
 fn point(scale: &Scale, order: GatherOrder, layout: PhotonLayout, caches: CacheSettings) -> Point {
-    let settings = RenderSettings { photon_layout: layout, ..scale.settings(order) };
+    let settings = scale.settings(order).with(|s| s.photons.layout = layout);
     scale.traffic_behind(CORNELL, settings, caches)
 }
 
 /// A point of sorted gathers in tiles of `tile` x `tile` pixels.
 fn sorted(scale: &Scale, layout: PhotonLayout, tile: u32) -> Point {
-    let settings = RenderSettings { photon_layout: layout, tile, ..scale.settings(GatherOrder::Sort) };
+    let settings = scale.settings(GatherOrder::Sort).with(|s| {
+        s.photons.layout = layout;
+        s.schedule.tile = tile;
+    });
     scale.traffic(CORNELL, settings)
 }
 
