@@ -4,14 +4,13 @@ use std::path::Path;
 use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::choice::Choice;
 use photoncard_driver::render::{
-    CardAddress, MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
+    CardAddress, MemoryStatistics, PROGRAM, ReadStatistics, RenderSettings, Rendering, Statistics, render,
 };
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scene::gltf::load_for;
 use photoncard_driver::{exr, output, preview};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::arguments::RenderOptions;
 use crate::console::{printable_json, say};
@@ -40,7 +39,7 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     })?;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
-    write(options, &settings, &rendering)?;
+    write(options, &settings.resolved(&scene), &rendering)?;
     if let Some(partial) = rendering.partial {
         partial.remove().map_err(Failure::work)?;
     }
@@ -158,26 +157,14 @@ fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Renderi
 }
 
 /// All that the pixels depend on, and nothing else: the file's bytes are the same on every card.
-fn provenance(
-    options: &RenderOptions,
-    settings: &RenderSettings,
-    rendering: &Rendering,
-) -> serde_json::Value {
-    json!({
-        "program": concat!("photoncard ", env!("CARGO_PKG_VERSION")),
-        "scene": options.scene.file_name().map(|name| name.to_string_lossy()),
-        "set": options.assignments,
-        "environment": options.environment.as_ref().map(EnvironmentOption::name),
-        "camera": settings.picture.camera,
-        "seed": settings.integrator.seed,
-        "photons": settings.photons.count,
-        "neighbors": settings.photons.neighbors,
-        "max_distance": rendering.statistics.max_distance,
-        "gather_rays": settings.integrator.gather_rays,
-        "shadow_rays": settings.integrator.shadow_rays,
-        "spp": settings.integrator.samples,
-        "sampling": settings.integrator.sampling.name(),
-        "ic_error": settings.integrator.irradiance_error,
-        "radiance": settings.photons.radiance.name(),
-    })
+fn provenance(options: &RenderOptions, settings: &RenderSettings, rendering: &Rendering) -> Value {
+    let mut provenance = settings.of_pixels();
+    let mut add = |name: &str, value| provenance.insert(name.to_owned(), value);
+    add("program", json!(PROGRAM));
+    add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
+    add("set", json!(options.assignments));
+    add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));
+    // That of the photons' density, where none is asked for.
+    add("max-distance", json!(rendering.statistics.max_distance));
+    provenance.into()
 }

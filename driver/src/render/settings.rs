@@ -140,11 +140,29 @@ impl RenderSettings {
         })
     }
 
+    /// Photons of a scene's caustic map; 0 for no map.
+    fn caustic_photons(&self, scene: &Scene) -> usize {
+        let asked = self.photons.caustic_photons.unwrap_or(DEFAULT_CAUSTIC_PHOTONS);
+        if scene.is_specular() { asked } else { 0 }
+    }
+
+    /// Settings that give a scene the same pixels, alike for all that do: the caustic map is that of the scene, and
+    /// without one its gathers are the default's.
+    #[must_use]
+    pub fn resolved(&self, scene: &Scene) -> Self {
+        let caustic_photons = self.caustic_photons(scene);
+        self.clone().with(|settings| {
+            settings.photons.caustic_photons = Some(caustic_photons);
+            if caustic_photons == 0 {
+                settings.photons.caustic_neighbors = PhotonMaps::default().caustic_neighbors;
+            }
+        })
+    }
+
     /// What the photon maps of a scene are to be.
     pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
-        let of_scene = || if scene.is_specular() { DEFAULT_CAUSTIC_PHOTONS } else { 0 };
         PhotonSettings {
-            caustic_photons: self.photons.caustic_photons.unwrap_or_else(of_scene),
+            caustic_photons: self.caustic_photons(scene),
             caustic_neighbors: self.photons.caustic_neighbors,
             seed: self.integrator.seed,
             photons: self.photons.count,

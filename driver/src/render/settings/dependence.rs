@@ -73,7 +73,7 @@ impl RenderSettings {
 
     /// Everything that the pixels of a scene depend on: program, scene and settings.
     pub fn identity(&self, scene: &Scene) -> Value {
-        let mut identity = self.of_pixels();
+        let mut identity = self.resolved(scene).of_pixels();
         identity.extend(named([
             ("program", json!(PROGRAM)),
             ("layout", json!(LAYOUT_VERSION)),
