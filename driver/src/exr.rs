@@ -19,6 +19,7 @@ use exr::prelude::{
 use thiserror::Error;
 
 use crate::allocation::{self, OutOfMemory};
+use crate::choice::choices;
 use crate::film::Film;
 use crate::foreign;
 use crate::layer::{Channel, Layers};
@@ -39,6 +40,8 @@ pub enum SampleFormat {
     /// `FLOAT`, 32 bits: exactly as rendered.
     Float,
 }
+
+choices!(SampleFormat { Half = "half", Float = "float" });
 
 /// Linear RGB radiance of a file's data window.
 #[derive(Clone, Debug, PartialEq)]

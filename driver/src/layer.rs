@@ -141,6 +141,12 @@ impl Layers {
         self.iter().any(Layer::is_of_chip)
     }
 
+    /// The layers that chips render for these: all that are left to chips, or none.
+    pub fn of_chip(&self) -> Self {
+        let are_of_chip = self.are_of_chip();
+        Self(Layer::ALL.into_iter().filter(|layer| are_of_chip && layer.is_of_chip()).collect())
+    }
+
     /// The channels `R G B` of radiance.
     pub fn colour() -> &'static [Channel] {
         &COLOUR
@@ -212,7 +218,10 @@ mod tests {
         for (text, are_of_chip) in
             [("none", false), ("albedo,N,Z", false), ("caustic", true), ("Z,gathers", true)]
         {
-            assert_eq!(text.parse::<Layers>().unwrap().are_of_chip(), are_of_chip, "{text}");
+            let layers: Layers = text.parse().unwrap();
+            assert_eq!(layers.are_of_chip(), are_of_chip, "{text}");
+            let rendered = if are_of_chip { "direct,indirect,caustic,gathers" } else { "none" };
+            assert_eq!(layers.of_chip().to_string(), rendered, "{text}");
         }
     }
 }

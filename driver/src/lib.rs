@@ -19,13 +19,16 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene = gltf::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf")))?;
-//! let settings =
-//!     RenderSettings { width: 16, height: 16, photons: 5_000, gather_rays: 8, ..RenderSettings::default() };
+//! let settings = RenderSettings::default().with(|settings| {
+//!     (settings.picture.width, settings.picture.height) = (16, 16);
+//!     settings.photons.count = 5_000;
+//!     settings.integrator.gather_rays = 8;
+//! });
 //! let rendering = render(&scene, &settings, &Unobserved)?;
 //!
 //! let folder = tempfile::tempdir()?;
 //! let path = folder.path().join("cornell.exr");
-//! exr::write(&path, &rendering.film, &settings.layers, r#"{"scene": "cornell"}"#, SampleFormat::Float)?;
+//! exr::write(&path, &rendering.film, &settings.picture.layers, r#"{"scene": "cornell"}"#, SampleFormat::Float)?;
 //! let picture = exr::read_rgb(&path)?;
 //! assert_eq!((picture.width, picture.height), (16, 16));
 //! assert!(picture.pixels.iter().flatten().sum::<f32>() > 0.0);
@@ -33,7 +36,7 @@
 //! # }
 //! ```
 //!
-//! [`RenderSettings`](render::RenderSettings) has a field for each option of `photoncard render`; its default is the
+//! [`RenderSettings`](render::RenderSettings) has the options of `photoncard render` in groups; its default is the
 //! dissertation's nominal frame on one emulated reference chip. [`Rendering`](render::Rendering) holds the
 //! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A tone-mapped PNG is written by [`preview::write_png`], and
 //! two pictures are compared by [`difference`].
@@ -43,12 +46,13 @@
 //! [`CardAddress`](render::CardAddress) names cards as `--card` does. Emulated and remote cards may be mixed in one render:
 //!
 //! ```
-//! use photoncard_driver::render::{CardAddress, RenderSettings};
+//! use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
 //!
 //! # fn main() -> Result<(), String> {
-//! let cards: Vec<CardAddress> = vec!["emulated:4".parse()?, "tcp:render-node:7000".parse()?];
+//! let addresses: Vec<CardAddress> = vec!["emulated:4".parse()?, "tcp:render-node:7000".parse()?];
+//! let cards = CardSet { addresses, ..CardSet::default() };
 //! let settings = RenderSettings { cards, ..RenderSettings::default() };
-//! assert_eq!(settings.cards[1].to_string(), "tcp:render-node:7000");
+//! assert_eq!(settings.cards.addresses[1].to_string(), "tcp:render-node:7000");
 //! assert!("usb:1".parse::<CardAddress>().is_err());
 //! # Ok(())
 //! # }
@@ -90,7 +94,7 @@
 //!
 //! | layer | modules | contents |
 //! |---|---|---|
-//! | foundation | [`output`], [`printable`], `allocation`, `foreign` | output files that appear whole or not at all; escaping of foreign text; memory limits; isolation of decoders that panic |
+//! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic |
 //! | tiles | [`sink`] | a finished tile, and [`TileSink`](sink::TileSink), the trait of every output |
 //! | pictures | [`film`], [`layer`], [`exr`], [`preview`], [`difference`] | pixels of a picture; its layers; files; comparison |
 //! | scenes | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
@@ -122,6 +126,7 @@
 
 mod allocation;
 pub mod bvh;
+pub mod choice;
 pub mod cost_model;
 mod density;
 pub mod difference;

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::choice::choices;
 use crate::film::{Film, PixelValue};
 use crate::output::{self, OutputError};
 
@@ -26,6 +27,12 @@ pub enum ToneCurve {
     /// It maps 1 to 0.80; the Academy's own curve is this one at 0.6 times the radiance.
     Aces,
 }
+
+choices!(ToneCurve {
+    None = "none": "Nothing: what is above 1 is clipped",
+    Reinhard = "reinhard": "Reinhard's extended curve of luminance, with the white point 4; it keeps hues",
+    Aces = "aces": "Narkowicz' fit of the filmic curve of ACES, of each channel",
+});
 
 impl ToneCurve {
     /// Compresses scaled radiance, which must be finite and not negative.

@@ -9,7 +9,10 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use photoncard_driver::render::{CardError, Observer, Phase, RenderError, RenderSettings, Rendering, render};
+use photoncard_driver::render::{
+    CardError, CardSet, Integrator, Observer, Phase, PhotonMaps, Picture, RenderError, RenderSettings,
+    Rendering, render,
+};
 use photoncard_driver::scene::gltf;
 use photoncard_shared::message::{Command, PROTOCOL_VERSION, Reply};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketType, bind, listen, socket};
@@ -47,11 +50,13 @@ fn render_with(path: &Path, side: u32, losses: &Losses) -> Result<Rendering, Ren
     let scene = format!("{}/../scenes/cornell.gltf", env!("CARGO_MANIFEST_DIR"));
     let cards = [format!("unix:{}", path.display()), "emulated:1".into()];
     let settings = RenderSettings {
-        width: side,
-        height: side,
-        photons: 1000,
-        gather_rays: 10,
-        cards: cards.iter().map(|card| card.parse().unwrap()).collect(),
+        picture: Picture { width: side, height: side, ..Picture::default() },
+        photons: PhotonMaps { count: 1000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 10, ..Integrator::default() },
+        cards: CardSet {
+            addresses: cards.iter().map(|card| card.parse().unwrap()).collect(),
+            ..CardSet::default()
+        },
         ..RenderSettings::default()
     };
     render(&gltf::load(scene.as_ref()).unwrap(), &settings, losses)

@@ -4,7 +4,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use photoncard_driver::render::{Observer, Phase, RenderSettings, render};
+use photoncard_driver::render::{
+    CardSet, Integrator, Observer, Phase, PhotonMaps, Picture, RenderSettings, render,
+};
 use photoncard_driver::scene::gltf;
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -32,11 +34,10 @@ fn a_panic_in_the_thread_of_one_card_ends_the_others() {
     let scene = format!("{}/../scenes/cornell.gltf", env!("CARGO_MANIFEST_DIR"));
     let scene = gltf::load(scene.as_ref()).unwrap();
     let settings = RenderSettings {
-        width: 4096,
-        height: 4096,
-        photons: 1000,
-        gather_rays: 10,
-        cards: vec!["emulated:2".parse().unwrap()],
+        picture: Picture { width: 4096, height: 4096, ..Picture::default() },
+        photons: PhotonMaps { count: 1000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 10, ..Integrator::default() },
+        cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     };
     let observer = Panics { has_panicked: AtomicBool::new(false), begin: Instant::now() };

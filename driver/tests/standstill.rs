@@ -4,7 +4,7 @@ mod scripted_card;
 
 use std::time::Duration;
 
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{Integrator, Picture, RenderSettings};
 use photoncard_driver::scene::Camera;
 use photoncard_driver::session::{Assignment, Event, Job, PixelLimits, Session, SessionError};
 use photoncard_shared::address::Line;
@@ -28,8 +28,12 @@ fn frame() -> FrameParameters {
         vertical_fov: 1.0,
         aspect: None,
     };
-    RenderSettings { width: 4, height: 4, gather_rays: 100, samples: 10, ..RenderSettings::default() }
-        .frame(&camera, 1.0, None)
+    RenderSettings {
+        picture: Picture { width: 4, height: 4, ..Picture::default() },
+        integrator: Integrator { gather_rays: 100, samples: 10, ..Integrator::default() },
+        ..RenderSettings::default()
+    }
+    .frame(&camera, 1.0, None)
 }
 
 const IMAGE: [Line; 100] = [Line::ZERO; 100];

@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use photoncard_driver::render::{RenderSettings, Unobserved, render};
+use photoncard_driver::choice::Choice;
+use photoncard_driver::render::{Unobserved, render};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::report::Provenance;
@@ -95,7 +96,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 #[test]
 fn studies_report_and_a_second_run_renders_nothing_and_says_the_same() {
     let folder = tempfile::tempdir().unwrap();
-    let options = options(folder.path(), &Study::ALL);
+    let options = options(folder.path(), Study::ALL);
     let first = Counting::up_to(usize::MAX);
     run(&options, &first).unwrap();
     assert!(first.measured() > 100, "{}", first.measured());
@@ -156,7 +157,12 @@ fn all_tiles_add_up_to_the_render() {
             (measured.total(|tile| tile.counters.records as f64), statistics.records),
             (measured.total(|tile| tile.counters.photons_tested as f64), statistics.photons_tested),
         ] {
-            assert_eq!((total.value, total.half_width), (expected as f64, 0.0), "{:?}", settings.order);
+            assert_eq!(
+                (total.value, total.half_width),
+                (expected as f64, 0.0),
+                "{:?}",
+                settings.schedule.order
+            );
         }
         let [raw, dram] = [measured.raw_bytes(), measured.photon_map_bytes()];
         assert!(raw.value > 0.0 && dram.value > 0.0 && raw.half_width == 0.0 && dram.half_width == 0.0);
@@ -171,7 +177,10 @@ fn a_render_like_its_reference_has_no_error_and_fewer_rays_have_some() {
     let mut laboratory = Laboratory::new(folder.path(), &scenes(), Some(2), &observer).unwrap();
     let scale = tiny();
     let of = |gather_rays| {
-        let settings = RenderSettings { gather_rays, irradiance_error: None, ..scale.all_on() };
+        let settings = scale.all_on().with(|s| {
+            s.integrator.gather_rays = gather_rays;
+            s.integrator.irradiance_error = None;
+        });
         scale.quality("cornell.gltf", settings)
     };
     let [same, fewer] = [of(scale.reference_rays), of(2)];

@@ -5,12 +5,12 @@ use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::render::{
-    CardAddress, MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
+    CardAddress, MemoryStatistics, PROGRAM, ReadStatistics, RenderSettings, Rendering, Statistics, render,
 };
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scene::gltf::load_for;
 use photoncard_driver::{exr, output, preview};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::arguments::RenderOptions;
 use crate::console::{printable_json, say};
@@ -20,8 +20,7 @@ use crate::progress::Progress;
 
 /// Renders a scene and writes the picture and what else was asked for.
 pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
-    let settings =
-        options.settings().map_err(|text| Failure::Input(Report::new(MietteDiagnostic::new(text))))?;
+    let settings = options.settings();
     for path in outputs(options) {
         output::check_writable(path).map_err(|error| Failure::input_error(&error))?;
     }
@@ -40,7 +39,7 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     })?;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
-    write(options, &settings, &rendering)?;
+    write(options, &settings.resolved(&scene), &rendering)?;
     if let Some(partial) = rendering.partial {
         partial.remove().map_err(Failure::work)?;
     }
@@ -71,10 +70,15 @@ fn tell_memory(memory: &MemoryStatistics, statistics: &Statistics) {
 }
 
 fn outputs(options: &RenderOptions) -> impl Iterator<Item = &Path> {
-    [Some(&options.output), options.picture.preview.as_ref(), options.stats.as_ref(), options.trace.as_ref()]
-        .into_iter()
-        .flatten()
-        .map(AsRef::as_ref)
+    [
+        Some(&options.output),
+        options.outputs.preview.as_ref(),
+        options.outputs.stats.as_ref(),
+        options.cards.trace.as_ref(),
+    ]
+    .into_iter()
+    .flatten()
+    .map(AsRef::as_ref)
 }
 
 /// Checks that no output replaces the scene, the environment or another output.
@@ -98,7 +102,7 @@ fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
 
 fn read_scene(options: &RenderOptions, settings: &RenderSettings) -> Result<Scene, Failure> {
     // An image goes into every card.
-    let dram_bytes = settings.cards.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
+    let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
     let mut scene = load_for(&options.scene, dram_bytes).map_err(Failure::input)?;
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
@@ -136,14 +140,14 @@ fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Renderi
         &rendering.film,
         &options.picture.aov,
         &provenance,
-        options.picture.sample_format(),
+        options.outputs.sample_type,
     )
     .map_err(|error| Failure::work_error(&error))?;
-    if let Some(path) = &options.picture.preview {
-        preview::write_png(path, &rendering.film, options.picture.tone_mapping())
+    if let Some(path) = &options.outputs.preview {
+        preview::write_png(path, &rendering.film, options.outputs.tone_mapping())
             .map_err(|error| Failure::work_error(&error))?;
     }
-    if let Some(path) = &options.stats {
+    if let Some(path) = &options.outputs.stats {
         let text = serde_json::to_string_pretty(&rendering.statistics)
             .map_err(|error| Failure::work_error(&error))?;
         output::write(path, (printable_json(&text) + "\n").as_bytes())
@@ -153,26 +157,14 @@ fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Renderi
 }
 
 /// All that the pixels depend on, and nothing else: the file's bytes are the same on every card.
-fn provenance(
-    options: &RenderOptions,
-    settings: &RenderSettings,
-    rendering: &Rendering,
-) -> serde_json::Value {
-    json!({
-        "program": concat!("photoncard ", env!("CARGO_PKG_VERSION")),
-        "scene": options.scene.file_name().map(|name| name.to_string_lossy()),
-        "set": options.assignments,
-        "environment": options.environment.as_ref().map(EnvironmentOption::name),
-        "camera": settings.camera,
-        "seed": settings.seed,
-        "photons": settings.photons,
-        "neighbors": settings.neighbors,
-        "max_distance": rendering.statistics.max_distance,
-        "gather_rays": settings.gather_rays,
-        "shadow_rays": settings.shadow_rays,
-        "spp": settings.samples,
-        "sampling": options.sampling_name(),
-        "ic_error": settings.irradiance_error,
-        "radiance": options.radiance_name(),
-    })
+fn provenance(options: &RenderOptions, settings: &RenderSettings, rendering: &Rendering) -> Value {
+    let mut provenance = settings.of_pixels();
+    let mut add = |name: &str, value| provenance.insert(name.to_owned(), value);
+    add("program", json!(PROGRAM));
+    add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
+    add("set", json!(options.assignments));
+    add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));
+    // That of the photons' density, where none is asked for.
+    add("max-distance", json!(rendering.statistics.max_distance));
+    provenance.into()
 }

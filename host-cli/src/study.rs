@@ -5,13 +5,16 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use photoncard_driver::choice::Choice;
 use photoncard_driver::study::report::Provenance;
 use photoncard_driver::study::{
     SampleRate, Scale, Study, StudyError, StudyObserver, StudyOptions, run as study,
 };
 
+use crate::arguments::choice::possible_value;
 use crate::arguments::threads::threads;
 use crate::console::say;
 use crate::failure::Failure;
@@ -23,8 +26,8 @@ const STOPPED: &str = "stopped; finished points are kept: run the command again 
 #[derive(Args)]
 pub(crate) struct StudyArguments {
     /// What to study
-    #[arg(value_name = "NAME")]
-    name: StudyName,
+    #[arg(value_name = "NAME", value_parser = Selection::parser())]
+    name: Selection,
     /// The folder for reports and finished points; it is made if it is missing
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
@@ -45,32 +48,29 @@ pub(crate) struct StudyArguments {
     quiet: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum StudyName {
-    /// Memory traffic by order, cache and layout
-    Reordering,
-    /// Memory traffic over the exponent of a glossy floor
-    #[value(name = "figure-6.17")]
-    Figure617,
-    /// Chips for a frame rate, by nominal and by measured counts
-    #[value(name = "table-7.1")]
-    Table71,
-    /// Each technique alone and together, at as many rays and at equal quality
-    Techniques,
-    /// Photons, tile sides, queues and chips
-    Scaling,
-    /// All of them, each in a folder of its own
+/// Studies by a name.
+#[derive(Clone, Copy, Debug)]
+enum Selection {
+    One(Study),
     All,
 }
 
-impl StudyName {
+impl Selection {
+    /// The name of all studies together.
+    const ALL: &str = "all";
+
+    /// Parser of the studies' names and of the one for all.
+    fn parser() -> impl TypedValueParser<Value = Self> {
+        let all = PossibleValue::new(Self::ALL).help("All of them, each in a folder of its own");
+        let studies = Study::ALL.iter().copied().map(possible_value);
+        PossibleValuesParser::new(studies.chain([all])).try_map(|name: String| {
+            if name == Self::ALL { Ok(Self::All) } else { Study::of_name(&name).map(Self::One) }
+        })
+    }
+
     fn studies(self) -> Vec<Study> {
         match self {
-            Self::Reordering => vec![Study::Reordering],
-            Self::Figure617 => vec![Study::Figure617],
-            Self::Table71 => vec![Study::Table71],
-            Self::Techniques => vec![Study::Techniques],
-            Self::Scaling => vec![Study::Scaling],
+            Self::One(study) => vec![study],
             Self::All => Study::ALL.to_vec(),
         }
     }
@@ -83,7 +83,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
         scale: if arguments.quick { Scale::QUICK } else { Scale::FULL }.with_sample(arguments.sample),
         scenes: arguments.scenes.clone(),
         out: arguments.out.clone(),
-        is_collection: matches!(arguments.name, StudyName::All),
+        is_collection: matches!(arguments.name, Selection::All),
         threads: arguments.threads,
         provenance: Provenance::here(&command_line()),
     };

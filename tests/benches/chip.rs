@@ -10,7 +10,7 @@ use glam::Vec3;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{RenderSettings, Schedule};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::chip::{Progress, ReferenceChip};
@@ -168,7 +168,8 @@ fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
         "hash" => GatherOrder::Hash,
         _ => GatherOrder::Sort,
     };
-    let settings = RenderSettings { order, ..RenderSettings::default() };
+    let settings =
+        RenderSettings { schedule: Schedule { order, ..Schedule::default() }, ..RenderSettings::default() };
     let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance, None);
     let (scene, _) = CORNELL.image.view();
     let mut counters = Counters::ZERO;

@@ -6,7 +6,7 @@
 
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
-use photoncard_driver::render::{RenderSettings, Sampling};
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Sampling};
 use photoncard_driver::scene::gltf;
 use photoncard_firmware::chip::MicroChip;
 use photoncard_shared::address::{LINE_BYTES, Line};
@@ -24,13 +24,14 @@ fn memory() -> Vec<u8> {
     let packed = PackedScene::new(&scene).expect("it is packed");
     // One gather a ray, done at once.
     let settings = RenderSettings {
-        width: 64,
-        height: 64,
-        photons: 20_000,
-        gather_rays: 16,
-        neighbors: 100,
-        sampling: Sampling::Reflection,
-        irradiance_error: None,
+        picture: Picture { width: 64, height: 64, ..Picture::default() },
+        photons: PhotonMaps { count: 20_000, neighbors: 100, ..PhotonMaps::default() },
+        integrator: Integrator {
+            gather_rays: 16,
+            sampling: Sampling::Reflection,
+            irradiance_error: None,
+            ..Integrator::default()
+        },
         ..RenderSettings::default()
     };
     let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("it is lit");

@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 use photoncard_driver::film::Window;
-use photoncard_driver::render::{RenderSettings, Sampling};
+use photoncard_driver::render::{PhotonMaps, Picture, RenderSettings, Sampling};
 use photoncard_driver::scene::gltf;
 use photoncard_tests::mapped::MappedScene;
 
@@ -34,36 +34,43 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().unwrap_or_else(|| "scenes/cornell.gltf".into());
     let mut settings = RenderSettings {
-        crop: Some(Window { x0: 64, x1: 448, y0: 192, y1: 320 }),
-        photons: 300_000,
+        picture: Picture { crop: Some(Window { x0: 64, x1: 448, y0: 192, y1: 320 }), ..Picture::default() },
+        photons: PhotonMaps { count: 300_000, ..PhotonMaps::default() },
         ..RenderSettings::default()
     };
     for argument in arguments {
         match argument.split_once('=') {
-            Some(("camera", camera)) => settings.camera = Some(camera.into()),
-            Some(("crop", crop)) => settings.crop = Some(window(crop)),
+            Some(("camera", camera)) => settings.picture.camera = Some(camera.into()),
+            Some(("crop", crop)) => settings.picture.crop = Some(window(crop)),
             _ => panic!("{argument} is neither camera=NAME nor crop=X0,X1,Y0,Y1"),
         }
     }
     let mapped = MappedScene::new(gltf::load(path.as_ref()).expect("the scene loads"), &settings);
     let reference = mapped
-        .frame(&RenderSettings { gather_rays: REFERENCE_RAYS, shadow_rays: 64, ..settings.clone() })
+        .frame(&settings.clone().with(|s| {
+            s.integrator.gather_rays = REFERENCE_RAYS;
+            s.integrator.shadow_rays = 64;
+        }))
         .radiance;
     let scale = mean(&reference);
     println!("{path}: mean {scale:.5}");
     for sampling in [Sampling::Reflection, Sampling::Product] {
-        let off = RenderSettings { gather_rays: RAYS, sampling, ..settings.clone() };
-        let on = ERRORS.map(|error| RenderSettings {
-            gather_rays: RAYS_OF_RECORD,
-            irradiance_error: Some(error),
-            ..off.clone()
+        let off = settings.clone().with(|s| {
+            s.integrator.gather_rays = RAYS;
+            s.integrator.sampling = sampling;
+        });
+        let on = ERRORS.map(|error| {
+            off.clone().with(|s| {
+                s.integrator.gather_rays = RAYS_OF_RECORD;
+                s.integrator.irradiance_error = Some(error);
+            })
         });
         for settings in [off].into_iter().chain(on) {
             let frame = mapped.frame(&settings);
             let counters = frame.counters;
             println!(
                 "{sampling:?} {:5}: rmse {:.4}, mean {:.4}, interpolated {:.3}, records {}, gathers {}",
-                settings.irradiance_error.map_or("off".into(), |error| error.to_string()),
+                settings.integrator.irradiance_error.map_or("off".into(), |error| error.to_string()),
                 rmse(&frame.radiance, &reference) / scale,
                 mean(&frame.radiance) / scale,
                 counters.interpolated_samples as f64 / counters.lambertian_samples.max(1) as f64,

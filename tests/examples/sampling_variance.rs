@@ -7,7 +7,7 @@
 //! standard errors; then how many rays the sampling needs for the RMSE of 200 `brdf` rays.
 
 use glam::DVec3;
-use photoncard_driver::render::{RenderSettings, Sampling};
+use photoncard_driver::render::{PhotonMaps, RenderSettings, Sampling};
 use photoncard_driver::scene::gltf;
 use photoncard_tests::mapped::{IndirectLight, MappedScene};
 
@@ -69,10 +69,13 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().unwrap_or_else(|| "scenes/cornell.gltf".into());
     let mut scene = gltf::load(path.as_ref()).expect("the scene loads");
-    let mut settings = RenderSettings { photons: 300_000, ..RenderSettings::default() };
+    let mut settings = RenderSettings {
+        photons: PhotonMaps { count: 300_000, ..PhotonMaps::default() },
+        ..RenderSettings::default()
+    };
     for argument in arguments {
         match argument.strip_prefix("camera=") {
-            Some(camera) => settings.camera = Some(camera.into()),
+            Some(camera) => settings.picture.camera = Some(camera.into()),
             None => scene.apply(&argument).expect("the assignment applies"),
         }
     }

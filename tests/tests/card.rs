@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::trace;
 use photoncard_driver::photon_map::store_photons;
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_firmware::kind::MICRO;
 use photoncard_shared::address::Line;
 use photoncard_shared::checksum::image_checksum;
@@ -31,8 +31,12 @@ fn image() -> CardImage {
 }
 
 fn frame() -> FrameParameters {
-    let settings =
-        RenderSettings { width: 8, height: 8, neighbors: 20, gather_rays: 4, ..RenderSettings::default() };
+    let settings = RenderSettings {
+        picture: Picture { width: 8, height: 8, ..Picture::default() },
+        photons: PhotonMaps { neighbors: 20, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 4, ..Integrator::default() },
+        ..RenderSettings::default()
+    };
     settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None)
 }
 

@@ -2,7 +2,10 @@
 
 use photoncard_driver::film::{Film, PixelValue, Window};
 use photoncard_driver::photon_map::PhotonLayout;
-use photoncard_driver::render::{CardAddress, Radiance, RenderSettings, Sampling, Unobserved, render};
+use photoncard_driver::render::{
+    CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling, Schedule,
+    Unobserved, render,
+};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::kind::{MICRO, REFERENCE};
@@ -16,14 +19,11 @@ fn glossy() -> Scene {
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 37,
-        height: 29,
-        photons: 20_000,
-        neighbors: 50,
-        gather_rays: 12,
-        samples: 2,
-        order: GatherOrder::Tiled,
-        cards: vec![card("emulated:1")],
+        picture: Picture { width: 37, height: 29, ..Picture::default() },
+        photons: PhotonMaps { count: 20_000, neighbors: 50, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 12, samples: 2, ..Integrator::default() },
+        schedule: Schedule { order: GatherOrder::Tiled, ..Schedule::default() },
+        cards: CardSet { addresses: vec![card("emulated:1")], ..CardSet::default() },
         ..RenderSettings::default()
     }
 }
@@ -44,68 +44,70 @@ fn pixel_bits(pixel: &PixelValue) -> [u32; 10] {
 
 /// Settings that must not change a bit of the picture.
 fn variants() -> Vec<RenderSettings> {
-    vec![
-        RenderSettings { order: GatherOrder::Naive, ..settings() },
-        RenderSettings { tile: 8, ..settings() },
-        RenderSettings { tile: 5, order: GatherOrder::Naive, ..settings() },
-        RenderSettings { tile: 64, ..settings() },
-        RenderSettings { tile: 64, order: GatherOrder::Sort, queue: Some(5000), ..settings() },
-        RenderSettings { cards: vec![card("emulated:2")], ..settings() },
-        RenderSettings { order: GatherOrder::DirectionBins, ..settings() },
-        RenderSettings { order: GatherOrder::DirectionBins, bins: Some(5), tile: 11, ..settings() },
-        RenderSettings { order: GatherOrder::DirectionBins, bins: Some(256), ..settings() },
-        RenderSettings { order: GatherOrder::Hash, ..settings() },
-        RenderSettings {
-            order: GatherOrder::Hash,
-            queue: Some(37),
-            cards: vec![card("emulated:3")],
-            ..settings()
-        },
-        RenderSettings { order: GatherOrder::Sort, queue: Some(1), tile: 9, ..settings() },
-        RenderSettings { order: GatherOrder::Sort, queue: Some(2), bins: Some(3), ..settings() },
-        RenderSettings {
-            order: GatherOrder::Sort,
-            queue: Some(1000),
-            cards: vec![card("emulated-micro:2")],
-            ..settings()
-        },
-        RenderSettings { order: GatherOrder::Sort, cards: vec![card("emulated:7")], tile: 16, ..settings() },
-        RenderSettings { cards: vec![card("emulated:3")], order: GatherOrder::Naive, ..settings() },
-        RenderSettings { cards: vec![card("emulated:7")], tile: 4, ..settings() },
-        RenderSettings { cards: vec![card("emulated-micro:2"), card("emulated:1")], ..settings() },
-        RenderSettings { photon_layout: PhotonLayout::Jensen, ..settings() },
-        RenderSettings {
-            photon_layout: PhotonLayout::Jensen,
-            order: GatherOrder::Sort,
-            cards: vec![card("emulated-micro:2")],
-            ..settings()
-        },
-        RenderSettings { order: GatherOrder::Hilbert, ..settings() },
-        RenderSettings {
-            order: GatherOrder::Hilbert,
-            tile: 7,
-            cards: vec![card("emulated:3")],
-            ..settings()
-        },
-    ]
+    use GatherOrder::{DirectionBins, Hash, Hilbert, Naive, Sort, Tiled};
+    let tile = Schedule::default().tile;
+    let schedules = [
+        (tile, Naive, None, None),
+        (8, Tiled, None, None),
+        (5, Naive, None, None),
+        (64, Tiled, None, None),
+        (64, Sort, None, Some(5000)),
+        (tile, DirectionBins, None, None),
+        (11, DirectionBins, Some(5), None),
+        (tile, DirectionBins, Some(256), None),
+        (tile, Hash, None, None),
+        (9, Sort, None, Some(1)),
+        (tile, Sort, Some(3), Some(2)),
+        (tile, Hilbert, None, None),
+    ];
+    let scheduled = schedules.map(|(tile, order, bins, queue)| RenderSettings {
+        schedule: Schedule { tile, order, bins, queue },
+        ..settings()
+    });
+    let cards = [
+        (&["emulated:2"][..], tile, Tiled, None),
+        (&["emulated:3"], tile, Hash, Some(37)),
+        (&["emulated-micro:2"], tile, Sort, Some(1000)),
+        (&["emulated:7"], tile, Sort, None),
+        (&["emulated:3"], tile, Naive, None),
+        (&["emulated:7"], 4, Tiled, None),
+        (&["emulated-micro:2", "emulated:1"], tile, Tiled, None),
+        (&["emulated:3"], 7, Hilbert, None),
+    ];
+    let dealt = cards.map(|(cards, tile, order, queue)| RenderSettings {
+        schedule: Schedule { tile, order, bins: None, queue },
+        cards: CardSet { addresses: cards.iter().copied().map(card).collect(), ..CardSet::default() },
+        ..settings()
+    });
+    let in_kd_tree = |order, cards| {
+        settings().with(|settings| {
+            settings.photons.layout = PhotonLayout::Jensen;
+            settings.schedule.order = order;
+            settings.cards.addresses = vec![card(cards)];
+        })
+    };
+    let in_kd_tree = [in_kd_tree(Tiled, "emulated:1"), in_kd_tree(Sort, "emulated-micro:2")];
+    scheduled.into_iter().chain(dealt).chain(in_kd_tree).collect()
 }
 
 /// Checks all variants with a sampling, without and with records of irradiance.
 fn check_variants(sampling: Sampling) {
-    check_variants_of(&glossy(), &RenderSettings { sampling, ..settings() });
+    check_variants_of(&glossy(), &settings().with(|s| s.integrator.sampling = sampling));
 }
 
 /// Checks all variants with the sampling and the radiance of some settings.
 fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
-    let RenderSettings { sampling, radiance, caustic_photons, .. } = *settings_of;
+    let PhotonMaps { radiance, caustic_photons, .. } = settings_of.photons;
+    let sampling = settings_of.integrator.sampling;
     for (irradiance_error, samples) in [(None, 2), (Some(0.025), 1), (Some(0.025), 2)] {
-        let with = |settings| RenderSettings {
-            sampling,
-            radiance,
-            caustic_photons,
-            irradiance_error,
-            samples,
-            ..settings
+        let with = |settings: RenderSettings| {
+            settings.with(|s| {
+                s.photons.radiance = radiance;
+                s.photons.caustic_photons = caustic_photons;
+                s.integrator.sampling = sampling;
+                s.integrator.irradiance_error = irradiance_error;
+                s.integrator.samples = samples;
+            })
         };
         let expected = bits(&render_or_panic(scene, &with(settings())).film);
         for variant in variants() {
@@ -138,12 +140,12 @@ fn nor_do_they_with_rays_by_the_mixture() {
 
 #[test]
 fn nor_do_they_with_precomputed_irradiance() {
-    check_variants_of(&glossy(), &RenderSettings { radiance: Radiance::Precomputed, ..settings() });
+    check_variants_of(&glossy(), &settings().with(|s| s.photons.radiance = Radiance::Precomputed));
 }
 
 #[test]
 fn nor_do_they_with_textures_cut_outs_mirrors_glass_and_lights_of_every_kind() {
-    check_variants_of(&everything(), &RenderSettings { caustic_photons: Some(3000), ..settings() });
+    check_variants_of(&everything(), &settings().with(|s| s.photons.caustic_photons = Some(3000)));
 }
 
 #[test]
@@ -152,16 +154,17 @@ fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
     let records = |width: u32, height: u32| (width.div_ceil(2) + 1) * (height.div_ceil(2) + 1);
     assert!(records(61, 61) > REFERENCE.irradiance_records && records(140, 1) > MICRO.irradiance_records);
     let scene = glossy();
-    let settings = |tile, order, cards| RenderSettings {
-        irradiance_error: Some(1e-5),
-        gather_rays: 2,
-        samples: 1,
-        width: 140,
-        height: 64,
-        tile,
-        order,
-        cards: vec![card(cards)],
-        ..settings()
+    let settings = |tile, order, cards| {
+        settings().with(|s| {
+            s.picture.width = 140;
+            s.picture.height = 64;
+            s.integrator.irradiance_error = Some(1e-5);
+            s.integrator.gather_rays = 2;
+            s.integrator.samples = 1;
+            s.schedule.tile = tile;
+            s.schedule.order = order;
+            s.cards.addresses = vec![card(cards)];
+        })
     };
     let expected = bits(&render_or_panic(&scene, &settings(4, GatherOrder::Sort, "emulated:2")).film);
     for (tile, order, cards) in [
@@ -178,15 +181,16 @@ fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
 #[test]
 fn nor_do_they_where_samples_are_rounded_to_the_next_pixel() {
     let scene = glossy();
-    let settings = |tile| RenderSettings {
-        width: 65_536,
-        height: 4096,
-        crop: Some(Window { x0: 33_008, x1: 33_072, y0: 2000, y1: 2032 }),
-        irradiance_error: Some(1e-6),
-        gather_rays: 1,
-        samples: 8,
-        tile,
-        ..settings()
+    let settings = |tile| {
+        settings().with(|s| {
+            s.picture.width = 65_536;
+            s.picture.height = 4096;
+            s.picture.crop = Some(Window { x0: 33_008, x1: 33_072, y0: 2000, y1: 2032 });
+            s.integrator.irradiance_error = Some(1e-6);
+            s.integrator.gather_rays = 1;
+            s.integrator.samples = 8;
+            s.schedule.tile = tile;
+        })
     };
     let expected = bits(&render_or_panic(&scene, &settings(16)).film);
     for tile in [32, 1] {
@@ -196,8 +200,10 @@ fn nor_do_they_where_samples_are_rounded_to_the_next_pixel() {
 
 #[test]
 fn a_frame_along_one_curve_is_for_emulated_reference_chips_alone() {
-    let settings =
-        RenderSettings { order: GatherOrder::Hilbert, cards: vec![card("emulated-micro:1")], ..settings() };
+    let settings = settings().with(|s| {
+        s.schedule.order = GatherOrder::Hilbert;
+        s.cards.addresses = vec![card("emulated-micro:1")];
+    });
     let error = render(&glossy(), &settings, &Unobserved).err().expect("is refused");
     assert!(error.is_input() && error.to_string().contains("--order hilbert"), "{error}");
 }
@@ -222,7 +228,7 @@ fn a_crop_is_the_same_region_of_the_whole() {
         Window { x0: 36, x1: 37, y0: 28, y1: 29 },
         Window { x0: 0, x1: 37, y0: 10, y1: 11 },
     ] {
-        let part = render_or_panic(&scene, &RenderSettings { crop: Some(window), ..settings() }).film;
+        let part = render_or_panic(&scene, &settings().with(|s| s.picture.crop = Some(window))).film;
         for y in window.y0..window.y1 {
             for x in window.x0..window.x1 {
                 let [a, b] = [&part, &whole].map(|film| film.pixel(x, y).map(pixel_bits));
@@ -236,7 +242,10 @@ fn a_crop_is_the_same_region_of_the_whole() {
 fn the_work_counted_does_not_depend_on_how_tiles_are_dealt() {
     let scene = glossy();
     let one = render_or_panic(&scene, &settings()).statistics;
-    let three = RenderSettings { cards: vec![card("emulated:3")], order: GatherOrder::Naive, ..settings() };
+    let three = settings().with(|s| {
+        s.schedule.order = GatherOrder::Naive;
+        s.cards.addresses = vec![card("emulated:3")];
+    });
     let three = render_or_panic(&scene, &three).statistics;
     assert_eq!(one.rays, three.rays);
     assert_eq!((one.gathers, one.photons_tested), (three.gathers, three.photons_tested));
@@ -247,6 +256,6 @@ fn the_work_counted_does_not_depend_on_how_tiles_are_dealt() {
 fn another_seed_is_another_picture() {
     let scene = glossy();
     let first = bits(&render_or_panic(&scene, &settings()).film);
-    let second = bits(&render_or_panic(&scene, &RenderSettings { seed: 1, ..settings() }).film);
+    let second = bits(&render_or_panic(&scene, &settings().with(|s| s.integrator.seed = 1)).film);
     assert!(first != second);
 }

@@ -3,17 +3,18 @@
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
-use photoncard_driver::render::{RenderSettings, Unobserved, render};
+use photoncard_driver::render::{
+    CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Unobserved, render,
+};
 use photoncard_driver::scene::{Material, Scene, Triangle, gltf};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 16,
-        height: 16,
-        photons: 20_000,
-        gather_rays: 16,
-        cards: vec!["emulated:2".parse().unwrap()],
+        picture: Picture { width: 16, height: 16, ..Picture::default() },
+        photons: PhotonMaps { count: 20_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 16, ..Integrator::default() },
+        cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     }
 }
@@ -41,7 +42,10 @@ fn tilted_floor(half_side: f32) -> Scene {
 
 #[test]
 fn the_size_of_a_tilted_floor_does_not_darken_what_is_seen_of_it() {
-    let settings = RenderSettings { gather_rays: 0, shadow_rays: 16, ..settings() };
+    let settings = settings().with(|s| {
+        s.integrator.gather_rays = 0;
+        s.integrator.shadow_rays = 16;
+    });
     let expected = mean(&radiances(&render_or_panic(&tilted_floor(4.0), &settings).film));
     for half_side in [12.0, 50.0, 300.0, 1000.0] {
         let found = mean(&radiances(&render_or_panic(&tilted_floor(half_side), &settings).film));
@@ -67,7 +71,11 @@ fn many_samples_next_to_a_dazzling_lamp_do_not_overflow() {
     let materials = vec![lambertian("floor", 0.5), emitting("lamp", 0.0, Vec3::splat(1000.0))];
     let scene = scene(triangles, materials, camera(Vec3::new(0.0, 0.15, 1.5), Vec3::new(0.0, -0.15, -1.5)));
     let picture = |samples: u32| {
-        let settings = RenderSettings { width: 8, height: 8, samples, ..settings() };
+        let settings = settings().with(|s| {
+            s.picture.width = 8;
+            s.picture.height = 8;
+            s.integrator.samples = samples;
+        });
         radiances(&render_or_panic(&scene, &settings).film)
     };
     let [few, many] = [picture(32), picture(512)];
@@ -82,7 +90,11 @@ fn direct_light_is_the_same_by_shadow_rays_by_gather_rays_and_by_both() {
         vec![lambertian("black", 0.0), lambertian("floor", 0.6), emitting("lamp", 0.0, Vec3::ONE)];
     let scene = scene(room([0, 0, 1, 2, 0, 0]), materials, camera(Vec3::ZERO, Vec3::new(0.01, -1.0, 0.02)));
     let picture = |shadow_rays: u32, gather_rays: u32| {
-        let settings = RenderSettings { shadow_rays, gather_rays, samples: 16, ..settings() };
+        let settings = settings().with(|s| {
+            s.integrator.shadow_rays = shadow_rays;
+            s.integrator.gather_rays = gather_rays;
+            s.integrator.samples = 16;
+        });
         radiances(&render_or_panic(&scene, &settings).film)
     };
     let expected = mean(&picture(64, 0));
@@ -128,11 +140,9 @@ fn box_and_far_triangle(distance: f32) -> Scene {
 #[test]
 fn a_far_triangle_changes_no_picture() {
     let settings = RenderSettings {
-        width: 32,
-        height: 32,
-        photons: 100_000,
-        gather_rays: 16,
-        max_distance: Some(0.1),
+        picture: Picture { width: 32, height: 32, ..Picture::default() },
+        photons: PhotonMaps { count: 100_000, max_distance: Some(0.1), ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 16, ..Integrator::default() },
         ..RenderSettings::default()
     };
     let picture = |distance| radiances(&render_or_panic(&box_and_far_triangle(distance), &settings).film);
@@ -164,13 +174,9 @@ fn shadow_rays_beside_a_small_lamp_bring_no_darkness() {
         camera(Vec3::new(0.3, 0.2, 0.0), Vec3::new(-0.3, -0.2, 0.01)),
     );
     let settings = RenderSettings {
-        width: 64,
-        height: 64,
-        gather_rays: 0,
-        shadow_rays: 2,
-        samples: 4,
-        photons: 1000,
-        neighbors: 10,
+        picture: Picture { width: 64, height: 64, ..Picture::default() },
+        photons: PhotonMaps { count: 1000, neighbors: 10, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 0, shadow_rays: 2, samples: 4, ..Integrator::default() },
         ..RenderSettings::default()
     };
     let radiances = radiances(&render_or_panic(&scene, &settings).film);

@@ -1,17 +1,22 @@
 //! A render over bad lines is the same picture, and tells what was repaired.
 
 use photoncard_driver::film::PixelValue;
-use photoncard_driver::render::{RenderSettings, Statistics};
+use photoncard_driver::render::{CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Statistics};
 use photoncard_driver::scene::gltf;
 use photoncard_tests::render_or_panic;
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 40,
-        height: 40,
-        photons: 5_000,
-        gather_rays: 2,
-        cards: vec!["emulated:2".parse().expect("cards"), "emulated-micro:1".parse().expect("a card")],
+        picture: Picture { width: 40, height: 40, ..Picture::default() },
+        photons: PhotonMaps { count: 5_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 2, ..Integrator::default() },
+        cards: CardSet {
+            addresses: vec![
+                "emulated:2".parse().expect("cards"),
+                "emulated-micro:1".parse().expect("a card"),
+            ],
+            ..CardSet::default()
+        },
         ..RenderSettings::default()
     }
 }
@@ -20,7 +25,7 @@ fn render(faults: Option<&str>) -> (Vec<PixelValue>, Statistics) {
     let path = format!("{}/../scenes/cornell.gltf", env!("CARGO_MANIFEST_DIR"));
     let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
     let faults = faults.map(|faults| faults.parse().expect("faults"));
-    let rendering = render_or_panic(&scene, &RenderSettings { faults, ..settings() });
+    let rendering = render_or_panic(&scene, &settings().with(|s| s.cards.faults = faults));
     (rendering.film.pixels().to_vec(), rendering.statistics)
 }
 

@@ -1,7 +1,9 @@
 //! Known radiance: a closed room of albedo rho whose walls emit L shows L / (1 - rho) everywhere.
 
 use glam::Vec3;
-use photoncard_driver::render::{CardAddress, Radiance, RenderSettings};
+use photoncard_driver::render::{
+    CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings,
+};
 use photoncard_driver::scene::{Material, Scene};
 use photoncard_tests::{camera, lambertian, mean, radiances, render_or_panic, room, scene};
 
@@ -14,12 +16,13 @@ fn furnace(material: Material) -> Scene {
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 48,
-        height: 48,
-        photons: 200_000,
-        gather_rays: 64,
-        samples: 4,
-        cards: vec!["emulated:2".parse::<CardAddress>().unwrap()],
+        picture: Picture { width: 48, height: 48, ..Picture::default() },
+        photons: PhotonMaps { count: 200_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 64, samples: 4, ..Integrator::default() },
+        cards: CardSet {
+            addresses: vec!["emulated:2".parse::<CardAddress>().unwrap()],
+            ..CardSet::default()
+        },
         ..RenderSettings::default()
     }
 }
@@ -34,9 +37,10 @@ fn check_with(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance
     let all = radiances(&film);
     let error = mean(&all) / expected - 1.0;
     assert!(error.abs() < 0.5 * tolerance, "mean is off by {error}");
-    for block_y in 0..settings.height / 8 {
-        for block_x in 0..settings.width / 8 {
-            let pixel = |i: u32| all[((block_y * 8 + i / 8) * settings.width + block_x * 8 + i % 8) as usize];
+    for block_y in 0..settings.picture.height / 8 {
+        for block_x in 0..settings.picture.width / 8 {
+            let pixel =
+                |i: u32| all[((block_y * 8 + i / 8) * settings.picture.width + block_x * 8 + i % 8) as usize];
             let block: Vec<[f32; 3]> = (0..64).map(pixel).collect();
             let error = mean(&block) / expected - 1.0;
             assert!(error.abs() < tolerance, "block {block_x}, {block_y} is off by {error}");
@@ -53,7 +57,7 @@ fn a_diffuse_furnace_glows_evenly() {
 
 #[test]
 fn nor_does_it_flicker_by_precomputed_irradiance() {
-    let settings = RenderSettings { radiance: Radiance::Precomputed, ..settings() };
+    let settings = settings().with(|s| s.photons.radiance = Radiance::Precomputed);
     for albedo in [0.2, 0.8] {
         let expected = EMISSION as f64 / (1.0 - albedo as f64);
         check_with(&furnace(lambertian("wall", albedo)), &settings, expected, 0.02);
@@ -80,7 +84,14 @@ fn a_phong_wall_in_a_diffuse_furnace_shows_its_directional_albedo() {
         let mut view = camera(origin, -origin);
         view.vertical_fov = 0.02;
         let scene = scene(triangles.clone(), vec![walls.clone(), phong.clone()], view);
-        let film = render_or_panic(&scene, &RenderSettings { width: 16, height: 16, ..settings() }).film;
+        let film = render_or_panic(
+            &scene,
+            &settings().with(|s| {
+                s.picture.width = 16;
+                s.picture.height = 16;
+            }),
+        )
+        .film;
         let expected = EMISSION as f64 / 0.5
             * (diffuse as f64 + lobe_albedo(specular as f64, exponent as f64, angle as f64));
         let error = mean(&radiances(&film)) / expected - 1.0;

@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use peak_alloc::PeakAlloc;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
-use photoncard_driver::render::{Observer, Phase, RenderSettings, render};
+use photoncard_driver::render::{
+    CardSet, Integrator, Observer, Phase, PhotonMaps, Picture, RenderSettings, Schedule, render,
+};
 use photoncard_driver::scene::{Scene, gltf};
 
 #[global_allocator]
@@ -22,12 +24,14 @@ fn cornell() -> Scene {
 
 fn settings(chips: usize) -> RenderSettings {
     RenderSettings {
-        width: 32,
-        height: 32,
-        tile: 16,
-        photons: PHOTONS,
-        gather_rays: 1,
-        cards: vec![format!("emulated:{chips}").parse().expect("an address")],
+        picture: Picture { width: 32, height: 32, ..Picture::default() },
+        photons: PhotonMaps { count: PHOTONS, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 1, ..Integrator::default() },
+        schedule: Schedule { tile: 16, ..Schedule::default() },
+        cards: CardSet {
+            addresses: vec![format!("emulated:{chips}").parse().expect("an address")],
+            ..CardSet::default()
+        },
         ..RenderSettings::default()
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use photoncard_driver::film::Window;
-use photoncard_driver::render::{RenderSettings, Sampling, Statistics};
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Sampling, Statistics};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_tests::mapped::{Frame, MappedScene};
 use photoncard_tests::{camera, lambertian, mean, radiances, render_or_panic, room, scene};
@@ -15,11 +15,14 @@ fn load(name: &str) -> Scene {
 /// The middle of the Cornell box as in a large picture.
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 256,
-        height: 256,
-        crop: Some(Window { x0: 32, x1: 224, y0: 112, y1: 144 }),
-        photons: 100_000,
-        shadow_rays: 16,
+        picture: Picture {
+            width: 256,
+            height: 256,
+            crop: Some(Window { x0: 32, x1: 224, y0: 112, y1: 144 }),
+            ..Picture::default()
+        },
+        photons: PhotonMaps { count: 100_000, ..PhotonMaps::default() },
+        integrator: Integrator { shadow_rays: 16, ..Integrator::default() },
         ..RenderSettings::default()
     }
 }
@@ -34,7 +37,10 @@ fn rmse(frame: &Frame, reference: &Frame) -> f32 {
 fn most_pixels_of_the_cornell_box_are_interpolated_at_no_greater_error() {
     let mapped = MappedScene::new(load("cornell.gltf"), &settings());
     let with = |irradiance_error, gather_rays| {
-        mapped.frame(&RenderSettings { irradiance_error, gather_rays, ..settings() })
+        mapped.frame(&settings().with(|s| {
+            s.integrator.irradiance_error = irradiance_error;
+            s.integrator.gather_rays = gather_rays;
+        }))
     };
     let reference = with(None, 1600);
     let [off, on] = [with(None, 100), with(Some(0.025), 100)];
@@ -49,7 +55,12 @@ fn most_pixels_of_the_cornell_box_are_interpolated_at_no_greater_error() {
 fn a_lesser_error_is_interpolated_from_more_records() {
     let mapped = MappedScene::new(load("cornell.gltf"), &settings());
     let counters = [1e-4, 0.003, 0.03, 0.3].map(|error| {
-        mapped.frame(&RenderSettings { irradiance_error: Some(error), gather_rays: 4, ..settings() }).counters
+        mapped
+            .frame(&settings().with(|s| {
+                s.integrator.irradiance_error = Some(error);
+                s.integrator.gather_rays = 4;
+            }))
+            .counters
     });
     for pair in counters.windows(2) {
         assert!(pair[0].interpolated_samples <= pair[1].interpolated_samples, "{counters:?}");
@@ -61,7 +72,10 @@ fn a_lesser_error_is_interpolated_from_more_records() {
 fn sixteen_samples_cost_little_more_than_one() {
     let mapped = MappedScene::new(load("cornell.gltf"), &settings());
     let gathers = |samples| {
-        let settings = RenderSettings { samples, irradiance_error: Some(0.025), ..settings() };
+        let settings = settings().with(|s| {
+            s.integrator.samples = samples;
+            s.integrator.irradiance_error = Some(0.025);
+        });
         mapped.frame(&settings).counters.gathers
     };
     let [one, sixteen] = [gathers(1), gathers(16)];
@@ -85,13 +99,15 @@ fn a_furnace_is_even_with_records_of_any_sampling() {
         (0.5, Sampling::Mixture),
     ] {
         let settings = RenderSettings {
-            width: 64,
-            height: 64,
-            photons: 200_000,
-            gather_rays: 64,
-            samples: 4,
-            irradiance_error: Some(0.025),
-            sampling,
+            picture: Picture { width: 64, height: 64, ..Picture::default() },
+            photons: PhotonMaps { count: 200_000, ..PhotonMaps::default() },
+            integrator: Integrator {
+                gather_rays: 64,
+                samples: 4,
+                irradiance_error: Some(0.025),
+                sampling,
+                ..Integrator::default()
+            },
             ..RenderSettings::default()
         };
         let rendering = render_or_panic(&furnace(albedo), &settings);
@@ -107,7 +123,13 @@ fn a_furnace_is_even_with_records_of_any_sampling() {
 fn no_seam_shows_at_the_borders_of_tiles() {
     let mapped = MappedScene::new(load("cornell.gltf"), &settings());
     let with = |seed, irradiance_error| {
-        mapped.frame(&RenderSettings { seed, irradiance_error, shadow_rays: 64, ..settings() }).radiance
+        mapped
+            .frame(&settings().with(|s| {
+                s.integrator.seed = seed;
+                s.integrator.irradiance_error = irradiance_error;
+                s.integrator.shadow_rays = 64;
+            }))
+            .radiance
     };
     let [mut at_borders, mut elsewhere] = [(0.0_f64, 0_u32); 2];
     for seed in 0..4 {

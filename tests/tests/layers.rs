@@ -3,7 +3,10 @@
 use photoncard_driver::film::{Film, FilmPixel, PixelLayers, PixelValue};
 use photoncard_driver::layer::Layers;
 use photoncard_driver::photon_map::PhotonLayout;
-use photoncard_driver::render::{CardAddress, RenderError, RenderSettings, Rendering, Unobserved, render};
+use photoncard_driver::render::{
+    CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderError, RenderSettings, Rendering,
+    Unobserved, render,
+};
 use photoncard_driver::scene::{Reflection, Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_tests::render_or_panic;
@@ -19,14 +22,10 @@ fn card(text: &str) -> CardAddress {
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 37,
-        height: 29,
-        photons: 20_000,
-        neighbors: 50,
-        gather_rays: 12,
-        samples: 2,
-        layers: Layers::all(),
-        cards: vec![card("emulated:1")],
+        picture: Picture { width: 37, height: 29, layers: Layers::all(), ..Picture::default() },
+        photons: PhotonMaps { count: 20_000, neighbors: 50, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 12, samples: 2, ..Integrator::default() },
+        cards: CardSet { addresses: vec![card("emulated:1")], ..CardSet::default() },
         ..RenderSettings::default()
     }
 }
@@ -60,12 +59,24 @@ fn variants() -> Vec<RenderSettings> {
         GatherOrder::Sort,
         GatherOrder::Hilbert,
     ];
-    let of_order = |order| RenderSettings { order, ..settings() };
+    let of_order = |order| settings().with(|s| s.schedule.order = order);
     let others = [
-        RenderSettings { tile: 32, queue: Some(5000), ..settings() },
-        RenderSettings { tile: 8, cards: vec![card("emulated-micro:2")], ..settings() },
-        RenderSettings { tile: 5, cards: vec![card("emulated:2")], ..of_order(GatherOrder::Hilbert) },
-        RenderSettings { photon_layout: PhotonLayout::Jensen, queue: Some(37), ..settings() },
+        settings().with(|s| {
+            s.schedule.tile = 32;
+            s.schedule.queue = Some(5000);
+        }),
+        settings().with(|s| {
+            s.schedule.tile = 8;
+            s.cards.addresses = vec![card("emulated-micro:2")];
+        }),
+        of_order(GatherOrder::Hilbert).with(|s| {
+            s.schedule.tile = 5;
+            s.cards.addresses = vec![card("emulated:2")];
+        }),
+        settings().with(|s| {
+            s.photons.layout = PhotonLayout::Jensen;
+            s.schedule.queue = Some(37);
+        }),
     ];
     orders.into_iter().map(of_order).chain(others).collect()
 }
@@ -74,8 +85,9 @@ fn variants() -> Vec<RenderSettings> {
 fn layers_add_up_to_the_picture_and_change_no_bit_of_it() {
     let scene = load("cornell-glossy.gltf");
     for irradiance_error in [None, Some(0.025)] {
-        let with = |settings| RenderSettings { irradiance_error, ..settings };
-        let plain = with(RenderSettings { layers: Layers::default(), ..settings() });
+        let with =
+            |settings: RenderSettings| settings.with(|s| s.integrator.irradiance_error = irradiance_error);
+        let plain = with(settings().with(|s| s.picture.layers = Layers::default()));
         let plain = render_or_panic(&scene, &plain).film;
         assert!(!plain.has_layers());
         let mut expected = None;
@@ -96,12 +108,12 @@ fn layers_add_up_to_the_picture_and_change_no_bit_of_it() {
 #[test]
 fn what_no_photon_brings_is_direct() {
     let scene = load("cornell.gltf");
-    let film = render_or_panic(&scene, &RenderSettings { gather_rays: 0, ..settings() }).film;
+    let film = render_or_panic(&scene, &settings().with(|s| s.integrator.gather_rays = 0)).film;
     for FilmPixel { pixel, layers } in film.all() {
         assert_eq!(layers, PixelLayers { direct: pixel.radiance, ..PixelLayers::default() });
     }
     // Shadow rays are the other way to it: what gather rays meet is weighted against them.
-    let without = render_or_panic(&scene, &RenderSettings { shadow_rays: 0, ..settings() }).film;
+    let without = render_or_panic(&scene, &settings().with(|s| s.integrator.shadow_rays = 0)).film;
     let with = render_or_panic(&scene, &settings()).film;
     for (without, with) in without.all().zip(with.all()) {
         assert_eq!(without.layers.indirect, with.layers.indirect);
@@ -124,7 +136,7 @@ fn every_sample_gathers_that_is_not_interpolated() {
     }
     assert!(gathers(&plain).iter().filter(|&&gathers| gathers == 2.0).count() > 37 * 29 / 2);
 
-    let cached = render_or_panic(&scene, &RenderSettings { irradiance_error: Some(0.025), ..settings() });
+    let cached = render_or_panic(&scene, &settings().with(|s| s.integrator.irradiance_error = Some(0.025)));
     assert!(gathers(&cached).iter().zip(gathers(&plain)).all(|(with, without)| *with <= without));
     let [with, without] =
         [&cached, &plain].map(|rendering| f64::from(gathers(rendering).iter().sum::<f32>()));
@@ -159,7 +171,11 @@ fn tiles_with_layers_that_no_chip_holds_are_refused_with_a_remedy() {
             if order == GatherOrder::Hilbert && most == 8 {
                 continue;
             }
-            let settings = RenderSettings { tile, cards, order, ..settings() };
+            let settings = settings().with(|s| {
+                s.schedule.tile = tile;
+                s.schedule.order = order;
+                s.cards.addresses = cards;
+            });
             let error = render(&scene, &settings, &Unobserved).err().expect("is refused");
             let said = error.to_string();
             assert!(error.is_input() && said.contains(&format!("1 to {most}")), "{said}");
@@ -171,7 +187,13 @@ fn tiles_with_layers_that_no_chip_holds_are_refused_with_a_remedy() {
     // Layers that the host has in any case ask for no room.
     for aov in ["albedo,N,Z", "none"] {
         let layers = aov.parse().unwrap();
-        render_or_panic(&scene, &RenderSettings { tile: 64, layers, ..settings() });
+        render_or_panic(
+            &scene,
+            &settings().with(|s| {
+                s.picture.layers = layers;
+                s.schedule.tile = 64;
+            }),
+        );
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
-use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
     Camera, Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Scene, Texture, Triangle,
     VertexAttributes,
@@ -36,14 +36,13 @@ fn lit_by(kind: PunctualKind, intensity: f32, place: Vec3) -> Scene {
 /// So many rays of each kind a sample.
 fn settings(shadow_rays: u32, gather_rays: u32) -> RenderSettings {
     RenderSettings {
-        width: 8,
-        height: 8,
-        photons: 2000,
-        neighbors: 20,
-        gather_rays,
-        shadow_rays,
-        samples: 4,
-        cards: vec!["emulated:1".parse::<CardAddress>().unwrap()],
+        picture: Picture { width: 8, height: 8, ..Picture::default() },
+        photons: PhotonMaps { count: 2000, neighbors: 20, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays, shadow_rays, samples: 4, ..Integrator::default() },
+        cards: CardSet {
+            addresses: vec!["emulated:1".parse::<CardAddress>().unwrap()],
+            ..CardSet::default()
+        },
         ..RenderSettings::default()
     }
 }
@@ -165,7 +164,7 @@ fn lamps_and_sky() -> Scene {
 fn shadow_rays_gather_rays_and_both_bring_the_same_light() {
     let scene = lamps_and_sky();
     let many =
-        |shadow_rays, gather_rays| RenderSettings { samples: 64, ..settings(shadow_rays, gather_rays) };
+        |shadow_rays, gather_rays| settings(shadow_rays, gather_rays).with(|s| s.integrator.samples = 64);
     let by_shadow_rays = seen(&scene, &many(64, 0));
     let by_gather_rays = seen(&scene, &many(0, 1024));
     let by_both = seen(&scene, &many(32, 64));
@@ -202,7 +201,7 @@ fn a_panel_with_a_fine_texture_lights_as_its_mean_does() {
     let texel = |i: u32| if (i / 32 + i % 32).is_multiple_of(4) { [255; 4] } else { [0, 0, 0, 255] };
     let texels = (0..32 * 32).map(texel).collect();
     let image = Image { name: "grid".into(), width: 32, height: 32, texels, encoding: Encoding::Srgb };
-    let many = RenderSettings { samples: 16, ..settings(64, 0) };
+    let many = settings(64, 0).with(|s| s.integrator.samples = 16);
     let plain = seen(&panel(2.0, None), &many);
     for settings in [many, settings(64, 256)] {
         let textured = seen(&panel(8.0, Some(image.clone())), &settings);
@@ -225,6 +224,9 @@ fn a_white_bowl_under_a_white_sky_is_white() {
     let mut bowl = scene(triangles, vec![white], camera(at(0.2, 2.5, 0.3), at(0.01, -1.0, 0.02)));
     bowl.cameras[0].vertical_fov = 0.5;
     bowl.environment = Some(Environment::constant(Vec3::splat(2.0)));
-    let settings = RenderSettings { photons: 200_000, neighbors: 60, ..settings(16, 64) };
+    let settings = settings(16, 64).with(|s| {
+        s.photons.count = 200_000;
+        s.photons.neighbors = 60;
+    });
     check(&bowl, &settings, 2.0, 0.02);
 }

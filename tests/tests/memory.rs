@@ -4,7 +4,10 @@ use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::{MappedImage, PhotonLayout, map_photons};
-use photoncard_driver::render::{MemoryStatistics, Radiance, ReadStatistics, RenderSettings, Statistics};
+use photoncard_driver::render::{
+    CardSet, Integrator, MemoryStatistics, PhotonMaps, Picture, Radiance, ReadStatistics, RenderSettings,
+    Schedule, Statistics,
+};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::{GatherOrder, tiles};
 use photoncard_firmware::chip::ReferenceChip;
@@ -24,14 +27,11 @@ fn glossy() -> Scene {
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 21,
-        height: 18,
-        photons: 5000,
-        neighbors: 30,
-        gather_rays: 8,
-        shadow_rays: 2,
-        tile: 8,
-        cards: vec!["emulated:1".parse().unwrap()],
+        picture: Picture { width: 21, height: 18, ..Picture::default() },
+        photons: PhotonMaps { count: 5000, neighbors: 30, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 8, shadow_rays: 2, ..Integrator::default() },
+        schedule: Schedule { tile: 8, ..Schedule::default() },
+        cards: CardSet { addresses: vec!["emulated:1".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     }
 }
@@ -57,7 +57,11 @@ impl Frame {
         let packed = PackedScene::new(&scene).unwrap();
         let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).unwrap();
         let frame = settings.frame(scene.camera(None).unwrap(), mapped.max_distance, mapped.caustics);
-        Self { mapped, frame, tiles: tiles(settings.window(), settings.tile, settings.order) }
+        Self {
+            mapped,
+            frame,
+            tiles: tiles(settings.window(), settings.schedule.tile, settings.schedule.order),
+        }
     }
 
     fn lines(&self) -> Lines<'_> {
@@ -113,7 +117,7 @@ fn a_tile_hits_and_misses_as_the_definition_of_its_caches_says() {
         let split = |_| LruOracle::new(32, 4, 1, |block| block % 32);
         let shape = CacheShape::new(9 << 10, 384, 3, SetIndex::Hashed).unwrap();
         for layout in [PhotonLayout::Jensen, PhotonLayout::Lines] {
-            let frame = Frame::new(&RenderSettings { photon_layout: layout, ..settings() });
+            let frame = Frame::new(&settings().with(|s| s.photons.layout = layout));
             for text in [SPLIT, UNIFIED] {
                 let mut reads = Vec::new();
                 let image = frame.mapped.image.lines();
@@ -185,10 +189,15 @@ fn counting_changes_no_picture() {
                 }
                 let caches = Some(caches(text));
                 let cards = vec![card.parse().unwrap()];
-                let counted = RenderSettings { order, photon_layout, caches, cards, ..settings() };
+                let counted = settings().with(|s| {
+                    s.photons.layout = photon_layout;
+                    s.schedule.order = order;
+                    s.cards.caches = caches;
+                    s.cards.addresses = cards;
+                });
                 let counted_picture = render_or_panic(&scene, &counted);
                 assert!(radiances(&counted_picture.film) == expected, "{counted:?}");
-                let direct = RenderSettings { caches: None, ..counted.clone() };
+                let direct = counted.clone().with(|s| s.cards.caches = None);
                 let direct = render_or_panic(&scene, &direct);
                 assert!(radiances(&direct.film) == expected, "{order:?}");
                 let counted = counted_picture.statistics;
@@ -210,12 +219,13 @@ fn what_is_counted_does_not_depend_on_how_tiles_are_dealt() {
     let irradiance_cache = (Some(0.05), GatherOrder::Sort);
     for (irradiance_error, order) in [(None, GatherOrder::Sort), (None, GatherOrder::Naive), irradiance_cache]
     {
-        let with = |cards: &str| RenderSettings {
-            irradiance_error,
-            order,
-            caches: Some(caches(SPLIT)),
-            cards: vec![cards.parse().unwrap()],
-            ..settings()
+        let with = |cards: &str| {
+            settings().with(|s| {
+                s.integrator.irradiance_error = irradiance_error;
+                s.schedule.order = order;
+                s.cards.caches = Some(caches(SPLIT));
+                s.cards.addresses = vec![cards.parse().unwrap()];
+            })
         };
         let (one, statistics) = measured(&with("emulated:1"));
         assert_eq!(one.written_bytes, statistics.image_bytes);
@@ -249,7 +259,12 @@ fn counts_are_of_whole_records_and_whole_lines() {
         (PhotonLayout::Lines, None, Radiance::Precomputed),
     ] {
         let caches = Some(caches(SPLIT));
-        let settings = RenderSettings { photon_layout, irradiance_error, radiance, caches, ..settings() };
+        let settings = settings().with(|s| {
+            s.photons.layout = photon_layout;
+            s.photons.radiance = radiance;
+            s.integrator.irradiance_error = irradiance_error;
+            s.cards.caches = caches;
+        });
         let (memory, statistics) = measured(&settings);
         let structures = &memory.structures;
         let is_jensen = photon_layout == PhotonLayout::Jensen;

@@ -1,7 +1,7 @@
 //! Shadow rays: many samples of one ray each are spread over a lamp as one sample of many is.
 
 use glam::Vec3;
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{Material, Scene};
 use photoncard_tests::{camera, lambertian, quad, radiances, render_or_panic, scene};
 
@@ -22,13 +22,9 @@ fn penumbra() -> Scene {
 
 fn picture(samples: u32, shadow_rays: u32, seed: u32) -> Vec<f64> {
     let settings = RenderSettings {
-        width: 24,
-        height: 24,
-        samples,
-        shadow_rays,
-        seed,
-        photons: 1000,
-        gather_rays: 0,
+        picture: Picture { width: 24, height: 24, ..Picture::default() },
+        photons: PhotonMaps { count: 1000, ..PhotonMaps::default() },
+        integrator: Integrator { samples, shadow_rays, seed, gather_rays: 0, ..Integrator::default() },
         ..RenderSettings::default()
     };
     let rendering = render_or_panic(&penumbra(), &settings);

@@ -8,7 +8,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
 use photoncard_driver::link::LineFaults;
-use photoncard_driver::render::{CardAddress, MemoryUse, RenderSettings, card_info};
+use photoncard_driver::render::{
+    CardAddress, CardSet, Integrator, MemoryUse, PhotonMaps, Picture, RenderSettings, card_info,
+};
 use photoncard_driver::scene::gltf;
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::kind::MICRO;
@@ -94,12 +96,14 @@ impl Drop for Machine {
 fn settings() -> RenderSettings {
     let gather_rays = std::env::var("PHOTONCARD_QEMU_GATHER_RAYS").map(|text| text.parse());
     RenderSettings {
-        width: 64,
-        height: 64,
-        photons: 20_000,
-        gather_rays: gather_rays.unwrap_or(Ok(4)).expect("a number of gather rays"),
-        irradiance_error: None,
-        cards: vec!["emulated-micro:1".parse().expect("a card")],
+        picture: Picture { width: 64, height: 64, ..Picture::default() },
+        photons: PhotonMaps { count: 20_000, ..PhotonMaps::default() },
+        integrator: Integrator {
+            gather_rays: gather_rays.unwrap_or(Ok(4)).expect("a number of gather rays"),
+            irradiance_error: None,
+            ..Integrator::default()
+        },
+        cards: CardSet { addresses: vec!["emulated-micro:1".parse().expect("a card")], ..CardSet::default() },
         ..RenderSettings::default()
     }
 }
@@ -119,15 +123,24 @@ fn renders_as_the_emulated_card(name: &str) {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell.gltf");
     let scene = gltf::load(&path).expect("a shipped scene loads");
     let (machine, address) = Machine::start(name);
-    let cached = RenderSettings { irradiance_error: Some(0.1), ..settings() };
+    let cached = settings().with(|s| s.integrator.irradiance_error = Some(0.1));
     // Other photons: another image, of which the card has little.
     let mut renders = vec![(settings(), None), (cached, None)];
     for (seed, faults) in (1..).zip(faults()) {
-        renders.push((RenderSettings { seed, photons: 5_000, ..settings() }, Some(faults)));
+        renders.push((
+            settings().with(|s| {
+                s.photons.count = 5_000;
+                s.integrator.seed = seed;
+            }),
+            Some(faults),
+        ));
     }
     for (number, (settings, faults)) in renders.into_iter().enumerate() {
         let expected = render_or_panic(&scene, &settings).film;
-        let remote = RenderSettings { cards: vec![address.clone()], faults, ..settings };
+        let remote = settings.with(|s| {
+            s.cards.addresses = vec![address.clone()];
+            s.cards.faults = faults;
+        });
         let rendering = render_or_panic(&scene, &remote);
         let (statistics, pixels) = (&rendering.statistics, rendering.film.pixels());
         say(&format!(
@@ -152,18 +165,17 @@ fn renders_as_the_emulated_card(name: &str) {
 /// Textures, cut-outs, mirrors, glass and lights of every kind.
 fn renders_everything(name: &str, address: &CardAddress) {
     let scene = everything();
-    let settings = RenderSettings {
-        width: 24,
-        height: 20,
-        photons: 3000,
-        caustic_photons: Some(1000),
-        gather_rays: 2,
-        shadow_rays: 3,
-        samples: 2,
-        ..settings()
-    };
+    let settings = settings().with(|s| {
+        s.picture.width = 24;
+        s.picture.height = 20;
+        s.photons.count = 3000;
+        s.photons.caustic_photons = Some(1000);
+        s.integrator.gather_rays = 2;
+        s.integrator.shadow_rays = 3;
+        s.integrator.samples = 2;
+    });
     let expected = render_or_panic(&scene, &settings).film;
-    let film = render_or_panic(&scene, &RenderSettings { cards: vec![address.clone()], ..settings }).film;
+    let film = render_or_panic(&scene, &settings.with(|s| s.cards.addresses = vec![address.clone()])).film;
     for (index, (pixel, expected)) in film.pixels().iter().zip(expected.pixels()).enumerate() {
         assert_eq!(
             pixel.to_bytes(),

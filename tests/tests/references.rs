@@ -7,7 +7,9 @@ use std::path::PathBuf;
 
 use photoncard_driver::exr::{RgbImage, read_rgb};
 use photoncard_driver::film::Film;
-use photoncard_driver::render::{Radiance, RenderSettings, Sampling};
+use photoncard_driver::render::{
+    CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling,
+};
 use photoncard_driver::scene::{Environment, gltf};
 use photoncard_tests::render_or_panic;
 
@@ -72,15 +74,16 @@ fn check_with(
 ) {
     let scene = gltf::load(&path("../scenes").join(scene)).expect("a shipped scene loads");
     let settings = RenderSettings {
-        width: 64,
-        height: 64,
-        photons: 300_000,
-        gather_rays: if irradiance_error.is_some() { 256 } else { 32 },
-        samples: 16,
-        sampling,
-        irradiance_error,
-        radiance,
-        cards: vec!["emulated:2".parse().unwrap()],
+        picture: Picture { width: 64, height: 64, ..Picture::default() },
+        photons: PhotonMaps { count: 300_000, radiance, ..PhotonMaps::default() },
+        integrator: Integrator {
+            gather_rays: if irradiance_error.is_some() { 256 } else { 32 },
+            samples: 16,
+            sampling,
+            irradiance_error,
+            ..Integrator::default()
+        },
+        cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     };
     let film = render_or_panic(&scene, &settings).film;
@@ -98,13 +101,14 @@ fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>) {
     scene.environment = file.map(|file| Environment::load(&file).expect("a shipped sky loads"));
     let reference = read(reference);
     let settings = RenderSettings {
-        width: (reference.width / SHRUNK) as u32,
-        height: (reference.height / SHRUNK) as u32,
-        photons: 500_000,
-        gather_rays: 8,
-        shadow_rays: 2,
-        samples: 64,
-        cards: vec!["emulated:2".parse().unwrap()],
+        picture: Picture {
+            width: (reference.width / SHRUNK) as u32,
+            height: (reference.height / SHRUNK) as u32,
+            ..Picture::default()
+        },
+        photons: PhotonMaps { count: 500_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 8, shadow_rays: 2, samples: 64, ..Integrator::default() },
+        cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     };
     compare(&render_or_panic(&scene, &settings).film, &reference, [0.02, 0.06]);

@@ -9,7 +9,7 @@ use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
 use photoncard_driver::photon_map::store_photons;
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::kind::MICRO;
 use photoncard_firmware::memory::{CardMemory, MemoryPort};
@@ -121,10 +121,9 @@ fn most_reads(frame: &FrameParameters) -> u64 {
 fn a_card_looks_at_its_link_however_many_samples_a_pixel_has() {
     with_room_for_a_card(|| {
         let settings = RenderSettings {
-            width: 8,
-            height: 8,
-            neighbors: 20,
-            gather_rays: 2,
+            picture: Picture { width: 8, height: 8, ..Picture::default() },
+            photons: PhotonMaps { neighbors: 20, ..PhotonMaps::default() },
+            integrator: Integrator { gather_rays: 2, ..Integrator::default() },
             ..RenderSettings::default()
         };
         let frame = settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None);

@@ -1,7 +1,7 @@
 //! Every sampling of the gather rays converges to the same picture.
 
 use glam::{DVec3, Vec3};
-use photoncard_driver::render::{RenderSettings, Sampling};
+use photoncard_driver::render::{PhotonMaps, Picture, RenderSettings, Sampling};
 use photoncard_driver::scene::gltf;
 use photoncard_tests::mapped::{IndirectLight, MappedScene};
 
@@ -11,9 +11,8 @@ fn check(scene: &str, camera: Option<&str>, assignments: &[&str]) {
     let mut scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
     assignments.iter().for_each(|assignment| scene.apply(assignment).expect("a material of the scene"));
     let settings = RenderSettings {
-        photons: 50_000,
-        neighbors: 50,
-        camera: camera.map(Into::into),
+        picture: Picture { camera: camera.map(Into::into), ..Picture::default() },
+        photons: PhotonMaps { count: 50_000, neighbors: 50, ..PhotonMaps::default() },
         ..RenderSettings::default()
     };
     let mapped = MappedScene::new(scene, &settings);

@@ -2,7 +2,7 @@
 //! them, and the caustics that they cast.
 
 use glam::Vec3;
-use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
     Encoding, Environment, Image, Material, Reflection, Scene, Texture, Transmission,
 };
@@ -16,12 +16,13 @@ const FURNACE: f64 = (EMISSION / (1.0 - ALBEDO)) as f64;
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 48,
-        height: 48,
-        photons: 200_000,
-        gather_rays: 16,
-        samples: 8,
-        cards: vec!["emulated:2".parse::<CardAddress>().unwrap()],
+        picture: Picture { width: 48, height: 48, ..Picture::default() },
+        photons: PhotonMaps { count: 200_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 16, samples: 8, ..Integrator::default() },
+        cards: CardSet {
+            addresses: vec!["emulated:2".parse::<CardAddress>().unwrap()],
+            ..CardSet::default()
+        },
         ..RenderSettings::default()
     }
 }
@@ -88,7 +89,7 @@ fn nothing_that_loses_no_light_shows_in_a_furnace() {
     shows(&furnace_with(mirror(1.0), ball), &settings(), FURNACE, 0.04);
     shows(&furnace_with(glass(true, 0.0), ball), &settings(), FURNACE, 0.04);
     // Gather rays bring what the caustic map would.
-    let without_map = RenderSettings { caustic_photons: Some(0), ..settings() };
+    let without_map = settings().with(|s| s.photons.caustic_photons = Some(0));
     shows(&furnace_with(glass(true, 0.0), ball), &without_map, FURNACE, 0.04);
 }
 
@@ -97,7 +98,12 @@ fn glance(triangles: Vec<photoncard_driver::scene::Triangle>, materials: Vec<Mat
     let mut view = camera(from, -from);
     view.vertical_fov = 0.02;
     let scene = scene(triangles, materials, view);
-    let settings = RenderSettings { width: 16, height: 16, samples: 256, gather_rays: 0, ..settings() };
+    let settings = settings().with(|s| {
+        s.picture.width = 16;
+        s.picture.height = 16;
+        s.integrator.samples = 256;
+        s.integrator.gather_rays = 0;
+    });
     mean(&radiances(&render_or_panic(&scene, &settings).film))
 }
 
@@ -175,7 +181,7 @@ fn a_caustic_through_a_pane_is_the_lamp_dimmed() {
         let mut view = camera(Vec3::new(0.0, 0.3, 0.9), Vec3::new(0.0, -0.3, -0.9));
         view.vertical_fov = 0.3;
         let scene = scene(triangles, vec![black_lamp(), floor.clone(), glass(false, 0.0)], view);
-        mean(&radiances(&render_or_panic(&scene, &RenderSettings { gather_rays: 0, ..settings() }).film))
+        mean(&radiances(&render_or_panic(&scene, &settings().with(|s| s.integrator.gather_rays = 0)).film))
     };
     // Most light comes steeply: the pane leaves little less than at normal incidence.
     let share = look(true) / look(false);
@@ -199,7 +205,12 @@ fn specular_things_alone_under_a_sky_show_it() {
         view.vertical_fov = 0.02;
         let mut scene = scene(pane.to_vec(), vec![material], view);
         scene.environment = Some(Environment::constant(Vec3::ONE));
-        let settings = RenderSettings { width: 16, height: 16, samples: 64, photons: 1000, ..settings() };
+        let settings = settings().with(|s| {
+            s.picture.width = 16;
+            s.picture.height = 16;
+            s.photons.count = 1000;
+            s.integrator.samples = 64;
+        });
         let seen = mean(&radiances(&render_or_panic(&scene, &settings).film));
         assert!((seen / expected - 1.0).abs() < 0.02, "{seen} instead of {expected}");
     }
@@ -227,7 +238,12 @@ fn where_a_texture_says_that_there_is_no_metal_glass_lets_light_through() {
         let encoding = Encoding::Linear;
         scene.images.push(Image { name: "metal".into(), width: 1, height: 1, texels, encoding });
         scene.textures.push(Texture::new(0));
-        let settings = RenderSettings { width: 16, height: 16, samples: 256, photons: 1000, ..settings() };
+        let settings = settings().with(|s| {
+            s.picture.width = 16;
+            s.picture.height = 16;
+            s.photons.count = 1000;
+            s.integrator.samples = 256;
+        });
         mean(&radiances(&render_or_panic(&scene, &settings).film))
     };
     let through = (1.0 - FACE) / (1.0 + FACE);

@@ -2,19 +2,20 @@
 
 use glam::Vec3;
 use photoncard_driver::film::Film;
-use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{Encoding, Image, Material, Reflection, Scene, Texture, Wrap};
 use photoncard_tests::shapes::{add_ball, add_textured_quad};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 48,
-        height: 48,
-        photons: 100_000,
-        gather_rays: 32,
-        samples: 4,
-        cards: vec!["emulated:2".parse::<CardAddress>().unwrap()],
+        picture: Picture { width: 48, height: 48, ..Picture::default() },
+        photons: PhotonMaps { count: 100_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 32, samples: 4, ..Integrator::default() },
+        cards: CardSet {
+            addresses: vec!["emulated:2".parse::<CardAddress>().unwrap()],
+            ..CardSet::default()
+        },
         ..RenderSettings::default()
     }
 }
@@ -42,7 +43,14 @@ fn canvas(material: Material) -> Scene {
 }
 
 fn film(scene: &Scene) -> Film {
-    render_or_panic(scene, &RenderSettings { gather_rays: 0, samples: 16, ..settings() }).film
+    render_or_panic(
+        scene,
+        &settings().with(|s| {
+            s.integrator.gather_rays = 0;
+            s.integrator.samples = 16;
+        }),
+    )
+    .film
 }
 
 fn glowing(texture: u32) -> Material {
@@ -174,7 +182,7 @@ fn a_texture_decides_what_a_mirror_is() {
         scene.materials.push(lambertian("floor", 0.5));
         let floor = scene.triangles.iter_mut().filter(|triangle| triangle.vertices.iter().all(|v| v.y < 0.0));
         floor.for_each(|triangle| triangle.material = 1);
-        radiances(&render_or_panic(&scene, &RenderSettings { samples: 1, ..settings() }).film)
+        radiances(&render_or_panic(&scene, &settings().with(|s| s.integrator.samples = 1)).film)
     };
     assert_eq!(film(1.0, Some(0)), film(0.0, None), "no metal is left");
     assert_eq!(film(1.0, Some(255)), film(1.0, None), "all metal is left");
@@ -199,7 +207,7 @@ fn where_alpha_cuts_out_there_is_nothing() {
         let texels = alpha.map(|alpha| [255, 255, 255, alpha]).to_vec();
         let nearest = Texture { nearest: true, ..Texture::new(0) };
         let scene = with_texture(scene, image(2, Encoding::Srgb, texels), nearest);
-        mean(&radiances(&render_or_panic(&scene, &RenderSettings { samples: 1, ..settings() }).film))
+        mean(&radiances(&render_or_panic(&scene, &settings().with(|s| s.integrator.samples = 1)).film))
     };
     let [closed, open] = [[255; 4], [0; 4]].map(sky);
     // Photons above it, on the walls, are gathered a little below as well.
@@ -208,7 +216,7 @@ fn where_alpha_cuts_out_there_is_nothing() {
     let bare = {
         let view = camera(Vec3::new(0.0, 0.5, 0.9), Vec3::new(0.0, -0.5, -0.9));
         let scene = scene(room([1, 1, 1, 0, 1, 1]), vec![lamp.clone(), lambertian("floor", 0.8)], view);
-        mean(&radiances(&render_or_panic(&scene, &RenderSettings { samples: 1, ..settings() }).film))
+        mean(&radiances(&render_or_panic(&scene, &settings().with(|s| s.integrator.samples = 1)).film))
     };
     assert!((open / bare - 1.0).abs() < 0.01, "{open} {bare}");
     assert!(half > 0.15 * open && half < 0.5 * open, "{half} of {open}");

@@ -24,6 +24,7 @@ use self::dram::EmulatedDram;
 pub use self::dram::SharedImage;
 use self::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use self::trace::{TraceFile, Traced};
+use crate::choice::choices;
 use crate::link::{LoopbackPort, loopback};
 
 /// Kind of the chip on an emulated card.
@@ -34,6 +35,11 @@ pub enum ChipKind {
     /// A chip of the budget [`MICRO`](photoncard_firmware::kind::MICRO).
     Micro,
 }
+
+choices!(ChipKind {
+    Reference = "emulated": "The reference chip",
+    Micro = "emulated-micro": "The micro chip",
+});
 
 impl ChipKind {
     /// On-chip memory of the firmware, its caches and stack included, bytes.

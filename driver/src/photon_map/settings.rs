@@ -2,6 +2,8 @@
 
 use photoncard_shared::message::Radiance;
 
+use crate::choice::choices;
+
 /// Parameters of a photon map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonSettings {
@@ -32,3 +34,8 @@ pub enum PhotonLayout {
     #[default]
     Lines,
 }
+
+choices!(PhotonLayout {
+    Jensen = "jensen": "A left-balanced kd-tree of 20-byte photons",
+    Lines = "lines": "Leaves that fill a line of memory each",
+});

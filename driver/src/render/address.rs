@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use super::RenderError;
+use crate::choice::Choice;
 use crate::emulator::ChipKind;
 use crate::link::{host_name, tcp_address};
 
@@ -62,6 +63,12 @@ impl Default for CardAddress {
 }
 
 impl CardAddress {
+    /// Chips of a kind in this process, one for each of its processor's cores.
+    pub fn emulated(kind: ChipKind) -> Self {
+        let chips = std::thread::available_parallelism().map_or(1, usize::from);
+        Self::Emulated { kind, chips }
+    }
+
     /// A card on a serial port, at the speed for which none is given.
     pub fn serial(path: impl Into<PathBuf>) -> Self {
         Self::Remote(RemoteAddress::Serial { path: path.into(), baud: DEFAULT_BAUD })
@@ -113,8 +120,7 @@ pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
 impl fmt::Display for CardAddress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Emulated { kind: ChipKind::Reference, chips } => write!(f, "emulated:{chips}"),
-            Self::Emulated { kind: ChipKind::Micro, chips } => write!(f, "emulated-micro:{chips}"),
+            Self::Emulated { kind, chips } => write!(f, "{}:{chips}", kind.name()),
             Self::Remote(address) => address.fmt(f),
         }
     }
@@ -135,9 +141,10 @@ impl FromStr for CardAddress {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (kind, rest) = text.split_once(':').map_or((text, None), |(kind, rest)| (kind, Some(rest)));
+        if let Ok(kind) = ChipKind::of_name(kind) {
+            return emulated(kind, rest);
+        }
         match kind {
-            "emulated" => emulated(ChipKind::Reference, rest),
-            "emulated-micro" => emulated(ChipKind::Micro, rest),
             "serial" => serial(rest.unwrap_or_default()).map(Self::Remote),
             "tcp" => tcp(rest.unwrap_or_default()).map(Self::Remote),
             "unix" => match rest {
@@ -153,14 +160,9 @@ impl FromStr for CardAddress {
 }
 
 fn emulated(kind: ChipKind, chips: Option<&str>) -> Result<CardAddress, String> {
-    let chips = match chips {
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-        Some(chips) => chips
-            .parse()
-            .ok()
-            .filter(|count| (1..=MAX_CHIPS).contains(count))
-            .ok_or_else(|| format!("{chips:?} is no number of chips; use 1 to {MAX_CHIPS}"))?,
-    };
+    let Some(text) = chips else { return Ok(CardAddress::emulated(kind)) };
+    let chips = text.parse().ok().filter(|count| (1..=MAX_CHIPS).contains(count));
+    let chips = chips.ok_or_else(|| format!("{text:?} is no number of chips; use 1 to {MAX_CHIPS}"))?;
     Ok(CardAddress::Emulated { kind, chips })
 }
 

@@ -13,8 +13,8 @@ use super::crew::Crew;
 use super::executor::{Executor, Outcome, Work};
 use super::greeting::{GreetedCard, GreetingError, card_name, greet};
 use super::open_card::OpenCard;
-use super::outputs::Outputs;
-use super::{CardError, Observer, RenderError, RenderSettings};
+use super::outputs::LiveOutputs;
+use super::{CardError, CardSet, Observer, RenderError, RenderSettings};
 use crate::dispatcher::Dispatcher;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{MemoryModel, SharedImage};
@@ -42,10 +42,10 @@ impl<'a> Cards<'a> {
         settings: &'a RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Self, RenderError> {
-        let mut trace = settings.trace.as_deref().map(TraceFile::create).transpose()?;
+        let mut trace = settings.cards.trace.as_deref().map(TraceFile::create).transpose()?;
         let start = Instant::now();
         let shared = SharedImage::default();
-        let RenderSettings { cards: addresses, faults, .. } = settings;
+        let CardSet { addresses, faults, .. } = &settings.cards;
         let caches = settings.modelled_caches();
         check_chips(addresses.iter().map(CardAddress::emulated_chips).sum())?;
         let each_card = (addresses.iter())
@@ -103,7 +103,7 @@ impl<'a> Cards<'a> {
         job: Job,
         scheduler: Scheduler,
         sinks: Vec<&dyn TileSink>,
-        outputs: &Outputs,
+        outputs: &LiveOutputs,
     ) -> Result<Outcome, RenderError> {
         let begun = self.start.elapsed();
         let (names, cards): (Vec<String>, Vec<GreetedCard>) = self.cards.into_iter().unzip();

@@ -31,7 +31,10 @@ pub use observer::{Observer, Phase, Unobserved};
 pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Radiance, Sampling};
-pub use settings::{DEFAULT_CAUSTIC_PHOTONS, MIN_IRRADIANCE_ERROR, RenderSettings};
+pub use settings::{
+    CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, Outputs, PROGRAM,
+    PhotonMaps, Picture, RenderSettings, Schedule,
+};
 pub use statistics::{LinkStatistics, Rays, Statistics};
 pub use times::Times;
 
@@ -40,7 +43,7 @@ use std::time::Instant;
 
 use self::cards::Cards;
 use self::executor::{Executor, Work};
-use self::outputs::Outputs;
+use self::outputs::LiveOutputs;
 use self::preparation::prepare;
 use self::whole_frame::WholeFrame;
 use crate::film::Film;
@@ -71,7 +74,7 @@ pub fn render(
     observer: &dyn Observer,
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
-    let camera = scene.camera(settings.camera.as_deref())?;
+    let camera = scene.camera(settings.picture.camera.as_deref())?;
     let executor = executor(settings, observer)?;
     let budgets = executor.budgets();
     for budget in &budgets {
@@ -79,8 +82,8 @@ pub fn render(
     }
     // Not before the settings are known to be possible: a film may be large.
     let mut film = settings.film()?;
-    let tiles = tiles(settings.window(), settings.tile, settings.order);
-    let outputs = Outputs::open(scene, settings, &tiles, &mut film, observer)?;
+    let tiles = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
+    let outputs = LiveOutputs::open(scene, settings, &tiles, &mut film, observer)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, &budgets, &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance, prepared.caustics);
@@ -108,7 +111,7 @@ fn executor<'a>(
     settings.check_trace()?;
     settings.check_memory_model()?;
     settings.check_verification()?;
-    Ok(match settings.order {
+    Ok(match settings.schedule.order {
         GatherOrder::Hilbert => Box::new(WholeFrame::new(settings)?),
         _ => Box::new(Cards::connect(settings, observer)?),
     })

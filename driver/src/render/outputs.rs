@@ -12,13 +12,13 @@ use crate::scene::Scene;
 use crate::sink::TileSink;
 
 /// Outputs of a render while it runs, as far as the settings ask for them.
-pub(super) struct Outputs<'a> {
+pub(super) struct LiveOutputs<'a> {
     partial: Option<PartialRender>,
     display: Option<Display>,
     pub(super) observer: &'a dyn Observer,
 }
 
-impl<'a> Outputs<'a> {
+impl<'a> LiveOutputs<'a> {
     /// Opens the outputs. Tiles of the render that is resumed are written into the film, and shown.
     ///
     /// # Errors
@@ -31,10 +31,10 @@ impl<'a> Outputs<'a> {
         observer: &'a dyn Observer,
     ) -> Result<Self, PartialError> {
         let begin = |partial| PartialRender::begin(partial, settings.identity(scene), film);
-        let partial = settings.partial.as_ref().map(begin).transpose()?;
-        let channels = settings.layers.channels();
+        let partial = settings.outputs.partial.as_ref().map(begin).transpose()?;
+        let channels = settings.picture.layers.channels();
         let open = |display| Display::open(display, film.window(), &channels);
-        let display = settings.display.as_ref().map(open);
+        let display = settings.outputs.display.as_ref().map(open);
         let outputs = Self { partial, display, observer };
         outputs.report_kept();
         let resumed: Vec<&Tile> = tiles.iter().filter(|tile| film.has(tile)).collect();

@@ -41,7 +41,7 @@ pub(super) fn prepare(
     for budget in budgets {
         photon_map::check_packed(&packed, &photon_settings, budget)?;
     }
-    let total = settings.photons as u64;
+    let total = settings.photons.count as u64;
     let progress = |stored: usize| {
         observer.progress(Phase::Photons, stored as u64, total);
         if stored as u64 == total {

@@ -1,130 +1,42 @@
 //! What a render is asked to do.
 
 mod check;
-
-use std::path::PathBuf;
+mod dependence;
+mod groups;
 
 use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_firmware::kind::MICRO;
-use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{self, CausticGather, FrameParameters, Radiance, Sampling};
-use serde_json::{Value, json};
+use photoncard_shared::message::{self, CausticGather, FrameParameters};
 
+pub use self::dependence::{NamedSettings, PROGRAM};
+pub use self::groups::{CardSet, Integrator, Outputs, PhotonMaps, Picture, Schedule};
 use super::address::{CardAddress, first_remote, is_one_emulated_chip};
 use super::error::RenderError;
-use crate::display::DisplaySettings;
 use crate::emulator::ChipKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::film::{Film, FilmError, Window};
 use crate::layer::Layers;
-use crate::link::LineFaults;
-use crate::partial::PartialSettings;
-use crate::photon_map::{PhotonLayout, PhotonSettings};
+use crate::photon_map::PhotonSettings;
 use crate::scene::{Camera, Scene};
 use crate::scheduler::GatherOrder;
 
-/// The settings of a render; each field is an option of the command line.
-#[derive(Clone, Debug, PartialEq)]
+/// Settings of a render: each field is an option of the command line, and each group a part of them.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderSettings {
-    /// Pixels in a row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// The part to render; `None` for the whole.
-    pub crop: Option<Window>,
-    /// Name of the camera; `None` for the first.
-    pub camera: Option<String>,
-    /// Seed of all random numbers.
-    pub seed: u32,
-    /// Photons in the map.
-    pub photons: usize,
-    /// How the photon map is laid out in card memory.
-    pub photon_layout: PhotonLayout,
-    /// Photons that a gather looks for.
-    pub neighbors: u32,
-    /// Greatest distance of a gather, metres; `None` for the one that the photons' density suggests.
-    pub max_distance: Option<f32>,
-    /// Photons in the caustic map; `None` for [`DEFAULT_CAUSTIC_PHOTONS`] if anything in the scene is perfectly specular, and
-    /// no map otherwise.
-    pub caustic_photons: Option<usize>,
-    /// Photons that a gather of caustics looks for.
-    pub caustic_neighbors: u32,
-    /// Final gather rays a sample.
-    pub gather_rays: u32,
-    /// Shadow rays a sample.
-    pub shadow_rays: u32,
-    /// Samples a pixel.
-    pub samples: u32,
-    /// Side of a tile, pixels.
-    pub tile: u32,
-    /// The layers that the picture has besides radiance.
-    pub layers: Layers,
-    /// What the directions of gather rays are chosen by.
-    pub sampling: Sampling,
-    /// The relative error that interpolated irradiance may have; `None` to interpolate none.
-    pub irradiance_error: Option<f32>,
-    /// What tells the radiance at the ends of gather rays.
-    pub radiance: Radiance,
-    /// Order of the photon gathers.
-    pub order: GatherOrder,
-    /// Direction bins of the gather rays, where the order has any; `None` for the default.
-    pub bins: Option<u32>,
-    /// Gathers that may wait on a chip, where the order lets any; `None` for as many as it has room for.
-    pub queue: Option<u32>,
-    /// The cards to render on.
-    pub cards: Vec<CardAddress>,
-    /// What the links to the cards do to bytes, to try how that is repaired; `None` for nothing.
-    pub faults: Option<LineFaults>,
-    /// The share of the tiles that two cards render, to see whether they agree; `None` for no tile.
-    pub verify: Option<f64>,
-    /// The caches that a chip's memory is modelled with; `None` to model none, which costs nothing.
-    pub caches: Option<CacheSettings>,
-    /// Where finished tiles are kept until the picture is written; `None` to keep none. Not with the order `hilbert`, which has
-    /// no finished tiles before the end.
-    pub partial: Option<PartialSettings>,
-    /// Where tiles are shown as they land; `None` to show none.
-    pub display: Option<DisplaySettings>,
-    /// The file that every read of the chip is written to. It takes one chip; without `caches` those of the default.
-    pub trace: Option<PathBuf>,
-}
-
-impl Default for RenderSettings {
-    /// The dissertation's nominal values (Table 7.1) on one emulated reference chip.
-    fn default() -> Self {
-        Self {
-            width: 512,
-            height: 512,
-            crop: None,
-            camera: None,
-            seed: 0,
-            photons: 500_000,
-            photon_layout: PhotonLayout::default(),
-            neighbors: 100,
-            max_distance: None,
-            caustic_photons: None,
-            caustic_neighbors: 50,
-            gather_rays: 100,
-            shadow_rays: 8,
-            samples: 1,
-            tile: 16,
-            layers: Layers::default(),
-            sampling: Sampling::Product,
-            irradiance_error: None,
-            radiance: Radiance::Density,
-            order: GatherOrder::Sort,
-            bins: None,
-            queue: None,
-            cards: vec![CardAddress::default()],
-            faults: None,
-            verify: None,
-            partial: None,
-            display: None,
-            caches: None,
-            trace: None,
-        }
-    }
+    /// The picture and the camera that sees it.
+    pub picture: Picture,
+    /// The photon map and the caustic map.
+    pub photons: PhotonMaps,
+    /// The estimate of light by rays.
+    pub integrator: Integrator,
+    /// The order of the work.
+    pub schedule: Schedule,
+    /// The cards that do it.
+    pub cards: CardSet,
+    /// Destinations of finished tiles besides the film.
+    pub outputs: Outputs,
 }
 
 /// Direction bins: three to an entry of the table that directions are sampled by.
@@ -134,35 +46,16 @@ const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 pub const DEFAULT_CAUSTIC_PHOTONS: usize = 200_000;
 
 impl RenderSettings {
-    /// All that the pixels depend on, by name.
-    pub fn identity(&self, scene: &Scene) -> Value {
-        let window = self.window();
-        json!({
-            "program": concat!("photoncard ", env!("CARGO_PKG_VERSION")),
-            "layout": LAYOUT_VERSION,
-            "scene": scene.checksum(),
-            "size": [self.width, self.height],
-            "crop": [window.x0, window.x1, window.y0, window.y1],
-            "camera": self.camera,
-            "seed": self.seed,
-            "photons": self.photons,
-            "neighbors": self.neighbors,
-            "max-distance": self.max_distance,
-            "caustic-photons": self.caustic_photons,
-            "caustic-neighbors": self.caustic_neighbors,
-            "gather-rays": self.gather_rays,
-            "shadow-rays": self.shadow_rays,
-            "spp": self.samples,
-            "sampling": format!("{:?}", self.sampling),
-            "irradiance-cache": self.irradiance_error,
-            "radiance": format!("{:?}", self.radiance),
-            "layers": self.layers.are_of_chip(),
-        })
+    /// These settings with a change.
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
     }
 
     /// The part to render.
     pub fn window(&self) -> Window {
-        self.crop.unwrap_or(Window::full(self.width, self.height))
+        self.picture.crop.unwrap_or(Window::full(self.picture.width, self.picture.height))
     }
 
     /// The side of a tile where none is asked for, pixels: one that the cards have room for, as far as that is known
@@ -170,7 +63,7 @@ impl RenderSettings {
     pub fn default_tile(layers: &Layers, cards: &[CardAddress]) -> u32 {
         let are_large =
             cards.iter().all(|card| matches!(card, CardAddress::Emulated { kind: ChipKind::Reference, .. }));
-        let side = Self::default().tile;
+        let side = Schedule::default().tile;
         if are_large { side } else { side.min(MICRO.pixels_of_tile(layers.are_of_chip()).isqrt()) }
     }
 
@@ -179,13 +72,13 @@ impl RenderSettings {
     /// # Errors
     /// If its size or its crop is not possible.
     pub fn film(&self) -> Result<Film, FilmError> {
-        let new = if self.layers.are_of_chip() { Film::with_layers } else { Film::new };
-        new(self.width, self.height, self.window())
+        let new = if self.picture.layers.are_of_chip() { Film::with_layers } else { Film::new };
+        new(self.picture.width, self.picture.height, self.window())
     }
 
     /// The caches that memory is modelled with, if it is.
     pub fn modelled_caches(&self) -> Option<CacheSettings> {
-        self.caches.or_else(|| self.trace.as_ref().map(|_| CacheSettings::default()))
+        self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| CacheSettings::default()))
     }
 
     /// Checks that the reads of the cards can be traced, if they are to be.
@@ -193,7 +86,7 @@ impl RenderSettings {
     /// # Errors
     /// If there is no one order of them.
     pub fn check_trace(&self) -> Result<(), RenderError> {
-        let Some(trace) = &self.trace else { return Ok(()) };
+        let Some(trace) = &self.cards.trace else { return Ok(()) };
         let refuse = |reason: &str, remedy: &str| {
             let value = trace.display().to_string();
             Err(RenderError::Setting {
@@ -203,13 +96,13 @@ impl RenderSettings {
                 remedy: remedy.into(),
             })
         };
-        if self.order == GatherOrder::Hilbert {
+        if self.schedule.order == GatherOrder::Hilbert {
             return refuse(
                 "with --order hilbert no one chip reads the photon map",
                 "use another --order, such as sort",
             );
         }
-        if !is_one_emulated_chip(&self.cards) {
+        if !is_one_emulated_chip(&self.cards.addresses) {
             return refuse(
                 "several chips read in no one order, and a chip that is not emulated tells nothing of its reads",
                 "use --card emulated:1 or --card emulated-micro:1",
@@ -223,7 +116,7 @@ impl RenderSettings {
     /// # Errors
     /// If a card is not emulated in this process.
     pub fn check_memory_model(&self) -> Result<(), RenderError> {
-        match first_remote(&self.cards).filter(|_| self.modelled_caches().is_some()) {
+        match first_remote(&self.cards.addresses).filter(|_| self.modelled_caches().is_some()) {
             None => Ok(()),
             Some(address) => Err(RenderError::Setting {
                 option: "--counters",
@@ -236,7 +129,7 @@ impl RenderSettings {
 
     /// Checks that there are tiles to go on with: gathers along a curve through the frame complete all tiles at once.
     pub(super) fn check_resume(&self) -> Result<(), RenderError> {
-        if !self.partial.as_ref().is_some_and(|partial| partial.resume) {
+        if !self.outputs.partial.as_ref().is_some_and(|partial| partial.resume) {
             return Ok(());
         }
         Err(RenderError::Setting {
@@ -247,18 +140,36 @@ impl RenderSettings {
         })
     }
 
+    /// Photons of a scene's caustic map; 0 for no map.
+    fn caustic_photons(&self, scene: &Scene) -> usize {
+        let asked = self.photons.caustic_photons.unwrap_or(DEFAULT_CAUSTIC_PHOTONS);
+        if scene.is_specular() { asked } else { 0 }
+    }
+
+    /// Settings that give a scene the same pixels, alike for all that do: the caustic map is that of the scene, and
+    /// without one its gathers are the default's.
+    #[must_use]
+    pub fn resolved(&self, scene: &Scene) -> Self {
+        let caustic_photons = self.caustic_photons(scene);
+        self.clone().with(|settings| {
+            settings.photons.caustic_photons = Some(caustic_photons);
+            if caustic_photons == 0 {
+                settings.photons.caustic_neighbors = PhotonMaps::default().caustic_neighbors;
+            }
+        })
+    }
+
     /// What the photon maps of a scene are to be.
     pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
-        let of_scene = || if scene.is_specular() { DEFAULT_CAUSTIC_PHOTONS } else { 0 };
         PhotonSettings {
-            caustic_photons: self.caustic_photons.unwrap_or_else(of_scene),
-            caustic_neighbors: self.caustic_neighbors,
-            seed: self.seed,
-            photons: self.photons,
-            neighbors: self.neighbors,
-            max_distance: self.max_distance,
-            layout: self.photon_layout,
-            radiance: self.radiance,
+            caustic_photons: self.caustic_photons(scene),
+            caustic_neighbors: self.photons.caustic_neighbors,
+            seed: self.integrator.seed,
+            photons: self.photons.count,
+            neighbors: self.photons.neighbors,
+            max_distance: self.photons.max_distance,
+            layout: self.photons.layout,
+            radiance: self.photons.radiance,
         }
     }
 
@@ -270,30 +181,30 @@ impl RenderSettings {
         caustics: Option<CausticGather>,
     ) -> FrameParameters {
         FrameParameters {
-            width: self.width,
-            height: self.height,
+            width: self.picture.width,
+            height: self.picture.height,
             camera: self.pinhole(camera),
-            seed: self.seed,
-            samples: self.samples,
-            gather_rays: self.gather_rays,
-            shadow_rays: self.shadow_rays,
-            neighbors: self.neighbors,
+            seed: self.integrator.seed,
+            samples: self.integrator.samples,
+            gather_rays: self.integrator.gather_rays,
+            shadow_rays: self.integrator.shadow_rays,
+            neighbors: self.photons.neighbors,
             max_distance,
-            sampling: self.sampling,
-            irradiance_error: self.irradiance_error,
-            bins: if self.order.has_bins() { self.bins.unwrap_or(DEFAULT_BINS) } else { 1 },
-            drain: self.order.drain(),
-            queue: self.queue.unwrap_or(u32::MAX),
-            radiance: self.radiance,
+            sampling: self.integrator.sampling,
+            irradiance_error: self.integrator.irradiance_error,
+            bins: if self.schedule.order.has_bins() { self.schedule.bins.unwrap_or(DEFAULT_BINS) } else { 1 },
+            drain: self.schedule.order.drain(),
+            queue: self.schedule.queue.unwrap_or(u32::MAX),
+            radiance: self.photons.radiance,
             caustics,
-            layers: self.layers.are_of_chip(),
+            layers: self.picture.layers.are_of_chip(),
         }
     }
 
     /// The vertical field of view is the camera's, the horizontal one follows from the size.
     fn pinhole(&self, camera: &Camera) -> message::Camera {
         let half_height = libm::tanf(0.5 * camera.vertical_fov);
-        let half_width = half_height * self.width as f32 / self.height as f32;
+        let half_width = half_height * self.picture.width as f32 / self.picture.height as f32;
         let scaled = |axis: Vec3, length: f32| (axis * length).to_array();
         message::Camera {
             origin: camera.origin.to_array(),

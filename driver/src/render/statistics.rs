@@ -95,7 +95,7 @@ impl Statistics {
             width: frame.width,
             height: frame.height,
             samples: frame.samples,
-            photons: settings.photons as u64,
+            photons: settings.photons.count as u64,
             photon_paths: prepared.paths,
             max_distance: frame.max_distance,
             cards: outcome.cards,

@@ -11,11 +11,11 @@ impl RenderSettings {
     /// # Errors
     /// If there are not two cards, the share is none, or reads are counted, which would be those of both cards.
     pub fn check_verification(&self) -> Result<(), RenderError> {
-        let Some(share) = self.verify else { return Ok(()) };
-        let chips: usize = self.cards.iter().map(|card| card.emulated_chips().max(1)).sum();
+        let Some(share) = self.cards.verify else { return Ok(()) };
+        let chips: usize = self.cards.addresses.iter().map(|card| card.emulated_chips().max(1)).sum();
         let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
             ["a share of the tiles is above 0 and at most 1", "give a number such as 0.02"]
-        } else if self.order == GatherOrder::Hilbert {
+        } else if self.schedule.order == GatherOrder::Hilbert {
             ["with --order hilbert the host does the gathers, and no card a whole tile", "use --order sort"]
         } else if chips < 2 {
             ["a tile is verified by a second card", "give two --card or more, or --card emulated:2"]
@@ -30,7 +30,7 @@ impl RenderSettings {
 
     /// Cards that must have said hello.
     pub(super) fn needed_cards(&self) -> usize {
-        if self.verify.is_some() { 2 } else { 1 }
+        if self.cards.verify.is_some() { 2 } else { 1 }
     }
 
     /// Deals tiles to so many cards. Where memory is modelled each tile is rendered once: all reads are counted.
@@ -40,8 +40,8 @@ impl RenderSettings {
             return scheduler;
         }
         let scheduler = scheduler.with_helpers();
-        match self.verify {
-            Some(share) => scheduler.verifying(share, self.seed),
+        match self.cards.verify {
+            Some(share) => scheduler.verifying(share, self.integrator.seed),
             None => scheduler,
         }
     }

@@ -25,7 +25,7 @@ impl WholeFrame {
     /// If there is a card of another kind, or the render is to be resumed.
     pub(super) fn new(settings: &RenderSettings) -> Result<Self, RenderError> {
         settings.check_resume()?;
-        let chips = reference_chips(&settings.cards)?;
+        let chips = reference_chips(&settings.cards.addresses)?;
         Ok(Self { chips, caches: settings.modelled_caches() })
     }
 }

@@ -2,6 +2,7 @@
 
 use photoncard_shared::message::{Drain, Tile};
 
+use crate::choice::choices;
 use crate::film::Window;
 
 /// In which order photon gathers are done. The picture is the same.
@@ -20,6 +21,16 @@ pub enum GatherOrder {
     /// All gathers of the frame along one Hilbert curve: on emulated cards alone, which leave them to the host.
     Hilbert,
 }
+
+choices!(GatherOrder {
+    Naive = "naive": "Pixels along scanlines",
+    Tiled = "tiled": "Pixels along the scanlines of a tile",
+    DirectionBins = "dirbin": "Rays of one direction bin for all pixels of a tile, then those of the next",
+    Hash = "hash": "By direction bins; gathers wait and are done by a spatial hash of their place",
+    Sort = "sort": "By direction bins; gathers wait and are done along a Hilbert curve",
+    Hilbert = "hilbert":
+        "All gathers of the frame along a Hilbert curve, on emulated cards alone: the bound to compare with",
+});
 
 impl GatherOrder {
     /// When a chip does its gathers.

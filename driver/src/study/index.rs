@@ -5,6 +5,7 @@ use std::path::Path;
 use super::error::StudyError;
 use super::report::{self, Block, Provenance, Report, Section};
 use super::studies::Study;
+use crate::choice::Choice;
 
 /// Writes `index.html` into `folder`, which holds the studies' folders.
 pub(super) fn write(

@@ -234,13 +234,17 @@ fn sharing_images(points: &[Point]) -> Vec<Point> {
 mod tests {
     use super::*;
     use crate::photon_map::PhotonLayout;
-    use crate::render::RenderSettings;
+    use crate::render::{PhotonMaps, RenderSettings, Schedule};
 
     fn point(exponent: u32, layout: PhotonLayout, tile: u32) -> Point {
         Point {
             scene: "cornell-glossy.gltf",
             assignments: vec![format!("floor.exponent={exponent}")],
-            settings: RenderSettings { photon_layout: layout, tile, ..RenderSettings::default() },
+            settings: RenderSettings {
+                photons: PhotonMaps { layout, ..PhotonMaps::default() },
+                schedule: Schedule { tile, ..Schedule::default() },
+                ..RenderSettings::default()
+            },
             task: Task::Quality { tiles: 1, reference_rays: 1 },
         }
     }

@@ -136,7 +136,7 @@ impl Bench<'_> {
     /// # Errors
     /// If the scene has no camera of the settings' name.
     pub fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
-        let camera = self.scene.camera(settings.camera.as_deref())?;
+        let camera = self.scene.camera(settings.picture.camera.as_deref())?;
         Ok(settings.frame(camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
@@ -174,8 +174,8 @@ impl Bench<'_> {
         least_tiles: usize,
     ) -> Result<Measurement, RenderError> {
         let frame = self.frame(settings)?;
-        let all = tiles(settings.window(), settings.tile, settings.order);
-        if settings.order == GatherOrder::Hilbert {
+        let all = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
+        if settings.schedule.order == GatherOrder::Hilbert {
             return self.whole_frame(&frame, &all, caches);
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));

@@ -30,6 +30,7 @@ use self::report::{Provenance, Report};
 pub use self::sample::{Estimate, SampleRate, choose};
 pub use self::scale::Scale;
 pub use self::studies::Study;
+use crate::choice::Choice;
 
 /// Options of [`run`]: the studies, their scale, and the folders they read and write.
 #[derive(Clone, Debug)]

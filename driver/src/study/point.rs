@@ -5,10 +5,9 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Value, json};
 
 use super::sample::SampleRate;
+use crate::choice::Choice;
 use crate::emulator::memory_model::CacheSettings;
-use crate::photon_map::PhotonLayout;
-use crate::render::{Radiance, RenderSettings, Sampling};
-use crate::scheduler::GatherOrder;
+use crate::render::{NamedSettings, PROGRAM, PhotonMaps, RenderSettings};
 
 /// One measurement of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +29,7 @@ pub enum Task {
     Traffic {
         /// The caches between chip and DRAM.
         caches: CacheSettings,
-        /// Share of the tiles; [`GatherOrder::Hilbert`] renders the whole frame whatever it is.
+        /// Share of the tiles; [`Hilbert`](crate::scheduler::GatherOrder::Hilbert) renders the whole frame whatever it is.
         sample: SampleRate,
         /// Minimum number of tiles, as far as the picture has that many.
         least_tiles: usize,
@@ -52,7 +51,7 @@ impl Point {
             Task::Quality { .. } => "quality",
         };
         let scene = self.scene.split('.').next().unwrap_or_default();
-        format!("{task}-{scene}-{}", order_name(self.settings.order))
+        format!("{task}-{scene}-{}", self.settings.schedule.order.name())
     }
 
     /// Key of the point in the store: everything that the result depends on. `scene` is the scene's checksum.
@@ -79,22 +78,15 @@ impl Point {
 
     /// Key of the point's card image; points of equal keys share the image.
     pub fn image_key(&self) -> ImageKey {
-        let settings = &self.settings;
+        let RenderSettings { photons, integrator, .. } = &self.settings;
         ImageKey {
             scene: self.scene,
             assignments: self.assignments.clone(),
-            seed: settings.seed,
-            photons: settings.photons,
-            neighbors: settings.neighbors,
-            max_distance: settings.max_distance,
-            layout: settings.photon_layout,
-            radiance: settings.radiance,
+            seed: integrator.seed,
+            photons: photons.clone(),
         }
     }
 }
-
-/// Name and version of this program.
-pub(super) const PROGRAM: &str = concat!("photoncard ", env!("CARGO_PKG_VERSION"));
 
 /// Everything that a point's card image depends on.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,72 +94,12 @@ pub struct ImageKey {
     scene: &'static str,
     assignments: Vec<String>,
     seed: u32,
-    photons: usize,
-    neighbors: u32,
-    max_distance: Option<f32>,
-    layout: PhotonLayout,
-    radiance: Radiance,
+    photons: PhotonMaps,
 }
 
-/// All settings but the cards as JSON: a point is always measured on reference chips.
-fn settings(settings: &RenderSettings) -> Value {
-    let crop = settings.crop.map(|window| [window.x0, window.x1, window.y0, window.y1]);
-    json!({
-        "size": [settings.width, settings.height],
-        "crop": crop,
-        "camera": settings.camera,
-        "seed": settings.seed,
-        "photons": settings.photons,
-        "photon_map": layout_name(settings.photon_layout),
-        "neighbors": settings.neighbors,
-        "max_distance": settings.max_distance,
-        "gather_rays": settings.gather_rays,
-        "shadow_rays": settings.shadow_rays,
-        "spp": settings.samples,
-        "tile": settings.tile,
-        "sampling": sampling_name(settings.sampling),
-        "ic_error": settings.irradiance_error,
-        "radiance": radiance_name(settings.radiance),
-        "order": order_name(settings.order),
-        "bins": settings.bins,
-        "queue": settings.queue,
-    })
-}
-
-/// An order's name on the command line.
-pub(super) fn order_name(order: GatherOrder) -> &'static str {
-    match order {
-        GatherOrder::Naive => "naive",
-        GatherOrder::Tiled => "tiled",
-        GatherOrder::DirectionBins => "dirbin",
-        GatherOrder::Hash => "hash",
-        GatherOrder::Sort => "sort",
-        GatherOrder::Hilbert => "hilbert",
-    }
-}
-
-/// The command line's name for a way to estimate radiance.
-pub(super) fn radiance_name(radiance: Radiance) -> &'static str {
-    match radiance {
-        Radiance::Density => "density",
-        Radiance::Precomputed => "precomputed",
-    }
-}
-
-/// The command line's name for a sampling of gather rays.
-pub(super) fn sampling_name(sampling: Sampling) -> &'static str {
-    match sampling {
-        Sampling::Reflection => "brdf",
-        Sampling::Photon => "photon",
-        Sampling::Product => "combined",
-        Sampling::Mixture => "mixture",
-    }
-}
-
-/// The command line's name for a layout of the photon map.
-pub(super) fn layout_name(layout: PhotonLayout) -> &'static str {
-    match layout {
-        PhotonLayout::Jensen => "jensen",
-        PhotonLayout::Lines => "lines",
-    }
+/// All settings but cards and outputs as JSON: a point is always measured on reference chips.
+fn settings(settings: &RenderSettings) -> NamedSettings {
+    let mut named = settings.of_pixels();
+    named.extend(settings.of_work());
+    named
 }

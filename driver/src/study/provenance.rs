@@ -2,9 +2,9 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use super::point::PROGRAM;
 use super::report::Provenance;
 use crate::printable::printable;
+use crate::render::PROGRAM;
 
 impl Provenance {
     /// This program on this machine today, called as `command_line`. Settings are for the study to add.

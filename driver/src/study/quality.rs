@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::measure::Bench;
 use super::sample::choose;
-use crate::render::{RenderError, RenderSettings};
+use crate::render::{RenderError, RenderSettings, Schedule};
 use crate::scheduler::{GatherOrder, tiles};
 
 /// Error of a render's pixels against a [`Reference`].
@@ -48,7 +48,10 @@ impl Reference {
     ) -> Result<Self, RenderError> {
         let settings = Self::settings(settings, rays);
         // Eye rays alone see emission and nothing else.
-        let emitters = RenderSettings { gather_rays: 0, shadow_rays: 0, ..settings.clone() };
+        let emitters = settings.clone().with(|s| {
+            s.integrator.gather_rays = 0;
+            s.integrator.shadow_rays = 0;
+        });
         let emission = pixels(bench, &emitters, tiles)?;
         let radiance = pixels(bench, &settings, tiles)?;
         let kept = radiance.into_iter().zip(emission).map(|(pixel, emission)| {
@@ -65,13 +68,12 @@ impl Reference {
 
     /// Settings of the reference for a render with `settings`.
     fn settings(settings: &RenderSettings, rays: u32) -> RenderSettings {
-        RenderSettings {
-            gather_rays: rays,
-            sampling: Sampling::Product,
-            irradiance_error: None,
-            radiance: Radiance::Density,
-            ..comparable(settings)
-        }
+        comparable(settings).with(|s| {
+            s.photons.radiance = Radiance::Density;
+            s.integrator.gather_rays = rays;
+            s.integrator.sampling = Sampling::Product;
+            s.integrator.irradiance_error = None;
+        })
     }
 
     /// Renders the reference's tiles with `settings`, and returns their error.
@@ -98,13 +100,16 @@ impl Reference {
 
 /// `settings` with tiles, order and queues replaced, which do not change pixels: the fastest order.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
-    RenderSettings { tile: TILE, order: GatherOrder::Sort, bins: None, queue: None, ..settings.clone() }
+    RenderSettings {
+        schedule: Schedule { tile: TILE, order: GatherOrder::Sort, bins: None, queue: None },
+        ..settings.clone()
+    }
 }
 
 /// Radiances of the pixels of `count` tiles, W/(sr m^2).
 fn pixels(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<Vec<[f32; 3]>, RenderError> {
     let frame = bench.frame(settings)?;
-    let chosen = choose(&tiles(settings.window(), TILE, settings.order), count);
+    let chosen = choose(&tiles(settings.window(), TILE, settings.schedule.order), count);
     let chosen: Vec<Tile> = chosen.into_iter().map(|chosen| chosen.tile).collect();
     let unit = bench.mapped.image.view().0.header.radiance_unit;
     let rendered = bench.render(&frame, &chosen, &|memory| memory)?;

@@ -2,11 +2,12 @@
 
 use photoncard_firmware::kind::REFERENCE;
 
-use super::point::{Point, Task, layout_name};
+use super::point::{Point, Task};
 use super::sample::SampleRate;
+use crate::choice::Choice;
 use crate::emulator::memory_model::CacheSettings;
 use crate::photon_map::PhotonLayout;
-use crate::render::{RenderSettings, Sampling};
+use crate::render::{Integrator, PhotonMaps, Picture, RenderSettings, Sampling, Schedule};
 use crate::scheduler::GatherOrder;
 
 /// Side of the largest tile that the reference chip has room for, pixels.
@@ -78,15 +79,20 @@ impl Scale {
     /// Settings without any technique but an order: 16x16 tiles, rays by the reflection, Jensen's kd-tree.
     pub fn settings(&self, order: GatherOrder) -> RenderSettings {
         RenderSettings {
-            width: self.side,
-            height: self.side,
-            photons: self.photons,
-            neighbors: self.neighbors,
-            gather_rays: self.gather_rays,
-            shadow_rays: self.shadow_rays,
-            sampling: Sampling::Reflection,
-            photon_layout: PhotonLayout::Jensen,
-            order,
+            picture: Picture { width: self.side, height: self.side, ..Picture::default() },
+            photons: PhotonMaps {
+                count: self.photons,
+                neighbors: self.neighbors,
+                layout: PhotonLayout::Jensen,
+                ..PhotonMaps::default()
+            },
+            integrator: Integrator {
+                gather_rays: self.gather_rays,
+                shadow_rays: self.shadow_rays,
+                sampling: Sampling::Reflection,
+                ..Integrator::default()
+            },
+            schedule: Schedule { order, ..Schedule::default() },
             ..RenderSettings::default()
         }
     }
@@ -94,18 +100,17 @@ impl Scale {
     /// Settings with everything on: gathers sorted over the largest tiles, combined sampling, the irradiance cache,
     /// photons in line leaves.
     pub fn all_on(&self) -> RenderSettings {
-        RenderSettings {
-            sampling: Sampling::Product,
-            irradiance_error: Some(IRRADIANCE_ERROR),
-            photon_layout: PhotonLayout::Lines,
-            tile: WIDEST_TILE,
-            ..self.settings(GatherOrder::Sort)
-        }
+        self.settings(GatherOrder::Sort).with(|s| {
+            s.photons.layout = PhotonLayout::Lines;
+            s.integrator.sampling = Sampling::Product;
+            s.integrator.irradiance_error = Some(IRRADIANCE_ERROR);
+            s.schedule.tile = WIDEST_TILE;
+        })
     }
 
     /// [`Self::all_on`] in the dissertation's tiles of 16x16 pixels, of which a frame has enough for many chips.
     pub fn all_on_in_small_tiles(&self) -> RenderSettings {
-        RenderSettings { tile: RenderSettings::default().tile, ..self.all_on() }
+        self.all_on().with(|s| s.schedule.tile = Schedule::default().tile)
     }
 
     /// A point that measures the traffic of sampled tiles behind the nominal caches.
@@ -139,14 +144,20 @@ impl Scale {
     pub fn rows(&self) -> Vec<(String, String)> {
         let settings = self.settings(GatherOrder::Sort);
         [
-            ("picture", format!("{0}x{0} pixels, 1 sample each, seed {1}", self.side, settings.seed)),
+            (
+                "picture",
+                format!("{0}x{0} pixels, 1 sample each, seed {1}", self.side, settings.integrator.seed),
+            ),
             ("photons", self.photons.to_string()),
             ("photons a gather looks for", self.neighbors.to_string()),
             ("gather rays a pixel", self.gather_rays.to_string()),
             ("shadow rays a pixel", self.shadow_rays.to_string()),
-            ("tiles", format!("{0}x{0} pixels; in the naive order rows of as many pixels", settings.tile)),
+            (
+                "tiles",
+                format!("{0}x{0} pixels; in the naive order rows of as many pixels", settings.schedule.tile),
+            ),
             ("sampling of gather rays", "brdf, unless said otherwise".to_owned()),
-            ("photon map", format!("{}, unless said otherwise", layout_name(settings.photon_layout))),
+            ("photon map", format!("{}, unless said otherwise", settings.photons.layout.name())),
             ("error of the irradiance cache, where it is on", IRRADIANCE_ERROR.to_string()),
             ("caches, unless said otherwise", CacheSettings::default().to_string()),
             ("share of the tiles rendered", format!("{}, at least {}", self.sample, self.least_tiles)),

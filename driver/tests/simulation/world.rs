@@ -6,7 +6,7 @@ use glam::Vec3;
 use photoncard_driver::film::Film;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::{MappedImage, map_photons};
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Schedule};
 use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
 use photoncard_driver::scheduler::{Scheduler, tiles};
 use photoncard_driver::session::{Job, PixelLimits};
@@ -50,13 +50,10 @@ fn scene() -> Scene {
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        width: 12,
-        height: 10,
-        tile: 3,
-        photons: 60,
-        neighbors: 8,
-        gather_rays: 2,
-        shadow_rays: 1,
+        picture: Picture { width: 12, height: 10, ..Picture::default() },
+        photons: PhotonMaps { count: 60, neighbors: 8, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 2, shadow_rays: 1, ..Integrator::default() },
+        schedule: Schedule { tile: 3, ..Schedule::default() },
         ..RenderSettings::default()
     }
 }
@@ -128,7 +125,7 @@ impl Fixture {
 
     /// The tiles of the picture, of which a share is verified.
     pub(crate) fn scheduler(&self, cards: usize, verify: Option<f64>, seed: u32) -> Scheduler {
-        let RenderSettings { tile, order, .. } = self.settings;
+        let Schedule { tile, order, .. } = self.settings.schedule;
         let scheduler = Scheduler::new(tiles(self.settings.window(), tile, order), cards).with_helpers();
         match verify {
             Some(share) => scheduler.verifying(share, seed),

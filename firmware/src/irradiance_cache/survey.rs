@@ -107,11 +107,11 @@ impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
         }
         let survey = &mut self.survey;
         survey.index += 1;
-        if survey.index >= self.records.len() {
+        if survey.index >= self.records.entries() {
             survey.index = first;
             survey.direction += 1;
-            if is_last || first >= self.records.len() {
-                *survey = Survey { task: Task::Division, index: 0, first: self.records.len(), ..*survey };
+            if is_last || first >= self.records.entries() {
+                *survey = Survey { task: Task::Division, index: 0, first: self.records.entries(), ..*survey };
             }
         }
         Ok(())

@@ -64,7 +64,7 @@ pub trait Map<K, V> {
     const EMPTY: Self;
 
     /// Number of entries.
-    fn len(&self) -> usize;
+    fn entries(&self) -> usize;
 
     /// Removes all entries.
     fn clear(&mut self);
@@ -87,7 +87,7 @@ impl<K: Eq + Hash, V, const N: usize> Map<K, V> for FnvIndexMap<K, V, N> {
     const EMPTY: Self = Self::new();
 
     #[inline(always)]
-    fn len(&self) -> usize {
+    fn entries(&self) -> usize {
         self.len()
     }
 

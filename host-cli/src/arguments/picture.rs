@@ -1,102 +1,48 @@
-//! The options of `photoncard render` that say what becomes of the picture.
+//! Options of the picture and of the camera that sees it.
 
-use std::path::{Path, PathBuf};
-
-use clap::{Args, ValueEnum};
-use photoncard_driver::display::{DisplayAddress, DisplaySettings};
-use photoncard_driver::exr::SampleFormat;
+use clap::Args;
+use photoncard_driver::film::Window;
 use photoncard_driver::layer::Layers;
-use photoncard_driver::preview::{ToneCurve, ToneMapping};
+use photoncard_driver::render::Picture;
 
 #[derive(Args)]
 pub(crate) struct PictureOptions {
+    /// Width and height of the picture, pixels
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = size, allow_hyphen_values = true)]
+    size: (u32, u32),
+    /// Render only the columns X0 up to X1 and the rows Y0 up to Y1
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, allow_hyphen_values = true)]
+    crop: Option<Window>,
+    /// Name of the camera [default: the first of the file]
+    #[arg(long)]
+    camera: Option<String>,
     /// Layers of the picture besides radiance, with commas between them: direct, indirect, caustic, albedo, N, Z, gathers; or
     /// all, or none
     #[arg(long, value_name = "LIST", default_value_t = Layers::default())]
     pub(crate) aov: Layers,
-    /// Type of the picture's samples; Z and gathers are always float
-    #[arg(long, default_value = "float")]
-    sample_type: SampleType,
-    /// Write a tone-mapped PNG as well
-    #[arg(long, value_name = "OUT.png")]
-    pub(crate) preview: Option<PathBuf>,
-    /// Exposure of that PNG in stops: radiance is doubled so often; or auto, which makes its log-average 0.18
-    #[arg(
-        long,
-        value_name = "EV",
-        requires = "preview",
-        default_value = "auto",
-        value_parser = exposure,
-        allow_negative_numbers = true
-    )]
-    exposure: Exposure,
-    /// What compresses the radiance of that PNG
-    #[arg(long = "tonemap", value_name = "CURVE", requires = "preview", default_value = "reinhard")]
-    tone_curve: ToneCurveOption,
-    /// Show tiles as they land, in tev or another viewer that speaks its protocol; port 14158 without one
-    #[arg(long, value_name = "HOST:PORT")]
-    display_server: Option<DisplayAddress>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum SampleType {
-    Half,
-    Float,
-}
-
-/// Tone curves of the PNG.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ToneCurveOption {
-    /// Nothing: what is above 1 is clipped
-    None,
-    /// Reinhard's extended curve of luminance, with the white point 4; it keeps hues
-    Reinhard,
-    /// Narkowicz' fit of the filmic curve of ACES, of each channel
-    Aces,
-}
-
-#[derive(Clone, Copy)]
-enum Exposure {
-    Auto,
-    Stops(f32),
 }
 
 impl PictureOptions {
-    /// Where the picture is shown, by the name of its file.
-    pub(super) fn display(&self, output: &Path) -> Option<DisplaySettings> {
-        let address = self.display_server.clone()?;
-        let image = output.file_name().unwrap_or(output.as_os_str());
-        Some(DisplaySettings { address, image: image.to_string_lossy().into_owned() })
-    }
-
-    /// How the PNG shows radiance.
-    pub(crate) fn tone_mapping(&self) -> ToneMapping {
-        ToneMapping {
-            exposure: match self.exposure {
-                Exposure::Auto => None,
-                Exposure::Stops(stops) => Some(stops),
-            },
-            curve: match self.tone_curve {
-                ToneCurveOption::None => ToneCurve::None,
-                ToneCurveOption::Reinhard => ToneCurve::Reinhard,
-                ToneCurveOption::Aces => ToneCurve::Aces,
-            },
-        }
-    }
-
-    /// The type of the picture's samples.
-    pub(crate) fn sample_format(&self) -> SampleFormat {
-        match self.sample_type {
-            SampleType::Half => SampleFormat::Half,
-            SampleType::Float => SampleFormat::Float,
-        }
+    /// The settings that the options stand for.
+    pub(super) fn settings(&self) -> Picture {
+        let Self { size: (width, height), crop, camera, aov } = self;
+        Picture { width: *width, height: *height, crop: *crop, camera: camera.clone(), layers: aov.clone() }
     }
 }
 
-fn exposure(text: &str) -> Result<Exposure, String> {
-    match text.parse() {
-        _ if text == "auto" => Ok(Exposure::Auto),
-        Ok(stops) if f32::is_finite(stops) => Ok(Exposure::Stops(stops)),
-        _ => Err("an exposure is a number of stops, such as -1.5, or auto".into()),
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let sides =
+        text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    match sides {
+        Some((width, height)) if width > 0 && height > 0 => Ok((width, height)),
+        _ => Err("a size is WIDTHxHEIGHT, both at least 1, such as 512x512".into()),
+    }
+}
+
+fn crop(text: &str) -> Result<Window, String> {
+    let ends: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
+    match ends.as_deref() {
+        Ok(&[x0, x1, y0, y1]) => Ok(Window { x0, x1, y0, y1 }),
+        _ => Err("a crop is X0,X1,Y0,Y1: four whole numbers, such as 0,64,0,64".into()),
     }
 }

@@ -1,50 +1,59 @@
 //! Options that are given and change nothing, as others that they need are not.
 
-use clap::ValueEnum;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::Scene;
+use photoncard_driver::scheduler::GatherOrder;
 
-use super::{Order, RadianceOption, RenderOptions, Switch};
+use super::render::RenderOptions;
 
 impl RenderOptions {
     /// A sentence on each option that has no effect on the render of a scene.
     pub(crate) fn without_effect(&self, scene: &Scene) -> Vec<String> {
-        let order = self.order.gather_order();
-        let name =
-            self.order.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-        let is_cached = self.irradiance_cache == Switch::On;
+        let order = self.schedule.order;
+        let name = order.name();
+        let is_cached = self.integrator.irradiance_cache;
         let without_specular = "without a caustic map: nothing in the scene is perfectly specular".to_owned();
-        let without_map = if self.caustic_photons == Some(0) {
+        let without_map = if self.photons.caustic_photons == Some(0) {
             "with --caustic-photons 0".to_owned()
         } else {
             without_specular.clone()
         };
-        let has_map = scene.is_specular() && self.caustic_photons != Some(0);
+        let has_map = scene.is_specular() && self.photons.caustic_photons != Some(0);
         let cases = [
-            (self.ic_error.is_some() && !is_cached, "--ic-error", "without --irradiance-cache on".to_owned()),
-            (is_cached && self.gather_rays == 0, "--irradiance-cache on", "with --gather-rays 0".to_owned()),
             (
-                self.radiance == RadianceOption::Precomputed && self.gather_rays == 0,
+                self.integrator.ic_error.is_some() && !is_cached,
+                "--ic-error",
+                "without --irradiance-cache on".to_owned(),
+            ),
+            (
+                is_cached && self.integrator.gather_rays == 0,
+                "--irradiance-cache on",
+                "with --gather-rays 0".to_owned(),
+            ),
+            (
+                self.photons.radiance == Radiance::Precomputed && self.integrator.gather_rays == 0,
                 "--radiance precomputed",
                 "with --gather-rays 0".to_owned(),
             ),
             (
-                self.bins.is_some() && !order.has_bins(),
+                self.schedule.bins.is_some() && !order.has_bins(),
                 "--bins",
                 format!("with --order {name}, which has no direction bins"),
             ),
             (
-                self.queue.is_some() && !order.has_queue(),
+                self.schedule.queue.is_some() && !order.has_queue(),
                 "--queue",
                 format!("with --order {name}, by which no gathers wait on a chip"),
             ),
             (
-                self.caustic_photons.is_some_and(|photons| photons > 0) && !has_map,
+                self.photons.caustic_photons.is_some_and(|photons| photons > 0) && !has_map,
                 "--caustic-photons",
                 without_specular,
             ),
-            (self.caustic_neighbors.is_some() && !has_map, "--caustic-neighbors", without_map),
+            (self.photons.caustic_neighbors.is_some() && !has_map, "--caustic-neighbors", without_map),
             (
-                self.faults.is_some() && self.order == Order::Hilbert,
+                self.cards.faults.is_some() && order == GatherOrder::Hilbert,
                 "--faults",
                 "with --order hilbert, which sends nothing over links".to_owned(),
             ),

@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::trace;
 use photoncard_driver::photon_map::{map_photons, precompute_irradiance, store_photons, to_kd_tree};
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::Material;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::HEADER_LINES;
@@ -46,14 +46,20 @@ fn images() -> [CardImage; 3] {
         .map(|image| precompute_irradiance(image, 20, 0.5, &|| true).expect("the irradiance is packed"));
     let scene = everything();
     let packed = PackedScene::new(&scene).expect("the scene is packed");
-    let settings = RenderSettings { photons: 300, caustic_photons: Some(100), ..RenderSettings::default() };
+    let settings = RenderSettings {
+        photons: PhotonMaps { count: 300, caustic_photons: Some(100), ..PhotonMaps::default() },
+        ..RenderSettings::default()
+    };
     let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("the scene is lit");
     [tree, leaves, mapped.image]
 }
 
 /// The frame that a byte chooses: every technique.
 fn frame(choice: u8) -> FrameParameters {
-    let settings = RenderSettings { width: 8, height: 8, ..RenderSettings::default() };
+    let settings = RenderSettings {
+        picture: Picture { width: 8, height: 8, ..Picture::default() },
+        ..RenderSettings::default()
+    };
     let is_set = |bit: u8| choice >> bit & 1 != 0;
     FrameParameters {
         neighbors: 20,

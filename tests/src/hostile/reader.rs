@@ -7,7 +7,7 @@ use std::path::Path;
 use photoncard_driver::difference::compare;
 use photoncard_driver::exr::read_rgb;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::render::{RenderSettings, Unobserved, render};
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Unobserved, render};
 use photoncard_driver::scene::{Environment, Scene, gltf};
 
 use super::inputs::as_file;
@@ -75,14 +75,9 @@ fn use_scene(mut scene: Scene, number: u64) {
         scene.environment = Some(Environment::constant(glam::Vec3::ONE));
     }
     let settings = RenderSettings {
-        width: 4,
-        height: 4,
-        photons: 200,
-        neighbors: 10,
-        caustic_photons: Some(50),
-        gather_rays: 2,
-        shadow_rays: 1,
-        samples: 1,
+        picture: Picture { width: 4, height: 4, ..Picture::default() },
+        photons: PhotonMaps { count: 200, neighbors: 10, caustic_photons: Some(50), ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 2, shadow_rays: 1, samples: 1, ..Integrator::default() },
         ..RenderSettings::default()
     };
     told(render(&scene, &settings, &Unobserved));

@@ -18,24 +18,24 @@ impl RenderSettings {
     /// # Errors
     /// The first setting that is not possible.
     pub fn check(&self, budget: &Budget) -> Result<(), RenderError> {
-        within("--size", self.width.max(self.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
-        within("--photons", self.photons as u64, 1, MAX_PHOTONS as u64)?;
-        within("--neighbors", self.neighbors as u64, 2, budget.neighbors as u64)?;
-        within("--caustic-photons", self.caustic_photons.unwrap_or(0) as u64, 0, MAX_PHOTONS as u64)?;
-        if self.caustic_photons != Some(0) {
-            let neighbors = self.caustic_neighbors as u64;
+        within("--size", self.picture.width.max(self.picture.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
+        within("--photons", self.photons.count as u64, 1, MAX_PHOTONS as u64)?;
+        within("--neighbors", self.photons.neighbors as u64, 2, budget.neighbors as u64)?;
+        within("--caustic-photons", self.photons.caustic_photons.unwrap_or(0) as u64, 0, MAX_PHOTONS as u64)?;
+        if self.photons.caustic_photons != Some(0) {
+            let neighbors = self.photons.caustic_neighbors as u64;
             within("--caustic-neighbors", neighbors, MIN_CAUSTIC_NEIGHBORS, budget.neighbors as u64)?;
         }
-        within("--gather-rays", self.gather_rays as u64, 0, budget.gather_rays as u64)?;
-        within("--shadow-rays", self.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
-        within("--spp", self.samples as u64, 1, budget.samples as u64)?;
-        within("--bins", self.bins.unwrap_or(1) as u64, 1, MAX_BINS as u64)?;
-        if self.queue.is_some() || self.order.has_queue() {
-            within("--queue", self.queue.unwrap_or(1) as u64, 1, budget.gather_queue as u64)?;
+        within("--gather-rays", self.integrator.gather_rays as u64, 0, budget.gather_rays as u64)?;
+        within("--shadow-rays", self.integrator.shadow_rays as u64, 0, budget.shadow_rays as u64)?;
+        within("--spp", self.integrator.samples as u64, 1, budget.samples as u64)?;
+        within("--bins", self.schedule.bins.unwrap_or(1) as u64, 1, MAX_BINS as u64)?;
+        if self.schedule.queue.is_some() || self.schedule.order.has_queue() {
+            within("--queue", self.schedule.queue.unwrap_or(1) as u64, 1, budget.gather_queue as u64)?;
         }
-        within("--tile", self.tile as u64, 1, budget.pixels_of_tile(false).isqrt() as u64)?;
+        within("--tile", self.schedule.tile as u64, 1, budget.pixels_of_tile(false).isqrt() as u64)?;
         self.check_tile_with_layers(budget)?;
-        if let Some(error) = self.irradiance_error
+        if let Some(error) = self.integrator.irradiance_error
             && !(MIN_IRRADIANCE_ERROR..=1.0).contains(&error)
         {
             return Err(RenderError::Setting {
@@ -45,7 +45,7 @@ impl RenderSettings {
                 remedy: "give a number such as 0.025".into(),
             });
         }
-        match self.max_distance {
+        match self.photons.max_distance {
             Some(distance) if !(distance.is_finite() && distance > 0.0) => Err(RenderError::Setting {
                 option: "--max-distance",
                 value: distance.to_string(),
@@ -58,23 +58,23 @@ impl RenderSettings {
 
     /// Checks that a chip has room for a tile with layers, if the picture has any of chips.
     fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
-        let most = budget.pixels_of_tile(self.layers.are_of_chip()).isqrt();
-        if self.tile <= most {
+        let most = budget.pixels_of_tile(self.picture.layers.are_of_chip()).isqrt();
+        if self.schedule.tile <= most {
             return Ok(());
         }
         let leave_out = "leave direct, indirect, caustic and gathers out of --aov: with them a chip keeps four sums a pixel";
         if most == 0 {
             return Err(RenderError::Setting {
                 option: "--aov",
-                value: self.layers.to_string(),
+                value: self.picture.layers.to_string(),
                 reason: "this card has no room for a tile with these layers".into(),
                 remedy: format!("render on another card, or {leave_out}"),
             });
         }
         Err(RenderError::Setting {
             option: "--tile",
-            value: self.tile.to_string(),
-            reason: format!("with --aov {} it must be 1 to {most} on this card", self.layers),
+            value: self.schedule.tile.to_string(),
+            reason: format!("with --aov {} it must be 1 to {most} on this card", self.picture.layers),
             remedy: format!("choose {most} or less, or {leave_out}"),
         })
     }
@@ -103,6 +103,7 @@ fn within(option: &'static str, value: u64, least: u64, most: u64) -> Result<(),
 mod tests {
     use photoncard_firmware::kind::REFERENCE;
 
+    use super::super::{PhotonMaps, Picture, Schedule};
     use super::*;
     use crate::scheduler::GatherOrder;
 
@@ -130,7 +131,11 @@ mod tests {
             assert!(reason.starts_with(option) && reason.contains("this card has room for"), "{reason}");
             assert!(remedy.contains("render on another") && !remedy.contains("choose"), "{option}: {remedy}");
         }
-        let layers = RenderSettings { layers: "all".parse().unwrap(), tile: 1, ..RenderSettings::default() };
+        let layers = RenderSettings {
+            picture: Picture { layers: "all".parse().unwrap(), ..Picture::default() },
+            schedule: Schedule { tile: 1, ..Schedule::default() },
+            ..RenderSettings::default()
+        };
         let (reason, remedy) = refusal(&layers, &Budget { tile_pixels: 1, ..REFERENCE });
         assert!(
             reason.starts_with("--aov") && remedy.contains("render on another card, or leave"),
@@ -141,9 +146,12 @@ mod tests {
     #[test]
     fn what_is_not_used_needs_no_room() {
         let few = Budget { neighbors: 7, gather_queue: 0, ..REFERENCE };
-        let settings =
-            RenderSettings { neighbors: 7, order: GatherOrder::DirectionBins, ..RenderSettings::default() };
+        let settings = RenderSettings {
+            photons: PhotonMaps { neighbors: 7, ..PhotonMaps::default() },
+            schedule: Schedule { order: GatherOrder::DirectionBins, ..Schedule::default() },
+            ..RenderSettings::default()
+        };
         assert!(refusal(&settings, &few).0.starts_with("--caustic-neighbors"));
-        RenderSettings { caustic_photons: Some(0), ..settings }.check(&few).unwrap();
+        settings.with(|s| s.photons.caustic_photons = Some(0)).check(&few).unwrap();
     }
 }

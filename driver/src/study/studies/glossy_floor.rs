@@ -2,7 +2,7 @@
 
 use super::super::laboratory::Results;
 use super::super::measure::{Measurement, TileMeasurement};
-use super::super::point::{Point, order_name};
+use super::super::point::Point;
 use super::super::report::{Panel, Report, Table, XScale, YScale};
 use super::super::sample::Estimate;
 use super::super::scale::Scale;
@@ -10,7 +10,8 @@ use super::present::{
     columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
 };
 use super::scenes::GLOSSY;
-use crate::render::{RenderSettings, Sampling};
+use crate::choice::Choice;
+use crate::render::Sampling;
 use crate::scheduler::GatherOrder::{self, DirectionBins, Hash, Naive, Sort, Tiled};
 
 /// Lines of the figure: order of the gathers and sampling of the rays.
@@ -33,18 +34,17 @@ fn exponents(scale: &Scale) -> Vec<u32> {
 
 fn line_name((order, sampling): (GatherOrder, Sampling)) -> String {
     match sampling {
-        Sampling::Product => format!("{}, combined", order_name(order)),
-        _ => order_name(order).to_owned(),
+        Sampling::Product => format!("{}, combined", order.name()),
+        _ => order.name().to_owned(),
     }
 }
 
 fn point(scale: &Scale, (order, sampling): (GatherOrder, Sampling), is_cached: bool, exponent: u32) -> Point {
-    let settings = RenderSettings {
-        camera: Some("floor".to_owned()),
-        sampling,
-        irradiance_error: scale.all_on().irradiance_error.filter(|_| is_cached),
-        ..scale.settings(order)
-    };
+    let settings = scale.settings(order).with(|s| {
+        s.picture.camera = Some("floor".to_owned());
+        s.integrator.sampling = sampling;
+        s.integrator.irradiance_error = scale.all_on().integrator.irradiance_error.filter(|_| is_cached);
+    });
     let assignments = vec![format!("floor.exponent={exponent}")];
     Point { assignments, ..scale.traffic(GLOSSY, settings) }
 }
@@ -179,7 +179,7 @@ fn check(scale: &Scale, results: &Results, is_cached: bool, name: &str) -> Strin
         let share = 100.0 * (highest - highest / range) / first.value;
         format!(
             "{} by a factor of {} from its least to its greatest, a range of {} % of the naive value at n = 1",
-            order_name(order),
+            order.name(),
             say(range),
             say(share)
         )

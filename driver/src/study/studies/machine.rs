@@ -81,7 +81,7 @@ fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
         let kinds = [("naive", naive(scale, scene)), ("all techniques", all_on(scale, scene))];
         frames.extend(kinds.map(|(kind, point)| {
             let workload = of_frame(results.traffic(&point), symbols.pixels(), &symbols);
-            let cost = cost(&workload, &symbols, point.settings.order);
+            let cost = cost(&workload, &symbols, point.settings.schedule.order);
             Frame { name: format!("{name}, {kind}"), workload, cost }
         }));
     }

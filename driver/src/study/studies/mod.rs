@@ -14,6 +14,7 @@ use super::laboratory::Results;
 use super::point::Point;
 use super::report::Report;
 use super::scale::Scale;
+use crate::choice::choices;
 
 /// A study that the program offers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,22 +31,15 @@ pub enum Study {
     Scaling,
 }
 
+choices!(Study {
+    Reordering = "reordering": "Memory traffic by order, cache and layout",
+    Figure617 = "figure-6.17": "Memory traffic over the exponent of a glossy floor",
+    Table71 = "table-7.1": "Chips for a frame rate, by nominal and by measured counts",
+    Techniques = "techniques": "Each technique alone and together, at as many rays and at equal quality",
+    Scaling = "scaling": "Photons, tile sides, queues and chips",
+});
+
 impl Study {
-    /// All studies.
-    pub const ALL: [Self; 5] =
-        [Self::Reordering, Self::Figure617, Self::Table71, Self::Techniques, Self::Scaling];
-
-    /// The study's name on the command line, also the name of its folder.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Reordering => "reordering",
-            Self::Figure617 => "figure-6.17",
-            Self::Table71 => "table-7.1",
-            Self::Techniques => "techniques",
-            Self::Scaling => "scaling",
-        }
-    }
-
     /// The points that the study measures.
     pub fn points(self, scale: &Scale) -> Vec<Point> {
         match self {

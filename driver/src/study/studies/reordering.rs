@@ -4,7 +4,7 @@ use photoncard_firmware::memory::SetIndex;
 
 use super::super::laboratory::Results;
 use super::super::measure::Measurement;
-use super::super::point::{Point, layout_name, order_name};
+use super::super::point::Point;
 use super::super::report::{Block, Cell, Column, Report, Series, Table, XScale, YScale};
 use super::super::sample::Estimate;
 use super::super::scale::{Scale, WIDEST_TILE};
@@ -13,9 +13,9 @@ use super::present::{
     table, text,
 };
 use super::scenes::CORNELL;
+use crate::choice::Choice;
 use crate::emulator::memory_model::{CacheSettings, CacheSpec};
 use crate::photon_map::PhotonLayout;
-use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 
 /// Orders of the gathers that a chip can keep.
@@ -57,13 +57,16 @@ fn behind(photon: CacheSpec) -> CacheSettings {
 }
 
 fn point(scale: &Scale, order: GatherOrder, layout: PhotonLayout, caches: CacheSettings) -> Point {
-    let settings = RenderSettings { photon_layout: layout, ..scale.settings(order) };
+    let settings = scale.settings(order).with(|s| s.photons.layout = layout);
     scale.traffic_behind(CORNELL, settings, caches)
 }
 
 /// A point of sorted gathers in tiles of `tile` x `tile` pixels.
 fn sorted(scale: &Scale, layout: PhotonLayout, tile: u32) -> Point {
-    let settings = RenderSettings { photon_layout: layout, tile, ..scale.settings(GatherOrder::Sort) };
+    let settings = scale.settings(GatherOrder::Sort).with(|s| {
+        s.photons.layout = layout;
+        s.schedule.tile = tile;
+    });
     scale.traffic(CORNELL, settings)
 }
 
@@ -121,7 +124,7 @@ fn by_order<'a>(
     let mut table = Table::new(title, columns(&[&[("order", ""), ("photon map", "")], heads].concat()));
     for order in ORDERS.into_iter().chain([GatherOrder::Hilbert]) {
         for layout in LAYOUTS {
-            let mut row = vec![order_name(order).into(), layout_name(layout).into()];
+            let mut row = vec![order.name().into(), layout.name().into()];
             row.extend(cells(nominal(order, layout)));
             table.push(row);
         }
@@ -162,7 +165,7 @@ fn by_tile<'a>(
             let measured = results.traffic(&sorted(scale, layout, tile));
             table.push(vec![
                 tile.into(),
-                layout_name(layout).into(),
+                layout.name().into(),
                 gigabytes(measured.photon_map_bytes()),
                 of_gather(measured).into(),
                 (of_gather(naive) / of_gather(measured)).into(),
@@ -190,15 +193,15 @@ fn by_gather<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> 
 
 fn plot_of_orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Block {
     let orders: Vec<_> = ORDERS.into_iter().chain([GatherOrder::Hilbert]).collect();
-    let names = orders.iter().map(|&order| order_name(order).to_owned()).collect();
+    let names = orders.iter().map(|&order| order.name().to_owned()).collect();
     let mut lines = Vec::new();
     for layout in LAYOUTS {
         let of = |bytes: fn(&Measurement) -> Estimate| {
             let point = |(index, &order)| gigabyte_point(index as f64, bytes(nominal(order, layout)));
             orders.iter().enumerate().map(point).collect()
         };
-        lines.push(series(format!("raw, {}", layout_name(layout)), of(Measurement::raw_bytes)));
-        lines.push(series(format!("from DRAM, {}", layout_name(layout)), of(Measurement::photon_map_bytes)));
+        lines.push(series(format!("raw, {}", layout.name()), of(Measurement::raw_bytes)));
+        lines.push(series(format!("from DRAM, {}", layout.name()), of(Measurement::photon_map_bytes)));
     }
     plot(
         "orders",
@@ -252,8 +255,8 @@ fn published<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> 
         table.push(vec![
             quantity.into(),
             (published / GIGA).into(),
-            order_name(order).into(),
-            layout_name(layout).into(),
+            order.name().into(),
+            layout.name().into(),
             gigabytes(bytes),
             Cell::from(at_all.value / GIGA),
         ]);
@@ -275,7 +278,7 @@ fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, C
     heads.extend(caches.iter().map(|(name, _)| Column::new(name.as_str(), "GB")));
     let mut table = Table::new(title, heads);
     for order in ORDERS {
-        let mut row = vec![order_name(order).into()];
+        let mut row = vec![order.name().into()];
         row.extend(caches.iter().map(|&(_, caches)| {
             let point = point(scale, order, PhotonLayout::Jensen, caches);
             gigabytes(results.traffic(&point).photon_map_bytes())
@@ -292,7 +295,7 @@ fn lines_by_caches(scale: &Scale, results: &Results, caches: &[(f64, CacheSettin
             let point = point(scale, order, PhotonLayout::Jensen, caches);
             gigabyte_point(x, results.traffic(&point).photon_map_bytes())
         });
-        series(order_name(order), points.collect())
+        series(order.name(), points.collect())
     };
     ORDERS.map(line).to_vec()
 }

@@ -25,9 +25,8 @@ type Line = (&'static str, fn(&Scale) -> RenderSettings);
 const NAIVE: Line = ("naive", |scale| scale.settings(GatherOrder::Naive));
 const HASH: Line = ("hash", |scale| scale.settings(GatherOrder::Hash));
 const SORT: Line = ("sort", |scale| scale.settings(GatherOrder::Sort));
-const SORT_LINES: Line = ("sort, lines", |scale| RenderSettings {
-    photon_layout: PhotonLayout::Lines,
-    ..scale.settings(GatherOrder::Sort)
+const SORT_LINES: Line = ("sort, lines", |scale| {
+    scale.settings(GatherOrder::Sort).with(|s| s.photons.layout = PhotonLayout::Lines)
 });
 const ALL_ON: Line = ("all techniques", Scale::all_on);
 
@@ -51,7 +50,7 @@ const SWEEPS: [Sweep; 3] = [
         values: |scale| {
             scale.pick(&[1, 2, 4, 8, 12], &[1, 4]).iter().map(|n| n * scale.photons as u32).collect()
         },
-        set: |settings, photons| settings.photons = photons as usize,
+        set: |settings, photons| settings.photons.count = photons as usize,
     },
     Sweep {
         name: "tile-side",
@@ -59,7 +58,7 @@ const SWEEPS: [Sweep; 3] = [
         axis: "side of a tile (pixels)",
         lines: &[SORT, SORT_LINES, ALL_ON],
         values: |_| powers(4, REFERENCE.tile_pixels.isqrt()),
-        set: |settings, side| settings.tile = side,
+        set: |settings, side| settings.schedule.tile = side,
     },
     Sweep {
         name: "queue",
@@ -70,7 +69,7 @@ const SWEEPS: [Sweep; 3] = [
             let all = powers(256, REFERENCE.gather_queue);
             if scale.is_quick { all.into_iter().step_by(2).collect() } else { all }
         },
-        set: |settings, queue| settings.queue = Some(queue),
+        set: |settings, queue| settings.schedule.queue = Some(queue),
     },
 ];
 

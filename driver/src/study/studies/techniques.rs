@@ -85,15 +85,14 @@ const TECHNIQUES: [Technique; 11] = [
 
 impl Technique {
     fn settings(&self, scale: &Scale, gather_rays: u32) -> RenderSettings {
-        RenderSettings {
-            gather_rays,
-            sampling: self.sampling,
-            irradiance_error: self.irradiance_error,
-            radiance: self.radiance,
-            photon_layout: self.layout,
-            tile: self.tile,
-            ..scale.settings(self.order)
-        }
+        scale.settings(self.order).with(|s| {
+            s.photons.radiance = self.radiance;
+            s.photons.layout = self.layout;
+            s.integrator.gather_rays = gather_rays;
+            s.integrator.sampling = self.sampling;
+            s.integrator.irradiance_error = self.irradiance_error;
+            s.schedule.tile = self.tile;
+        })
     }
 
     fn traffic(&self, scale: &Scale, scene: &'static str, rays: u32) -> Point {
@@ -105,12 +104,11 @@ impl Technique {
     fn quality(&self, scale: &Scale, scene: &'static str, rays: u32) -> Point {
         let settings = self.settings(scale, rays);
         let shared = scale.settings(GatherOrder::Sort);
-        let settings = RenderSettings {
-            order: shared.order,
-            photon_layout: shared.photon_layout,
-            tile: shared.tile,
-            ..settings
-        };
+        let settings = settings.with(|s| {
+            s.photons.layout = shared.photons.layout;
+            s.schedule.order = shared.schedule.order;
+            s.schedule.tile = shared.schedule.tile;
+        });
         scale.quality(scene, settings)
     }
 

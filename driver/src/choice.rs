@@ -1,0 +1,64 @@
+//! Choices: enumerations whose values have names, by which options, files and reports refer to them.
+
+use photoncard_shared::message::{Radiance, Sampling};
+
+/// An enumeration whose values have names.
+pub trait Choice: Copy + Send + Sync + 'static {
+    /// All values, in the order in which they are presented.
+    const ALL: &'static [Self];
+
+    /// Name of the value: the argument of its option.
+    fn name(self) -> &'static str;
+
+    /// Explanation of the value in a line of help; empty where the name says it all.
+    fn about(self) -> &'static str;
+
+    /// The value of a name.
+    ///
+    /// # Errors
+    /// If no value has the name; the text lists those that are there.
+    fn of_name(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.iter().find(|value| value.name() == name);
+        found.copied().ok_or_else(|| {
+            let names: Vec<_> = Self::ALL.iter().map(|value| value.name()).collect();
+            format!("{name:?} is none of {}", names.join(", "))
+        })
+    }
+}
+
+/// Implements [`Choice`] by a table of variants, names and explanations. A variant that the table lacks is an error of
+/// the compiler.
+macro_rules! choices {
+    ($choice:ty { $($variant:ident = $name:literal $(: $about:literal)?),+ $(,)? }) => {
+        impl $crate::choice::Choice for $choice {
+            const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name),+
+                }
+            }
+
+            fn about(self) -> &'static str {
+                match self {
+                    $(Self::$variant => concat!($($about)?)),+
+                }
+            }
+        }
+    };
+}
+
+pub(crate) use choices;
+
+choices!(Sampling {
+    Reflection = "brdf": "The reflection function",
+    Photon = "photon": "The photons that arrive at the point",
+    Product = "combined": "The product of both",
+    Mixture = "mixture": "The mean of both",
+});
+
+choices!(Radiance {
+    Density = "density": "The density of the photons nearest to it",
+    Precomputed = "precomputed":
+        "An approximation: the irradiance that the host has estimated at the nearest photon of the surface",
+});

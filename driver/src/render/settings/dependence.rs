@@ -1,0 +1,91 @@
+//! Settings by the names of their options, in two lists: pixels depend on the first, and on nothing of the second.
+//!
+//! Both lists take the groups apart field by field, so that a new field cannot be forgotten.
+
+use photoncard_shared::image::LAYOUT_VERSION;
+use serde_json::{Map, Value, json};
+
+use super::RenderSettings;
+use super::groups::{Integrator, PhotonMaps, Picture, Schedule};
+use crate::choice::Choice;
+use crate::scene::Scene;
+
+/// Values by the names of their options.
+pub type NamedSettings = Map<String, Value>;
+
+impl RenderSettings {
+    /// Every setting that pixels depend on.
+    pub fn of_pixels(&self) -> NamedSettings {
+        let Self { picture, photons, integrator, schedule: _, cards: _, outputs: _ } = self;
+        let Picture { width, height, crop: _, camera, layers } = picture;
+        let PhotonMaps {
+            count,
+            layout: _,
+            neighbors,
+            max_distance,
+            caustic_photons,
+            caustic_neighbors,
+            radiance,
+        } = photons;
+        let Integrator { seed, samples, gather_rays, shadow_rays, sampling, irradiance_error } = integrator;
+        let window = self.window();
+        named([
+            ("size", json!([width, height])),
+            ("crop", json!([window.x0, window.x1, window.y0, window.y1])),
+            ("camera", json!(camera)),
+            ("aov", json!(layers.of_chip().to_string())),
+            ("photons", json!(count)),
+            ("neighbors", json!(neighbors)),
+            ("max-distance", json!(max_distance)),
+            ("caustic-photons", json!(caustic_photons)),
+            ("caustic-neighbors", json!(caustic_neighbors)),
+            ("radiance", json!(radiance.name())),
+            ("seed", json!(seed)),
+            ("spp", json!(samples)),
+            ("gather-rays", json!(gather_rays)),
+            ("shadow-rays", json!(shadow_rays)),
+            ("sampling", json!(sampling.name())),
+            ("ic-error", json!(irradiance_error)),
+        ])
+    }
+
+    /// Every setting that a chip's work and memory traffic depend on, and no pixel.
+    pub fn of_work(&self) -> NamedSettings {
+        let Self { picture: _, photons, integrator: _, schedule, cards: _, outputs: _ } = self;
+        let PhotonMaps {
+            count: _,
+            layout,
+            neighbors: _,
+            max_distance: _,
+            caustic_photons: _,
+            caustic_neighbors: _,
+            radiance: _,
+        } = photons;
+        let Schedule { tile, order, bins, queue } = schedule;
+        named([
+            ("photon-map", json!(layout.name())),
+            ("tile", json!(tile)),
+            ("order", json!(order.name())),
+            ("bins", json!(bins)),
+            ("queue", json!(queue)),
+        ])
+    }
+
+    /// Everything that the pixels of a scene depend on: program, scene and settings.
+    pub fn identity(&self, scene: &Scene) -> Value {
+        let mut identity = self.resolved(scene).of_pixels();
+        identity.extend(named([
+            ("program", json!(PROGRAM)),
+            ("layout", json!(LAYOUT_VERSION)),
+            ("scene", json!(scene.checksum())),
+        ]));
+        identity.into()
+    }
+}
+
+/// Name and version of this program.
+pub const PROGRAM: &str = concat!("photoncard ", env!("CARGO_PKG_VERSION"));
+
+fn named<const N: usize>(settings: [(&str, Value); N]) -> NamedSettings {
+    settings.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
+}

@@ -1,0 +1,49 @@
+//! Options of the cards, and of the tests that they are put to.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use photoncard_driver::emulator::ChipKind;
+use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::link::LineFaults;
+use photoncard_driver::render::{CardAddress, CardSet};
+
+#[derive(Args)]
+pub(crate) struct CardOptions {
+    /// Where to render: emulated:CHIPS, emulated-micro:CHIPS, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH; may be
+    /// repeated [default: a chip a core]
+    #[arg(long = "card", value_name = "CARD")]
+    cards: Vec<CardAddress>,
+    /// Have two cards render a share of the tiles, above 0 and up to 1, and compare them bit for bit; of three cards the odd one lies,
+    /// and others render its tiles
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    verify: Option<f64>,
+    /// Make the links to the cards bad ones, to try how that is repaired: rates a byte as flips=1e-5,drops=1e-6,repeats=1e-6,
+    /// delays=1e-4,seed=1
+    #[arg(long, value_name = "FAULTS")]
+    pub(super) faults: Option<LineFaults>,
+    /// Model the memory of emulated chips, and tell in the statistics what was read of it
+    #[arg(long)]
+    counters: bool,
+    /// Caches of the modelled memory, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=... [default:
+    /// photon=128K/128/4,scene=75K/128/4]
+    #[arg(long, value_name = "CACHES")]
+    cache: Option<CacheSettings>,
+    /// Write every read of an emulated chip in Dinero's input format, compressed by gzip; a frame has billions: use --crop
+    #[arg(long, value_name = "OUT.din.gz")]
+    pub(crate) trace: Option<PathBuf>,
+}
+
+impl CardOptions {
+    /// The settings that the options stand for.
+    pub(super) fn settings(&self) -> CardSet {
+        let emulated = || vec![CardAddress::emulated(ChipKind::Reference)];
+        CardSet {
+            addresses: if self.cards.is_empty() { emulated() } else { self.cards.clone() },
+            faults: self.faults,
+            verify: self.verify,
+            caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
+            trace: self.trace.clone(),
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Options of the photon map and of the caustic map.
+
+use clap::Args;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::photon_map::PhotonLayout;
+use photoncard_driver::render::{PhotonMaps, Radiance};
+
+use super::choice::choice;
+
+#[derive(Args)]
+pub(crate) struct PhotonOptions {
+    /// Photons stored in the map
+    #[arg(long, default_value_t = PhotonMaps::default().count, allow_negative_numbers = true)]
+    pub(super) photons: usize,
+    /// Layout of the photon map in card memory; it never changes the picture
+    #[arg(long, default_value = PhotonMaps::default().layout.name(), value_parser = choice::<PhotonLayout>())]
+    pub(super) photon_map: PhotonLayout,
+    /// Photons that a gather looks for
+    #[arg(long, default_value_t = PhotonMaps::default().neighbors, allow_negative_numbers = true)]
+    pub(super) neighbors: u32,
+    /// Photons of the caustic map: light that has met mirrors and glass alone [default: 200000 if anything in the scene is
+    /// perfectly specular]. With 0 gather rays bring that light, with more noise, and that of punctual lights is lost
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub(super) caustic_photons: Option<usize>,
+    /// Photons that a gather of caustics looks for, at least 8: fewer are sharper, more are smoother
+    /// [default: 50]
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    pub(super) caustic_neighbors: Option<u32>,
+    /// Greatest distance of a gather in metres, or auto: from the photons' density
+    #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true)]
+    pub(super) max_distance: MaxDistance,
+    /// What tells the radiance of a Lambertian surface at the end of a gather ray; one with a Phong lobe is always by density
+    #[arg(long, default_value = PhotonMaps::default().radiance.name(), value_parser = choice::<Radiance>())]
+    pub(super) radiance: Radiance,
+}
+
+#[derive(Clone, Copy)]
+pub(super) enum MaxDistance {
+    Auto,
+    Metres(f32),
+}
+
+impl PhotonOptions {
+    /// The settings that the options stand for.
+    pub(super) fn settings(&self) -> PhotonMaps {
+        PhotonMaps {
+            count: self.photons,
+            layout: self.photon_map,
+            neighbors: self.neighbors,
+            max_distance: match self.max_distance {
+                MaxDistance::Auto => None,
+                MaxDistance::Metres(distance) => Some(distance),
+            },
+            caustic_photons: self.caustic_photons,
+            caustic_neighbors: self
+                .caustic_neighbors
+                .unwrap_or_else(|| PhotonMaps::default().caustic_neighbors),
+            radiance: self.radiance,
+        }
+    }
+}
+
+fn max_distance(text: &str) -> Result<MaxDistance, String> {
+    match text.parse() {
+        _ if text == "auto" => Ok(MaxDistance::Auto),
+        Ok(distance) if f32::is_finite(distance) && distance > 0.0 => Ok(MaxDistance::Metres(distance)),
+        _ => Err("a greatest distance is a positive number of metres, or auto".into()),
+    }
+}

@@ -1,0 +1,69 @@
+//! The options of `photoncard render`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use photoncard_driver::render::RenderSettings;
+
+use super::cards::CardOptions;
+use super::integrator::IntegratorOptions;
+use super::outputs::{OutputOptions, partial_path};
+use super::photons::PhotonOptions;
+use super::picture::PictureOptions;
+use super::schedule::ScheduleOptions;
+use super::threads::threads;
+use crate::environment::EnvironmentOption;
+
+#[derive(Args)]
+pub(crate) struct RenderOptions {
+    /// A glTF 2.0 file, .gltf or .glb
+    pub(crate) scene: PathBuf,
+    /// The picture, an EXR file: linear RGB radiance and the layers of --aov
+    #[arg(short, long, value_name = "OUT.exr")]
+    pub(crate) output: PathBuf,
+    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness or emission; may be repeated
+    #[arg(long = "set", value_name = "ASSIGNMENT")]
+    pub(crate) assignments: Vec<String>,
+    /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and top is y;
+    /// or the same radiance from everywhere
+    #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]
+    pub(crate) environment: Option<EnvironmentOption>,
+    #[command(flatten)]
+    pub(crate) picture: PictureOptions,
+    #[command(flatten)]
+    pub(super) photons: PhotonOptions,
+    #[command(flatten)]
+    pub(super) integrator: IntegratorOptions,
+    #[command(flatten)]
+    pub(super) schedule: ScheduleOptions,
+    #[command(flatten)]
+    pub(crate) cards: CardOptions,
+    #[command(flatten)]
+    pub(crate) outputs: OutputOptions,
+    /// Threads of the host's own work [default: a thread a core]
+    #[arg(long, value_parser = threads, allow_negative_numbers = true)]
+    pub(crate) threads: Option<usize>,
+    /// Show no progress
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl RenderOptions {
+    /// The settings that the options stand for.
+    pub(crate) fn settings(&self) -> RenderSettings {
+        let cards = self.cards.settings();
+        RenderSettings {
+            picture: self.picture.settings(),
+            photons: self.photons.settings(),
+            integrator: self.integrator.settings(),
+            schedule: self.schedule.settings(&self.picture.aov, &cards.addresses),
+            cards,
+            outputs: self.outputs.settings(&self.output),
+        }
+    }
+
+    /// The file in which finished tiles are kept until the picture is written.
+    pub(crate) fn partial_path(&self) -> PathBuf {
+        partial_path(&self.output)
+    }
+}

@@ -1,0 +1,106 @@
+//! Provenance of a picture: the attribute of the EXR file that holds all that its pixels depend on.
+
+mod support;
+
+use std::collections::BTreeSet;
+
+use serde_json::{Value, json};
+use support::{Room, shipped};
+
+/// Options that pixels depend on: a value of each but the default, its key in the provenance, and what is said there.
+fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
+    vec![
+        (&["--size", "9x7"], "size", json!([9, 7])),
+        (&["--crop", "1,5,2,6"], "crop", json!([1, 5, 2, 6])),
+        (&["--camera", "camera"], "camera", json!("camera")),
+        (&["--aov", "direct"], "aov", json!("direct,indirect,caustic,gathers")),
+        (&["--set", "white.diffuse=0.5,0.5,0.5"], "set", json!(["white.diffuse=0.5,0.5,0.5"])),
+        (&["--environment", "1,2,3"], "environment", json!("1,2,3")),
+        (&["--seed", "5"], "seed", json!(5)),
+        (&["--photons", "300"], "photons", json!(300)),
+        (&["--neighbors", "6"], "neighbors", json!(6)),
+        (&["--caustic-photons", "90"], "caustic-photons", json!(90)),
+        (&["--caustic-neighbors", "9"], "caustic-neighbors", json!(9)),
+        (&["--max-distance", "0.5"], "max-distance", json!(0.5)),
+        (&["--radiance", "precomputed"], "radiance", json!("precomputed")),
+        (&["--gather-rays", "5"], "gather-rays", json!(5)),
+        (&["--shadow-rays", "2"], "shadow-rays", json!(2)),
+        (&["--spp", "2"], "spp", json!(2)),
+        (&["--sampling", "mixture"], "sampling", json!("mixture")),
+        (&["--irradiance-cache", "on"], "ic-error", json!(0.025_f32)),
+        (&["--ic-error", "0.5", "--irradiance-cache", "on"], "ic-error", json!(0.5)),
+    ]
+}
+
+/// Options that no pixel depends on.
+const OTHERS: [&[&str]; 18] = [
+    &["--photon-map", "jensen"],
+    &["--tile", "3"],
+    &["--order", "naive"],
+    &["--bins", "5"],
+    &["--queue", "7"],
+    &["--card", "emulated-micro:2"],
+    &["--verify", "0.5", "--card", "emulated:2"],
+    &["--faults", "flips=1e-6"],
+    &["--resume"],
+    &["--counters"],
+    &["--cache", "unified=8K/128/2"],
+    &["--trace", "a.din.gz", "--card", "emulated:1"],
+    &["--threads", "2"],
+    &["--preview", "a.png"],
+    &["--exposure", "1", "--preview", "a.png"],
+    &["--tonemap", "aces", "--preview", "a.png"],
+    &["--display-server", "127.0.0.1:1"],
+    &["--stats", "a.json"],
+];
+
+/// Options that say how samples are stored, which the file says itself, and what is printed.
+const OF_THE_FILE: [&str; 4] = ["--output", "--sample-type", "--quiet", "--help"];
+
+/// The provenance in an EXR file: the text of the attribute `photoncard`.
+fn provenance(file: &[u8]) -> Value {
+    let head = b"photoncard\0string\0";
+    let start = file.windows(head.len()).position(|bytes| bytes == head).expect("the attribute") + head.len();
+    let (length, text) = file[start..].split_first_chunk().expect("a length");
+    serde_json::from_slice(&text[..u32::from_le_bytes(*length) as usize]).expect("JSON")
+}
+
+/// The provenance of a render of a scene with mirrors and glass.
+fn rendered(room: &Room, options: &[&str]) -> Value {
+    let small = if options.contains(&"--caustic-photons") { &[][..] } else { &["--caustic-photons", "99"] };
+    room.rendered(&shipped("cornell-spheres.glb"), &[&["-o", "a.exr"], small, options].concat());
+    provenance(&room.read("a.exr"))
+}
+
+#[test]
+fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
+    let room = Room::new();
+    let plain = rendered(&room, &[]);
+    assert_eq!(plain["scene"], "cornell-spheres.glb");
+    let mut keys = BTreeSet::from(["program", "scene"]);
+    for (options, key, value) in options_of_pixels() {
+        let found = rendered(&room, options);
+        assert_eq!(found[key], value, "{options:?}");
+        assert_ne!(plain[key], value, "{options:?}");
+        keys.insert(key);
+    }
+    let found: BTreeSet<_> = plain.as_object().expect("an object").keys().map(String::as_str).collect();
+    assert_eq!(found, keys);
+    for options in OTHERS {
+        assert_eq!(rendered(&room, options), plain, "{options:?}");
+    }
+}
+
+/// An option that is added is to be in one of the lists above.
+#[test]
+fn every_option_is_known_to_change_pixels_or_not_to() {
+    let help = Room::new().run(&["render", "--help"]).stdout;
+    let lines =
+        help.lines().filter_map(|line| line.trim_start().strip_prefix("-").map(|_| line.trim_start()));
+    let options = lines.filter_map(|line| line.split([' ', ',']).find(|word| word.starts_with("--")));
+    let offered: BTreeSet<_> = options.collect();
+    let of_pixels = options_of_pixels();
+    let known = of_pixels.iter().map(|(options, ..)| options[0]).chain(OTHERS.map(|options| options[0]));
+    let known: BTreeSet<_> = known.chain(OF_THE_FILE).collect();
+    assert_eq!(offered, known);
+}

@@ -1,0 +1,200 @@
+//! Settings: the pixels depend on those that a picture's provenance names, and on no others.
+
+use std::path::Path;
+
+use photoncard_driver::display::DisplaySettings;
+use photoncard_driver::film::{Film, Window};
+use photoncard_driver::layer::Layers;
+use photoncard_driver::partial::PartialSettings;
+use photoncard_driver::photon_map::PhotonLayout;
+use photoncard_driver::render::{
+    CardAddress, CardSet, Integrator, Outputs, PhotonMaps, Picture, Radiance, RenderSettings, Sampling,
+    Schedule,
+};
+use photoncard_driver::scene::Scene;
+use photoncard_driver::scheduler::GatherOrder;
+use photoncard_driver::study::{Point, Scale};
+use photoncard_tests::everything::everything;
+use photoncard_tests::{camera, lambertian, quad, render_or_panic, scene};
+
+/// Settings that no default serves instead of.
+fn settings() -> RenderSettings {
+    RenderSettings {
+        picture: Picture { width: 12, height: 10, ..Picture::default() },
+        photons: PhotonMaps {
+            count: 2000,
+            neighbors: 20,
+            caustic_photons: Some(1000),
+            caustic_neighbors: 20,
+            ..PhotonMaps::default()
+        },
+        integrator: Integrator { gather_rays: 8, shadow_rays: 2, ..Integrator::default() },
+        cards: CardSet { addresses: cards("emulated:1"), ..CardSet::default() },
+        ..RenderSettings::default()
+    }
+}
+
+fn cards(text: &str) -> Vec<CardAddress> {
+    vec![text.parse().expect("an address")]
+}
+
+/// What depends on a setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Dependence {
+    /// Pixels, and the card image.
+    Image,
+    /// Pixels alone.
+    Pixels,
+    /// The card image, and no pixel.
+    Layout,
+    /// The work of a chip, and no pixel.
+    Work,
+    /// Neither pixels nor work.
+    Nothing,
+}
+
+/// A change of every field, by its name. The compiler refuses a list that lacks one.
+macro_rules! changes {
+    ($($group:ident: $type:ident { $($field:ident: $dependence:ident = $value:expr),+ $(,)? })+) => {{
+        let RenderSettings { $($group: $type { $($field: _),+ }),+ } = settings();
+        vec![$($((
+            concat!(stringify!($group), ".", stringify!($field)),
+            Dependence::$dependence,
+            settings().with(|s| s.$group.$field = $value),
+        )),+),+]
+    }};
+}
+
+fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
+    let mut changes = changes! {
+        picture: Picture {
+            width: Pixels = 13,
+            height: Pixels = 11,
+            crop: Pixels = Some(Window { x0: 2, x1: 9, y0: 1, y1: 8 }),
+            camera: Pixels = Some("second".to_owned()),
+            layers: Pixels = Layers::all(),
+        }
+        photons: PhotonMaps {
+            count: Image = 2001,
+            layout: Layout = PhotonLayout::Jensen,
+            neighbors: Image = 19,
+            max_distance: Image = Some(0.2),
+            caustic_photons: Image = Some(900),
+            caustic_neighbors: Image = 19,
+            radiance: Image = Radiance::Precomputed,
+        }
+        integrator: Integrator {
+            seed: Image = 1,
+            samples: Pixels = 2,
+            gather_rays: Pixels = 9,
+            shadow_rays: Pixels = 3,
+            sampling: Pixels = Sampling::Reflection,
+            irradiance_error: Pixels = Some(0.5),
+        }
+        schedule: Schedule {
+            tile: Work = 5,
+            order: Work = GatherOrder::Naive,
+            bins: Work = Some(7),
+            queue: Work = Some(9),
+        }
+        cards: CardSet {
+            addresses: Nothing = cards("emulated-micro:2"),
+            faults: Nothing = Some("flips=1e-5,seed=1".parse().expect("faults")),
+            verify: Nothing = Some(0.5),
+            caches: Nothing = Some("unified=8K/128/2".parse().expect("caches")),
+            trace: Nothing = Some(folder.join("reads.din.gz")),
+        }
+        outputs: Outputs {
+            partial: Nothing = Some(PartialSettings { path: folder.join("a.exr.partial"), resume: false }),
+            // Nobody listens there.
+            display: Nothing = Some(DisplaySettings {
+                address: "127.0.0.1:1".parse().expect("an address"),
+                image: "a.exr".to_owned(),
+            }),
+        }
+    };
+    for (.., settings) in &mut changes {
+        if settings.cards.verify.is_some() {
+            settings.cards.addresses = cards("emulated:2");
+        }
+    }
+    changes
+}
+
+/// The scene with everything, seen by two cameras.
+fn with_two_cameras() -> Scene {
+    let mut scene = everything();
+    let mut second = scene.cameras[0].clone();
+    second.name = "second".into();
+    second.vertical_fov *= 0.9;
+    scene.cameras.push(second);
+    scene
+}
+
+/// The bits of all that a film holds, with its size and window.
+fn bits(film: &Film) -> Vec<u32> {
+    let window = film.window();
+    let size = [film.width(), film.height(), window.x0, window.x1, window.y0, window.y1];
+    let pixels = film.all().flat_map(|film| {
+        let pixel = [film.pixel.radiance, film.pixel.albedo, film.pixel.normal];
+        let layers = [film.layers.direct, film.layers.indirect, film.layers.caustic];
+        let single = [film.pixel.depth, film.layers.gathers];
+        pixel.into_iter().chain(layers).flatten().chain(single).map(f32::to_bits).collect::<Vec<_>>()
+    });
+    size.into_iter().chain(pixels).collect()
+}
+
+fn point(settings: &RenderSettings) -> Point {
+    Scale::QUICK.whole("cornell.gltf", settings.clone())
+}
+
+#[test]
+fn a_setting_is_in_the_identity_of_a_picture_exactly_if_pixels_depend_on_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = with_two_cameras();
+    let expected = bits(&render_or_panic(&scene, &settings()).film);
+    let mut differing = 0;
+    for (name, dependence, changed) in changes(folder.path()) {
+        assert!(changed != settings(), "{name} is not changed");
+        let is_of_pixels = matches!(dependence, Dependence::Image | Dependence::Pixels);
+        let found = bits(&render_or_panic(&scene, &changed).film);
+        assert_eq!(found != expected, is_of_pixels, "the pixels by {name}");
+        assert_eq!(changed.of_pixels() != settings().of_pixels(), is_of_pixels, "{name}");
+        assert_eq!(changed.identity(&scene) != settings().identity(&scene), is_of_pixels, "{name}");
+        differing += usize::from(is_of_pixels);
+    }
+    // Width and height are one option.
+    assert_eq!(settings().of_pixels().len(), differing - 1);
+}
+
+#[test]
+fn a_setting_is_in_the_key_of_a_point_exactly_if_its_result_depends_on_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, dependence, changed) in changes(folder.path()) {
+        let [old, new] = [settings(), changed].map(|settings| point(&settings));
+        assert_eq!(old.key("") != new.key(""), dependence != Dependence::Nothing, "the key by {name}");
+        let is_of_image = matches!(dependence, Dependence::Image | Dependence::Layout);
+        assert_eq!(old.image_key() != new.image_key(), is_of_image, "the image by {name}");
+    }
+}
+
+#[test]
+fn settings_of_a_caustic_map_that_a_scene_has_not_are_not_in_the_identity() {
+    let view = camera(glam::Vec3::Z, -glam::Vec3::Z);
+    let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| glam::Vec3::new(x, y, 0.0));
+    let dull = scene(quad(corners, 0).into(), vec![lambertian("wall", 0.5)], view);
+    let identity = |scene: &Scene, photons, neighbors| {
+        let settings = settings().with(|s| {
+            s.photons.caustic_photons = photons;
+            s.photons.caustic_neighbors = neighbors;
+        });
+        settings.identity(scene)
+    };
+    for (photons, neighbors) in [(Some(0), 50), (Some(9), 50), (None, 60)] {
+        assert_eq!(identity(&dull, photons, neighbors), identity(&dull, None, 50));
+    }
+    let specular = everything();
+    assert_eq!(identity(&specular, Some(0), 60), identity(&specular, Some(0), 50));
+    assert_ne!(identity(&specular, Some(9), 60), identity(&specular, Some(9), 50));
+    assert_ne!(identity(&specular, Some(9), 50), identity(&specular, None, 50));
+}
