@@ -24,8 +24,8 @@ pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Radiance, Sampling};
 pub use settings::{
-    CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, Outputs, PROGRAM,
-    PhotonMaps, Picture, RenderSettings, Schedule,
+    CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM, PhotonMaps,
+    Picture, RenderSettings, Schedule, TileOutputs,
 };
 pub use statistics::{Flops, LinkStatistics, Rays, Statistics, Times};
 
