@@ -8,8 +8,8 @@ use photoncard_driver::layer::Layers;
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{
-    CardAddress, CardSet, Integrator, Outputs, PhotonMaps, Picture, Radiance, RenderSettings, Sampling,
-    Schedule,
+    CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling, Schedule,
+    TileOutputs,
 };
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::GatherOrder;
@@ -104,7 +104,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             caches: Nothing = Some("unified=8K/128/2".parse().expect("caches")),
             trace: Nothing = Some(folder.join("reads.din.gz")),
         }
-        outputs: Outputs {
+        outputs: TileOutputs {
             partial: Nothing = Some(PartialSettings { path: folder.join("a.exr.partial"), resume: false }),
             // Nobody listens there.
             display: Nothing = Some(DisplaySettings {

@@ -13,7 +13,7 @@ use super::crew::Crew;
 use super::executor::{Executor, Outcome, Work};
 use super::greeting::{GreetedCard, GreetingError, card_name, greet};
 use super::open_card::OpenCard;
-use super::outputs::LiveOutputs;
+use super::outputs::Outputs;
 use super::{CardError, CardSet, Observer, RenderError, RenderSettings};
 use crate::dispatcher::Dispatcher;
 use crate::emulator::trace::TraceFile;
@@ -103,7 +103,7 @@ impl<'a> Cards<'a> {
         job: Job,
         scheduler: Scheduler,
         sinks: Vec<&dyn TileSink>,
-        outputs: &LiveOutputs,
+        outputs: &Outputs,
     ) -> Result<Outcome, RenderError> {
         let begun = self.start.elapsed();
         let (names, cards): (Vec<String>, Vec<GreetedCard>) = self.cards.into_iter().unzip();

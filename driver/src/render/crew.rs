@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::exchange::WAIT;
-use super::outputs::LiveOutputs;
+use super::outputs::Outputs;
 use super::{CardError, RenderError};
 use crate::dispatcher::Dispatcher;
 use crate::scheduler::{CardNumber, SchedulerError, Source, Standing, rectangles};
@@ -12,7 +12,7 @@ use crate::scheduler::{CardNumber, SchedulerError, Source, Standing, rectangles}
 /// What the threads of all cards share.
 pub(super) struct Crew<'a> {
     pub(super) dispatcher: Dispatcher<'a>,
-    pub(super) outputs: &'a LiveOutputs<'a>,
+    pub(super) outputs: &'a Outputs<'a>,
     pub(super) start: Instant,
     /// What errors call each card.
     pub(super) names: Vec<String>,

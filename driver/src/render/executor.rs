@@ -7,7 +7,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
 
 use super::RenderError;
-use super::outputs::LiveOutputs;
+use super::outputs::Outputs;
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::film::Film;
 use crate::pack::CardImage;
@@ -43,7 +43,7 @@ pub(super) struct Work<'a> {
     /// Takers of finished tiles.
     pub(super) sinks: Vec<&'a dyn TileSink>,
     /// Outputs that are looked at in between.
-    pub(super) outputs: &'a LiveOutputs<'a>,
+    pub(super) outputs: &'a Outputs<'a>,
 }
 
 /// Outcome of an executor's work.

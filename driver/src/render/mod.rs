@@ -32,8 +32,8 @@ pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Radiance, Sampling};
 pub use settings::{
-    CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, Outputs, PROGRAM,
-    PhotonMaps, Picture, RenderSettings, Schedule,
+    CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM, PhotonMaps,
+    Picture, RenderSettings, Schedule, TileOutputs,
 };
 pub use statistics::{LinkStatistics, Rays, Statistics};
 pub use times::Times;
@@ -43,7 +43,7 @@ use std::time::Instant;
 
 use self::cards::Cards;
 use self::executor::{Executor, Work};
-use self::outputs::LiveOutputs;
+use self::outputs::Outputs;
 use self::preparation::prepare;
 use self::whole_frame::WholeFrame;
 use crate::film::Film;
@@ -83,7 +83,7 @@ pub fn render(
     // Not before the settings are known to be possible: a film may be large.
     let mut film = settings.film()?;
     let tiles = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
-    let outputs = LiveOutputs::open(scene, settings, &tiles, &mut film, observer)?;
+    let outputs = Outputs::open(scene, settings, &tiles, &mut film, observer)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, &budgets, &mut times, observer)?;
     let frame = settings.frame(camera, prepared.max_distance, prepared.caustics);

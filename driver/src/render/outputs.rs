@@ -12,13 +12,13 @@ use crate::scene::Scene;
 use crate::sink::TileSink;
 
 /// Outputs of a render while it runs, as far as the settings ask for them.
-pub(super) struct LiveOutputs<'a> {
+pub(super) struct Outputs<'a> {
     partial: Option<PartialRender>,
     display: Option<Display>,
     pub(super) observer: &'a dyn Observer,
 }
 
-impl<'a> LiveOutputs<'a> {
+impl<'a> Outputs<'a> {
     /// Opens the outputs. Tiles of the render that is resumed are written into the film, and shown.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use photoncard_firmware::kind::MICRO;
 use photoncard_shared::message::{self, CausticGather, FrameParameters};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
-pub use self::groups::{CardSet, Integrator, Outputs, PhotonMaps, Picture, Schedule};
+pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
 use super::address::{CardAddress, first_remote, is_one_emulated_chip};
 use super::error::RenderError;
 use crate::emulator::ChipKind;
@@ -36,7 +36,7 @@ pub struct RenderSettings {
     /// The cards that do it.
     pub cards: CardSet,
     /// Destinations of finished tiles besides the film.
-    pub outputs: Outputs,
+    pub outputs: TileOutputs,
 }
 
 /// Direction bins: three to an entry of the table that directions are sampled by.

@@ -7,7 +7,7 @@ use photoncard_driver::display::{DisplayAddress, DisplaySettings};
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::preview::{ToneCurve, ToneMapping};
-use photoncard_driver::render::Outputs;
+use photoncard_driver::render::TileOutputs;
 
 use super::choice::choice;
 
@@ -58,8 +58,8 @@ enum Exposure {
 
 impl OutputOptions {
     /// The settings that the options stand for, of the picture in the file `output`.
-    pub(super) fn settings(&self, output: &Path) -> Outputs {
-        Outputs {
+    pub(super) fn settings(&self, output: &Path) -> TileOutputs {
+        TileOutputs {
             partial: Some(PartialSettings { path: partial_path(output), resume: self.resume }),
             display: self.display(output),
         }

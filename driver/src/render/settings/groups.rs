@@ -147,7 +147,7 @@ impl Default for CardSet {
 
 /// Destinations of finished tiles besides the film. No pixel depends on them.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Outputs {
+pub struct TileOutputs {
     /// File in which finished tiles are kept until the picture is written; `None` to keep none. Not with the order
     /// [`Hilbert`](GatherOrder::Hilbert), which has no finished tiles before the end.
     pub partial: Option<PartialSettings>,
