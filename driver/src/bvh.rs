@@ -44,19 +44,21 @@ pub enum HierarchyError {
         entries: usize,
     },
     /// The scene has more triangles than a card can index.
-    #[error("the scene has {triangles} triangles; a card can tell {MAX_TRIANGLES} apart")]
+    #[error("the scene has {triangles} triangles; a card image can index at most {MAX_TRIANGLES}")]
     TooMany {
         /// Number of triangles of the scene.
         triangles: usize,
     },
     /// A triangle's material is beyond the materials that a card can index.
-    #[error("a triangle is of material {material}; a card can tell {MAX_MATERIALS} apart")]
+    #[error(
+        "a triangle has the material of index {material}; a card image can index at most {MAX_MATERIALS} materials"
+    )]
     TooManyMaterials {
         /// Index of the material.
         material: u32,
     },
     /// A triangle has a corner that is not finite, or so far away that the area of the scene's bounding box is not.
-    #[error("a triangle has a corner that is not a finite place, or too far away")]
+    #[error("a triangle has a corner whose position is not finite, or too far from the origin")]
     NotFinite,
 }
 
@@ -116,8 +118,8 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
 
 /// Input of the builder: one box for many triangles whose boxes have a common centre, one for each other triangle.
 ///
-/// Of boxes in one another each is as near as any larger one, so that hardly two choose each other, and the builder would go
-/// through all of them for each pair that it joins.
+/// Concentric boxes, each in the next, are all at one distance from the smallest: hardly two of them are each other's
+/// nearest, and the builder would search all of them for each pair that it joins.
 struct Parts {
     crowds: Vec<Vec<u32>>,
     singles: Vec<u32>,

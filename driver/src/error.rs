@@ -10,23 +10,23 @@ use thiserror::Error;
 
 use crate::allocation::{self, OutOfMemory};
 
-/// A place in a scene: the file, and what in it.
+/// Location in a scene: file and JSON path.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct Location {
     /// The scene file.
     pub file: PathBuf,
     /// The JSON path in the file, such as `meshes[2].primitives[0].attributes.POSITION`; empty for the whole file.
     pub item: String,
 }
 
-impl Place {
-    /// The place `item` in `file`.
+impl Location {
+    /// Location `item` in `file`.
     pub fn new(file: &Path, item: impl Into<String>) -> Self {
         Self { file: file.to_owned(), item: item.into() }
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.file.display())?;
         if self.item.is_empty() { Ok(()) } else { write!(f, ": {}", self.item) }
@@ -35,7 +35,7 @@ impl fmt::Display for Place {
 
 /// A scene that cannot be loaded, or a setting that cannot be applied to it.
 ///
-/// Every variant names the place and, as its help, the remedy.
+/// Every variant names the location and, as its help, the remedy.
 #[derive(Debug, Error, Diagnostic)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -76,7 +76,10 @@ pub enum SceneError {
 
     /// The text is not JSON, or not JSON of glTF's shape.
     #[error("{file} is not glTF JSON: {message}")]
-    #[diagnostic(code(scene::json), help("correct the JSON at the place shown, or export the scene again"))]
+    #[diagnostic(
+        code(scene::json),
+        help("correct the JSON at the position shown, or export the scene again")
+    )]
     Json {
         /// The file's name.
         file: String,
@@ -91,14 +94,14 @@ pub enum SceneError {
     },
 
     /// The scene says that it cannot be shown without an extension this renderer does not know.
-    #[error("{place} requires the extension {name}, which is not supported")]
+    #[error("{location} requires the extension {name}, which is not supported")]
     #[diagnostic(
         code(scene::required_extension),
         help("export the scene without {name}; supported are {supported}")
     )]
     RequiredExtension {
         /// Where it is required.
-        place: Place,
+        location: Location,
         /// The extension.
         name: String,
         /// The extensions that are supported.
@@ -106,11 +109,11 @@ pub enum SceneError {
     },
 
     /// The file breaks a rule of glTF.
-    #[error("{place}: {reason}")]
+    #[error("{location}: {reason}")]
     #[diagnostic(code(scene::invalid), help("{remedy}"))]
     Invalid {
         /// Where.
-        place: Place,
+        location: Location,
         /// What is wrong.
         reason: String,
         /// What to do.
@@ -118,11 +121,11 @@ pub enum SceneError {
     },
 
     /// A buffer's bytes cannot be had.
-    #[error("{place}: {reason}")]
+    #[error("{location}: {reason}")]
     #[diagnostic(code(scene::buffer), help("{remedy}"))]
     Buffer {
         /// Which buffer.
-        place: Place,
+        location: Location,
         /// What is wrong.
         reason: String,
         /// What to do.
@@ -130,11 +133,11 @@ pub enum SceneError {
     },
 
     /// An image's texels cannot be had.
-    #[error("{place}: {reason}")]
+    #[error("{location}: {reason}")]
     #[diagnostic(code(scene::image), help("{remedy}"))]
     Image {
         /// Which image.
-        place: Place,
+        location: Location,
         /// What is wrong.
         reason: String,
         /// What to do.
@@ -154,11 +157,11 @@ pub enum SceneError {
     },
 
     /// A vertex's place, or something else of it, is not a number, infinite, or out of any scale.
-    #[error("{place}: vertex {vertex} of mesh '{mesh}', primitive {primitive}, {reason}")]
+    #[error("{location}: vertex {vertex} of mesh '{mesh}', primitive {primitive}, {reason}")]
     #[diagnostic(code(scene::vertex), help("repair the mesh in the modelling tool and export it again"))]
     Vertex {
         /// The attribute.
-        place: Place,
+        location: Location,
         /// The mesh's name.
         mesh: String,
         /// The primitive's index in the mesh.
@@ -171,12 +174,12 @@ pub enum SceneError {
 
     /// An index refers to a vertex that does not exist.
     #[error(
-        "{place}: index {position} is {index}, but mesh '{mesh}', primitive {primitive}, has {vertices} vertices"
+        "{location}: index {position} is {index}, but mesh '{mesh}', primitive {primitive}, has {vertices} vertices"
     )]
     #[diagnostic(code(scene::index), help("repair the mesh in the modelling tool and export it again"))]
     IndexOutOfRange {
         /// The index accessor's place.
-        place: Place,
+        location: Location,
         /// The mesh's name.
         mesh: String,
         /// The primitive's index in the mesh.
@@ -210,7 +213,7 @@ pub enum SceneError {
     TooLarge {
         /// The file.
         file: PathBuf,
-        /// What takes it, with what was counted before.
+        /// Contents of the card image that exceed the memory, such as `8 materials`.
         what: String,
         /// Bytes of the card image, at least.
         needed: u64,
@@ -218,24 +221,24 @@ pub enum SceneError {
         available: u64,
     },
 
-    /// The process cannot have the memory that a step of loading takes.
+    /// The system does not give the memory that a step of loading takes.
     #[error("{}: {step} takes {bytes} bytes of memory, which the system does not give", file.display())]
     #[diagnostic(code(scene::memory), help("simplify the scene, or {}", allocation::REMEDY))]
     Memory {
         /// The file.
         file: PathBuf,
-        /// What takes it.
+        /// Step of loading that takes the memory.
         step: &'static str,
-        /// How many bytes.
+        /// Number of bytes.
         bytes: u64,
     },
 
     /// A material's value is out of its range.
-    #[error("{place}: material '{material}': {reason}")]
+    #[error("{location}: material '{material}': {reason}")]
     #[diagnostic(code(scene::material), help("{remedy}"))]
     Material {
         /// Where.
-        place: Place,
+        location: Location,
         /// The material.
         material: String,
         /// What is wrong.

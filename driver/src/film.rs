@@ -1,15 +1,27 @@
 //! Film: the pixels of a picture's crop window, as far as they are rendered.
+//!
+//! ```
+//! use photoncard_driver::film::{Film, PixelValue, Window};
+//!
+//! # fn main() -> Result<(), photoncard_driver::film::FilmError> {
+//! let mut film = Film::new(640, 480, Window { x0: 0, x1: 2, y0: 0, y1: 1 })?;
+//! film.write(1, 0, PixelValue { radiance: [0.5; 3], ..PixelValue::default() })?;
+//! assert_eq!((film.missing(), film.is_complete()), (1, false));
+//! assert_eq!(film.pixel(1, 0).map(|pixel| pixel.radiance), Some([0.5; 3]));
+//! assert_eq!(film.pixel(2, 0), None);
+//! # Ok(())
+//! # }
+//! ```
 
 use std::sync::{Mutex, PoisonError};
 
-use photoncard_shared::counters::Counters;
 use photoncard_shared::message::Tile;
 pub use photoncard_shared::message::{Pixel as PixelValue, PixelLayers, PixelRecord};
 use thiserror::Error;
 
-use crate::sink::{FinishedTile, TileSink, places};
+use crate::sink::{FinishedTile, TileSink, pixel_positions};
 
-/// The most pixels a film may hold: 2^28, about 10 GiB, with layers 20.
+/// Maximum number of pixels of a film: 2^28, about 10 GiB, or 20 GiB with layers.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Maximum width and height of a picture, pixels.
@@ -259,20 +271,14 @@ impl Film {
         if !self.has(tile) {
             return None;
         }
-        let mut records = Vec::new();
-        for (x, y) in places(tile) {
-            let FilmPixel { pixel, layers } = self.all_at(x, y)?;
-            records.extend(pixel.to_bytes());
-            if self.has_layers() {
-                records.extend(layers.to_bytes());
-            }
-        }
-        FinishedTile::new(*tile, records, self.has_layers(), Counters::ZERO)
+        let pixels = pixel_positions(tile).filter_map(|(x, y)| self.all_at(x, y));
+        let records = pixels.map(|FilmPixel { pixel, layers }| PixelRecord { pixel, layers: Some(layers) });
+        FinishedTile::of_pixels(*tile, records, self.has_layers())
     }
 
     /// Takes a tile's pixels for not written.
     pub fn erase(&mut self, tile: &Tile) {
-        for index in places(tile).filter_map(|(x, y)| self.index(x, y)).collect::<Vec<_>>() {
+        for index in pixel_positions(tile).filter_map(|(x, y)| self.index(x, y)).collect::<Vec<_>>() {
             self.missing += usize::from(std::mem::replace(&mut self.written[index], false));
         }
     }

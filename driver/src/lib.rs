@@ -1,9 +1,135 @@
-//! The host half of photoncard.
+//! The host half of photoncard: a library that renders glTF scenes with global illumination, on emulated chips in this process
+//! or on cards at the other end of a link.
+//!
+//! photoncard is photon mapping (Jensen 2001) on *rendering chips*: small processors with a fixed amount of on-chip memory, a
+//! private DRAM and one link to a host. A chip runs [`photoncard_firmware`]. This crate is what runs on the host: it loads a
+//! scene, traces photons, packs scene and photon map into a *card image*, sends the image to each card, deals tiles to the cards
+//! and assembles the picture. The picture is equal, bit for bit, for any number and kind of cards.
+//!
+//! # First steps
+//!
+//! A render takes three calls: [`scene::gltf::load`], [`render::render`] and [`exr::write`].
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use photoncard_driver::exr::{self, SampleFormat};
+//! use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Unobserved, render};
+//! use photoncard_driver::scene::gltf;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene = gltf::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf")))?;
+//! let settings = RenderSettings {
+//!     picture: Picture { width: 16, height: 16, ..Picture::default() },
+//!     photons: PhotonMaps { count: 5_000, ..PhotonMaps::default() },
+//!     integrator: Integrator { gather_rays: 8, ..Integrator::default() },
+//!     ..RenderSettings::default()
+//! };
+//! let rendering = render(&scene, &settings, &Unobserved)?;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("cornell.exr");
+//! let layers = &settings.picture.layers;
+//! exr::write(&path, &rendering.film, layers, r#"{"scene": "cornell"}"#, SampleFormat::Float)?;
+//! let picture = exr::read_rgb(&path)?;
+//! assert_eq!((picture.width, picture.height), (16, 16));
+//! assert!(picture.pixels.iter().flatten().sum::<f32>() > 0.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! [`RenderSettings`](render::RenderSettings) has a field for each option of `photoncard render`, in groups; its default
+//! is the dissertation's nominal frame on one emulated reference chip. [`Rendering`](render::Rendering) holds the
+//! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A tone-mapped PNG is written by [`preview::write_png`], and
+//! two pictures are compared by [`difference`].
+//!
+//! # Cards
+//!
+//! [`CardAddress`](render::CardAddress) names cards as `--card` does. Emulated and remote cards may be mixed in one render:
+//!
+//! ```
+//! use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
+//!
+//! # fn main() -> Result<(), String> {
+//! let addresses: Vec<CardAddress> = vec!["emulated:4".parse()?, "tcp:render-node:7000".parse()?];
+//! let cards = CardSet { addresses, ..CardSet::default() };
+//! let settings = RenderSettings { cards, ..RenderSettings::default() };
+//! assert_eq!(settings.cards.addresses[1].to_string(), "tcp:render-node:7000");
+//! assert!("usb:1".parse::<CardAddress>().is_err());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Progress and cancellation
+//!
+//! [`Observer`](render::Observer) is called from the threads of a render, and ends it by [`is_stopped`](render::Observer::is_stopped):
+//!
+//! ```
+//! use std::sync::atomic::{AtomicBool, Ordering};
+//!
+//! use photoncard_driver::render::{Observer, Phase};
+//!
+//! #[derive(Default)]
+//! struct Progress {
+//!     cancelled: AtomicBool,
+//! }
+//!
+//! impl Observer for Progress {
+//!     fn progress(&self, phase: Phase, done: u64, total: u64) {
+//!         eprintln!("{phase:?}: {done} of {total}");
+//!     }
+//!
+//!     fn is_stopped(&self) -> bool {
+//!         self.cancelled.load(Ordering::Relaxed)
+//!     }
+//! }
+//!
+//! let progress = Progress::default();
+//! progress.cancelled.store(true, Ordering::Relaxed);
+//! assert!(progress.is_stopped());
+//! ```
+//!
+//! # Layers
+//!
+//! Modules from bottom to top. A module imports modules of its own row and of rows above it in this table, never of rows below
+//! it; and no file imports one that imports it back, directly or around (`tests/tests/imports`).
+//!
+//! | layer | modules | contents |
+//! |---|---|---|
+//! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic |
+//! | tiles | [`sink`] | a finished tile, and [`TileSink`](sink::TileSink), the trait of every output |
+//! | pictures | [`film`], [`layer`], [`exr`], [`preview`], [`difference`] | pixels of a picture; its layers; files; comparison |
+//! | scenes | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
+//! | trees | [`bvh`], `fold`, `light` | bounding volume hierarchy; folding of binary trees into wide nodes; light tree and environment |
+//! | card image | [`pack`] | the scene's sections of the card image |
+//! | photons | [`photon`], `density`, [`photon_map`] | photon pass; area corrections of the density estimate; the photon map's sections of the card image |
+//! | links | [`link`], [`session`] | ports of bytes; the host's end of the protocol, without I/O |
+//! | cards | [`emulator`] | chips on threads of this process, memory models and traces |
+//! | tiles to cards | [`scheduler`], [`dispatcher`] | which card renders which tile; finished tiles to the sinks |
+//! | sinks | [`partial`], [`display`] | the file of finished tiles, for `--resume`; the client of a display server |
+//! | cost model | [`cost_model`] | FLOPs and DRAM bytes of a frame by Table 7.1 |
+//! | render | [`render`] | one render from a scene to a complete film; settings, statistics, card addresses |
+//! | studies | [`study`] | measurements of shipped scenes, and reports |
+//!
+//! Below all of them are [`photoncard_shared`] (formats of memory and wire) and [`photoncard_firmware`]. `pack`, `light`,
+//! `photon`, `density`, `photon_map` and `emulator` import the firmware, so that photons, chords and irradiance points are
+//! computed by the chip's own code.
+//!
+//! # Way of the data
+//!
+//! ```text
+//! scene::gltf -> Scene -> pack -> photon -> photon_map (with density) -> CardImage
+//!     -> session -> link -> card -> link -> session -> dispatcher -> TileSinks: Film, PartialRender, Display
+//! Film -> exr, preview
+//! ```
+//!
+//! Terms are defined in `docs/glossary.md`, design decisions and "how to add" lists are in `docs/architecture.md`.
 #![forbid(unsafe_code)]
 
 mod allocation;
 pub mod bvh;
 pub mod choice;
+pub mod cost_model;
 mod density;
 pub mod difference;
 pub mod dispatcher;

@@ -6,7 +6,7 @@
 
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
-use photoncard_shared::image::{Header, SECTIONS, Section, SectionKind};
+use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{
     self, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, power_of_two_above,
 };
@@ -102,7 +102,7 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     let hierarchy = bvh::build(&scene.triangles, &cut_out)?;
     let corners = PackedCorners::new(scene, lights, &hierarchy.leaf_triangles);
     let textures = textures::records(scene, lights.environment())?;
-    let places = places_in_image(scene, &hierarchy.leaf_triangles);
+    let indices = indices_in_image(scene, &hierarchy.leaf_triangles);
     let mut image = ImageWriter::new(header(scene, lights));
     image.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
     image.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
@@ -111,8 +111,8 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     image.append(SectionKind::Materials, materials::records(scene, lights))?;
     image.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
     image.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;
-    let place = |triangle: usize| places.get(triangle).copied().unwrap_or(0);
-    image.append(SectionKind::Emitters, lights.emitters(place).map(|emitter| emitter.to_bytes()))?;
+    let index_in_image = |triangle: usize| indices.get(triangle).copied().unwrap_or(0);
+    image.append(SectionKind::Emitters, lights.emitters(index_in_image).map(|emitter| emitter.to_bytes()))?;
     image.append(SectionKind::LightNodes, lights.nodes())?;
     image.append(SectionKind::DistantLights, lights.distant().iter().map(DistantLight::to_bytes))?;
     let cells = lights.cell_thresholds();
@@ -123,26 +123,22 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
 /// The header of a scene without photons: units and lights. Lines and sections are the writer's.
 fn header(scene: &Scene, lights: &Lights) -> Header {
     Header {
-        lines: 0,
-        photon_power_unit: 1.0,
-        caustic_power_unit: 1.0,
         radiance_unit: radiance_unit(scene, lights),
-        photon_grid: PhotonGrid::UNIT,
         lights: lights.header(scene.textures.len() as u32),
-        sections: [Section::default(); SECTIONS],
+        ..Header::EMPTY
     }
 }
 
-/// Of each triangle of the scene, its index in the card image, by the triangles of the image's leaves.
-fn places_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
-    let mut places = vec![0; scene.triangles.len()];
+/// Index of each triangle of the scene in the card image, from the triangles of the image's leaves.
+fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
+    let mut indices = vec![0; scene.triangles.len()];
     for (leaf, triangles) in leaves.iter().enumerate() {
         for (slot, &triangle) in triangles.iter().enumerate() {
             // The hierarchy has few enough.
-            places[triangle as usize] = (leaf * LEAF_TRIANGLES + slot) as u32;
+            indices[triangle as usize] = (leaf * LEAF_TRIANGLES + slot) as u32;
         }
     }
-    places
+    indices
 }
 
 /// Fixed-point sums of radiance hold 23 bits above the unit and 40 below.

@@ -52,11 +52,12 @@ pub struct PartialSettings {
 pub struct PartialRender {
     path: PathBuf,
     settings: Value,
-    state: Mutex<State>,
+    kept: Mutex<KeptTiles>,
 }
 
+/// Tiles in the file, and the file once it is open.
 #[derive(Default)]
-struct State {
+struct KeptTiles {
     /// The file, locked.
     file: Option<File>,
     /// Whether it begins with title and settings.
@@ -82,19 +83,19 @@ impl PartialRender {
         film: &mut Film,
     ) -> Result<Self, PartialError> {
         let path = partial.path.clone();
-        let this = Self { path, settings, state: Mutex::default() };
+        let this = Self { path, settings, kept: Mutex::default() };
         if let Some(file) = file::open(&this.path, false)? {
-            let mut state = this.lock();
+            let mut kept = this.lock();
             if partial.resume {
-                this.resume(&mut state, &file, film)?;
+                this.resume(&mut kept, &file, film)?;
             }
-            state.file = Some(file);
+            kept.file = Some(file);
         }
         Ok(this)
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, KeptTiles> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn error(&self, source: io::Error) -> PartialError {
@@ -102,7 +103,7 @@ impl PartialRender {
     }
 
     /// Takes the sound tiles of the file into the film, and cuts off what is behind the last.
-    fn resume(&self, state: &mut State, mut file: &File, film: &mut Film) -> Result<(), PartialError> {
+    fn resume(&self, kept: &mut KeptTiles, mut file: &File, film: &mut Film) -> Result<(), PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let mut reader = BufReader::new(file);
         let Some(head) = self.read_head(&mut reader)? else { return Ok(()) };
@@ -110,9 +111,9 @@ impl PartialRender {
             file.set_len(sound)?;
             file.seek(SeekFrom::End(0))
         });
-        state.holds_earlier = sound.map_err(|error| self.error(error))? > head;
-        state.holds_tiles = state.holds_earlier;
-        state.is_begun = true;
+        kept.holds_earlier = sound.map_err(|error| self.error(error))? > head;
+        kept.holds_tiles = kept.holds_earlier;
+        kept.is_begun = true;
         Ok(())
     }
 
@@ -138,14 +139,14 @@ impl PartialRender {
         Ok(Some((title().len() + settings.len()) as u64))
     }
 
-    fn append(&self, state: &mut State, tile: &FinishedTile) -> Result<(), PartialError> {
-        if state.file.is_none() {
-            state.file = file::open(&self.path, true)?;
+    fn append(&self, kept: &mut KeptTiles, tile: &FinishedTile) -> Result<(), PartialError> {
+        if kept.file.is_none() {
+            kept.file = file::open(&self.path, true)?;
         }
-        let Some(file) = &mut state.file else { return Ok(()) };
-        if !state.is_begun {
+        let Some(file) = &mut kept.file else { return Ok(()) };
+        if !kept.is_begun {
             self.write_head(file).map_err(|error| self.error(error))?;
-            state.is_begun = true;
+            kept.is_begun = true;
         }
         let mut write = || {
             let start = file.stream_position()?;
@@ -154,22 +155,22 @@ impl PartialRender {
             Ok(start)
         };
         let start = write().map_err(|error| self.error(error))?;
-        state.records.insert(tile.tile().id, start);
-        state.holds_tiles = true;
+        kept.records.insert(tile.tile().id, start);
+        kept.holds_tiles = true;
         Ok(())
     }
 
     /// Makes the record of a tile that was kept one that a reader passes over: its magic number goes.
-    fn strike_out(&self, state: &mut State, tile: &Tile) -> Result<(), PartialError> {
-        let start = state.records.remove(&tile.id);
-        let (Some(start), Some(file)) = (start, &mut state.file) else { return Ok(()) };
+    fn strike_out(&self, kept: &mut KeptTiles, tile: &Tile) -> Result<(), PartialError> {
+        let start = kept.records.remove(&tile.id);
+        let (Some(start), Some(file)) = (start, &mut kept.file) else { return Ok(()) };
         let mut write = || {
             file.seek(SeekFrom::Start(start))?;
             file.write_all(&[0; HEAD_BYTES])?;
             file.seek(SeekFrom::End(0))
         };
         write().map_err(|error| self.error(error))?;
-        state.holds_tiles = state.holds_earlier || !state.records.is_empty();
+        kept.holds_tiles = kept.holds_earlier || !kept.records.is_empty();
         Ok(())
     }
 
@@ -180,12 +181,12 @@ impl PartialRender {
     }
 
     /// Removes a file without a tile that cannot be written: there is nothing to go on from.
-    fn discard_empty(&self, state: &mut State) {
-        if let Some(file) = state.file.take_if(|_| !state.holds_tiles) {
+    fn discard_empty(&self, kept: &mut KeptTiles) {
+        if let Some(file) = kept.file.take_if(|_| !kept.holds_tiles) {
             // What cannot be removed is empty.
             let _ = file.set_len(0);
             let _ = file::remove(&file, &self.path);
-            state.is_begun = false;
+            kept.is_begun = false;
         }
     }
 
@@ -200,8 +201,8 @@ impl PartialRender {
     /// If anything did.
     pub(crate) fn check(&self) -> Result<(), PartialError> {
         // Whoever holds the lock writes, and tells of it later.
-        let Ok(mut state) = self.state.try_lock() else { return Ok(()) };
-        state.failed.take().map_or(Ok(()), Err)
+        let Ok(mut kept) = self.kept.try_lock() else { return Ok(()) };
+        kept.failed.take().map_or(Ok(()), Err)
     }
 
     /// Removes the file, when the picture is written. Where this render has none, one that is there is another's.
@@ -219,19 +220,19 @@ impl PartialRender {
 /// Failures are kept for the render loop, which asks for them.
 impl TileSink for PartialRender {
     fn put(&self, tile: &FinishedTile) {
-        let mut state = self.lock();
-        if state.failed.is_none()
-            && let Err(error) = self.append(&mut state, tile)
+        let mut kept = self.lock();
+        if kept.failed.is_none()
+            && let Err(error) = self.append(&mut kept, tile)
         {
-            self.discard_empty(&mut state);
-            state.failed = Some(error);
+            self.discard_empty(&mut kept);
+            kept.failed = Some(error);
         }
     }
 
     fn revoke(&self, tile: &Tile) {
-        let mut state = self.lock();
-        if let Err(error) = self.strike_out(&mut state, tile) {
-            state.failed.get_or_insert(error);
+        let mut kept = self.lock();
+        if let Err(error) = self.strike_out(&mut kept, tile) {
+            kept.failed.get_or_insert(error);
         }
     }
 }

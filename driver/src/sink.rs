@@ -21,6 +21,23 @@ impl FinishedTile {
         (records.len() as u64 == bytes).then_some(Self { tile, records, has_layers, counters })
     }
 
+    /// A tile of these pixels, row by row, whose work is counted elsewhere; `None` unless there is one for each pixel.
+    /// Layers that a pixel lacks are zero.
+    pub fn of_pixels(
+        tile: Tile,
+        pixels: impl IntoIterator<Item = PixelRecord>,
+        has_layers: bool,
+    ) -> Option<Self> {
+        let mut records = Vec::new();
+        for PixelRecord { pixel, layers } in pixels {
+            records.extend(pixel.to_bytes());
+            if has_layers {
+                records.extend(layers.unwrap_or_default().to_bytes());
+            }
+        }
+        Self::new(tile, records, has_layers, Counters::ZERO)
+    }
+
     /// Its rectangle of the picture.
     pub fn tile(&self) -> &Tile {
         &self.tile
@@ -34,12 +51,12 @@ impl FinishedTile {
     /// Column and row of each pixel, and its record.
     pub fn pixels(&self) -> impl Iterator<Item = ((u32, u32), PixelRecord)> {
         let records = self.records.chunks_exact(record_bytes(self.has_layers));
-        places(&self.tile).zip(records.map(|record| PixelRecord::read(record).unwrap_or_default()))
+        pixel_positions(&self.tile).zip(records.map(|record| PixelRecord::read(record).unwrap_or_default()))
     }
 }
 
 /// Columns and rows of a tile's pixels, row by row.
-pub fn places(tile: &Tile) -> impl Iterator<Item = (u32, u32)> + use<> {
+pub fn pixel_positions(tile: &Tile) -> impl Iterator<Item = (u32, u32)> + use<> {
     let Tile { x, y, width, height, .. } = *tile;
     (y..y + height).flat_map(move |row| (x..x + width).map(move |column| (column, row)))
 }

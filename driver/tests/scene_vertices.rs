@@ -4,12 +4,12 @@ mod scene_support;
 
 use glam::{Vec2, Vec3};
 use miette::Diagnostic;
-use photoncard_driver::scene::{Attributes, NO_ATTRIBUTES, Scene, Triangle};
+use photoncard_driver::scene::{NO_ATTRIBUTES, Scene, Triangle, VertexAttributes};
 use scene_support::{Extended, push};
 use serde_json::{Value, json};
 
 /// The attributes of the only triangle.
-fn attributes(scene: &Scene) -> Attributes {
+fn attributes(scene: &Scene) -> VertexAttributes {
     assert_eq!(scene.triangles.len(), 1);
     scene.attributes[scene.triangles[0].attributes as usize]
 }
@@ -108,7 +108,7 @@ fn colours_of_every_format_are_linear_rgba() {
     for (mut scene, accessor, expected) in cases {
         scene.primitive()["attributes"]["COLOR_0"] = json!(accessor);
         let scene = scene.load().unwrap();
-        assert_eq!(attributes(&scene), Attributes { colours: [expected; 3], ..Attributes::NONE });
+        assert_eq!(attributes(&scene), VertexAttributes { colours: [expected; 3], ..VertexAttributes::NONE });
         assert_eq!(scene.notices, Vec::<String>::new());
     }
     let mut white = Extended::new();

@@ -10,7 +10,7 @@ use photoncard_driver::session::{Assignment, Event, Job, PixelLimits, Session, S
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::image::{Header, Lights, SECTIONS, Section};
+use photoncard_shared::image::Header;
 use photoncard_shared::layout::PhotonGrid;
 use photoncard_shared::message::{Command, FrameParameters, PIXEL_BYTES, Reply, Tile};
 use photoncard_shared::transport::Transport;
@@ -39,18 +39,10 @@ fn frame() -> FrameParameters {
 const IMAGE: [Line; 100] = [Line::ZERO; 100];
 const STEP: Duration = Duration::from_millis(100);
 
-/// What pixels can have of an image of which nothing is known.
+/// Limits of the pixels of an image in units of 1, with the grid of a small scene.
 fn limits(frame: &FrameParameters) -> PixelLimits {
-    let header = Header {
-        lines: 2,
-        photon_power_unit: 1.0,
-        caustic_power_unit: 1.0,
-        radiance_unit: 1.0,
-        photon_grid: PhotonGrid { origin: [0; 3], cell: 1e-6 },
-        lights: Lights::NONE,
-        sections: [Section::default(); SECTIONS],
-    };
-    PixelLimits::new(&header, frame)
+    let photon_grid = PhotonGrid { origin: [0; 3], cell: 1e-6 };
+    PixelLimits::new(&Header { photon_grid, ..Header::EMPTY }, frame)
 }
 
 /// A session in virtual time.

@@ -1,21 +1,30 @@
 //! The photon mapping renderer of one rendering chip.
 //!
-//! No allocator, no I/O, every buffer sized at compile time by [`photoncard_shared::budget`]. From the memory to the
-//! wire:
+//! No allocator, no I/O, every buffer sized at compile time by a [`kind`] of chip. An emulated card, a machine of QEMU and a
+//! board run the same code. Terms are defined in `docs/glossary.md`.
+//!
+//! # Layers
+//!
+//! Modules from bottom to top. A module imports modules of its own row and of rows above it in this table, never of rows below it.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`memory`] | 128-byte lines of card DRAM |
-//! | [`scene`] | ray caster, surfaces, textures and lights, read from card memory |
-//! | [`photon`] | search for the k nearest photons, radiance estimate, precomputed irradiance |
-//! | [`sampler`] | stratified random numbers from (pixel, sample, dimension) |
+//! | `vector`, [`fixed_point`], [`simd`] | arithmetic with equal bits on every processor; sums independent of order; vector kernels |
+//! | [`sampler`] | stratified random numbers, functions of (seed, pixel, sample, dimension) |
+//! | [`memory`] | 128-byte lines of card DRAM; caches and counters |
+//! | [`scene`], `wide_tree` | ray caster, surfaces, reflection, textures and lights, read from card memory; traversal of trees of sixteen-wide nodes |
+//! | [`photon`] | search for the k nearest photons, density estimate, precomputed irradiance |
+//! | [`kind`] | kinds of chip: budgets, and capacities of buffers |
 //! | [`gather`] | queue of photon gathers, and their order |
 //! | [`importance`] | importance sampling of final gather directions |
+//! | [`render`] | passes of a tile: eye rays, direct light, caustics, final gather |
 //! | [`irradiance_cache`] | indirect irradiance, gathered at few points and interpolated between them |
-//! | [`render`] | eye rays, direct light, final gather: the stages of a tile |
-//! | [`chip`] | state of a tile; one method for each stage |
+//! | [`chip`] | state of a tile; one method for each pass |
 //! | [`card`] | protocol of a card: commands in, replies out |
 //! | [`serve`] | main loop of a card on a port |
+//!
+//! [`card::Card`] is the whole firmware: it is fed with bytes, works in small steps, and returns bytes. `boards/` has the images for
+//! boards, which add registers and a memory map.
 //!
 //! # Light paths
 //!
@@ -32,7 +41,7 @@
 //! # Exactness
 //!
 //! Random numbers are functions of (seed, pixel, sample, dimension). Sums over photons and over gather rays are in
-//! fixed point ([`fixed_point`]), so that their order does not matter. All processors give the same bits: `f32` add,
+//! fixed point ([`fixed_point`]), so that their order does not matter. All processors give equal bits: `f32` add,
 //! multiply, divide and square root, `libm`, integer arithmetic, and never a fused multiply-add.
 // `simd` alone is exempt, for its vector instructions.
 #![deny(unsafe_code)]
@@ -58,6 +67,7 @@ pub mod fixed_point;
 pub mod gather;
 pub mod importance;
 pub mod irradiance_cache;
+pub mod kind;
 pub mod memory;
 pub mod photon;
 pub mod render;

@@ -5,6 +5,7 @@ use core::time::Duration;
 use photoncard_shared::link::{Port, PortError};
 
 use crate::card::Card;
+use crate::kind::ChipKind;
 use crate::memory::CardMemory;
 
 /// Maximum wait of an idle card for a byte.
@@ -16,15 +17,8 @@ const IDLE_WAIT: Duration = Duration::from_millis(20);
 ///
 /// # Errors
 /// The port's failure; [`PortError::Closed`] is the regular end of a session.
-pub fn serve<
-    M: CardMemory,
-    const TILE_PIXELS: usize,
-    const CANDIDATES: usize,
-    const QUEUE: usize,
-    const RECORDS: usize,
-    const GATHERED: usize,
->(
-    card: &mut Card<M, TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>,
+pub fn serve<K: ChipKind, M: CardMemory>(
+    card: &mut Card<K, M>,
     port: &mut impl Port,
 ) -> Result<(), PortError> {
     let mut buffer = [0; 512];

@@ -2,6 +2,17 @@
 //!
 //! Standard output is for data, standard error for people. Exit status: 0 done; 1 the work failed; 2 wrong arguments or
 //! unreadable input; 130 stopped by an interrupt.
+//!
+//! | module | contents |
+//! |---|---|
+//! | `console`, `report` | the standard streams, with foreign text escaped; layout of errors |
+//! | `failure` | errors with their exit status |
+//! | `arguments`, `environment` | command line: options of every command, and their values |
+//! | `progress` | progress of a render |
+//! | `render`, `scene`, `card`, `card_list`, `emulate`, `diff`, `study` | one module for each command |
+//!
+//! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render from Rust, use
+//! `photoncard_driver` directly.
 #![forbid(unsafe_code)]
 
 mod arguments;

@@ -21,7 +21,7 @@ use crate::failure::Failure;
 use crate::progress::stop_on_signals;
 
 /// What is said of an interrupted study.
-const STOPPED: &str = "stopped; finished points are kept, and the same command goes on from them";
+const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
 
 #[derive(Args)]
 pub(crate) struct StudyArguments {

@@ -151,7 +151,7 @@ fn what_is_no_cache_is_refused_with_what_is() {
         ("128K", "such as photon=128K/128/4"),
         ("photon=128K/64/4", "128 bytes"),
         ("photon=128K/128/3", "whole number of sets"),
-        ("unified=128K/128/4,scene=1K/128/1", "one or the other"),
+        ("unified=128K/128/4,scene=1K/128/1", "give unified, or photon and scene"),
         ("unified=128K/128/4,index=best", "use modulo or hash"),
     ] {
         let outcome = room.render("scene.gltf", &["-o", "a.exr", "--cache", cache]);

@@ -7,7 +7,7 @@ use std::net::{TcpListener, TcpStream};
 use std::thread;
 use std::time::Duration;
 
-use photoncard_shared::budget::MICRO;
+use photoncard_firmware::kind::MICRO;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, Command, PROTOCOL_VERSION, Reply};
 use photoncard_shared::transport::Transport;

@@ -4,8 +4,8 @@ use base64::Engine;
 use glam::{Vec2, Vec3};
 
 use crate::document::{
-    Accessor, Attributes, Buffer, BufferView, CameraEntry, Document, ImageEntry, MaterialEntry, MeshEntry,
-    Node, Perspective, Primitive, Roots, Sampler, TextureEntry,
+    Accessor, Buffer, BufferView, CameraEntry, Document, ImageEntry, MaterialEntry, MeshEntry, Node,
+    Perspective, Primitive, PrimitiveAttributes, Roots, Sampler, TextureEntry,
 };
 use crate::material::Material;
 use crate::mesh::Mesh;
@@ -21,7 +21,7 @@ const LINEAR: u32 = 9729;
 /// Vertices and indices that are in the file, for use by any number of meshes.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
-    attributes: Attributes,
+    attributes: PrimitiveAttributes,
     indices: Option<usize>,
     mode: Option<u32>,
 }
@@ -156,12 +156,12 @@ impl SceneBuilder {
 
     /// Adds the attributes of a mesh's vertices. Normals that equal the positions, as on a unit sphere, share their
     /// accessor.
-    fn attributes(&mut self, mesh: &Mesh) -> Attributes {
+    fn attributes(&mut self, mesh: &Mesh) -> PrimitiveAttributes {
         let (min, max) = mesh.bounds();
         let position = self.vectors(mesh.positions.iter().map(Vec3::to_array), "VEC3");
         self.document.accessors[position].min = Some(min.to_array());
         self.document.accessors[position].max = Some(max.to_array());
-        let mut attributes = Attributes { position, normal: None, texcoord_0: None, color_0: None };
+        let mut attributes = PrimitiveAttributes { position, normal: None, texcoord_0: None, color_0: None };
         if mesh.normals == mesh.positions {
             attributes.normal = Some(position);
         } else if !mesh.normals.is_empty() {

@@ -73,7 +73,7 @@ pub(crate) struct MeshEntry {
 
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Primitive {
-    pub(crate) attributes: Attributes,
+    pub(crate) attributes: PrimitiveAttributes,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) indices: Option<usize>,
     pub(crate) material: usize,
@@ -83,7 +83,7 @@ pub(crate) struct Primitive {
 
 #[derive(Clone, Copy, Debug, Serialize)]
 #[serde(rename_all = "UPPERCASE")]
-pub(crate) struct Attributes {
+pub(crate) struct PrimitiveAttributes {
     pub(crate) position: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) normal: Option<usize>,

@@ -1,6 +1,17 @@
 //! Generators of the scenes that ship with photoncard.
 //!
-//! Every run on every machine makes the same bytes; a test compares them with the files beside this crate.
+//! [`scenes`] returns all files, equal on every machine; a test compares them with the files beside this crate. `README.md` beside them
+//! describes each scene.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`mesh`], `sphere` | triangle meshes and operations on them |
+//! | [`material`] | reflection, transmission and emission, as glTF states them |
+//! | [`document`], [`builder`] | glTF's JSON, and its assembly from meshes, materials, nodes and cameras |
+//! | `cornell`, `furnace`, `atrium`, `room`, `roughness` | one module for each scene and its variants |
+//! | `sky` | environment map for `atrium-open.glb` |
+//!
+//! To add a scene, write a module with a function that returns the file's bytes, and add it to [`scenes`].
 #![forbid(unsafe_code)]
 
 mod atrium;

@@ -1,4 +1,4 @@
-//! Capacities of the chips: the only source of the size of every container.
+//! Capacities of a chip, as hosts and chips exchange them, and the bounds that hold for every kind of chip.
 
 use serde::{Deserialize, Serialize};
 
@@ -50,70 +50,6 @@ impl Budget {
     /// Maximum number of pixels of a tile, in a picture without or with layers.
     pub const fn pixels_of_tile(&self, layers: bool) -> u32 {
         self.tile_pixels / sums_of_pixel(layers)
-    }
-}
-
-/// The reference chip: the dissertation's, with a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB
-/// (section 7.3.2); tiles have up to 64x64 pixels (16x16 in the dissertation).
-pub const REFERENCE: Budget = Budget {
-    sram_bytes: 1 << 20,
-    dram_bytes: 512 << 20,
-    photon_cache_bytes: 128 << 10,
-    scene_cache_bytes: 75 << 10,
-    stack_bytes: 16 << 10,
-    tile_pixels: 4096,
-    neighbors: 256,
-    gather_rays: MAX_GATHER_RAYS,
-    gather_queue: 12_640,
-    irradiance_records: 512,
-    gathered_records: 512,
-    shadow_rays: 64,
-    samples: 4096,
-    tiles: 4,
-};
-
-/// The micro chip: the whole renderer in 256 KB of SRAM, as microcontrollers have.
-pub const MICRO: Budget = Budget {
-    sram_bytes: 256 << 10,
-    dram_bytes: 16 << 20,
-    photon_cache_bytes: 64 << 10,
-    scene_cache_bytes: 32 << 10,
-    stack_bytes: 24 << 10,
-    tile_pixels: 256,
-    neighbors: 128,
-    gather_rays: MAX_GATHER_RAYS,
-    gather_queue: 1024,
-    irradiance_records: 128,
-    gathered_records: 128,
-    shadow_rays: 64,
-    samples: 4096,
-    tiles: 2,
-};
-
-/// Limits of the on-chip memory that each technique adds to a chip, bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TechniqueMemory {
-    /// Deferred reordering: the gather queue.
-    pub reordering: usize,
-    /// Irradiance cache: its records, and the sums of the records being gathered.
-    pub irradiance_cache: usize,
-    /// Combined importance sampling: a direction table for every pixel of a tile.
-    pub importance_sampling: usize,
-}
-
-impl TechniqueMemory {
-    /// Limits on the [`REFERENCE`] chip.
-    pub const REFERENCE: Self =
-        Self { reordering: 299 << 10, irradiance_cache: 189 << 10, importance_sampling: 136 << 10 };
-    /// Limits on the [`MICRO`] chip.
-    pub const MICRO: Self =
-        Self { reordering: (24 << 10) + 64, irradiance_cache: 48 << 10, importance_sampling: 8704 };
-
-    /// True if no technique exceeds its limit in `limit`.
-    pub const fn is_within(&self, limit: &Self) -> bool {
-        self.reordering <= limit.reordering
-            && self.irradiance_cache <= limit.irradiance_cache
-            && self.importance_sampling <= limit.importance_sampling
     }
 }
 

@@ -238,6 +238,17 @@ const _: () = assert!(SECTION_TABLE + 8 * SECTIONS <= LIGHTS);
 const NO_ENVIRONMENT: u32 = u32::MAX;
 
 impl Header {
+    /// Header of an image without lines, sections and lights, all units 1.
+    pub const EMPTY: Self = Self {
+        lines: 0,
+        photon_power_unit: 1.0,
+        caustic_power_unit: 1.0,
+        radiance_unit: 1.0,
+        photon_grid: PhotonGrid::UNIT,
+        lights: Lights::NONE,
+        sections: [Section { first_line: 0, records: 0 }; SECTIONS],
+    };
+
     /// The section of this kind.
     #[expect(clippy::indexing_slicing, reason = "a kind is below SECTIONS")]
     pub fn section(&self, kind: SectionKind) -> Section {

@@ -1,20 +1,32 @@
 //! Wire and memory formats of photoncard: bytes, no rendering.
 //!
-//! Both ends of a link are built on this crate. It defines the contents of a card's memory ([`address`], [`layout`],
-//! [`image`]), the capacities of a chip ([`budget`]), and the protocol between the two ends ([`message`] inside
-//! [`frame`]). The layers, from memory to wire:
+//! Firmware and host are built on this crate. It defines the contents of a card's memory ([`address`], [`layout`],
+//! [`image`]), the capacities of a chip ([`budget`]), and the protocol of a link ([`message`], [`transport`], [`frame`]).
+//!
+//! # Layers
+//!
+//! Card memory, from bottom to top:
 //!
 //! | module | unit | contents |
 //! |---|---|---|
 //! | [`address`] | 128-byte line | addresses of card memory |
 //! | [`layout`] | record | little-endian photons, nodes, triangles, materials, emitters |
 //! | [`image`] | section | positions of a scene's records in the card image |
-//! | [`message`] | message | commands of the host, replies of a card |
-//! | [`transport`] | message | windowed acknowledgement, selective repetition |
-//! | [`frame`] | frame | COBS, header, CRC-32C |
-//! | [`link`] | byte | a port: bytes with a bounded wait |
+//! | [`budget`] | | capacities of the two kinds of chip |
 //!
-//! Nothing here allocates, and nothing here panics on any input.
+//! Protocol, from bottom to top:
+//!
+//! | module | unit | contents |
+//! |---|---|---|
+//! | [`link`] | byte | a port: bytes with a bounded wait |
+//! | [`stuffing`], [`checksum`] | byte | COBS; CRC-32C and CRC-64/XZ |
+//! | [`frame`] | frame | header, payload, checksum |
+//! | [`transport`] | message | windowed acknowledgement, selective repetition |
+//! | [`message`] | message | commands of the host, replies of a card, faults |
+//! | [`counters`] | | work of a tile, which a card reports with it |
+//!
+//! No function allocates, and no input makes one panic. `docs/protocol.md` describes the protocol for other implementations,
+//! `docs/glossary.md` defines the terms.
 #![forbid(unsafe_code)]
 #![no_std]
 // A chip never panics: these lints catch what could, and each exception gives its reason.

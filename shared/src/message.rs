@@ -1,18 +1,18 @@
-//! Messages: what host and card say to each other. Each is the payload of one frame, in postcard's encoding.
+//! Messages of host and card, in postcard's encoding. Each is the payload of one frame.
 //!
-//! The host speaks first. A session is
+//! The host sends the first message. The course of a session:
 //!
 //! ```text
-//! Hello           -> Hello                       versions, budget, build, what of its memory is written and in use
-//! ReadChecksums   -> Checksums ...               of chunks that are written: what is there already is not sent again
+//! Hello           -> Hello                       versions, budget, build, written lines, use of on-chip memory
+//! ReadChecksums   -> Checksums ...               of written chunks; equal chunks are not sent again
 //! BeginImage      -> (nothing)
 //! WriteLines ...  -> (nothing)                   any number, in any order, each up to eight lines
-//! EndImage        -> ImageAccepted               the checksum of all lines compared, the header read
+//! EndImage        -> ImageAccepted               after the check of the checksum and the header
 //! BeginFrame      -> FrameAccepted
 //! RenderTile ...  -> Pixels ..., TileDone        at most the budget's `tiles` unanswered
 //! ```
 //!
-//! Whatever a card cannot do it answers with [`Reply::Fault`]; it stays ready for the next command.
+//! A command that the card cannot execute is answered with [`Reply::Fault`]; the card stays ready for the next one.
 
 mod fault;
 mod pixel;
@@ -27,27 +27,27 @@ use serde::{Deserialize, Serialize};
 use crate::budget::Budget;
 use crate::counters::Counters;
 
-/// The version of this module, of [`crate::transport`] and of [`crate::frame`].
+/// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
 pub const PROTOCOL_VERSION: u16 = 9;
 
-/// Lines that one [`Command::WriteLines`] may carry.
+/// Maximum number of lines of one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
 
-/// Lines of a chunk: what one of [`Reply::Checksums`] is of.
+/// Number of lines of a chunk, the unit of [`Reply::Checksums`].
 pub const CHUNK_LINES: u32 = 64;
 
-/// What a firmware takes of its chip's on-chip memory, as its board measures it.
+/// On-chip memory that a firmware uses, as its board measures it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MemoryUse {
     /// Static data, initialised and zeroed, bytes.
     pub static_bytes: u32,
     /// Size of the stack, bytes.
     pub stack_bytes: u32,
-    /// The most bytes of the stack that have been in use since the chip was switched on.
+    /// Maximum of the stack in use since the chip was switched on, bytes.
     pub stack_used: u32,
 }
 
-/// Checksums that one [`Reply::Checksums`] may carry.
+/// Maximum number of checksums of one [`Reply::Checksums`].
 pub const CHECKSUMS_PER_REPLY: u32 = 64;
 
 /// A pinhole camera. The ray through the picture's point `(u, v)`, both from 0 to 1, v downwards, has the direction
@@ -64,12 +64,12 @@ pub struct Camera {
     pub up: [f32; 3],
 }
 
-/// All that a picture depends on besides the card image.
+/// Parameters of a frame: everything besides the card image that its pixels depend on, and its order of work.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameParameters {
-    /// Pixels of the whole picture in a row.
+    /// Width of the whole picture, pixels.
     pub width: u32,
-    /// Rows of the whole picture.
+    /// Height of the whole picture, pixels.
     pub height: u32,
     /// The view.
     pub camera: Camera,
@@ -81,80 +81,80 @@ pub struct FrameParameters {
     pub gather_rays: u32,
     /// Shadow rays a sample.
     pub shadow_rays: u32,
-    /// Photons a gather looks for, at least 2: the last only tells how far it looked.
+    /// Number k of photons of a gather, at least 2: the k-th only determines the radius.
     pub neighbors: u32,
-    /// How far from its place a gather looks, metres.
+    /// Maximum radius of a gather, metres.
     pub max_distance: f32,
-    /// Which way gather rays go.
+    /// Importance sampling of gather rays.
     pub sampling: Sampling,
-    /// The relative error that interpolated irradiance may have, above 0 and at most 1; without one no irradiance is interpolated.
+    /// Relative error bound of interpolated irradiance, above 0 and at most 1; `None` turns the irradiance cache off.
     pub irradiance_error: Option<f32>,
-    /// Bins that the directions of gather rays are grouped in, at least 1: the rays of one bin are cast for all pixels
-    /// of a tile before those of the next. One bin casts all rays of a pixel before those of the next.
+    /// Number of direction bins of gather rays, at least 1: the rays of one bin are cast for all pixels of a tile before
+    /// those of the next bin. With one bin, all rays of a pixel are cast before those of the next pixel.
     pub bins: u32,
-    /// When gathers are done.
+    /// Time and order of gathers.
     pub drain: Drain,
-    /// Gathers that wait at most, at least 1; a chip takes what it has room for.
+    /// Maximum number of waiting gathers, at least 1; a chip limits it to the capacity of its queue.
     pub queue: u32,
-    /// What tells the radiance at the end of a gather ray.
+    /// Source of the radiance at the end of a gather ray.
     pub radiance: Radiance,
-    /// The gathers of caustics; without them gather rays bring the light of emitters by way of perfectly specular surfaces.
+    /// Gathers in the caustic map; with `None`, emission that gather rays meet through perfectly specular surfaces counts.
     pub caustics: Option<CausticGather>,
-    /// Whether pixels come with their [`PixelLayers`]. The rest of them is the same; a tile has fewer
+    /// `true` for pixels with [`PixelLayers`]. Their [`Pixel`]s do not change; tiles have fewer pixels
     /// ([`Budget::pixels_of_tile`]).
     pub layers: bool,
 }
 
-/// What a gather of caustics looks for.
+/// Parameters of gathers in the caustic map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CausticGather {
-    /// Photons, at least 2: the last only tells how far it looked.
+    /// Number k of photons, at least 2: the k-th only determines the radius.
     pub neighbors: u32,
-    /// How far from its place it looks, metres.
+    /// Maximum radius, metres.
     pub max_distance: f32,
 }
 
-/// What the directions of final gather rays are chosen by. The expectation of the picture is the same.
+/// Importance sampling of final gather rays. The expectation of the picture does not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sampling {
-    /// The reflection function and the cosine.
+    /// By the reflection function and the cosine.
     #[default]
     Reflection,
-    /// The photons that arrive at the point.
+    /// By the flux of the photons at the point.
     Photon,
-    /// The product of both.
+    /// By the product of reflection and flux.
     Product,
-    /// The mean of both.
+    /// By the mean of reflection and flux.
     Mixture,
 }
 
-/// What tells the radiance of a surface at the end of a gather ray.
+/// Source of the reflected radiance at the end of a gather ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Radiance {
-    /// The density of the photons nearest to it.
+    /// Density of the nearest photons.
     #[default]
     Density,
-    /// Of a Lambertian surface the nearest irradiance point, which the image must have (Christensen 1999, *Faster photon map
-    /// global illumination*); of one with a Phong lobe the density of photons.
+    /// Nearest irradiance point, which the image must have (Christensen 1999, *Faster photon map global illumination*), for
+    /// Lambertian surfaces; density of photons for surfaces with a lobe.
     Precomputed,
 }
 
-/// When gathers are done, and in which order. The picture is the same.
+/// Time and order of gathers. The picture does not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Drain {
-    /// At once.
+    /// At the end of their ray, without a queue.
     #[default]
     Immediate,
-    /// When the queue is full or their results are needed, by a spatial hash of their place.
+    /// By a spatial hash of their position, when the queue is full or their results are needed.
     Hash,
-    /// When the queue is full or their results are needed, along a Hilbert curve.
+    /// Along a Hilbert curve, when the queue is full or their results are needed.
     Sort,
 }
 
 /// A rectangle of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tile {
-    /// The host's number for it.
+    /// Number of the tile, chosen by the host.
     pub id: u32,
     /// First column.
     pub x: u32,
@@ -173,67 +173,67 @@ impl Tile {
     }
 }
 
-/// From the host to a card.
+/// Message from the host to a card.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
-    /// Who are you? Any time; forgets frame and tiles, and whether there is an image. Lines that are written stay.
-    /// It is the same in all versions of the protocol.
+    /// Begins a session, at any time. The card forgets frame, tiles, and whether it has an image; written lines stay. Its
+    /// encoding is equal in all versions of the protocol.
     Hello {
         /// The host's [`PROTOCOL_VERSION`].
         protocol: u16,
         /// The host's [`crate::image::LAYOUT_VERSION`].
         layout: u16,
     },
-    /// Tell the checksums of some chunks, at most [`CHECKSUMS_PER_REPLY`] of them.
+    /// Requests the checksums of up to [`CHECKSUMS_PER_REPLY`] chunks.
     ReadChecksums {
         /// The first chunk.
         first: u32,
-        /// How many.
+        /// Number of chunks.
         count: u32,
     },
-    /// An image of so many lines follows, with this checksum of all its bytes.
+    /// Announces an image: number of lines, and checksum of all its bytes.
     BeginImage {
         /// Lines.
         lines: u32,
-        /// [`crate::checksum::image_checksum`] of them.
+        /// [`crate::checksum::image_checksum`] of the lines.
         checksum: u64,
     },
-    /// Lines of the image.
+    /// Writes lines of the image.
     WriteLines {
-        /// Number of the first.
+        /// Number of the first line.
         first: u32,
         /// Whole lines, at most [`LINES_PER_WRITE`].
         #[serde(borrow)]
         data: &'a [u8],
     },
-    /// The image is complete.
+    /// Ends the image, which is then checked.
     EndImage,
-    /// The parameters of the tiles to come.
+    /// Sets the parameters of the tiles that follow.
     BeginFrame(FrameParameters),
-    /// Render a tile.
+    /// Renders a tile.
     RenderTile(Tile),
 }
 
-/// From a card to the host.
+/// Message from a card to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply<'a> {
-    /// Who I am. The versions come first in all versions of the protocol: [`hello_versions`].
+    /// Answer to [`Command::Hello`]. The versions are first in all versions of the protocol: [`hello_versions`].
     Hello {
         /// The card's [`PROTOCOL_VERSION`].
         protocol: u16,
         /// The card's [`crate::image::LAYOUT_VERSION`].
         layout: u16,
-        /// What the chip can hold.
+        /// Capacities of the chip.
         budget: Budget,
-        /// Lines of its memory, from the first on, that were written since it was switched on: what is beyond is nothing.
+        /// Number of lines of card memory, from the first, that were written since the card was switched on.
         written_lines: u32,
-        /// What the firmware takes of on-chip memory; `None` where nobody measures it, as of an emulated chip.
+        /// On-chip memory that the firmware uses; `None` on cards that do not measure it, such as emulated ones.
         memory_use: Option<MemoryUse>,
         /// Name and version of the firmware.
         #[serde(borrow)]
         build: &'a str,
     },
-    /// Checksums of chunks.
+    /// Answer to [`Command::ReadChecksums`].
     Checksums {
         /// The first chunk.
         first: u32,
@@ -241,52 +241,52 @@ pub enum Reply<'a> {
         #[serde(borrow)]
         data: &'a [u8],
     },
-    /// The image is in memory and its header is sound.
+    /// Answer to [`Command::EndImage`]: the checksum agrees, and the header is sound.
     ImageAccepted,
-    /// Tiles may come.
+    /// Answer to [`Command::BeginFrame`]: the card can render it.
     FrameAccepted,
-    /// Some pixels of a tile, in rows, [`record_bytes`] each.
+    /// Consecutive pixels of a tile in row-major order, [`record_bytes`] each.
     Pixels {
         /// The tile's number.
         tile: u32,
-        /// The first of these pixels, counted in the tile's rows.
+        /// Index of the first of these pixels, row-major.
         first: u32,
         /// [`PixelRecord`]s.
         #[serde(borrow)]
         data: &'a [u8],
     },
-    /// All pixels of this tile are sent.
+    /// End of a tile, after all its pixels.
     TileDone {
         /// The tile's number.
         tile: u32,
-        /// The work that it took.
+        /// Work on the tile.
         counters: Counters,
     },
-    /// A command could not be done.
+    /// Answer to a command that the card cannot execute.
     Fault(Fault),
 }
 
-/// Writes a message into `bytes`; its length, or `None` if there is no room.
+/// Writes a message into `bytes` and returns its length; `None` if there is no room.
 pub fn encode<T: Serialize>(message: &T, bytes: &mut [u8]) -> Option<usize> {
     postcard::to_slice(message, bytes).ok().map(|written| written.len())
 }
 
-/// Reads a message that fills all of `bytes`; `None` if they are anything else.
+/// Reads a message that fills `bytes` exactly; `None` for any other bytes.
 pub fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
     postcard::take_from_bytes(bytes).ok().filter(|(_, rest)| rest.is_empty()).map(|(message, _)| message)
 }
 
-/// The versions of a hello.
+/// Versions in a hello.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Versions {
-    /// The protocol's.
+    /// Version of the protocol.
     pub protocol: u16,
-    /// The card image's layout's.
+    /// Version of the card image's layout.
     pub layout: u16,
 }
 
-/// Reads the versions of a [`Reply::Hello`] of any version of the protocol; `None` of any other reply. They come first in
-/// all versions, whatever follows.
+/// Reads the versions of a [`Reply::Hello`] of any version of the protocol, in which they are first; `None` for other
+/// replies.
 pub fn hello_versions(bytes: &[u8]) -> Option<Versions> {
     let (opcode, rest) = postcard::take_from_bytes::<u32>(bytes).ok()?;
     let (versions, _) = postcard::take_from_bytes(rest).ok()?;

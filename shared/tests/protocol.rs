@@ -1,6 +1,6 @@
 //! What crosses the wire: frames come back whole or not at all, opcodes stay what they are.
 
-use photoncard_shared::budget::{Budget, REFERENCE};
+use photoncard_shared::budget::Budget;
 use photoncard_shared::checksum::checksum;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::{
@@ -8,6 +8,24 @@ use photoncard_shared::frame::{
 };
 use photoncard_shared::message::*;
 use proptest::prelude::*;
+
+/// A budget of distinct values, as large as those of cards.
+const BUDGET: Budget = Budget {
+    sram_bytes: 1 << 20,
+    dram_bytes: 512 << 20,
+    photon_cache_bytes: 128 << 10,
+    scene_cache_bytes: 75 << 10,
+    stack_bytes: 16 << 10,
+    tile_pixels: 4096,
+    neighbors: 256,
+    gather_rays: 1 << 14,
+    gather_queue: 12_640,
+    irradiance_records: 512,
+    gathered_records: 511,
+    shadow_rays: 64,
+    samples: 4097,
+    tiles: 4,
+};
 
 const HEADER: FrameHeader =
     FrameHeader { kind: FrameKind::Data, session: 0x1234_5678, sequence: 0, acknowledged: 7, held: 0b101 };
@@ -186,7 +204,7 @@ fn opcodes_are_pinned() {
     }
     assert_eq!(encoded(&Command::RenderTile(tile)), [6, 1, 2, 3, 4, 5]);
     let hello = |memory_use| {
-        let budget = REFERENCE;
+        let budget = BUDGET;
         Reply::Hello { protocol: 1, layout: 1, budget, written_lines: 0, memory_use, build: "x" }
     };
     let replies = [
@@ -330,7 +348,7 @@ fn fault_codes_are_pinned() {
 
 #[test]
 fn the_versions_of_a_hello_are_read_whatever_follows() {
-    let budget = REFERENCE;
+    let budget = BUDGET;
     let hello =
         Reply::Hello { protocol: 300, layout: 2, budget, written_lines: 0, memory_use: None, build: "x" };
     let versions = Versions { protocol: 300, layout: 2 };

@@ -13,7 +13,7 @@ use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::Photons;
 use photoncard_driver::photon_map::store_photons;
-use photoncard_firmware::gather::Place;
+use photoncard_firmware::gather::HilbertCode;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::layout::{FULL_DISC, Photon, Rgbe};
@@ -106,7 +106,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut along_curve = random.clone();
     // What tells a place is its number along the curve.
     let grid = image.view().0.header.photon_grid;
-    along_curve.sort_by_key(|&query| Place::new(&grid, query));
+    along_curve.sort_by_key(|&query| HilbertCode::new(&grid, query));
     if let Some(folder) = folder {
         let write = |name: &str, places: &[[f32; 3]]| {
             let bytes: Vec<u8> = places.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();

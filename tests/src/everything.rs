@@ -34,7 +34,7 @@ pub fn everything() -> Scene {
             scene.triangles[index].attributes = scene.attributes.len() as u32;
             let coordinates = vertices.map(|vertex| Vec2::new(vertex.x + vertex.z, vertex.y - vertex.z));
             let colours = [[1.0, 0.9, 0.8, 1.0], [0.7, 1.0, 0.6, 1.0], [0.9, 0.5, 1.0, 1.0]];
-            scene.attributes.push(photoncard_driver::scene::Attributes {
+            scene.attributes.push(photoncard_driver::scene::VertexAttributes {
                 normals: None,
                 coordinates: [coordinates, coordinates.map(|coordinate| coordinate * 3.0)],
                 colours,

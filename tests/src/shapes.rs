@@ -1,7 +1,7 @@
 //! Shapes for scenes of tests.
 
 use glam::{Vec2, Vec3};
-use photoncard_driver::scene::{Attributes, Scene, Triangle};
+use photoncard_driver::scene::{Scene, Triangle, VertexAttributes};
 
 use crate::{quad, room};
 
@@ -39,7 +39,9 @@ pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, materi
                 // Quadrilaterals at the poles are triangles.
                 if triangle.area() > 0.0 {
                     scene.triangles.push(triangle);
-                    scene.attributes.push(Attributes { normals: Some(normals), ..Attributes::NONE });
+                    scene
+                        .attributes
+                        .push(VertexAttributes { normals: Some(normals), ..VertexAttributes::NONE });
                 }
             }
         }
@@ -52,6 +54,8 @@ pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f
     let [a, b, c, d] = coordinates.map(Vec2::from);
     for (triangle, coordinates) in quad(corners, material).into_iter().zip([[a, b, c], [a, c, d]]) {
         scene.triangles.push(Triangle { attributes: scene.attributes.len() as u32, ..triangle });
-        scene.attributes.push(Attributes { coordinates: [coordinates, [Vec2::ZERO; 3]], ..Attributes::NONE });
+        scene
+            .attributes
+            .push(VertexAttributes { coordinates: [coordinates, [Vec2::ZERO; 3]], ..VertexAttributes::NONE });
     }
 }

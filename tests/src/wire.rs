@@ -3,7 +3,6 @@
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::budget::MICRO;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{
     self, Command, Fault, FaultCode, LINES_PER_WRITE, MemoryUse, PROTOCOL_VERSION, Reply, record_bytes,
@@ -42,7 +41,7 @@ pub enum Answer {
 impl<'a> Wire<'a> {
     /// A card that was just switched on, with `memory` for its DRAM.
     pub fn new(memory: &'a mut [Line]) -> Self {
-        let card = Box::new(MicroCard::new(MICRO, Dram::new(memory)));
+        let card = Box::new(MicroCard::new(Dram::new(memory)));
         Self { card, host: Transport::host(), session: 0, layers: false }
     }
 

@@ -6,7 +6,8 @@ use glam::{Vec2, Vec3};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
 use photoncard_driver::scene::{
-    Attributes, Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Scene, Texture, Triangle,
+    Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Scene, Texture, Triangle,
+    VertexAttributes,
 };
 use photoncard_firmware::scene::light::{environment_direction, environment_radiance};
 use photoncard_tests::{camera, lambertian, quad, room, scene};
@@ -141,7 +142,7 @@ fn a_panel_with_a_texture_emits_its_mean_and_all_lights_together_their_sum() {
     all.triangles.extend(quad([corner(-1., 1.), corner(1., 1.), corner(1., -1.), corner(-1., -1.)], 1));
     let [a, b, c, d] = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
     for (corners, index) in [([a, b, c], 0), ([a, c, d], 1)] {
-        all.attributes.push(Attributes { coordinates: [corners; 2], ..Attributes::NONE });
+        all.attributes.push(VertexAttributes { coordinates: [corners; 2], ..VertexAttributes::NONE });
         all.triangles[12 + index as usize].attributes = index;
     }
     all.materials.push(Material {

@@ -8,7 +8,7 @@ use photoncard_driver::render::{
 };
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
-use photoncard_shared::budget::{MICRO, REFERENCE};
+use photoncard_firmware::kind::{MICRO, REFERENCE};
 use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
 

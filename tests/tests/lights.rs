@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use glam::{Vec2, Vec3};
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Attributes, Camera, Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Scene, Texture,
-    Triangle,
+    Camera, Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Scene, Texture, Triangle,
+    VertexAttributes,
 };
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, scene};
 
@@ -188,7 +188,7 @@ fn panel(emission: f32, image: Option<Image>) -> Scene {
         material.emissive_texture = Some(0);
         let [a, b, c, d] = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
         for (corners, index) in [([a, b, c], 0), ([a, c, d], 1)] {
-            scene.attributes.push(Attributes { coordinates: [corners; 2], ..Attributes::NONE });
+            scene.attributes.push(VertexAttributes { coordinates: [corners; 2], ..VertexAttributes::NONE });
             scene.triangles[2 + index as usize].attributes = index;
         }
     }

@@ -13,8 +13,8 @@ use photoncard_driver::render::{
 };
 use photoncard_driver::scene::gltf;
 use photoncard_firmware::card::MicroCard;
+use photoncard_firmware::kind::MICRO;
 use photoncard_firmware::memory::Dram;
-use photoncard_shared::budget::MICRO;
 use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
 

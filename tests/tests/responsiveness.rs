@@ -11,10 +11,10 @@ use photoncard_driver::photon::trace;
 use photoncard_driver::photon_map::store_photons;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_firmware::card::MicroCard;
+use photoncard_firmware::kind::MICRO;
 use photoncard_firmware::memory::{CardMemory, MemoryPort};
 use photoncard_firmware::serve::serve;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::budget::MICRO;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::link::{Port, PortError};
@@ -111,7 +111,7 @@ fn most_reads(frame: &FrameParameters) -> u64 {
     let mut port =
         HostPort { host: Transport::host(), commands, reads: &reads, before: 0, most: 0, tiles: 0 };
     port.host.open(1);
-    let mut card = Box::new(MicroCard::new(MICRO, CountingMemory { lines, reads: &reads }));
+    let mut card = Box::new(MicroCard::new(CountingMemory { lines, reads: &reads }));
     assert_eq!(serve(&mut *card, &mut port), Err(PortError::Closed));
     assert_eq!(port.tiles, 1);
     port.most

@@ -41,7 +41,7 @@ const STEP: f32 = 1e-5;
 /// The codes of a leaf's photons.
 type Codes = [u8; LEAF_PHOTONS];
 /// Some of a leaf's photons.
-type Places = heapless::Vec<Place, LEAF_PHOTONS>;
+type DiscPhotons = heapless::Vec<DiscPhoton, LEAF_PHOTONS>;
 
 /// Measures the disc fraction of every photon for gathers of `neighbors` photons within `max_distance`, and writes it
 /// into the image. `go_on` is asked now and then.
@@ -94,7 +94,7 @@ struct Meter<'a> {
 
 /// A photon whose disc is measured.
 #[derive(Clone, Copy)]
-struct Place {
+struct DiscPhoton {
     /// Its number in its leaf.
     photon: usize,
     position: Vec3,
@@ -102,7 +102,7 @@ struct Place {
     normal: u8,
 }
 
-impl Place {
+impl DiscPhoton {
     /// The unit normal that the code stands for.
     fn coded_normal(&self) -> Vec3 {
         Vec3::from(decode_normal(self.normal)).normalize()
@@ -138,12 +138,12 @@ impl<'a> Meter<'a> {
         let mut measured = Vec::new();
         for (index, line) in (first..end).zip(&self.image.section(SectionKind::PhotonLeaves)[first..end]) {
             let leaf = PhotonLeaf::read(&line.0);
-            let photons: Places = (0..leaf.photons())
+            let photons: DiscPhotons = (0..leaf.photons())
                 .map(|photon| {
                     let [.., low, high] = leaf.content(photon);
                     let normal = Photon::normal_of_flags(u16::from_le_bytes([low, high]));
                     let position = grid.position(leaf.point(photon)).into();
-                    Place { photon: photon as usize, position, normal }
+                    DiscPhoton { photon: photon as usize, position, normal }
                 })
                 .collect();
             let fractions = self.measure(photons)?;
@@ -156,7 +156,7 @@ impl<'a> Meter<'a> {
     }
 
     /// The disc fractions of the photons of a leaf.
-    fn measure(&mut self, mut photons: Places) -> Result<[f32; LEAF_PHOTONS], Fault> {
+    fn measure(&mut self, mut photons: DiscPhotons) -> Result<[f32; LEAF_PHOTONS], Fault> {
         let mut fractions = [1.0; LEAF_PHOTONS];
         if self.is_plain(&photons, self.searcher.max_distance())? {
             return Ok(fractions);
@@ -173,7 +173,7 @@ impl<'a> Meter<'a> {
     }
 
     /// True if the spheres around some photons hold nothing but the plane that all of them lie on.
-    fn is_plain(&mut self, photons: &[Place], radius: f32) -> Result<bool, Fault> {
+    fn is_plain(&mut self, photons: &[DiscPhoton], radius: f32) -> Result<bool, Fault> {
         let Some(middle) = middle(photons) else { return Ok(true) };
         if photons.iter().any(|photon| photon.normal != middle.normal) {
             return Ok(false);
@@ -191,8 +191,8 @@ impl<'a> Meter<'a> {
     /// The disc fractions of photons within a radius of one of them, which is that of their gathers.
     fn measure_cluster(
         &mut self,
-        mut photons: Places,
-        middle: Place,
+        mut photons: DiscPhotons,
+        middle: DiscPhoton,
         radius: f32,
         fractions: &mut [f32; LEAF_PHOTONS],
     ) -> Result<(), Fault> {
@@ -220,7 +220,7 @@ impl<'a> Meter<'a> {
     /// The disc fractions of photons of about one normal.
     fn measure_group(
         &mut self,
-        group: &[Place],
+        group: &[DiscPhoton],
         frame: &ChordFrame,
         cluster: &Cluster,
         fractions: &mut [f32; LEAF_PHOTONS],
@@ -250,7 +250,7 @@ impl<'a> Meter<'a> {
 
     /// A frame along the normal of a photon, and a point above it with nothing in between: some of the radius, or half of
     /// what is free.
-    fn frame(&self, photon: &Place, cluster: &Cluster) -> Result<ChordFrame, Fault> {
+    fn frame(&self, photon: &DiscPhoton, cluster: &Cluster) -> Result<ChordFrame, Fault> {
         let Cluster { ball, radius, .. } = *cluster;
         let normal = self.exact_normal(photon, radius)?;
         let tangent = normal.any_orthonormal_vector();
@@ -264,7 +264,7 @@ impl<'a> Meter<'a> {
     }
 
     /// The normal of the surface that a photon lies on, which a short ray finds again; its code is rough.
-    fn exact_normal(&self, photon: &Place, radius: f32) -> Result<Vec3, Fault> {
+    fn exact_normal(&self, photon: &DiscPhoton, radius: f32) -> Result<Vec3, Fault> {
         let coded = photon.coded_normal();
         let above =
             offset_origin(photon.position, coded, magnitude(&[photon.position])) + coded * self.lift(radius);
@@ -326,22 +326,22 @@ impl<'a> Meter<'a> {
 }
 
 /// The photon nearest to the mean of some: on a curved surface the mean is off it.
-fn middle(photons: &[Place]) -> Option<Place> {
+fn middle(photons: &[DiscPhoton]) -> Option<DiscPhoton> {
     nearest(photons, photons.iter().map(|photon| photon.position).sum::<Vec3>() / photons.len() as f32)
 }
 
-fn nearest(photons: &[Place], to: Vec3) -> Option<Place> {
-    let distance = |photon: &&Place| photon.position.distance_squared(to);
+fn nearest(photons: &[DiscPhoton], to: Vec3) -> Option<DiscPhoton> {
+    let distance = |photon: &&DiscPhoton| photon.position.distance_squared(to);
     photons.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).copied()
 }
 
 /// The distance of the farthest of some photons from one of them, metres.
-fn spread(photons: &[Place], middle: Place) -> f32 {
+fn spread(photons: &[DiscPhoton], middle: DiscPhoton) -> f32 {
     photons.iter().map(|photon| photon.position.distance(middle.position)).fold(0.0, f32::max)
 }
 
 /// Takes those photons away that are chosen.
-fn split_off(photons: &mut Places, is_chosen: impl Fn(&Place) -> bool) -> Places {
+fn split_off(photons: &mut DiscPhotons, is_chosen: impl Fn(&DiscPhoton) -> bool) -> DiscPhotons {
     let chosen = photons.iter().filter(|photon| is_chosen(photon)).copied().collect();
     photons.retain(|photon| !is_chosen(photon));
     chosen

@@ -1,10 +1,11 @@
 //! The greatest distance of gathers, from searches of the photon map on the host.
 
 use glam::Vec3;
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::scene::SceneImage;
-use photoncard_shared::budget::{REFERENCE, gather_candidates};
+use photoncard_shared::budget::gather_candidates;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::PhotonLeaf;
 use photoncard_shared::message::Fault;

@@ -8,8 +8,8 @@
 mod address;
 mod error;
 pub mod packet;
+mod queue;
 mod sender;
-mod state;
 #[cfg(test)]
 mod tests;
 

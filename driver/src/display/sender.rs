@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use photoncard_shared::message::Tile;
 
 use super::packet::{create_image, update_image};
-use super::state::{SharedState, State};
+use super::queue::{PacketQueue, SharedQueue};
 use super::{DisplayAddress, DisplayError};
 use crate::film::{Film, FilmPixel, Window};
 use crate::layer::Channel;
@@ -41,7 +41,7 @@ pub struct Display {
     settings: DisplaySettings,
     window: Window,
     channels: Vec<Channel>,
-    state: Arc<SharedState>,
+    queue: Arc<SharedQueue>,
     most_waiting: usize,
 }
 
@@ -58,18 +58,18 @@ impl Display {
         window: Window,
         channels: &[Channel],
     ) -> Self {
-        let state = Arc::new(SharedState::default());
+        let queue = Arc::new(SharedQueue::default());
         let display = Self {
             settings: settings.clone(),
             window,
             channels: channels.to_vec(),
-            state: state.clone(),
+            queue: queue.clone(),
             most_waiting,
         };
         let size = [window.width(), window.height()];
-        state.lock().push(create_image(&settings.image, size, &display.names()));
+        queue.lock().push(create_image(&settings.image, size, &display.names()));
         let address = settings.address.clone();
-        let work = move || send_packets(&address, &state);
+        let work = move || send_packets(&address, &queue);
         // The thread is not joined: a look-up of a name may take any time.
         let begun = std::thread::Builder::new().name("display".into()).spawn(work);
         if let Err(source) = begun {
@@ -94,54 +94,54 @@ impl Display {
 
     /// The error that ended the display, returned once. After an error nothing more is shown.
     pub fn failure(&self) -> Option<DisplayError> {
-        self.state.lock().take_failure()
+        self.queue.lock().take_failure()
     }
 
     /// Sends the tiles that found no room before, and waits until all packets are sent: at most 20 s, at most 2 s
     /// without progress.
     pub fn finish(&self, film: &Film) {
-        let missed = std::mem::take(&mut self.state.lock().missed);
+        let missed = std::mem::take(&mut self.queue.lock().missed);
         let mut watch = Watch::new();
         for finished in missed.iter().filter_map(|tile| film.finished(tile)) {
             let packet = self.packet(&finished);
-            let has_room = |state: &State| state.has_room(packet.len(), self.most_waiting);
-            if !watch.wait_until(&self.state, |state| !state.is_open() || has_room(state)) {
+            let has_room = |queue: &PacketQueue| queue.has_room(packet.len(), self.most_waiting);
+            if !watch.wait_until(&self.queue, |queue| !queue.is_open() || has_room(queue)) {
                 return self.give_up(missed.len());
             }
-            self.state.change(|state| {
-                if state.is_open() {
-                    state.push(packet);
+            self.queue.change(|queue| {
+                if queue.is_open() {
+                    queue.push(packet);
                 }
             });
         }
-        if !watch.wait_until(&self.state, |state| !state.is_open() || state.is_empty()) {
+        if !watch.wait_until(&self.queue, |queue| !queue.is_open() || queue.is_empty()) {
             self.give_up(0);
         }
     }
 
     /// Ends the display as too slow: it lacks the waiting packets, and up to `missed` tiles.
     fn give_up(&self, missed: usize) {
-        let packets = self.state.lock().left() + missed;
+        let packets = self.queue.lock().left() + missed;
         self.fail(DisplayError::Slow { address: self.settings.address.clone(), packets });
     }
 
     fn fail(&self, error: DisplayError) {
-        self.state.change(|state| state.fail(error));
+        self.queue.change(|queue| queue.fail(error));
     }
 }
 
 impl TileSink for Display {
     /// Shows a tile, now or, if too much waits to be sent, when the picture is [finished](Display::finish).
     fn put(&self, tile: &FinishedTile) {
-        if !self.state.lock().is_open() {
+        if !self.queue.lock().is_open() {
             return;
         }
         let packet = self.packet(tile);
-        self.state.change(|state| {
-            if state.has_room(packet.len(), self.most_waiting) {
-                state.push(packet);
+        self.queue.change(|queue| {
+            if queue.has_room(packet.len(), self.most_waiting) {
+                queue.push(packet);
             } else {
-                state.missed.push(*tile.tile());
+                queue.missed.push(*tile.tile());
             }
         });
     }
@@ -152,7 +152,7 @@ impl TileSink for Display {
 
 impl Drop for Display {
     fn drop(&mut self) {
-        self.state.change(|state| state.is_closed = true);
+        self.queue.change(|queue| queue.is_closed = true);
     }
 }
 
@@ -170,9 +170,9 @@ impl Watch {
     }
 
     /// Waits until `is_ready` holds. Returns whether it does; false if the display takes too long.
-    fn wait_until(&mut self, state: &SharedState, is_ready: impl Fn(&State) -> bool) -> bool {
-        while !state.wait_until(WRITE_WAIT, &is_ready) {
-            let sent = state.lock().sent;
+    fn wait_until(&mut self, queue: &SharedQueue, is_ready: impl Fn(&PacketQueue) -> bool) -> bool {
+        while !queue.wait_until(WRITE_WAIT, &is_ready) {
+            let sent = queue.lock().sent;
             if sent != self.sent {
                 self.sent = sent;
                 self.moved = Instant::now();
@@ -186,14 +186,14 @@ impl Watch {
 }
 
 /// Connects, and sends packets until the display is closed or fails.
-fn send_packets(address: &DisplayAddress, state: &SharedState) {
+fn send_packets(address: &DisplayAddress, queue: &SharedQueue) {
     let result = match connect(address) {
-        Ok(mut stream) => send_all(&mut stream, state)
+        Ok(mut stream) => send_all(&mut stream, queue)
             .map_err(|source| DisplayError::Gone { address: address.clone(), source }),
         Err(source) => Err(DisplayError::Connect { address: address.clone(), source }),
     };
     if let Err(error) = result {
-        state.change(|state| state.fail(error));
+        queue.change(|queue| queue.fail(error));
     }
 }
 
@@ -212,8 +212,8 @@ fn connect(address: &DisplayAddress) -> io::Result<TcpStream> {
     Err(last)
 }
 
-fn send_all(stream: &mut TcpStream, state: &SharedState) -> io::Result<()> {
-    while let Some(packet) = state.next() {
+fn send_all(stream: &mut TcpStream, queue: &SharedQueue) -> io::Result<()> {
+    while let Some(packet) = queue.next() {
         let mut rest = packet.as_slice();
         while !rest.is_empty() {
             let count = match stream.write(rest) {
@@ -223,7 +223,7 @@ fn send_all(stream: &mut TcpStream, state: &SharedState) -> io::Result<()> {
                 Err(error) => return Err(error),
             };
             rest = &rest[count..];
-            if !state.advance(count, rest.is_empty()) {
+            if !queue.advance(count, rest.is_empty()) {
                 return Ok(());
             }
         }

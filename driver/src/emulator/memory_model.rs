@@ -114,10 +114,9 @@ impl FromStr for CacheSettings {
         let index = index.unwrap_or_default();
         let with_index = |spec: CacheSpec| CacheSpec { index, ..spec };
         match unified {
-            Some(_) if photon.is_some() || scene.is_some() => Err(
-                "a unified cache is instead of those of the photon map and the scene; give one or the other"
-                    .into(),
-            ),
+            Some(_) if photon.is_some() || scene.is_some() => {
+                Err("unified replaces the caches photon and scene: give unified, or photon and scene".into())
+            }
             Some(unified) => Ok(Self::Unified(with_index(unified))),
             None => Ok(Self::Split {
                 photon: with_index(photon.unwrap_or(CacheSpec::PHOTON)),
@@ -281,7 +280,7 @@ mod tests {
             ("photon=99999M/128/4", "too large"),
             ("photon=1000M/128/4", "above"),
             ("photon=128K/128/4,photon=128K/128/4", "twice"),
-            ("unified=128K/128/4,scene=128K/128/4", "one or the other"),
+            ("unified=128K/128/4,scene=128K/128/4", "unified replaces the caches"),
             ("index=random", "modulo or hash"),
             ("texture=1K/128/1", "photon=SIZE"),
         ] {

@@ -10,11 +10,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard, REFERENCE_SRAM_BYTES, ReferenceCard};
-use photoncard_firmware::chip::{MicroChip, ReferenceChip, sram_bytes, tag_bytes};
+use photoncard_firmware::card::{Card, sram_bytes};
+use photoncard_firmware::chip::Chip;
+use photoncard_firmware::kind::{
+    self, ChipKind as _, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
+};
 use photoncard_firmware::memory::CardMemory;
 use photoncard_firmware::serve::serve;
-use photoncard_shared::budget::{Budget, MICRO, REFERENCE, TechniqueMemory};
+use photoncard_shared::budget::Budget;
 use photoncard_shared::link::Port;
 
 use self::dram::EmulatedDram;
@@ -27,9 +30,9 @@ use crate::link::{LoopbackPort, loopback};
 /// Kind of the chip on an emulated card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChipKind {
-    /// A chip of the budget [`REFERENCE`].
+    /// A chip of the budget [`REFERENCE`](photoncard_firmware::kind::REFERENCE).
     Reference,
-    /// A chip of the budget [`MICRO`].
+    /// A chip of the budget [`MICRO`](photoncard_firmware::kind::MICRO).
     Micro,
 }
 
@@ -42,16 +45,16 @@ impl ChipKind {
     /// On-chip memory of the firmware, its caches and stack included, bytes.
     pub fn sram_bytes(self) -> usize {
         match self {
-            Self::Reference => REFERENCE_SRAM_BYTES,
-            Self::Micro => MICRO_SRAM_BYTES,
+            Self::Reference => sram_bytes::<Reference>(),
+            Self::Micro => sram_bytes::<Micro>(),
         }
     }
 
     /// On-chip memory that each technique adds, bytes.
     pub fn techniques(self) -> TechniqueMemory {
         match self {
-            Self::Reference => ReferenceChip::TECHNIQUES,
-            Self::Micro => MicroChip::TECHNIQUES,
+            Self::Reference => Chip::<Reference>::TECHNIQUES,
+            Self::Micro => Chip::<Micro>::TECHNIQUES,
         }
     }
 
@@ -62,14 +65,15 @@ impl ChipKind {
 
     pub(crate) fn budget(self) -> Budget {
         match self {
-            Self::Reference => REFERENCE,
-            Self::Micro => MICRO,
+            Self::Reference => Reference::BUDGET,
+            Self::Micro => Micro::BUDGET,
         }
     }
 
     /// On-chip memory of the buffers of tile and link, bytes.
     pub fn buffer_bytes(self) -> usize {
-        self.sram_bytes() - sram_bytes(&self.budget(), 0)
+        let budget = self.budget();
+        self.sram_bytes() - cache_bytes(&budget) - budget.stack_bytes as usize
     }
 }
 
@@ -195,17 +199,19 @@ fn serve_on<M: CardMemory, R>(
     port: &mut impl Port,
     end: impl FnOnce(&mut M) -> R,
 ) -> R {
-    // The end of the link is no error: it is how the host ends a card.
     match kind {
-        ChipKind::Reference => {
-            let mut card = Box::new(ReferenceCard::new(REFERENCE, memory));
-            let _ = serve(&mut *card, port);
-            end(card.memory())
-        }
-        ChipKind::Micro => {
-            let mut card = Box::new(MicroCard::new(MICRO, memory));
-            let _ = serve(&mut *card, port);
-            end(card.memory())
-        }
+        ChipKind::Reference => serve_kind::<Reference, M, R>(memory, port, end),
+        ChipKind::Micro => serve_kind::<Micro, M, R>(memory, port, end),
     }
+}
+
+fn serve_kind<K: kind::ChipKind, M: CardMemory, R>(
+    memory: M,
+    port: &mut impl Port,
+    end: impl FnOnce(&mut M) -> R,
+) -> R {
+    let mut card = Box::new(Card::<K, M>::new(memory));
+    // The end of the link is no error: it is how the host ends a card.
+    let _ = serve(&mut *card, port);
+    end(card.memory())
 }

@@ -10,20 +10,21 @@ use glam::Vec3;
 use photoncard_firmware::chip::{Completion, Component, ReferenceChip};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::CandidateBuffer;
 use photoncard_firmware::render::final_gather::gathered;
 use photoncard_firmware::render::{Context, GatherOutlet};
-use photoncard_shared::budget::{REFERENCE, gather_candidates, sums_of_pixel};
+use photoncard_shared::budget::{gather_candidates, sums_of_pixel};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Fault, FrameParameters, Tile};
+use photoncard_shared::message::{Fault, FaultCode, FrameParameters, PixelRecord, Tile};
 use rayon::prelude::*;
 
 use super::THREAD_STACK;
 use super::direct::{RenderedTile, render_tile};
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
-use crate::film::{Film, FilmError};
 use crate::pack::CardImage;
+use crate::sink::{FinishedTile, TileSink, pixel_positions};
 
 /// Maximum number of gathers that are kept at once, 32 bytes each: 4.3 GB.
 const MAX_GATHERS: u64 = 1 << 27;
@@ -53,9 +54,6 @@ pub enum FrameError {
     /// The threads cannot be started.
     #[error("the chips could not be started: {0}")]
     Start(#[from] rayon::ThreadPoolBuildError),
-    /// A tile does not lie in the film.
-    #[error(transparent)]
-    Film(#[from] FilmError),
     /// The caller stopped the render.
     #[error("stopped before the picture was complete")]
     Stopped,
@@ -120,21 +118,22 @@ pub struct CurveOutcome {
     pub traffic: MemoryTraffic,
 }
 
-/// Renders tiles into a film. `progress(done, total)` is called with the work that is done, in tiles, and returns
-/// whether to go on. With `caches` the memory is modelled.
+/// Renders tiles into sinks, all of them at the end. `progress(done, total)` is called with the work that is done, in
+/// tiles, and returns whether to go on. With `caches` the memory is modelled.
 ///
-/// # Errors If the frame has too many gathers, the card image is malformed, the threads cannot be started, a tile does
-/// not lie in the film, or `progress` returns false.
+/// # Errors
+/// If the frame has too many gathers, the card image is malformed, the threads cannot be started, or `progress` returns
+/// false.
 pub fn render_along_curve(
     job: CurveJob,
     caches: Option<&CacheSettings>,
-    film: &mut Film,
+    sinks: &[&dyn TileSink],
     progress: &(dyn Fn(u64, u64) -> bool + Sync),
 ) -> Result<CurveOutcome, FrameError> {
     match caches {
-        None => render_with(job, GATHERS_PER_TASK, &|memory| memory, film, progress),
+        None => render_with(job, GATHERS_PER_TASK, &|memory| memory, sinks, progress),
         Some(caches) => {
-            render_with(job, GATHERS_PER_COUNTED_TASK, &|memory| caches.over(memory), film, progress)
+            render_with(job, GATHERS_PER_COUNTED_TASK, &|memory| caches.over(memory), sinks, progress)
         }
     }
 }
@@ -143,7 +142,7 @@ fn render_with<'a, M: MeasuredMemory>(
     job: CurveJob<'a>,
     gathers_per_task: usize,
     model: &(impl Fn(Lines<'a>) -> M + Sync),
-    film: &mut Film,
+    sinks: &[&dyn TileSink],
     progress: &(dyn Fn(u64, u64) -> bool + Sync),
 ) -> Result<CurveOutcome, FrameError> {
     let CurveJob { frame, tiles, chips, .. } = job;
@@ -158,7 +157,7 @@ fn render_with<'a, M: MeasuredMemory>(
     for tiles in tiles.chunks(tiles_per_round) {
         all.add(frame, pool.install(|| cast_tiles(job, model, tiles, &go_on))?)?;
     }
-    pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.request.place));
+    pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.request.position));
     let mut done = 0;
     for waiting in all.waiting.chunks(GATHERS_PER_ROUND.max(chips * gathers_per_task)) {
         let parts: Result<Vec<_>, Fault> = pool.install(|| {
@@ -177,7 +176,7 @@ fn render_with<'a, M: MeasuredMemory>(
             return Err(FrameError::Stopped);
         }
     }
-    complete(job, model, &mut all, film)?;
+    complete(job, model, &mut all, sinks)?;
     Ok(CurveOutcome { counters: all.counters, traffic: all.traffic })
 }
 
@@ -253,26 +252,31 @@ fn cast_tiles<'a, M: MeasuredMemory>(
     tiles.par_iter().map_init(new_chip, cast_one).collect()
 }
 
-/// Completes the pixels and writes them into the film.
+/// Completes the pixels, and puts the tiles into sinks.
 fn complete<'a, M: MeasuredMemory>(
     job: CurveJob<'a>,
     model: &impl Fn(Lines<'a>) -> M,
     all: &mut Frame,
-    film: &mut Film,
+    sinks: &[&dyn TileSink],
 ) -> Result<(), FrameError> {
     let (scene, memory) = job.image.view();
     let mut memory = model(memory);
     let counters = &mut all.counters;
     let mut context =
         Context { scene: &scene, memory: &mut memory, frame: job.frame, counters, outlet: None };
-    let places = job.tiles.iter().flat_map(|tile| {
-        (0..tile.height).flat_map(move |y| (0..tile.width).map(move |x| (tile.x + x, tile.y + y)))
-    });
     let sums_of_pixel = sums_of_pixel(job.frame.layers) as usize;
-    for (sums, (x, y)) in all.sums.chunks_exact(sums_of_pixel).zip(places) {
-        let mut completion = Completion::NOTHING;
-        while !completion.step(&mut context, x, y)? {}
-        film.write_record(x, y, &completion.pixel(&context, sums))?;
+    let mut sums = all.sums.chunks_exact(sums_of_pixel);
+    for tile in job.tiles {
+        let pixels: Result<Vec<PixelRecord>, Fault> = (pixel_positions(tile).zip(sums.by_ref()))
+            .map(|((x, y), sums)| {
+                let mut completion = Completion::NOTHING;
+                while !completion.step(&mut context, x, y)? {}
+                Ok(completion.pixel(&context, sums))
+            })
+            .collect();
+        let finished = FinishedTile::of_pixels(*tile, pixels?, job.frame.layers)
+            .ok_or(Fault { code: FaultCode::Tile, detail: tile.id })?;
+        sinks.iter().for_each(|sink| sink.put(&finished));
     }
     all.traffic.add(&memory.traffic());
     Ok(())

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::footprint::Footprint;
 use super::pyramid::{Level, Pyramid, decode};
-use crate::scene::{Attributes, Image, Material, Scene, Triangle};
+use crate::scene::{Image, Material, Scene, Triangle, VertexAttributes};
 
 /// Maximum distance from its centre at which a texel contributes to bilinear interpolation, texels.
 const REACH: f64 = 1.0;
@@ -29,7 +29,8 @@ impl<'s> EmissiveTextures<'s> {
         let Some(index) = material.emissive_texture else { return emission };
         let Some(texture) = self.scene.textures.get(index as usize) else { return DVec3::ZERO };
         let Some(image) = self.scene.images.get(texture.image as usize) else { return DVec3::ZERO };
-        let attributes = self.scene.attributes.get(triangle.attributes as usize).unwrap_or(&Attributes::NONE);
+        let attributes =
+            self.scene.attributes.get(triangle.attributes as usize).unwrap_or(&VertexAttributes::NONE);
         let footprint = Footprint::new(texture, attributes);
         let mut mean = Mean::default();
         let texel = |index: usize, _| mean.add(decode(image.encoding, image.texels[index]), 1.0);
@@ -93,7 +94,7 @@ mod tests {
             Image { name: "spark".into(), width: side, height: side, texels, encoding: Encoding::Srgb };
         let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE];
         Scene {
-            attributes: vec![Attributes { coordinates: [corners; 2], ..Attributes::NONE }],
+            attributes: vec![VertexAttributes { coordinates: [corners; 2], ..VertexAttributes::NONE }],
             textures: vec![Texture::new(0)],
             images: vec![image],
             ..Scene::default()

@@ -1,6 +1,6 @@
 //! Footprint of a triangle on its texture: the texels that show on the triangle.
 
-use crate::scene::{Attributes, Texture, Wrap};
+use crate::scene::{Texture, VertexAttributes, Wrap};
 
 /// A triangle in the coordinates of a texture.
 pub(super) struct Footprint {
@@ -15,7 +15,7 @@ const FARTHEST: f64 = 1e12;
 const MAX_CELLS: f64 = 8192.0;
 
 impl Footprint {
-    pub(super) fn new(texture: &Texture, attributes: &Attributes) -> Self {
+    pub(super) fn new(texture: &Texture, attributes: &VertexAttributes) -> Self {
         let coordinates = attributes.coordinates[texture.set as usize & 1];
         let corners = coordinates.map(|coordinate| {
             let [u, v] = coordinate.to_array().map(f64::from);

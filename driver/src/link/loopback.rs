@@ -9,30 +9,31 @@ use photoncard_shared::link::{Port, PortError};
 /// One direction of the link.
 #[derive(Default)]
 struct Direction {
-    state: Mutex<State>,
+    queue: Mutex<ByteQueue>,
     changed: Condvar,
 }
 
+/// Bytes on their way.
 #[derive(Default)]
-struct State {
-    queue: VecDeque<u8>,
+struct ByteQueue {
+    bytes: VecDeque<u8>,
     closed: bool,
 }
 
 impl Direction {
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, ByteQueue> {
         // A thread that panicked holding the lock has left whole bytes.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Waits until `ready`, the link is closed or the time is over.
-    fn wait(&self, wait: Duration, ready: impl Fn(&State) -> bool) -> MutexGuard<'_, State> {
-        let state = self.lock();
-        if wait.is_zero() || ready(&state) || state.closed {
-            return state;
+    fn wait(&self, wait: Duration, ready: impl Fn(&ByteQueue) -> bool) -> MutexGuard<'_, ByteQueue> {
+        let queue = self.lock();
+        if wait.is_zero() || ready(&queue) || queue.closed {
+            return queue;
         }
-        let waiting = |state: &mut State| !ready(state) && !state.closed;
-        self.changed.wait_timeout_while(state, wait, waiting).unwrap_or_else(PoisonError::into_inner).0
+        let waiting = |queue: &mut ByteQueue| !ready(queue) && !queue.closed;
+        self.changed.wait_timeout_while(queue, wait, waiting).unwrap_or_else(PoisonError::into_inner).0
     }
 
     fn close(&self) {
@@ -58,12 +59,12 @@ pub fn loopback(capacity: usize) -> (LoopbackPort, LoopbackPort) {
 
 impl Port for LoopbackPort {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
-        let mut state = self.incoming.wait(wait, |state| !state.queue.is_empty());
-        let count = buffer.len().min(state.queue.len());
+        let mut queue = self.incoming.wait(wait, |queue| !queue.bytes.is_empty());
+        let count = buffer.len().min(queue.bytes.len());
         if count == 0 {
-            return if state.closed { Err(PortError::Closed) } else { Ok(0) };
+            return if queue.closed { Err(PortError::Closed) } else { Ok(0) };
         }
-        for (target, byte) in buffer.iter_mut().zip(state.queue.drain(..count)) {
+        for (target, byte) in buffer.iter_mut().zip(queue.bytes.drain(..count)) {
             *target = byte;
         }
         self.incoming.changed.notify_all();
@@ -72,12 +73,12 @@ impl Port for LoopbackPort {
 
     fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
         let capacity = self.capacity;
-        let mut state = self.outgoing.wait(wait, |state| state.queue.len() < capacity);
-        if state.closed {
+        let mut queue = self.outgoing.wait(wait, |queue| queue.bytes.len() < capacity);
+        if queue.closed {
             return Err(PortError::Closed);
         }
-        let count = bytes.len().min(capacity - state.queue.len());
-        state.queue.extend(&bytes[..count]);
+        let count = bytes.len().min(capacity - queue.bytes.len());
+        queue.bytes.extend(&bytes[..count]);
         self.outgoing.changed.notify_all();
         Ok(count)
     }

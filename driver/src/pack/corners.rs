@@ -4,7 +4,7 @@ use photoncard_shared::layout::{self, LeafAttributes};
 
 use crate::bvh::LeafTriangles;
 use crate::light::Lights;
-use crate::scene::{Attributes, NO_ATTRIBUTES, Scene};
+use crate::scene::{NO_ATTRIBUTES, Scene, VertexAttributes};
 
 /// The attributes of the triangles of all leaves. Leaves whose triangles have none have no records.
 pub(super) struct PackedCorners {
@@ -45,7 +45,8 @@ impl PackedCorners {
         for &index in leaf {
             let triangle = &scene.triangles[index as usize];
             let emitter = lights.of_triangle(index);
-            let attributes = scene.attributes.get(triangle.attributes as usize).unwrap_or(&Attributes::NONE);
+            let attributes =
+                scene.attributes.get(triangle.attributes as usize).unwrap_or(&VertexAttributes::NONE);
             self.records.extend((0..1 + usize::from(two_sets)).map(|set| record(attributes, set, emitter)));
         }
         LeafAttributes { first, two_sets }.to_entry()
@@ -53,7 +54,7 @@ impl PackedCorners {
 }
 
 /// The record of some attributes with one set of texture coordinates, of a triangle that may be an emitter.
-fn record(attributes: &Attributes, set: usize, emitter: Option<u32>) -> layout::Attributes {
+fn record(attributes: &VertexAttributes, set: usize, emitter: Option<u32>) -> layout::Attributes {
     layout::Attributes {
         normals: attributes.normals.map(|normals| normals.map(|normal| normal.to_array())),
         coordinates: attributes.coordinates[set].map(|coordinates| coordinates.to_array()),

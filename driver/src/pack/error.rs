@@ -29,8 +29,8 @@ pub enum PackError {
         bytes: u64,
     },
     /// More textures than the index in a material's record can name.
-    #[error("the scene has {textures} textures; a card tells {} apart", NO_TEXTURE)]
-    #[diagnostic(help("join textures of the same image and sampler, or split the scene"))]
+    #[error("the scene has {textures} textures; a card image can index at most {}", NO_TEXTURE)]
+    #[diagnostic(help("use one texture wherever image and sampler are equal, or split the scene"))]
     TooManyTextures {
         /// Textures of the scene.
         textures: usize,

@@ -3,12 +3,12 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
 
-use photoncard_shared::budget::REFERENCE;
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::checksum::checksum;
 use photoncard_shared::message::{PixelRecord, Tile, record_bytes};
 
 use crate::film::Film;
-use crate::sink::{FinishedTile, places};
+use crate::sink::{FinishedTile, pixel_positions};
 
 /// What a record begins with. As of a PNG file, a transfer that alters the ends of lines or the eighth bits is found out.
 pub(super) const MAGIC: [u8; 8] = *b"\x89TILE\r\n\x1a";
@@ -102,7 +102,7 @@ fn read_tile(reader: &mut impl Read, available: u64, film: &mut Film) -> io::Res
     if checksum(bytes).to_le_bytes() != sum {
         return Ok(None);
     }
-    for ((x, y), record) in places(&tile).zip(bytes[HEAD_BYTES..].chunks_exact(pixel_bytes)) {
+    for ((x, y), record) in pixel_positions(&tile).zip(bytes[HEAD_BYTES..].chunks_exact(pixel_bytes)) {
         // The tile lies inside the window, and records have their length.
         let _ = PixelRecord::read(record).map(|record| film.write_record(x, y, &record));
     }

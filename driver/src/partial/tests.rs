@@ -9,7 +9,7 @@ use super::file::{check_lock, is_at};
 use super::records::{CHECKSUM_BYTES, HEAD_BYTES, MAGIC};
 use super::*;
 use crate::film::Window;
-use crate::sink::places;
+use crate::sink::pixel_positions;
 
 const TILES: u32 = 6;
 /// Bytes of a tile's record.
@@ -37,7 +37,9 @@ fn partial(folder: &tempfile::TempDir, resume: bool) -> PartialSettings {
 /// Writes a file of all tiles, and returns its bytes.
 fn written(folder: &tempfile::TempDir) -> Vec<u8> {
     let mut film = film();
-    for (number, (x, y)) in places(&Tile { id: 0, x: 0, y: 0, width: 4 * TILES, height: 3 }).enumerate() {
+    for (number, (x, y)) in
+        pixel_positions(&Tile { id: 0, x: 0, y: 0, width: 4 * TILES, height: 3 }).enumerate()
+    {
         film.write(x, y, Pixel { depth: number as f32, ..Pixel::default() }).unwrap();
     }
     let settings = partial(folder, false);
@@ -97,7 +99,8 @@ fn revoked_tiles_are_struck_out_and_replaced() {
     let begin = |film: &mut Film| PartialRender::begin(&settings, json!({ "seed": 1 }), film).unwrap();
     let of_depth = |id: u32, depth: f32| {
         let mut film = film();
-        places(&tile(id)).for_each(|(x, y)| film.write(x, y, Pixel { depth, ..Pixel::default() }).unwrap());
+        pixel_positions(&tile(id))
+            .for_each(|(x, y)| film.write(x, y, Pixel { depth, ..Pixel::default() }).unwrap());
         film.finished(&tile(id)).unwrap()
     };
     let render = begin(&mut film());
@@ -132,7 +135,7 @@ fn the_later_record_of_a_tile_holds() {
     let folder = tempfile::tempdir().unwrap();
     let mut bytes = written(&folder);
     let mut film = film();
-    for (x, y) in places(&tile(1)) {
+    for (x, y) in pixel_positions(&tile(1)) {
         film.write(x, y, Pixel { depth: -1.0, ..Pixel::default() }).unwrap();
     }
     bytes.extend(record(&film.finished(&tile(1)).unwrap()));
@@ -156,7 +159,7 @@ fn layers_are_kept() {
     let settings = partial(&folder, true);
     let with_layers = || Film::with_layers(4, 3, Window::full(4, 3)).unwrap();
     let mut film = with_layers();
-    for (number, (x, y)) in places(&tile(0)).enumerate() {
+    for (number, (x, y)) in pixel_positions(&tile(0)).enumerate() {
         let pixel = Pixel { depth: number as f32, ..Pixel::default() };
         let layers = Some(PixelLayers { gathers: 0.5 * number as f32, ..PixelLayers::default() });
         film.write_record(x, y, &PixelRecord { pixel, layers }).unwrap();

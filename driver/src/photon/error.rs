@@ -23,7 +23,8 @@ pub enum PhotonError {
     },
     /// Photons could not be told apart: the scene is too wide for so small a gather.
     #[error(
-        "the scene is too wide: places are told apart to {cell} m in it, and a gather looks only {max_distance} m far"
+        "the scene is too wide: a cell of the grid of photon positions has a side of {cell} m, and a gather reaches only \
+         {max_distance} m"
     )]
     #[diagnostic(help(
         "leave out geometry that is far away, move the scene to the origin, or choose a greater --max-distance or fewer \

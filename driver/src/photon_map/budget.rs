@@ -99,7 +99,7 @@ fn simplify(scene: u64, texels: u64) -> String {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
-    use photoncard_shared::budget::REFERENCE;
+    use photoncard_firmware::kind::REFERENCE;
 
     use super::*;
     use crate::photon_map::map_photons;

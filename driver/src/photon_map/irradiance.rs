@@ -5,12 +5,13 @@
 //! is to know that none is on the way, which is one less: of photons that lie at random the mean is right.
 
 use glam::Vec3;
-use photoncard_firmware::gather::Place;
+use photoncard_firmware::gather::HilbertCode;
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather, reflected_radiance};
 use photoncard_firmware::scene::{PartialReflection, SceneImage};
 use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::budget::{REFERENCE, gather_candidates};
+use photoncard_shared::budget::gather_candidates;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{IrradiancePoint, PHOTON_CONTENT_BYTES, Photon, PhotonLeaf, Record};
 use photoncard_shared::message::Fault;
@@ -108,7 +109,7 @@ fn surface_points(image: &CardImage) -> Result<Vec<SurfacePoint>, Fault> {
         (0..leaf.photons()).for_each(|photon| add(leaf.point(photon), leaf.content(photon)));
     }
     // Along a curve: neighbours have most of their photons in common.
-    points.par_sort_by_cached_key(|&(point, normal)| (normal, Place::new(&grid, grid.position(point))));
+    points.par_sort_by_cached_key(|&(point, normal)| (normal, HilbertCode::new(&grid, grid.position(point))));
     points.dedup();
     Ok(points)
 }

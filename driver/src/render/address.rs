@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use super::RenderError;
 use crate::choice::Choice;
 use crate::emulator::ChipKind;
 use crate::link::{host_name, tcp_address};
@@ -47,7 +48,7 @@ pub enum RemoteAddress {
 }
 
 /// Chips that one process emulates.
-pub(super) const MAX_CHIPS: usize = 1024;
+const MAX_CHIPS: usize = 1024;
 /// The speed of a serial port for which none is given.
 const DEFAULT_BAUD: u32 = 115_200;
 /// A card acknowledges two whole frames at a time, and is silent meanwhile. Even if one acknowledgement is lost the next is
@@ -88,6 +89,22 @@ impl CardAddress {
             Self::Remote(_) => u32::MAX,
         }
     }
+}
+
+/// Checks the number of chips of one process.
+///
+/// # Errors
+/// If there are more than [`MAX_CHIPS`].
+pub(super) fn check_chips(chips: usize) -> Result<(), RenderError> {
+    if chips <= MAX_CHIPS {
+        return Ok(());
+    }
+    Err(RenderError::Setting {
+        option: "--card",
+        value: format!("with {chips} chips in all"),
+        reason: format!("one process emulates at most {MAX_CHIPS}"),
+        remedy: "use fewer chips".into(),
+    })
 }
 
 /// Returns whether there is one chip at some addresses, and it is emulated.

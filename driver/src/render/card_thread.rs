@@ -130,11 +130,11 @@ impl CardAtWork<'_> {
                 outcome.loaded = crew.start.elapsed();
             }
             let (done, total) = crew.dispatcher.scheduler().progress();
-            crew.observer.progress(Phase::Tiles, done as u64, total as u64);
+            crew.outputs.observer.progress(Phase::Tiles, done as u64, total as u64);
         } else if outcome.loaded.is_zero() {
             let [loaded, all] =
                 [session.loaded_lines(), job.image.len()].map(|lines| (lines * LINE_BYTES) as u64);
-            crew.observer.progress(Phase::Load, loaded, all);
+            crew.outputs.observer.progress(Phase::Load, loaded, all);
         }
     }
 }

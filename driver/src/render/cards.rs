@@ -1,63 +1,30 @@
-//! The cards of a render: reached, greeted, and put to work together.
+//! Executor of tiles on cards: they are reached, greeted, and put to work together.
 
-use std::sync::Arc;
+use std::sync::PoisonError;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use photoncard_shared::budget::Budget;
-use photoncard_shared::counters::Counters;
+use photoncard_shared::checksum::image_checksum;
 
-use super::address::{CardAddress, MAX_CHIPS};
+use super::address::{CardAddress, check_chips};
 use super::card_thread::{CardOutcome, render_on};
 use super::crew::Crew;
+use super::executor::{Executor, Outcome, Work};
 use super::greeting::{GreetedCard, GreetingError, card_name, greet};
 use super::open_card::OpenCard;
+use super::outputs::Outputs;
 use super::{CardError, CardSet, Observer, RenderError, RenderSettings};
 use crate::dispatcher::Dispatcher;
-use crate::display::Display;
-use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
-use crate::emulator::{ChipKind, MemoryModel, SharedImage};
-use crate::pack::CardImage;
-use crate::partial::PartialRender;
-use crate::scheduler::{Scheduler, Standing, TileCounts};
-use crate::session::{Job, LinkBytes};
+use crate::emulator::{MemoryModel, SharedImage};
+use crate::scheduler::{Scheduler, Standing};
+use crate::session::{Job, PixelLimits};
 use crate::sink::TileSink;
 
-/// The number of emulated reference chips at some addresses.
-///
-/// # Errors
-/// If there is any other card among them.
-pub(super) fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
-    let counts = addresses.iter().map(|address| match *address {
-        CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),
-        _ => None,
-    });
-    let chips = counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
-        option: "--order",
-        value: "hilbert".into(),
-        reason: "it leaves all gathers of the frame to the host, as no chip has room for them".into(),
-        remedy: "use --card emulated:CHIPS, or --order sort".into(),
-    })?;
-    check_chips(chips)?;
-    Ok(chips)
-}
-
-/// Checks the number of chips of one process.
-fn check_chips(chips: usize) -> Result<(), RenderError> {
-    if chips <= MAX_CHIPS {
-        return Ok(());
-    }
-    Err(RenderError::Setting {
-        option: "--card",
-        value: format!("with {chips} chips in all"),
-        reason: format!("one process emulates at most {MAX_CHIPS}"),
-        remedy: "use fewer chips".into(),
-    })
-}
-
 /// Cards that have said hello.
-pub(super) struct Cards {
+pub(super) struct Cards<'a> {
+    settings: &'a RenderSettings,
     cards: Vec<(String, GreetedCard)>,
     start: Instant,
     shared: SharedImage,
@@ -65,40 +32,17 @@ pub(super) struct Cards {
     lost: usize,
 }
 
-/// What looks on while tiles are finished.
-#[derive(Clone, Copy)]
-pub(super) struct Onlookers<'a> {
-    pub(super) partial: Option<&'a PartialRender>,
-    pub(super) display: Option<&'a Display>,
-    pub(super) observer: &'a dyn Observer,
-}
-
-/// What came of a run.
-#[derive(Default)]
-pub(super) struct Outcome {
-    pub(super) counters: Counters,
-    pub(super) bytes: LinkBytes,
-    /// What was read, where memory is modelled.
-    pub(super) traffic: Option<MemoryTraffic>,
-    pub(super) cards: usize,
-    /// Cards that were given up, or have never said hello.
-    pub(super) cards_given_up: usize,
-    pub(super) tiles: TileCounts,
-    pub(super) load_seconds: f64,
-    pub(super) render_seconds: f64,
-}
-
-impl Cards {
-    /// Starts all cards and says hello to each, at the same time. Their memory is modelled if the settings say so, that of the
-    /// first with `trace`. A card that does not say hello is lost.
+impl<'a> Cards<'a> {
+    /// Starts all cards and says hello to each, at the same time. Their memory is modelled if the settings ask for it, the
+    /// first card's with the trace. A card that does not say hello is lost.
     ///
     /// # Errors
-    /// If fewer are left than are needed.
+    /// If the trace cannot be written, or fewer cards are left than are needed.
     pub(super) fn connect(
-        settings: &RenderSettings,
-        mut trace: Option<TraceFile>,
+        settings: &'a RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Self, RenderError> {
+        let mut trace = settings.cards.trace.as_deref().map(TraceFile::create).transpose()?;
         let start = Instant::now();
         let shared = SharedImage::default();
         let CardSet { addresses, faults, .. } = &settings.cards;
@@ -124,7 +68,7 @@ impl Cards {
             };
             threads.into_iter().map(|(name, thread)| (name, join(thread))).collect()
         });
-        let mut this = Self { cards: Vec::new(), start, shared, lost: 0 };
+        let mut this = Self { settings, cards: Vec::new(), start, shared, lost: 0 };
         let mut errors = Vec::new();
         for (name, result) in results {
             match result {
@@ -153,40 +97,22 @@ impl Cards {
         last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
     }
 
-    /// Tells emulated cards of the image that they will be loaded with, so that they need not copy it.
-    pub(super) fn share(&self, image: Arc<CardImage>) {
-        self.shared.give(image);
-    }
-
-    /// What each card can hold.
-    pub(super) fn budgets(&self) -> impl Iterator<Item = Budget> {
-        self.cards.iter().map(|(_, card)| card.budget)
-    }
-
-    /// How many there are.
-    pub(super) fn count(&self) -> usize {
-        self.cards.len()
-    }
-
     /// Renders a scheduler's tiles on all cards, into sinks.
-    pub(super) fn run(
+    fn render(
         self,
         job: Job,
         scheduler: Scheduler,
         sinks: Vec<&dyn TileSink>,
-        onlookers: Onlookers,
+        outputs: &Outputs,
     ) -> Result<Outcome, RenderError> {
         let begun = self.start.elapsed();
         let (names, cards): (Vec<String>, Vec<GreetedCard>) = self.cards.into_iter().unzip();
         let count = cards.len();
-        let Onlookers { partial, display, observer } = onlookers;
         let crew = Crew {
             dispatcher: Dispatcher::new(scheduler, sinks),
-            observer,
+            outputs,
             start: self.start,
             names,
-            partial,
-            display,
             failed: AtomicBool::new(false),
         };
         let results: Vec<Result<CardOutcome, RenderError>> = std::thread::scope(|scope| {
@@ -218,7 +144,33 @@ impl Cards {
     }
 }
 
-/// What came of all cards together.
+impl Executor for Cards<'_> {
+    fn budgets(&self) -> Vec<Budget> {
+        self.cards.iter().map(|(_, card)| card.budget).collect()
+    }
+
+    fn finishes_tiles_early(&self) -> bool {
+        true
+    }
+
+    fn run(self: Box<Self>, work: Work) -> Result<Outcome, RenderError> {
+        let Work { image, frame, tiles, film, sinks, outputs } = work;
+        // Emulated cards that know the image which they are loaded with need not copy it.
+        self.shared.give(image.clone());
+        let (scene_image, _) = image.view();
+        let job = Job {
+            image: image.lines(),
+            checksum: image_checksum(image.lines()),
+            frame,
+            limits: PixelLimits::new(&scene_image.header, frame),
+        };
+        let scheduler = self.settings.scheduler(tiles, self.cards.len());
+        let scheduler = scheduler.with_kept(&film.lock().unwrap_or_else(PoisonError::into_inner));
+        self.render(job, scheduler, sinks, outputs)
+    }
+}
+
+/// Sum of the outcomes of all cards.
 ///
 /// # Errors
 /// That of the card which failed first: it made the others stop.

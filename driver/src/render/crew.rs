@@ -4,21 +4,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::exchange::WAIT;
-use super::{CardError, Observer, RenderError};
+use super::outputs::Outputs;
+use super::{CardError, RenderError};
 use crate::dispatcher::Dispatcher;
-use crate::display::Display;
-use crate::partial::PartialRender;
 use crate::scheduler::{CardNumber, SchedulerError, Source, Standing, rectangles};
 
 /// What the threads of all cards share.
 pub(super) struct Crew<'a> {
     pub(super) dispatcher: Dispatcher<'a>,
-    pub(super) observer: &'a dyn Observer,
+    pub(super) outputs: &'a Outputs<'a>,
     pub(super) start: Instant,
     /// What errors call each card.
     pub(super) names: Vec<String>,
-    pub(super) partial: Option<&'a PartialRender>,
-    pub(super) display: Option<&'a Display>,
     pub(super) failed: AtomicBool,
 }
 
@@ -40,15 +37,11 @@ impl Crew<'_> {
     /// # Errors
     /// If the observer or the failure of a card has stopped the render.
     pub(super) fn is_complete(&self) -> Result<bool, RenderError> {
-        if self.failed.load(Ordering::Relaxed) || self.observer.is_stopped() {
+        if self.failed.load(Ordering::Relaxed) || self.outputs.observer.is_stopped() {
             return Err(RenderError::Stopped);
         }
-        if let Some(error) = self.display.and_then(Display::failure) {
-            self.observer.not_shown(&error);
-        }
-        if let Some(partial) = self.partial {
-            partial.check().map_err(|error| self.fail(error.into()))?;
-        }
+        self.outputs.report_display();
+        self.outputs.check_partial().map_err(|error| self.fail(error.into()))?;
         Ok(self.dispatcher.scheduler().is_complete())
     }
 
@@ -93,7 +86,7 @@ impl Crew<'_> {
         drop(scheduler);
         let name = self.names[card].clone();
         if !is_last || was_lost && standing == Standing::Lost {
-            self.observer.lost(&name, &error);
+            self.outputs.observer.lost(&name, &error);
             return Ok(());
         }
         Err(self.fail(if crashed_at.is_empty() {

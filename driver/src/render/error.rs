@@ -26,7 +26,7 @@ pub enum CardError {
     /// Its link was closed before it had said hello.
     #[error("it closed the link before it said hello")]
     #[diagnostic(help(
-        "another host may be using the card: wait until it is done; or what listens there is no card"
+        "another host may be using the card: wait until it is done; or check that a card listens at the address"
     ))]
     Refused,
     /// It does not do what it should.
@@ -84,7 +84,7 @@ pub enum RenderError {
     /// Cards contradict each other, and there is none to decide.
     #[error("{cards} render the tile {tile} differently: at least one of them lies")]
     #[diagnostic(help(
-        "render with a third card, which decides; or with one that you trust. What these have rendered alone is not kept"
+        "render with a third card, which decides; or with one that you trust. Tiles that only one of these cards has rendered are not kept"
     ))]
     Disagreement {
         /// The tile, as `--crop` takes it.
@@ -94,7 +94,7 @@ pub enum RenderError {
     },
     /// Cards contradict the file of an earlier render.
     #[error(
-        "the file of finished tiles has another tile {tile} than two cards render: a card has lied to the render that wrote it"
+        "the tile {tile} in the file of finished tiles differs from what two cards render: a card has lied to the render that wrote it"
     )]
     #[diagnostic(help("render without --resume"))]
     KeptDiffers {
@@ -139,7 +139,6 @@ impl From<FrameError> for RenderError {
         match error {
             FrameError::Stopped => Self::Stopped,
             FrameError::Image(fault) => Self::Image(fault),
-            FrameError::Film(error) => Self::Film(error),
             FrameError::Start(source) => Self::Chips(source),
             FrameError::TooManyGathers { .. } => Self::Setting {
                 option: "--order",

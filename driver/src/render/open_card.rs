@@ -14,11 +14,12 @@ pub(super) type BoxedPort = Box<dyn Port + Send>;
 
 /// A card that can be talked to.
 pub(super) struct OpenCard {
-    place: Place,
+    connection: Connection,
     injector: Option<FaultInjector>,
 }
 
-enum Place {
+/// Connection to a card.
+enum Connection {
     Emulated(EmulatedCard),
     /// Its port is closed before it is opened again, as a device may have one user at a time.
     Remote {
@@ -37,22 +38,22 @@ impl OpenCard {
         shared: &SharedImage,
         faults: Option<LineFaults>,
     ) -> Result<Self, CardError> {
-        let place = match address {
-            CardAddress::Emulated { kind, .. } => {
-                Place::Emulated(EmulatedCard::start(*kind, model, shared.clone()).map_err(CardError::Start)?)
-            }
+        let connection = match address {
+            CardAddress::Emulated { kind, .. } => Connection::Emulated(
+                EmulatedCard::start(*kind, model, shared.clone()).map_err(CardError::Start)?,
+            ),
             CardAddress::Remote(address) => {
-                Place::Remote { address: address.clone(), port: Some(reach(address)?) }
+                Connection::Remote { address: address.clone(), port: Some(reach(address)?) }
             }
         };
-        Ok(Self { place, injector: faults.map(|faults| FaultInjector::new(faults, index)) })
+        Ok(Self { connection, injector: faults.map(|faults| FaultInjector::new(faults, index)) })
     }
 
     /// Closes the link to a card. Returns where it can be reached again: an emulated card does not come back.
     pub(super) fn close(&mut self) -> Option<RemoteAddress> {
-        match &mut self.place {
-            Place::Emulated(_) => None,
-            Place::Remote { address, port } => {
+        match &mut self.connection {
+            Connection::Emulated(_) => None,
+            Connection::Remote { address, port } => {
                 drop(port.take());
                 Some(address.clone())
             }
@@ -61,26 +62,26 @@ impl OpenCard {
 
     /// Goes on with a link that was opened again.
     pub(super) fn go_on_with(&mut self, opened: BoxedPort) {
-        if let Place::Remote { port, .. } = &mut self.place {
+        if let Connection::Remote { port, .. } = &mut self.connection {
             *port = Some(opened);
         }
     }
 
     /// Whether its trace cannot be written.
     pub(super) fn trace_has_failed(&self) -> bool {
-        matches!(&self.place, Place::Emulated(card) if card.trace_has_failed())
+        matches!(&self.connection, Connection::Emulated(card) if card.trace_has_failed())
     }
 
     /// Ends an emulated card, or the link to another. Returns what its memory leaves, if it is modelled.
     pub(super) fn finish(self) -> Option<MemoryRecord> {
-        match self.place {
-            Place::Emulated(card) => card.finish(),
-            Place::Remote { .. } => None,
+        match self.connection {
+            Connection::Emulated(card) => card.finish(),
+            Connection::Remote { .. } => None,
         }
     }
 }
 
-impl Place {
+impl Connection {
     fn port(&mut self) -> Result<&mut dyn Port, PortError> {
         match self {
             Self::Emulated(card) => Ok(card.port()),
@@ -95,7 +96,7 @@ impl Place {
 /// The host's end of the link.
 impl Port for OpenCard {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
-        let port = self.place.port()?;
+        let port = self.connection.port()?;
         match &mut self.injector {
             None => port.read(buffer, wait),
             Some(injector) => injector.read(port, buffer, wait),
@@ -103,7 +104,7 @@ impl Port for OpenCard {
     }
 
     fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
-        let port = self.place.port()?;
+        let port = self.connection.port()?;
         match &mut self.injector {
             None => port.write(bytes, wait),
             Some(injector) => injector.write(port, bytes, wait),

@@ -7,7 +7,7 @@ mod groups;
 use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
-use photoncard_shared::budget::MICRO;
+use photoncard_firmware::kind::MICRO;
 use photoncard_shared::message::{self, CausticGather, FrameParameters};
 
 pub use self::dependence::{NamedSettings, PROGRAM};

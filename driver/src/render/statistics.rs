@@ -1,11 +1,13 @@
 //! What a render took: the keys of `--stats`.
 
-use photoncard_shared::counters::Counters;
 use photoncard_shared::message::FrameParameters;
 use serde::Serialize;
 
-use super::MemoryStatistics;
-use crate::study::cost_model::{Cost, Symbols, Workload};
+use super::executor::Outcome;
+use super::preparation::Prepared;
+use super::times::Times;
+use super::{MemoryStatistics, RenderSettings};
+use crate::cost_model::Flops;
 
 /// The contents of the statistics file. Keys are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -79,29 +81,66 @@ pub struct Statistics {
     pub peak_memory_bytes: Option<u64>,
 }
 
-/// Seconds of each phase.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Times {
-    /// Reading the scene file.
-    pub scene: f64,
-    /// Tracing photons.
-    pub photons: f64,
-    /// Building hierarchy, photon map and card image.
-    pub pack: f64,
-    /// Of these, the hierarchy and the other parts of the scene.
-    pub hierarchy: f64,
-    /// Of these, the photon map.
-    pub photon_map: f64,
-    /// Of these, how far gathers look, and how much of the discs around photons is surface.
-    pub discs: f64,
-    /// Of these, irradiance at photons, if it is precomputed.
-    pub irradiance: f64,
-    /// Loading the slowest card.
-    pub load: f64,
-    /// Rendering, after the last card was loaded.
-    pub render: f64,
-    /// All of it.
-    pub total: f64,
+impl Statistics {
+    /// Statistics of a finished render.
+    pub(super) fn new(
+        settings: &RenderSettings,
+        frame: &FrameParameters,
+        prepared: &Prepared,
+        outcome: &Outcome,
+        time_s: Times,
+    ) -> Self {
+        let counters = &outcome.counters;
+        Self {
+            width: frame.width,
+            height: frame.height,
+            samples: frame.samples,
+            photons: settings.photons.count as u64,
+            photon_paths: prepared.paths,
+            max_distance: frame.max_distance,
+            cards: outcome.cards,
+            cards_given_up: outcome.cards_given_up,
+            verified_tiles: outcome.tiles.verified,
+            repeated_tiles: outcome.tiles.repeated,
+            revoked_tiles: outcome.tiles.revoked,
+            time_s,
+            rays: Rays {
+                eye: counters.eye_rays,
+                shadow: counters.shadow_rays,
+                gather: counters.gather_rays,
+                survey: counters.survey_rays,
+                specular: counters.specular_rays,
+            },
+            lost_paths: counters.lost_paths,
+            caustic_gathers: counters.caustic_gathers,
+            gathers: counters.gathers,
+            tables: counters.tables,
+            records: counters.records,
+            interpolated_share: counters.interpolated_samples as f64
+                / counters.lambertian_samples.max(1) as f64,
+            photons_tested: counters.photons_tested,
+            photons_taken: counters.photons_taken,
+            photons_selected: counters.photons_selected,
+            photons_found: counters.photons_found,
+            lookups: counters.lookups,
+            points_tested: counters.points_tested,
+            drains: counters.drains,
+            most_waiting: counters.most_waiting,
+            flops: Flops::counted(counters, frame.gather_rays),
+            image_bytes: prepared.image.bytes(),
+            link: LinkStatistics {
+                payload_bytes: outcome.bytes.payload,
+                wire_bytes: outcome.bytes.wire,
+                retransmitted_frames: outcome.bytes.line.repeated,
+                damaged_frames: outcome.bytes.line.damaged,
+                duplicate_frames: outcome.bytes.line.duplicates,
+                probes: outcome.bytes.line.probes,
+                resets: outcome.bytes.resets,
+            },
+            memory: settings.modelled_caches().zip(outcome.traffic.as_ref()).map(MemoryStatistics::new),
+            peak_memory_bytes: peak_memory_bytes(),
+        }
+    }
 }
 
 /// Rays by kind.
@@ -117,30 +156,6 @@ pub struct Rays {
     pub survey: u64,
     /// From perfectly specular surfaces, on the way of any of these but shadow rays.
     pub specular: u64,
-}
-
-/// Floating-point operations of each unit of the chip, on all chips together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Flops {
-    /// All rays.
-    pub ray_caster: f64,
-    /// Importance tables and the irradiance cache.
-    pub controller: f64,
-    /// Searches of the photon map and all reflection.
-    pub gather_unit: f64,
-}
-
-impl Flops {
-    /// Of the work that was counted, each piece at its nominal cost.
-    pub(super) fn new(counters: &Counters, frame: &FrameParameters) -> Self {
-        let symbols = Symbols { gather_rays: frame.gather_rays as f64, ..Symbols::NOMINAL };
-        let cost = Cost::new(&Workload::counted(counters), &symbols);
-        Self {
-            ray_caster: cost.ray_caster.flops,
-            controller: cost.controller.flops,
-            gather_unit: cost.gather_unit.flops,
-        }
-    }
 }
 
 /// Bytes over all links.
@@ -163,7 +178,7 @@ pub struct LinkStatistics {
 }
 
 /// The process's peak resident memory, where `/proc` tells.
-pub(super) fn peak_memory_bytes() -> Option<u64> {
+fn peak_memory_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;

@@ -25,16 +25,16 @@ pub use self::limits::BRIGHTEST;
 pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
 pub use self::material::{Material, Reflection, Transmission};
 pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
-pub use self::triangle::{Attributes, NO_ATTRIBUTES, Triangle};
+pub use self::triangle::{NO_ATTRIBUTES, Triangle, VertexAttributes};
 use crate::error::SceneError;
 
-/// A scene in world space, every instance resolved.
+/// A scene in world space, every instance resolved. [`gltf::load`] reads one from a file.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Triangles of non-zero area, in file order, counter-clockwise seen from the front.
     pub triangles: Vec<Triangle>,
     /// Attributes of the triangles that have any: normals, texture coordinates and colours of the corners.
-    pub attributes: Vec<Attributes>,
+    pub attributes: Vec<VertexAttributes>,
     /// Materials; the index in [`Triangle::material`] refers to this list.
     pub materials: Vec<Material>,
     /// Textures, mappings of images to surfaces; the indices in [`Material`] refer to this list.

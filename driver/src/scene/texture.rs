@@ -11,7 +11,7 @@ pub const MAX_TEXELS: u64 = 1 << 28;
 pub struct Texture {
     /// Index into [`Scene::images`](super::Scene::images).
     pub image: u32,
-    /// Index of the set of texture coordinates in [`Attributes`](super::Attributes): 0 or 1.
+    /// Index of the set of texture coordinates in [`VertexAttributes`](super::VertexAttributes): 0 or 1.
     pub set: u32,
     /// Wrap modes of u and v.
     pub wrap: [Wrap; 2],

@@ -36,7 +36,7 @@ impl Triangle {
 
 /// Vertex attributes of a triangle's corners beyond their positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Attributes {
+pub struct VertexAttributes {
     /// Unit shading normals of the corners in world space, on the front's side. `None` for a flat triangle, also
     /// where all three normals equal the geometric normal.
     pub normals: Option<[Vec3; 3]>,
@@ -48,7 +48,7 @@ pub struct Attributes {
     pub colours: [[f32; 4]; 3],
 }
 
-impl Attributes {
+impl VertexAttributes {
     /// Attributes of a triangle that states none: flat, at the origin of every texture, white.
     pub const NONE: Self = Self { normals: None, coordinates: [[Vec2::ZERO; 3]; 2], colours: [[1.0; 4]; 3] };
 }

@@ -37,7 +37,7 @@ pub enum SchedulerError {
         sources: Vec<Source>,
     },
     /// Two cards agree on a tile, and the file of an earlier render has another.
-    #[error("the file of finished tiles has another tile {} than cards render", Rectangle(tile))]
+    #[error("the tile {} in the file of finished tiles differs from what cards render", Rectangle(tile))]
     KeptDiffers {
         /// The tile.
         tile: Tile,

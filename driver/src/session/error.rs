@@ -93,11 +93,11 @@ pub enum SessionError {
     },
     /// Other cards render a tile otherwise.
     #[error(
-        "the card lies: the tile {},{},{},{} is another than two others render",
+        "the card lies: its tile {},{},{},{} differs from what two other cards render",
         .tile.x, .tile.x + .tile.width, .tile.y, .tile.y + .tile.height
     )]
     #[diagnostic(help(
-        "the memory of the card may be bad, or its firmware altered: what it has rendered is rendered again by others"
+        "the memory of the card may be bad, or its firmware altered: its tiles are rendered again by other cards"
     ))]
     Outvoted {
         /// The tile.

@@ -13,7 +13,6 @@ use super::sample::{Chosen, Estimate, SampleRate, choose};
 use crate::emulator::direct::{RenderedTile, render_tile};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
-use crate::film::Film;
 use crate::photon_map::MappedImage;
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::Scene;
@@ -177,7 +176,7 @@ impl Bench<'_> {
         let frame = self.frame(settings)?;
         let all = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
         if settings.schedule.order == GatherOrder::Hilbert {
-            return self.whole_frame(settings, &frame, &all, caches);
+            return self.whole_frame(&frame, &all, caches);
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
         let tiles: Vec<Tile> = chosen.iter().map(|chosen| chosen.tile).collect();
@@ -190,15 +189,13 @@ impl Bench<'_> {
 
     fn whole_frame(
         &self,
-        settings: &RenderSettings,
         frame: &FrameParameters,
         tiles: &[Tile],
         caches: &CacheSettings,
     ) -> Result<Measurement, RenderError> {
-        let mut film = Film::new(settings.picture.width, settings.picture.height, settings.window())?;
         let chips = self.pool.current_num_threads();
         let job = CurveJob { image: &self.mapped.image, frame, tiles, chips };
-        let outcome = render_along_curve(job, Some(caches), &mut film, &|_, _| !(self.is_stopped)())?;
+        let outcome = render_along_curve(job, Some(caches), &[], &|_, _| !(self.is_stopped)())?;
         let whole = TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic);
         Ok(Measurement { tiles: vec![whole] })
     }

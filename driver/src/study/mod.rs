@@ -2,10 +2,9 @@
 //! that are not at hand.
 //!
 //! A study is a list of [`Point`]s and a function from their [`Results`] to a [`Report`]. [`run`] measures the points
-//! in a [`Laboratory`], which keeps their outcomes, and writes the report. [`cost_model`] predicts the chips that a
+//! in a [`Laboratory`], which keeps their outcomes, and writes the report. [`crate::cost_model`] predicts the chips that a
 //! frame rate takes, [`load_balance`] how evenly tiles load them.
 
-pub mod cost_model;
 mod error;
 mod index;
 mod laboratory;

@@ -1,6 +1,6 @@
 //! Points: single measurements, each with everything that its result depends on.
 
-use photoncard_shared::budget::REFERENCE;
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Value, json};
 

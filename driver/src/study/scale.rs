@@ -1,6 +1,6 @@
 //! Scale of a study: the settings that its renders have in common, and the number of values that it varies them over.
 
-use photoncard_shared::budget::REFERENCE;
+use photoncard_firmware::kind::REFERENCE;
 
 use super::point::{Point, Task};
 use super::sample::SampleRate;

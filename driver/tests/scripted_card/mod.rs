@@ -1,6 +1,6 @@
 //! A card of which a test says what it answers.
 
-use photoncard_shared::budget::MICRO;
+use photoncard_firmware::kind::MICRO;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, Command, PROTOCOL_VERSION, Reply};

@@ -24,6 +24,15 @@ fn check_tiles(outcome: &Outcome, alone: &Outcome, seed: u32) {
     }
 }
 
+/// Checks the runs of all seeds against the run of one card without faults, each with random numbers of its own.
+fn check_seeds(salt: u32, mut check: impl FnMut(&Fixture, &Outcome, u32, &mut Random)) {
+    let fixture = Fixture::new();
+    let alone = Run::new(&fixture, 1, 0).go();
+    for seed in seeds(SEEDS) {
+        check(&fixture, &alone, seed, &mut Random(hash(seed ^ salt)));
+    }
+}
+
 /// Cards of a seed: of the first, some lie and some are lazy.
 fn troubled<'a>(fixture: &'a Fixture, seed: u32, random: &mut Random) -> Run<'a> {
     let cards = 2 + random.below(5);
@@ -42,21 +51,18 @@ fn troubled<'a>(fixture: &'a Fixture, seed: u32, random: &mut Random) -> Run<'a>
 #[test]
 fn impossible_values_and_laziness_never_reach_the_picture_nor_stop_it() {
     with_room_for_a_card(|| {
-        let fixture = Fixture::new();
-        let alone = Run::new(&fixture, 1, 0).go();
         let [mut runs, mut caught, mut helped, mut revoked] = [0; 4];
-        for seed in seeds(SEEDS) {
-            let random = &mut Random(hash(seed ^ 0x11a5));
-            let outcome = troubled(&fixture, seed, random).go();
+        check_seeds(0x11a5, |fixture, alone, seed, random| {
+            let outcome = troubled(fixture, seed, random).go();
             assert_eq!(outcome.end, End::Complete, "seed {seed}: honest cards are left");
-            check_tiles(&outcome, &alone, seed);
+            check_tiles(&outcome, alone, seed);
             assert!(outcome.pixels == alone.pixels, "seed {seed}");
             assert_eq!(outcome.counters, alone.counters, "seed {seed}: work is counted twice");
             caught += outcome.caught.len();
             helped += outcome.counts.repeated;
             revoked += outcome.counts.revoked;
             runs += 1;
-        }
+        });
         println!(
             "{runs} runs: {caught} liars caught, {revoked} of their tiles revoked, {helped} tiles rendered twice"
         );
@@ -64,18 +70,15 @@ fn impossible_values_and_laziness_never_reach_the_picture_nor_stop_it() {
     });
 }
 
-/// The same among resets, stalls and bad lines.
+/// Lies and laziness among resets, stalls and bad lines.
 #[test]
 fn liars_and_lazy_cards_among_faults_end_in_the_picture_or_in_words() {
     with_room_for_a_card(|| {
-        let fixture = Fixture::new();
-        let alone = Run::new(&fixture, 1, 0).go();
         let [mut complete, mut runs] = [0; 2];
-        for seed in seeds(SEEDS) {
-            let random = &mut Random(hash(seed ^ 0xfa17));
+        check_seeds(0xfa17, |fixture, alone, seed, random| {
             let faults = Faults::of(random);
-            let outcome = Run { faults, ..troubled(&fixture, seed, random) }.go();
-            check_tiles(&outcome, &alone, seed);
+            let outcome = Run { faults, ..troubled(fixture, seed, random) }.go();
+            check_tiles(&outcome, alone, seed);
             match outcome.end {
                 End::Complete => {
                     assert!(outcome.pixels == alone.pixels, "seed {seed}");
@@ -87,7 +90,7 @@ fn liars_and_lazy_cards_among_faults_end_in_the_picture_or_in_words() {
                 }
             }
             runs += 1;
-        }
+        });
         println!("{complete} of {runs} runs complete");
         assert!(2 * complete > runs, "only {complete} of {runs} runs ended in the picture");
     });
@@ -102,22 +105,19 @@ fn plausible(cards: usize, liars: usize, random: &mut Random) -> HashMap<CardNum
 #[test]
 fn verified_lies_are_outvoted_or_named() {
     with_room_for_a_card(|| {
-        let fixture = Fixture::new();
-        let alone = Run::new(&fixture, 1, 0).go();
         let [mut complete, mut named, mut runs] = [0; 3];
-        for seed in seeds(SEEDS) {
-            let random = &mut Random(hash(seed ^ 0x7e57));
+        check_seeds(0x7e57, |fixture, alone, seed, random| {
             let cards = 2 + random.below(4);
             let liars = plausible(cards, 1 + random.below(cards - 1), random);
             let honest = cards - liars.len();
-            let run = Run { liars: liars.clone(), verify: Some(1.0), ..Run::new(&fixture, cards, seed) };
+            let run = Run { liars: liars.clone(), verify: Some(1.0), ..Run::new(fixture, cards, seed) };
             let outcome = run.go();
             assert!(
                 outcome.caught.iter().all(|card| liars.contains_key(card)) || outcome.end != End::Complete
             );
             match &outcome.end {
                 End::Complete => {
-                    check_tiles(&outcome, &alone, seed);
+                    check_tiles(&outcome, alone, seed);
                     assert!(outcome.pixels == alone.pixels, "seed {seed}");
                     assert_eq!(outcome.counts.verified, alone.tiles.len(), "seed {seed}");
                     assert_eq!(outcome.counters, alone.counters, "seed {seed}: work is counted twice");
@@ -128,7 +128,7 @@ fn verified_lies_are_outvoted_or_named() {
                         |source: &Source| matches!(source, Source::Card(card) if liars.contains_key(card));
                     assert!(sources.iter().any(is_liar), "seed {seed}: honest cards are named");
                     assert!(honest < 2, "seed {seed}: two honest cards are a majority of two");
-                    check_tiles(&outcome, &alone, seed);
+                    check_tiles(&outcome, alone, seed);
                     named += 1;
                 }
                 end => {
@@ -137,7 +137,7 @@ fn verified_lies_are_outvoted_or_named() {
                 }
             }
             runs += 1;
-        }
+        });
         println!("{complete} of {runs} runs complete, {named} name the cards that differ");
         assert!(runs < 50 || complete > runs / 4 && named > 0);
     });
@@ -147,30 +147,27 @@ fn verified_lies_are_outvoted_or_named() {
 #[test]
 fn what_a_caught_liar_has_rendered_is_rendered_again() {
     with_room_for_a_card(|| {
-        let fixture = Fixture::new();
-        let alone = Run::new(&fixture, 1, 0).go();
         let [mut caught, mut revoked] = [0; 2];
-        for seed in seeds(SEEDS) {
-            let random = &mut Random(hash(seed ^ 0xca7c));
+        check_seeds(0xca7c, |fixture, alone, seed, random| {
             let faults =
                 if seed % 2 == 0 { Faults { deaths: 0, ..Faults::of(random) } } else { Faults::default() };
             let liars: HashMap<_, _> = [(0, (Lie::Brighter(1.5), 1))].into();
             let run =
-                Run { faults, liars, verify: Some(0.2), ..Run::new(&fixture, 3 + random.below(3), seed) };
+                Run { faults, liars, verify: Some(0.2), ..Run::new(fixture, 3 + random.below(3), seed) };
             let outcome = run.go();
             assert!(
                 outcome.caught.is_empty() || outcome.caught == [0] || outcome.end != End::Complete,
                 "seed {seed}"
             );
             if outcome.caught == [0] {
-                check_tiles(&outcome, &alone, seed);
+                check_tiles(&outcome, alone, seed);
                 caught += 1;
                 revoked += outcome.counts.revoked;
             }
             if outcome.end == End::Complete {
                 assert!(outcome.counts.verified > 0, "seed {seed}: nothing is verified");
             }
-        }
+        });
         println!("{caught} liars caught, {revoked} of their tiles rendered again");
         assert!(caught > 0 && (revoked > 0 || seeds(SEEDS).len() < 50));
     });

@@ -13,7 +13,6 @@ use photoncard_driver::session::{Job, PixelLimits};
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::memory::{CardMemory, MemoryPort, copy_lines};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::budget::MICRO;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters};
 
@@ -117,7 +116,7 @@ impl Fixture {
     /// A card that was just switched on.
     pub(crate) fn card(&self) -> Box<MicroCard<Memory>> {
         let lines = self.mapped.image.lines().len();
-        Box::new(MicroCard::new(MICRO, Memory { lines: vec![Line::ZERO; lines] }))
+        Box::new(MicroCard::new(Memory { lines: vec![Line::ZERO; lines] }))
     }
 
     pub(crate) fn film(&self) -> Film {

@@ -22,12 +22,12 @@ use core::panic::PanicInfo;
 
 #[cfg(target_arch = "arm")]
 use cortex_m_rt::entry;
-use photoncard_firmware::card::{MICRO_SRAM_BYTES, MicroCard};
+use photoncard_firmware::card::{MicroCard, sram_bytes};
 use photoncard_firmware::chip::MicroChip;
+use photoncard_firmware::kind::{MICRO, Micro};
 use photoncard_firmware::memory::Dram;
 use photoncard_firmware::serve::serve;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::budget::MICRO;
 use photoncard_shared::counters::Counters;
 #[cfg(target_arch = "riscv32")]
 use riscv_rt::entry;
@@ -40,10 +40,10 @@ use self::report::StackCheck;
 use crate::hardware::ThisBoard;
 
 /// The card. Made by the compiler: its buffers never lie on the stack.
-static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(MICRO, Dram::new(&mut [])));
+static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(Dram::new(&mut [])));
 
 // The buffers of the image beside the card's are small change, and still fit with the caches that the budget has.
-const _: () = assert!(MICRO_SRAM_BYTES + port::STATIC_BYTES <= MICRO.sram_bytes as usize);
+const _: () = assert!(sram_bytes::<Micro>() + port::STATIC_BYTES <= MICRO.sram_bytes as usize);
 
 #[entry]
 fn main() -> ! {

@@ -4,23 +4,29 @@ use glam::Vec3;
 use photoncard_shared::message::{Drain, Fault, FrameParameters};
 
 use crate::gather::{GatherQueue, GatherRequest};
+use crate::kind::Capacity;
 use crate::memory::MemoryPort;
-use crate::photon::CandidateBuffer;
+use crate::photon::{CandidateStorage, Candidates};
 use crate::render::Context;
 use crate::render::final_gather::gathered;
 
 /// Candidate buffer of a gather, and the gather queue.
-pub(super) struct Gathers<const CANDIDATES: usize, const QUEUE: usize> {
-    pub(super) candidates: CandidateBuffer<CANDIDATES>,
-    queue: GatherQueue<QUEUE>,
+pub(super) struct Gathers<C: Capacity, Q: Capacity> {
+    candidates: C::Candidates,
+    queue: GatherQueue<Q>,
 }
 
 /// Number of queued gathers done in one call of [`Gathers::drain`].
 const GATHERS_PER_STEP: usize = 16;
 
-impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
+impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
     pub(super) const fn new() -> Self {
-        Self { candidates: CandidateBuffer::new(), queue: GatherQueue::new() }
+        Self { candidates: CandidateStorage::EMPTY, queue: GatherQueue::new() }
+    }
+
+    /// The candidate buffer, for a search that is no gather.
+    pub(super) fn candidates(&mut self) -> Candidates<'_> {
+        self.candidates.view()
     }
 
     /// Drops all queued gathers.
@@ -40,7 +46,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
 
     /// True if the queue is at the frame's limit: it must be drained before another ray is cast.
     pub(super) fn is_full(&self, frame: &FrameParameters) -> bool {
-        self.queue.len() >= most_waiting::<QUEUE>(frame)
+        self.queue.len() >= most_waiting::<Q>(frame)
     }
 
     /// Queues a gather, or does it at once: without deferred reordering, or if the queue has filled up since the last
@@ -97,7 +103,7 @@ impl<const CANDIDATES: usize, const QUEUE: usize> Gathers<CANDIDATES, QUEUE> {
     }
 }
 
-/// Maximum number of queued gathers in a frame: its own limit, within the capacity `QUEUE`.
-fn most_waiting<const QUEUE: usize>(frame: &FrameParameters) -> usize {
-    (frame.queue as usize).clamp(1, QUEUE)
+/// Maximum number of queued gathers in a frame: its own limit, within the capacity of the queue.
+fn most_waiting<Q: Capacity>(frame: &FrameParameters) -> usize {
+    (frame.queue as usize).clamp(1, Q::ENTRIES)
 }

@@ -1,7 +1,7 @@
-//! One chip: the state of a tile, and its stages.
+//! One chip: the state of a tile, and its passes.
 //!
 //! A tile is rendered in one block or, if its irradiance records do not fit into the cache, in several smaller ones. A
-//! block goes through the stages of `position`; every stage is done for all pixels before the next begins, so that
+//! block goes through the passes of `position`; every pass is done for all pixels before the next begins, so that
 //! gathers of neighbouring pixels are adjacent. Each call of [`Chip::step`] does a small piece of this work.
 
 mod completion;
@@ -13,58 +13,37 @@ mod records;
 mod stored_point;
 
 use heapless::Vec;
-use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::budget::{
-    Budget, MICRO, REFERENCE, TechniqueMemory, gather_candidates, sums_of_pixel,
-};
+use photoncard_shared::budget::sums_of_pixel;
 use photoncard_shared::message::{Fault, FrameParameters, PixelRecord, Tile};
 
 pub use self::completion::Completion;
 use self::gathers::Gathers;
 pub use self::light::Component;
 use self::light::{add_light, sums_of};
-use self::position::{Block, Position, Stage};
+use self::position::{Block, Pass, Position};
 use self::stored_point::StoredPoint;
 use crate::fixed_point::ColourSum;
 use crate::gather::GatherQueue;
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
-use crate::memory::{CacheEntry, MemoryPort};
+use crate::kind::{self, Buffer, Capacity, ChipKind, Micro, Reference, TechniqueMemory};
+use crate::memory::MemoryPort;
 use crate::render::{Context, PixelSample};
 
-/// The chip of [`REFERENCE`].
-pub type ReferenceChip = Chip<
-    { REFERENCE.tile_pixels as usize },
-    { gather_candidates(REFERENCE.neighbors) },
-    { REFERENCE.gather_queue as usize },
-    { REFERENCE.irradiance_records as usize },
-    { REFERENCE.gathered_records as usize },
->;
-/// The chip of [`MICRO`].
-pub type MicroChip = Chip<
-    { MICRO.tile_pixels as usize },
-    { gather_candidates(MICRO.neighbors) },
-    { MICRO.gather_queue as usize },
-    { MICRO.irradiance_records as usize },
-    { MICRO.gathered_records as usize },
->;
+/// The chip of the budget [`REFERENCE`](crate::kind::REFERENCE).
+pub type ReferenceChip = Chip<Reference>;
+/// The chip of the budget [`MICRO`](crate::kind::MICRO).
+pub type MicroChip = Chip<Micro>;
 
-/// A chip, with buffers for `TILE_PIXELS` pixels, `CANDIDATES` candidates of a gather, `QUEUE` queued gathers, and
-/// `RECORDS` irradiance records, of which `GATHERED` are gathered at once.
-pub struct Chip<
-    const TILE_PIXELS: usize,
-    const CANDIDATES: usize,
-    const QUEUE: usize,
-    const RECORDS: usize,
-    const GATHERED: usize,
-> {
+/// A chip of one kind, which gives the capacities of all its buffers.
+pub struct Chip<K: ChipKind> {
     /// Origins of gather rays: the surface that each pixel of the tile sees in the current sample, or irradiance
     /// records.
-    points: Vec<StoredPoint, TILE_PIXELS>,
+    points: <K::TilePixels as Capacity>::Buffer<StoredPoint>,
     /// Sums of the tile's pixels, in the image's radiance units: [`sums_of_pixel`] for each pixel.
-    sums: Vec<ColourSum, TILE_PIXELS>,
-    gathers: Gathers<CANDIDATES, QUEUE>,
-    cache: IrradianceCache<RECORDS, GATHERED>,
+    sums: <K::TilePixels as Capacity>::Buffer<ColourSum>,
+    gathers: Gathers<K::Candidates, K::GatherQueue>,
+    cache: IrradianceCache<K::IrradianceRecords, K::GatheredRecords>,
     tile: Tile,
     /// Blocks of the tile that have not begun, the next on top.
     blocks: Vec<Block, MAX_BLOCKS>,
@@ -91,39 +70,26 @@ pub enum Progress {
     Complete,
 }
 
-impl<
-    const TILE_PIXELS: usize,
-    const CANDIDATES: usize,
-    const QUEUE: usize,
-    const RECORDS: usize,
-    const GATHERED: usize,
-> Default for Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
-{
+impl<K: ChipKind> Default for Chip<K> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<
-    const TILE_PIXELS: usize,
-    const CANDIDATES: usize,
-    const QUEUE: usize,
-    const RECORDS: usize,
-    const GATHERED: usize,
-> Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
-{
+impl<K: ChipKind> Chip<K> {
     /// On-chip memory that each technique adds to the chip.
     pub const TECHNIQUES: TechniqueMemory = TechniqueMemory {
-        reordering: size_of::<GatherQueue<QUEUE>>(),
-        irradiance_cache: size_of::<IrradianceCache<RECORDS, GATHERED>>(),
-        importance_sampling: TILE_PIXELS * size_of::<DirectionTable>(),
+        reordering: size_of::<GatherQueue<K::GatherQueue>>(),
+        irradiance_cache: size_of::<IrradianceCache<K::IrradianceRecords, K::GatheredRecords>>(),
+        importance_sampling: K::TilePixels::ENTRIES * size_of::<DirectionTable>(),
     };
 
     /// A chip without a tile.
     pub const fn new() -> Self {
+        const { kind::check::<K>() };
         Self {
-            points: Vec::new(),
-            sums: Vec::new(),
+            points: Buffer::EMPTY,
+            sums: Buffer::EMPTY,
             gathers: Gathers::new(),
             cache: IrradianceCache::new(),
             tile: Tile { id: 0, x: 0, y: 0, width: 0, height: 0 },
@@ -136,7 +102,7 @@ impl<
 
     /// Maximum number of pixels of a tile of a frame.
     pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
-        TILE_PIXELS as u64 / u64::from(sums_of_pixel(frame.layers))
+        K::TilePixels::ENTRIES as u64 / u64::from(sums_of_pixel(frame.layers))
     }
 
     /// Begins a tile of a frame. Returns false if the tile has no pixels or more than [`Self::tile_pixels`].
@@ -146,16 +112,20 @@ impl<
         self.tile = tile;
         self.position = Position::DONE;
         self.completion = Completion::NOTHING;
-        self.points.clear();
-        self.sums.clear();
+        self.points.view_mut().clear();
+        self.sums.view_mut().clear();
         self.gathers.clear();
         self.blocks.clear();
         if tile.pixels() == 0 || tile.pixels() > self.tile_pixels(frame) {
             return false;
         }
         let pixels = tile.pixels() as usize;
-        self.points.resize(pixels, StoredPoint::NOTHING).is_ok()
-            && self.sums.resize(pixels * sums_of_pixel(frame.layers) as usize, ColourSum::ZERO).is_ok()
+        self.points.view_mut().resize(pixels, StoredPoint::NOTHING).is_ok()
+            && self
+                .sums
+                .view_mut()
+                .resize(pixels * sums_of_pixel(frame.layers) as usize, ColourSum::ZERO)
+                .is_ok()
             && self.blocks.push(Block::whole(tile.width, tile.height)).is_ok()
     }
 
@@ -177,26 +147,26 @@ impl<
         Ok(Progress::Busy)
     }
 
-    /// Does the next piece of the tile: one stage of one pixel or record; in the stages of gather rays, rays of one
+    /// Does the next piece of the tile: one pass of one pixel or record; in the passes of gather rays, rays of one
     /// direction bin of it; in the survey, one cell of the lattice or one ray; or some of the queued gathers.
     #[inline(always)]
     fn piece<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<Progress, Fault> {
-        let stage = self.position.stage;
-        let must_be_empty = matches!(stage, Stage::Done | Stage::RecordSums);
+        let pass = self.position.pass;
+        let must_be_empty = matches!(pass, Pass::Done | Pass::RecordSums);
         let must_drain = self.gathers.is_full(context.frame) || must_be_empty && !self.gathers.is_empty();
         if self.gathers.is_draining() || must_drain {
             self.drain(context)?;
             return Ok(Progress::Busy);
         }
-        match stage {
-            Stage::Survey => self.survey(context)?,
-            Stage::RecordPoints => self.choose_record_point(context)?,
-            Stage::RecordRays => self.cast_for_record(context)?,
-            Stage::RecordSums => self.end_records(context),
-            Stage::Eye => self.look(context)?,
-            Stage::Direct => self.light_directly(context)?,
-            Stage::Rays => self.cast_for_pixel(context)?,
-            Stage::Done => return Ok(self.next_block(context)),
+        match pass {
+            Pass::Survey => self.survey(context)?,
+            Pass::RecordPoints => self.choose_record_point(context)?,
+            Pass::RecordRays => self.cast_for_record(context)?,
+            Pass::RecordSums => self.end_records(context),
+            Pass::Eye => self.look(context)?,
+            Pass::Direct => self.light_directly(context)?,
+            Pass::Rays => self.cast_for_pixel(context)?,
+            Pass::Done => return Ok(self.next_block(context)),
         }
         Ok(Progress::Busy)
     }
@@ -206,7 +176,7 @@ impl<
         let Some(block) = self.blocks.pop() else { return Progress::Complete };
         self.block = block;
         match allowed_error(context.frame) {
-            None => self.position = Position::at(Stage::Eye),
+            None => self.position = Position::at(Pass::Eye),
             Some(_) => self.begin_records(),
         }
         Progress::Busy
@@ -223,20 +193,20 @@ impl<
     fn drain<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Self { sums, gathers, cache, position, .. } = self;
         let frame = context.frame;
-        if matches!(position.stage, Stage::RecordRays | Stage::RecordSums) {
+        if matches!(position.pass, Pass::RecordRays | Pass::RecordSums) {
             return gathers.drain(context, &mut |request, brought| {
                 cache.add(request.target, request.cell, brought);
             });
         }
         gathers.drain(context, &mut |request, brought| {
-            add_light(sums, frame, request.target, Component::Indirect, brought);
+            add_light(sums.view_mut(), frame, request.target, Component::Indirect, brought);
         })
     }
 
     /// Sums of the complete tile's pixels, row-major, in the image's radiance units: one for each pixel, or
     /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`] in a frame with layers.
     pub fn sums(&self) -> &[ColourSum] {
-        &self.sums
+        self.sums.view()
     }
 
     /// Computes the record of pixel `index`, row-major, of the complete tile, some samples at a call: `None` until the
@@ -256,25 +226,11 @@ impl<
         }
         let completion = core::mem::replace(&mut self.completion, Completion::NOTHING);
         // The sums of an index past the last pixel are empty: no light.
-        Ok(Some(completion.pixel(context, sums_of(&self.sums, context.frame, index))))
+        Ok(Some(completion.pixel(context, sums_of(self.sums.view(), context.frame, index))))
     }
 }
 
 /// Error bound of interpolated irradiance; `None` if the frame interpolates none.
 fn allowed_error(frame: &FrameParameters) -> Option<f32> {
     frame.irradiance_error.filter(|_| frame.gather_rays > 0)
-}
-
-/// On-chip memory of a card, bytes: its state of `card_bytes`, and the budget's caches with their tags and stack.
-pub const fn sram_bytes(budget: &Budget, card_bytes: usize) -> usize {
-    card_bytes + cache_bytes(budget) + tag_bytes(budget) + budget.stack_bytes as usize
-}
-
-const fn cache_bytes(budget: &Budget) -> usize {
-    budget.photon_cache_bytes as usize + budget.scene_cache_bytes as usize
-}
-
-/// On-chip memory of the tags of a budget's caches, bytes.
-pub const fn tag_bytes(budget: &Budget) -> usize {
-    cache_bytes(budget) / LINE_BYTES * size_of::<CacheEntry>()
 }

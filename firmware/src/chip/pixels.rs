@@ -1,13 +1,14 @@
-//! The stages of a block's pixels, sample by sample.
+//! The passes of a block's pixels, sample by sample.
 
 use photoncard_shared::message::{Fault, FrameParameters};
 
 use super::light::{Component, add_light, count_gather};
-use super::position::Stage;
+use super::position::Pass;
 use super::stored_point::{StoredPoint, StoredRays, pattern};
 use super::{Chip, allowed_error};
 use crate::irradiance_cache::SeenSample;
-use crate::memory::{MemoryPort, Stage as MemoryStage};
+use crate::kind::{Buffer, ChipKind};
+use crate::memory::{MemoryPort, Stage};
 use crate::render::eye::{Sight, View};
 use crate::render::{Context, GatherPoint, PixelSample, Purpose, caustic, direct, eye, final_gather};
 use crate::scene::{Seen, Surface};
@@ -25,14 +26,7 @@ fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpo
     }
 }
 
-impl<
-    const TILE_PIXELS: usize,
-    const CANDIDATES: usize,
-    const QUEUE: usize,
-    const RECORDS: usize,
-    const GATHERED: usize,
-> Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
-{
+impl<K: ChipKind> Chip<K> {
     /// Casts the eye ray of the present sample; adds the light that needs no other ray.
     pub(super) fn look<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
@@ -40,15 +34,15 @@ impl<
         match eye::view(context, at)? {
             Sight::Background(radiance) => {
                 let light = radiance * sample_share(context);
-                add_light(&mut self.sums, context.frame, index as u16, Component::Direct, light);
+                add_light(self.sums.view_mut(), context.frame, index as u16, Component::Direct, light);
             }
             Sight::Surface(view) => {
                 let purpose = self.light_at_once(context, index, at, &view);
                 let mut point = pixel_point(context.frame, at, view.surface, purpose);
                 if purpose == Purpose::Sample && point.rays > 0 {
-                    count_gather(&mut self.sums, context.frame, index);
+                    count_gather(self.sums.view_mut(), context.frame, index);
                 }
-                point.choose_directions(context, self.gathers.candidates.view())?;
+                point.choose_directions(context, self.gathers.candidates())?;
                 stored = StoredPoint {
                     seen: view.seen.unwrap_or(Seen::ELSEWHERE),
                     directions: point.directions,
@@ -56,11 +50,11 @@ impl<
                 };
             }
         }
-        if let Some(slot) = self.points.get_mut(index) {
+        if let Some(slot) = self.points.view_mut().get_mut(index) {
             *slot = stored;
         }
         if self.position.next_index(self.block.pixels()) {
-            self.position.stage = Stage::Direct;
+            self.position.pass = Pass::Direct;
         }
         Ok(())
     }
@@ -75,36 +69,36 @@ impl<
     ) -> Purpose {
         let frame = context.frame;
         let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
-        let sample = SeenSample { pixel: [at.x, at.y], place: eye::place(context, at), surface };
+        let sample = SeenSample { pixel: [at.x, at.y], film: eye::film_position(context, at), surface };
         // Records lie where eye rays meet surfaces, not behind mirrors and glass.
         let allowed = allowed_error(frame).filter(|_| is_lambertian && seen.is_some());
         let interpolated = allowed.and_then(|allowed| self.cache.interpolate(&sample, allowed));
         context.counters.lambertian_samples += u64::from(is_lambertian);
         context.counters.interpolated_samples += u64::from(interpolated.is_some());
         let (share, target) = (sample_share(context), index as u16);
-        add_light(&mut self.sums, frame, target, Component::Direct, surface.emission * share);
+        add_light(self.sums.view_mut(), frame, target, Component::Direct, surface.emission * share);
         let Some(light) = interpolated else { return Purpose::Sample };
         let reflected = surface.reflector().lambertian_albedo() * light;
-        add_light(&mut self.sums, frame, target, Component::Indirect, reflected * share);
+        add_light(self.sums.view_mut(), frame, target, Component::Indirect, reflected * share);
         Purpose::Lobe
     }
 
     /// Adds the light of shadow rays and caustics to the present pixel.
     pub(super) fn light_directly<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
-        context.memory.enter(MemoryStage::Shadow);
-        if let Some(stored) = self.points.get(index)
+        context.memory.enter(Stage::Shadow);
+        if let Some(stored) = self.points.view().get(index)
             && let Some(point) = stored.restore(context, at)?
         {
             let reflected = direct::reflected(context, at, &point)?;
             let light = reflected * sample_share(context);
-            add_light(&mut self.sums, context.frame, index as u16, Component::Direct, light);
-            let focused = caustic::reflected(context, &point, self.gathers.candidates.view())?;
+            add_light(self.sums.view_mut(), context.frame, index as u16, Component::Direct, light);
+            let focused = caustic::reflected(context, &point, self.gathers.candidates())?;
             let light = focused / context.frame.samples.max(1) as f32;
-            add_light(&mut self.sums, context.frame, index as u16, Component::Caustic, light);
+            add_light(self.sums.view_mut(), context.frame, index as u16, Component::Caustic, light);
         }
         if self.position.next_index(self.block.pixels()) {
-            self.position.stage = Stage::Rays;
+            self.position.pass = Pass::Rays;
         }
         Ok(())
     }
@@ -115,7 +109,7 @@ impl<
         let [column, row] = self.block.pixel(self.position.index);
         let first = (row * self.tile.width + column) as usize;
         let left = (self.block.x + self.block.width).saturating_sub(column) as usize;
-        let rest = self.points.get(first..first + left).unwrap_or_default();
+        let rest = self.points.view().get(first..first + left).unwrap_or_default();
         let skipped = rest.iter().position(|stored| stored.rays.number() > 0);
         self.position.index += skipped.unwrap_or(left.saturating_sub(1)) as u32;
     }
@@ -126,8 +120,8 @@ impl<
         let (index, at) = self.present();
         let Self { points, sums, gathers, position, .. } = self;
         let frame = context.frame;
-        context.memory.enter(MemoryStage::GatherRay);
-        let stored = points.get(index).copied().unwrap_or(StoredPoint::NOTHING);
+        context.memory.enter(Stage::GatherRay);
+        let stored = points.view().get(index).copied().unwrap_or(StoredPoint::NOTHING);
         let of_bin = stored.rays_of_bin(frame, at, position.bin);
         if !of_bin.is_empty()
             && let Some(point) = stored.restore(context, at)?
@@ -138,7 +132,7 @@ impl<
                 // A tile has at most TILE_PIXELS pixels, which 16 bits tell apart.
                 let end = final_gather::cast(context, &point, index as u16, share, ray)?;
                 let Some(end) = end else { continue };
-                add_light(sums, frame, index as u16, Component::Direct, end.direct);
+                add_light(sums.view_mut(), frame, index as u16, Component::Direct, end.direct);
                 match (end.request, &mut context.outlet) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => {
@@ -146,7 +140,7 @@ impl<
                     }
                     (Some(request), None) => {
                         gathers.submit(context, request, &mut |request, brought| {
-                            add_light(sums, frame, request.target, Component::Indirect, brought);
+                            add_light(sums.view_mut(), frame, request.target, Component::Indirect, brought);
                         })?;
                     }
                 }
@@ -157,7 +151,7 @@ impl<
         }
         if position.next_index(self.block.pixels()) && position.next_bin(frame.bins) {
             let is_last = position.next_sample(frame.samples);
-            position.stage = if is_last { Stage::Done } else { Stage::Eye };
+            position.pass = if is_last { Pass::Done } else { Pass::Eye };
         }
         Ok(())
     }

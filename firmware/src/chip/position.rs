@@ -1,4 +1,4 @@
-//! Progress of a tile: its blocks, and the stages of a block.
+//! Progress of a tile: its blocks, and the passes of a block.
 
 use core::ops::Range;
 
@@ -45,10 +45,10 @@ impl Block {
     }
 }
 
-/// Stages of a block, in order. The stages from [`Stage::Survey`] to [`Stage::RecordSums`] are skipped without the
+/// Passes of a block, in order. The passes from [`Pass::Survey`] to [`Pass::RecordSums`] are skipped without the
 /// irradiance cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stage {
+pub(super) enum Pass {
     /// Survey: placement of irradiance records, level by level of the lattice.
     Survey,
     /// Directions of the gather rays of the next records, as many as are gathered at once.
@@ -70,7 +70,7 @@ pub(super) enum Stage {
 /// Progress of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Position {
-    pub(super) stage: Stage,
+    pub(super) pass: Pass,
     pub(super) sample: u32,
     /// Direction bin.
     pub(super) bin: u32,
@@ -84,11 +84,11 @@ pub(super) struct Position {
 const RAYS_PER_STEP: u32 = 64;
 
 impl Position {
-    pub(super) const DONE: Self = Self::at(Stage::Done);
+    pub(super) const DONE: Self = Self::at(Pass::Done);
 
-    /// The beginning of a stage, at the first sample.
-    pub(super) const fn at(stage: Stage) -> Self {
-        Self { stage, sample: 0, bin: 0, index: 0, rays: 0 }
+    /// The beginning of a pass, at the first sample.
+    pub(super) const fn at(pass: Pass) -> Self {
+        Self { pass, sample: 0, bin: 0, index: 0, rays: 0 }
     }
 
     /// The next rays to cast, at most [`RAYS_PER_STEP`], of the current bin's rays `of_bin`, and whether they are the
@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn steps_cast_all_rays_of_a_bin_and_none_twice() {
         for of_bin in [5..5, 0..1, 7..71, 3..500, 0..64, 0..16_384] {
-            let mut position = Position::at(Stage::Rays);
+            let mut position = Position::at(Pass::Rays);
             let mut cast = Vec::new();
             loop {
                 let (rays, is_last) = position.next_rays(of_bin.clone());

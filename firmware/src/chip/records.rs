@@ -1,21 +1,15 @@
-//! The stages of a block's irradiance records.
+//! The passes of a block's irradiance records.
 
 use photoncard_shared::message::Fault;
 
-use super::position::{Position, Stage};
+use super::position::{Pass, Position};
 use super::{Chip, MAX_BLOCKS, allowed_error};
 use crate::irradiance_cache::{Full, Window};
+use crate::kind::{Buffer, ChipKind};
 use crate::memory::MemoryPort;
 use crate::render::{Context, GatherPoint, final_gather};
 
-impl<
-    const TILE_PIXELS: usize,
-    const CANDIDATES: usize,
-    const QUEUE: usize,
-    const RECORDS: usize,
-    const GATHERED: usize,
-> Chip<TILE_PIXELS, CANDIDATES, QUEUE, RECORDS, GATHERED>
-{
+impl<K: ChipKind> Chip<K> {
     fn window(&self) -> Window {
         let [x0, y0] = [self.tile.x + self.block.x, self.tile.y + self.block.y];
         Window { x0, x1: x0 + self.block.width, y0, y1: y0 + self.block.height }
@@ -23,7 +17,7 @@ impl<
 
     /// Begins the survey of the block's records.
     pub(super) fn begin_records(&mut self) {
-        self.position = Position::at(Stage::Survey);
+        self.position = Position::at(Pass::Survey);
         if self.cache.begin(&self.window()).is_err() {
             self.divide_block();
         }
@@ -46,7 +40,7 @@ impl<
 
     fn do_without_records(&mut self) {
         self.cache.forget();
-        self.position = Position::at(Stage::Eye);
+        self.position = Position::at(Pass::Eye);
     }
 
     /// Does the next step of the survey.
@@ -65,8 +59,8 @@ impl<
 
     /// Begins the gather of the next records, or the eye rays if all records are gathered.
     fn begin_gather(&mut self) {
-        let count = self.cache.begin_gather(self.points.len());
-        self.position = Position::at(if count > 0 { Stage::RecordPoints } else { Stage::Eye });
+        let count = self.cache.begin_gather(self.points.view().len());
+        self.position = Position::at(if count > 0 { Pass::RecordPoints } else { Pass::Eye });
     }
 
     /// Chooses the directions of one record's gather rays.
@@ -76,13 +70,13 @@ impl<
     ) -> Result<(), Fault> {
         let index = self.position.index;
         let point = self.cache.point(context.frame, index);
-        if let (Some(mut point), Some(stored)) = (point, self.points.get_mut(index as usize)) {
-            point.choose_directions(context, self.gathers.candidates.view())?;
+        if let (Some(mut point), Some(stored)) = (point, self.points.view_mut().get_mut(index as usize)) {
+            point.choose_directions(context, self.gathers.candidates())?;
             self.cache.set_point(index, &point);
             stored.directions = point.directions;
         }
         if self.position.next_index(self.cache.being_gathered()) {
-            self.position = Position::at(Stage::RecordRays);
+            self.position = Position::at(Pass::RecordRays);
         }
         Ok(())
     }
@@ -92,7 +86,7 @@ impl<
         let Self { points, cache, gathers, position, .. } = self;
         let index = position.index;
         let point = cache.point(context.frame, index);
-        if let (Some(point), Some(stored)) = (point, points.get(index as usize)) {
+        if let (Some(point), Some(stored)) = (point, points.view().get(index as usize)) {
             let point = &GatherPoint { directions: stored.directions, ..point };
             let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, context.frame.bins);
             let (rays, is_last) = position.next_rays(of_bin);
@@ -112,7 +106,7 @@ impl<
             }
         }
         if position.next_index(cache.being_gathered()) && position.next_bin(context.frame.bins) {
-            self.position = Position::at(Stage::RecordSums);
+            self.position = Position::at(Pass::RecordSums);
         }
         Ok(())
     }

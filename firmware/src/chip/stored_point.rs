@@ -78,8 +78,8 @@ impl StoredPoint {
             let Some(view) = eye::view(context, at)?.surface() else { return Ok(None) };
             view.surface
         } else {
-            let place = eye::place(context, at);
-            eye::surface(context, place, &self.seen)?
+            let film = eye::film_position(context, at);
+            eye::surface(context, film, &self.seen)?
         };
         Ok(Some(GatherPoint {
             surface,

@@ -18,9 +18,9 @@ const BUCKETS: u32 = 256;
 /// Position of a gather, rounded to the photons' grid: index along the Hilbert curve through 1024 cells an axis, and
 /// offset within the cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Place(u64);
+pub struct HilbertCode(u64);
 
-impl Place {
+impl HilbertCode {
     /// Code of the grid point nearest to a position, metres.
     #[inline(always)]
     pub fn new(grid: &PhotonGrid, position: [f32; 3]) -> Self {
@@ -137,12 +137,12 @@ mod tests {
         const SIDE: u32 = 1 << BITS;
         let mut cells = [[u32::MAX; 3]; (SIDE * SIDE * SIDE) as usize];
         for cell in 0..SIDE * SIDE * SIDE {
-            let place = [cell / SIDE / SIDE, cell / SIDE % SIDE, cell % SIDE];
-            let index = hilbert_index(place, BITS);
-            assert_eq!(hilbert_cell(index, BITS), place);
+            let point = [cell / SIDE / SIDE, cell / SIDE % SIDE, cell % SIDE];
+            let index = hilbert_index(point, BITS);
+            assert_eq!(hilbert_cell(index, BITS), point);
             let visited = &mut cells[index as usize];
             assert_eq!(*visited, [u32::MAX; 3]);
-            *visited = place;
+            *visited = point;
         }
         for pair in cells.windows(2) {
             let steps: u32 = (0..3).map(|axis| pair[0][axis].abs_diff(pair[1][axis])).sum();
@@ -151,21 +151,21 @@ mod tests {
     }
 
     #[test]
-    fn a_place_gives_back_its_grid_point() {
+    fn a_code_gives_back_its_grid_point() {
         let grid = PhotonGrid::around([-1.0, -2.0, 0.0], [1.0, 0.5, 4.0]);
         for i in 0..10_000 {
             let position = [0, 1, 2].map(|axis| -2.0 + 6.0 * (hash(3 * i + axis) >> 8) as f32 / 16_777_216.0);
             let expected = grid.position(grid.nearest(position));
-            assert_eq!(Place::new(&grid, position).position(&grid), expected, "{position:?}");
+            assert_eq!(HilbertCode::new(&grid, position).position(&grid), expected, "{position:?}");
         }
     }
 
     #[test]
-    fn places_outside_the_grid_have_a_key() {
-        for place in [-9e9, 9e9, f32::NAN, f32::INFINITY] {
-            let place = Place::new(&PhotonGrid::UNIT, [place; 3]);
+    fn positions_outside_the_grid_have_a_key() {
+        for coordinate in [-9e9, 9e9, f32::NAN, f32::INFINITY] {
+            let code = HilbertCode::new(&PhotonGrid::UNIT, [coordinate; 3]);
             for drain in [Drain::Hash, Drain::Sort] {
-                place.key(drain);
+                code.key(drain);
             }
         }
     }

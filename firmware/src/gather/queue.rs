@@ -1,44 +1,44 @@
 //! The gather queue of deferred reordering: requests are kept until the queue is full or their results are needed, and
-//! are then done in the order of [`super::Place::key`]. A full queue is drained before the next request; nothing is
+//! are then done in the order of [`super::HilbertCode::key`]. A full queue is drained before the next request; nothing is
 //! lost.
 
-use heapless::Vec;
 use photoncard_shared::message::Drain;
 
 use super::GatherRequest;
+use crate::kind::{Buffer, Capacity};
 
-/// Queue of up to `N` gather requests, 24 bytes each.
-pub struct GatherQueue<const N: usize> {
-    waiting: Vec<GatherRequest, N>,
+/// Queue of up to [`Capacity::ENTRIES`] gather requests, 24 bytes each.
+pub struct GatherQueue<C: Capacity> {
+    waiting: C::Buffer<GatherRequest>,
     draining: bool,
 }
 
-impl<const N: usize> Default for GatherQueue<N> {
+impl<C: Capacity> Default for GatherQueue<C> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const N: usize> GatherQueue<N> {
+impl<C: Capacity> GatherQueue<C> {
     /// An empty queue.
     pub const fn new() -> Self {
-        Self { waiting: Vec::new(), draining: false }
+        Self { waiting: Buffer::EMPTY, draining: false }
     }
 
     /// Drops all queued requests.
     pub fn clear(&mut self) {
-        self.waiting.clear();
+        self.waiting.view_mut().clear();
         self.draining = false;
     }
 
     /// Number of queued requests.
     pub fn len(&self) -> usize {
-        self.waiting.len()
+        self.waiting.view().len()
     }
 
     /// True if no request is queued.
     pub fn is_empty(&self) -> bool {
-        self.waiting.is_empty()
+        self.waiting.view().is_empty()
     }
 
     /// True between [`Self::begin_drain`] and the end of the drain.
@@ -51,19 +51,19 @@ impl<const N: usize> GatherQueue<N> {
     /// # Errors
     /// The request itself if the queue is full.
     pub fn push(&mut self, request: GatherRequest) -> Result<(), GatherRequest> {
-        self.waiting.push(request)
+        self.waiting.view_mut().push(request)
     }
 
     /// Begins a drain: sorts the requests in the order of `drain`.
     pub fn begin_drain(&mut self, drain: Drain) {
         // In descending order, as requests are popped from the end.
-        self.waiting.sort_unstable_by_key(|request| u64::MAX - request.place.key(drain));
+        self.waiting.view_mut().sort_unstable_by_key(|request| u64::MAX - request.position.key(drain));
         self.draining = true;
     }
 
     /// The next request; `None` ends the drain.
     pub fn take(&mut self) -> Option<GatherRequest> {
-        let next = self.waiting.pop();
+        let next = self.waiting.view_mut().pop();
         self.draining = next.is_some();
         next
     }

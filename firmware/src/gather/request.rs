@@ -1,18 +1,18 @@
-//! The record of a waiting gather: place, partially evaluated reflection, pixel.
+//! The record of a waiting gather: position, partial reflection, pixel.
 
-use super::Place;
+use super::HilbertCode;
 use crate::scene::PartialReflection;
 
-/// A gather of photons at a place, reflected into a gather point's sum; 24 bytes.
+/// Gather of photons at a position, whose radiance is added to a gather point's sum; 24 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherRequest {
-    /// The place.
-    pub place: Place,
-    /// The reflection, times the gather ray's weight, from photon power units to radiance units.
+    /// Position, on the photons' grid.
+    pub position: HilbertCode,
+    /// Partial reflection times the gather ray's weight, from photon power units to radiance units.
     pub reflection: PartialReflection,
-    /// Number of the gather point on the chip whose sum takes the result.
+    /// Index of the gather point whose sum takes the result.
     pub target: u16,
-    /// Cell of the hemisphere above the gather point that the ray went through.
+    /// Cell of the gather point's hemisphere with the ray's direction.
     pub cell: u8,
 }
 

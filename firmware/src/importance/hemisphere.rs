@@ -17,20 +17,20 @@ pub const COLUMNS: usize = 8;
 /// All cells.
 pub const CELLS: usize = ROWS * COLUMNS;
 
-/// The row and the column of a cell.
+/// Row and column of a cell.
 #[inline(always)]
-fn place(cell: u8) -> [u8; 2] {
+fn row_and_step(cell: u8) -> [u8; 2] {
     let [row, step] = [cell / COLUMNS as u8, cell % COLUMNS as u8];
     [row, if row.is_multiple_of(2) { step } else { COLUMNS as u8 - 1 - step }]
 }
 
-/// The cell of a row and a column.
+/// Cell at a row and a column.
 #[inline(always)]
 pub(crate) fn cell_at(row: usize, column: usize) -> usize {
     row * COLUMNS + if row.is_multiple_of(2) { column } else { COLUMNS - 1 - column }
 }
 
-/// The cell that a unit vector lies in; `None` at or below the horizon of `normal`.
+/// Cell that contains a unit vector; `None` at or below the horizon of `normal`.
 #[inline(always)]
 pub fn cell_of(normal: Vec3, direction: Vec3) -> Option<u8> {
     let (tangent, bitangent) = tangents(normal);
@@ -49,11 +49,11 @@ pub fn cell_of(normal: Vec3, direction: Vec3) -> Option<u8> {
     Some(cell_at(row, column) as u8)
 }
 
-/// The direction at a point of a cell, uniform in projected solid angle: `along` runs from 0 to 1 in the direction of
-/// the walk, `across` from the normal's side to the horizon's.
+/// Direction at a point of a cell, uniform in projected solid angle: `along` is the coordinate in the direction of
+/// the walk, `across` the one from the normal to the horizon, both 0 to 1.
 #[inline(always)]
 pub(crate) fn direction_in(normal: Vec3, cell: u8, [along, across]: [f32; 2]) -> Vec3 {
-    let [row, column] = place(cell);
+    let [row, column] = row_and_step(cell);
     let turn = if row.is_multiple_of(2) { along } else { 1.0 - along };
     let azimuth = (column as f32 + turn) * (2.0 * PI / COLUMNS as f32);
     let sine_squared = (row as f32 + across) * (1.0 / ROWS as f32);
@@ -62,9 +62,9 @@ pub(crate) fn direction_in(normal: Vec3, cell: u8, [along, across]: [f32; 2]) ->
     from_frame(normal, sine * libm::cosf(azimuth), sine * libm::sinf(azimuth), cosine)
 }
 
-/// The middle of a cell as seen from the normal: its azimuth, radians, and the square of the sine of its angle.
+/// Centre of a cell: azimuth, radians, and `sin^2` of the polar angle.
 pub(crate) fn cell_centre(cell: u8) -> [f32; 2] {
-    let [row, column] = place(cell);
+    let [row, column] = row_and_step(cell);
     [(column as f32 + 0.5) * (2.0 * PI / COLUMNS as f32), (row as f32 + 0.5) * (1.0 / ROWS as f32)]
 }
 
@@ -92,7 +92,7 @@ mod tests {
     fn neighbours_of_the_walk_share_a_border() {
         for cell in 0..CELLS as u8 - 1 {
             let end = direction_in(Vec3::Z, cell, [1.0, 1.0]);
-            let [row, next_row] = [cell, cell + 1].map(|cell| place(cell)[0]);
+            let [row, next_row] = [cell, cell + 1].map(|cell| row_and_step(cell)[0]);
             let start = direction_in(Vec3::Z, cell + 1, [0.0, if row == next_row { 1.0 } else { 0.0 }]);
             // From a row to the next the azimuth turns back: the walk goes on at the same place.
             assert!(end.distance(start) < 1e-3, "{cell}: {end} {start}");

@@ -1,10 +1,10 @@
-//! Directions of the indirect light at a point, estimated from the nearest photons, and the tables made of them.
+//! Flux of indirect light through the cells of the hemisphere, estimated from the nearest photons, and direction tables from it.
 //!
-//! The flux of the photons that came through each cell is summed, those straight from an emitter left out: their light is
-//! there already, by shadow rays. With k = 100 photons a cell holds a few, and its flux is uncertain by half of itself.
-//! A table of raw sums would cost more variance than it saves wherever light comes from all around. So the sums are
-//! drawn towards their mean by as much of their spread as the photons' number explains (James, Stein 1961, *Estimation with
-//! quadratic loss*): a spread of noise alone gives the cosine's table, light in few cells theirs.
+//! Photons straight from a light are excluded: shadow rays bring that light. With k = 100 photons a cell has a few, and its flux is
+//! uncertain by half. A table of raw sums would cost more variance than it saves wherever light comes from all around. The sums are
+//! therefore shrunk towards their mean (James, Stein 1961, *Estimation with quadratic loss*): by the factor
+//! `max(0, 1 - noise / spread)`, with `spread` the sum of squared deviations and `noise` the part of it that the number of photons
+//! explains. Pure noise gives the table of the cosine; light through few cells keeps its shape.
 
 use glam::Vec3;
 use photoncard_shared::layout::decode_direction;
@@ -19,17 +19,16 @@ use crate::sampler::radical_inverse;
 use crate::scene::Reflector;
 use crate::vector::{max, unit};
 
-/// Share of a product's cells that is divided evenly, however sure the photons are: light varies within a cell as well, and
-/// only many rays in all cells sample that. It bounds the weight of a ray by twice the albedo where light comes from a cell
-/// without photons. Measured: `docs/techniques.md`.
+/// Uniform share of the cells of a product (defensive sampling): light varies within a cell too, and may come through a cell without
+/// photons. It bounds the weight of a ray by about twice the albedo. Measured: `docs/techniques.md`.
 const EVEN_SHARE: f32 = 0.55;
-/// Flux of an empty cell over the mean: Jensen's small energy.
+/// Flux of an empty cell over the mean flux: the small energy of Jensen 1995.
 const EMPTY_CELL: f32 = 0.1;
-/// Points of the lobe whose cells are looked up.
+/// Number of sampled directions of the lobe that distribute it over the cells.
 const LOBE_POINTS: u32 = 32;
-/// Sharpness of a lobe of which a cell holds one half: its solid angle is about that of two cells.
+/// Sharpness of a lobe of which the cells take one half: its solid angle is about that of two cells.
 const HALF_HELD_SHARPNESS: f32 = 16.0;
-/// Least share of the lobe's entry, over the lobe's share of the albedos.
+/// Minimum share of the lobe's entry, over the lobe's share of the albedos.
 const LOBE_PART: f32 = 0.25;
 
 /// Flux through the cells of the hemisphere: the photons' power weighted by a colour, in photon power units.
@@ -40,7 +39,7 @@ pub struct IncidentFlux {
 }
 
 impl IncidentFlux {
-    /// The flux of the photons nearest to a point, on its surface, that did not come straight from an emitter. `colour`, at most
+    /// Flux of the nearest photons of the point's surface, without photons straight from a light. `colour`, at most
     /// about 1, weights the channels of their power. `normal_code` is the code of `normal`.
     pub fn new(nearest: &NearestPhotons, normal: Vec3, normal_code: u8, colour: Vec3) -> Self {
         let mut flux = Self { cells: [Sum::ZERO; CELLS], squares: Sum::ZERO };
@@ -60,13 +59,13 @@ impl IncidentFlux {
         flux
     }
 
-    /// The flux of each cell; all 1 if there is none.
+    /// Flux of each cell; 1 for all if there is none.
     fn raw(&self) -> [f32; CELLS] {
         let cells = self.cells.map(Sum::value);
         if cells.iter().any(|&cell| cell > 0.0) { cells } else { [1.0; CELLS] }
     }
 
-    /// The flux of each cell drawn towards the mean.
+    /// Flux of each cell, shrunk towards the mean.
     fn shrunk(&self) -> [f32; CELLS] {
         let cells = self.raw();
         let mean = mean(&cells);
@@ -76,7 +75,7 @@ impl IncidentFlux {
         cells.map(|cell| mean + known * (cell - mean))
     }
 
-    /// The table of a sampling for a point where the reflection is not black.
+    /// Direction table of a sampling for a reflection that is not black.
     pub fn table(&self, sampling: Sampling, reflector: &Reflector) -> DirectionTable {
         match sampling {
             Sampling::Reflection => DirectionTable::of_reflection(reflector),
@@ -92,7 +91,7 @@ impl IncidentFlux {
 }
 
 impl DirectionTable {
-    /// The table of the reflection alone.
+    /// Direction table of the reflection alone.
     pub fn of_reflection(reflector: &Reflector) -> Self {
         let [diffuse, lobe] = reflector.albedos();
         Self::new(&[diffuse * (1.0 / CELLS as f32); CELLS], lobe)
@@ -103,7 +102,7 @@ fn mean(cells: &[f32; CELLS]) -> f32 {
     cells.iter().sum::<f32>() * (1.0 / CELLS as f32)
 }
 
-/// The flux of each cell, reflected: by the Lambertian part, and by what of the lobe cells can hold.
+/// Table of flux times reflection: the Lambertian part, and the part of the lobe that is as wide as cells.
 fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     let [diffuse, specular] = reflector.albedos();
     let even = EVEN_SHARE * mean(flux);
@@ -119,7 +118,7 @@ fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
         let (Some(reflected), Some(flux)) = (cells.get_mut(cell as usize), flux.get(cell as usize)) else {
             continue;
         };
-        // The cell's radiance at the lobe's point, where f / p weights it.
+        // Flux of the cell at the sampled direction, weighted by f / p.
         let cosine = reflector.normal.dot(direction);
         let brought = scale * flux * cosine * reflector.lobe_gain(direction);
         *reflected += held * brought;
@@ -130,7 +129,7 @@ fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     DirectionTable::new(&cells, max(lobe, least))
 }
 
-/// Directions of the lobe, each with its cell; directions below the surface are left out.
+/// Sampled directions of the lobe with their cells, without directions below the surface.
 fn lobe_points(reflector: &Reflector) -> impl Iterator<Item = (u8, Vec3)> {
     (0..LOBE_POINTS).filter_map(move |index| {
         let point = [radical_inverse(index), (index as f32 + 0.5) / LOBE_POINTS as f32];
@@ -139,7 +138,7 @@ fn lobe_points(reflector: &Reflector) -> impl Iterator<Item = (u8, Vec3)> {
     })
 }
 
-/// Half of the rays by the reflection, half by the flux.
+/// Table with half of the rays by the reflection, half by the flux.
 fn mixture(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     let all: f32 = flux.iter().sum();
     let diffuse_share = reflector.diffuse_share();

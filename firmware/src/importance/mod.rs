@@ -25,7 +25,7 @@ pub use table::{DirectionTable, ENTRIES};
 
 use glam::Vec3;
 
-/// A direction of a gather ray, and the weight of the radiance from there.
+/// Direction of a gather ray, with the weight of its radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherDirection {
     /// Unit vector away from the surface.
@@ -34,6 +34,6 @@ pub struct GatherDirection {
     pub weight: Vec3,
     /// Probability density of the direction, 1/sr.
     pub density: f32,
-    /// The cell of the hemisphere that the direction lies in.
+    /// Cell of the hemisphere that contains the direction.
     pub cell: u8,
 }

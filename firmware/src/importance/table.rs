@@ -1,4 +1,4 @@
-//! The table of one surface point: shares of its gather rays by direction.
+//! The direction table of a gather point: shares of its gather rays by direction.
 
 use core::f32::consts::FRAC_1_PI;
 use core::ops::Range;
@@ -14,7 +14,7 @@ use crate::vector::max;
 /// Entries of a table: the cells of the hemisphere along their walk, then the lobe.
 pub const ENTRIES: usize = CELLS + 1;
 
-/// The number of the lobe's entry.
+/// Index of the lobe's entry.
 const LOBE: usize = CELLS;
 
 /// Shares of the gather rays: whole numbers, so that densities are exact. 34 bytes.
@@ -34,8 +34,7 @@ impl DirectionTable {
     /// Equal cells: the density `cos(theta) / pi`.
     pub const COSINE: Self = Self { cells: [1; CELLS], lobe: 0 };
 
-    /// A table in proportion to `cells` and `lobe`, which are finite and not negative; no cell is left empty unless all
-    /// are.
+    /// Table in proportion to `cells` and `lobe`, which are finite and not negative. If any cell is positive, all cells get a share.
     pub(super) fn new(cells: &[f32; CELLS], lobe: f32) -> Self {
         let greatest = cells.iter().fold(0.0, |greatest, &cell| max(cell, greatest));
         if greatest <= 0.0 {
@@ -53,7 +52,7 @@ impl DirectionTable {
         self.cells.iter().map(|&share| share as u32).sum::<u32>() + self.lobe as u32
     }
 
-    /// The share of all rays that a cell's own entry has, without the lobe's rays through the cell.
+    /// Share of all rays in a cell's entry, without the lobe's rays through the cell.
     pub(crate) fn cell_share(&self, cell: usize) -> f32 {
         self.cells.get(cell).map_or(0.0, |&share| share as f32) / self.total() as f32
     }
@@ -63,15 +62,15 @@ impl DirectionTable {
         self.cells.get(entry).map_or(self.lobe as u32, |&share| share as u32)
     }
 
-    /// The sum of the shares before an entry.
+    /// Sum of the shares before an entry.
     #[inline(always)]
     fn before(&self, entry: usize) -> u32 {
         let cells: u32 = self.cells.iter().take(entry).map(|&share| share as u32).sum();
         cells + if entry > LOBE { self.lobe as u32 } else { 0 }
     }
 
-    /// The rays, of `count` in all, that belong to direction bin `bin` of `bins`: bins divide the walk through the
-    /// entries evenly. One bin holds all rays; the ranges of all bins follow each other.
+    /// Range of the rays, of `count` in all, in direction bin `bin` of `bins`. Bins divide the walk through the
+    /// entries into equal parts; their ranges follow each other.
     ///
     /// `count` is at most [`MAX_GATHER_RAYS`](photoncard_shared::budget::MAX_GATHER_RAYS), `bins` at most
     /// [`MAX_BINS`](photoncard_shared::budget::MAX_BINS).
@@ -83,19 +82,19 @@ impl DirectionTable {
         self.first_ray(pattern, count, bin, bins)..self.first_ray(pattern, count, bin + 1, bins)
     }
 
-    /// The first ray at or behind the beginning of a bin.
+    /// Index of the first ray at or after the start of a bin.
     fn first_ray(&self, pattern: Pattern, count: u32, bin: u32, bins: u32) -> u32 {
         let [entry, part] = [bin * ENTRIES as u32 / bins, bin * ENTRIES as u32 % bins];
-        // In units of 1 / bins of a share: whole numbers.
+        // In units of a share over `bins`: integers.
         let beginning = (self.before(entry as usize) * bins + self.share(entry as usize) * part) as u64;
-        // Every table has a share; the compiler cannot see it.
+        // At least 1 in every table, which the compiler cannot prove.
         let total = (self.total() * bins).max(1) as u64;
         let ray = (beginning * count as u64 / total) as u32;
         let is_before = ray < count && stratum_point(pattern, ray) * total < beginning * whole(count);
         ray + u32::from(is_before)
     }
 
-    /// Ray `index` of `count`: its entry, and its place in the entry along the walk and across it.
+    /// Entry of ray `index` of `count`, and the ray's coordinates within the entry, along the walk and across it.
     #[inline(always)]
     fn entry(&self, pattern: Pattern, index: u32, count: u32) -> (usize, [f32; 2]) {
         let target = stratum_point(pattern, index) * self.total() as u64;
@@ -111,7 +110,7 @@ impl DirectionTable {
         (LOBE, [part(target - before, size), pattern.radical_inverse(index)])
     }
 
-    /// Rays of `count` in each cell, not counting those of the lobe.
+    /// Number of rays, of `count`, in each cell, without the lobe's.
     pub fn rays_in_cells(&self, pattern: Pattern, count: u32) -> [u16; CELLS] {
         let mut rays = [0; CELLS];
         for index in 0..count {
@@ -123,7 +122,7 @@ impl DirectionTable {
         rays
     }
 
-    /// The direction of ray `index` of `count`; `None` below the surface, where nothing is reflected.
+    /// Direction of ray `index` of `count`; `None` below the surface.
     #[inline(always)]
     pub fn sample(
         &self,
@@ -141,7 +140,7 @@ impl DirectionTable {
             direction_in(*normal, entry as u8, point)
         };
         let cosine = normal.dot(direction);
-        // A ray of a cell keeps its cell, whatever the rounding of its direction.
+        // The cell of the entry, not of the rounded direction.
         let cell = if entry == LOBE { cell_of(*normal, direction)? } else { entry as u8 };
         if cosine <= 0.0 {
             return None;
@@ -152,7 +151,7 @@ impl DirectionTable {
         (density > 0.0).then_some(GatherDirection { direction, weight, density, cell })
     }
 
-    /// The probability density, 1/sr, of a direction on the side of the normal.
+    /// Probability density of a direction above the surface, 1/sr.
     #[inline(always)]
     pub fn density(&self, reflector: &Reflector, direction: Vec3) -> f32 {
         let Some(cell) = cell_of(reflector.normal, direction) else { return 0.0 };
@@ -168,16 +167,16 @@ impl DirectionTable {
     }
 }
 
-/// Bits of a point's place in its stratum.
+/// Bits of a point's offset in its stratum.
 const JITTER_BITS: u32 = 24;
 
-/// The length of all strata.
+/// Length of all strata together.
 #[inline(always)]
 fn whole(count: u32) -> u64 {
     (count as u64) << JITTER_BITS
 }
 
-/// The point of a ray along all strata, each of the length `2^JITTER_BITS`.
+/// Point of a ray along all strata, each `2^JITTER_BITS` long.
 #[inline(always)]
 fn stratum_point(pattern: Pattern, index: u32) -> u64 {
     (index as u64) << JITTER_BITS | (pattern.jitter(index) >> (u32::BITS - JITTER_BITS)) as u64

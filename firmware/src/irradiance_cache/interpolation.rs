@@ -5,13 +5,14 @@ use glam::Vec3;
 use super::lattice::Cell;
 use super::record::{Content, Record};
 use super::{IrradianceCache, LatticePoint};
+use crate::kind::{Capacity, Map};
 use crate::scene::Surface;
 use crate::vector::min;
 
 /// Minimum sum of the weights of a sample's records.
 const MIN_WEIGHT: f32 = 0.05;
 
-/// Records at the corners of a cell, where there are any.
+/// Records at the corners of a cell; `None` at a corner without one.
 pub(super) struct Corners<'a>([Option<&'a Record>; 4]);
 
 impl<'a> Corners<'a> {
@@ -35,24 +36,24 @@ impl<'a> Corners<'a> {
     }
 }
 
-/// Surface that a sample sees, and the sample's position in the picture.
+/// A sample: the surface that it sees, and its position in the picture.
 #[derive(Clone, Copy, Debug)]
 pub struct SeenSample<'a> {
     /// Column and row of its pixel.
     pub pixel: [u32; 2],
     /// Position in the picture, pixels from the upper left corner.
-    pub place: [f32; 2],
+    pub film: [f32; 2],
     /// Visible surface.
     pub surface: &'a Surface,
 }
 
-/// Weights of a sample's cell's four corners.
+/// Weights of the four corners of a sample's cell.
 struct Weights {
     cell: Cell,
     weights: [f32; 4],
 }
 
-impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
+impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
     pub(super) fn corners(&self, cell: &Cell) -> Corners<'_> {
         Corners(cell.corners().map(|corner| self.records.get(&corner).and_then(Option::as_ref)))
     }
@@ -69,11 +70,11 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
 
     /// Weights of the records for a sample; `None` if it cannot be interpolated.
     fn weights(&self, sample: &SeenSample, allowed: f32) -> Option<Weights> {
-        let SeenSample { pixel, place, surface } = *sample;
-        // By pixel, as rounding may move `place` to the border of the next pixel.
+        let SeenSample { pixel, film, surface } = *sample;
+        // By pixel, as rounding may move `film` to the border of the next pixel.
         let cell = self.undivided_cell(pixel)?;
         let part = |at: f32, from: u32| (at - from as f32) / cell.side() as f32;
-        let [x, y] = [part(place[0], cell.corner.x), part(place[1], cell.corner.y)];
+        let [x, y] = [part(film[0], cell.corner.x), part(film[1], cell.corner.y)];
         let bilinear = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
         let corners = self.corners(&cell);
         let errors = corners.errors(allowed, surface.position, surface.normal);

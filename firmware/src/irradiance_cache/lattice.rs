@@ -24,12 +24,12 @@ pub struct LatticePoint {
 
 /// Offset of a record's eye ray from its lattice point, pixels: in a symmetric view of a room, edges of walls run
 /// exactly through lattice points, and the survey rays of a record on an edge would miss the adjacent wall.
-const PLACE_OFFSET: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
+const FILM_OFFSET: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
 impl LatticePoint {
     /// Picture position of the eye ray of the point's record, pixels.
-    pub(super) fn place(&self) -> [f32; 2] {
-        let [right, down] = PLACE_OFFSET;
+    pub(super) fn film_position(&self) -> [f32; 2] {
+        let [right, down] = FILM_OFFSET;
         [self.x as f32 + right, self.y as f32 + down]
     }
 }

@@ -34,7 +34,6 @@ pub use lattice::{LatticePoint, Window};
 
 use glam::Vec3;
 use heapless::Vec;
-use heapless::index_map::FnvIndexMap;
 use photoncard_shared::message::FrameParameters;
 
 use self::gradient::{coefficients, rotation};
@@ -42,6 +41,7 @@ use self::record::{Content, Irradiance, Record};
 use self::survey_state::Survey;
 use crate::fixed_point::ColourSum;
 use crate::importance::CELLS;
+use crate::kind::{Buffer, Capacity, Map};
 use crate::render::{Context, GatherPoint};
 use crate::sampler::{Dimension, Pattern};
 use crate::vector::{from_upper_half, max, upper_half};
@@ -51,14 +51,14 @@ const MAX_ROOTS: usize = 16;
 /// Maximum number of records of a block of one pixel: 4 corners, and 5 more for each division.
 const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
-/// Irradiance records of a block: up to `RECORDS`, a power of two, of which up to `GATHERED` are gathered at once.
-pub struct IrradianceCache<const RECORDS: usize, const GATHERED: usize> {
+/// Irradiance records of a block: up to `R`, a power of two, of which up to `G` are gathered at once.
+pub struct IrradianceCache<R: Capacity, G: Capacity> {
     /// Records by lattice point; `None` where no surface with a Lambertian part is seen.
-    records: FnvIndexMap<LatticePoint, Option<Record>, RECORDS>,
+    records: R::Map<LatticePoint, Option<Record>>,
     /// Coarsest cells, each with a bit mask of the divided cells in its quadtree ([`lattice::Cell::tree_number`]).
     roots: Vec<(LatticePoint, u32), MAX_ROOTS>,
     survey: Survey,
-    gathered: Vec<GatheredRecord, GATHERED>,
+    gathered: G::Buffer<GatheredRecord>,
     /// Index of the first record that is not yet gathered or being gathered.
     next: usize,
 }
@@ -78,26 +78,26 @@ struct GatheredRecord {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Full;
 
-impl<const RECORDS: usize, const GATHERED: usize> Default for IrradianceCache<RECORDS, GATHERED> {
+impl<R: Capacity, G: Capacity> Default for IrradianceCache<R, G> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
+impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
     const SUFFICES: () = {
-        assert!(RECORDS >= MIN_RECORDS, "a block of one pixel must fit");
-        assert!(GATHERED > 0 && GATHERED <= 1 << 16, "a gather's target is told in 16 bits");
+        assert!(R::ENTRIES >= MIN_RECORDS, "a block of one pixel must fit");
+        assert!(G::ENTRIES > 0 && G::ENTRIES <= 1 << 16, "a gather's target is told in 16 bits");
     };
 
     /// A cache without records.
     pub const fn new() -> Self {
         let () = Self::SUFFICES;
         Self {
-            records: FnvIndexMap::new(),
+            records: Map::EMPTY,
             roots: Vec::new(),
             survey: Survey::BEGIN,
-            gathered: Vec::new(),
+            gathered: Buffer::EMPTY,
             next: 0,
         }
     }
@@ -125,15 +125,15 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         self.records.clear();
         self.roots.clear();
         self.survey = Survey::BEGIN;
-        self.gathered.clear();
+        self.gathered.view_mut().clear();
         self.next = 0;
     }
 
-    /// Begins the gather of the next records, at most `most`. Returns their number; 0 if all records are gathered.
+    /// Begins the gather of the next records, up to `most`. Returns their number; 0 if all records are gathered.
     pub fn begin_gather(&mut self, most: usize) -> u32 {
-        self.gathered.clear();
-        while self.gathered.len() < most.min(GATHERED) {
-            let Some((_, record)) = self.records.get_index(self.next) else { break };
+        self.gathered.view_mut().clear();
+        while self.gathered.view().len() < most.min(G::ENTRIES) {
+            let Some((_, record)) = self.records.entry(self.next) else { break };
             if let Some(Record { content: Content::Surveyed(_), .. }) = record {
                 let gathered = GatheredRecord {
                     record: self.next,
@@ -142,34 +142,34 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
                     translation: [ColourSum::ZERO; 2],
                     rotation: [ColourSum::ZERO; 2],
                 };
-                // Always fits: the loop ends at GATHERED.
-                let _ = self.gathered.push(gathered);
+                // Always fits: the loop ends at its capacity.
+                let _ = self.gathered.view_mut().push(gathered);
             }
             self.next += 1;
         }
-        self.gathered.len() as u32
+        self.gathered.view().len() as u32
     }
 
     /// Gather point of record `index` of the records being gathered, without directions; `None` if there is no such
     /// record.
     #[inline(always)]
     pub fn point(&self, frame: &FrameParameters, index: u32) -> Option<GatherPoint> {
-        let gathered = self.gathered.get(index as usize)?;
-        let (&LatticePoint { x, y }, record) = self.records.get_index(gathered.record)?;
+        let gathered = self.gathered.view().get(index as usize)?;
+        let (&LatticePoint { x, y }, record) = self.records.entry(gathered.record)?;
         let pattern = Pattern::new(frame.seed, x, y, 0, Dimension::Irradiance);
         Some(GatherPoint::record(record.as_ref()?.surface(), pattern, frame.gather_rays))
     }
 
     /// Number of records being gathered.
     pub fn being_gathered(&self) -> u32 {
-        self.gathered.len() as u32
+        self.gathered.view().len() as u32
     }
 
     /// Sets the directions of record `index` of the records being gathered, which determine its gradient's
     /// coefficients.
     pub fn set_point(&mut self, index: u32, point: &GatherPoint) {
-        let Some(gathered) = self.gathered.get_mut(index as usize) else { return };
-        let record = self.records.get_index(gathered.record).and_then(|(_, record)| record.as_ref());
+        let Some(gathered) = self.gathered.view_mut().get_mut(index as usize) else { return };
+        let record = self.records.entry(gathered.record).and_then(|(_, record)| record.as_ref());
         if let Some(Record { content: Content::Surveyed(distances), .. }) = record {
             gathered.coefficients = coefficients(point, distances).map(|cell| cell.map(upper_half));
         }
@@ -178,7 +178,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
     /// Adds the radiance of a gather ray in a cell of the hemisphere to record `index` of the records being gathered.
     #[inline]
     pub fn add(&mut self, index: u16, cell: u8, brought: Vec3) {
-        let Some(gathered) = self.gathered.get_mut(index as usize) else { return };
+        let Some(gathered) = self.gathered.view_mut().get_mut(index as usize) else { return };
         gathered.mean.add(brought);
         if let Some(coefficients) = gathered.coefficients.get(cell as usize) {
             for (sum, coefficient) in gathered.translation.iter_mut().zip(coefficients) {
@@ -193,9 +193,9 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
     /// Ends the gather of the records: turns their sums into irradiance over pi, W/(sr m^2).
     pub fn end_gather<M>(&mut self, context: &mut Context<M>, allowed: f32) {
         let unit = context.scene.header.radiance_unit;
-        for gathered in &self.gathered {
+        for gathered in self.gathered.view() {
             context.counters.records += 1;
-            let record = self.records.get_index_mut(gathered.record);
+            let record = self.records.entry_mut(gathered.record);
             let Some((_, Some(record))) = record else { continue };
             let irradiance = Irradiance {
                 mean: gathered.mean.value() * unit,
@@ -205,6 +205,6 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
             let reach = libm::sqrtf(allowed) * record.radius;
             record.content = Content::Gathered(irradiance.limited(max(reach, record.distance)));
         }
-        self.gathered.clear();
+        self.gathered.view_mut().clear();
     }
 }

@@ -13,6 +13,7 @@ use super::record::Record;
 use super::survey_state::{Survey, Task};
 use super::{Full, IrradianceCache, LatticePoint, Window};
 use crate::importance::{CELLS, direction_in};
+use crate::kind::{Capacity, Map};
 use crate::memory::{MemoryPort, Stage};
 use crate::render::{Context, eye};
 use crate::sampler::{Dimension, Pattern, unit_interval};
@@ -21,7 +22,7 @@ use crate::scene::{Ray, Surface, closest_hit};
 /// Minimum reach of a record, pixels.
 const MIN_REACH: f32 = 3.0;
 
-impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHERED> {
+impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
     /// Does the next piece of the survey: one lattice cell, or one ray of one record. Returns whether it was the last.
     ///
     /// # Errors
@@ -80,11 +81,11 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
         allowed: f32,
     ) -> Result<Result<(), Full>, Fault> {
         for corner in cell.corners() {
-            if self.records.contains_key(&corner) {
+            if self.records.get(&corner).is_some() {
                 continue;
             }
             let record = new_record(context, corner, allowed)?;
-            if self.records.insert(corner, record).is_err() {
+            if !self.records.insert(corner, record) {
                 return Ok(Err(Full));
             }
         }
@@ -96,7 +97,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
     fn cast<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Survey { index, direction, first, .. } = self.survey;
         let is_last = direction as usize + 1 >= CELLS;
-        if let Some((point, Some(record))) = self.records.get_index_mut(index) {
+        if let Some((point, Some(record))) = self.records.entry_mut(index) {
             let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
             let distance = distance_in(context, &record.surface(), pattern, direction)?;
             record.set_distance(direction, distance);
@@ -133,7 +134,7 @@ impl<const RECORDS: usize, const GATHERED: usize> IrradianceCache<RECORDS, GATHE
             return Ok(false);
         }
         for point in cell.middles() {
-            let seen = eye::see(context, point.place())?;
+            let seen = eye::see(context, point.film_position())?;
             if !seen.is_some_and(|surface| covers(surface.position, surface.normal)) {
                 return Ok(false);
             }
@@ -156,7 +157,7 @@ fn new_record<M: MemoryPort>(
     point: LatticePoint,
     allowed: f32,
 ) -> Result<Option<Record>, Fault> {
-    let seen = eye::see(context, point.place())?;
+    let seen = eye::see(context, point.film_position())?;
     // A surface seen in a mirror or through glass is not where the lattice point is.
     let surface = seen.filter(|surface| surface.reflection.has_lambertian() && surface.specular.is_none());
     Ok(surface.map(|surface| {
@@ -175,8 +176,8 @@ fn distance_in<M: MemoryPort>(
 ) -> Result<f32, Fault> {
     context.memory.enter(Stage::Survey);
     context.counters.survey_rays += 1;
-    let place = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];
-    let ray = Ray::new(surface.offset_origin(), direction_in(surface.normal, cell, place));
+    let square = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];
+    let ray = Ray::new(surface.offset_origin(), direction_in(surface.normal, cell, square));
     let hit = closest_hit(context.scene, context.memory, &ray)?;
     Ok(hit.map_or(f32::INFINITY, |hit| hit.intersection.distance))
 }

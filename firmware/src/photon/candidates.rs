@@ -89,6 +89,24 @@ impl Candidate {
     }
 }
 
+/// Storage of a fixed number of candidates.
+pub trait CandidateStorage {
+    /// The storage, zeroed.
+    const EMPTY: Self;
+
+    /// A view of the whole storage.
+    fn view(&mut self) -> Candidates<'_>;
+}
+
+impl<const N: usize> CandidateStorage for CandidateBuffer<N> {
+    const EMPTY: Self = Self::new();
+
+    #[inline(always)]
+    fn view(&mut self) -> Candidates<'_> {
+        self.view()
+    }
+}
+
 /// Buffer of `N` candidates.
 pub struct CandidateBuffer<const N: usize> {
     distances: [u32; N],

@@ -7,6 +7,6 @@ pub(super) trait Collector {
     /// Squared search radius, m^2.
     fn limit(&self) -> f32;
 
-    /// Adds those of the first `count` lanes that are within the limit: bits of squared distances, and contents.
+    /// Adds the photons of the first `count` lanes that are within the limit: bits of squared distances, and contents.
     fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]);
 }

@@ -13,7 +13,7 @@ use glam::Vec3;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::message::Fault;
 
-pub use candidates::{Candidate, CandidateBuffer, Candidates};
+pub use candidates::{Candidate, CandidateBuffer, CandidateStorage, Candidates};
 pub use irradiance::{FoundIrradiance, PointSearch, nearest_irradiance};
 pub use nearest::NearestPhotons;
 pub use radiance::{Estimate, MIN_NORMAL_COSINE, SameSurface, reflected_radiance};
@@ -42,7 +42,7 @@ impl PhotonMap {
     }
 }
 
-/// Collects the photons of a map nearest to `position` in `nearest`, the same set in either layout of the map. Returns
+/// Collects the photons of a map nearest to `position` in `nearest`; both layouts of the map give equal sets. Returns
 /// the number of photons tested.
 ///
 /// # Errors

@@ -1,18 +1,17 @@
-//! The radiance that the nearest photons reflect: Jensen's density estimate, corrected where it is known to be wrong.
+//! Radiance that the nearest photons reflect: the density estimate of Jensen 2001, chapter 7, with three corrections.
 //!
-//! `L = 1 / (pi r^2 c) sum f(incoming) power`, over the photons within `r`. Three corrections, each principled:
+//! `L = 1 / (pi r^2 c) sum f(incoming) power`, over the photons within `r`:
 //!
-//! - The distance r to the k-th photon is a stopping rule: with all k photons in the sum the estimate is too bright by
-//!   `k / (k - 1)`. The k-th only says how far the search went; the k - 1 within r are summed. This is the unbiased
-//!   estimate of a Poisson density, also where fewer than k lie within the greatest distance and r is that distance.
-//! - Photons of another surface do not count: their surface normals differ. That leaves out photons on the other side
-//!   of a thin wall, and those on the other wall of a corner.
-//! - `c` is the area of all surface whose photons the search finds and the sum takes, in units of the disc's: without it
-//!   every edge and corner darkens, and stacked surfaces glow. The host measures it around each photon, for about that
-//!   photon's own distance to its k-th neighbour; here the nearest photon of the surface carries it. At the distance of
-//!   the nearest of k photons, about r / sqrt(k), c has hardly changed.
+//! - The distance r to the k-th photon is a stopping rule: with all k photons in the sum the estimate would be too bright by
+//!   `k / (k - 1)`. The k - 1 photons within r are summed, the unbiased estimate of a Poisson density. If fewer than k
+//!   lie within the maximum distance, all of them are summed, and r is that distance.
+//! - Photons of another surface, by their normals, are excluded: those on the other side of a thin wall, and those on the other wall
+//!   of a corner.
+//! - `c` is the area of the surface whose photons are summed, over the disc's area: without it edges and corners would darken, and
+//!   stacked surfaces glow. The host measures it for each photon, with about the photon's own distance to its k-th neighbour. A
+//!   gather uses the c of the nearest photon of its surface, at a distance of about r / sqrt(k), where c has hardly changed.
 //!
-//! The estimate's blur remains: the radiance is a mean over the disc.
+//! The remaining bias is blur: the radiance is a mean over the disc.
 
 use core::f32::consts::PI;
 
@@ -25,15 +24,13 @@ use crate::scene::{DecodedLobe, PartialReflection, magnitude};
 use crate::simd::{self, Isa, Kernel};
 use crate::vector::{max, unit};
 
-/// Least cosine between the surface normals of a photon and of the query on one surface.
+/// Minimum cosine between the normals of a photon and of the query that count as one surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
 
-/// Least radius of a disc over the place's greatest coordinate, about the rounding of the place: photons in one point have
-/// no density.
+/// Minimum radius of a disc over the query's greatest coordinate, about its rounding error: photons at one point have no density.
 const MIN_RADIUS_SHARE: f32 = 1e-6;
 
-/// The radiance of a gather at a position, in the units of the reflection: the photons' power over the area of their disc,
-/// reflected.
+/// Radiance of a gather at a position, in the units of the reflection: the photons' power, reflected, over the area of their disc.
 #[inline(always)]
 pub fn reflected_radiance(nearest: &NearestPhotons, position: Vec3, reflection: &PartialReflection) -> Vec3 {
     simd::run(Estimate { nearest, position, reflection })
@@ -41,11 +38,11 @@ pub fn reflected_radiance(nearest: &NearestPhotons, position: Vec3, reflection: 
 
 /// The [`Kernel`] of [`reflected_radiance`].
 pub struct Estimate<'a, 'n> {
-    /// The photons nearest to a place.
+    /// The nearest photons.
     pub nearest: &'a NearestPhotons<'n>,
-    /// The place, metres.
+    /// Position of the gather, metres.
     pub position: Vec3,
-    /// The reflection there.
+    /// Reflection at the position.
     pub reflection: &'a PartialReflection,
 }
 
@@ -69,7 +66,7 @@ impl Kernel for Estimate<'_, '_> {
     }
 }
 
-/// The first or the last candidate: `choose` orders distances, `is_better` candidates of one distance.
+/// Extreme candidate: `choose` selects among distances, `is_better` among candidates of equal distance.
 #[inline(always)]
 fn extreme(
     nearest: &NearestPhotons,
@@ -90,7 +87,7 @@ fn extreme(
     best
 }
 
-/// The closest photon of the surface, and the sums over its photons; `farthest`, if given, is left out.
+/// Closest photon of the surface, and the sums over its photons without `farthest`, if given.
 #[inline(always)]
 fn sum<'a>(
     nearest: &NearestPhotons,
@@ -100,7 +97,7 @@ fn sum<'a>(
     let (_, contents) = nearest.columns();
     let mut sums = Sums::new(reflection);
     if reflection.is_lambertian() && are_all_of(reflection.normal(), contents) {
-        // A single photon is the farthest itself.
+        // With a single photon, `farthest` is the closest too.
         if farthest.is_some() && contents.len() < 2 {
             return None;
         }
@@ -112,7 +109,7 @@ fn sum<'a>(
         return Some((closest, sums));
     }
     let mut same_surface = SameSurface::new(reflection.normal());
-    // Of several photons equal to the farthest, one is left out.
+    // Exactly one of several photons that equal the farthest is excluded.
     let mut excluded = farthest;
     let mut closest: Option<Candidate> = None;
     for candidate in nearest.candidates() {
@@ -136,10 +133,10 @@ fn are_all_of(normal: u8, contents: &[u64]) -> bool {
     differ & 0xff << NORMAL_SHIFT == 0
 }
 
-/// First bit of the normal's code in a photon's contents.
+/// First bit of the normal's code in a photon's content.
 const NORMAL_SHIFT: u32 = 50;
 
-/// The sum of the photons' power, and the lobe's sum.
+/// Sum of the photons' power, and sum of the power times the lobe's factor.
 struct Sums<'a> {
     reflection: &'a PartialReflection,
     decoded: DecodedLobe,
@@ -169,7 +166,7 @@ impl<'a> Sums<'a> {
     }
 }
 
-/// The test for photons of one surface. Neighbours mostly have the normal of the one before, whose answer is kept.
+/// Test for photons of one surface. Consecutive photons mostly have equal normals, so that the last result is cached.
 pub struct SameSurface {
     normal: Vec3,
     last: (u8, bool),

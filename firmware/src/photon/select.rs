@@ -4,8 +4,8 @@
 //! contains the k-th and few others is guessed by interpolation; counting the candidates below its ends verifies and
 //! corrects the guess. One pass then keeps the candidates below the interval and sets aside those in it, of which the
 //! first fill up the k. Where no guess succeeds, as with many candidates at one distance, quickselect (Hoare 1961)
-//! takes over, and after a bounded number of pivots a radix selection, bit by bit of the sort key. The result is the
-//! same on each of these paths.
+//! takes over, and after a bounded number of pivots a radix selection, bit by bit of the sort key. All of these give
+//! equal sets.
 
 use super::candidates::{Candidate, CandidateCells, Candidates};
 use crate::simd::{Isa, LANES};
@@ -58,9 +58,9 @@ fn guess(distances: &[u32], count: usize) -> Option<[u32; 2]> {
             return Some([low.to_bits(), high.to_bits()]);
         } else {
             let step = (high - low) / (nearer_than_high - nearer_than_low) as f32;
-            let place = (count - nearer_than_low) as f32;
-            high = high.min(low + (place + slack) * step);
-            low += (place - slack).max(0.0) * step;
+            let rank = (count - nearer_than_low) as f32;
+            high = high.min(low + (rank + slack) * step);
+            low += (rank - slack).max(0.0) * step;
         }
     }
     None
@@ -156,12 +156,12 @@ impl Aside {
         Some(())
     }
 
-    /// Moves the `place + 1` nearest to the front, unordered, and returns the farthest of them.
+    /// Moves the `rank + 1` nearest to the front, unordered, and returns the farthest of them.
     #[inline(always)]
-    fn select(&mut self, isa: impl Isa, place: usize) -> Option<Candidate> {
-        let Some(index) = self.only_one_at(place) else {
+    fn select(&mut self, isa: impl Isa, rank: usize) -> Option<Candidate> {
+        let Some(index) = self.only_one_at(rank) else {
             let Self { distances, contents, count } = self;
-            return part(Candidates { distances, contents }.first(*count)?.cells(), place);
+            return part(Candidates { distances, contents }.first(*count)?.cells(), rank);
         };
         let last = Candidate { distance: *self.distances.get(index)?, content: *self.contents.get(index)? };
         let all = core::mem::take(&mut self.count);
@@ -175,9 +175,9 @@ impl Aside {
         Some(last)
     }
 
-    /// Index of the candidate with exactly `place` nearer ones; `None` if it shares its distance with another.
+    /// Index of the candidate with exactly `rank` nearer ones; `None` if it shares its distance with another.
     #[inline(always)]
-    fn only_one_at(&self, place: usize) -> Option<usize> {
+    fn only_one_at(&self, rank: usize) -> Option<usize> {
         let all: &[u32; BETWEEN] = self.distances.first_chunk()?;
         let mut nearer = [0_u32; BETWEEN];
         for other in self.distances.get(..self.count)? {
@@ -186,40 +186,40 @@ impl Aside {
             }
         }
         let mut there = nearer.iter().take(self.count).enumerate();
-        let index = there.find(|&(_, &nearer)| nearer as usize == place).map(|(index, _)| index)?;
-        let is_another = there.any(|(_, &nearer)| nearer as usize == place);
+        let index = there.find(|&(_, &nearer)| nearer as usize == rank).map(|(index, _)| index)?;
+        let is_another = there.any(|(_, &nearer)| nearer as usize == rank);
         (!is_another).then_some(index)
     }
 }
 
-/// Moves the `place + 1` nearest candidates to the front, unordered, and returns the farthest of them.
-fn part(mut cells: CandidateCells, mut place: usize) -> Option<Candidate> {
+/// Moves the `rank + 1` nearest candidates to the front, unordered, and returns the farthest of them.
+fn part(mut cells: CandidateCells, mut rank: usize) -> Option<Candidate> {
     for _ in 0..PIVOTS {
         if cells.len() <= FEW {
-            return sort(cells, place);
+            return sort(cells, rank);
         }
         let pivot = pivot(cells)?;
         let mut less = divide(cells, |candidate| candidate.key() < pivot.key());
         if less == 0 {
             // The pivot is the minimum: the candidates equal to it come first.
             less = divide(cells, |candidate| candidate.key() <= pivot.key());
-            if place < less {
+            if rank < less {
                 return Some(pivot);
             }
         }
-        (cells, place) = follow(cells, place, less)?;
+        (cells, rank) = follow(cells, rank, less)?;
     }
     for bit in (0..Candidate::KEY_BITS).rev() {
         let less = divide(cells, |candidate| candidate.key() >> bit & 1 == 0);
-        (cells, place) = follow(cells, place, less)?;
+        (cells, rank) = follow(cells, rank, less)?;
     }
-    cells.get(place)
+    cells.get(rank)
 }
 
-/// The side of a partition after the first `less` cells that contains rank `place`, and the rank in that side.
-fn follow(cells: CandidateCells, place: usize, less: usize) -> Option<(CandidateCells, usize)> {
+/// The side of a partition after the first `less` cells that contains rank `rank`, and the rank in that side.
+fn follow(cells: CandidateCells, rank: usize, less: usize) -> Option<(CandidateCells, usize)> {
     let (front, back) = cells.split_at(less)?;
-    Some(if place < less { (front, place) } else { (back, place - less) })
+    Some(if rank < less { (front, rank) } else { (back, rank - less) })
 }
 
 /// Partitions the candidates: moves those of `is_first` to the front, and returns their number.
@@ -252,8 +252,8 @@ fn median(a: Candidate, b: Candidate, c: Candidate) -> Candidate {
     }
 }
 
-/// Insertion sort; returns the candidate of rank `place`.
-fn sort(cells: CandidateCells, place: usize) -> Option<Candidate> {
+/// Insertion sort; returns the candidate of rank `rank`.
+fn sort(cells: CandidateCells, rank: usize) -> Option<Candidate> {
     for sorted in 1..cells.len() {
         let candidate = cells.get(sorted)?;
         let mut hole = sorted;
@@ -266,5 +266,5 @@ fn sort(cells: CandidateCells, place: usize) -> Option<Candidate> {
         }
         cells.set(hole, candidate);
     }
-    cells.get(place)
+    cells.get(rank)
 }

@@ -1,5 +1,5 @@
-//! Caustics: light that has met perfectly specular surfaces alone, gathered from a photon map of its own where the eye sees it
-//! (Jensen 1996, *Global illumination using photon maps*).
+//! Caustics, paths `L S+ D S* E`: a gather in the caustic map at the surface that the eye sees (Jensen 1996, *Global illumination using
+//! photon maps*).
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -34,7 +34,7 @@ pub fn reflected<M: MemoryPort>(
     search(context, PhotonMap::Caustics, position, &mut nearest)?;
     let header = &context.scene.header;
     let unit = header.caustic_power_unit / header.radiance_unit;
-    // The shading normal reflects; photons carry the triangle's.
+    // Reflection is by the shading normal; photons carry the geometric one.
     let surface = &point.surface;
     let reflection =
         PartialReflection::encode(&surface.reflector(), Vec3::splat(unit), point.pattern.dither(0))

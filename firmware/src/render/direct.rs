@@ -1,19 +1,19 @@
-//! Direct light: shadow rays to lights ([`crate::scene::light`]), weighted against the final gather rays that meet one.
+//! Direct light, paths `L D S* E`: shadow rays to lights ([`crate::scene::light`]), and final gather rays that meet a light.
 //!
-//! Shadow rays alone are noisy where an emitter is near, as their contribution grows with the inverse square of its
-//! distance; gather rays alone where it is small. Both are there in any case, and the balance heuristic (Veach, Guibas
-//! 1995) takes from each what it does best: a path found with `n` rays of density `p` one way and `m` of density `q`
-//! the other counts `n p / (n p + m q)`. The two weights of a path sum to 1, so that direct light is counted once.
+//! Shadow rays are noisy near an emitter, as their contribution grows with the inverse square of the distance; gather rays are noisy
+//! where the emitter is small. Gather rays are cast in any case, so both are combined by the balance heuristic (Veach, Guibas 1995): with
+//! `n` rays of density `p` in one technique and `m` of density `q` in the other, a path has the weight `n p / (n p + m q)` in the first.
+//! The two weights of a path sum to 1, so that direct light is counted once.
 //!
-//! An irradiance record shares its rays' part with samples around it, whose shadow rays bring the rest. The weights
-//! between the two are made for that: with the cosine's density in place of the record's own, which a sample could not
-//! know, with the shadow rays of all samples of a pixel, and by the power heuristic, as the noise of a record shows as
-//! a blotch: light of small emitters is left to shadow rays, that of a sky to records.
+//! The emission that rays of an irradiance record meet is interpolated for the samples around it, whose shadow rays bring the rest.
+//! Both sides must compute equal weights. So the record's density is replaced by `cos(theta) / pi`, as samples do not know its
+//! direction table; the number of shadow rays is that of all samples of a pixel; and the power heuristic leaves small emitters, which
+//! would make a record noisy, to shadow rays, and a sky to records.
 //!
-//! Lights without extent, points and distant ones, are met by no ray, and left to shadow rays alone.
+//! Points, spots and distant lights are met by no gather ray: shadow rays alone bring their light.
 //!
-//! The samples of lights are stratified over all samples of a pixel, as places in the pixel are: many samples with a shadow
-//! ray or two each are as good as one with many.
+//! Light samples are stratified over all samples of a pixel: many samples with one or two shadow rays each are as good as one sample
+//! with many.
 
 use core::f32::consts::FRAC_1_PI;
 
@@ -29,10 +29,10 @@ use crate::scene::light::{
 use crate::scene::{Ray, Surface, is_occluded};
 use crate::vector::max_component;
 
-/// Length of a shadow ray over the distance of its target: it ends short of it by the rounding.
+/// Length of a shadow ray over the distance of its light: it ends before the emitter's surface, whatever the rounding.
 const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
 
-/// Reflected direct light at a point, W/(sr m^2): the share of shadow rays.
+/// Reflected direct light at a point by shadow rays, weighted, W/(sr m^2).
 ///
 /// # Errors
 /// If the image is not sound.
@@ -80,7 +80,7 @@ fn from_light<M: MemoryPort>(
     }
     let cosine = surface.normal.dot(direction);
     let reflector = point.reflector();
-    // Lights without extent are found by light samples alone.
+    // No gather ray meets a light without extent: weight 1.
     let weight = density.map_or(1.0, |density| {
         let by_gather_rays = (point.rays, point.directions.density(&reflector, direction));
         balance((context.frame.shadow_rays, density), by_gather_rays)
@@ -96,8 +96,8 @@ fn from_light<M: MemoryPort>(
     Ok(reflected * irradiance * cosine)
 }
 
-/// The radiance that a gather ray of a point brings straight from an emitter that it has met, with its weight against
-/// the shadow rays. `gather_density` is the ray's own probability density, 1/sr.
+/// Emission of the surface at the end of a gather ray, times its weight against shadow rays, W/(sr m^2). `gather_density` is the ray's
+/// probability density, 1/sr.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -112,7 +112,7 @@ pub fn seen_by_gather_ray<M: MemoryPort>(
     if max_component(met.emission) <= 0.0 {
         return Ok(Vec3::ZERO);
     }
-    // Light samples are of emitters alone; surfaces too dark to be one are met by gather rays only.
+    // Emissive surfaces that are too dark for the light tree are met by gather rays only: weight 1.
     let density = match met.emitter {
         Some(emitter) => {
             let receiver = Receiver::new(&point.surface);
@@ -125,8 +125,8 @@ pub fn seen_by_gather_ray<M: MemoryPort>(
     Ok(met.emission * weight_of_gather_ray(context, point, ray.direction, gather_density, density))
 }
 
-/// The radiance that a gather ray of a point brings from the environment, as it meets nothing, with its weight against the shadow
-/// rays. `gather_density` is the ray's own probability density, 1/sr.
+/// Radiance of the environment along a gather ray that leaves the scene, times its weight against shadow rays, W/(sr m^2).
+/// `gather_density` is the ray's probability density, 1/sr.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -144,7 +144,7 @@ pub fn escaped<M: MemoryPort>(
     Ok(radiance * weight_of_gather_ray(context, point, direction, gather_density, density))
 }
 
-/// The weight of a gather ray against light samples that take its direction with `density`, 1/sr.
+/// Weight of a gather ray against light samples whose density in its direction is `density`, 1/sr.
 #[inline(always)]
 fn weight_of_gather_ray<M>(
     context: &Context<M>,
@@ -161,20 +161,19 @@ fn weight_of_gather_ray<M>(
     }
 }
 
-/// The rays of a record, and the density of one as its samples see it, 1/sr.
+/// Number of gather rays of a record, and the density that weights assume for one, `cos(theta) / pi`, 1/sr.
 #[inline(always)]
 fn rays_of_record<M>(context: &Context<M>, cosine: f32) -> (u32, f32) {
     (context.frame.gather_rays, cosine * FRAC_1_PI)
 }
 
-/// The shadow rays that share direct light with the rays of records, and the density of one, 1/sr.
+/// Number of shadow rays that share direct light with the rays of a record, and the density of one, 1/sr.
 #[inline(always)]
 fn shadow_rays_for_records<M>(context: &Context<M>, density: f32) -> (u32, f32) {
     (context.frame.shadow_rays * context.frame.samples, density)
 }
 
-/// The weight of the first of two ways to find a path, each with its number of rays and its density: the balance
-/// heuristic.
+/// Balance heuristic: weight of the first of two sampling techniques, each with its number of rays and density.
 #[inline(always)]
 fn balance(way: (u32, f32), other: (u32, f32)) -> f32 {
     1.0 / (1.0 + ratio(other, way))
@@ -187,12 +186,12 @@ fn power(way: (u32, f32), other: (u32, f32)) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// Expected samples of a path one way over the other; a way without rays has none.
+/// Ratio `n p / (m q)` of two sampling techniques; 0 for a first technique without rays.
 #[inline(always)]
 fn ratio((rays, density): (u32, f32), (other_rays, other_density): (u32, f32)) -> f32 {
     if rays == 0 {
         return 0.0;
     }
-    // Divided first: a density may be infinite at a grazing angle, and the ratio is then as well, or 0.
+    // At a grazing angle a density, and the ratio, may be infinite.
     (rays as f32 * density) / (other_rays as f32 * other_density)
 }

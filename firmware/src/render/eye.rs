@@ -1,4 +1,4 @@
-//! Eye rays: what a sample of a pixel sees.
+//! Eye rays, and the eye paths that follow them through perfectly specular surfaces.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -11,37 +11,37 @@ use crate::scene::light::environment_radiance;
 use crate::scene::{Ray, Seen, Surface, closest_hit, read_surface};
 use crate::vector::unit;
 
-/// The place of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over
-/// its square (a box filter).
-pub fn place<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
+/// Position of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over
+/// its square (box filter).
+pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     let PixelSample { x, y, sample } = pixel;
     let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Pixel);
     let [jitter_x, jitter_y] = pattern.point(sample, context.frame.samples);
     [x as f32 + jitter_x, y as f32 + jitter_y]
 }
 
-/// What a sample of a pixel sees.
+/// Surface that a sample sees.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    /// The surface, with all that the path there keeps of its light.
+    /// The surface, its reflection and emission times the throughput of the eye path.
     pub surface: Surface,
-    /// Where the eye ray itself met it; `None` if it is seen by way of perfectly specular surfaces.
+    /// Hit of the eye ray itself; `None` behind perfectly specular surfaces.
     pub seen: Option<Seen>,
-    /// How deep the eye ray went, along the view's axis, metres.
+    /// Depth of the eye ray's hit along the view's axis, metres.
     pub depth: f32,
 }
 
-/// What the eye ray of a sample comes to.
+/// End of an eye path.
 #[derive(Clone, Copy, Debug)]
 pub enum Sight {
     /// A surface.
     Surface(View),
-    /// The environment, of this radiance, W/(sr m^2); zero without one.
+    /// The environment; its radiance, W/(sr m^2), zero without one.
     Background(Vec3),
 }
 
 impl Sight {
-    /// The surface, if it is one.
+    /// The surface; `None` for the environment.
     pub fn surface(self) -> Option<View> {
         match self {
             Self::Surface(view) => Some(view),
@@ -50,14 +50,14 @@ impl Sight {
     }
 }
 
-/// Follows the eye ray of a sample, through perfectly specular surfaces too, to what it sees.
+/// Follows the eye path of a sample through perfectly specular surfaces to its end.
 ///
 /// # Errors
 /// If the image is not sound.
 pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Sight, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
-    let ray = eye_ray(context, place(context, pixel));
+    let ray = eye_ray(context, film_position(context, pixel));
     let PixelSample { x, y, sample } = pixel;
     let samples = context.frame.samples;
     let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Specular);
@@ -87,43 +87,43 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     }))
 }
 
-/// The environment at the end of a path that left the scene.
+/// Radiance of the environment at the end of a path that left the scene.
 fn background<M: MemoryPort>(context: &mut Context<M>, path: &SpecularPath) -> Result<Sight, Fault> {
     let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
     Ok(Sight::Background(radiance * path.throughput))
 }
 
-/// What the eye ray at a place of the picture meets.
+/// Hit of the eye ray at a position of the picture.
 ///
 /// # Errors
 /// If the image is not sound.
-pub fn look<M: MemoryPort>(context: &mut Context<M>, place: [f32; 2]) -> Result<Option<Seen>, Fault> {
+pub fn look<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Seen>, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
-    let hit = closest_hit(context.scene, context.memory, &eye_ray(context, place))?;
+    let hit = closest_hit(context.scene, context.memory, &eye_ray(context, film))?;
     Ok(hit.map(|hit| Seen::new(&hit)))
 }
 
-/// The surface of what was seen at a place of the picture.
+/// Surface at a stored hit of the eye ray at a position of the picture.
 ///
 /// # Errors
 /// If the image is not sound.
 #[inline(always)]
 pub fn surface<M: MemoryPort>(
     context: &mut Context<M>,
-    place: [f32; 2],
+    film: [f32; 2],
     seen: &Seen,
 ) -> Result<Surface, Fault> {
-    seen.surface(context.scene, context.memory, &eye_ray(context, place))
+    seen.surface(context.scene, context.memory, &eye_ray(context, film))
 }
 
-/// The surface that is seen at a place of the picture.
+/// Surface at the hit of the eye ray at a position of the picture.
 ///
 /// # Errors
 /// If the image is not sound.
-pub fn see<M: MemoryPort>(context: &mut Context<M>, place: [f32; 2]) -> Result<Option<Surface>, Fault> {
-    match look(context, place)? {
-        Some(seen) => surface(context, place, &seen).map(Some),
+pub fn see<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Surface>, Fault> {
+    match look(context, film)? {
+        Some(seen) => surface(context, film, &seen).map(Some),
         None => Ok(None),
     }
 }
@@ -137,7 +137,7 @@ fn eye_ray<M>(context: &Context<M>, [x, y]: [f32; 2]) -> Ray {
     Ray::new(camera.origin.into(), unit(direction))
 }
 
-/// The side of a pixel at the depth of a surface, metres.
+/// Side of a pixel's footprint at the depth of a surface, metres.
 pub fn pixel_side<M>(context: &Context<M>, surface: &Surface) -> f32 {
     let frame = context.frame;
     let up = libm::sqrtf(Vec3::from_array(frame.camera.up).length_squared());

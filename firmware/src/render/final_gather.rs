@@ -1,32 +1,32 @@
 //! The final gather: rays over the hemisphere, each ending in a gather of the photons nearest to its end.
 //!
-//! Emission at a ray's end is direct light, weighted against the shadow rays that bring it too ([`super::direct`]).
+//! Emission at a ray's end is direct light, weighted against shadow rays ([`super::direct`]).
 
 use glam::Vec3;
 use photoncard_shared::message::{Fault, Radiance};
 
 use super::specular_path::{Carried, PathEnd, SpecularPath};
 use super::{Context, GatherPoint, direct};
-use crate::gather::{GatherRequest, Place};
+use crate::gather::{GatherRequest, HilbertCode};
 use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
 use crate::scene::light::environment_radiance;
 use crate::scene::{PartialReflection, Ray, closest_hit, read_surface};
 
-/// The light at the end of a final gather ray.
+/// Contribution of one final gather ray.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherRayEnd {
-    /// The cell of the hemisphere that the ray went through.
+    /// Cell of the hemisphere with the ray's direction.
     pub cell: u8,
-    /// Direct light of the emitter or the environment it met, weighted, in the image's radiance units.
+    /// Weighted emission of the surface or the environment that it meets, in the image's radiance units.
     pub direct: Vec3,
-    /// The gather of reflected light; `None` at a black surface.
+    /// Gather of the reflected light; `None` at a black surface.
     pub request: Option<GatherRequest>,
 }
 
-/// Casts ray `index` of a gather point; `None` if it meets neither a surface nor the environment. Its light is its term of the
-/// mean over all rays of the point, times `share`; the request's result goes to `target`.
+/// Casts ray `index` of a gather point; `None` if it meets neither a surface nor the environment. The contribution is one term of
+/// the mean over the point's rays, times `share`; the gather's result goes to the sum `target`.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -45,7 +45,7 @@ pub fn cast<M: MemoryPort>(
     let ray = Ray::new(point.surface.offset_origin(), sampled.direction);
     context.counters.gather_rays += 1;
     let mut path = SpecularPath::new(ray, Carried::Radiance);
-    // The mean is taken here, so that the sum stays small.
+    // The division by the number of rays is done here: sums stay within the fixed-point range.
     let weight = sampled.weight * (share / point.rays as f32);
     let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
         return escaped(context, point, &path, &sampled, weight);
@@ -69,7 +69,7 @@ pub fn cast<M: MemoryPort>(
     let unit = 1.0 / context.scene.header.radiance_unit;
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
-        place: Place::new(&header.photon_grid, met.position.to_array()),
+        position: HilbertCode::new(&header.photon_grid, met.position.to_array()),
         reflection: PartialReflection::encode(
             &met.reflector(),
             weight * (header.photon_power_unit / header.radiance_unit),
@@ -102,13 +102,13 @@ fn escaped<M: MemoryPort>(
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
 }
 
-/// The share of emitted light that gather rays bring by way of perfectly specular surfaces: no shadow ray brings any, but
-/// photons of caustics do, if there are any.
+/// Weight of emission at the end of a gather ray that passed perfectly specular surfaces: 0 with a caustic map, which brings it, and 1
+/// without. No shadow ray brings it.
 fn beyond_specular<M>(context: &Context<M>) -> f32 {
     if context.frame.caustics.is_none() { 1.0 } else { 0.0 }
 }
 
-/// Does a gather. Returns its radiance, in the image's radiance units.
+/// Executes a gather. Returns its radiance, in the image's radiance units.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -118,8 +118,8 @@ pub fn gathered<M: MemoryPort>(
     candidates: Candidates,
 ) -> Result<Vec3, Fault> {
     context.memory.enter(Stage::Gather);
-    let position = request.place.position(&context.scene.header.photon_grid).into();
-    // A lobe needs the directions of light, which irradiance does not hold.
+    let position = request.position.position(&context.scene.header.photon_grid).into();
+    // Irradiance has no directions, which a lobe needs.
     if context.frame.radiance == Radiance::Precomputed && request.reflection.is_lambertian() {
         return Ok(
             request.reflection.lambertian() * irradiance(context, position, request.reflection.normal())?
@@ -129,7 +129,7 @@ pub fn gathered<M: MemoryPort>(
     Ok(reflected_radiance(&nearest, position, &request.reflection))
 }
 
-/// The precomputed irradiance of a surface near a place, photon power units a square metre; zero where none is known.
+/// Precomputed irradiance of the nearest irradiance point of a surface, photon power units/m^2; 0 without one.
 #[inline(always)]
 fn irradiance<M: MemoryPort>(context: &mut Context<M>, position: Vec3, normal: u8) -> Result<Vec3, Fault> {
     let max_distance = context.frame.max_distance;
@@ -139,7 +139,7 @@ fn irradiance<M: MemoryPort>(context: &mut Context<M>, position: Vec3, normal: u
     Ok(found.irradiance)
 }
 
-/// The frame's number of photons nearest to a place.
+/// The k nearest photons to a position, k from the frame parameters.
 #[inline(always)]
 fn nearest_photons<'a, M: MemoryPort>(
     context: &mut Context<M>,

@@ -1,4 +1,4 @@
-//! The stages of a tile, each a function of one pixel or one ray.
+//! Passes of a tile, each a function of one pixel or one ray: eye ray, direct light, caustics, final gather.
 
 pub mod caustic;
 pub mod direct;
@@ -16,33 +16,33 @@ use photoncard_shared::message::FrameParameters;
 use crate::gather::GatherRequest;
 use crate::scene::SceneImage;
 
-/// What every stage needs: the scene in its memory, the frame, and what is counted.
+/// Arguments of every pass: scene, memory, frame parameters and counters.
 pub struct Context<'a, M> {
-    /// Where the records lie.
+    /// Sections of the card image.
     pub scene: &'a SceneImage,
     /// Card memory.
     pub memory: &'a mut M,
-    /// The frame's parameters.
+    /// Frame parameters.
     pub frame: &'a FrameParameters,
-    /// What is counted.
+    /// Counters of the tile.
     pub counters: &'a mut Counters,
-    /// Who does the gathers of pixels, if it is not the chip.
+    /// Receiver of the pixels' gathers, if the chip does not execute them itself.
     pub outlet: Option<&'a mut dyn GatherOutlet>,
 }
 
-/// Takes the gathers of pixels from a chip: a host that has room for those of a whole frame.
+/// Receiver of gathers of pixels: a host with memory for the gathers of a whole frame (`--order hilbert`).
 pub trait GatherOutlet {
-    /// Takes a gather; its target is the pixel's number in the tile.
+    /// Takes a gather; its target is the pixel's index in the tile.
     fn take(&mut self, request: GatherRequest);
 }
 
-/// One sample of one pixel: what random numbers depend on.
+/// One sample of one pixel, on which random numbers depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelSample {
-    /// Column in the whole picture.
+    /// Column of the pixel in the whole picture.
     pub x: u32,
-    /// Row in the whole picture.
+    /// Row of the pixel in the whole picture.
     pub y: u32,
-    /// Number of the sample.
+    /// Index of the sample in the pixel.
     pub sample: u32,
 }

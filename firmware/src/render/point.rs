@@ -16,7 +16,7 @@ use crate::scene::{Reflector, Surface};
 pub struct GatherPoint {
     /// The surface, with its whole reflection whatever the purpose.
     pub surface: Surface,
-    /// The rays' random numbers.
+    /// Random numbers of the rays.
     pub pattern: Pattern,
     /// Number of rays; with 0, direct light is left to shadow rays.
     pub rays: u32,

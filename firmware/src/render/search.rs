@@ -1,4 +1,4 @@
-//! The search of a photon map for points that the eye sees.
+//! Photon search at points that the eye sees.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -7,8 +7,8 @@ use super::Context;
 use crate::memory::MemoryPort;
 use crate::photon::{NearestPhotons, PhotonMap, gather};
 
-/// The photons of a map nearest to a place, as many as `nearest` looks for: for gathers at the points that the eye sees. They are
-/// few, and have the code in common.
+/// Collects the photons of a map nearest to a position in `nearest`, for direction tables and caustics. These searches are few and share
+/// one copy of the code, unlike gathers at the ends of rays.
 #[inline(never)]
 pub(super) fn search<M: MemoryPort>(
     context: &mut Context<M>,

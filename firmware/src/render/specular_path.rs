@@ -1,10 +1,10 @@
 //! Paths through perfectly specular surfaces: mirrors, smooth coats, smooth glass.
 //!
-//! Where a ray meets such a surface, one way is taken at random, in proportion to its share of the light: the path is
-//! reflected, transmitted, or stays for the rest of the reflection. The samples of a pixel take all ways. A path ends, black,
-//! after [`SPECULAR_BOUNCES`].
+//! At such a surface a path takes one continuation at random, in proportion to its share of the light: reflection, transmission, or an
+//! end at the surface for the rest of its reflection. The samples of a pixel cover all of them. A path is black after
+//! [`SPECULAR_BOUNCES`].
 //!
-//! Absorption follows the law of Beer and Lambert in the glass entered last; glass within glass is not kept track of.
+//! Absorption follows the Beer-Lambert law, with the coefficient of the glass entered last; nested glass is not tracked.
 
 use glam::Vec3;
 use photoncard_shared::budget::SPECULAR_BOUNCES;
@@ -15,7 +15,7 @@ use crate::memory::MemoryPort;
 use crate::scene::{Hit, Ray, Surface, closest_hit, read_surface};
 use crate::vector::{max, max_component};
 
-/// Least probability to stay over that to go on, where the reflection is not black.
+/// Minimum ratio of the probabilities to end at a surface and to go on, if its reflection is not black.
 const MIN_STAY: f32 = 1.0 / 16.0;
 
 /// A path through specular surfaces, up to its present ray.
@@ -25,34 +25,34 @@ pub struct SpecularPath {
     pub ray: Ray,
     /// Throughput between the path's origin and the present ray, without unit.
     pub throughput: Vec3,
-    /// Specular surfaces passed.
+    /// Number of specular surfaces passed.
     pub bounces: u32,
-    /// Distance of the first of them from the origin, metres.
+    /// Distance of the first specular surface from the origin, metres.
     pub first_distance: f32,
-    /// The quantity that is carried.
+    /// Transported quantity.
     carried: Carried,
     /// Absorption coefficient around the ray, 1/m.
     absorption: Vec3,
 }
 
-/// The quantity that a path carries. At the surface of glass, radiance changes with the square of the index of refraction
-/// (Veach 1997, section 5.2); power does not.
+/// Quantity that a path transports. Refraction scales radiance by the square of the relative index of refraction (Veach 1997,
+/// section 5.2), and leaves power unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Carried {
-    /// Radiance, against the way that the path is followed.
+    /// Radiance: the path is followed from the eye, against the light.
     Radiance,
-    /// Power, as photons do.
+    /// Power: the path is a photon's.
     Power,
 }
 
 /// The continuation of a path at a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
-    /// It ends there.
+    /// The path ends at the surface.
     Ends,
-    /// It goes on along its new ray.
+    /// The path goes on along its new ray.
     GoesOn,
-    /// It has met too many surfaces, or one that takes everything.
+    /// The path is black: after too many specular surfaces, or at one that absorbs everything.
     Lost,
 }
 
@@ -74,7 +74,7 @@ impl SpecularPath {
         Self { ray, throughput: Vec3::ONE, bounces: 0, first_distance: 0.0, carried, absorption: Vec3::ZERO }
     }
 
-    /// Arrives at a surface; `random` in [0, 1) chooses the way.
+    /// Arrives at a surface; `random` in [0, 1) chooses the continuation.
     #[inline(always)]
     pub fn arrive(&mut self, surface: &Surface, random: f32) -> Arrival {
         if surface.specular.is_none() && self.absorption == Vec3::ZERO {
@@ -98,7 +98,7 @@ impl SpecularPath {
         let [reflected, transmitted] = [specular.reflected, specular.transmitted].map(max_component);
         let goes = reflected + transmitted;
         let stays = max_component(surface.reflector().albedo());
-        // Often enough that a path that stays is no firefly; at an emitter half of the time.
+        // A minimum probability bounds the weight of ending here: no fireflies. At an emitter it is one half.
         let stays = if stays > 0.0 { max(stays, goes * MIN_STAY) } else { 0.0 };
         let stays = if max_component(surface.emission) > 0.0 { max(stays, goes) } else { stays };
         let all = goes + stays;

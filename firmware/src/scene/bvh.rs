@@ -1,4 +1,5 @@
-//! The ray caster: descent in a hierarchy of sixteen-wide nodes and leaves of some triangles, one line each.
+//! The ray caster: traversal of a bounding volume hierarchy with nodes of sixteen children and leaves of up to eight triangles, one
+//! line each.
 
 use core::ops::ControlFlow;
 
@@ -15,7 +16,7 @@ use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
 use crate::wide_tree::{Descent, Order, Stack};
 
-/// The first triangle on the ray's way; of two at the same distance, that of the lower index.
+/// Closest hit of a ray. Ties of distance are broken by the lower triangle index.
 ///
 /// # Errors
 /// If the image is not sound: a record out of range, or a hierarchy deeper than the stack.
@@ -28,7 +29,7 @@ pub fn closest_hit(
     simd::run(ClosestHit { scene, memory, ray })
 }
 
-/// Whether any triangle lies on the ray's way.
+/// `true` if the ray meets any triangle.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -37,7 +38,7 @@ pub fn is_occluded(scene: &SceneImage, memory: &mut impl MemoryPort, ray: &Ray) 
     simd::run(AnyHit { scene, memory, ray })
 }
 
-/// What [`closest_hit`] does, for any processor.
+/// Kernel of [`closest_hit`].
 pub struct ClosestHit<'a, M> {
     /// The scene.
     pub scene: &'a SceneImage,
@@ -68,7 +69,7 @@ impl<M: MemoryPort> Kernel for ClosestHit<'_, M> {
     }
 }
 
-/// What [`is_occluded`] does, for any processor.
+/// Kernel of [`is_occluded`].
 pub struct AnyHit<'a, M> {
     /// The scene.
     pub scene: &'a SceneImage,
@@ -93,11 +94,11 @@ impl<M: MemoryPort> Kernel for AnyHit<'_, M> {
     }
 }
 
-/// Those triangles of a leaf that a ray meets unless it goes through a cut-out of theirs.
+/// Hits of triangles with cut-outs in one leaf, before their alpha is read.
 type CutOuts = heapless::Vec<Hit, LEAF_TRIANGLES>;
 
-/// Calls `visit` for every triangle that the ray meets and that is not farther than `visit` last said, with its index, and
-/// with what reads it.
+/// Calls `visit` with each intersection, the triangle's index, and a function that reads the triangle. The maximum distance is the one
+/// that `visit` returned last.
 #[inline(always)]
 fn descend(
     isa: impl Isa,
@@ -130,7 +131,7 @@ fn descend(
                     };
                     let index = leaf.wrapping_mul(LEAF_TRIANGLES as u32).wrapping_add(slot as u32);
                     if line.is_cut_out(slot) {
-                        // Their textures are read when the line is done with.
+                        // Alpha is read after the leaf: a read of a texture ends the borrow of the leaf's line.
                         let _ =
                             with_cut_outs.push(Hit { intersection, triangle: line.triangle(slot), index });
                         continue;
@@ -156,7 +157,7 @@ fn descend(
     Ok(())
 }
 
-/// The triangle with this index in the image.
+/// Triangle `index` of the image.
 #[inline(always)]
 pub(super) fn read_triangle(
     scene: &SceneImage,

@@ -1,4 +1,4 @@
-//! What the corners of a triangle have besides their places, interpolated between them.
+//! Vertex attributes of a triangle's corners, interpolated: normals, texture coordinates, colours.
 
 use glam::Vec3;
 use photoncard_shared::image::{LEAF_ATTRIBUTES_PER_LINE, SectionKind};
@@ -12,7 +12,7 @@ use crate::vector::unit;
 
 const ATTRIBUTES_PER_LINE: u32 = Attributes::PER_LINE as u32;
 
-/// The corners of a triangle, seen from a place on it.
+/// Vertex attributes of a triangle at a point on it.
 pub(super) struct Corners {
     leaf: LeafAttributes,
     slot: u32,
@@ -21,7 +21,7 @@ pub(super) struct Corners {
 }
 
 impl Corners {
-    /// Those of triangle `index`, whose corners have these weights; `None` if they have nothing besides their places.
+    /// Reads the attributes of triangle `index` for barycentric `weights`; `None` without attributes.
     pub(super) fn read(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -38,14 +38,14 @@ impl Corners {
         Ok(Some(Self { leaf, slot, attributes, weights }))
     }
 
-    /// The interpolated unit shading normal on the front's side; `None` if the triangle is flat.
+    /// Interpolated unit shading normal on the front; `None` for a flat triangle.
     pub(super) fn normal(&self) -> Option<Vec3> {
         let normals = self.attributes.normals?;
         let weighted = normals.into_iter().zip(self.weights);
         Some(unit(weighted.map(|(normal, weight)| unit(normal.into()) * weight).sum()))
     }
 
-    /// The interpolated linear colour.
+    /// Interpolated vertex colour, linear red, green, blue and alpha.
     pub(super) fn colour(&self) -> [f32; 4] {
         let mut sum = [0.0; 4];
         for (colour, weight) in self.attributes.colours.into_iter().zip(self.weights) {
@@ -54,12 +54,12 @@ impl Corners {
         sum
     }
 
-    /// The emitter that the triangle is.
+    /// Index of the triangle's emitter, if it emits.
     pub(super) fn emitter(&self) -> Option<u32> {
         self.attributes.emitter
     }
 
-    /// What a texture holds here; white without one.
+    /// Value of texture `index` at the point; 1 in all channels for [`NO_TEXTURE`].
     pub(super) fn texture(
         &self,
         scene: &SceneImage,

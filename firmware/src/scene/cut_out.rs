@@ -1,4 +1,4 @@
-//! Cut-outs: where the alpha of a texture or of the corners says that there is nothing.
+//! Cut-outs (glTF's `alphaMode` `MASK`): points of a triangle whose alpha is below the material's cutoff.
 
 use photoncard_shared::layout::Triangle;
 use photoncard_shared::message::Fault;
@@ -8,7 +8,7 @@ use super::corners::Corners;
 use super::surface::read_material;
 use crate::memory::MemoryPort;
 
-/// Whether a triangle with cut-outs is there at a place on it.
+/// `true` if the alpha at a point of a triangle, with barycentric `weights`, is not below the cutoff.
 ///
 /// # Errors
 /// If the image is not sound.

@@ -35,25 +35,25 @@ use crate::simd::Isa;
 /// A ray: the points `origin + t direction` with `t` in (0, `max_distance`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it starts, metres.
+    /// Origin, metres.
     pub origin: Vec3,
-    /// Unit vector of its way.
+    /// Unit direction.
     pub direction: Vec3,
-    /// Where it ends, metres from the origin.
+    /// Maximum distance from the origin, metres.
     pub max_distance: f32,
 }
 
 impl Ray {
-    /// A ray without end.
+    /// Ray with infinite maximum distance.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self { origin, direction, max_distance: f32::INFINITY }
     }
 }
 
-/// A loaded card image: what is needed to find its records.
+/// A card image in memory: locates its records by the header.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneImage {
-    /// The header, checked.
+    /// Header, validated.
     pub header: Header,
 }
 
@@ -75,7 +75,7 @@ impl SceneImage {
         read_slot(memory, kind.structure(), line, slot, first..first + N as u32).ok_or(fault)?
     }
 
-    /// Reads line `index` of a section whose records are whole lines, of which the bytes in `used` are asked for.
+    /// Reads line `index` of a section with records of one line each. The bytes in `used` are counted as requested.
     ///
     /// # Errors
     /// As [`Self::record`].
@@ -92,7 +92,7 @@ impl SceneImage {
         read_slot(memory, kind.structure(), line, slot, used).ok_or(fault)?
     }
 
-    /// Has line `index` of a section whose records are whole lines brought near, as it may be read soon.
+    /// Prefetches line `index` of a section with records of one line each.
     #[inline(always)]
     pub(crate) fn prefetch(&self, isa: impl Isa, memory: &impl MemoryPort, kind: SectionKind, index: u32) {
         let line = self.header.section(kind).locate::<1>(index);
@@ -118,14 +118,14 @@ fn read_slot<const N: usize>(
 
 /// A point just off a surface, on the side of `normal`, from which a ray does not meet the surface again.
 ///
-/// A point on a triangle is off its plane by a few units in the last place of the greatest coordinate that it was
-/// computed from, `magnitude`: a corner's or the ray's origin. The offset is 32 of them.
+/// A computed point deviates from the triangle's plane by a few units in the last place of `magnitude`, the greatest coordinate of
+/// the corners and of the ray's origin. The offset is 32 such units.
 #[inline(always)]
 pub fn offset_origin(position: Vec3, normal: Vec3, magnitude: f32) -> Vec3 {
     position + normal * (magnitude * (32.0 * f32::EPSILON) + f32::MIN_POSITIVE)
 }
 
-/// The greatest coordinate of some points, whatever its sign.
+/// Greatest absolute value of the points' coordinates.
 #[inline(always)]
 pub fn magnitude(points: &[Vec3]) -> f32 {
     points

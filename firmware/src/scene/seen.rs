@@ -1,4 +1,4 @@
-//! What a ray has met, in twelve bytes: enough to read the surface again.
+//! A hit in twelve bytes, from which the surface can be read again.
 
 use photoncard_shared::message::Fault;
 
@@ -7,34 +7,34 @@ use super::surface::surface_of;
 use super::{Hit, Ray, SceneImage, Surface};
 use crate::memory::MemoryPort;
 
-/// A place on a triangle.
+/// Point on a triangle: index and barycentric coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
     /// Index of the triangle.
     triangle: u32,
-    /// Weights of its second and third corner; that of the first is the rest of 1.
+    /// Weights v and w of the second and third corner; the first has 1 - v - w.
     weights: [f32; 2],
 }
 
 impl Seen {
-    /// A place on no surface in particular.
+    /// Arbitrary initial value.
     pub const NOWHERE: Self = Self { triangle: 0, weights: [0.0; 2] };
-    /// A place that is not kept here.
+    /// Marks a point that is seen through specular surfaces, and must be found by its path.
     pub const ELSEWHERE: Self = Self { triangle: u32::MAX, ..Self::NOWHERE };
 
-    /// Whether the place is [`Self::ELSEWHERE`].
+    /// `true` for [`Self::ELSEWHERE`].
     #[inline(always)]
     pub fn is_elsewhere(&self) -> bool {
         self.triangle == u32::MAX
     }
 
-    /// Where a ray met a triangle.
+    /// The point of a hit.
     pub fn new(hit: &Hit) -> Self {
         let [_, v, w] = hit.intersection.barycentric;
         Self { triangle: hit.index, weights: [v, w] }
     }
 
-    /// The surface there, on the side that the ray comes from. Its distance is not known and zero.
+    /// Reads the surface on the side of the ray's origin. Its `distance` is 0.
     ///
     /// # Errors
     /// If the image is not sound.

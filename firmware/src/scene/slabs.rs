@@ -1,11 +1,11 @@
-//! Ray against the boxes of a node: where it enters each of them, all at once.
+//! Slab test of a ray against all boxes of a node at once.
 //!
-//! A side of a box is at `corner + unit * side`. The distance to its plane is `(corner - origin) / d + side * (unit / d)`,
-//! in which a node has the first part and the factor of the second in common.
+//! A side of a box is at `corner + unit * side`, `side` a byte. The distance to its plane is
+//! `(corner - origin) / d + side * (unit / d)`; the first term and `unit / d` are common to a node's boxes.
 //!
-//! Rounding never loses a box that holds what the ray meets: the first part is made less for near sides, and greater for
-//! far ones, by more than it and the triangle test round, and boxes are larger than what they hold by more than the second part and
-//! the sum round (as Ize 2013, *Robust BVH ray traversal*, does with far distances).
+//! The test is conservative under rounding (compare Ize 2013, *Robust BVH ray traversal*): the first term is decreased for near planes
+//! and increased for far ones by more than its rounding error and the triangle test's; boxes are enlarged by more than the rounding
+//! error of the second term and the sum.
 
 use photoncard_shared::layout::{BvhAxis, BvhNode, NODE_CHILDREN};
 
@@ -14,22 +14,22 @@ use crate::simd::{Isa, LANES};
 use crate::vector::{max, min};
 use crate::wide_tree::BEYOND;
 
-/// A ray made ready for many boxes.
+/// Ray with the values that are common to all boxes.
 pub(super) struct Slabs {
     axes: [SlabAxis; 3],
 }
 
-/// One axis of it.
+/// One axis of a [`Slabs`].
 struct SlabAxis {
     origin: f32,
-    /// One over the direction.
+    /// Reciprocal of the direction's component.
     inverse: f32,
 }
 
-/// How much is left for rounding, in proportion.
+/// Relative margin for rounding errors.
 const MARGIN: f32 = 8.0 * f32::EPSILON;
 
-/// A component of a direction that is less than this would overflow products: one that small is as good.
+/// Minimum magnitude of a direction's component: smaller ones, whose reciprocals overflow, are replaced by it.
 const MIN_COMPONENT: f32 = 1e-20;
 
 impl Slabs {
@@ -40,7 +40,7 @@ impl Slabs {
         Self { axes: [SlabAxis::new(a, x), SlabAxis::new(b, y), SlabAxis::new(c, z)] }
     }
 
-    /// The bits of where the ray enters each child's box: [`BEYOND`] if it does not, or beyond `until`.
+    /// Bits of the entry distance of each child's box; [`BEYOND`] for a miss, or an entry beyond `until`.
     #[inline(always)]
     pub(super) fn enter(&self, isa: impl Isa, node: BvhNode, children: usize, until: f32) -> [u32; LANES] {
         let [x, y, z] = node.axes();
@@ -48,7 +48,7 @@ impl Slabs {
         let [x, y, z] = [a.planes(&x), b.planes(&y), c.planes(&z)];
         let mut distances = [BEYOND; LANES];
         for lane in 0..isa.lanes(children) {
-            // What is no number, on the left, counts for nothing.
+            // `max` and `min` return the right operand if the left one is NaN.
             let near = max(x.near(lane), max(y.near(lane), max(z.near(lane), 0.0)));
             let far = min(x.far(lane), min(y.far(lane), min(z.far(lane), until)));
             if let Some(distance) = distances.get_mut(lane) {
@@ -66,7 +66,7 @@ impl SlabAxis {
         Self { origin, inverse }
     }
 
-    /// The planes of the sides of a node's boxes.
+    /// Planes of a node's boxes on this axis.
     #[inline(always)]
     fn planes<'a>(&self, axis: &BvhAxis<'a>) -> Planes<'a> {
         let corner = (axis.corner - self.origin) * self.inverse;
@@ -77,11 +77,11 @@ impl SlabAxis {
     }
 }
 
-/// Planes on one axis, by their distance along the ray.
+/// Planes of a node's boxes on one axis: distance along the ray is `first + side * unit` or `last + side * unit`.
 struct Planes<'a> {
     near: &'a [u8; NODE_CHILDREN],
     far: &'a [u8; NODE_CHILDREN],
-    /// The least that the distance of the node's corner may be, and the greatest.
+    /// Lower bound of the distance to the node's corner; `last` is the upper bound.
     first: f32,
     last: f32,
     unit: f32,

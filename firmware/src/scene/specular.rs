@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::vector::{max, mirror, unit};
 
-/// Light that leaves a surface in one direction, or in two.
+/// Perfectly specular reflection and transmission at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Specular {
     /// Reflectance, to the mirror direction, 0 to 1.
@@ -34,40 +34,40 @@ impl Specular {
         Self { reflected, ..Self::NONE }
     }
 
-    /// Both shares times another.
+    /// Reflectance and transmittance times `share`.
     pub(super) fn dimmed(self, share: f32) -> Self {
         Self { reflected: self.reflected * share, transmitted: self.transmitted * share, ..self }
     }
 
-    /// `true` if nothing is reflected or transmitted perfectly specularly.
+    /// `true` without perfectly specular reflection and transmission.
     #[inline(always)]
     pub fn is_none(&self) -> bool {
         self.reflected == Vec3::ZERO && self.transmitted == Vec3::ZERO
     }
 
-    /// The mirror direction of `outgoing` about a shading normal; about the geometric one where that is behind the surface.
+    /// Mirror direction of `outgoing` about the shading normal, or about the geometric normal if the former is below the surface.
     pub(crate) fn reflected_direction(outgoing: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
         let direction = mirror(outgoing, normal);
         if direction.dot(geometric_normal) > 0.0 { direction } else { mirror(outgoing, geometric_normal) }
     }
 }
 
-/// A smooth dielectric at one place, textures applied.
+/// Smooth dielectric at a point, textures applied.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glass {
     pub(super) base: Vec3,
     pub(super) absorption: Vec3,
-    /// Share of what is not reflected that goes through.
+    /// Transmitted share of the light that is not reflected.
     pub(super) transmission: f32,
     /// Index of refraction.
     pub(super) ior: f32,
-    /// Factor of the reflectance: `KHR_materials_specular`.
+    /// Factor of the reflectance (`specularFactor` of `KHR_materials_specular`).
     pub(super) specular: f32,
     pub(super) is_thin: bool,
 }
 
 impl Glass {
-    /// The albedo of the Lambertian part, and the specular part. Normals are on the side of `outgoing`, which is the inside if
+    /// Albedo of the Lambertian part, and specular part. Normals are on the side of `outgoing`, the inside of the solid if
     /// `is_inside`.
     pub(super) fn at(
         &self,
@@ -78,9 +78,9 @@ impl Glass {
         let cosine = max(normal.dot(outgoing), 0.0);
         let index = if is_inside && !self.is_thin { 1.0 / self.ior } else { self.ior };
         let (reflectance, cosine_behind) = fresnel(cosine, index);
-        // Total reflection where nothing is refracted.
+        // Total internal reflection is not scaled.
         let reflectance = if cosine_behind > 0.0 { reflectance * self.specular } else { reflectance };
-        // Both faces of a thin wall reflect, again and again (Stokes 1862).
+        // Interreflection between both faces of a thin wall: 2 R / (1 + R) (Stokes 1862).
         let reflectance = if self.is_thin { 2.0 * reflectance / (1.0 + reflectance) } else { reflectance };
         let refracted = unit(normal * (cosine / index - cosine_behind) - outgoing * (1.0 / index));
         let behind =
@@ -97,13 +97,12 @@ impl Glass {
     }
 }
 
-/// The share of unpolarised light that the surface of a dielectric reflects (Fresnel 1823), and the cosine of the
-/// refracted direction; `index` is the index of refraction behind over that in front. All is reflected, and the cosine is
-/// zero, where nothing can be refracted.
+/// Fresnel reflectance of unpolarised light at a dielectric, and cosine of the refracted direction; 1 and 0 under total internal
+/// reflection. `index` is the ratio of the indices of refraction, behind over in front.
 fn fresnel(cosine: f32, index: f32) -> (f32, f32) {
     let sine_squared = (1.0 - cosine * cosine) / (index * index);
     let cosine_squared = 1.0 - sine_squared;
-    // An index of NaN refracts nothing.
+    // NaN from an unsound image counts as total reflection.
     if cosine_squared.is_nan() || cosine_squared <= 0.0 {
         return (1.0, 0.0);
     }

@@ -16,10 +16,10 @@ use crate::vector::{max_component, unit};
 
 const MATERIALS_PER_LINE: u32 = Material::PER_LINE as u32;
 
-/// The point where a ray meets a surface, on the side that it comes from.
+/// Surface at the hit of a ray, on the side of the ray's origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
-    /// The point, metres.
+    /// Position, metres.
     pub position: Vec3,
     /// Unit shading normal on the side of the ray's origin.
     pub normal: Vec3,
@@ -37,16 +37,16 @@ pub struct Surface {
     pub emission: Vec3,
     /// Index of the emitter that the surface belongs to, if it is one.
     pub emitter: Option<u32>,
-    /// `true` if the other side reflects and emits as well.
+    /// `true` if the other side reflects and emits too (glTF's `doubleSided`).
     pub double_sided: bool,
     /// Distance along the ray, metres.
     pub distance: f32,
-    /// Greatest coordinate that the point was computed from, metres: its rounding is in proportion.
+    /// Greatest absolute coordinate that `position` was computed from, metres: it bounds the rounding error.
     pub magnitude: f32,
 }
 
 impl Surface {
-    /// A white Lambertian surface, seen from straight above.
+    /// White Lambertian surface, seen along its normal.
     pub fn white(position: Vec3, normal: Vec3, magnitude: f32) -> Self {
         Self {
             position,
@@ -77,7 +77,7 @@ impl Surface {
         Reflector { normal, outgoing, reflection }
     }
 
-    /// The surface seen through a throughput: reflection and emission times it.
+    /// Reflection and emission times a throughput.
     #[inline(always)]
     pub fn dimmed(mut self, throughput: Vec3) -> Self {
         self.reflection = self.reflection.dimmed(throughput);
@@ -91,13 +91,13 @@ impl Surface {
         offset_origin(self.position, self.geometric_normal, self.magnitude)
     }
 
-    /// [`Self::offset_origin`] on the other side.
+    /// A point just off the other side, from which a ray does not meet the surface again.
     pub fn offset_behind(&self) -> Vec3 {
         offset_origin(self.position, -self.geometric_normal, self.magnitude)
     }
 
-    /// `true` for a direction on the viewer's side by both normals: light from elsewhere does not reach the surface, however it
-    /// is shaded.
+    /// `true` for a direction above both shading and geometric normal's horizon. Light from other directions is excluded, so that
+    /// smooth normals leak none.
     #[inline(always)]
     pub fn is_above(&self, direction: Vec3) -> bool {
         self.normal.dot(direction) > 0.0 && self.geometric_normal.dot(direction) > 0.0
@@ -124,7 +124,7 @@ pub fn read_surface(
     surface_of(scene, memory, ray, (*index, triangle), intersection.barycentric, intersection.distance)
 }
 
-/// A triangle's material.
+/// Reads material `index`.
 #[inline(always)]
 pub(super) fn read_material(
     scene: &SceneImage,
@@ -136,7 +136,7 @@ pub(super) fn read_material(
     Ok(Material::read(bytes))
 }
 
-/// The surface of a triangle at a place on it.
+/// Surface of a triangle at barycentric `weights`.
 #[inline(always)]
 pub(super) fn surface_of(
     scene: &SceneImage,
@@ -154,7 +154,7 @@ pub(super) fn surface_of(
     let normal = if is_front { front_normal } else { -front_normal };
     let double_sided = material.flags & DOUBLE_SIDED != 0;
     let bare = Surface {
-        // From the corners and not along the ray: the rounding is then that of the corners.
+        // From the corners, not along the ray: the rounding error is relative to the corners.
         position: a * u + b * v + c * w,
         outgoing: -ray.direction,
         reflection: Reflection::BLACK,
@@ -176,13 +176,13 @@ pub(super) fn surface_of(
     finished(scene, memory, bare, (index, weights, is_front), &material)
 }
 
-/// `true` for a material whose surfaces have neither textures nor attributes.
+/// `true` for a material without textures and vertex attributes.
 #[inline(always)]
 fn is_plain(material: &Material) -> bool {
     material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0
 }
 
-/// A surface with its corners' attributes, its textures and its material.
+/// The surface with vertex attributes, textures and material applied.
 #[inline(never)]
 fn finished(
     scene: &SceneImage,

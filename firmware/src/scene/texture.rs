@@ -1,4 +1,4 @@
-//! Textures: texels of card memory, interpolated linearly between the four nearest.
+//! Textures: bilinear interpolation of texels in card memory.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
@@ -14,7 +14,7 @@ const TEXTURES_PER_LINE: u32 = Texture::PER_LINE as u32;
 /// Bytes of a texel.
 const TEXEL_BYTES: u32 = 4;
 
-/// Texture `index`.
+/// Reads texture `index`.
 ///
 /// # Errors
 /// If there is none.
@@ -24,7 +24,7 @@ pub fn read_texture(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
     Ok(Texture::read(bytes))
 }
 
-/// What a texture holds at some coordinates: linear red, green, blue and alpha.
+/// Value of a texture at texture coordinates: linear red, green, blue and alpha.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -39,7 +39,7 @@ pub fn sample_texture(
     let place = |axis: usize, size: u16, wrap: Wrap| {
         let [[a, b], [c, d]] = texture.matrix;
         let [x, y] = texture.offset;
-        Place::new(if axis == 0 { a * u + b * v + x } else { c * u + d * v + y }, size, wrap)
+        TexelPair::new(if axis == 0 { a * u + b * v + x } else { c * u + d * v + y }, size, wrap)
     };
     let [across, down] = texture.wrap;
     let [across, down] = [place(0, columns, across), place(1, rows, down)];
@@ -57,18 +57,18 @@ pub fn sample_texture(
     Ok(sum)
 }
 
-/// A place along one axis of a texture, between the middles of two texels.
-struct Place {
-    /// The texels, the first before the second.
+/// Position along one axis of a texture, between the centres of two texels.
+struct TexelPair {
+    /// Indices of the two texels.
     texels: [u32; 2],
-    /// How far it is from the middle of the first to that of the second.
+    /// Weight of the second texel, 0 to 1.
     fraction: f32,
 }
 
-impl Place {
+impl TexelPair {
     fn new(coordinate: f32, size: u16, wrap: Wrap) -> Self {
         let texels = u32::from(size.max(1));
-        // The period in texels; what is clamped has none.
+        // Period in texels; unused by clamping.
         let period = if wrap == Wrap::Mirror { 2 * texels } else { texels };
         let turns = match wrap {
             Wrap::Clamp => coordinate,
@@ -76,11 +76,11 @@ impl Place {
             Wrap::Mirror => (coordinate * 0.5 - libm::floorf(coordinate * 0.5)) * 2.0,
         };
         let half_outside = 0.5 / texels as f32;
-        // What is no number becomes the first texel.
+        // NaN becomes the first texel.
         let turns = if turns > -half_outside { turns } else { -half_outside };
         let turns = min(turns, period as f32 / texels as f32 + half_outside);
         let at = turns * texels as f32 + 0.5;
-        // Counted from the texel before the first.
+        // Texel indices here start at 1: 0 is the texel before the first.
         let first = at as u32;
         let wrapped = |texel: u32| match wrap {
             Wrap::Clamp => texel.saturating_sub(1).min(texels - 1),
@@ -121,7 +121,7 @@ fn texel(
     Ok(decode_texel(texture.format, texel))
 }
 
-/// The least and the greatest value of each channel over all texels: linear red, green, blue and alpha.
+/// Minimum and maximum of each channel over all texels: linear red, green, blue and alpha.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -143,7 +143,7 @@ pub(super) fn channel_ranges(
     Ok(ranges)
 }
 
-/// What a texel stands for: linear red, green, blue and alpha.
+/// Value of an encoded texel: linear red, green, blue and alpha.
 pub fn decode_texel(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
     let linear = |channel: u8| f32::from(channel) * (1.0 / 255.0);
     let [red, green, blue, alpha] = texel;
@@ -222,7 +222,7 @@ mod tests {
 
     #[track_caller]
     fn between(coordinate: f32, wrap: Wrap) -> [(u32, f32); 2] {
-        Place::new(coordinate, 4, wrap).texels()
+        TexelPair::new(coordinate, 4, wrap).texels()
     }
 
     #[test]
@@ -255,7 +255,7 @@ mod tests {
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
             for size in [1, 2, 3, 16_384, u16::MAX] {
                 for &coordinate in &coordinates {
-                    let place = Place::new(coordinate, size, wrap);
+                    let place = TexelPair::new(coordinate, size, wrap);
                     assert!(place.texels.into_iter().all(|texel| texel < u32::from(size)));
                     assert!(
                         (0.0..=1.0).contains(&place.fraction),

@@ -13,33 +13,33 @@ use crate::vector::{max, min};
 
 const _: () = assert!(LEAF_TRIANGLES == HALF_LANES && VERTEX_LANES <= LANES);
 
-/// A ray made ready for many triangles.
+/// Ray with the shear that is common to all triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct RayFrame {
-    /// The axes: the greatest component of the direction is the last.
+    /// Permutation of the axes: the direction's greatest component is last.
     axes: [usize; 3],
-    /// Coordinates of the origin on these.
+    /// Origin on the permuted axes.
     origin: [f32; 3],
     shear: [f32; 3],
 }
 
-/// Where a ray meets a triangle.
+/// Intersection of a ray and a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intersection {
     /// Distance along the ray, metres.
     pub distance: f32,
-    /// Weights of the three corners, of sum 1.
+    /// Barycentric coordinates: weights of the three corners, of sum 1.
     pub barycentric: [f32; 3],
 }
 
-/// The nearest triangle that a ray meets.
+/// Intersection with the triangle that was met.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Where on the ray and on the triangle.
+    /// Distance and barycentric coordinates.
     pub intersection: Intersection,
     /// The triangle.
     pub triangle: Triangle,
-    /// Its index in the image.
+    /// Index of the triangle in the image.
     pub index: u32,
 }
 
@@ -53,7 +53,7 @@ fn component([x, y, z]: [f32; 3], axis: usize) -> f32 {
 }
 
 impl RayFrame {
-    /// Makes a ray ready.
+    /// Computes axes and shear of a ray.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
         let magnitude = ray.direction.abs();
@@ -74,7 +74,7 @@ impl RayFrame {
         Self { axes, origin: on_axes(ray.origin), shear: [x / z, y / z, 1.0 / z] }
     }
 
-    /// The corner with these coordinates on the axes, relative to the origin and sheared; and its depth before scaling.
+    /// Corner relative to the origin, sheared, from its coordinates on the permuted axes; and its depth before scaling.
     #[inline(always)]
     fn shear(&self, [x, y, z]: [f32; 3]) -> ([f32; 2], f32) {
         let [origin_x, origin_y, origin_z] = self.origin;
@@ -83,8 +83,7 @@ impl RayFrame {
         ([x - origin_x - shear_x * depth, y - origin_y - shear_y * depth], depth)
     }
 
-    /// The triangles of a leaf that the line of the ray may meet, behind its origin too: all that
-    /// [`Self::intersect_slot`] finds, and few others: a bit for each.
+    /// Bit mask of the triangles of a leaf that the ray's line may meet: a superset of the hits of [`Self::intersect_slot`].
     #[inline(always)]
     pub(super) fn may_meet(&self, isa: impl Isa, leaf: BvhLeaf) -> u32 {
         let [x, y, z] = self.axes.map(|axis| leaf.coordinates(axis));
@@ -105,7 +104,7 @@ impl RayFrame {
                 [x.get(lane).copied().unwrap_or(0.0), y.get(lane).copied().unwrap_or(0.0)]
             };
             let [u, v, w] = edges(at(&a), at(&b), at(&c));
-            // Where one may be zero the signs are not yet known.
+            // A product of zero: some sign is undecided in `f32`.
             let is_missed = (min(min(u, v), w) < 0.0) & (max(max(u, v), w) > 0.0) & (u * v * w != 0.0);
             if let Some(misses) = misses.get_mut(lane) {
                 *misses = u32::from(is_missed);
@@ -114,7 +113,7 @@ impl RayFrame {
         isa.below(&misses, 1) & !(u32::MAX << leaf.triangles())
     }
 
-    /// Where the ray meets a triangle, from either side, at a distance in (0, `max_distance`].
+    /// Intersection with either side of a triangle at a distance in (0, `max_distance`].
     #[inline(always)]
     pub fn intersect(&self, vertices: &[[f32; 3]; 3], max_distance: f32) -> Option<Intersection> {
         let [x, y, z] = self.axes;
@@ -123,7 +122,7 @@ impl RayFrame {
         self.intersect_on_axes([on_axes(a), on_axes(b), on_axes(c)], max_distance)
     }
 
-    /// The same of a triangle of a leaf.
+    /// [`Self::intersect`] with triangle `slot` of a leaf.
     #[inline(always)]
     pub(super) fn intersect_slot(
         &self,
@@ -160,7 +159,7 @@ impl RayFrame {
     }
 }
 
-/// The coordinates of a corner of each triangle, from those of the vertices.
+/// Coordinates of one corner of each triangle, gathered from the leaf's vertices.
 #[inline(always)]
 fn permute(
     isa: impl Isa,
@@ -170,7 +169,7 @@ fn permute(
     [isa.permute(x, vertices), isa.permute(y, vertices)]
 }
 
-/// The edge functions at the origin, each opposite to a corner.
+/// Edge functions at the origin, each of the edge opposite to a corner.
 #[inline(always)]
 fn edges(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> [f32; 3] {
     [cross(c, b), cross(a, c), cross(b, a)]

@@ -4,26 +4,26 @@ use heapless::Vec;
 
 use crate::frame::{Frame, FrameHeader, FrameKind, MAX_FRAME, MAX_PAYLOAD, write_frame};
 
-/// Messages on their way in one direction.
+/// Maximum number of messages in flight in one direction.
 pub const WINDOW: usize = 4;
 
-/// Messages that are taken before the other end is told without being asked.
+/// Number of messages taken after which an acknowledgement is sent without a probe.
 const TOLD_UNASKED: u16 = WINDOW as u16 / 2;
 
-/// What a transport has seen of its line.
+/// Counts of damage and repetition on a link, as one end sees them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineStatistics {
-    /// Frames that came damaged.
+    /// Damaged frames received.
     pub damaged: u64,
-    /// Messages that were sent again.
+    /// Messages sent again.
     pub repeated: u64,
-    /// Messages that came again.
+    /// Messages received again.
     pub duplicates: u64,
-    /// Probes that were sent.
+    /// Probes sent.
     pub probes: u64,
 }
 
-/// What came, besides messages.
+/// Event of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A whole frame of this session.
@@ -32,41 +32,41 @@ pub enum Event {
     Unknown,
 }
 
-/// How far a message is on its way.
+/// Delivery state of an outgoing message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Passage {
     /// To be sent, again if `again`.
     Waiting { again: bool },
-    /// Sent, as this one of all transmissions.
+    /// Sent, with the number of its transmission.
     Sent { transmission: u16 },
-    /// The other end has it, and has not taken it yet.
+    /// Arrived, but not taken by the other end.
     Held,
 }
 
-/// A message on its way.
+/// An outgoing message in flight.
 struct Outgoing {
     payload: Vec<u8, MAX_PAYLOAD>,
     kind: FrameKind,
     passage: Passage,
 }
 
-/// A message that has come, if `has_come`, and is not taken.
+/// A received message that is not taken; empty unless `has_come`.
 struct Incoming {
     payload: Vec<u8, MAX_PAYLOAD>,
     has_come: bool,
 }
 
-/// What is to be sent besides messages.
+/// Frame to be sent besides messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Control {
     Acknowledge,
     Probe,
     Answer,
-    /// The session of this number is not known.
+    /// A frame of the unknown session of this number arrived.
     Unknown(u32),
 }
 
-/// Which end of the link it is.
+/// End of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
     Host,
@@ -74,40 +74,41 @@ pub(super) enum End {
 }
 
 /// The state of one session.
-pub(super) struct Session {
+pub(super) struct LinkSession {
     end: End,
-    /// `None` before the first.
+    /// Number of the session; `None` before the first.
     number: Option<u32>,
-    /// Whether its first message was sent.
+    /// `true` once the first message of the session was sent.
     has_opened: bool,
-    /// Messages on their way, at their number modulo [`WINDOW`].
+    /// Messages in flight, at their number modulo [`WINDOW`].
     outgoing: [Outgoing; WINDOW],
-    /// The first message that is not acknowledged.
+    /// Number of the first message that is not acknowledged.
     oldest: u16,
-    /// The number of the next message.
+    /// Number of the next message.
     next: u16,
-    /// Frames with messages, and probes, that were sent.
+    /// Number of frames with messages, and probes, sent.
     transmissions: u16,
-    /// What the other end had sent when it last answered: of that, what has not come is lost. Told once.
+    /// Number of messages that the other end had sent at its last answer: missing ones below it are lost. Taken by the next
+    /// probe.
     lost_below: Option<u16>,
-    /// What the last probe of the other end carried.
+    /// Payload of the last probe of the other end.
     asked: [u8; 2],
-    /// At their number modulo [`WINDOW`].
+    /// Received messages, at their number modulo [`WINDOW`].
     incoming: [Incoming; WINDOW],
-    /// The number of the message to be taken next.
+    /// Number of the message to be taken next.
     expected: u16,
-    /// Messages that were taken since the other end was told last.
+    /// Messages taken since the last acknowledgement.
     untold: u16,
     control: Option<Control>,
     statistics: LineStatistics,
 }
 
-/// Whether a number comes before another.
+/// `true` if number `a` is before `b`, modulo 2^16.
 fn is_before(a: u16, b: u16) -> bool {
     (a.wrapping_sub(b) as i16) < 0
 }
 
-/// The place of a number among [`WINDOW`] messages.
+/// Slot of a message's number in the window.
 fn slot<T>(slots: &mut [T; WINDOW], number: u16) -> &mut T {
     let [a, b, c, d] = slots;
     match number % WINDOW as u16 {
@@ -118,7 +119,7 @@ fn slot<T>(slots: &mut [T; WINDOW], number: u16) -> &mut T {
     }
 }
 
-impl Session {
+impl LinkSession {
     pub(super) const fn new(end: End) -> Self {
         Self {
             end,
@@ -152,7 +153,7 @@ impl Session {
         self.next.wrapping_sub(self.oldest)
     }
 
-    /// Messages that were taken at either end.
+    /// Number of messages taken at either end, modulo 2^16.
     pub(super) fn passed(&self) -> u16 {
         self.oldest.wrapping_add(self.expected)
     }
@@ -172,12 +173,12 @@ impl Session {
         true
     }
 
-    /// Whether the other end does not know of all that was taken.
+    /// Returns whether taken messages are not yet acknowledged.
     pub(super) fn has_untold(&self) -> bool {
         self.untold > 0
     }
 
-    /// A frame came damaged.
+    /// Counts a damaged frame.
     pub(super) fn count_damaged(&mut self) {
         self.statistics.damaged += 1;
     }
@@ -192,7 +193,7 @@ impl Session {
         }
     }
 
-    /// Goes through the messages on their way, from the oldest.
+    /// Visits the messages in flight, from the oldest.
     fn each_on_its_way(&mut self, mut visit: impl FnMut(u16, &mut Outgoing)) {
         for offset in 0..self.on_their_way() {
             let number = self.oldest.wrapping_add(offset);
@@ -200,7 +201,7 @@ impl Session {
         }
     }
 
-    /// Sent messages for which `is_lost`, given their number and transmission, are to be sent again.
+    /// Marks sent messages for repetition if `is_lost` holds for their number and transmission.
     pub(super) fn lose(&mut self, is_lost: impl Fn(u16, u16) -> bool) {
         self.each_on_its_way(|number, message| {
             if let Passage::Sent { transmission } = message.passage
@@ -211,7 +212,7 @@ impl Session {
         });
     }
 
-    /// The next frame: messages before all else, so that an answer and a probe come after them.
+    /// Writes the next frame. Messages are first, so that answers and probes follow them.
     pub(super) fn write_next(&mut self, wire: &mut Vec<u8, MAX_FRAME>) {
         if let Some(Control::Unknown(number)) = self.control {
             self.control = None;
@@ -263,7 +264,7 @@ impl Session {
         FrameHeader { kind, session, sequence, acknowledged: self.expected, held }
     }
 
-    /// Whether a message of the window from the expected one on has come.
+    /// Returns whether a message of the window, which begins with the expected one, has arrived.
     fn has_come(&self, number: u16) -> bool {
         self.incoming.get(number as usize % WINDOW).is_some_and(|incoming| incoming.has_come)
     }
@@ -300,11 +301,11 @@ impl Session {
         Some(Event::Heard)
     }
 
-    /// Learns what the other end has, and with that what is lost.
+    /// Takes the acknowledgements of a header, and marks the messages that they show lost.
     fn learn(&mut self, header: &FrameHeader) {
         let taken = header.acknowledged.wrapping_sub(self.oldest);
         if taken > self.on_their_way() {
-            // From before what is known, or of nothing that was sent.
+            // An acknowledgement that is older than a known one, or of messages never sent.
             return;
         }
         let mut latest: Option<u16> = None;
@@ -329,8 +330,8 @@ impl Session {
         }
     }
 
-    /// Concludes from an answer what is lost: of ours, what was sent before the probe and is not there; of theirs, what they
-    /// had sent and is not here.
+    /// Marks messages lost by an answer: sent before the probe and not arrived at the other end, or sent by the other end before
+    /// the answer and not arrived here.
     fn conclude(&mut self, probe: u16, sent: u16) {
         self.lose(|_, transmission| is_before(transmission, probe));
         let count = sent.wrapping_sub(self.expected).min(WINDOW as u16);
@@ -344,7 +345,7 @@ impl Session {
     fn keep(&mut self, number: u16, payload: &[u8]) {
         let offset = number.wrapping_sub(self.expected);
         if offset >= WINDOW as u16 || self.has_come(number) {
-            // The other end does not know that it has come, or it would not send it again.
+            // A repetition: the acknowledgement was lost, and is repeated.
             self.statistics.duplicates += 1;
             return self.ask_for(Control::Acknowledge);
         }

@@ -1,6 +1,6 @@
 //! Messages: payloads of frames that are commands, replies, or neither.
 
-use photoncard_shared::budget::{MICRO, REFERENCE};
+use photoncard_firmware::kind::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::message::{

@@ -7,11 +7,12 @@ use photoncard_driver::dispatcher::Dispatcher;
 use photoncard_driver::film::{Film, PixelValue, Window};
 use photoncard_driver::scheduler::Scheduler;
 use photoncard_driver::session::{Job, PixelLimits, Session, SessionError};
+use photoncard_firmware::kind::MICRO;
 use photoncard_shared::address::Line;
-use photoncard_shared::budget::{Budget, MICRO};
+use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
-use photoncard_shared::image::{Header, LAYOUT_VERSION, Lights, SECTIONS, Section};
+use photoncard_shared::image::{Header, LAYOUT_VERSION};
 use photoncard_shared::layout::PhotonGrid;
 use photoncard_shared::message::{
     self, FrameParameters, PIXELS_BYTES, PROTOCOL_VERSION, Reply, Tile, record_bytes,
@@ -104,19 +105,6 @@ impl Sessions {
         }
         bytes.truncate(MAX_PAYLOAD);
         bytes
-    }
-}
-
-/// The header of an image of which nothing is known.
-fn header() -> Header {
-    Header {
-        lines: LINES,
-        photon_power_unit: 1.0,
-        caustic_power_unit: 1.0,
-        radiance_unit: 1.0,
-        photon_grid: PhotonGrid { origin: [0; 3], cell: 1e-6 },
-        lights: Lights::NONE,
-        sections: [Section::default(); SECTIONS],
     }
 }
 
@@ -222,7 +210,8 @@ impl Target for Sessions {
             now: Duration::ZERO,
         };
         let frame = &self.frames[usize::from(layers)];
-        let limits = PixelLimits::new(&header(), frame);
+        let photon_grid = PhotonGrid { origin: [0; 3], cell: 1e-6 };
+        let limits = PixelLimits::new(&Header { photon_grid, ..Header::EMPTY }, frame);
         let job = Job { image: &self.image, checksum: 0, frame, limits };
         ends.session.start(job, ends.now);
         let mut was_loaded = false;

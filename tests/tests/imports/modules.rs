@@ -29,9 +29,9 @@ pub(crate) struct Crate {
     modules: Vec<Module>,
 }
 
-/// What a path leads to.
+/// Target of a path.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Place {
+enum Resolved {
     /// A module itself.
     Module(ModuleIndex),
     /// An item that a module defines.
@@ -112,8 +112,8 @@ impl Crate {
             let used = &first_segments[file.as_path()];
             let handed_on = paths.handed_on.iter().filter(|(name, _)| used.contains(name));
             for path in paths.imports.iter().chain(handed_on.map(|(_, path)| path)) {
-                for place in self.resolve(index, path, &mut BTreeSet::new()) {
-                    let (Place::Module(target) | Place::ItemOf(target)) = place;
+                for resolved in self.resolve(index, path, &mut BTreeSet::new()) {
+                    let (Resolved::Module(target) | Resolved::ItemOf(target)) = resolved;
                     let target = &self.modules[target].file;
                     if target != file {
                         of_file.entry(target.clone()).or_insert_with(|| path.join("::"));
@@ -124,8 +124,8 @@ impl Crate {
     }
 
     /// The places that a path of a module leads to; none in another crate.
-    fn resolve(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Place> {
-        let [first, rest @ ..] = path else { return vec![Place::Module(module)] };
+    fn resolve(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Resolved> {
+        let [first, rest @ ..] = path else { return vec![Resolved::Module(module)] };
         match (first.as_str(), self.modules[module].parent) {
             ("crate", _) => self.walk(0, rest, asked),
             ("self", _) => self.resolve(module, rest, asked),
@@ -136,14 +136,14 @@ impl Crate {
 
     /// The places that the rest of a path leads to from a module. What is not found in it, such as what a macro defines, is its
     /// own.
-    fn walk(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Place> {
-        let [first, rest @ ..] = path else { return vec![Place::Module(module)] };
+    fn walk(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Resolved> {
+        let [first, rest @ ..] = path else { return vec![Resolved::Module(module)] };
         let found = self.look_up(module, first, rest, asked);
-        if found.is_empty() { vec![Place::ItemOf(module)] } else { found }
+        if found.is_empty() { vec![Resolved::ItemOf(module)] } else { found }
     }
 
     /// The places of a name that a module declares, defines or imports, and of the path that follows it.
-    fn look_up(&self, module: ModuleIndex, name: &str, rest: &[String], asked: &mut Asked) -> Vec<Place> {
+    fn look_up(&self, module: ModuleIndex, name: &str, rest: &[String], asked: &mut Asked) -> Vec<Resolved> {
         if !asked.insert((module, name.to_owned())) {
             return Vec::new();
         }
@@ -152,7 +152,7 @@ impl Crate {
             return children.iter().flat_map(|child| self.walk(*child, rest, asked)).collect();
         }
         if names.defined.contains(name) {
-            return vec![Place::ItemOf(module)];
+            return vec![Resolved::ItemOf(module)];
         }
         if let Some(imported) = names.imported.get(name) {
             let path: PathText = imported.iter().chain(rest).cloned().collect();
@@ -160,8 +160,8 @@ impl Crate {
         }
         let mut places = Vec::new();
         for glob in &names.globs {
-            for place in self.resolve(module, glob, asked) {
-                if let Place::Module(of) = place {
+            for resolved in self.resolve(module, glob, asked) {
+                if let Resolved::Module(of) = resolved {
                     places.extend(self.look_up(of, name, rest, asked));
                 }
             }

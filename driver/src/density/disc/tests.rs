@@ -23,7 +23,7 @@ fn the_triangles_around_a_photon_are_what_rays_meet() {
             let leaf = PhotonLeaf::read(&line.0);
             let [.., low, high] = leaf.content(0);
             let normal = Photon::normal_of_flags(u16::from_le_bytes([low, high]));
-            let place = Place { photon: 0, position: grid.position(leaf.point(0)).into(), normal };
+            let place = DiscPhoton { photon: 0, position: grid.position(leaf.point(0)).into(), normal };
             let radius = meter.searcher.radius(place.position).expect("sound");
             let ball = Ball { centre: place.position, radius: 1.1 * radius };
             let Meter { searcher, surroundings, .. } = &mut meter;

@@ -101,7 +101,7 @@ fn within(option: &'static str, value: u64, least: u64, most: u64) -> Result<(),
 
 #[cfg(test)]
 mod tests {
-    use photoncard_shared::budget::REFERENCE;
+    use photoncard_firmware::kind::REFERENCE;
 
     use super::super::{PhotonMaps, Picture, Schedule};
     use super::*;

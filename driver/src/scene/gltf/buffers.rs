@@ -17,7 +17,7 @@ pub(super) fn load(document: &Document) -> Result<Vec<Bytes<'_>>, SceneError> {
 fn load_one(document: &Document, index: usize) -> Result<Bytes<'_>, SceneError> {
     let buffer = &document.root.buffers[index];
     let fault = |field: &str, reason: String, remedy| SceneError::Buffer {
-        place: document.place(format!("buffers[{index}]{field}")),
+        location: document.location(format!("buffers[{index}]{field}")),
         reason,
         remedy,
     };

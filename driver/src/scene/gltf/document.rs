@@ -12,7 +12,7 @@ use miette::{NamedSource, SourceSpan};
 use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
 use super::files::{Files, read_file};
 use super::parse_cost;
-use crate::error::{Place, SceneError};
+use crate::error::{Location, SceneError};
 use crate::printable::printable;
 use crate::{allocation, foreign};
 
@@ -57,8 +57,8 @@ impl Document {
     }
 
     /// The place `item` of this file.
-    pub(super) fn place(&self, item: impl Into<String>) -> Place {
-        Place::new(&self.path, item)
+    pub(super) fn location(&self, item: impl Into<String>) -> Location {
+        Location::new(&self.path, item)
     }
 
     pub(super) fn invalid(
@@ -67,16 +67,16 @@ impl Document {
         reason: impl Into<String>,
         remedy: &'static str,
     ) -> SceneError {
-        SceneError::Invalid { place: self.place(item), reason: reason.into(), remedy }
+        SceneError::Invalid { location: self.location(item), reason: reason.into(), remedy }
     }
 
     fn check(&self) -> Result<(), SceneError> {
         self.check_version()?;
         for (i, name) in self.root.extensions_required.iter().enumerate() {
             if !SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
-                let place = self.place(format!("extensionsRequired[{i}]"));
+                let location = self.location(format!("extensionsRequired[{i}]"));
                 let supported = SUPPORTED_EXTENSIONS.join(", ");
-                return Err(SceneError::RequiredExtension { place, name: name.clone(), supported });
+                return Err(SceneError::RequiredExtension { location, name: name.clone(), supported });
             }
         }
         self.check_positions()?;
@@ -125,7 +125,7 @@ impl Document {
         };
         // The types' names of the extension's fields are not those of the file.
         let item = path.as_str().replace("khrLightsPunctual", "KHR_lights_punctual");
-        Err(self.invalid(item, reason, "export the scene again, or correct the file at this place"))
+        Err(self.invalid(item, reason, "export the scene again, or correct this item of the file"))
     }
 
     /// The first rule that is broken and matters, and where.
@@ -218,7 +218,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<json::Root, SceneError> {
         return Err(not_gltf("it is empty"));
     }
     let bytes = parse_cost::estimate(text).ok_or_else(|| SceneError::Invalid {
-        place: Place::new(path, ""),
+        location: Location::new(path, ""),
         reason: format!(
             "its {} bytes of JSON would take more than {} bytes of memory",
             text.len(),

@@ -67,8 +67,8 @@ fn fault(
     reason: impl Into<String>,
     remedy: &'static str,
 ) -> SceneError {
-    let place = source.document.place(format!("images[{index}]{field}"));
-    SceneError::Image { place, reason: reason.into(), remedy }
+    let location = source.document.location(format!("images[{index}]{field}"));
+    SceneError::Image { location, reason: reason.into(), remedy }
 }
 
 /// The image's name, or that of its file, or `image N`.

@@ -23,13 +23,13 @@ const ROTATIONS: Format = Format {
 
 #[derive(Deserialize)]
 struct Extension {
-    attributes: Attributes,
+    attributes: InstanceAttributes,
 }
 
 /// Accessors. Others than these are for applications.
 #[derive(Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
-struct Attributes {
+struct InstanceAttributes {
     translation: Option<usize>,
     rotation: Option<usize>,
     scale: Option<usize>,

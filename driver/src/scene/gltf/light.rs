@@ -42,8 +42,8 @@ pub(super) fn place(
     let position = world.w_axis.truncate().as_vec3();
     let direction = (-world.z_axis.truncate()).try_normalize().map(DVec3::as_vec3);
     let misplaced = || {
-        let reason = "the light's node, with its parents, gives it no place or no direction";
-        let remedy = "give the light's node and its parents a finite place and a scale other than 0";
+        let reason = "the light's node, with its parents, gives it no finite position or no direction";
+        let remedy = "give the light's node and its parents a finite position and a scale other than 0";
         document.invalid(format!("nodes[{node}]"), reason, remedy)
     };
     if !position.is_finite() {

@@ -85,7 +85,7 @@ fn load_one(
             Property::Emission => "emissiveFactor",
         };
         SceneError::Material {
-            place: document.place(format!("materials[{index}].{item}")),
+            location: document.location(format!("materials[{index}].{item}")),
             material: material.name.clone(),
             reason: fault.reason,
             remedy: fault.remedy,
@@ -224,7 +224,7 @@ fn read_phong(
         let message = error.to_string();
         let message = message.split(" at line ").next().unwrap_or_default();
         SceneError::Material {
-            place: document.place(format!("materials[{index}].extras.photoncard")),
+            location: document.location(format!("materials[{index}].extras.photoncard")),
             material: name.to_owned(),
             reason: message.to_owned(),
             remedy: r#"state it as {"photoncard": {"phong": {"specular": [r, g, b], "exponent": n}}}"#,

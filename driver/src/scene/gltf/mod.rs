@@ -32,7 +32,7 @@ mod vertex;
 
 use std::path::Path;
 
-use photoncard_shared::budget::REFERENCE;
+use photoncard_firmware::kind::REFERENCE;
 
 use self::accessor::Source;
 use self::document::Document;
@@ -43,7 +43,20 @@ use self::texture::Textures;
 use crate::error::SceneError;
 use crate::scene::Scene;
 
-/// Loads the default scene of a glTF file, or its first, if an emulated chip of the reference kind may hold it.
+/// Loads the default scene of a glTF file, or its first, within the memory of the reference chip.
+///
+/// ```
+/// # use std::path::Path;
+/// # fn main() -> Result<(), photoncard_driver::error::SceneError> {
+/// let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell.gltf");
+/// let mut scene = photoncard_driver::scene::gltf::load(&path)?;
+/// assert_eq!((scene.triangles.len(), scene.cameras[0].name.as_str()), (36, "camera"));
+/// assert!(scene.notices.is_empty(), "every feature of the file is rendered");
+/// scene.apply("light.emission=30,25,20")?;
+/// scene.check_light()?;
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
 /// As [`load_for`].
@@ -51,14 +64,13 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     load_for(path, REFERENCE.dram_bytes)
 }
 
-/// Loads the default scene of a glTF file, or its first, for cards of so much memory.
+/// Loads the default scene of a glTF file, or its first, for cards with `dram_bytes` of memory.
 ///
-/// What the file holds and the renderer does not use is named in [`Scene::notices`].
+/// [`Scene::notices`] names the features of the file that are not rendered.
 ///
 /// # Errors
-/// If the file, or a file it refers to, cannot be read, breaks a rule of glTF, takes more of a card's memory than there is, or
-/// holds no triangle with an area. The error names the place and the remedy. Whether there is light is for
-/// [`Scene::check_light`] to say.
+/// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory, or
+/// has no triangle with an area. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
 pub fn load_for(path: &Path, dram_bytes: u32) -> Result<Scene, SceneError> {
     let document = Document::read(path)?;
     let buffers = buffers::load(&document)?;

@@ -109,13 +109,13 @@ pub(super) struct Primitive<'a> {
 }
 
 /// Reads the attributes of one primitive.
-struct Attributes<'s, 'a> {
+struct AttributeReader<'s, 'a> {
     source: &'s Source<'a>,
     item: String,
     primitive: &'s json::mesh::Primitive,
 }
 
-impl<'a> Attributes<'_, 'a> {
+impl<'a> AttributeReader<'_, 'a> {
     fn get(&self, semantic: Semantic, format: &Format) -> Result<Option<Elements<'a>>, SceneError> {
         let item = format!("{}.attributes.{}", self.item, semantic.to_string());
         let Some(accessor) = self.primitive.attributes.get(&Checked::Valid(semantic)) else {
@@ -157,7 +157,7 @@ impl<'a> Primitive<'a> {
         let document = source.document;
         let primitive = &document.root.meshes[mesh].primitives[index];
         let item = format!("meshes[{mesh}].primitives[{index}]");
-        let attributes = Attributes { source, item: item.clone(), primitive };
+        let attributes = AttributeReader { source, item: item.clone(), primitive };
         let is_quantized = document.is_quantized();
         let positions = attributes.get(Semantic::Positions, &positions(is_quantized))?.ok_or_else(|| {
             let reason = "the primitive has no POSITION";
@@ -236,7 +236,7 @@ impl<'a> Primitive<'a> {
 
 /// All pairs of joints and weights.
 fn influences<'a>(
-    attributes: &Attributes<'_, 'a>,
+    attributes: &AttributeReader<'_, 'a>,
     count: u64,
 ) -> Result<Vec<(Elements<'a>, Elements<'a>)>, SceneError> {
     let mut pairs = Vec::new();

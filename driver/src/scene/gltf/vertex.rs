@@ -12,7 +12,7 @@ use super::pose::Pose;
 use super::primitive::Primitive;
 use super::transform::Transform;
 use crate::error::SceneError;
-use crate::scene::{Attributes, Triangle};
+use crate::scene::{Triangle, VertexAttributes};
 
 /// The largest coordinate in metres: products of three stay far inside what single precision holds.
 pub(super) const MAX_COORDINATE: f32 = 1e8;
@@ -37,7 +37,7 @@ impl VertexReader<'_, '_> {
         let Self { source, mesh, primitive, .. } = self;
         let item = format!("meshes[{mesh}].primitives[{}].attributes.{attribute}", primitive.index);
         SceneError::Vertex {
-            place: source.document.place(item),
+            location: source.document.location(item),
             mesh: mesh_name(&source.document.root, *mesh),
             primitive: primitive.index,
             vertex,
@@ -55,10 +55,10 @@ impl VertexReader<'_, '_> {
         match corners.iter().position(|&index| index >= vertices) {
             None => Ok(corners),
             Some(corner) => Err(SceneError::IndexOutOfRange {
-                place: self
+                location: self
                     .source
                     .document
-                    .place(format!("meshes[{}].primitives[{}].indices", self.mesh, primitive.index)),
+                    .location(format!("meshes[{}].primitives[{}].indices", self.mesh, primitive.index)),
                 mesh: mesh_name(&self.source.document.root, self.mesh),
                 primitive: primitive.index,
                 position: places[corner],
@@ -99,23 +99,23 @@ impl VertexReader<'_, '_> {
         corners: [u64; 3],
         transforms: &[Cow<'_, Transform>; 3],
         triangle: &Triangle,
-    ) -> Result<Option<Attributes>, SceneError> {
+    ) -> Result<Option<VertexAttributes>, SceneError> {
         if !self.primitive.may_have_attributes() {
             return Ok(None);
         }
         let is_mapped = self.primitive.is_mapped();
-        let mut coordinates = Attributes::NONE.coordinates;
+        let mut coordinates = VertexAttributes::NONE.coordinates;
         for (set, coordinates) in coordinates.iter_mut().enumerate() {
             for (coordinate, corner) in coordinates.iter_mut().zip(corners) {
                 *coordinate = self.coordinate(set, corner)?;
             }
         }
-        let attributes = Attributes {
+        let attributes = VertexAttributes {
             normals: self.normals(corners, transforms, triangle),
             coordinates,
             colours: corners.map(|corner| self.colour(corner)),
         };
-        Ok(Some(attributes).filter(|attributes| is_mapped || *attributes != Attributes::NONE))
+        Ok(Some(attributes).filter(|attributes| is_mapped || *attributes != VertexAttributes::NONE))
     }
 
     fn coordinate(&self, set: usize, vertex: u64) -> Result<Vec2, SceneError> {

@@ -170,7 +170,7 @@ fn check(scale: &Scale, results: &Results, is_cached: bool, name: &str) -> Strin
     let verdict = match (fall.value.abs() > fall.half_width, fall.value > 0.0) {
         (true, true) => "it falls",
         (true, false) => "it rises",
-        (false, _) => "it changes by less than the sample can tell",
+        (false, _) => "its change is within the sampling error",
     };
     let reordered = [DirectionBins, Hash, Sort].map(|order| {
         let curve = of((order, Sampling::Reflection));

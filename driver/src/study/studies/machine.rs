@@ -1,6 +1,5 @@
 //! Study of Table 7.1: chips that a frame rate takes, by the table's symbols and by measured counts.
 
-use super::super::cost_model::{Cost, Machine, Origin, Prediction, Resource, Symbols, Workload};
 use super::super::laboratory::Results;
 use super::super::load_balance::Balance;
 use super::super::point::Point;
@@ -10,6 +9,7 @@ use super::balance::{CREDITS, ORDERS, chip_counts, curves, deal};
 use super::present::{columns, how_it_counts, page, panel, plot, say, section, series, table, text};
 use super::scenes::SCENES;
 use super::workload::{cost, of_frame, tile_seconds};
+use crate::cost_model::{Cost, Machine, Origin, Prediction, Resource, Symbols, Workload};
 use crate::scheduler::GatherOrder;
 
 /// Maximum number of chips in the plots.

@@ -1,8 +1,7 @@
 //! Traffic over the number of photons, the side of tiles and the size of the queue; time over the number of chips.
 
-use photoncard_shared::budget::REFERENCE;
+use photoncard_firmware::kind::REFERENCE;
 
-use super::super::cost_model::Machine;
 use super::super::laboratory::Results;
 use super::super::load_balance::Balance;
 use super::super::point::Point;
@@ -15,6 +14,7 @@ use super::present::{
 };
 use super::scenes::CORNELL;
 use super::workload::tile_seconds;
+use crate::cost_model::Machine;
 use crate::photon_map::PhotonLayout;
 use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;

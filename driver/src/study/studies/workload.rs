@@ -1,7 +1,7 @@
 //! Measured counts as workloads of the cost model.
 
-use super::super::cost_model::{Cost, Machine, Symbols, Workload};
 use super::super::measure::{Measurement, TileMeasurement};
+use crate::cost_model::{Cost, Machine, Symbols, Workload};
 use crate::scheduler::GatherOrder;
 
 type Count<'a> = &'a dyn Fn(&TileMeasurement) -> f64;

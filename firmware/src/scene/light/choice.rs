@@ -1,39 +1,39 @@
-//! Choices by one random number after another's choice has used a part of it.
+//! Discrete choices, several in a row, by one random number: each choice rescales what is left of it.
 
 use photoncard_shared::message::Fault;
 
 use crate::sampler::{hash, unit_interval};
 use crate::vector::{max, min};
 
-/// A number in [0, 1) that chooses between shares, and again within the share that it fell in.
+/// A random number in [0, 1) for several choices in a row.
 ///
-/// What is left of it after a choice has fewer digits, as many as the share is small. They are filled up with random ones, so
-/// that a small share is chosen from as finely as a large one.
+/// A choice of probability p leaves -log2(p) bits fewer. Random bits from `dither` replace them, so that choices within a small share
+/// have full resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fraction {
     value: f32,
     dither: u32,
 }
 
-/// A step of the numbers that fractions begin as.
+/// Resolution of the initial number: 2^-24.
 const STEP: f32 = 1.0 / 16_777_216.0;
-/// The greatest number below 1.
+/// Greatest value of a fraction.
 const BELOW_ONE: f32 = 1.0 - STEP;
 
 impl Fraction {
-    /// A number in [0, 1), and random bits that belong to it.
+    /// A fraction with value `value` in [0, 1) and 32 random bits.
     #[inline(always)]
     pub fn new(value: f32, dither: u32) -> Self {
         Self { value, dither }
     }
 
-    /// The number.
+    /// Value in [0, 1).
     #[inline(always)]
     pub fn value(self) -> f32 {
         self.value
     }
 
-    /// What is left of a number that has fallen in the share of this width from `lower` on.
+    /// Rescales the share `lower..lower + width`, which contains the value, to [0, 1).
     #[inline(always)]
     #[must_use]
     pub fn within(self, lower: f32, width: f32) -> Self {
@@ -43,24 +43,24 @@ impl Fraction {
     }
 }
 
-/// One of several, as cumulated thresholds of 2^32 choose it.
+/// Result of [`choose`]: index, probability, and rescaled fraction.
 pub(super) struct Chosen {
     pub(super) index: u32,
     pub(super) probability: f32,
     pub(super) rest: Fraction,
 }
 
-/// All shares together.
+/// Denominator of the thresholds, 2^32.
 const ALL: f32 = 4_294_967_296.0;
 
-/// The one of `count` in whose share the number falls; `threshold` tells the upper ends.
+/// Chooses one of `count` by their cumulative distribution; `threshold` returns its value at an index, in units of 2^-32.
 pub(super) fn choose(
     fraction: Fraction,
     count: u32,
     mut threshold: impl FnMut(u32) -> Result<u32, Fault>,
 ) -> Result<Chosen, Fault> {
     let target = (fraction.value * ALL) as u32;
-    // The first whose threshold is not below the target; the last one's is 2^32 - 1.
+    // Binary search of the first threshold that is not below the target; the last threshold is 2^32 - 1.
     let (mut low, mut high) = (0, count.saturating_sub(1));
     while low < high {
         let middle = low + (high - low) / 2;
@@ -75,7 +75,7 @@ pub(super) fn choose(
     Ok(Chosen { index: low, probability: width, rest })
 }
 
-/// The probability that [`choose`] chooses this one.
+/// Probability of `index` in [`choose`].
 pub(super) fn probability(
     index: u32,
     mut threshold: impl FnMut(u32) -> Result<u32, Fault>,
@@ -83,13 +83,13 @@ pub(super) fn probability(
     share(index, &mut threshold).map(|(_, width)| width)
 }
 
-/// The lower end of a share, of 2^32, and its width, of 1.
+/// Lower end of a share, in units of 2^-32, and its width, 0 to 1.
 fn share(index: u32, threshold: &mut impl FnMut(u32) -> Result<u32, Fault>) -> Result<(u32, f32), Fault> {
     let lower = match index.checked_sub(1) {
         Some(before) => threshold(before)?,
         None => 0,
     };
-    // An unsound table could hold anything.
+    // An unsound image may hold a descending table.
     let width = threshold(index)?.saturating_sub(lower).max(1);
     Ok((lower, width as f32 * (1.0 / ALL)))
 }
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn what_is_left_of_a_number_is_as_fine_as_it_was() {
-        // A share of ten steps: what is left of them takes more than ten values, evenly.
+        // A share of ten steps of the initial number: the rescaled fraction takes more than ten values, uniformly.
         let (lower, width) = (0.5, 10.0 * STEP);
         let mut sums = [0.0_f64; 2];
         for step in 0..10 {

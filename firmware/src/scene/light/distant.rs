@@ -1,4 +1,4 @@
-//! Distant lights: chosen by their irradiance, each of one direction.
+//! Sampling of distant (directional) lights, in proportion to their irradiance.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -12,7 +12,7 @@ use crate::scene::SceneImage;
 
 const LIGHTS_PER_LINE: u32 = DistantLight::PER_LINE as u32;
 
-/// The distant light that belongs to a number; distant lights have this share of all samples.
+/// Samples a distant light by `across`. `share` is the probability of choosing the distant lights at all.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

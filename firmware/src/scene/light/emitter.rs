@@ -1,5 +1,4 @@
-//! Emitters: what comes from a triangle, a point or a spot that the light tree has chosen. A point on a triangle is chosen uniformly
-//! by area.
+//! Sampling of emitters: triangles, uniformly by area, points and spots. The light tree selects the emitter.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -41,8 +40,8 @@ pub fn read_emitter(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
     Ok(Emitter::read(bytes))
 }
 
-/// The point of an emissive triangle that belongs to a point of the unit square, uniformly by area; `None` if the emitter is no
-/// triangle. Neighbours are near each other.
+/// Maps a point of the unit square to an emissive triangle, uniformly by area and continuously; `None` if the emitter is not a
+/// triangle.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -71,7 +70,7 @@ pub fn emitter_point(
     }))
 }
 
-/// The radiance that leaves a triangle that is not the same all over, where its corners have these weights.
+/// Emitted radiance at barycentric `weights` of a triangle with an emissive texture or cut-outs, W/(sr m^2).
 fn emission_at(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -93,8 +92,8 @@ fn emission_at(
     Ok(emission * Vec3::new(red, green, blue))
 }
 
-/// The probability density, 1/sr, with which a light sample for a place takes the direction in which an emissive triangle is met
-/// at this distance, metres, and at this cosine to its normal.
+/// Probability density, 1/sr, of a light sample in a direction that meets an emissive triangle at `distance`, metres, and at `cosine`
+/// to its normal.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -112,7 +111,7 @@ pub fn emitter_density(
     Ok(probability * (distance * distance / (cosine * area(vertices))))
 }
 
-/// The point of an emitter that belongs to a point of the unit square; emitters have this share of all samples.
+/// Samples an emitter by the fractions `across` and `down`. `share` is the probability of choosing the emitters at all.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -142,14 +141,14 @@ pub(super) fn sample(
     }
 }
 
-/// The share of a spot's intensity at a cosine to its axis (`KHR_lights_punctual`).
+/// Angular attenuation of a spot at a cosine to its axis, 0 to 1 (`KHR_lights_punctual`).
 #[inline(always)]
 pub fn falloff(cosine: f32, scale: f32, offset: f32) -> f32 {
     let linear = min(max(cosine * scale + offset, 0.0), 1.0);
     linear * linear
 }
 
-/// What comes from a point on a triangle of this density, 1/m^2.
+/// Light sample from a point of a triangle that was chosen with `density`, 1/m^2; `None` from its dark side.
 fn from_area(
     receiver: &Receiver,
     target: &EmitterPoint,
@@ -167,7 +166,7 @@ fn from_area(
     let direction = way / distance;
     let cosine = -normal.dot(direction);
     let density = density * (distance_squared / cosine);
-    // Of a zero distance the cosine is no number.
+    // At distance 0 the cosine is NaN.
     (cosine > 0.0).then_some(LightSample {
         direction,
         distance,
@@ -176,7 +175,7 @@ fn from_area(
     })
 }
 
-/// What comes from a point whose intensity depends on the direction towards it.
+/// Light sample from a point light with an intensity, W/sr, that depends on the direction towards it.
 fn from_point(
     receiver: &Receiver,
     position: Vec3,
@@ -188,17 +187,17 @@ fn from_point(
     let distance = libm::sqrtf(distance_squared);
     let direction = way / distance;
     let irradiance = intensity(direction) / (probability * distance_squared);
-    // At the light itself there is no direction.
+    // At distance 0 there is no direction.
     (distance > 0.0).then_some(LightSample { direction, distance, irradiance, density: None })
 }
 
-/// The area of a triangle, m^2.
+/// Area of a triangle, m^2.
 fn area(vertices: [[f32; 3]; 3]) -> f32 {
     let [a, b, c] = vertices.map(Vec3::from_array);
     0.5 * libm::sqrtf((b - a).cross(c - a).length_squared())
 }
 
-/// Maps the unit square on the triangle `p, q >= 0, p + q <= 1`, keeping areas (Heitz 2019, *A low-distortion map
+/// Area-preserving map of the unit square to the triangle `p, q >= 0, p + q <= 1` (Heitz 2019, *A low-distortion map
 /// between triangle and square*).
 #[inline(always)]
 fn square_to_triangle([x, y]: [f32; 2]) -> [f32; 2] {

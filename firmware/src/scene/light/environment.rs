@@ -1,5 +1,5 @@
-//! The environment: light from infinitely far, of an equirectangular map. A direction is chosen by a grid of cells of equal
-//! angles: first a row, then a column, by how much light comes through the cell, then evenly by solid angle in it.
+//! The environment: light from infinitely far, an equirectangular map. Directions are sampled by a grid of cells of equal
+//! angles: row, then column, in proportion to the light through the cell, then uniformly in solid angle within it.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -13,21 +13,21 @@ use crate::memory::MemoryPort;
 use crate::scene::{SceneImage, read_texture, sample_texture};
 use crate::vector::{max, min};
 
-/// Where a direction is on the map: from the left and from the top, each 0 to 1. The middle is -z, the top y.
+/// Coordinates of a direction on the map, from the left and from the top, 0 to 1. The centre is -z, the top +y.
 pub fn environment_coordinates(direction: Vec3) -> [f32; 2] {
     let Vec3 { x, y, z } = direction;
     let across = libm::atan2f(x, -z) * (0.5 * FRAC_1_PI) + 0.5;
     [across, libm::atan2f(libm::sqrtf(x * x + z * z), y) * FRAC_1_PI]
 }
 
-/// The unit vector at these columns of the map, 0 to 1 from the left, at a cosine of the angle to y.
+/// Unit vector at horizontal coordinate `across` of the map, 0 to 1 from the left, and `cosine` of the angle to +y.
 pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
     let angle = 2.0 * PI * (across - 0.5);
     let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
     Vec3::new(sine * libm::sinf(angle), cosine, -sine * libm::cosf(angle))
 }
 
-/// Radiance that comes from a direction, W/(sr m^2); zero without an environment.
+/// Radiance from a direction, W/(sr m^2); zero without an environment.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -42,7 +42,7 @@ pub fn environment_radiance(
     Ok(Vec3::new(red, green, blue) * Vec3::from_array(scene.header.lights.radiance))
 }
 
-/// The probability density, 1/sr, with which a light sample takes a direction of the environment.
+/// Probability density of a light sample in a direction of the environment, 1/sr.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -65,7 +65,7 @@ pub fn environment_density(
     Ok(cells.density(share, row, of_row * of_column))
 }
 
-/// The direction that belongs to a point of the unit square; the environment has this share of all samples.
+/// Samples a direction of the environment. `share` is the probability of choosing the environment at all.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -89,7 +89,7 @@ pub(super) fn sample(
     })
 }
 
-/// The cell of a coordinate, 0 to 1.
+/// Index of the cell that contains a coordinate, 0 to 1.
 fn cell_at(coordinate: f32, cells: u32) -> u32 {
     ((coordinate * cells as f32) as u32).min(cells - 1)
 }
@@ -106,7 +106,7 @@ impl Cells {
         Self { columns, rows }
     }
 
-    /// Index of the first threshold of the cells of a row.
+    /// Index of the first threshold of a row's cells.
     fn first_of_row(&self, row: u32) -> u32 {
         self.rows.wrapping_add(row.wrapping_mul(self.columns))
     }
@@ -117,16 +117,16 @@ impl Cells {
         Ok(u32::from_le_bytes(*bytes))
     }
 
-    /// The cosine at a share of the solid angle of a row, from its upper border on.
+    /// Cosine of the angle to +y at the fraction `share` of a row's solid angle, from its upper border.
     fn cosine(&self, row: u32, share: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
         let [upper, lower] = [border(row), border(row + 1)];
         min(max(upper + (lower - upper) * share, -1.0), 1.0)
     }
 
-    /// Density of a direction in a cell of this probability, 1/sr.
+    /// Density of a direction in a cell that is chosen with `probability`, 1/sr.
     fn density(&self, share: f32, row: u32, probability: f32) -> f32 {
-        // The difference of the borders' cosines, as a product.
+        // cos(upper border) - cos(lower border), as a product: no cancellation.
         let half = 0.5 * PI / self.rows as f32;
         let height = 2.0 * libm::sinf((2 * row + 1) as f32 * half) * libm::sinf(half);
         let solid_angle = 2.0 * PI / self.columns as f32 * height;

@@ -1,12 +1,12 @@
-//! Lights, for shadow rays: which one, from where on it, and how likely.
+//! Light sampling for shadow rays: choice of a light, point on it, probability density.
 //!
-//! Emissive triangles, points and spots are leaves of the light tree (module `tree`); distant lights and the environment are everywhere
-//! equally far, and chosen apart: the header tells the three shares. One point of the unit square chooses all of it: each choice
-//! uses up a part of a coordinate, and what is left is spread over [0, 1) again ([`Fraction`]). So neighbouring points
-//! are near each other on one light, and a stratified pattern stratifies the lights.
+//! Emissive triangles, points and spots are leaves of the light tree (module `tree`). Distant lights and the environment have no
+//! distance and are chosen beside it; the image header has the probabilities of the three. One point of the unit square makes all
+//! choices: each uses a part of a coordinate and rescales the rest ([`Fraction`]). Neighbouring points therefore fall on neighbouring
+//! points of one light, and a stratified pattern stratifies the lights.
 //!
-//! What samples a light and what tells the density of such a sample to rays that meet the light by themselves agree to the bit but
-//! for the rounding of the ray's own way.
+//! Sampling and density are computed by equal operations: the weights of a shadow ray and of a gather ray that meets the
+//! light differ only by the rounding of the gather ray's hit.
 
 mod choice;
 mod distant;
@@ -29,8 +29,7 @@ use photoncard_shared::message::Fault;
 use super::SceneImage;
 use crate::memory::MemoryPort;
 
-/// The light that belongs to a point of the unit square, as a place receives it; `None` if nothing comes from there. `dither` is 32
-/// random bits that belong to the point.
+/// Samples a light for a receiver by a point `(u, v)` of the unit square and 32 random bits; `None` for a sample without light.
 ///
 /// # Errors
 /// If the image is not sound.

@@ -1,10 +1,10 @@
-//! The light tree: which emitter a shadow ray goes to (Conty Estevez, Kulla 2018, *Importance sampling of many lights with adaptive
+//! The light tree: selection of the emitter of a shadow ray (Conty Estevez, Kulla 2018, *Importance sampling of many lights with adaptive
 //! tree splitting*; the bounds are those of Pharr, Jakob, Humphreys 2023, *Physically Based Rendering*, section 12.6.3).
 //!
-//! A descent from the root takes one of up to four children at each node, by a bound of the light that may come from there: the
-//! power, times the greatest cosines at both ends that the child's sphere and cone of normals allow, over the squared distance.
-//! No distance is less than the sphere's radius: within it, a child is as a whole nearby. A small part of the choices is even, so that
-//! no emitter is missed that the bound thinks little of; a child from which nothing can come is left out.
+//! At each node one of up to four children is chosen by a bound of its light: power, times the greatest cosines at receiver and
+//! emitter that the child's bounding sphere and cone of normals allow, over the squared distance, which is at least the sphere's
+//! radius. A fraction [`EVEN`] of the choices is uniform, so that emitters with a low bound are not starved; a child that cannot light
+//! the receiver is excluded.
 
 use glam::Vec3;
 use photoncard_shared::address::LINE_BYTES;
@@ -24,23 +24,23 @@ const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
 const TRAIL_BITS: usize = 2;
 const _: () = assert!(1 << TRAIL_BITS == LIGHT_CHILDREN && TRAIL_BITS * LIGHT_TREE_LEVELS <= 32);
 
-/// The part of the choices at a node that is even.
+/// Fraction of the choices at a node that is uniform.
 const EVEN: f32 = 1.0 / 64.0;
-/// A bound of a cosine below this means that nothing comes; it is less than 0 by more than what axes of cones are rounded.
+/// Upper bound of a cosine below which a child is excluded: below 0 by more than the rounding error of cones' axes.
 const BELOW_HORIZON: f32 = -1e-3;
 
-/// An emitter that was chosen.
+/// Result of [`select_emitter`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
-    /// Its index.
+    /// Index of the emitter.
     pub emitter: u32,
-    /// How likely it was.
+    /// Probability of the choice.
     pub probability: f32,
-    /// What is left of the number.
+    /// Fraction rescaled after the choice, for the point on the emitter.
     pub rest: Fraction,
 }
 
-/// The emitter that belongs to a number, for a place; `None` if none can light it.
+/// Selects an emitter for a receiver; `None` if none can light it.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -68,7 +68,7 @@ pub fn select_emitter(
     Err(Fault { code: FaultCode::Depth, detail: node })
 }
 
-/// The probability with which [`select_emitter`] chooses this emitter for a place; 0 if it cannot light it.
+/// Probability of `emitter` in [`select_emitter`]; 0 if it cannot light the receiver.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -88,7 +88,7 @@ pub fn selection_probability(
         trail >>= TRAIL_BITS;
         let link = children.get(next).and_then(|child| child.map(|child| child.link));
         let Some(child) = Choice::new(&children, receiver).option(next) else {
-            // Either nothing comes from there, or there is nothing.
+            // The child is excluded, or does not exist: an unsound trail.
             return link.map(|_| 0.0).ok_or(Fault { code: FaultCode::Record, detail: emitter });
         };
         probability *= child.probability;
@@ -108,12 +108,12 @@ fn read_node(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Re
     Ok(core::array::from_fn(|child| line.child(child)))
 }
 
-/// The children of a node that light may come from.
+/// Children of a node that may light a receiver, with their probabilities.
 struct Choice {
     options: [Option<Weighted>; LIGHT_CHILDREN],
 }
 
-/// A child, and how likely it is to be chosen.
+/// A child with the probability of its choice.
 #[derive(Clone, Copy)]
 struct Weighted {
     link: LightLink,
@@ -123,7 +123,7 @@ struct Weighted {
 impl Choice {
     fn new(children: &Children, receiver: &Receiver) -> Self {
         let bounds = children.map(|child| child.and_then(|child| Bound::new(&child, receiver)));
-        // In proportion to that of the nearest: squares of distances may have any magnitude.
+        // Relative to the nearest child: squared distances may overflow or underflow.
         let nearest = bounds.iter().flatten().map(|bound| bound.distance_squared);
         let nearest = nearest.fold(f32::INFINITY, crate::vector::min);
         let weights = bounds.map(|bound| bound.map_or(0.0, |bound| bound.weight(nearest)));
@@ -135,7 +135,7 @@ impl Choice {
         {
             let (Some(child), Some(_)) = (child, bound) else { continue };
             let even = 1.0 / count;
-            // Not `<= 0`: of an unsound image the sum may be no number.
+            // Not `<= 0`: in an unsound image the sum may be NaN.
             let probability = if total > 0.0 { weight / total * (1.0 - EVEN) + even * EVEN } else { even };
             *option = Some(Weighted { link: child.link, probability });
         }
@@ -146,7 +146,7 @@ impl Choice {
         self.options.get(index).copied().flatten()
     }
 
-    /// The child in whose share the number falls, and where that share begins; `None` if there is none at all.
+    /// The chosen child, and the lower end of its share; `None` without children.
     fn choose(&self, fraction: Fraction) -> Option<(Weighted, f32)> {
         let mut chosen = None;
         let mut lower = 0.0;
@@ -161,17 +161,17 @@ impl Choice {
     }
 }
 
-/// A bound of the light that may come from a child.
+/// Upper bound of a child's light at a receiver.
 #[derive(Clone, Copy)]
 struct Bound {
-    /// The power, times the greatest cosines at both ends.
+    /// Power times the greatest cosines at receiver and emitter.
     strength: f32,
-    /// Square of the distance, or of the sphere's radius if that is greater.
+    /// Squared distance to the sphere's centre, at least the squared radius, m^2.
     distance_squared: f32,
 }
 
 impl Bound {
-    /// `None` if nothing can come.
+    /// The bound; `None` for a child that cannot light the receiver.
     fn new(child: &LightChild, receiver: &Receiver) -> Option<Self> {
         let way = Vec3::from_array(child.centre) - receiver.position;
         let distance_squared = way.length_squared();
@@ -216,12 +216,12 @@ impl Angle {
         Self { cosine, sine: libm::sqrtf(max(1.0 - cosine * cosine, 0.0)) }
     }
 
-    /// An angle of pi / 2 at the most.
+    /// Angle up to pi / 2.
     fn of_sine_squared(squared: f32) -> Self {
         Self { cosine: libm::sqrtf(max(1.0 - squared, 0.0)), sine: libm::sqrtf(squared) }
     }
 
-    /// The angle less another one, or zero if that is greater.
+    /// Difference of two angles, at least 0.
     fn less(self, other: Self) -> Self {
         if self.cosine >= other.cosine {
             return Self::ZERO;

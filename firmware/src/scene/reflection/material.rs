@@ -11,10 +11,10 @@ use crate::scene::SceneImage;
 use crate::scene::specular::{Glass, Specular};
 use crate::scene::texture::{channel_ranges, read_texture};
 
-/// The factors that textures and corners have at a point.
+/// Factors of the material's values at a point, from textures and vertex colours.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct Texel {
-    /// Of the base colour or the diffuse albedo.
+    /// Factor of the base colour or the diffuse albedo.
     pub(in crate::scene) colour: Vec3,
     pub(in crate::scene) roughness: f32,
     pub(in crate::scene) metallic: f32,
@@ -24,17 +24,17 @@ impl Texel {
     pub(in crate::scene) const WHITE: Self = Self { colour: Vec3::ONE, roughness: 1.0, metallic: 1.0 };
 }
 
-/// The side that a point is seen from.
+/// Geometry of the view of a point.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct View {
-    /// Unit vector to the viewer.
+    /// Unit direction to the viewer.
     pub(in crate::scene) outgoing: Vec3,
-    /// Unit shading normal and unit normal of the triangle, on the viewer's side.
+    /// Shading normal and geometric normal, unit vectors on the viewer's side.
     pub(in crate::scene) normals: [Vec3; 2],
     pub(in crate::scene) is_front: bool,
 }
 
-/// The ways of light at a point.
+/// Scattering at a point: reflection, perfectly specular part, absorption.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct Scattering {
     pub(in crate::scene) reflection: Reflection,
@@ -74,7 +74,7 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
             let (base, absorption) = (Vec3::from(base) * texel.colour, Vec3::from(absorption));
             let glass = Glass { base, absorption, transmission, ior, specular, is_thin };
             let (diffuse, specular) = glass.at(outgoing, normals, !is_front);
-            // Metal lets nothing through.
+            // Metal is opaque.
             let [metallic, roughness] = [metallic * texel.metallic, roughness * texel.roughness];
             let metal = MetallicRoughness { base, dielectric: Vec3::ZERO, metallic: 1.0, roughness };
             scattering.reflection = metal.lobe_beside(diffuse * (1.0 - metallic), metallic);
@@ -106,8 +106,8 @@ pub fn keeps_photons(
     Ok(metallic.into_iter().any(|metallic| reflects(material, metallic)))
 }
 
-/// `true` if a texel of a metalness, white besides, has a reflection that is not black. Its light comes straight from above,
-/// where smooth coats reflect the least and leave the most. Of a range of metalness, one end reflects if anything does.
+/// `true` if a texel of a given metalness, white otherwise, has a reflection that is not black at normal incidence, where smooth coats
+/// reflect least and the base most. Over a range of metalness, one of the ends reflects if any value does.
 fn reflects(material: &Material, metallic: f32) -> bool {
     let texel = Texel { metallic, ..Texel::WHITE };
     let view = View { outgoing: Vec3::Y, normals: [Vec3::Y; 2], is_front: true };

@@ -4,8 +4,8 @@
 //! `alpha = roughness^2`. Here:
 //!
 //! - The lobe's exponent is `n = 0.4 / alpha^2 - 0.4`: somewhat wider than GGX's peak, for its long tails. (A Phong lobe of
-//!   `0.5 / alpha^2` is as wide as the peak, Walter et al. 2007.) It is chosen by pictures of balls: smooth metals want a
-//!   little more, rough ones less.
+//!   `0.5 / alpha^2` is as wide as the peak, Walter et al. 2007.) The factor is a compromise for the balls of `scenes/roughness.glb`:
+//!   smooth metals are closest with a somewhat greater one, rough metals with a smaller one.
 //! - The lobe's albedo is `a F0 + b F90`, the mean over the hemisphere of what GGX's coat reflects, with Schlick's
 //!   reflectance: masking makes it less, the rougher it is. `a = 20/21 / (1 + 1.6 alpha^2)` and
 //!   `b = 1/21 / (1 + 1.5 alpha + 19.5 alpha^2)` are fitted to integrals by the Monte Carlo method, to 3 % of the albedo.
@@ -13,9 +13,9 @@
 //!   the dielectric's with the share `1 - metallic`, the base colour with the share `metallic`.
 //! - The Lambertian albedo is `base (1 - metallic) (1 - dielectric)`, where `dielectric` is the greatest channel of Schlick's
 //!   mean over pairs of directions, each distributed by the cosine. It is lowered where more light would leave than arrives.
-//! - Of roughness 0 the coat is perfectly specular, with Schlick's reflectance at the angle.
+//! - At roughness 0 the coat is perfectly specular, with Schlick's reflectance `F0 + (F90 - F0) (1 - cos)^5`.
 //!
-//! What that costs against GGX is measured in `docs/accuracy.md`.
+//! The error against GGX is measured in `docs/accuracy.md`.
 
 use glam::Vec3;
 use photoncard_shared::layout::MAX_PHONG_EXPONENT;
@@ -34,7 +34,7 @@ const MEAN_OF_PAIRS: f32 = 0.0037;
 /// The albedo of a metal's lobe over the mean albedo of GGX.
 const METAL_GAIN: f32 = 1.1;
 
-/// A metallic-roughness surface at one place, textures applied.
+/// Metallic-roughness surface at a point, textures applied.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MetallicRoughness {
     pub(super) base: Vec3,

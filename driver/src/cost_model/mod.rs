@@ -2,12 +2,14 @@
 //!
 //! [`Symbols`] are the parameters of Table 7.1, a [`Workload`] the counts of rays, gathers and bytes of one frame, a
 //! [`Cost`] the FLOPs and bytes that they take of each unit of the chip, and a [`Prediction`] the speed of a
-//! [`Machine`] at that cost. Formulas: `docs/scaling.md`.
+//! [`Machine`] at that cost. [`Flops`] are the operations of work that chips counted. Formulas: `docs/scaling.md`.
 
+mod flops;
 mod prediction;
 mod symbols;
 mod workload;
 
+pub use flops::Flops;
 pub use prediction::{ChipsNeeded, Machine, Prediction, Resource};
 pub use symbols::{Origin, Symbol, SymbolError, Symbols};
 pub use workload::Workload;

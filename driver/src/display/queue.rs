@@ -1,4 +1,4 @@
-//! State that a display shares with its thread: the waiting packets, progress and failure.
+//! Queue of packets that a display shares with its thread.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -10,8 +10,8 @@ use super::DisplayError;
 
 /// Queue of packets from the display to its thread, with progress and failure.
 #[derive(Default)]
-pub(super) struct State {
-    queue: VecDeque<Vec<u8>>,
+pub(super) struct PacketQueue {
+    packets: VecDeque<Vec<u8>>,
     /// Bytes in the queue.
     waiting: usize,
     /// True while a packet that was taken from the queue is not wholly sent.
@@ -28,7 +28,7 @@ pub(super) struct State {
     failure: Option<DisplayError>,
 }
 
-impl State {
+impl PacketQueue {
     /// Returns whether packets are still sent.
     pub(super) fn is_open(&self) -> bool {
         !self.is_closed && !self.has_failed
@@ -36,12 +36,12 @@ impl State {
 
     /// Returns whether all packets of the queue are sent.
     pub(super) fn is_empty(&self) -> bool {
-        self.queue.is_empty() && !self.is_sending
+        self.packets.is_empty() && !self.is_sending
     }
 
     /// Number of packets that are not wholly sent, and of tiles that found no room.
     pub(super) fn left(&self) -> usize {
-        self.queue.len() + usize::from(self.is_sending) + self.missed.len()
+        self.packets.len() + usize::from(self.is_sending) + self.missed.len()
     }
 
     /// Returns whether `bytes` more may wait, of `most` in all; a single packet always may.
@@ -52,7 +52,7 @@ impl State {
     /// Appends a packet to the queue.
     pub(super) fn push(&mut self, packet: Vec<u8>) {
         self.waiting += packet.len();
-        self.queue.push_back(packet);
+        self.packets.push_back(packet);
     }
 
     /// Ends the display with an error and drops what waits. Only the first error is kept.
@@ -61,7 +61,7 @@ impl State {
             self.failure = Some(error);
         }
         self.has_failed = true;
-        self.queue.clear();
+        self.packets.clear();
         self.missed.clear();
         self.is_sending = false;
     }
@@ -72,56 +72,56 @@ impl State {
     }
 }
 
-/// The state with its lock, and a condition variable for its changes.
+/// The queue with its lock, and a condition variable for its changes.
 #[derive(Default)]
-pub(super) struct SharedState {
-    state: Mutex<State>,
+pub(super) struct SharedQueue {
+    queue: Mutex<PacketQueue>,
     changed: Condvar,
 }
 
-impl SharedState {
-    pub(super) fn lock(&self) -> MutexGuard<'_, State> {
+impl SharedQueue {
+    pub(super) fn lock(&self) -> MutexGuard<'_, PacketQueue> {
         // A thread that panicked left no change half done.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the state, and wakes the other thread.
-    pub(super) fn change<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
+    /// Changes the queue, and wakes the other thread.
+    pub(super) fn change<T>(&self, change: impl FnOnce(&mut PacketQueue) -> T) -> T {
         let result = change(&mut self.lock());
         self.changed.notify_all();
         result
     }
 
     /// Waits until `is_ready` holds, at most for `most`. Returns whether it holds.
-    pub(super) fn wait_until(&self, most: Duration, is_ready: impl Fn(&State) -> bool) -> bool {
-        let is_not_ready = |state: &mut State| !is_ready(state);
+    pub(super) fn wait_until(&self, most: Duration, is_ready: impl Fn(&PacketQueue) -> bool) -> bool {
+        let is_not_ready = |queue: &mut PacketQueue| !is_ready(queue);
         let waited = self.changed.wait_timeout_while(self.lock(), most, is_not_ready);
-        let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        is_ready(&state)
+        let (queue, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        is_ready(&queue)
     }
 
     /// The next packet to send, waited for; `None` once the display is closed or has failed.
     pub(super) fn next(&self) -> Option<Vec<u8>> {
-        let mut state = self.lock();
+        let mut queue = self.lock();
         loop {
-            if !state.is_open() {
+            if !queue.is_open() {
                 return None;
             }
-            if let Some(packet) = state.queue.pop_front() {
-                state.waiting -= packet.len();
-                state.is_sending = true;
+            if let Some(packet) = queue.packets.pop_front() {
+                queue.waiting -= packet.len();
+                queue.is_sending = true;
                 return Some(packet);
             }
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            queue = self.changed.wait(queue).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
     /// Counts bytes of the current packet as sent. Returns whether to go on.
     pub(super) fn advance(&self, bytes: usize, is_last: bool) -> bool {
-        self.change(|state| {
-            state.sent += bytes as u64;
-            state.is_sending &= !is_last;
-            state.is_open()
+        self.change(|queue| {
+            queue.sent += bytes as u64;
+            queue.is_sending &= !is_last;
+            queue.is_open()
         })
     }
 }

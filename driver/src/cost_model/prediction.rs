@@ -44,8 +44,7 @@ pub struct ChipsNeeded {
 /// Upper bound of the speed at which a machine renders frames of some cost.
 ///
 /// Memory, arithmetic and link work at the same time, as in a pipeline that never waits, and tiles are dealt without
-/// loss; [`crate::study::load_balance`] simulates the loss. The rate of a resource that a frame does not use is
-/// infinite.
+/// loss. The rate of a resource that a frame does not use is infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// Tiles a second that one chip's memory bandwidth allows.

@@ -1,0 +1,30 @@
+//! Floating-point operations of a frame whose work was counted.
+
+use photoncard_shared::counters::Counters;
+use serde::Serialize;
+
+use super::{Cost, Symbols, Workload};
+
+/// Floating-point operations of each unit of the chip, on all chips together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Flops {
+    /// All rays.
+    pub ray_caster: f64,
+    /// Importance tables and the irradiance cache.
+    pub controller: f64,
+    /// Searches of the photon map and all reflection.
+    pub gather_unit: f64,
+}
+
+impl Flops {
+    /// Operations of counted work with `gather_rays` gather rays a sample, each piece at its nominal cost.
+    pub fn counted(counters: &Counters, gather_rays: u32) -> Self {
+        let symbols = Symbols { gather_rays: f64::from(gather_rays), ..Symbols::NOMINAL };
+        let cost = Cost::new(&Workload::counted(counters), &symbols);
+        Self {
+            ray_caster: cost.ray_caster.flops,
+            controller: cost.controller.flops,
+            gather_unit: cost.gather_unit.flops,
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Executor: what renders the tiles of a picture.
+
+use std::sync::{Arc, Mutex};
+
+use photoncard_shared::budget::Budget;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{FrameParameters, Tile};
+
+use super::RenderError;
+use super::outputs::Outputs;
+use crate::emulator::memory_model::MemoryTraffic;
+use crate::film::Film;
+use crate::pack::CardImage;
+use crate::scheduler::TileCounts;
+use crate::session::LinkBytes;
+use crate::sink::TileSink;
+
+/// Renders the tiles of a picture.
+pub(super) trait Executor {
+    /// Budget of each chip.
+    fn budgets(&self) -> Vec<Budget>;
+
+    /// Returns whether tiles are finished one after another, so that a render that ends early has finished tiles.
+    fn finishes_tiles_early(&self) -> bool;
+
+    /// Renders the tiles into the sinks.
+    ///
+    /// # Errors
+    /// If the tiles cannot be rendered, or the observer stops the render.
+    fn run(self: Box<Self>, work: Work) -> Result<Outcome, RenderError>;
+}
+
+/// Work of an executor.
+pub(super) struct Work<'a> {
+    /// The card image.
+    pub(super) image: &'a Arc<CardImage>,
+    /// The frame's parameters.
+    pub(super) frame: &'a FrameParameters,
+    /// All tiles of the picture.
+    pub(super) tiles: Vec<Tile>,
+    /// The picture, with the tiles of the render that is resumed; one of the sinks.
+    pub(super) film: &'a Mutex<Film>,
+    /// Takers of finished tiles.
+    pub(super) sinks: Vec<&'a dyn TileSink>,
+    /// Outputs that are looked at in between.
+    pub(super) outputs: &'a Outputs<'a>,
+}
+
+/// Outcome of an executor's work.
+#[derive(Default)]
+pub(super) struct Outcome {
+    /// Counts of the work.
+    pub(super) counters: Counters,
+    /// Bytes over all links.
+    pub(super) bytes: LinkBytes,
+    /// Memory traffic, where memory is modelled.
+    pub(super) traffic: Option<MemoryTraffic>,
+    /// Number of cards.
+    pub(super) cards: usize,
+    /// Cards that were given up, or have never said hello.
+    pub(super) cards_given_up: usize,
+    /// Tiles that were more to render than the picture has.
+    pub(super) tiles: TileCounts,
+    /// Time until the last card was loaded, seconds.
+    pub(super) load_seconds: f64,
+    /// Time from then on, seconds.
+    pub(super) render_seconds: f64,
+}

@@ -1,0 +1,80 @@
+//! Executor of the order `hilbert`: emulated chips that leave all gathers of the frame to the host.
+
+use std::time::Instant;
+
+use photoncard_firmware::kind::REFERENCE;
+use photoncard_shared::budget::Budget;
+
+use super::address::{CardAddress, check_chips};
+use super::executor::{Executor, Outcome, Work};
+use super::{Phase, RenderError, RenderSettings};
+use crate::emulator::ChipKind;
+use crate::emulator::memory_model::CacheSettings;
+use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
+
+/// Emulated reference chips without cards.
+pub(super) struct WholeFrame {
+    chips: usize,
+    caches: Option<CacheSettings>,
+}
+
+impl WholeFrame {
+    /// The chips of the settings.
+    ///
+    /// # Errors
+    /// If there is a card of another kind, or the render is to be resumed.
+    pub(super) fn new(settings: &RenderSettings) -> Result<Self, RenderError> {
+        settings.check_resume()?;
+        let chips = reference_chips(&settings.cards.addresses)?;
+        Ok(Self { chips, caches: settings.modelled_caches() })
+    }
+}
+
+impl Executor for WholeFrame {
+    fn budgets(&self) -> Vec<Budget> {
+        vec![REFERENCE]
+    }
+
+    fn finishes_tiles_early(&self) -> bool {
+        false
+    }
+
+    fn run(self: Box<Self>, work: Work) -> Result<Outcome, RenderError> {
+        let begun = Instant::now();
+        let Self { chips, caches } = *self;
+        let Work { image, frame, tiles, sinks, outputs, .. } = work;
+        let progress = |done: u64, total: u64| {
+            outputs.observer.progress(Phase::Tiles, done, total);
+            outputs.report_display();
+            !outputs.observer.is_stopped()
+        };
+        let job = CurveJob { image, frame, tiles: &tiles, chips };
+        let CurveOutcome { counters, traffic } = render_along_curve(job, caches.as_ref(), &sinks, &progress)?;
+        Ok(Outcome {
+            counters,
+            traffic: caches.map(|_| traffic),
+            cards: chips,
+            render_seconds: begun.elapsed().as_secs_f64(),
+            ..Outcome::default()
+        })
+    }
+}
+
+/// Number of emulated reference chips at some addresses.
+///
+/// # Errors
+/// If there is any other card among them, or there are too many.
+fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
+    let counts = addresses.iter().map(|address| match *address {
+        CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),
+        _ => None,
+    });
+    let chips = counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
+        option: "--order",
+        value: "hilbert".into(),
+        reason: "it leaves all gathers of the frame to the host, as no chip has room for them".into(),
+        remedy: "use --card emulated:CHIPS, or --order sort".into(),
+    })?;
+    check_chips(chips)?;
+    Ok(chips)
+}

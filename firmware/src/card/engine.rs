@@ -1,0 +1,263 @@
+//! The state of a card that commands change, and the work that they leave to it.
+
+use heapless::Deque;
+use photoncard_shared::budget::Budget;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::image::LAYOUT_VERSION;
+use photoncard_shared::message::{
+    self, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXELS_BYTES, PROTOCOL_VERSION, PixelRecord,
+    Reply, Tile, record_bytes,
+};
+use photoncard_shared::transport::Transport;
+
+use super::frame::check_frame;
+use super::load::{CHECKSUMS_BYTES, Checksums, ImageState, Loader, OUT_OF_ORDER};
+use crate::chip::{Chip, Progress};
+use crate::kind::ChipKind;
+use crate::memory::CardMemory;
+use crate::render::Context;
+
+/// Maximum number of queued tile commands, over all budgets.
+pub(super) const TILE_QUEUE: usize = 4;
+
+/// Image, frame and tiles of a card: the state that commands change.
+pub(super) struct Engine<K: ChipKind> {
+    chip: Chip<K>,
+    image: ImageState,
+    /// Measurement of on-chip memory, on a board that has one.
+    pub(super) measure: Option<fn() -> MemoryUse>,
+    /// Number of lines, from the first on, written since the card was switched on.
+    written: u32,
+    checksums: Option<Checksums>,
+    frame: Option<FrameParameters>,
+    /// Counters of the tile at work.
+    counters: Counters,
+    tiles: Deque<Tile, TILE_QUEUE>,
+    at_work: Option<TileWork>,
+    /// Pixels of the tile at work, or checksums, to be sent.
+    data: heapless::Vec<u8, DATA_BYTES>,
+}
+
+/// Progress of the tile at work.
+#[derive(Clone, Copy)]
+enum TileWork {
+    Rendering(Tile),
+    /// The pixels from this one on are still to be completed and sent.
+    Sending(Tile, u32),
+    /// All pixels are sent.
+    Sent(Tile),
+}
+
+/// Bytes of pixels or checksums in one reply.
+const DATA_BYTES: usize = PIXELS_BYTES;
+const _: () = assert!(CHECKSUMS_BYTES <= DATA_BYTES);
+
+impl<K: ChipKind> Engine<K> {
+    /// The engine of a card that has seen no host yet.
+    pub(super) const fn new() -> Self {
+        Self {
+            chip: Chip::new(),
+            image: ImageState::None,
+            measure: None,
+            written: 0,
+            checksums: None,
+            frame: None,
+            counters: Counters::ZERO,
+            tiles: Deque::new(),
+            at_work: None,
+            data: heapless::Vec::new(),
+        }
+    }
+
+    /// Carries out a command. Returns its reply, if it is ready at once.
+    ///
+    /// # Errors
+    /// The fault to be sent instead.
+    pub(super) fn execute(
+        &mut self,
+        memory: &mut impl CardMemory,
+        command: &Command,
+    ) -> Result<Option<Reply<'static>>, Fault> {
+        match *command {
+            Command::Hello { .. } => {
+                self.forget();
+                Ok(Some(hello(&K::BUDGET, self.written, self.measure.map(|measure| measure()))))
+            }
+            Command::ReadChecksums { first, count } => {
+                if self.is_at_work() {
+                    return Err(OUT_OF_ORDER);
+                }
+                self.data.clear();
+                self.checksums = Some(Checksums::new(first, count, self.written)?);
+                Ok(None)
+            }
+            Command::BeginImage { lines, checksum } => {
+                self.forget();
+                self.image = ImageState::Loading(Loader::new(memory, lines, checksum)?);
+                Ok(None)
+            }
+            Command::WriteLines { first, data } => {
+                let end = self.image.loader()?.write(memory, first, data)?;
+                self.written = self.written.max(end);
+                Ok(None)
+            }
+            Command::EndImage => {
+                self.image = ImageState::Checking(self.image.loader()?.check());
+                Ok(None)
+            }
+            Command::BeginFrame(frame) => {
+                let scene = self.image.scene().filter(|_| !self.is_at_work()).ok_or(OUT_OF_ORDER)?;
+                check_frame(&K::BUDGET, &scene.header, &frame)?;
+                self.frame = Some(frame);
+                Ok(Some(Reply::FrameAccepted))
+            }
+            Command::RenderTile(tile) => self.accept(tile).map(|()| None),
+        }
+    }
+
+    fn forget(&mut self) {
+        self.image = ImageState::None;
+        self.checksums = None;
+        self.frame = None;
+        self.tiles.clear();
+        self.at_work = None;
+    }
+
+    /// True while tiles or checksums are at work.
+    fn is_at_work(&self) -> bool {
+        self.at_work.is_some() || !self.tiles.is_empty() || self.checksums.is_some()
+    }
+
+    /// True while there is work to do without a command.
+    pub(super) fn has_work(&self) -> bool {
+        self.is_at_work() || matches!(self.image, ImageState::Checking(_))
+    }
+
+    fn accept(&mut self, tile: Tile) -> Result<(), Fault> {
+        let frame = self.frame.ok_or(OUT_OF_ORDER)?;
+        let fits =
+            |first: u32, count: u32, size: u32| first.checked_add(count).is_some_and(|end| end <= size);
+        let is_inside = fits(tile.x, tile.width, frame.width) && fits(tile.y, tile.height, frame.height);
+        if !is_inside || tile.pixels() == 0 || tile.pixels() > self.chip.tile_pixels(&frame) {
+            return Err(Fault { code: FaultCode::Tile, detail: tile.id });
+        }
+        let too_many = Fault { code: FaultCode::TooManyTiles, detail: tile.id };
+        let waiting = self.tiles.len() + usize::from(self.at_work.is_some());
+        if waiting >= K::BUDGET.tiles as usize {
+            return Err(too_many);
+        }
+        self.tiles.push_back(tile).map_err(|_| too_many)
+    }
+
+    /// Does the next piece of work. A fault ends the tile at work.
+    ///
+    /// # Errors
+    /// The fault to be sent.
+    pub(super) fn work(
+        &mut self,
+        memory: &mut impl CardMemory,
+        transport: &mut Transport,
+    ) -> Result<(), Fault> {
+        if let Some(checksums) = &mut self.checksums {
+            return match checksums.step(memory, self.written) {
+                Ok((checksum, is_last)) => {
+                    // There is room for CHECKSUMS_PER_REPLY.
+                    let _ = self.data.extend_from_slice(&checksum.to_le_bytes());
+                    if is_last {
+                        send(transport, &Reply::Checksums { first: checksums.first, data: &self.data });
+                        self.checksums = None;
+                    }
+                    Ok(())
+                }
+                Err(fault) => {
+                    self.checksums = None;
+                    Err(fault)
+                }
+            };
+        }
+        if let ImageState::Checking(check) = &mut self.image {
+            let result = check.step(memory);
+            if let Ok(None) = result {
+                return Ok(());
+            }
+            self.image = ImageState::None;
+            if let Some(scene) = result? {
+                self.image = ImageState::Ready(scene);
+                send(transport, &Reply::ImageAccepted);
+            }
+            return Ok(());
+        }
+        let result = self.render(memory, transport);
+        if result.is_err() {
+            self.at_work = None;
+        }
+        result
+    }
+
+    fn render(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {
+        let (Some(scene), Some(frame)) = (self.image.scene(), self.frame.as_ref()) else { return Ok(()) };
+        match self.at_work {
+            None => {
+                if let Some(tile) = self.tiles.pop_front() {
+                    if !self.chip.begin(memory, frame, tile) {
+                        return Err(Fault { code: FaultCode::Tile, detail: tile.id });
+                    }
+                    self.data.clear();
+                    self.counters = Counters::ZERO;
+                    self.at_work = Some(TileWork::Rendering(tile));
+                }
+            }
+            Some(TileWork::Rendering(tile)) => {
+                let counters = &mut self.counters;
+                let progress =
+                    self.chip.step(&mut Context { scene, memory, frame, counters, outlet: None })?;
+                if progress == Progress::Complete {
+                    self.at_work = Some(TileWork::Sending(tile, 0));
+                }
+            }
+            Some(TileWork::Sending(tile, next)) => {
+                let counters = &mut self.counters;
+                let context = &mut Context { scene, memory, frame, counters, outlet: None };
+                let Some(record) = self.chip.complete(context, next as usize)? else { return Ok(()) };
+                let PixelRecord { pixel, layers } = record;
+                let data = &mut self.data;
+                let bytes = record_bytes(frame.layers);
+                // There is room: what is full is sent.
+                let _ = data.extend_from_slice(&pixel.to_bytes());
+                if let Some(layers) = layers {
+                    let _ = data.extend_from_slice(&layers.to_bytes());
+                }
+                let is_last = next as u64 + 1 >= tile.pixels();
+                if data.len() + bytes > data.capacity() || is_last {
+                    let first = next + 1 - (data.len() / bytes) as u32;
+                    send(transport, &Reply::Pixels { tile: tile.id, first, data });
+                    data.clear();
+                }
+                self.at_work =
+                    Some(if is_last { TileWork::Sent(tile) } else { TileWork::Sending(tile, next + 1) });
+            }
+            Some(TileWork::Sent(tile)) => {
+                send(transport, &Reply::TileDone { tile: tile.id, counters: self.counters });
+                self.at_work = None;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn hello(budget: &Budget, written_lines: u32, memory_use: Option<MemoryUse>) -> Reply<'static> {
+    Reply::Hello {
+        protocol: PROTOCOL_VERSION,
+        layout: LAYOUT_VERSION,
+        budget: *budget,
+        written_lines,
+        memory_use,
+        build: concat!("photoncard-firmware ", env!("CARGO_PKG_VERSION")),
+    }
+}
+
+/// Sends a reply. To be called with room for it in the transport's window.
+pub(super) fn send(transport: &mut Transport, reply: &Reply) {
+    // Every reply fits a frame, as tests of the longest show.
+    transport.send(|bytes| message::encode(reply, bytes));
+}

@@ -1,0 +1,55 @@
+//! Check of a frame's parameters.
+
+use photoncard_shared::budget::{Budget, MAX_BINS};
+use photoncard_shared::image::{Header, SectionKind};
+use photoncard_shared::message::{Fault, FrameParameters, Parameter, Radiance};
+
+/// Checks a frame's parameters against the budget and the image.
+///
+/// # Errors
+/// The fault of the first parameter out of range.
+pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParameters) -> Result<(), Fault> {
+    let camera = &frame.camera;
+    let camera = [camera.origin, camera.forward, camera.right, camera.up];
+    let within = |value: u32, most: u32| (1..=most).contains(&value);
+    let is_length = |distance: f32| distance.is_finite() && distance > 0.0;
+    let neighbors = |count: u32| count >= 2 && within(count, budget.neighbors);
+    let checks = [
+        (Parameter::Width, within(frame.width, MAX_PICTURE_SIDE)),
+        (Parameter::Height, within(frame.height, MAX_PICTURE_SIDE)),
+        (Parameter::Camera, camera.as_flattened().iter().all(|component| component.is_finite())),
+        (Parameter::Samples, within(frame.samples, budget.samples)),
+        (Parameter::GatherRays, frame.gather_rays <= budget.gather_rays),
+        (Parameter::ShadowRays, frame.shadow_rays <= budget.shadow_rays),
+        (Parameter::Neighbors, neighbors(frame.neighbors)),
+        (Parameter::MaxDistance, is_length(frame.max_distance)),
+        (Parameter::IrradianceError, frame.irradiance_error.is_none_or(is_irradiance_error)),
+        (Parameter::Bins, within(frame.bins, MAX_BINS)),
+        (Parameter::Queue, frame.queue >= 1),
+        (Parameter::Radiance, frame.radiance == Radiance::Density || has_irradiance(header)),
+        (
+            Parameter::Caustics,
+            frame.caustics.is_none_or(|gather| neighbors(gather.neighbors) && is_length(gather.max_distance)),
+        ),
+    ];
+    match checks.iter().find(|(_, holds)| !holds) {
+        Some((parameter, _)) => Err(parameter.fault()),
+        None => Ok(()),
+    }
+}
+
+fn is_irradiance_error(error: f32) -> bool {
+    (MIN_IRRADIANCE_ERROR..=1.0).contains(&error)
+}
+
+/// True if an image has irradiance points, or no photons to compute them from.
+fn has_irradiance(header: &Header) -> bool {
+    let holds = |kind| header.section(kind).records > 0;
+    holds(SectionKind::IrradianceLeaves) || !holds(SectionKind::Photons) && !holds(SectionKind::PhotonLeaves)
+}
+
+/// Minimum allowed error of interpolated irradiance; smaller errors are below rounding.
+pub const MIN_IRRADIANCE_ERROR: f32 = 1e-6;
+
+/// Maximum width and height of a picture, pixels: an `f32` holds a pixel's index and 7 bits of the position in it.
+pub const MAX_PICTURE_SIDE: u32 = 1 << 16;

@@ -1,0 +1,118 @@
+//! Capacities as types: a family of containers of one fixed number of entries.
+
+use core::hash::Hash;
+
+use heapless::index_map::FnvIndexMap;
+use heapless::{Vec, VecView};
+
+use crate::photon::{CandidateBuffer, CandidateStorage};
+
+/// A number of entries, and the containers that hold as many.
+///
+/// It stands for a const generic parameter where the number follows from a [`ChipKind`](super::ChipKind): the containers are
+/// associated types, so that a chip has one parameter instead of one for each container.
+pub trait Capacity: 'static {
+    /// Maximum number of entries.
+    const ENTRIES: usize;
+    /// A vector of up to [`Self::ENTRIES`] values.
+    type Buffer<T>: Buffer<T>;
+    /// A hash map of up to [`Self::ENTRIES`] values, which must be a power of two.
+    type Map<K: Eq + Hash, V>: Map<K, V>;
+    /// A buffer of [`Self::ENTRIES`] candidates of a photon search.
+    type Candidates: CandidateStorage;
+}
+
+/// The capacity of `N` entries.
+pub struct Entries<const N: usize>;
+
+impl<const N: usize> Capacity for Entries<N> {
+    const ENTRIES: usize = N;
+    type Buffer<T> = Vec<T, N>;
+    type Map<K: Eq + Hash, V> = FnvIndexMap<K, V, N>;
+    type Candidates = CandidateBuffer<N>;
+}
+
+/// A vector of fixed capacity.
+pub trait Buffer<T> {
+    /// The vector without values.
+    const EMPTY: Self;
+
+    /// The values, to be read.
+    fn view(&self) -> &VecView<T>;
+
+    /// The values, to be changed.
+    fn view_mut(&mut self) -> &mut VecView<T>;
+}
+
+impl<T, const N: usize> Buffer<T> for Vec<T, N> {
+    const EMPTY: Self = Self::new();
+
+    #[inline(always)]
+    fn view(&self) -> &VecView<T> {
+        self.as_view()
+    }
+
+    #[inline(always)]
+    fn view_mut(&mut self) -> &mut VecView<T> {
+        self.as_mut_view()
+    }
+}
+
+/// A hash map of fixed capacity that keeps the order of insertion.
+pub trait Map<K, V> {
+    /// The map without entries.
+    const EMPTY: Self;
+
+    /// Number of entries.
+    fn len(&self) -> usize;
+
+    /// Removes all entries.
+    fn clear(&mut self);
+
+    /// The value of a key.
+    fn get(&self, key: &K) -> Option<&V>;
+
+    /// The entry of an index, in the order of insertion.
+    fn entry(&self, index: usize) -> Option<(&K, &V)>;
+
+    /// The entry of an index, in the order of insertion, its value to be changed.
+    fn entry_mut(&mut self, index: usize) -> Option<(&K, &mut V)>;
+
+    /// Appends an entry, or replaces the value of its key. Returns false if the map is full.
+    #[must_use]
+    fn insert(&mut self, key: K, value: V) -> bool;
+}
+
+impl<K: Eq + Hash, V, const N: usize> Map<K, V> for FnvIndexMap<K, V, N> {
+    const EMPTY: Self = Self::new();
+
+    #[inline(always)]
+    fn len(&self) -> usize {
+        self.len()
+    }
+
+    #[inline(always)]
+    fn clear(&mut self) {
+        self.clear();
+    }
+
+    #[inline(always)]
+    fn get(&self, key: &K) -> Option<&V> {
+        self.get(key)
+    }
+
+    #[inline(always)]
+    fn entry(&self, index: usize) -> Option<(&K, &V)> {
+        self.get_index(index)
+    }
+
+    #[inline(always)]
+    fn entry_mut(&mut self, index: usize) -> Option<(&K, &mut V)> {
+        self.get_index_mut(index)
+    }
+
+    #[inline(always)]
+    fn insert(&mut self, key: K, value: V) -> bool {
+        self.insert(key, value).is_ok()
+    }
+}

@@ -1,0 +1,71 @@
+//! The trait of a kind of chip, and the memory of its techniques and caches.
+
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::budget::{Budget, gather_candidates};
+
+use super::capacity::Capacity;
+use crate::memory::CacheEntry;
+
+/// A kind of chip.
+pub trait ChipKind: 'static {
+    /// Capacities, as the card states them in its hello.
+    const BUDGET: Budget;
+    /// Limits of the on-chip memory that each technique adds.
+    const TECHNIQUE_LIMITS: TechniqueMemory;
+    /// [`Budget::tile_pixels`].
+    type TilePixels: Capacity;
+    /// [`gather_candidates`] of [`Budget::neighbors`].
+    type Candidates: Capacity;
+    /// [`Budget::gather_queue`].
+    type GatherQueue: Capacity;
+    /// [`Budget::irradiance_records`].
+    type IrradianceRecords: Capacity;
+    /// [`Budget::gathered_records`].
+    type GatheredRecords: Capacity;
+}
+
+/// On-chip memory that each technique adds to a chip, bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TechniqueMemory {
+    /// Deferred reordering: the gather queue.
+    pub reordering: usize,
+    /// Irradiance cache: its records, and the sums of the records being gathered.
+    pub irradiance_cache: usize,
+    /// Combined importance sampling: a direction table for every pixel of a tile.
+    pub importance_sampling: usize,
+}
+
+impl TechniqueMemory {
+    /// True if no technique exceeds its limit in `limit`.
+    pub const fn is_within(&self, limit: &Self) -> bool {
+        self.reordering <= limit.reordering
+            && self.irradiance_cache <= limit.irradiance_cache
+            && self.importance_sampling <= limit.importance_sampling
+    }
+}
+
+/// Compile-time check that the capacities of a kind are those of its budget, and within the ranges of the chip's indices.
+pub(crate) const fn check<K: ChipKind>() {
+    let budget = K::BUDGET;
+    assert!(K::TilePixels::ENTRIES == budget.tile_pixels as usize, "TilePixels is not of the budget");
+    assert!(K::Candidates::ENTRIES == gather_candidates(budget.neighbors), "Candidates is not of the budget");
+    assert!(K::GatherQueue::ENTRIES == budget.gather_queue as usize, "GatherQueue is not of the budget");
+    let records = [K::IrradianceRecords::ENTRIES, K::GatheredRecords::ENTRIES];
+    assert!(records[0] == budget.irradiance_records as usize, "IrradianceRecords is not of the budget");
+    assert!(records[1] == budget.gathered_records as usize, "GatheredRecords is not of the budget");
+    assert!(budget.tile_pixels <= 1 << 16, "the target of a gather has 16 bits");
+}
+
+/// On-chip memory of a budget's caches and their tags, bytes.
+pub const fn cache_bytes(budget: &Budget) -> usize {
+    line_bytes(budget) + tag_bytes(budget)
+}
+
+/// On-chip memory of the tags of a budget's caches, bytes.
+pub const fn tag_bytes(budget: &Budget) -> usize {
+    line_bytes(budget) / LINE_BYTES * size_of::<CacheEntry>()
+}
+
+const fn line_bytes(budget: &Budget) -> usize {
+    budget.photon_cache_bytes as usize + budget.scene_cache_bytes as usize
+}

@@ -1,0 +1,42 @@
+//! The micro chip: the whole renderer in the SRAM that microcontrollers have.
+
+use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_candidates};
+
+use super::capacity::Entries;
+use super::chip_kind::{ChipKind, TechniqueMemory};
+
+/// Budget of the micro chip: the whole renderer in 256 KB of SRAM.
+pub const MICRO: Budget = Budget {
+    sram_bytes: 256 << 10,
+    dram_bytes: 16 << 20,
+    photon_cache_bytes: 64 << 10,
+    scene_cache_bytes: 32 << 10,
+    stack_bytes: 24 << 10,
+    tile_pixels: 256,
+    neighbors: 128,
+    gather_rays: MAX_GATHER_RAYS,
+    gather_queue: 1024,
+    irradiance_records: 128,
+    gathered_records: 128,
+    shadow_rays: 64,
+    samples: 4096,
+    tiles: 2,
+};
+
+/// The kind of the micro chip: [`MICRO`].
+#[derive(Clone, Copy, Debug)]
+pub enum Micro {}
+
+impl ChipKind for Micro {
+    const BUDGET: Budget = MICRO;
+    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
+        reordering: (24 << 10) + 64,
+        irradiance_cache: 48 << 10,
+        importance_sampling: 8704,
+    };
+    type TilePixels = Entries<{ MICRO.tile_pixels as usize }>;
+    type Candidates = Entries<{ gather_candidates(MICRO.neighbors) }>;
+    type GatherQueue = Entries<{ MICRO.gather_queue as usize }>;
+    type IrradianceRecords = Entries<{ MICRO.irradiance_records as usize }>;
+    type GatheredRecords = Entries<{ MICRO.gathered_records as usize }>;
+}

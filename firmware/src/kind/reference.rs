@@ -1,0 +1,43 @@
+//! The reference chip: the dissertation's.
+
+use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_candidates};
+
+use super::capacity::Entries;
+use super::chip_kind::{ChipKind, TechniqueMemory};
+
+/// Budget of the reference chip: a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB (section 7.3.2);
+/// tiles have up to 64x64 pixels (16x16 in the dissertation).
+pub const REFERENCE: Budget = Budget {
+    sram_bytes: 1 << 20,
+    dram_bytes: 512 << 20,
+    photon_cache_bytes: 128 << 10,
+    scene_cache_bytes: 75 << 10,
+    stack_bytes: 16 << 10,
+    tile_pixels: 4096,
+    neighbors: 256,
+    gather_rays: MAX_GATHER_RAYS,
+    gather_queue: 12_640,
+    irradiance_records: 512,
+    gathered_records: 512,
+    shadow_rays: 64,
+    samples: 4096,
+    tiles: 4,
+};
+
+/// The kind of the reference chip: [`REFERENCE`].
+#[derive(Clone, Copy, Debug)]
+pub enum Reference {}
+
+impl ChipKind for Reference {
+    const BUDGET: Budget = REFERENCE;
+    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
+        reordering: 299 << 10,
+        irradiance_cache: 189 << 10,
+        importance_sampling: 136 << 10,
+    };
+    type TilePixels = Entries<{ REFERENCE.tile_pixels as usize }>;
+    type Candidates = Entries<{ gather_candidates(REFERENCE.neighbors) }>;
+    type GatherQueue = Entries<{ REFERENCE.gather_queue as usize }>;
+    type IrradianceRecords = Entries<{ REFERENCE.irradiance_records as usize }>;
+    type GatheredRecords = Entries<{ REFERENCE.gathered_records as usize }>;
+}
