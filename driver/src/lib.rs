@@ -28,7 +28,7 @@
 //!
 //! let folder = tempfile::tempdir()?;
 //! let path = folder.path().join("cornell.exr");
-//! let identity = settings.identity(&scene).to_string();
+//! let identity = serde_json::Value::from(settings.identity(&scene)).to_string();
 //! exr::write(&path, &rendering.film, &settings.picture.layers, &identity, SampleFormat::Float)?;
 //! let picture = exr::read_rgb(&path)?;
 //! assert_eq!((picture.width, picture.height), (16, 16));

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::render::{
-    CardAddress, MemoryStatistics, PROGRAM, ReadStatistics, RenderSettings, Rendering, Statistics, render,
+    CardAddress, MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
 };
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scene::gltf::load_for;
@@ -39,7 +39,7 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     })?;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
-    write(options, &settings.resolved(&scene), &rendering)?;
+    write(options, &settings, &scene, &rendering)?;
     if let Some(partial) = rendering.partial {
         partial.remove().map_err(Failure::work)?;
     }
@@ -133,8 +133,13 @@ fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) 
     Ok(pool.map_err(|error| Failure::work_error(&error))?.install(work))
 }
 
-fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Rendering) -> Result<(), Failure> {
-    let provenance = printable_json(&provenance(options, settings, rendering).to_string());
+fn write(
+    options: &RenderOptions,
+    settings: &RenderSettings,
+    scene: &Scene,
+    rendering: &Rendering,
+) -> Result<(), Failure> {
+    let provenance = printable_json(&provenance(options, settings, scene, rendering).to_string());
     exr::write(
         &options.output,
         &rendering.film,
@@ -156,11 +161,15 @@ fn write(options: &RenderOptions, settings: &RenderSettings, rendering: &Renderi
     Ok(())
 }
 
-/// All that the pixels depend on, and nothing else: the file's bytes are the same on every card.
-fn provenance(options: &RenderOptions, settings: &RenderSettings, rendering: &Rendering) -> Value {
-    let mut provenance = settings.of_pixels();
+/// The identity of the render, with the names of its inputs: nothing that differs between cards.
+fn provenance(
+    options: &RenderOptions,
+    settings: &RenderSettings,
+    scene: &Scene,
+    rendering: &Rendering,
+) -> Value {
+    let mut provenance = settings.identity(scene);
     let mut add = |name: &str, value| provenance.insert(name.to_owned(), value);
-    add("program", json!(PROGRAM));
     add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
     add("set", json!(options.assignments));
     add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));

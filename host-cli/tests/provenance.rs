@@ -5,7 +5,7 @@ mod support;
 use std::collections::BTreeSet;
 
 use serde_json::{Value, json};
-use support::{Room, shipped};
+use support::{Room, scene, shipped};
 
 /// Options that pixels depend on: a value of each but the default, its key in the provenance, and what is said there.
 fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
@@ -77,7 +77,7 @@ fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
     let room = Room::new();
     let plain = rendered(&room, &[]);
     assert_eq!(plain["scene"], "cornell-spheres.glb");
-    let mut keys = BTreeSet::from(["program", "scene"]);
+    let mut keys = BTreeSet::from(["program", "layout", "scene", "scene-checksum"]);
     for (options, key, value) in options_of_pixels() {
         let found = rendered(&room, options);
         assert_eq!(found[key], value, "{options:?}");
@@ -89,6 +89,20 @@ fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
     for options in OTHERS {
         assert_eq!(rendered(&room, options), plain, "{options:?}");
     }
+}
+
+#[test]
+fn scenes_of_one_name_that_differ_have_another_provenance() {
+    let room = Room::new();
+    let [dark, light] = [0.2, 0.9].map(|red| {
+        let mut scene = scene();
+        scene["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([red, 0.5, 0.5, 1.0]);
+        room.write_scene("scene.gltf", &scene);
+        room.rendered("scene.gltf", &["-o", "a.exr", "--max-distance", "0.5"]);
+        provenance(&room.read("a.exr"))
+    });
+    assert_eq!(dark["scene"], light["scene"]);
+    assert_ne!(dark, light);
 }
 
 /// An option that is added is to be in one of the lists above.

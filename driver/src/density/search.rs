@@ -1,11 +1,10 @@
 //! The greatest distance of gathers, from searches of the photon map on the host.
 
 use glam::Vec3;
-use photoncard_firmware::kind::REFERENCE;
+use photoncard_firmware::kind::ReferenceCandidates;
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
+use photoncard_firmware::photon::{NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::scene::SceneImage;
-use photoncard_shared::budget::gather_candidates;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::PhotonLeaf;
 use photoncard_shared::message::Fault;
@@ -21,13 +20,11 @@ const COVERED_SHARE: f64 = 0.95;
 /// Share of the sampled caustic photons whose k-th neighbour lies within the automatic greatest distance.
 const FOCUSED_SHARE: f64 = 0.8;
 
-type Buffer = CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>;
-
 /// A search of the photon map, with its buffer.
 pub(super) struct Searcher<'a> {
     pub(super) scene: SceneImage,
     pub(super) memory: Lines<'a>,
-    buffer: Box<Buffer>,
+    buffer: Box<ReferenceCandidates>,
     map: PhotonMap,
     neighbors: u32,
     max_distance: f32,

@@ -10,12 +10,11 @@ use glam::Vec3;
 use photoncard_firmware::chip::{Completion, Component, ReferenceChip};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
-use photoncard_firmware::kind::REFERENCE;
+use photoncard_firmware::kind::ReferenceCandidates;
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::photon::CandidateBuffer;
 use photoncard_firmware::render::final_gather::gathered;
 use photoncard_firmware::render::{Context, GatherOutlet};
-use photoncard_shared::budget::{gather_candidates, sums_of_pixel};
+use photoncard_shared::budget::sums_of_pixel;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters, PixelRecord, Tile};
 use rayon::prelude::*;
@@ -305,7 +304,7 @@ fn do_gathers<'a, M: MeasuredMemory>(
         counters: &mut counters,
         outlet: None,
     };
-    let mut candidates = CandidateBuffer::<{ gather_candidates(REFERENCE.neighbors) }>::new();
+    let mut candidates = ReferenceCandidates::new();
     let mut brought = Vec::with_capacity(waiting.len());
     for Waiting { sum, request, .. } in waiting {
         brought.push((*sum, gathered(&mut context, request, candidates.view())?));

@@ -6,12 +6,11 @@
 
 use glam::Vec3;
 use photoncard_firmware::gather::HilbertCode;
-use photoncard_firmware::kind::REFERENCE;
+use photoncard_firmware::kind::ReferenceCandidates;
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather, reflected_radiance};
+use photoncard_firmware::photon::{NearestPhotons, PhotonMap, gather, reflected_radiance};
 use photoncard_firmware::scene::{PartialReflection, SceneImage};
 use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::budget::gather_candidates;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{IrradiancePoint, PHOTON_CONTENT_BYTES, Photon, PhotonLeaf, Record};
 use photoncard_shared::message::Fault;
@@ -68,7 +67,7 @@ pub fn precompute_irradiance(
 struct Estimator<'a> {
     scene: SceneImage,
     memory: Lines<'a>,
-    buffer: Box<CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>>,
+    buffer: Box<ReferenceCandidates>,
     neighbors: u32,
     max_distance: f32,
 }

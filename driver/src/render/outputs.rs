@@ -30,7 +30,7 @@ impl<'a> Outputs<'a> {
         film: &mut Film,
         observer: &'a dyn Observer,
     ) -> Result<Self, PartialError> {
-        let begin = |partial| PartialRender::begin(partial, settings.identity(scene), film);
+        let begin = |partial| PartialRender::begin(partial, settings.identity(scene).into(), film);
         let partial = settings.outputs.partial.as_ref().map(begin).transpose()?;
         let channels = settings.picture.layers.channels();
         let open = |display| Display::open(display, film.window(), &channels);

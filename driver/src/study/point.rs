@@ -1,13 +1,12 @@
 //! Points: single measurements, each with everything that its result depends on.
 
 use photoncard_firmware::kind::REFERENCE;
-use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Value, json};
 
 use super::sample::SampleRate;
 use crate::choice::Choice;
 use crate::emulator::memory_model::CacheSettings;
-use crate::render::{NamedSettings, PROGRAM, PhotonMaps, RenderSettings};
+use crate::render::{PhotonMaps, RenderSettings};
 
 /// One measurement of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,13 +56,11 @@ impl Point {
     /// Key of the point in the store: everything that the result depends on. `scene` is the scene's checksum.
     pub fn key(&self, scene: &str) -> Value {
         let mut key = json!({
-            "program": PROGRAM,
-            "layout_version": LAYOUT_VERSION,
+            "identity": self.settings.identity_with(scene),
+            "work": self.settings.of_work(),
             "chip": REFERENCE,
             "scene": self.scene,
-            "scene_content": scene,
             "set": self.assignments,
-            "settings": settings(&self.settings),
         });
         key["task"] = match &self.task {
             Task::Traffic { caches, sample, least_tiles } => {
@@ -95,11 +92,4 @@ pub struct ImageKey {
     assignments: Vec<String>,
     seed: u32,
     photons: PhotonMaps,
-}
-
-/// All settings but cards and outputs as JSON: a point is always measured on reference chips.
-fn settings(settings: &RenderSettings) -> NamedSettings {
-    let mut named = settings.of_pixels();
-    named.extend(settings.of_work());
-    named
 }

@@ -13,4 +13,4 @@ pub use capacity::{Buffer, Capacity, Entries, Map};
 pub(crate) use chip_kind::check;
 pub use chip_kind::{ChipKind, TechniqueMemory, cache_bytes, tag_bytes};
 pub use micro::{MICRO, Micro};
-pub use reference::{REFERENCE, Reference};
+pub use reference::{REFERENCE, Reference, ReferenceCandidates};

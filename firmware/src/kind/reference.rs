@@ -4,6 +4,7 @@ use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_candidates};
 
 use super::capacity::Entries;
 use super::chip_kind::{ChipKind, TechniqueMemory};
+use crate::photon::CandidateBuffer;
 
 /// Budget of the reference chip: a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB (section 7.3.2);
 /// tiles have up to 64x64 pixels (16x16 in the dissertation).
@@ -41,3 +42,6 @@ impl ChipKind for Reference {
     type IrradianceRecords = Entries<{ REFERENCE.irradiance_records as usize }>;
     type GatheredRecords = Entries<{ REFERENCE.gathered_records as usize }>;
 }
+
+/// Buffer of the candidates of a search with all neighbours of [`REFERENCE`]: for searches on the host.
+pub type ReferenceCandidates = CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>;

@@ -6,7 +6,7 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Map, Value, json};
 
 use super::RenderSettings;
-use super::groups::{Integrator, PhotonMaps, Picture, Schedule};
+use super::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
 use crate::choice::Choice;
 use crate::scene::Scene;
 
@@ -16,7 +16,10 @@ pub type NamedSettings = Map<String, Value>;
 impl RenderSettings {
     /// Every setting that pixels depend on.
     pub fn of_pixels(&self) -> NamedSettings {
-        let Self { picture, photons, integrator, schedule: _, cards: _, outputs: _ } = self;
+        let Self { picture, photons, integrator, schedule, cards, outputs } = self;
+        let Schedule { tile: _, order: _, bins: _, queue: _ } = schedule;
+        let CardSet { addresses: _, faults: _, verify: _, caches: _, trace: _ } = cards;
+        let TileOutputs { partial: _, display: _ } = outputs;
         let Picture { width, height, crop: _, camera, layers } = picture;
         let PhotonMaps {
             count,
@@ -49,7 +52,7 @@ impl RenderSettings {
         ])
     }
 
-    /// Every setting that a chip's work and memory traffic depend on, and no pixel.
+    /// Every setting that a chip's work and memory traffic depend on besides the kind of chip and its caches, and no pixel.
     pub fn of_work(&self) -> NamedSettings {
         let Self { picture: _, photons, integrator: _, schedule, cards: _, outputs: _ } = self;
         let PhotonMaps {
@@ -72,14 +75,19 @@ impl RenderSettings {
     }
 
     /// Everything that the pixels of a scene depend on: program, scene and settings.
-    pub fn identity(&self, scene: &Scene) -> Value {
-        let mut identity = self.resolved(scene).of_pixels();
+    pub fn identity(&self, scene: &Scene) -> NamedSettings {
+        self.resolved(scene).identity_with(&scene.checksum())
+    }
+
+    /// [`Self::identity`] of settings that are [`Self::resolved`], and of a scene of this checksum.
+    pub fn identity_with(&self, checksum: &str) -> NamedSettings {
+        let mut identity = self.of_pixels();
         identity.extend(named([
             ("program", json!(PROGRAM)),
             ("layout", json!(LAYOUT_VERSION)),
-            ("scene", json!(scene.checksum())),
+            ("scene-checksum", json!(checksum)),
         ]));
-        identity.into()
+        identity
     }
 }
 
