@@ -1,6 +1,7 @@
-//! Settings by the names of their options, in two lists: pixels depend on the first, and on nothing of the second.
+//! Settings by the names of their options, in two lists: those that pixels depend on, and those that only the work depends
+//! on.
 //!
-//! Both lists take the groups apart field by field, so that a new field cannot be forgotten.
+//! Both lists destructure the groups field by field, so that a new field cannot be forgotten.
 
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Map, Value, json};
@@ -14,7 +15,7 @@ use crate::scene::Scene;
 pub type NamedSettings = Map<String, Value>;
 
 impl RenderSettings {
-    /// Every setting that pixels depend on.
+    /// All settings that pixels depend on.
     pub fn of_pixels(&self) -> NamedSettings {
         let Self { picture, photons, integrator, schedule: _, cards: _, outputs: _ } = self;
         let Picture { width, height, crop: _, camera, layers } = picture;
@@ -49,7 +50,7 @@ impl RenderSettings {
         ])
     }
 
-    /// Every setting that a chip's work and memory traffic depend on, and no pixel.
+    /// All settings that a chip's work and memory traffic depend on, but no pixel.
     pub fn of_work(&self) -> NamedSettings {
         let Self { picture: _, photons, integrator: _, schedule, cards: _, outputs: _ } = self;
         let PhotonMaps {
