@@ -1,18 +1,18 @@
-//! Memory that work of a known size is about to take, asked of the system beforehand: what a process cannot have is an error,
-//! where an allocation that fails in the middle of the work would abort it.
+//! Check of available memory before work of a known size: memory that the process cannot have is an error, whereas an
+//! allocation that fails in the middle of the work would abort the process.
 
 use std::hint::black_box;
 
-/// The process cannot have this memory.
+/// Error of an allocation that the process cannot have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{bytes} bytes of memory are needed, which the system does not give")]
 pub(crate) struct OutOfMemory {
-    /// Bytes that were asked for.
+    /// Requested bytes.
     pub(crate) bytes: u64,
 }
 
 impl OutOfMemory {
-    /// A list of so many elements that cannot grow to twice as many.
+    /// Error of a list of `elements` elements that cannot grow to twice that number.
     pub(crate) fn doubling<T>(elements: usize) -> Self {
         Self { bytes: 2 * (elements * size_of::<T>()) as u64 }
     }
@@ -25,19 +25,19 @@ pub(crate) fn push<T>(list: &mut Vec<T>, element: T) -> Result<(), OutOfMemory> 
     Ok(())
 }
 
-/// Remedy for memory that the system does not give.
+/// Remedy for memory that the system refuses.
 pub(crate) const REMEDY: &str =
     "close other programs, raise the process's limit (`ulimit -v`), or use a machine with more memory";
 
-/// Checks that the process can have so much memory now, all at once. None of it stays taken.
+/// Checks that the process can allocate `bytes` at once. The allocation is freed again.
 ///
 /// # Errors
-/// If not.
+/// If the allocation fails.
 pub(crate) fn check(bytes: u64) -> Result<(), OutOfMemory> {
     let mut probe = Vec::<u8>::new();
     let all = usize::try_from(bytes).map_err(|_| OutOfMemory { bytes })?;
     probe.try_reserve_exact(all).map_err(|_| OutOfMemory { bytes })?;
-    // An allocation that nothing looks at would be left out.
+    // An allocation that is never used may be removed by the compiler.
     black_box(probe.as_mut_ptr());
     Ok(())
 }

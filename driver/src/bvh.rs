@@ -26,7 +26,7 @@ pub struct Hierarchy {
 /// Indices of the triangles of a leaf, in the leaf's order.
 pub type LeafTriangles = heapless::Vec<u32, LEAF_TRIANGLES>;
 
-/// The triangles that a hierarchy is built of.
+/// Triangles of a hierarchy; `cut_out` holds one entry per material.
 struct Mesh<'a> {
     triangles: &'a [Triangle],
     cut_out: &'a [bool],
@@ -35,7 +35,7 @@ struct Mesh<'a> {
 /// Error of [`build`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HierarchyError {
-    /// A descent could overflow the chip's stack.
+    /// Error of a descent that could overflow the chip's stack.
     #[error(
         "a descent in the bounding volume hierarchy may put off {entries} parts; the chip's stack holds {BVH_STACK}"
     )]
@@ -43,13 +43,13 @@ pub enum HierarchyError {
         /// Maximum number of stack entries that a descent needs.
         entries: usize,
     },
-    /// The scene has more triangles than a card can index.
+    /// Error of more triangles than a card can index.
     #[error("the scene has {triangles} triangles; a card image can index at most {MAX_TRIANGLES}")]
     TooMany {
         /// Number of triangles of the scene.
         triangles: usize,
     },
-    /// A triangle's material is beyond the materials that a card can index.
+    /// Error of a material index above the maximum that a card can index.
     #[error(
         "a triangle has the material of index {material}; a card image can index at most {MAX_MATERIALS} materials"
     )]
@@ -57,23 +57,23 @@ pub enum HierarchyError {
         /// Index of the material.
         material: u32,
     },
-    /// A triangle has a corner that is not finite, or so far away that the area of the scene's bounding box is not.
+    /// Error of a corner that is not finite, or so far away that the area of the scene's bounding box is not.
     #[error("a triangle has a corner whose position is not finite, or too far from the origin")]
     NotFinite,
 }
 
-/// Maximum number of triangles: each may have a leaf of its own, and its index in the card image is the leaf's times
-/// [`LEAF_TRIANGLES`] plus its slot.
+/// Maximum number of triangles. Each may have a leaf of its own, and a triangle's index in the card image is `leaf *
+/// LEAF_TRIANGLES + slot`.
 const MAX_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 
 /// Cost of a visit of a leaf, relative to a visit of a node.
 const LEAF_COST: f32 = 1.0;
 
-/// Triangles whose boxes have one centre and that the builder may be given one by one.
+/// Maximum number of concentric boxes that the builder receives one by one.
 const MAX_CONCENTRIC: usize = 64;
 
-/// Builds the hierarchy of some triangles, at least one. The same on every machine: obvhs runs on one thread. `cut_out` says
-/// of each material whether its triangles may have cut-outs; those beyond its end have none.
+/// Builds the hierarchy of `triangles`, at least one. The result does not depend on the machine: obvhs runs on one thread.
+/// `cut_out[m]` is true if triangles of material `m` may have cut-outs; materials beyond its end have none.
 ///
 /// # Errors
 /// If the triangles or materials are too many, a corner is not finite or too far away, or a descent could overflow the
@@ -86,7 +86,7 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
         return Err(HierarchyError::TooManyMaterials { material: triangle.material });
     }
     let boxes: Vec<Aabb> = triangles.iter().map(bounding_box).collect();
-    // Minima and maxima pass over NaN, so the corners are checked themselves.
+    // `min` and `max` skip NaN, so the corners themselves are checked.
     let is_finite = triangles.iter().flat_map(|triangle| triangle.vertices).all(glam::Vec3::is_finite);
     let all = boxes.iter().fold(Aabb::empty(), |all, bounds| all.union(bounds));
     if !is_finite || !all.half_area().is_finite() {
@@ -100,7 +100,7 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
     let mesh = &Mesh { triangles, cut_out };
     let mut folded = Folded::new(tree(&binary, &parts, &boxes, mesh));
     if folded.stack > BVH_STACK {
-        // Median splits do not make the best of trees, but one of minimum depth.
+        // A tree of median splits is slower to traverse, but has minimum depth.
         let mut indices: Vec<u32> = (0..triangles.len() as u32).collect();
         folded = Folded::new(halves(&mut indices, &boxes, mesh));
     }
@@ -169,7 +169,7 @@ impl Mesh<'_> {
         layout::Triangle { vertices, material, cut_out }
     }
 
-    /// The line of a leaf of some triangles, if one line holds them.
+    /// Encodes a leaf of the triangles `indices`; `None` if they exceed one line.
     fn encode(&self, indices: &[u32]) -> Option<[u8; LINE_BYTES]> {
         let records: heapless::Vec<_, LEAF_TRIANGLES> =
             indices.iter().map(|&index| self.record(&self.triangles[index as usize])).collect();
@@ -177,7 +177,7 @@ impl Mesh<'_> {
     }
 }
 
-/// A tree that may be folded. Whatever a leaf has room for may be one.
+/// Converts the builder's tree for folding. Every subtree whose triangles fit in one leaf may become one.
 fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
     // Parents before children.
     let mut order = vec![0];
@@ -197,7 +197,7 @@ fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafT
         let bounds = NodeBox { lower: node.aabb().min.to_array(), upper: node.aabb().max.to_array() };
         let area = node.aabb().half_area();
         trees[index as usize] = Some(if node.is_leaf() {
-            // Of one part, as the builder was told.
+            // `max_prims_per_leaf` is 1: the leaf holds one part.
             halves(&mut parts.triangles(binary.primitive_indices[first]).to_vec(), boxes, mesh)
         } else {
             let parts = [first, first + 1].map(|part| trees[part].take().unwrap_or_else(missing));
@@ -226,7 +226,7 @@ fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangle
     Tree::node(parts, node_box, area, None)
 }
 
-/// The triangles of two leaves, if one leaf holds them.
+/// Triangles of two leaves together, if one leaf holds them.
 fn both(parts: &[Tree<LeafTriangles, NodeBox>; 2], mesh: &Mesh) -> Option<LeafTriangles> {
     let mut indices = LeafTriangles::new();
     for part in parts {
@@ -336,7 +336,7 @@ mod tests {
         }
     }
 
-    /// Squares in one place, or in one another, of which the builder would join two at a time.
+    /// Coincident or concentric squares, of which the builder would join two at a time.
     #[test]
     fn crowds_of_triangles_are_built_in_no_time_to_speak_of() {
         for step in [0.0, 1e-5] {

@@ -13,10 +13,10 @@ pub trait Choice: Copy + Send + Sync + 'static {
     /// Explanation of the value in a line of help; empty where the name says it all.
     fn about(self) -> &'static str;
 
-    /// The value of a name.
+    /// Value with the name `name`.
     ///
     /// # Errors
-    /// If no value has the name; the text lists those that are there.
+    /// If no value has the name; the text lists all names.
     fn of_name(name: &str) -> Result<Self, String> {
         let found = Self::ALL.iter().find(|value| value.name() == name);
         found.copied().ok_or_else(|| {

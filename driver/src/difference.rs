@@ -52,7 +52,7 @@ pub struct BlockErrors {
     pub size: usize,
     /// Blocks that were compared.
     pub count: usize,
-    /// Blocks that were left out because the reference exceeds the stated radiance in them.
+    /// Blocks that were left out because the reference exceeds the radiance limit in them.
     pub excluded: usize,
     /// Compared blocks whose reference is black; the relative errors leave them out.
     pub black: usize,
@@ -71,7 +71,7 @@ pub struct BlockErrors {
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum DifferenceError {
-    /// The pictures differ in size.
+    /// Error of pictures of different sizes.
     #[error(
         "the reference has {} x {} pixels and the image {} x {}; render the image in the reference's size or crop both \
          alike", reference[0], reference[1], image[0], image[1]
@@ -82,10 +82,10 @@ pub enum DifferenceError {
         /// Width and height of the image.
         image: [usize; 2],
     },
-    /// The block has no pixels.
+    /// Error of a block without pixels.
     #[error("a block of 0 x 0 pixels is not possible; choose a side of at least 1")]
     EmptyBlock,
-    /// A radiance is infinite or not a number.
+    /// Error of a radiance that is infinite or not a number.
     #[error("pixel ({x}, {y}) of the {which} is {value:?}, not a finite radiance; render it again")]
     NotFinite {
         /// `reference` or `image`.
@@ -97,16 +97,16 @@ pub enum DifferenceError {
         /// Red, green and blue of the pixel.
         value: [f32; 3],
     },
-    /// The limit leaves nothing to compare.
+    /// Error of a limit that leaves nothing to compare.
     #[error("every block of the reference exceeds {limit} somewhere; exclude less")]
     AllExcluded {
-        /// The radiance stated.
+        /// Radiance limit.
         limit: f32,
     },
-    /// The limit is not a number.
+    /// Error of a limit that is not a number.
     #[error("blocks cannot be excluded by a radiance of {limit}; state a number")]
     BadLimit {
-        /// The radiance stated.
+        /// Radiance limit.
         limit: f32,
     },
 }
@@ -318,7 +318,7 @@ mod tests {
         }
     }
 
-    /// Noise of mean zero over each block is seen in pixels and not in blocks.
+    /// Noise whose mean over each block is zero shows in the errors of pixels, not of blocks.
     #[test]
     fn blocks_average_noise_away() {
         let reference = picture(8, 8, |_, _| [1.0; 3]);
@@ -345,7 +345,7 @@ mod tests {
         let difference = compare(&reference, &image, 4, Some(5.0)).unwrap();
         assert_eq!((difference.blocks.count, difference.blocks.excluded, difference.pixel_count), (1, 1, 16));
         assert_eq!((difference.pixels.mse, difference.mean_image), (1.0, 2.0));
-        // Only more than the limit counts.
+        // The limit itself is not excluded.
         assert_eq!(compare(&reference, &image, 4, Some(10.0)).unwrap().blocks.excluded, 0);
         let all = compare(&reference, &image, 4, Some(0.5));
         assert_eq!(all, Err(DifferenceError::AllExcluded { limit: 0.5 }));

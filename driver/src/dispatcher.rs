@@ -1,4 +1,4 @@
-//! Between scheduler, sessions and sinks: gives cards their tiles, and sinks the finished ones.
+//! Transfer of tiles: from the scheduler to sessions, and finished ones from sessions to sinks.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
@@ -9,29 +9,29 @@ use crate::scheduler::{Answered, CardNumber, Scheduler, SchedulerError, Standing
 use crate::session::{Event, Session, SessionError};
 use crate::sink::{FinishedTile, TileSink};
 
-/// State shared by the sessions of a render, each on a thread of its own or all on one.
+/// State that the sessions of a render share, each on a thread of its own or all on one.
 pub struct Dispatcher<'a> {
     scheduler: Mutex<Scheduler>,
-    /// A tile waits again, a card is given up, or all tiles are done.
+    /// Notified when a tile waits again, a card is given up, or all tiles are done.
     changed: Condvar,
     sinks: Vec<&'a dyn TileSink>,
-    /// Shared by whoever has a tile on its way to the sinks, held alone by whoever has them forget tiles.
+    /// Held shared while a tile is put into the sinks, exclusively while sinks revoke tiles.
     order: RwLock<()>,
 }
 
 impl<'a> Dispatcher<'a> {
-    /// Tiles go from the scheduler's cards to all sinks.
+    /// Dispatcher between the scheduler's cards and all sinks.
     pub fn new(scheduler: Scheduler, sinks: Vec<&'a dyn TileSink>) -> Self {
         Self { scheduler: Mutex::new(scheduler), changed: Condvar::new(), sinks, order: RwLock::default() }
     }
 
-    /// Which tiles are left.
+    /// The scheduler, which holds the tiles that are left.
     pub fn scheduler(&self) -> MutexGuard<'_, Scheduler> {
         // A thread that panicked holding the lock ends the render.
         self.scheduler.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Gives a card as many tiles as it has free credits.
+    /// Assigns tiles to a card until its credits are used up.
     pub fn supply(&self, card: CardNumber, session: &mut Session, now: Duration) {
         while session.wants_tile() {
             let Some(assignment) = self.scheduler().take(card, now) else { break };
@@ -40,7 +40,7 @@ impl<'a> Dispatcher<'a> {
         }
     }
 
-    /// Takes what has come of a session.
+    /// Handles the events of a session.
     ///
     /// # Errors
     /// If cards contradict each other, or none can render the tiles that are left.
@@ -62,13 +62,13 @@ impl<'a> Dispatcher<'a> {
         }
         let result = self.scheduler().check(now);
         if let Err(SchedulerError::Disagreement { tile, sources }) = &result {
-            // Which of them lies cannot be told: what they alone have rendered is not kept.
+            // Either of two cards that disagree may be wrong: tiles that only they have rendered are revoked.
             sources.iter().filter_map(|source| source.card()).for_each(|card| self.distrust(card, *tile));
         }
         result
     }
 
-    /// A card has rendered a tile.
+    /// Handles a tile that a card has rendered.
     fn finish(&self, card: CardNumber, tile: FinishedTile, now: Duration) -> Result<(), SchedulerError> {
         let rectangle = *tile.tile();
         let order = self.order.read().unwrap_or_else(PoisonError::into_inner);
@@ -77,7 +77,7 @@ impl<'a> Dispatcher<'a> {
             order
         } else {
             drop(order);
-            // The tile is not done yet: no render is complete with what a liar has left.
+            // The tile is not complete yet, so the render cannot end before the wrong card's tiles are revoked.
             liars.into_iter().for_each(|liar| self.distrust(liar, rectangle));
             self.order.read().unwrap_or_else(PoisonError::into_inner)
         };
@@ -86,12 +86,12 @@ impl<'a> Dispatcher<'a> {
             self.scheduler().complete(rectangle.id);
         }
         drop(order);
-        // Another may verify the tile, or all are done.
+        // Another card may verify the tile, or all tiles are done.
         self.changed.notify_all();
         fault.map_or(Ok(()), Err)
     }
 
-    /// Gives up a card that has lied about a tile: all that it alone has rendered is rendered again.
+    /// Gives up a card that sent wrong pixels of the tile `about`, and revokes all tiles that it alone has rendered.
     pub fn distrust(&self, card: CardNumber, about: Tile) {
         let _alone = self.order.write().unwrap_or_else(PoisonError::into_inner);
         let revoked = self.scheduler().expel(card, about);
@@ -101,16 +101,16 @@ impl<'a> Dispatcher<'a> {
         self.changed.notify_all();
     }
 
-    /// Verdict of other cards on a card that is used no more.
+    /// Verdict of other cards on a card whose session has ended.
     ///
     /// # Errors
-    /// If it has lied.
+    /// If they outvoted it.
     pub fn check_card(&self, card: CardNumber) -> Result<(), SessionError> {
         let lie = self.scheduler().lie_of(card);
         lie.map_or(Ok(()), |tile| Err(SessionError::Outvoted { tile }))
     }
 
-    /// Waits until there may be something to do, not longer than `longest`.
+    /// Waits at most `longest` for a change; returns at once if all tiles are done.
     pub fn wait(&self, longest: Duration) {
         let scheduler = self.scheduler();
         if !scheduler.is_complete() {

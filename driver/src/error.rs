@@ -1,4 +1,4 @@
-//! What can be wrong with a scene, where, and what to do about it.
+//! Errors of scenes and settings: the fault, its location and the remedy.
 
 use std::fmt;
 use std::io;
@@ -39,170 +39,170 @@ impl fmt::Display for Location {
 #[derive(Debug, Error, Diagnostic)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// The scene file, or a file it refers to, cannot be read.
+    /// Error of a scene file, or a file it refers to, that cannot be read.
     #[error("cannot read {}", file.display())]
     #[diagnostic(code(scene::unreadable), help("check that the path names a file and that it may be read"))]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// What the operating system says.
+        /// The operating system's error.
         #[source]
         source: io::Error,
     },
 
-    /// The file is neither glTF JSON nor GLB.
+    /// Error of a file that is neither glTF JSON nor GLB.
     #[error("{} is not a glTF 2.0 scene: {reason}", file.display())]
     #[diagnostic(code(scene::not_gltf), help("export the scene as glTF 2.0 (.gltf or .glb)"))]
     NotGltf {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// What gives it away.
+        /// Evidence, such as a wrong magic number.
         reason: String,
     },
 
-    /// A GLB file ends before its own lengths say so.
+    /// Error of a GLB file that is shorter than the lengths in its headers.
     #[error("{} is truncated: {what} needs {needed} bytes and {available} are there", file.display())]
     #[diagnostic(code(scene::truncated), help("copy or export the file again; it was cut off on the way"))]
     Truncated {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// The part that is cut off.
+        /// Truncated part.
         what: &'static str,
-        /// Bytes the part states.
+        /// Stated size of the part, bytes.
         needed: u64,
-        /// Bytes there are.
+        /// Available bytes.
         available: u64,
     },
 
-    /// The text is not JSON, or not JSON of glTF's shape.
+    /// Error of a text that is not JSON, or does not follow glTF's schema.
     #[error("{file} is not glTF JSON: {message}")]
     #[diagnostic(
         code(scene::json),
         help("correct the JSON at the position shown, or export the scene again")
     )]
     Json {
-        /// The file's name.
+        /// Name of the file.
         file: String,
-        /// What is wrong.
+        /// The parser's message.
         message: String,
-        /// The text.
+        /// Text of the file.
         #[source_code]
         text: Arc<NamedSource<String>>,
-        /// Where in the text.
+        /// Position of the fault in the text.
         #[label("here")]
         at: SourceSpan,
     },
 
-    /// The scene says that it cannot be shown without an extension this renderer does not know.
+    /// Error of a scene whose `extensionsRequired` has an unsupported extension.
     #[error("{location} requires the extension {name}, which is not supported")]
     #[diagnostic(
         code(scene::required_extension),
         help("export the scene without {name}; supported are {supported}")
     )]
     RequiredExtension {
-        /// Where it is required.
+        /// Location in `extensionsRequired`.
         location: Location,
-        /// The extension.
+        /// Name of the extension.
         name: String,
-        /// The extensions that are supported.
+        /// Names of the supported extensions.
         supported: String,
     },
 
-    /// The file breaks a rule of glTF.
+    /// Error of a file that violates the glTF specification.
     #[error("{location}: {reason}")]
     #[diagnostic(code(scene::invalid), help("{remedy}"))]
     Invalid {
-        /// Where.
+        /// Location of the violation.
         location: Location,
-        /// What is wrong.
+        /// Description of the violation.
         reason: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
 
-    /// A buffer's bytes cannot be had.
+    /// Error of a buffer whose bytes cannot be obtained.
     #[error("{location}: {reason}")]
     #[diagnostic(code(scene::buffer), help("{remedy}"))]
     Buffer {
-        /// Which buffer.
+        /// Location of the buffer.
         location: Location,
-        /// What is wrong.
+        /// Description of the fault.
         reason: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
 
-    /// An image's texels cannot be had.
+    /// Error of an image whose texels cannot be obtained.
     #[error("{location}: {reason}")]
     #[diagnostic(code(scene::image), help("{remedy}"))]
     Image {
-        /// Which image.
+        /// Location of the image.
         location: Location,
-        /// What is wrong.
+        /// Description of the fault.
         reason: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
 
-    /// An environment cannot be read.
+    /// Error of an environment that cannot be read.
     #[error("{}: {reason}", file.display())]
     #[diagnostic(code(scene::environment), help("{remedy}"))]
     Environment {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// What is wrong.
+        /// Description of the fault.
         reason: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
 
-    /// A vertex's place, or something else of it, is not a number, infinite, or out of any scale.
+    /// Error of a vertex attribute that is not finite or out of range.
     #[error("{location}: vertex {vertex} of mesh '{mesh}', primitive {primitive}, {reason}")]
     #[diagnostic(code(scene::vertex), help("repair the mesh in the modelling tool and export it again"))]
     Vertex {
-        /// The attribute.
+        /// Location of the attribute.
         location: Location,
-        /// The mesh's name.
+        /// Name of the mesh.
         mesh: String,
-        /// The primitive's index in the mesh.
+        /// Index of the primitive in the mesh.
         primitive: usize,
-        /// The vertex's index in the primitive.
+        /// Index of the vertex in the primitive.
         vertex: u64,
-        /// What is wrong with it.
+        /// Description of the fault.
         reason: String,
     },
 
-    /// An index refers to a vertex that does not exist.
+    /// Error of an index that refers to no vertex.
     #[error(
         "{location}: index {position} is {index}, but mesh '{mesh}', primitive {primitive}, has {vertices} vertices"
     )]
     #[diagnostic(code(scene::index), help("repair the mesh in the modelling tool and export it again"))]
     IndexOutOfRange {
-        /// The index accessor's place.
+        /// Location of the index accessor.
         location: Location,
-        /// The mesh's name.
+        /// Name of the mesh.
         mesh: String,
-        /// The primitive's index in the mesh.
+        /// Index of the primitive in the mesh.
         primitive: usize,
-        /// Which index in the list.
+        /// Position in the list of indices.
         position: u64,
-        /// Its value.
+        /// Value of the index.
         index: u64,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: u64,
     },
 
-    /// The scene holds more triangles than a card image can address.
+    /// Error of a scene with more triangles than a card image can address.
     #[error("{}: more than {limit} triangles once every instance is placed", file.display())]
     #[diagnostic(code(scene::too_many_triangles), help("simplify the meshes or place fewer instances"))]
     TooManyTriangles {
-        /// The file.
+        /// Path of the scene file.
         file: PathBuf,
-        /// The limit.
+        /// Maximum number of triangles.
         limit: usize,
     },
 
-    /// The scene cannot be held by a card, whatever else is left out.
+    /// Error of a scene that exceeds a card's memory even without photons.
     #[error("{}: {what} take {needed} bytes of a card's memory or more, and the card has {available}", file.display())]
     #[diagnostic(
         code(scene::too_large),
@@ -211,21 +211,21 @@ pub enum SceneError {
         )
     )]
     TooLarge {
-        /// The file.
+        /// Path of the scene file.
         file: PathBuf,
         /// Contents of the card image that exceed the memory, such as `8 materials`.
         what: String,
-        /// Bytes of the card image, at least.
+        /// Lower bound of the card image's size, bytes.
         needed: u64,
-        /// Bytes of the card's memory.
+        /// Size of the card's memory, bytes.
         available: u64,
     },
 
-    /// The system does not give the memory that a step of loading takes.
+    /// Error of a step of loading whose memory the system refuses.
     #[error("{}: {step} takes {bytes} bytes of memory, which the system does not give", file.display())]
     #[diagnostic(code(scene::memory), help("simplify the scene, or {}", allocation::REMEDY))]
     Memory {
-        /// The file.
+        /// Path of the scene file.
         file: PathBuf,
         /// Step of loading that takes the memory.
         step: &'static str,
@@ -233,32 +233,32 @@ pub enum SceneError {
         bytes: u64,
     },
 
-    /// A material's value is out of its range.
+    /// Error of a material's value that is out of range.
     #[error("{location}: material '{material}': {reason}")]
     #[diagnostic(code(scene::material), help("{remedy}"))]
     Material {
-        /// Where.
+        /// Location of the value.
         location: Location,
-        /// The material.
+        /// Name of the material.
         material: String,
-        /// What is wrong.
+        /// Description of the fault.
         reason: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
 
-    /// The file has no scene.
+    /// Error of a file without a scene.
     #[error("{} holds no scene", file.display())]
     #[diagnostic(
         code(scene::no_scene),
         help("export the objects as part of a scene (the glTF array `scenes`)")
     )]
     NoScene {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
     },
 
-    /// The scene has no triangle.
+    /// Error of a scene without triangles.
     #[error("{}: the scene has no triangles", file.display())]
     #[diagnostic(
         code(scene::no_geometry),
@@ -267,24 +267,24 @@ pub enum SceneError {
         )
     )]
     NoGeometry {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
     },
 
-    /// The scene has triangles, but none with an area.
+    /// Error of a scene whose triangles all have zero area.
     #[error("{}: all {skipped} triangles have zero area", file.display())]
     #[diagnostic(
         code(scene::zero_area),
         help("check the scale of the nodes and the mesh: every triangle collapses to a line or a point")
     )]
     OnlyZeroArea {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// How many there are.
+        /// Number of triangles.
         skipped: usize,
     },
 
-    /// Nothing emits light.
+    /// Error of a scene without light.
     #[error("the scene has no light")]
     #[diagnostic(
         code(scene::no_light),
@@ -295,43 +295,43 @@ pub enum SceneError {
     )]
     NoLight,
 
-    /// The scene has no camera of this name.
+    /// Error of a camera name that the scene lacks.
     #[error("the scene has no camera '{name}'")]
     #[diagnostic(code(scene::camera), help("choose one of: {cameras}"))]
     UnknownCamera {
-        /// The name asked for.
+        /// Requested name.
         name: String,
-        /// The names there are.
+        /// Names of the scene's cameras.
         cameras: String,
     },
 
-    /// The scene has no material of this name.
+    /// Error of a material name that the scene lacks.
     #[error("`{assignment}`: the scene has no material '{material}'")]
     #[diagnostic(code(setting::material), help("choose one of: {nearest}"))]
     UnknownMaterial {
-        /// The assignment as given.
+        /// Assignment as given.
         assignment: String,
-        /// The name in it.
+        /// Requested name.
         material: String,
-        /// The names nearest to it.
+        /// Names of the scene that are most similar.
         nearest: String,
     },
 
-    /// A setting is not of the form `MATERIAL.PROPERTY=VALUE`, or its value is not possible.
+    /// Error of an assignment that is not of the form `MATERIAL.PROPERTY=VALUE`, or whose value is not possible.
     #[error("`{assignment}`: {reason}")]
     #[diagnostic(code(setting::invalid), help("{remedy}"))]
     Setting {
-        /// The assignment as given.
+        /// Assignment as given.
         assignment: String,
-        /// What is wrong.
+        /// Description of the fault.
         reason: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
 }
 
 impl SceneError {
-    /// A step of loading for which there is no memory.
+    /// Error of a step of loading whose memory the system refuses.
     pub(crate) fn memory(file: &Path, step: &'static str, OutOfMemory { bytes }: OutOfMemory) -> Self {
         Self::Memory { file: file.to_owned(), step, bytes }
     }

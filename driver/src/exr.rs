@@ -230,7 +230,7 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
 
 /// [`read_rgb`] from the bytes of a file, with at most `most_pixels` pixels.
 pub(crate) fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
-    // The `exr` crate trusts a file's numbers in places: sums of window sizes, offsets of blocks.
+    // The `exr` crate does not check every number of a file: sums of window sizes, offsets of blocks.
     foreign::decode(
         || decode(path, bytes, most_pixels),
         || ExrError::Malformed {
@@ -300,7 +300,7 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
     if stated > held {
         return contradiction(format!("{width} x {height} pixels do not fit into {length} bytes"));
     }
-    // The picture, and a block as it is unpacked and put in order.
+    // The picture, and one block while it is unpacked and reordered.
     let block = stated.min(header.max_block_byte_size() as u64);
     allocation::check(pixels.saturating_mul(size_of::<[f32; 3]>() as u64).saturating_add(3 * block))
         .map_err(|OutOfMemory { bytes }| ExrError::Memory { path: path.to_owned(), bytes })?;
@@ -314,8 +314,8 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
 
 /// Upper bound of the compression ratio; `None` for compressions that are not read.
 ///
-/// Blocks of DWA state the sizes of their parts, and the `exr` crate allocates what they state: a few bytes could end
-/// the process, since an allocation that fails aborts and cannot be caught as a panic.
+/// Blocks of DWA state the sizes of their parts, and the `exr` crate allocates as much as they state. A few bytes could end
+/// the process, since a failed allocation aborts and cannot be caught like a panic.
 fn most_compressed(compression: Compression) -> Option<u64> {
     match compression {
         Compression::Uncompressed => Some(1),

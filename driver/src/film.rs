@@ -71,9 +71,9 @@ pub enum FilmError {
         "a picture of {width} x {height} pixels is not possible: each side must be 1 to {MAX_SIDE}; choose another size"
     )]
     Size {
-        /// The width asked for.
+        /// Requested width.
         width: u32,
-        /// The height asked for.
+        /// Requested height.
         height: u32,
     },
     /// The crop window is empty or not inside the picture.
@@ -276,7 +276,7 @@ impl Film {
         FinishedTile::of_pixels(*tile, records, self.has_layers())
     }
 
-    /// Takes a tile's pixels for not written.
+    /// Marks a tile's pixels as not written.
     pub fn erase(&mut self, tile: &Tile) {
         for index in pixel_positions(tile).filter_map(|(x, y)| self.index(x, y)).collect::<Vec<_>>() {
             self.missing += usize::from(std::mem::replace(&mut self.written[index], false));

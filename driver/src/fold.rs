@@ -1,6 +1,5 @@
 //! Binary trees, folded into wide nodes of minimum expected cost and numbered as in a card image (Ylitie, Karras, Laine
-//! 2017,
-//! *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, section 3.1).
+//! 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, section 3.1).
 
 use std::collections::VecDeque;
 
@@ -13,14 +12,14 @@ pub(crate) struct Tree<L, B> {
     costs: [f32; NODE_CHILDREN],
 }
 
-/// A node of a binary tree: the leaf that it may become, and its two parts, if it has them. Its costs are kept apart,
-/// as only the node above needs them.
+/// A node of a binary tree: the leaf that it may become, and its two children, if any. Its costs are in [`Tree`], as only
+/// its parent needs them.
 struct Part<L, B> {
     bounds: B,
     leaf: Option<L>,
     parts: Option<Box<[Self; 2]>>,
-    /// `first[i]`: of at most `i + 1` children of a wide node, the number that the first part makes; 0 if the whole is
-    /// one child.
+    /// `first[i]`: of at most `i + 1` children of a wide node, the number that the first part contributes; 0 if the whole
+    /// part is one child.
     first: [u8; NODE_CHILDREN],
 }
 
@@ -45,7 +44,7 @@ impl<L, B: Copy> Tree<L, B> {
                 }
             }
         }
-        // As a wide node of its own it may be split in another way than among the children of its parent.
+        // As a wide node of its own it may be split differently than among the children of its parent.
         let opened = first[NODE_CHILDREN - 1];
         let as_one = leaf.as_ref().map_or(node + costs[NODE_CHILDREN - 1], |(_, cost)| *cost);
         for (cost, first) in costs.iter_mut().zip(&mut first).take(NODE_CHILDREN - 1) {
@@ -53,14 +52,14 @@ impl<L, B: Copy> Tree<L, B> {
                 (*cost, *first) = (as_one, 0);
             }
         }
-        // The last entry is read only to open the node as a wide node of its own.
+        // The last entry is read only when the node becomes a wide node of its own.
         first[NODE_CHILDREN - 1] = opened;
         let leaf = leaf.map(|(leaf, _)| leaf);
         let parts = Some(Box::new(parts.map(|tree| tree.part)));
         Self { part: Part { bounds, leaf, parts, first }, costs }
     }
 
-    /// The leaf that the tree may become, if it may.
+    /// The leaf that the tree may become, if any.
     pub(crate) fn as_leaf(&self) -> Option<&L> {
         self.part.leaf.as_ref()
     }
@@ -101,14 +100,14 @@ impl<L, B: Copy> Folded<L, B> {
     /// Folds a tree. The root is always a node, if only of one leaf.
     pub(crate) fn new(tree: Tree<L, B>) -> Self {
         let mut folded = Self { nodes: Vec::new(), leaves: Vec::new(), stack: 1 };
-        // Nodes to come, each with the stack entries that its ancestors leave.
+        // Queue of nodes, each with the number of stack entries that its ancestors leave.
         let mut waiting = VecDeque::from([(tree.part, 0)]);
         while let Some((node, above)) = waiting.pop_front() {
             let mut children = Vec::with_capacity(NODE_CHILDREN);
             node.unfold(NODE_CHILDREN, &mut children);
             // Stable: children that are near in space stay near.
             children.sort_by_key(|child| child.leaf.is_none());
-            // The node is taken off before its children are put on.
+            // A descent pops the node before it pushes the children.
             let below = above + children.len() - 1;
             folded.stack = folded.stack.max(below + 1);
             let first_leaf = folded.leaves.len();

@@ -1,17 +1,18 @@
-//! A wall around decoders of foreign bytes: a decoder that panics ends in an error, silently and on its own thread.
+//! Isolation of decoders of untrusted bytes: a decoder that panics returns an error, without a message and without ending
+//! the process.
 //!
-//! Decoders are written not to panic, and some do on malformed input. A build that aborts on panics has no wall.
+//! Decoders are written not to panic, but some do on malformed input. A build with `panic = "abort"` has no isolation.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::Once;
 
 thread_local! {
-    /// Walls around the code that this thread runs.
+    /// Number of nested [`decode`] calls on this thread.
     static WALLS: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Runs a decoder; `panicked` makes the error of one that panics. What the decoder changes outside of itself must be of no use
+/// Runs a decoder; `panicked` makes the error if it panics. State outside of the decoder that it changes must not be used
 /// after an error.
 pub(crate) fn decode<T, E>(
     decoder: impl FnOnce() -> Result<T, E>,
@@ -24,7 +25,7 @@ pub(crate) fn decode<T, E>(
     result.unwrap_or_else(|_| Err(panicked()))
 }
 
-/// Puts a hook before the present one that passes on only panics outside of walls.
+/// Installs a panic hook that suppresses the messages of isolated decoders and passes other panics on.
 fn silence_walled_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -50,7 +51,7 @@ mod tests {
         assert_eq!(WALLS.get(), 0);
     }
 
-    /// The other test in a process of its own, the output of which is not kept back.
+    /// Runs the other test in a process of its own, whose output is not captured.
     #[test]
     fn nothing_is_said_of_a_panic_behind_a_wall() {
         let test = "foreign::tests::a_decoder_that_panics_ends_in_an_error";

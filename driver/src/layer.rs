@@ -141,7 +141,7 @@ impl Layers {
         self.iter().any(Layer::is_of_chip)
     }
 
-    /// The layers that chips render for these: all that are left to chips, or none.
+    /// The layers among these that chips render; chips render all of them or none.
     pub fn of_chip(&self) -> Self {
         let are_of_chip = self.are_of_chip();
         Self(Layer::ALL.into_iter().filter(|layer| are_of_chip && layer.is_of_chip()).collect())
@@ -182,7 +182,7 @@ impl FromStr for Layers {
                 ));
             }
         }
-        // Each once, in one order.
+        // Each layer once, in the order of [`Layer::ALL`].
         let is_named = |layer: &Layer| text.split(',').any(|name| name == layer.name());
         Ok(Self(Layer::ALL.into_iter().filter(is_named).collect()))
     }

@@ -1,4 +1,4 @@
-//! Output files that appear whole or not at all: written beside their place, then renamed.
+//! Output files that appear whole or not at all: written to a temporary file in their folder, then renamed.
 
 use std::fs::{self, FileType};
 use std::io::{self, Write};
@@ -7,38 +7,38 @@ use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 use thiserror::Error;
 
-/// Why an output file cannot be written.
+/// Error of an output file that cannot be written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum OutputError {
-    /// The path ends in no file name.
+    /// Error of a path without a file name.
     #[error("'{}' names no file; add a file name", path.display())]
     NoFileName {
-        /// The path.
+        /// Path of the output.
         path: PathBuf,
     },
-    /// The folder does not exist, or is none.
+    /// Error of a folder that does not exist, or is no folder.
     #[error("cannot write {}: the folder {} does not exist; create it or choose another", path.display(), folder.display())]
     MissingFolder {
-        /// The output file.
+        /// Path of the output file.
         path: PathBuf,
-        /// Its folder.
+        /// Path of the folder.
         folder: PathBuf,
     },
-    /// Something that is not a file is in the way.
+    /// Error of a path that names something other than a regular file.
     #[error("cannot write {}: a {kind} has that name; choose another", path.display())]
     NotAFile {
-        /// The output file.
+        /// Path of the output file.
         path: PathBuf,
-        /// What is there.
+        /// Kind of the existing object.
         kind: &'static str,
     },
-    /// Writing failed.
+    /// Error of writing.
     #[error("cannot write {}; check the folder's permissions and the free space", path.display())]
     Write {
-        /// The output file.
+        /// Path of the output file.
         path: PathBuf,
-        /// What the operating system says.
+        /// The operating system's error.
         #[source]
         source: io::Error,
     },
@@ -62,7 +62,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     file.commit()
 }
 
-/// A file that is written beside its place until [`Self::commit`] puts it there. Dropped before, it leaves nothing behind.
+/// Temporary file that [`Self::commit`] renames to its path. If it is dropped before, it is removed.
 #[derive(Debug)]
 pub struct PendingFile {
     file: NamedTempFile,
@@ -71,7 +71,7 @@ pub struct PendingFile {
 }
 
 impl PendingFile {
-    /// Begins a file that is to become `path`.
+    /// Creates a temporary file for the output `path`.
     ///
     /// # Errors
     /// As [`check_writable`].
@@ -81,7 +81,7 @@ impl PendingFile {
         Ok(Self { file, target, path: path.to_owned() })
     }
 
-    /// Puts the file in its place, and replaces what is there.
+    /// Renames the file to its path, replacing an existing file.
     ///
     /// # Errors
     /// If the disk is full or fails.
@@ -90,8 +90,8 @@ impl PendingFile {
         let failed = |source| OutputError::Write { path: path.clone(), source };
         file.as_file().sync_all().map_err(failed)?;
         file.persist(&target).map_err(|error| failed(error.error))?;
-        // The rename itself survives a power cut only once the folder is on disk too. Not every file system can do
-        // that for a folder, and the file is in place either way.
+        // The rename itself survives a power cut only once the folder is on disk too. Not every file system can sync a
+        // folder, and the file is complete either way.
         if let Ok(folder) = fs::File::open(folder_of(&target)) {
             let _ = folder.sync_all();
         }
@@ -109,8 +109,8 @@ impl Write for PendingFile {
     }
 }
 
-/// Whether two paths name one file, or would if it were written. Names that a file system takes for one, such as those
-/// that differ in case alone, are told apart while there is no such file.
+/// Returns whether two paths name one file, or would after writing it. Of files that do not exist yet, names that the file
+/// system would identify, such as names that differ in case alone, count as different.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let absolute = |path: &Path| {
         let folder = || Some(fs::canonicalize(folder_of(path)).ok()?.join(path.file_name()?));
@@ -122,7 +122,7 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// The file that will be replaced: what `path` names, through symbolic links.
+/// Path of the file that will be replaced: `path` with symbolic links resolved.
 fn resolve(path: &Path) -> Result<PathBuf, OutputError> {
     if path.file_name().is_none() {
         return Err(OutputError::NoFileName { path: path.to_owned() });
@@ -141,7 +141,7 @@ fn resolve(path: &Path) -> Result<PathBuf, OutputError> {
     }
 }
 
-/// What something that is no regular file is called.
+/// Name of the kind of a file system object; `None` for a regular file.
 pub(crate) fn kind_of(found: FileType) -> Option<&'static str> {
     if found.is_file() {
         return None;

@@ -1,7 +1,7 @@
-//! Packing: a scene as the sections of a card image, in lines.
+//! Packing: conversion of a scene to the sections of a card image, in lines.
 //!
-//! A [`PackedScene`] holds hierarchy, triangles, materials and lights. The photon pass ([`crate::photon`]) traces in it with the
-//! chip's own ray caster, so that photons land on exactly the surfaces that gather rays meet. [`crate::photon_map`]
+//! A [`PackedScene`] holds hierarchy, triangles, materials and lights. The photon pass ([`crate::photon`]) traces in it
+//! with the chip's own ray caster, so that photons lie on exactly the surfaces that gather rays meet. [`crate::photon_map`]
 //! adds the sections of the photon map.
 
 use photoncard_firmware::memory::Lines;
@@ -28,7 +28,7 @@ use self::corners::PackedCorners;
 pub use self::error::PackError;
 pub(crate) use self::writer::ImageWriter;
 
-/// Bytes of memory that packing takes for a triangle beside the scene: binary trees, most of all.
+/// Bytes of memory that packing takes per triangle beside the scene, mainly for binary trees.
 const BYTES_OF_A_TRIANGLE: u64 = 700;
 
 /// The card image of a scene without photons, and the sources that light it.
@@ -43,7 +43,7 @@ impl PackedScene {
     /// Packs geometry, materials, textures and lights.
     ///
     /// # Errors
-    /// If the geometry is too much for a chip or for this process, or there are more textures or lights than a chip can tell apart.
+    /// If the geometry exceeds a chip or this process's memory, or there are more textures or lights than a chip can index.
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
         allocation::check(BYTES_OF_A_TRIANGLE * scene.triangles.len() as u64)
             .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles: scene.triangles.len(), bytes })?;
@@ -73,7 +73,7 @@ impl PackedScene {
         self.image
     }
 
-    /// The grid for photons' positions: the finest that holds the scene.
+    /// Grid of photon positions: the finest that covers the scene.
     pub fn photon_grid(&self) -> PhotonGrid {
         self.image
             .bounds()
@@ -90,7 +90,7 @@ impl PackedScene {
         self.aimed_sources.as_ref()
     }
 
-    /// True if photons are stored at any surface.
+    /// Returns whether any surface stores photons.
     pub(crate) fn keeps_photons(&self) -> bool {
         self.keeps_photons
     }
@@ -120,7 +120,7 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     Ok(image.finish())
 }
 
-/// The header of a scene without photons: units and lights. Lines and sections are the writer's.
+/// Header of a scene without photons: units and lights. The writer sets lines and sections.
 fn header(scene: &Scene, lights: &Lights) -> Header {
     Header {
         radiance_unit: radiance_unit(scene, lights),
@@ -134,18 +134,18 @@ fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
     let mut indices = vec![0; scene.triangles.len()];
     for (leaf, triangles) in leaves.iter().enumerate() {
         for (slot, &triangle) in triangles.iter().enumerate() {
-            // The hierarchy has few enough.
+            // [`bvh`](crate::bvh) has checked that indices fit.
             indices[triangle as usize] = (leaf * LEAF_TRIANGLES + slot) as u32;
         }
     }
     indices
 }
 
-/// Fixed-point sums of radiance hold 23 bits above the unit and 40 below.
+/// Unit of the chips' fixed-point sums of radiance, which hold 23 bits above the unit and 40 below.
 ///
-/// The unit is the radiance that all surfaces would have if the emitted power were spread over them, once reflected by
-/// white: a typical one. A much brighter emitter or texel of the environment raises it, so that its own radiance is within
-/// 2^12 units: shadow rays next to an emitter may bring a thousand times as much.
+/// The unit is a typical radiance: that of all surfaces if the emitted power were spread over them and reflected once by
+/// white. A much brighter emitter or texel of the environment raises it, so that its own radiance is within 2^12 units:
+/// shadow rays next to an emitter may contribute a thousand times as much.
 fn radiance_unit(scene: &Scene, lights: &Lights) -> f32 {
     let area: f64 = scene.triangles.iter().map(|triangle| triangle.area() as f64).sum();
     let typical = lights.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));

@@ -1,4 +1,4 @@
-//! A render that may be gone on with: finished tiles are kept in a file beside the picture, one after another.
+//! Partial renders: finished tiles are appended to a file beside the picture, so that `--resume` can continue from them.
 //!
 //! ```text
 //! photoncard partial render 2\n
@@ -7,12 +7,12 @@
 //! ...
 //! ```
 //!
-//! Numbers are little-endian; the checksum is that of all before it in the record. A tile that was being written when the process
-//! ended is cut off. A record that is damaged is skipped: the next one is found by the eight bytes that it begins with. Of two
-//! records of a pixel the later one holds. What a picture does not depend on is not in the settings: tiles, order and cards may be
-//! others when it is gone on with.
+//! Numbers are little-endian; the checksum covers all preceding bytes of the record. An incomplete last record, left when
+//! the process ended during a write, is cut off. A damaged record is skipped: the reader searches for the magic number that
+//! begins the next one. If two records contain a pixel, the later one holds. The settings are those that pixels depend on:
+//! a resumed render may use other tiles, another order and other cards.
 //!
-//! The file is locked by the render that writes it. What is there under its name and is no such file is refused, and stays as it is.
+//! The render that writes the file locks it. A file of this name that is no partial render is refused and left unchanged.
 
 mod error;
 mod file;
@@ -36,47 +36,48 @@ use self::records::{HEAD_BYTES, read_tiles, record};
 use crate::film::Film;
 use crate::sink::{FinishedTile, TileSink};
 
-/// Bytes of the settings at the most.
+/// Maximum size of the settings, bytes.
 const MAX_SETTINGS: u64 = 1 << 20;
 
-/// Where finished tiles are kept, and whether those of an earlier render are taken over.
+/// File of finished tiles, and whether a render continues from it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartialSettings {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Whether to go on with what it holds.
+    /// True to take over its tiles.
     pub resume: bool,
 }
 
-/// The file of a render's finished tiles. It is made when there is one.
+/// File of a render's finished tiles. It is created with the first tile.
 pub struct PartialRender {
     path: PathBuf,
     settings: Value,
     kept: Mutex<KeptTiles>,
 }
 
-/// Tiles in the file, and the file once it is open.
+/// Open file, and its tiles.
 #[derive(Default)]
 struct KeptTiles {
-    /// The file, locked.
+    /// The file, locked; `None` until it is created.
     file: Option<File>,
-    /// Whether it begins with title and settings.
+    /// True once title and settings are written.
     is_begun: bool,
-    /// Whether it holds a tile that this render has taken over.
+    /// True if the file has tiles of the earlier render.
     holds_earlier: bool,
-    /// Whether it holds a tile that this render has taken over or kept.
+    /// True if the file has tiles of either render.
     holds_tiles: bool,
-    /// Where the records begin that this render has written, by the number of their tile.
+    /// Offset of each record of this render, by tile number.
     records: HashMap<u32, u64>,
     failed: Option<PartialError>,
 }
 
 impl PartialRender {
-    /// Begins to keep tiles of the picture that `settings` tells, all that its pixels depend on. If it is to be gone on with
-    /// what is there, that is written into the film.
+    /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on. With
+    /// [`PartialSettings::resume`] the tiles of the file are written into the film.
     ///
     /// # Errors
-    /// If what is there is no partial render or another render's, cannot be read, or is to be gone on with and of another picture.
+    /// If the file is no partial render, in use by another render or unreadable, or if it is to be resumed and has other
+    /// settings.
     pub(crate) fn begin(
         partial: &PartialSettings,
         settings: Value,
@@ -102,7 +103,7 @@ impl PartialRender {
         PartialError::File { path: self.path.clone(), source }
     }
 
-    /// Takes the sound tiles of the file into the film, and cuts off what is behind the last.
+    /// Writes the valid tiles of the file into the film, and truncates the file after the last one.
     fn resume(&self, kept: &mut KeptTiles, mut file: &File, film: &mut Film) -> Result<(), PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let mut reader = BufReader::new(file);
@@ -117,7 +118,7 @@ impl PartialRender {
         Ok(())
     }
 
-    /// Compares title and settings. Returns their bytes; `None` if the file ends before theirs do.
+    /// Checks title and settings. Returns their size in bytes; `None` if the file ends before they do.
     fn read_head(&self, reader: &mut impl BufRead) -> Result<Option<u64>, PartialError> {
         let foreign = || PartialError::Foreign { path: self.path.clone() };
         match read_title(reader).map_err(|error| self.error(error))?.ok_or_else(foreign)? {
@@ -150,7 +151,7 @@ impl PartialRender {
         }
         let mut write = || {
             let start = file.stream_position()?;
-            // One call: another process sees a tile whole or cut off.
+            // A single call: another process sees the tile whole or truncated.
             file.write_all(&record(tile))?;
             Ok(start)
         };
@@ -160,7 +161,7 @@ impl PartialRender {
         Ok(())
     }
 
-    /// Makes the record of a tile that was kept one that a reader passes over: its magic number goes.
+    /// Invalidates the record of a tile by overwriting its magic number, so that readers skip it.
     fn strike_out(&self, kept: &mut KeptTiles, tile: &Tile) -> Result<(), PartialError> {
         let start = kept.records.remove(&tile.id);
         let (Some(start), Some(file)) = (start, &mut kept.file) else { return Ok(()) };
@@ -180,32 +181,32 @@ impl PartialRender {
         file.write_all(format!("{}{}\n", title(), self.settings).as_bytes())
     }
 
-    /// Removes a file without a tile that cannot be written: there is nothing to go on from.
+    /// Removes a file without tiles that cannot be written: there is nothing to resume from.
     fn discard_empty(&self, kept: &mut KeptTiles) {
         if let Some(file) = kept.file.take_if(|_| !kept.holds_tiles) {
-            // What cannot be removed is empty.
+            // If the removal fails, the file is empty at least.
             let _ = file.set_len(0);
             let _ = file::remove(&file, &self.path);
             kept.is_begun = false;
         }
     }
 
-    /// Whether the file holds a tile that this render has taken over or kept.
+    /// Returns whether the file has tiles of this or the earlier render.
     pub(crate) fn holds_tiles(&self) -> bool {
         self.lock().holds_tiles
     }
 
-    /// Tells what went wrong while tiles were kept.
+    /// Reports the first failure of writing tiles, once.
     ///
     /// # Errors
-    /// If anything did.
+    /// If a write failed.
     pub(crate) fn check(&self) -> Result<(), PartialError> {
-        // Whoever holds the lock writes, and tells of it later.
+        // Another thread holds the lock to write, and its failure is found by the next call.
         let Ok(mut kept) = self.kept.try_lock() else { return Ok(()) };
         kept.failed.take().map_or(Ok(()), Err)
     }
 
-    /// Removes the file, when the picture is written. Where this render has none, one that is there is another's.
+    /// Removes the file after the picture is written. A file that this render has not opened is another's, and stays.
     ///
     /// # Errors
     /// If it cannot be removed.
@@ -217,7 +218,7 @@ impl PartialRender {
     }
 }
 
-/// Failures are kept for the render loop, which asks for them.
+/// Failures are stored until the render loop calls `PartialRender::check`.
 impl TileSink for PartialRender {
     fn put(&self, tile: &FinishedTile) {
         let mut kept = self.lock();
@@ -237,12 +238,12 @@ impl TileSink for PartialRender {
     }
 }
 
-/// The first line.
+/// First line of the file.
 fn title() -> String {
     format!("{FAMILY}{VERSION}\n")
 }
 
-/// Every setting that is another, in words.
+/// Descriptions of the settings that differ.
 fn differences(found: &Value, asked: &Value) -> Vec<String> {
     let empty = Map::new();
     let [found, asked] = [found, asked].map(|value| value.as_object().unwrap_or(&empty));

@@ -63,7 +63,7 @@ pub struct ToneMapping {
 
 /// White point of Reinhard's curve: the scaled luminance that it maps to 1.
 const WHITE: f32 = 4.0;
-/// Maximum of scaled radiance, beyond which it is clamped: its square is finite.
+/// Maximum of scaled radiance, beyond which it is clamped; its square is finite.
 const MOST: f32 = 1e18;
 
 /// Log-average luminance after automatic exposure.
@@ -90,7 +90,7 @@ pub enum PreviewError {
         "an exposure of {exposure} is not possible; state a number of stops, or none for an automatic one"
     )]
     Exposure {
-        /// The exposure asked for.
+        /// Requested exposure.
         exposure: f32,
     },
 }
@@ -232,7 +232,7 @@ mod tests {
             let found = grey(curve, value);
             assert!((found - expected).abs() < 2e-6 * expected, "{curve:?} {value}: {found}");
         }
-        // Reinhard's keeps the hue, the filmic one bleaches.
+        // Reinhard's curve keeps the hue, the filmic curve desaturates.
         let [red, green, _] = ToneCurve::Reinhard.compress([2.0, 0.5, 0.1]);
         assert!((red / green - 4.0).abs() < 1e-5);
         let [red, green, _] = ToneCurve::Aces.compress([2.0, 0.5, 0.1]);

@@ -1,14 +1,15 @@
-//! Text of others, from scenes, cards, paths or arguments, made fit for a terminal.
+//! Escaping of foreign text, from scenes, cards, paths or arguments, before it is printed.
 
 use std::borrow::Cow;
 
-/// The same text with all escaped that does not print as itself: control characters, line ends among them, what hides text or turns
-/// its direction round, and code points without a character. Quotes and backslashes stay, so that what is escaped stays as it is.
+/// Escapes all characters that do not print as themselves: control characters, line ends included, invisible and
+/// bidirectional formatting characters, and unassigned code points. Quotes and backslashes are kept, so that escaped text
+/// stays as it is.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
         return Cow::Borrowed(text);
     }
-    // `escape_debug` knows what prints, but escapes these too.
+    // `escape_debug` knows which characters print, but escapes these too.
     let kept = ['\'', '"', '\\'];
     let piece = |piece: &str| {
         let body = piece.trim_end_matches(kept);

@@ -1,9 +1,9 @@
-//! The host's side of one card's link: a state machine without I/O, fed with bytes, tiles and a clock.
+//! The host's end of a card's link: a state machine without I/O, whose inputs are bytes, tiles and a clock.
 //!
-//! It says hello, loads what the card does not have of the image, sets the frame, has tiles rendered, and checks their
-//! pixels. What comes of that are [`Event`]s. A card that was reset is greeted and loaded again, and its tiles are lost
-//! to it. Threads, ports, time, scheduler and sinks live outside: [`crate::render`] runs one session a thread, a simulator
-//! many in one.
+//! A session greets the card, sends the parts of the image that the card lacks, sets the frame, requests tiles and checks
+//! their pixels. Its results are [`Event`]s. A card that was reset is greeted and loaded again, and its tiles are returned.
+//! Threads, ports, time, scheduler and sinks are outside: [`crate::render`] runs one session per thread, a simulator many
+//! in one.
 
 mod clock;
 mod error;
@@ -36,10 +36,10 @@ use self::load::Load;
 use self::state::State;
 use self::tiles::TilesInFlight;
 
-/// Tiles that a card may hold at the most, whatever it says: those of a card that holds many come late if it is lost.
+/// Maximum number of tiles on a card, whatever its budget: the tiles of a lost card are delayed.
 const MAX_CREDITS: u32 = 16;
 
-/// The session with one card.
+/// Session with one card.
 pub struct Session<'a> {
     state: State,
     budget: Option<Budget>,
@@ -51,18 +51,19 @@ pub struct Session<'a> {
     events: VecDeque<Event>,
     bytes: LinkBytes,
     transport: Transport,
-    /// Encoded commands that wait for room on the line.
+    /// Encoded commands that wait for room in the send window.
     commands: VecDeque<Vec<u8>>,
-    /// The number of the link's present session.
+    /// Number of the link's current session.
     number: u32,
     clock: Clock,
     failures: Failures,
-    /// Whether the card was at a suspect tile when it was greeted last.
+    /// True if the card was working on a suspect tile when it was last greeted.
     left_suspect: bool,
 }
 
 impl<'a> Session<'a> {
-    /// A session that says hello first. `number` tells it from what a line may still hold of another: any will do.
+    /// Session that starts with a greeting. `number` distinguishes it from frames of other sessions on the line; any value
+    /// is valid.
     pub fn new(number: u32, now: Duration) -> Self {
         let mut session = Self {
             state: State::Greeting,
@@ -85,22 +86,22 @@ impl<'a> Session<'a> {
         session
     }
 
-    /// What the card can hold, once it has said so.
+    /// Budget of the card; `None` before its hello.
     pub fn budget(&self) -> Option<&Budget> {
         self.budget.as_ref()
     }
 
-    /// Name and version of the card's firmware, once it has said so.
+    /// Name and version of the card's firmware; empty before its hello.
     pub fn build(&self) -> &str {
         &self.build
     }
 
-    /// What the card's firmware takes of on-chip memory, if the card measures it and has said so.
+    /// On-chip memory of the card's firmware; `None` before its hello, or if the card does not measure it.
     pub fn memory_use(&self) -> Option<MemoryUse> {
         self.memory_use
     }
 
-    /// Gives the card something to do, once it is known.
+    /// Sets the job of the card, which starts as soon as the card has answered the greeting.
     pub fn start(&mut self, job: Job<'a>, now: Duration) {
         self.job = Some(job);
         self.clock.rest(now);
@@ -109,12 +110,12 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// What has come of the session since the last call, from the oldest.
+    /// Removes and returns the oldest event.
     pub fn next_event(&mut self) -> Option<Event> {
         self.events.pop_front()
     }
 
-    /// Whether the card has a free credit, and its line room for a command.
+    /// Returns whether the card has a free credit, and the send window room for a command.
     pub fn wants_tile(&self) -> bool {
         let credits = self.budget.map_or(1, |budget| budget.tiles.min(MAX_CREDITS) as usize);
         self.is_loaded()
@@ -123,18 +124,18 @@ impl<'a> Session<'a> {
             && self.transport.can_send()
     }
 
-    /// Gives a card that wants one a tile.
+    /// Assigns a tile to a card for which [`Self::wants_tile`] is true.
     pub fn give(&mut self, assignment: Assignment) {
         self.tiles.push(assignment);
         self.send(&Command::RenderTile(assignment.tile));
     }
 
-    /// Bytes over the link so far.
+    /// Statistics of the link so far.
     pub fn link_bytes(&self) -> LinkBytes {
         LinkBytes { line: self.transport.statistics(), ..self.bytes }
     }
 
-    /// Lines of the image that are on the card or on their way.
+    /// Number of lines of the image that the card has or that were sent.
     pub fn loaded_lines(&self) -> usize {
         match self.state {
             State::Greeting | State::Ready | State::Comparing => 0,
@@ -143,17 +144,17 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Whether the card has the image and the frame.
+    /// Returns whether the card has the image and the frame.
     pub fn is_loaded(&self) -> bool {
         self.state == State::Rendering
     }
 
-    /// Whether the card has nothing to do, and there is no tile for it.
+    /// Returns whether the card is loaded, has no tile, and no bytes are to be sent.
     pub fn is_idle(&mut self) -> bool {
         self.is_loaded() && !self.is_waiting() && self.transport.outgoing().is_empty()
     }
 
-    /// Whether an answer of the card is due.
+    /// Returns whether an answer of the card is due.
     fn is_waiting(&self) -> bool {
         match self.state {
             State::Ready => false,
@@ -162,7 +163,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Makes what there is to send next.
+    /// Fills the send window with commands and lines of the image.
     pub fn prepare(&mut self) {
         while self.transport.can_send() {
             if let Some(command) = self.commands.pop_front() {
@@ -176,7 +177,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Sends the next lines of the image, or says that they were all. Returns whether there was anything to say.
+    /// Sends the next lines of the image, or the command that ends it. Returns false if the session is not loading.
     fn load_more(&mut self) -> bool {
         let (State::Loading, Some(job)) = (self.state, self.job) else { return false };
         let sent = self.load.next_lines(job.image, &mut self.transport);
@@ -188,17 +189,17 @@ impl<'a> Session<'a> {
         true
     }
 
-    /// What is to be sent now.
+    /// Bytes to send now.
     pub fn outgoing(&mut self) -> &[u8] {
         self.transport.outgoing()
     }
 
-    /// Whether there is something to send without an answer from the card.
+    /// Returns whether there are bytes to send before the card answers.
     pub fn has_more_to_send(&mut self) -> bool {
         !self.transport.outgoing().is_empty() || self.state == State::Loading && self.transport.can_send()
     }
 
-    /// Tells that the first `bytes` of the outgoing ones are sent.
+    /// Removes the first `bytes` bytes of [`Self::outgoing`], which were sent.
     pub fn sent(&mut self, bytes: usize, now: Duration) {
         self.transport.sent(bytes);
         self.bytes.wire += bytes as u64;
@@ -207,10 +208,10 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Takes what came from the card.
+    /// Processes bytes from the card.
     ///
     /// # Errors
-    /// If it is not what a card of this protocol answers, tells of a fault, or the card has failed too often.
+    /// If they violate the protocol, report a fault of the card, or show that it has failed too often.
     pub fn receive(&mut self, mut bytes: &[u8], now: Duration) -> Result<(), SessionError> {
         self.bytes.wire += bytes.len() as u64;
         while !bytes.is_empty() {
@@ -221,7 +222,7 @@ impl<'a> Session<'a> {
                 None => {}
                 Some(LineEvent::Heard) => self.clock.heard(now),
                 Some(LineEvent::Unknown) if self.clock.has_heard() => self.reset(now)?,
-                // Our hello was lost.
+                // The greeting was lost.
                 Some(LineEvent::Unknown) => self.transport.send_again(),
             }
             let mut payload = [0; MAX_PAYLOAD];
@@ -241,23 +242,23 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Tells the card what has come: when the line is quiet.
+    /// Acknowledges received frames; to be called when the line is quiet.
     pub fn acknowledge(&mut self) {
         self.transport.acknowledge();
     }
 
-    /// Asks a card that has been quiet for too long whether it is there. To be called often. `slowest` is the most seconds that
-    /// a ray, or the gather at its end, may take the card, if tiles that were rendered tell.
+    /// Advances the clock; to be called often. Probes a card that has been quiet for too long. `slowest` is the maximum
+    /// time of a ray or its gather, seconds, if known ([`Scheduler::slowest`](crate::scheduler::Scheduler::slowest)).
     ///
     /// # Errors
-    /// If the card has been silent, or has come no further, for longer than it may, or has failed too often.
+    /// If the card has been silent or without progress for too long, or has failed too often.
     pub fn tick(&mut self, slowest: Option<f64>, now: Duration) -> Result<(), SessionError> {
         self.clock.look(now);
         if !self.is_waiting() {
             self.clock.rest(now);
             return Ok(());
         }
-        // A card that holds a session of this very number, of another host, takes the hello for one that came before.
+        // A card that holds another host's session of equal number treats the hello as a repeated frame.
         if self.state == State::Greeting && self.clock.is_greeted_in_vain(now) {
             return self.reset(now);
         }
@@ -272,12 +273,13 @@ impl<'a> Session<'a> {
         result
     }
 
-    /// Takes the tiles that the card has not completed from it: it is lost, or was reset.
+    /// Returns the unfinished tiles of a card that is lost or was reset, as events.
     pub fn give_back(&mut self) {
         self.tiles.give_back(&mut self.events);
     }
 
-    /// Greets the card again and takes its tiles from it: its link was closed, or it is silent.
+    /// Greets the card again, with a new session number, after its link was closed or it was silent. Its tiles are
+    /// returned.
     pub fn greet_again(&mut self, now: Duration) {
         self.left_suspect = self.tiles.is_at_suspect();
         self.give_back();
@@ -287,7 +289,7 @@ impl<'a> Session<'a> {
         self.greet_card();
     }
 
-    /// Greets a card again that does not know the session, or answers and leaves its greeting without a reply.
+    /// Greets a card again that does not know the session, or that answers without a reply to the hello.
     fn reset(&mut self, now: Duration) -> Result<(), SessionError> {
         self.failures.forget_lines();
         self.fail()?;
@@ -295,7 +297,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// The card was reset or came no further. That is its fault, unless cards have crashed before at what it was at.
+    /// Counts a failure of the card, unless it was working on a tile at which cards have crashed before.
     fn fail(&mut self) -> Result<(), SessionError> {
         if self.tiles.is_at_suspect() { Ok(()) } else { self.failures.count() }
     }
@@ -309,14 +311,14 @@ impl<'a> Session<'a> {
 
     fn send(&mut self, command: &Command) {
         let mut bytes = vec![0; MAX_PAYLOAD];
-        // Every command fits a frame: tests pin the longest.
+        // Every command fits a frame: tests cover the longest.
         if let Some(length) = message::encode(command, &mut bytes) {
             bytes.truncate(length);
             self.commands.push_back(bytes);
         }
     }
 
-    /// Asks for the next checksums of what the card has, or begins to send lines.
+    /// Requests the next checksums of the card's chunks; after the last ones starts to send lines.
     fn begin_load(&mut self) {
         let Some(job) = self.job else { return };
         if let Some(question) = self.load.next_question(job.image) {

@@ -1,28 +1,28 @@
-//! Finished tiles, and where they go: the film, the file of finished tiles, the display server.
+//! Finished tiles, and the trait of their destinations: film, partial file, display server.
 
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{PixelRecord, Tile, record_bytes};
 
-/// A tile with all its pixels.
+/// Tile with all its pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FinishedTile {
     tile: Tile,
-    /// [`PixelRecord`]s as the wire carries them, row by row: equal bytes are equal pixels, bit for bit.
+    /// [`PixelRecord`]s in the format of the wire, row by row: equal bytes are equal pixels, bit for bit.
     records: Vec<u8>,
     has_layers: bool,
-    /// Work that the chip counted.
+    /// Work counters of the chip.
     pub counters: Counters,
 }
 
 impl FinishedTile {
-    /// A tile of these records; `None` unless there is one for each pixel.
+    /// Tile from encoded records; `None` unless there is one for each pixel.
     pub fn new(tile: Tile, records: Vec<u8>, has_layers: bool, counters: Counters) -> Option<Self> {
         let bytes = tile.pixels().checked_mul(record_bytes(has_layers) as u64)?;
         (records.len() as u64 == bytes).then_some(Self { tile, records, has_layers, counters })
     }
 
-    /// A tile of these pixels, row by row, whose work is counted elsewhere; `None` unless there is one for each pixel.
-    /// Layers that a pixel lacks are zero.
+    /// Tile from pixels, row by row, with zero counters; `None` unless there is one for each pixel. Missing layers of a
+    /// pixel are zero.
     pub fn of_pixels(
         tile: Tile,
         pixels: impl IntoIterator<Item = PixelRecord>,
@@ -38,35 +38,35 @@ impl FinishedTile {
         Self::new(tile, records, has_layers, Counters::ZERO)
     }
 
-    /// Its rectangle of the picture.
+    /// Rectangle of the tile in the picture.
     pub fn tile(&self) -> &Tile {
         &self.tile
     }
 
-    /// The pixels' records, row by row.
+    /// Encoded records of the pixels, row by row.
     pub fn records(&self) -> &[u8] {
         &self.records
     }
 
-    /// Column and row of each pixel, and its record.
+    /// Column, row and record of each pixel.
     pub fn pixels(&self) -> impl Iterator<Item = ((u32, u32), PixelRecord)> {
         let records = self.records.chunks_exact(record_bytes(self.has_layers));
         pixel_positions(&self.tile).zip(records.map(|record| PixelRecord::read(record).unwrap_or_default()))
     }
 }
 
-/// Columns and rows of a tile's pixels, row by row.
+/// Column and row of each pixel of a tile, row by row.
 pub fn pixel_positions(tile: &Tile) -> impl Iterator<Item = (u32, u32)> + use<> {
     let Tile { x, y, width, height, .. } = *tile;
     (y..y + height).flat_map(move |row| (x..x + width).map(move |column| (column, row)))
 }
 
-/// Takes finished tiles, from any thread. What goes wrong a sink tells its owner: a card has no part in it.
+/// Destination of finished tiles, called from any thread. A sink reports errors to its owner, not to the card's thread.
 pub trait TileSink: Sync {
-    /// Takes a finished tile.
+    /// Stores a finished tile.
     fn put(&self, tile: &FinishedTile);
 
-    /// Forgets a tile that was put: the card that rendered it has lied. The tile is put again once another card has
-    /// rendered it, unless the render ends before.
+    /// Revokes a stored tile, whose card sent wrong pixels. The tile is stored again once another card has rendered it,
+    /// unless the render ends before.
     fn revoke(&self, tile: &Tile);
 }

@@ -207,8 +207,8 @@ fn nothing_to_listen_on() {
     let room = Room::new();
     for (options, words) in [
         (&[][..], ["--listen", "required"]),
-        (&["--listen", "abacus"], ["nothing to listen on", "unix:PATH"]),
-        (&["--listen", "unix:"], ["nothing to listen on", "unix:PATH"]),
+        (&["--listen", "abacus"], ["no address to listen on", "unix:PATH"]),
+        (&["--listen", "unix:"], ["no address to listen on", "unix:PATH"]),
         (&["--listen", "tcp:localhost:65536"], ["no port", "0 to 65535"]),
         (&["--listen", "tcp:::1:7000"], ["no host", "in brackets"]),
         (&["--listen", "pty", "--card", "tcp:localhost:1"], ["--card", "emulated-micro"]),

@@ -92,8 +92,8 @@ fn reflected_rays(workload: &Workload) -> f64 {
     workload.gather_rays + workload.shadow_rays
 }
 
-/// FLOPs of importance tables and irradiance cache. The dissertation's formula is not in the public excerpts: the terms
-/// and their FLOPs are ours.
+/// FLOPs of importance tables and irradiance cache. The dissertation's formula is not in the public excerpts: the terms and
+/// their FLOPs are this project's.
 fn controller_flops(workload: &Workload, symbols: &Symbols) -> f64 {
     let table = workload.photons_per_gather * symbols.table_photon + symbols.table_cells * symbols.table_cell;
     let interpolation = symbols.records_per_pixel * symbols.interpolation;
@@ -141,7 +141,7 @@ mod tests {
             let mut symbols = nominal;
             symbols.set(&format!("{}={}", symbol.notation, 1.5 * value)).unwrap();
             let after = total(&symbols);
-            // An interpolated pixel takes less than one that gathers.
+            // An interpolated pixel costs less than one with a final gather.
             let falls = symbol.notation == "R_IC";
             assert_eq!(after.flops > before.flops, of_flops.contains(&symbol.notation), "{symbol:?}");
             assert_eq!(

@@ -14,8 +14,8 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// The chip that section 7.1 expects of 2010: 90 GB/s and 500 GFLOPS. The link is our choice: the 4 GB/s each way
-    /// of the sixteen lanes of PCI Express 1.x that a workstation of 2007 had.
+    /// The chip that section 7.1 expects of 2010: 90 GB/s and 500 GFLOPS. The link is this project's choice: 4 GB/s each
+    /// way, the sixteen lanes of PCI Express 1.x in a workstation of 2007.
     pub const NOMINAL: Self = Self { bandwidth: 90e9, flops: 500e9, link: 4e9 };
 }
 
@@ -57,7 +57,7 @@ pub struct Prediction {
     pub tiles: f64,
 }
 
-/// Relative error of a ratio of rates that is taken for rounding.
+/// Maximum relative error of a ratio of rates that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
 impl Prediction {

@@ -11,7 +11,7 @@ pub enum Origin {
     Table,
     /// The dissertation or one of its papers, outside the table.
     Published,
-    /// Our choice: no publication states the value.
+    /// This project's choice: no publication states the value.
     Ours,
 }
 
@@ -134,7 +134,8 @@ impl Symbols {
 
     /// Sets one symbol by an assignment such as `R_IC=0.5`.
     ///
-    /// # Errors If the text is not of the form `NAME=VALUE`, names no symbol, or has a value out of the symbol's
+    /// # Errors
+    /// If the text is not of the form `NAME=VALUE`, names no symbol, or has a value out of the symbol's
     /// [range](Symbol::range).
     pub fn set(&mut self, assignment: &str) -> Result<(), SymbolError> {
         let Some((name, value)) = assignment.split_once('=') else {

@@ -66,7 +66,7 @@ impl Workload {
         workload
     }
 
-    /// The part that every pixel takes, interpolated or not.
+    /// Part of the workload that is equal for interpolated and gathering pixels.
     fn of_pixels(symbols: &Symbols) -> Self {
         let pixels = symbols.pixels();
         Self {
@@ -80,7 +80,7 @@ impl Workload {
         }
     }
 
-    /// Workload that chips counted. Bytes and tiles, which [`Counters`] lack, are zero.
+    /// Workload from the counters of chips. Bytes and tiles, which [`Counters`] lack, are zero.
     pub fn counted(counters: &Counters) -> Self {
         Self {
             eye_rays: counters.eye_rays as f64,

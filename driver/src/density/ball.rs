@@ -1,4 +1,4 @@
-//! Triangles that may be in a ball, found by one descent in the hierarchy.
+//! Query of the hierarchy for the triangles that may intersect a ball.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -9,7 +9,7 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{BvhAxis, BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, VERTEX_LANES, WideNode};
 use photoncard_shared::message::{Fault, FaultCode};
 
-/// A ball to look into, metres.
+/// Ball around photons, metres.
 #[derive(Clone, Copy)]
 pub(super) struct Ball {
     pub(super) centre: Vec3,
@@ -17,7 +17,7 @@ pub(super) struct Ball {
 }
 
 impl Ball {
-    /// The vertices of a leaf in its coordinates.
+    /// Vertices of a leaf in the ball's coordinates: relative to its centre, in units of its radius.
     #[inline(always)]
     fn vertices(&self, leaf: &BvhLeaf) -> [Vec3; VERTEX_LANES] {
         let scale = self.radius.recip();
@@ -33,7 +33,7 @@ impl Ball {
     }
 }
 
-/// True if the triangle has an area, and its bounding box and its plane are within 1 of the origin.
+/// True if the triangle has an area, and its bounding box and its plane are within distance 1 of the origin.
 #[inline(always)]
 fn is_near(corners: &[Vec3; 3]) -> bool {
     let [a, b, c] = *corners;
@@ -44,8 +44,8 @@ fn is_near(corners: &[Vec3; 3]) -> bool {
     outside.length_squared() <= 1.0 && size > 0.0 && distance * distance <= size
 }
 
-/// Visits all triangles that may be in a ball, with their index in the image and their corners in its coordinates, until one
-/// is not wanted. Returns whether all were.
+/// Calls `visit(index, corners)` for all triangles that may intersect a ball, until one call returns false. `index` is the
+/// triangle's index in the image; corners are in the ball's coordinates. Returns whether all calls returned true.
 #[inline(always)]
 pub(super) fn for_each_near(
     scene: &SceneImage,
@@ -57,7 +57,7 @@ pub(super) fn for_each_near(
     let Ball { centre, radius } = ball;
     stack.clear();
     stack.push(Child::Node(0));
-    // A part of a sound tree is visited once.
+    // In a sound tree each part is visited at most once; more visits mean a cycle.
     let parts = [SectionKind::Nodes, SectionKind::Triangles].map(|kind| scene.header.section(kind).records);
     let mut visits_left = u64::from(parts[0]) + u64::from(parts[1]);
     while let Some(part) = stack.pop() {
@@ -100,7 +100,7 @@ fn line<'a>(
     memory.0.get(address.0 as usize).map(|line| &line.0).ok_or(fault)
 }
 
-/// A bit for every child of a node that may be in a ball.
+/// Bit mask of the children of a node whose boxes may intersect a ball.
 struct NearChildren<'a> {
     node: BvhNode<'a>,
     centre: Vec3,
@@ -115,7 +115,7 @@ impl Kernel for NearChildren<'_> {
         let Self { node, centre, radius } = self;
         let [x, y, z] = node.axes();
         let [p, q, r] = centre.to_array();
-        // Boxes are larger than what they hold by more than this rounds.
+        // Stored boxes are enlarged by more than the rounding error of this test.
         let limit = (radius * radius).to_bits();
         let mut distances = [0; LANES];
         for (lane, distance) in distances.iter_mut().enumerate() {

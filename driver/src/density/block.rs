@@ -1,21 +1,21 @@
-//! Triangles in blocks of sixteen, and a ray against them.
+//! Blocks of sixteen triangles, and the intersection of a ray with them.
 
 use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
 
 use super::lanes::{LaneVector, at, cross, dot, greatest, least, minus};
 
-/// Sixteen triangles. Of what is no triangle the corners coincide: nothing meets it.
+/// Sixteen triangles. Unused lanes have coinciding corners, which no ray or chord meets.
 pub(super) struct Block {
     pub(super) corners: [LaneVector; 3],
     /// Indices in the image.
     pub(super) indices: [u32; LANES],
-    /// A bit for each whose back is the inside of something.
+    /// Bit mask of the triangles whose back faces the inside of a solid.
     pub(super) are_solid: u32,
 }
 
 impl Block {
-    /// True if one of its triangles has these corners.
+    /// True if the block has a triangle with these corners.
     pub(super) fn holds(&self, corners: &[Vec3; 3]) -> bool {
         (0..LANES).any(|lane| {
             self.corners.iter().zip(corners).all(|(lanes, corner)| at(lanes, lane) == corner.to_array())
@@ -23,9 +23,9 @@ impl Block {
     }
 }
 
-/// A triangle as seen from a point: the planes through the point and its edges, and six times the volume of both.
+/// Planes through a point and each edge of a triangle, and six times the volume of their tetrahedron.
 ///
-/// Of two triangles that share an edge the planes are opposite to the last bit: no ray passes between them.
+/// The planes of an edge that two triangles share are opposite to the last bit: no ray passes between them.
 #[inline(always)]
 fn seen_from(point: [f32; 3], block: &Block, lane: usize) -> ([[f32; 3]; 3], f32) {
     let corner = |corner: usize| minus(at(&block.corners[corner], lane), point);
@@ -34,7 +34,7 @@ fn seen_from(point: [f32; 3], block: &Block, lane: usize) -> ([[f32; 3]; 3], f32
     (planes, dot(a, planes[0]))
 }
 
-/// The first triangle of some blocks that a ray meets, in a ball's coordinates.
+/// Kernel that finds the nearest triangle along a ray, in a ball's coordinates.
 pub(super) struct FirstOnWay<'a> {
     pub(super) blocks: &'a [Block],
     pub(super) origin: Vec3,
@@ -42,7 +42,7 @@ pub(super) struct FirstOnWay<'a> {
 }
 
 impl Kernel for FirstOnWay<'_> {
-    /// The distance, and the triangle's corners.
+    /// Distance and corners of the triangle.
     type Output = Option<(f32, [Vec3; 3])>;
 
     #[inline(always)]

@@ -1,9 +1,10 @@
-//! Chords of a ball, all along one direction: which surfaces they pass through, and which of those are open to light.
+//! Parallel chords of a ball: their crossings with surfaces, and which of these lie outside all solids.
 //!
-//! The area of a surface is that of its shadow over the cosine between both, so that evenly spread chords measure it: each
-//! stands for a share of the disc across them, over the cosine of what it meets. All that it meets counts, not only the
-//! first, but for what is inside of a solid. How many solids a point is inside of is known from how their surfaces are
-//! crossed on the way from a point that is inside of none: beside a photon there is one.
+//! The area of a surface is the area of its projection over the cosine between their normals, `A = A_p / cos`. Evenly
+//! spread chords therefore measure it: each stands for an equal share of the disc across them, and each crossing for that
+//! share over its cosine. All crossings of a chord count, not only the first, except those inside a solid. The *depth* of a
+//! point is the number of solids that contain it. It follows from the front and back faces that are crossed on a path from
+//! a reference point outside all solids, a little above the photon.
 
 use glam::Vec3;
 use photoncard_firmware::photon::SameSurface;
@@ -12,12 +13,12 @@ use photoncard_firmware::simd::{Isa, Kernel, LANES};
 use super::lanes::Lane;
 use super::sides::Sides;
 
-/// Lanes of chords.
+/// Number of batches of sixteen chords.
 pub(super) const BATCHES: usize = 8;
-/// Chords through a ball.
+/// Number of chords through a ball.
 pub(super) const CHORDS: usize = BATCHES * LANES;
 
-/// Sixteen neighbouring chords: their points in the disc across them, and the bounds of these.
+/// Sixteen neighbouring chords: their points in the disc across them, and the bounds of these points.
 #[derive(Clone, Copy)]
 pub(super) struct Batch {
     pub(super) x: Lane,
@@ -46,13 +47,13 @@ impl Batch {
     }
 }
 
-/// Chords spread evenly over a disc.
+/// Chords that are spread evenly over a disc.
 pub(super) struct Chords {
     pub(super) batches: [Batch; BATCHES],
 }
 
 impl Chords {
-    /// Over a disc of radius 1, by the sunflower spiral (Vogel 1979): equal areas, no two points in line.
+    /// Chords over a disc of radius 1 by the sunflower spiral (Vogel 1979): each stands for an equal area.
     pub(super) fn new() -> Self {
         let mut points: Vec<[f32; 2]> = (0..CHORDS)
             .map(|index| {
@@ -66,35 +67,35 @@ impl Chords {
         Self { batches: std::array::from_fn(|batch| Batch::new(&batches[batch])) }
     }
 
-    /// Over a disc of another radius.
+    /// Chords over a disc of radius `radius`.
     pub(super) fn scaled(&self, radius: f32) -> Self {
         Self { batches: self.batches.each_ref().map(|batch| batch.scaled(radius)) }
     }
 
-    /// The point of chord `index` in the disc.
+    /// Point of chord `index` in the disc.
     pub(super) fn point(&self, index: usize) -> [f32; 2] {
         let Batch { x, y, .. } = &self.batches[index / LANES];
         [x[index % LANES], y[index % LANES]]
     }
 }
 
-/// A frame along a normal, and a point that is inside of nothing; coordinates are those of a ball.
+/// Frame along a surface normal, with a reference point outside all solids, in a ball's coordinates.
 pub(super) struct ChordFrame {
     /// Two axes across the chords, and the normal along them.
     pub(super) axes: [Vec3; 3],
-    /// The open point, along these axes.
+    /// Reference point outside all solids, along the axes.
     pub(super) open: Vec3,
 }
 
 impl ChordFrame {
-    /// A vector from the ball's centre in the coordinates of the frame.
+    /// Components along the axes of a vector from the ball's centre.
     pub(super) fn along(&self, place: Vec3) -> Vec3 {
         let [x, y, z] = self.axes.map(|axis| axis.dot(place));
         Vec3::new(x, y, z)
     }
 }
 
-/// Orders points so that sixteen in a row are neighbours.
+/// Sorts points so that every sixteen consecutive ones are neighbours.
 fn gather_neighbors(points: &mut [[f32; 2]], axis: usize) {
     if points.len() > LANES {
         points.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
@@ -104,16 +105,16 @@ fn gather_neighbors(points: &mut [[f32; 2]], axis: usize) {
     }
 }
 
-/// The crossing of a chord and a triangle.
+/// Crossing of a chord and a triangle.
 #[derive(Clone, Copy)]
 pub(super) struct Crossing {
-    /// By chord, from the top down, fronts before backs.
+    /// Sort key: by chord, then from the top down, fronts before backs.
     key: u64,
-    /// The height above the disc.
+    /// Height above the disc.
     pub(super) height: f32,
-    /// The triangle's place in a list.
+    /// Index of the triangle in the image.
     pub(super) triangle: u32,
-    /// The area of surface for each of the disc's: one over the cosine.
+    /// Area of surface per area of the disc, `1 / cos`.
     pub(super) slope: f32,
 }
 
@@ -121,7 +122,7 @@ impl Crossing {
     #[inline(always)]
     pub(super) fn new(chord: usize, height: f32, is_front: bool, triangle: u32, slope: f32) -> Self {
         let bits = height.to_bits();
-        // The bits of floats are in the order of their values, those of negative ones backwards.
+        // As integers, the bits of positive floats ascend with the value, those of negative floats descend.
         let ascending = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
         let key = (chord as u64) << 33 | u64::from(!ascending) << 1 | u64::from(!is_front);
         Self { key, height, triangle, slope }
@@ -137,14 +138,14 @@ impl Crossing {
     }
 }
 
-/// The crossings of all chords.
+/// Crossings of all chords.
 pub(super) struct Crossings {
     pub(super) list: Vec<Crossing>,
-    /// [`Self::list`] by chord.
+    /// [`Self::list`], sorted by chord.
     sorted: Vec<Crossing>,
-    /// Solids that each chord is inside of at [`Self::height`], less those that the open point is inside of.
+    /// Depth of each chord at [`Self::height`], minus the depth of the reference point.
     pub(super) depths: [[i32; LANES]; BATCHES],
-    /// The height of the open point.
+    /// Height of the reference point.
     pub(super) height: f32,
 }
 
@@ -159,12 +160,12 @@ impl Crossings {
         self.height = height;
     }
 
-    /// Sets how many solids more than the open point a chord is inside of at its height.
+    /// Sets the depth of a chord at the height of the reference point, relative to that point.
     pub(super) fn set_depth(&mut self, chord: usize, depth: i32) {
         self.depths[chord / LANES][chord % LANES] = depth;
     }
 
-    /// Collects the crossings at which the chord is inside of no solid. `sides` are those of a triangle.
+    /// Collects the crossings outside all solids. `sides` maps a triangle's index to its sides.
     pub(super) fn open_surfaces(
         &mut self,
         chords: &Chords,
@@ -199,7 +200,7 @@ impl Crossings {
 }
 
 impl Crossings {
-    /// Puts them in the order of their chords, of which there are few.
+    /// Counting sort by chord.
     fn sort_by_chord(&mut self) {
         let mut places = [0_u32; CHORDS + 1];
         for crossing in &self.list {
@@ -218,20 +219,20 @@ impl Crossings {
     }
 }
 
-/// Places on open surfaces, each of which stands for the share of a chord.
+/// Points on surfaces outside all solids, each of which stands for the share of a chord.
 #[derive(Default)]
 pub(super) struct OpenSurfaces {
     places: Vec<SurfaceLanes>,
     count: usize,
 }
 
-/// Sixteen of them. What is none has no area.
+/// Sixteen surface points. Unused lanes have no area.
 #[derive(Clone, Copy)]
 struct SurfaceLanes {
     places: [Lane; 3],
     slopes: Lane,
     normals: [u8; LANES],
-    /// The slope if it is of the surface that is asked for, else 0.
+    /// The slope if the point belongs to the chosen surface, else 0.
     areas: Lane,
 }
 
@@ -259,7 +260,7 @@ impl OpenSurfaces {
         }
     }
 
-    /// Chooses those that a gather takes for the surface of a photon with a normal of this code.
+    /// Chooses the points that a gather counts to the surface of a photon whose normal has the code `normal`.
     pub(super) fn choose(&mut self, normal: u8) {
         let mut same = SameSurface::new(normal);
         for lanes in &mut self.places {
@@ -270,13 +271,14 @@ impl OpenSurfaces {
     }
 }
 
-/// The area of chosen surface in the sphere around a photon, over that of its disc: the disc fraction.
+/// Kernel that computes a disc fraction: area of the chosen surface within the sphere around a photon over the area of its
+/// disc.
 pub(super) struct FractionWithin<'a> {
     pub(super) chords: &'a Chords,
     pub(super) surfaces: &'a OpenSurfaces,
     pub(super) centre: Vec3,
     pub(super) radius: f32,
-    /// Error of heights.
+    /// Maximum error of heights.
     pub(super) lift: f32,
 }
 
@@ -300,7 +302,8 @@ impl Kernel for FractionWithin<'_> {
             for (lane, area) in areas.iter_mut().enumerate() {
                 let [x, y, z] = [0, 1, 2].map(|axis: usize| lanes.places[axis][lane]);
                 let (x, y, z) = (x - p, y - q, z - r);
-                // A plain disc's are those of its chords, wherever the grid has put the photon.
+                // The grid may move a photon off its plane; heights within that error count as 0, so that a plane has
+                // fraction 1.
                 let z = if z.abs() <= lift { 0.0 } else { z };
                 let is_near = x * x + y * y + z * z <= limit;
                 *area += if is_near { lanes.areas[lane] } else { 0.0 };

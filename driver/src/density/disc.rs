@@ -1,14 +1,14 @@
 //! Disc fractions: the boundary correction of the density estimate.
 //!
-//! A gather divides by the area of a flat disc. But its search looks into a sphere, and finds the photons of all surfaces
-//! there, of which those with about the same normal count. Near an edge or in a corner they are less than a disc, and the
-//! estimate would be too dark: on a Cornell box by some 2 % of all indirect light. On steps, or between balusters, they
-//! may be more, and it would be too bright. Here the area of that surface is measured once for every photon, for the
-//! radius that a gather at the photon would have, along chords of the sphere ([`super::chords`]). A gather then divides
-//! by that area ([`photoncard_firmware::photon`]).
+//! A gather divides by the area of a flat disc. Its search covers a sphere, however, and finds the photons of all surfaces
+//! in it, of which those with a similar normal count. Near an edge or in a corner these surfaces have less area than the
+//! disc, and the estimate would be too dark: on a Cornell box by some 2 % of all indirect light. On steps, or between
+//! balusters, they may have more, and it would be too bright. This module measures the area once for every photon, for the
+//! radius of a gather at the photon, along chords of the sphere ([`super::chords`]). A gather then divides by this area
+//! ([`photoncard_firmware::photon`]).
 //!
-//! Most photons lie inside a large flat surface, and have a whole disc: such leaves are recognized by the triangles around
-//! them. The photons of other leaves share a search for the radius, one for the triangles around them, and their chords.
+//! Most photons lie inside a large flat surface, with a fraction of 1: such leaves are recognized by the triangles around
+//! them. The photons of other leaves share the search for the radius, the query for triangles and the chords.
 
 use glam::Vec3;
 use photoncard_firmware::photon::MIN_NORMAL_COSINE;
@@ -29,25 +29,25 @@ use super::surroundings::{PlainWall, Surroundings};
 use crate::pack::CardImage;
 use crate::photon::PhotonError;
 
-/// Leaves that one task measures.
+/// Number of leaves of one task.
 const LEAVES_PER_TASK: usize = 64;
-/// Photons share chords along the normal of one of them if theirs is at least at this cosine to it.
+/// Minimum cosine between the normals of photons that share chords.
 const MIN_SHARED_COSINE: f32 = 0.85;
-/// Height above a photon of the point that is inside of no solid, in radii, if there is room.
+/// Height of the reference point above a photon, in radii, if no surface is nearer.
 const OPEN_HEIGHT: f32 = 0.1;
-/// Distance behind a triangle at which a ray goes on, in radii of the ball.
+/// Distance behind a hit at which a ray continues, in radii of the ball.
 const STEP: f32 = 1e-5;
 
-/// The codes of a leaf's photons.
+/// Encoded disc fractions of a leaf's photons.
 type Codes = [u8; LEAF_PHOTONS];
-/// Some of a leaf's photons.
+/// Photons of one leaf.
 type DiscPhotons = heapless::Vec<DiscPhoton, LEAF_PHOTONS>;
 
-/// Measures the disc fraction of every photon for gathers of `neighbors` photons within `max_distance`, and writes it
-/// into the image. `go_on` is asked now and then.
+/// Measures the disc fraction of every photon for gathers of `neighbors` photons within `max_distance`, and writes it into
+/// the image. `go_on` is called before each task.
 ///
 /// # Errors
-/// If the image is not sound, or `go_on` says no.
+/// If the image is malformed, or `go_on` returns false.
 pub(crate) fn measure_discs(
     image: &mut CardImage,
     neighbors: u32,
@@ -79,7 +79,7 @@ pub(crate) fn measure_discs(
     Ok(())
 }
 
-/// Measures discs.
+/// Measurement of disc fractions, with its buffers.
 struct Meter<'a> {
     image: &'a CardImage,
     sides: &'a SideTable,
@@ -95,25 +95,25 @@ struct Meter<'a> {
 /// A photon whose disc is measured.
 #[derive(Clone, Copy)]
 struct DiscPhoton {
-    /// Its number in its leaf.
+    /// Index in its leaf.
     photon: usize,
     position: Vec3,
-    /// The code of its surface's normal.
+    /// Code of the surface normal.
     normal: u8,
 }
 
 impl DiscPhoton {
-    /// The unit normal that the code stands for.
+    /// Decoded unit normal.
     fn coded_normal(&self) -> Vec3 {
         Vec3::from(decode_normal(self.normal)).normalize()
     }
 }
 
-/// Photons whose gathers have about one radius, metres.
+/// Photons whose gathers have about equal radii, metres.
 struct Cluster {
     ball: Ball,
     radius: f32,
-    /// The radius of the disc that the discs of all are in.
+    /// Radius of a disc that contains the discs of all photons.
     outer: f32,
 }
 
@@ -132,7 +132,7 @@ impl<'a> Meter<'a> {
         }
     }
 
-    /// The codes of those leaves that have a photon whose disc is not whole.
+    /// Encoded fractions of the leaves `first..end`, without leaves whose fractions are all 1.
     fn measure_leaves(&mut self, first: usize, end: usize) -> Result<Vec<(usize, Codes)>, Fault> {
         let grid = self.searcher.scene.header.photon_grid;
         let mut measured = Vec::new();
@@ -155,7 +155,7 @@ impl<'a> Meter<'a> {
         Ok(measured)
     }
 
-    /// The disc fractions of the photons of a leaf.
+    /// Disc fractions of the photons of a leaf.
     fn measure(&mut self, mut photons: DiscPhotons) -> Result<[f32; LEAF_PHOTONS], Fault> {
         let mut fractions = [1.0; LEAF_PHOTONS];
         if self.is_plain(&photons, self.searcher.max_distance())? {
@@ -172,7 +172,7 @@ impl<'a> Meter<'a> {
         Ok(fractions)
     }
 
-    /// True if the spheres around some photons hold nothing but the plane that all of them lie on.
+    /// True if the spheres around `photons` contain no surface but the plane that all of them lie on.
     fn is_plain(&mut self, photons: &[DiscPhoton], radius: f32) -> Result<bool, Fault> {
         let Some(middle) = middle(photons) else { return Ok(true) };
         if photons.iter().any(|photon| photon.normal != middle.normal) {
@@ -188,7 +188,7 @@ impl<'a> Meter<'a> {
         self.surroundings.is_plain(scene, *memory, self.sides, ball, wall)
     }
 
-    /// The disc fractions of photons within a radius of one of them, which is that of their gathers.
+    /// Disc fractions of photons within `radius`, the radius of their gathers, of the photon `middle`.
     fn measure_cluster(
         &mut self,
         mut photons: DiscPhotons,
@@ -198,8 +198,8 @@ impl<'a> Meter<'a> {
     ) -> Result<(), Fault> {
         let spread = spread(&photons, middle);
         let outer = radius + spread;
-        // The ways from the open point are in the ball as well.
-        // In double precision the squares of no two lengths are too large.
+        // The paths from the reference point lie in the ball as well. Double precision: the squares of no two lengths
+        // overflow.
         let [across, along] = [outer, spread + OPEN_HEIGHT * radius].map(f64::from);
         let reach = (across * across + along * along).sqrt() as f32;
         let ball = Ball { centre: middle.position, radius: 1.001 * reach + 2.0 * self.lift(radius) };
@@ -217,7 +217,7 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// The disc fractions of photons of about one normal.
+    /// Disc fractions of photons with similar normals.
     fn measure_group(
         &mut self,
         group: &[DiscPhoton],
@@ -248,8 +248,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// A frame along the normal of a photon, and a point above it with nothing in between: some of the radius, or half of
-    /// what is free.
+    /// Frame along the normal of a photon. The reference point is above the photon with no surface in between: at
+    /// [`OPEN_HEIGHT`], or halfway to the nearest surface above.
     fn frame(&self, photon: &DiscPhoton, cluster: &Cluster) -> Result<ChordFrame, Fault> {
         let Cluster { ball, radius, .. } = *cluster;
         let normal = self.exact_normal(photon, radius)?;
@@ -263,7 +263,7 @@ impl<'a> Meter<'a> {
         Ok(ChordFrame { open: frame.along((open - ball.centre) / ball.radius), ..frame })
     }
 
-    /// The normal of the surface that a photon lies on, which a short ray finds again; its code is rough.
+    /// Normal of the surface that a photon lies on, from a short ray: the stored code is coarse.
     fn exact_normal(&self, photon: &DiscPhoton, radius: f32) -> Result<Vec3, Fault> {
         let coded = photon.coded_normal();
         let above =
@@ -272,13 +272,13 @@ impl<'a> Meter<'a> {
         Ok(found.filter(|normal| normal.dot(coded) >= MIN_NORMAL_COSINE).unwrap_or(coded))
     }
 
-    /// Height above a photon at which rays start, metres: a little of the disc's radius, and more than the grid may have put the photon
-    /// below its surface.
+    /// Height above a photon at which rays start, metres: a small part of the radius, and more than the grid may have moved
+    /// the photon below its surface.
     fn lift(&self, radius: f32) -> f32 {
         1e-3 * radius + self.searcher.scene.header.photon_grid.cell
     }
 
-    /// The first surface on the way from a place along a unit vector: its distance, and its normal on the side of the place.
+    /// Nearest surface from `origin` along a unit vector: its distance, and its normal on the side of `origin`.
     fn first_on_way(
         &self,
         origin: Vec3,
@@ -295,7 +295,7 @@ impl<'a> Meter<'a> {
         }))
     }
 
-    /// [`Surroundings::cross`] by rays, where there are too many triangles to list.
+    /// [`Surroundings::cross`] by rays, for more triangles than a list may hold.
     fn cross_by_rays(&mut self, frame: &ChordFrame, chords: &Chords, ball: Ball) -> Result<(), Fault> {
         self.crossings.clear(frame.open.z);
         let Searcher { scene, memory, .. } = &self.searcher;
@@ -325,7 +325,7 @@ impl<'a> Meter<'a> {
     }
 }
 
-/// The photon nearest to the mean of some: on a curved surface the mean is off it.
+/// The photon nearest to the mean position: on a curved surface the mean itself lies off the surface.
 fn middle(photons: &[DiscPhoton]) -> Option<DiscPhoton> {
     nearest(photons, photons.iter().map(|photon| photon.position).sum::<Vec3>() / photons.len() as f32)
 }
@@ -335,20 +335,20 @@ fn nearest(photons: &[DiscPhoton], to: Vec3) -> Option<DiscPhoton> {
     photons.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).copied()
 }
 
-/// The distance of the farthest of some photons from one of them, metres.
+/// Distance of the photon that is farthest from `middle`, metres.
 fn spread(photons: &[DiscPhoton], middle: DiscPhoton) -> f32 {
     photons.iter().map(|photon| photon.position.distance(middle.position)).fold(0.0, f32::max)
 }
 
-/// Takes those photons away that are chosen.
+/// Removes and returns the chosen photons.
 fn split_off(photons: &mut DiscPhotons, is_chosen: impl Fn(&DiscPhoton) -> bool) -> DiscPhotons {
     let chosen = photons.iter().filter(|photon| is_chosen(photon)).copied().collect();
     photons.retain(|photon| !is_chosen(photon));
     chosen
 }
 
-/// The codes of a leaf's fractions. The dithers of its photons are spread evenly, so that what rounding does to one is made
-/// up for by its neighbours.
+/// Encoded fractions of a leaf. The dithers of its photons are spread evenly (golden ratio), so that the rounding errors of
+/// neighbours cancel.
 fn codes(fractions: &[f32; LEAF_PHOTONS], leaf: usize) -> Codes {
     const GOLDEN_RATIO: u32 = 0x9e37_79b9;
     let first = hash(leaf as u32);

@@ -3,10 +3,10 @@
 use glam::Vec3;
 use photoncard_firmware::simd::LANES;
 
-/// A number in each of sixteen lanes.
+/// One number per lane.
 pub(super) type Lane = [f32; LANES];
 
-/// The components of sixteen vectors.
+/// Components of sixteen vectors.
 pub(super) type LaneVector = [Lane; 3];
 
 pub(super) fn set(lanes: &mut LaneVector, lane: usize, vector: Vec3) {

@@ -1,8 +1,8 @@
-//! Density estimation as the host prepares it: what a gather on the chip knows beyond the photons.
+//! Preparation of the density estimate on the host.
 //!
-//! Both depend on the image and the number of neighbours: the greatest distance of gathers, from the photons' own density
-//! (`search`), and at every photon the disc fraction, the area of surface within the radius of a gather there over that of
-//! a flat disc (`disc`).
+//! Both results depend on the image and the number of neighbours: the maximum distance of gathers, from the density of the
+//! photons (`search`), and for every photon its disc fraction, the area of surface within the radius of a gather over the
+//! area of a flat disc (`disc`).
 
 mod ball;
 mod block;

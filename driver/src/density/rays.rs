@@ -1,21 +1,21 @@
-//! Rays against the whole scene, where more triangles are around a photon than are listed.
+//! Rays against the whole scene, for balls with more triangles than a list may hold.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::{Ray, SceneImage, closest_hit};
 use photoncard_shared::message::Fault;
 
-/// The intersection of a ray with a triangle.
+/// Intersection of a ray with a triangle.
 pub(super) struct Met {
-    /// Metres from the ray's origin.
+    /// Distance from the ray's origin, metres.
     pub(super) distance: f32,
-    /// The unit normal of the front.
+    /// Unit normal of the front face.
     pub(super) normal: Vec3,
-    /// The index in the image.
+    /// Index of the triangle in the image.
     pub(super) triangle: u32,
 }
 
-/// The first triangle that a ray meets.
+/// Nearest triangle along a ray.
 pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -> Result<Option<Met>, Fault> {
     let Some(hit) = closest_hit(scene, &mut memory, ray)? else { return Ok(None) };
     let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
@@ -23,7 +23,7 @@ pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -
     Ok(Some(Met { distance: hit.intersection.distance, normal, triangle: hit.index }))
 }
 
-/// All triangles on the segment between two points that are at least a step apart.
+/// All triangles on the segment between two points; after each hit the ray continues `step` behind it.
 pub(super) fn all_on_way(
     scene: &SceneImage,
     memory: Lines,

@@ -1,4 +1,4 @@
-//! The greatest distance of gathers, from searches of the photon map on the host.
+//! Maximum distance of gathers, from searches of the photon map on the host.
 
 use glam::Vec3;
 use photoncard_firmware::kind::ReferenceCandidates;
@@ -12,12 +12,12 @@ use rayon::prelude::*;
 
 use crate::pack::CardImage;
 
-/// Leaves from which the automatic greatest distance is estimated, a photon of each.
+/// Number of leaves that the automatic maximum distance is estimated from, one photon of each.
 const SAMPLED_LEAVES: usize = 2048;
-/// Share of the sampled photons whose k-th neighbour lies within the automatic greatest distance.
+/// Share of the sampled photons whose k-th neighbour lies within the automatic maximum distance.
 const COVERED_SHARE: f64 = 0.95;
 
-/// Share of the sampled caustic photons whose k-th neighbour lies within the automatic greatest distance.
+/// Share of the sampled caustic photons whose k-th neighbour lies within the automatic maximum distance.
 const FOCUSED_SHARE: f64 = 0.8;
 
 /// A search of the photon map, with its buffer.
@@ -36,17 +36,17 @@ impl<'a> Searcher<'a> {
         Self { scene, memory, buffer: Box::default(), map: PhotonMap::Indirect, neighbors, max_distance }
     }
 
-    /// The searcher, in another map.
+    /// The searcher with another map.
     fn of(self, map: PhotonMap) -> Self {
         Self { map, ..self }
     }
 
-    /// The greatest distance of gathers, metres.
+    /// Maximum distance of gathers, metres.
     pub(super) fn max_distance(&self) -> f32 {
         self.max_distance
     }
 
-    /// The radius of a gather at `position`, metres: the distance of the k-th photon, or the greatest distance.
+    /// Radius of a gather at `position`, metres: the distance of the k-th photon, or the maximum distance.
     pub(super) fn radius(&mut self, position: Vec3) -> Result<f32, Fault> {
         let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
         gather(&self.scene, &mut self.memory, self.map, position, &mut nearest)?;
@@ -58,25 +58,25 @@ impl<'a> Searcher<'a> {
     }
 }
 
-/// The greatest distance of gathers that the photons' density suggests, metres: that within which 95 % of the photons
-/// have `neighbors` others.
+/// Automatic maximum distance of gathers, metres: the 95th percentile of the distance of the k-th neighbour, `k =
+/// neighbors`.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is malformed.
 pub(crate) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
     distance_within(image, PhotonMap::Indirect, neighbors, COVERED_SHARE)
 }
 
-/// The greatest distance of gathers of caustics, metres: that within which 80 % of the caustic photons have `neighbors` others.
-/// The light of the others is spread so far that it is no caustic.
+/// Maximum distance of gathers of caustics, metres: the 80th percentile of the distance of the k-th neighbour among caustic
+/// photons, `k = neighbors`. Photons beyond it are spread too far to form a caustic.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is malformed.
 pub(crate) fn caustic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
     distance_within(image, PhotonMap::Caustics, neighbors, FOCUSED_SHARE)
 }
 
-/// The distance within which a share of the photons of a map have `neighbors` others.
+/// Distance within which the share `share` of a map's photons have `neighbors` neighbours.
 fn distance_within(image: &CardImage, map: PhotonMap, neighbors: u32, share: f64) -> Result<f32, Fault> {
     let leaves = match map {
         PhotonMap::Indirect => image.section(SectionKind::PhotonLeaves),
@@ -98,7 +98,7 @@ fn distance_within(image: &CardImage, map: PhotonMap, neighbors: u32, share: f64
         )
         .collect();
     let mut distances = distances?;
-    // Fewer photons than neighbours: no distance is short of any.
+    // A map of fewer photons than neighbours has no such distances.
     distances.retain(|&distance| distance < unlimited);
     distances.sort_by(f32::total_cmp);
     let place = (distances.len() as f64 * share) as usize;

@@ -1,4 +1,5 @@
-//! Chords against triangles: sixteen triangles' shadows along the chords, then sixteen chords for one of them.
+//! Intersection of chords and triangles: sixteen triangles are projected along the chords, then sixteen chords are tested
+//! against one triangle.
 
 use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
@@ -7,7 +8,7 @@ use super::block::Block;
 use super::chords::{BATCHES, Batch, ChordFrame, Chords, Crossing, Crossings};
 use super::lanes::{Lane, LaneVector, at, cross, greatest, least, minus};
 
-/// Adds where chords cross the triangles of some blocks.
+/// Kernel that adds the crossings of chords with the triangles of some blocks.
 pub(super) struct CrossAll<'a> {
     pub(super) blocks: &'a [Block],
     pub(super) frame: &'a ChordFrame,
@@ -45,23 +46,23 @@ impl Kernel for CrossAll<'_> {
     }
 }
 
-/// Sixteen triangles along the axes of a frame, and their shadows across the chords.
+/// Sixteen triangles in the coordinates of a frame, and their projections along the chords.
 struct Shadows {
     corners: [LaneVector; 3],
-    /// Of each edge the line `x a + y b + c`, positive inside.
+    /// Line of each edge, `x a + y b + c`, positive inside.
     edges: [LaneVector; 3],
-    /// The height `x a + y b + c`.
+    /// Height of the plane, `x a + y b + c`.
     heights: LaneVector,
     slopes: Lane,
     /// 1 where the front is up, else 0.
     is_front: Lane,
-    /// Infinite for what is met by no chord, else 0.
+    /// Infinite for triangles that no chord meets, else 0.
     steep: Lane,
     lower: [Lane; 2],
     upper: [Lane; 2],
 }
 
-/// Triangles that chords pass at a cosine below this are met by none.
+/// Minimum cosine between chord and normal: chords miss steeper triangles.
 const MIN_COSINE: f32 = 1e-4;
 
 impl Shadows {
@@ -76,7 +77,7 @@ impl Shadows {
         upper: [[0.0; LANES]; 2],
     };
 
-    /// Short loops over lanes, each of which becomes a few vector instructions.
+    /// Projects the triangles of a block. Short loops over lanes compile to few vector instructions each.
     #[inline(always)]
     fn cast(&mut self, block: &Block, frame: &ChordFrame) {
         for corner in 0..3 {
@@ -94,7 +95,8 @@ impl Shadows {
             let ([x, y, _], [p, q, _]) = (&self.corners[edge], &self.corners[(edge + 1) % 3]);
             let [a, b, c] = &mut self.edges[edge];
             for lane in 0..LANES {
-                // Opposite to the last bit for the two triangles of an edge, and so is the sign: the same lines.
+                // The lines of a shared edge are opposite to the last bit in its two triangles. So is the sign: both test
+                // one line.
                 let sign = if self.is_front[lane] != 0.0 { 1.0 } else { -1.0 };
                 a[lane] = (y[lane] - q[lane]) * sign;
                 b[lane] = (p[lane] - x[lane]) * sign;
@@ -111,7 +113,7 @@ impl Shadows {
         }
     }
 
-    /// The triangles' planes.
+    /// Computes the triangles' planes.
     #[inline(always)]
     fn cast_planes(&mut self) {
         let [a, b, c] = &self.corners;
@@ -130,7 +132,7 @@ impl Shadows {
         }
     }
 
-    /// A bit for each triangle that chords of a batch may meet.
+    /// Bit mask of the triangles that chords of a batch may meet.
     #[inline(always)]
     fn near(&self, isa: impl Isa, batch: &Batch) -> u32 {
         let mut apart = [0; LANES];
@@ -143,7 +145,7 @@ impl Shadows {
         isa.below(&apart, 1)
     }
 
-    /// A bit for each triangle that the plane at a height cuts.
+    /// Bit mask of the triangles that the plane at a height cuts.
     #[inline(always)]
     fn cut(&self, isa: impl Isa, height: f32) -> u32 {
         let mut apart = [0; LANES];
@@ -165,7 +167,7 @@ impl Shadows {
         crossings: &mut Crossings,
     ) {
         let edges = [0, 1, 2].map(|edge: usize| at(&self.edges[edge], triangle));
-        // Of two triangles that share an edge, one has the points on it.
+        // Points exactly on a shared edge belong to one of its two triangles.
         let bounds = edges.map(|[a, b, _]| {
             let has_points = (a > 0.0) | ((a == 0.0) & (b > 0.0));
             if has_points { -f32::MIN_POSITIVE } else { 0.0 }
@@ -192,8 +194,8 @@ impl Shadows {
     }
 }
 
-/// The cut of a triangle by the plane at the height of an open point: a line from `start` to `end`, relative to that point, with
-/// the front on its left.
+/// Cut of a triangle by the horizontal plane through the reference point: a segment from `start` to `end`, relative to that
+/// point, with the front on its left.
 struct Cut {
     start: [f32; 2],
     end: [f32; 2],
@@ -215,7 +217,8 @@ impl Cut {
         Some(Self { start: start?, end: end? })
     }
 
-    /// Counts it for each chord whose way from the open point crosses it: one more where it enters by the front.
+    /// Changes the depth of each chord whose path from the reference point crosses the cut: +1 where it enters by the
+    /// front, else -1.
     #[inline(always)]
     fn count(&self, chords: &Chords, open: Vec3, depths: &mut [[i32; LANES]; BATCHES]) {
         let ([a, b], [c, d]) = (self.start, self.end);

@@ -1,4 +1,4 @@
-//! The two sides of every triangle: the normals that photons are stored by, and the bounds of solids.
+//! Front and back of every triangle: the normals that photons are stored with, and the boundaries of solids.
 
 use std::collections::HashMap;
 
@@ -14,29 +14,29 @@ use rayon::prelude::*;
 
 use crate::pack::CardImage;
 
-/// The two sides of a triangle.
+/// Front and back of a triangle.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sides {
-    /// Of the front and of the back: the code of its normal if it reflects, so that photons are stored there.
+    /// Codes of the normals of front and back; `None` for a side where no photons are stored.
     normals: [Option<u8>; 2],
-    /// True if the back is the inside of a solid. The back of a double-sided sheet is as open as its front.
+    /// True if the back faces the inside of a solid. The back of a double-sided sheet is as open as its front.
     pub(super) is_solid: bool,
 }
 
 impl Sides {
-    /// The code of the normal on a side where photons are stored.
+    /// Code of the normal on a side where photons are stored.
     #[inline(always)]
     pub(super) fn normal(&self, is_front: bool) -> Option<u8> {
         self.normals[usize::from(!is_front)]
     }
 }
 
-/// The sides of all triangles of an image.
+/// Sides of all triangles of an image.
 pub(super) struct SideTable {
     sides: Vec<Sides>,
 }
 
-/// The properties of a material that decide on its sides.
+/// Properties of a material that decide on its triangles' sides.
 #[derive(Clone, Copy)]
 struct Finish {
     reflects: bool,
@@ -46,8 +46,10 @@ struct Finish {
 }
 
 impl SideTable {
+    /// Reads the sides from an image.
+    ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is malformed.
     pub(super) fn new(image: &CardImage) -> Result<Self, Fault> {
         let (scene, mut memory) = image.view();
         let materials = scene.header.section(SectionKind::Materials).records;
@@ -87,14 +89,14 @@ impl SideTable {
         Ok(table)
     }
 
-    /// The sides of a triangle; none reflects if there is no such triangle.
+    /// Sides of a triangle; the default, on which no photons are stored, if there is no such triangle.
     #[inline(always)]
     pub(super) fn of(&self, triangle: u32) -> Sides {
         self.sides.get(triangle as usize).copied().unwrap_or_default()
     }
 
-    /// Double-sided triangles are the surface of something solid where they close it: no light gets into it, unless they
-    /// emit it themselves. They do if each edge is shared with one other that runs along it the other way.
+    /// Marks double-sided triangles that form closed surfaces as solid: no light enters, unless they emit it themselves or
+    /// are glass. A surface is closed if each of its edges is shared by exactly two triangles, in opposite directions.
     fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
@@ -103,7 +105,7 @@ impl SideTable {
             for slot in 0..leaf_triangles.triangles() as usize {
                 let index = leaf * LEAF_TRIANGLES + slot;
                 if !self.sides[index].is_solid {
-                    // A sum with zero makes one zero of both.
+                    // `-0.0 + 0.0` is `0.0`: equal coordinates have equal bits.
                     let bits = |vertex: [f32; 3]| vertex.map(|coordinate| (coordinate + 0.0).to_bits());
                     let triangle = leaf_triangles.triangle(slot);
                     sheets.push((index, triangle.vertices.map(bits)));
@@ -152,7 +154,7 @@ fn edges_of<T: Copy>([a, b, c]: [T; 3]) -> [[T; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-/// Things that are joined to others: a forest of disjoint sets.
+/// Disjoint-set forest.
 struct Components {
     parents: Vec<usize>,
 }

@@ -1,8 +1,8 @@
-//! The triangles around a place, found once for all chords and short rays there.
+//! Triangles in a ball, found once for all chords and short rays in it.
 //!
 //! A descent in the hierarchy for every ray would visit the same few leaves again and again. Here one descent finds all
-//! triangles in a ball; then sixteen of them are tested for one ray, or sixteen chords for one of them. Coordinates are
-//! relative to the ball's centre and in units of its radius.
+//! triangles in a ball; then sixteen of them are tested against one ray, or sixteen chords against one of them. Coordinates
+//! are relative to the ball's centre and in units of its radius.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -18,18 +18,18 @@ use super::lanes::set;
 use super::shadows::CrossAll;
 use super::sides::SideTable;
 
-/// Triangles that are tested one by one; of more, a descent for each ray finds the few that matter.
+/// Maximum number of triangles of a list; with more, a descent for each ray is faster.
 const MAX_TRIANGLES: usize = 4096;
-/// Beyond this many triangles those in the place of another are left out: thousands in one place are as one.
+/// Number of triangles beyond which repeated triangles are left out: thousands of coinciding ones act as one.
 const MAX_WITH_TWINS: usize = 512;
-/// Coordinates of corners beyond this, in radii, would round away what is near.
+/// Maximum coordinate of corners, in radii: beyond it rounding would be too coarse near the ball.
 const MAX_EXTENT: f32 = 1e4;
-/// Triangles of a plain wall within a ball, at the most.
+/// Maximum number of triangles of a plain wall within a ball.
 const MAX_PLAIN: usize = 24;
-/// Triangles of a plane have normals that differ by less: to a thousandth of the radius at its end.
+/// Minimum cosine between normals of one plane: a deviation of a thousandth of the radius at the ball's border.
 const MIN_PLAIN_COSINE: f32 = 1.0 - 5e-7;
 
-/// The triangles in a ball.
+/// Triangles in a ball.
 #[derive(Default)]
 pub(super) struct Surroundings {
     blocks: Vec<Block>,
@@ -40,10 +40,11 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Finds the triangles in a ball. Returns whether all of them could be taken: if not, nothing may be asked.
+    /// Finds the triangles in a ball. Returns false if they are too many or too large for a list; the list is then
+    /// incomplete, and not to be used.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is malformed.
     pub(super) fn find(
         &mut self,
         scene: &SceneImage,
@@ -62,11 +63,11 @@ impl Surroundings {
         all
     }
 
-    /// True if all triangles in a ball are one plain wall around its centre, on the side of a normal's code. The triangles found
-    /// before are kept.
+    /// True if all triangles in a ball form one plain wall around its centre, on the side of the wall's normal. The list of
+    /// triangles stays as it was.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is malformed.
     pub(super) fn is_plain(
         &mut self,
         scene: &SceneImage,
@@ -92,7 +93,7 @@ impl Surroundings {
         Ok(wall.holds(ball, normal) && covers(&triangles, normal))
     }
 
-    /// Adds a triangle. Returns whether there is room, and it is not too large.
+    /// Adds a triangle. Returns false if the list is full or the triangle too large.
     #[inline(always)]
     fn add(&mut self, index: u32, corners: &[Vec3; 3], sides: &SideTable) -> bool {
         let extent = corners.iter().map(|corner| corner.abs().max_element()).fold(0.0, f32::max);
@@ -117,8 +118,8 @@ impl Surroundings {
         true
     }
 
-    /// The first triangle on the way from a place along a unit vector: its distance, if it is not beyond `max_distance`, and
-    /// its unit normal on the side that the ray comes from; metres.
+    /// Nearest triangle from `origin` along a unit vector, if within `max_distance`: its distance, metres, and its unit
+    /// normal on the side of `origin`.
     pub(super) fn first_on_way(
         &self,
         origin: Vec3,
@@ -140,26 +141,26 @@ impl Surroundings {
     }
 }
 
-/// A place on a wall that may be plain.
+/// Candidate for a plain wall: a surface normal and points that should lie on it.
 #[derive(Clone, Copy)]
 pub(super) struct PlainWall<'a> {
-    /// The code of its normal.
+    /// Code of the normal.
     pub(super) normal: u8,
-    /// Greatest distance of photons from the wall, metres.
+    /// Maximum distance of photons from the wall, metres.
     pub(super) lift: f32,
-    /// Other places on it.
+    /// Positions of photons on the wall.
     pub(super) places: &'a [Vec3],
 }
 
 impl PlainWall<'_> {
-    /// True if all places are in the plane.
+    /// True if all positions are in the plane.
     fn holds(&self, ball: Ball, normal: Vec3) -> bool {
         self.places.iter().all(|place| (*place - ball.centre).dot(normal).abs() <= self.lift)
     }
 }
 
-/// True if triangles of one plane cover the disc of radius 1 around the origin once: one of them covers the origin, and no
-/// edge in the disc is without another triangle beyond it.
+/// True if coplanar triangles cover the disc of radius 1 around the origin exactly once: one of them covers the origin, and
+/// each edge within the disc is shared with one other triangle.
 fn covers(triangles: &[[Vec3; 3]], normal: Vec3) -> bool {
     let edges = |[a, b, c]: [Vec3; 3]| [(a, b), (b, c), (c, a)];
     let is_left = |(a, b): (Vec3, Vec3)| (b - a).cross(-a).dot(normal) >= 0.0;

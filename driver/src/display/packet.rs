@@ -16,7 +16,7 @@ use photoncard_shared::message::Tile;
 
 use crate::printable::printable;
 
-/// The operation that creates an image, or replaces the one of its name.
+/// Operation that creates an image, or replaces the image of equal name.
 pub const CREATE_IMAGE: u8 = 4;
 /// Operation that replaces the values of a rectangle in some channels.
 pub const UPDATE_IMAGE: u8 = 6;

@@ -65,7 +65,7 @@ fn every_tile_is_shown_though_few_have_room_to_wait() {
     drop(display);
     let mut shown = viewer.join().unwrap();
     assert!(shown.remove(0) == create_image("film", [64, 576], &["R", "G", "B"]));
-    // Tiles that found no room come last; their number depends on the sender's speed.
+    // Delayed tiles come last; their number depends on the sender's speed.
     shown.sort_unstable();
     expected.sort_unstable();
     assert!(shown == expected, "{} packets of {}", shown.len(), expected.len());

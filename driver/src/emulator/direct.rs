@@ -21,8 +21,8 @@ pub struct RenderedTile {
     pub traffic: MemoryTraffic,
 }
 
-/// Renders a tile on a chip with a memory of its own. With an `outlet` the gathers of the pixels go there, and the
-/// caller does them and completes the pixels.
+/// Renders a tile on a chip with a memory of its own. With an `outlet` the pixels' gathers are sent to it instead, and the
+/// caller evaluates them and completes the pixels.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for the tile.
@@ -42,7 +42,7 @@ pub fn render_tile(
     }
     while chip.step(&mut context)? == Progress::Busy {}
     if context.outlet.is_none() {
-        // The reads that complete pixels on a card are counted here as well.
+        // Counts the reads with which a card completes its pixels.
         for index in 0..tile.pixels() as usize {
             while chip.complete(&mut context, index)?.is_none() {}
         }

@@ -1,9 +1,9 @@
-//! The DRAM of an emulated card, which takes as little of the host's memory as it can.
+//! DRAM of an emulated card, stored copy-on-write over the host's card image.
 //!
-//! A host and its emulated cards live in one process, and each card's DRAM holds the same image. A card still gets it line by
-//! line over its link; but as long as what is written is, byte for byte, what stands in the host's image at that place, the
-//! card keeps no copy and reads the host's. From the first line on that differs it has lines of its own: what a card holds is
-//! always what was written.
+//! A host and its emulated cards live in one process, and each card's DRAM holds the same image. A card still receives it
+//! line by line over its link. As long as the received lines equal the lines of the host's image at the same addresses, the
+//! card stores no copy and reads the host's. At the first line that differs it switches to lines of its own, so that a card
+//! always reads what was written.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -14,29 +14,29 @@ use photoncard_shared::message::{Fault, FaultCode};
 
 use crate::pack::CardImage;
 
-/// The host's image, once there is one.
+/// The host's card image; empty until [`Self::give`].
 #[derive(Clone, Default)]
 pub struct SharedImage(Arc<OnceLock<Arc<CardImage>>>);
 
 impl SharedImage {
-    /// Gives the image to the cards that share it; the first one stays.
+    /// Shares the image with the cards; later calls have no effect.
     pub fn give(&self, image: Arc<CardImage>) {
-        // Cards that write another have lines of their own.
+        // Cards that receive another image store it themselves.
         let _ = self.0.set(image);
     }
 }
 
-/// DRAM that takes host memory only for the lines that are written, and of those none for what the host has anyway.
+/// DRAM that takes host memory only for written lines, and none for lines that the shared image holds.
 pub(super) struct EmulatedDram {
     lines: Stored,
     limit: u32,
     shared: SharedImage,
 }
 
-/// The lines from the first to the last that was written.
+/// Lines from the first to the last written one.
 enum Stored {
     Own(Vec<Line>),
-    /// The first so many of an image.
+    /// The first lines of an image, and their number.
     Shared(Arc<CardImage>, usize),
 }
 
@@ -60,7 +60,8 @@ impl EmulatedDram {
         }
     }
 
-    /// Takes lines that are the shared image's, those before them being there; returns whether they are.
+    /// Stores lines by reference if they equal the shared image's and follow the lines stored so far. Returns whether they
+    /// do.
     fn share(&mut self, first: usize, lines: &[[u8; LINE_BYTES]]) -> bool {
         if matches!(&self.lines, Stored::Own(own) if own.is_empty())
             && let Some(image) = self.shared.0.get()
@@ -134,7 +135,7 @@ mod tests {
         matches!(dram.lines, Stored::Shared(..))
     }
 
-    /// Writes lines to a DRAM that shares an image and to one that does not, and compares what they hold.
+    /// Writes lines to a DRAM with a shared image and to one without, and compares the contents.
     fn write(drams: &mut [EmulatedDram; 2], first: usize, lines: &[[u8; LINE_BYTES]]) {
         let address = LineAddress(first as u32);
         for dram in drams.iter_mut() {
@@ -158,7 +159,7 @@ mod tests {
         shared.give(image);
         let mut other = bytes.clone();
         other[3][7] ^= 1;
-        // What is written, and whether it is shared after it.
+        // First line, lines, and whether the DRAM shares the image afterwards.
         type Step<'a> = (usize, &'a [[u8; LINE_BYTES]], bool);
         let runs: [&[Step]; 5] = [
             &[(0, &bytes, true), (2, &bytes[2..4], true)],

@@ -47,7 +47,7 @@ impl CacheSpec {
     }
 
     fn cache(&self) -> LineCache<Vec<CacheEntry>, Vec<Line>> {
-        // `FromStr` and the constants make valid shapes alone.
+        // Only `FromStr` and the constants make shapes, and they make valid ones.
         let shape = self.shape().unwrap_or_else(|error| unreachable!("{self}: {error:?}"));
         let entries = vec![CacheEntry::EMPTY; shape.entries()];
         let lines = vec![Line::ZERO; shape.lines()];
@@ -91,8 +91,7 @@ impl fmt::Display for CacheSettings {
 impl FromStr for CacheSettings {
     type Err = String;
 
-    /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash`, where parts left out have their defaults, or
-    /// `unified=256K/128/8`.
+    /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash`, whose parts are optional, or `unified=256K/128/8`.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut photon = None;
         let mut scene = None;

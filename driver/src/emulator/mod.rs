@@ -94,7 +94,7 @@ pub struct MemoryModel {
 pub struct MemoryRecord {
     /// Traffic of the card's whole life.
     pub traffic: MemoryTraffic,
-    /// Trace of the reads, still to be finished.
+    /// Unfinished trace of the reads.
     pub trace: Option<TraceFile>,
 }
 
@@ -150,7 +150,7 @@ impl Drop for EmulatedCard {
     fn drop(&mut self) {
         drop(self.port.take());
         if let Some(thread) = self.thread.take() {
-            // A chip that panicked has already closed its link, which the session has reported.
+            // A chip that panicked has closed its link already, and the session has reported that.
             let _ = thread.join();
         }
     }
@@ -211,7 +211,7 @@ fn serve_kind<K: kind::ChipKind, M: CardMemory, R>(
     end: impl FnOnce(&mut M) -> R,
 ) -> R {
     let mut card = Box::new(Card::<K, M>::new(memory));
-    // The end of the link is no error: it is how the host ends a card.
+    // The end of the link is no error: a host ends a card by closing the link.
     let _ = serve(&mut *card, port);
     end(card.memory())
 }

@@ -1,7 +1,7 @@
 //! Traces of a chip's memory: every read of its tiles, in the classic input format of the cache simulator Dinero.
 //!
-//! A line of text is an access: a label, a blank, a byte address in hexadecimal. Label 0 is a read of data; label 4 is
-//! Dinero's escape that flushes its caches, here at the begin of every tile, with address 0. `docs/memory.md` says more.
+//! Each line of text is one access: a label, a blank, a byte address in hexadecimal. Label 0 is a read of data; label 4 is
+//! Dinero's escape that flushes its caches, written at the beginning of every tile with address 0. See `docs/memory.md`.
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -17,26 +17,26 @@ use photoncard_shared::message::Fault;
 
 use crate::output::{OutputError, PendingFile};
 
-/// Bytes of text that are compressed at once.
+/// Size of a block of text that is compressed at once, bytes.
 const BUFFER: usize = 64 << 10;
-/// The longest line: a label, a blank, 39 bits in hexadecimal, the end.
+/// Maximum length of a line: a label, a blank, 39 bits in hexadecimal, the line feed.
 const LONGEST_LINE: usize = 16;
 
 const READ: u8 = 0;
 const FLUSH: u8 = 4;
 
-/// A trace on its way to a file, compressed by gzip. A file appears only when it is finished.
+/// Unfinished trace file, compressed by gzip. The file appears under its name only when the trace is finished.
 pub struct TraceFile {
     encoder: GzEncoder<PendingFile>,
     buffer: Vec<u8>,
     path: PathBuf,
-    /// The first failure; nothing is written after it.
+    /// First failure, after which nothing is written.
     error: Option<io::Error>,
     has_failed: Arc<AtomicBool>,
 }
 
 impl TraceFile {
-    /// Begins a trace that is to become `path`.
+    /// Creates a trace that will be stored as `path`.
     ///
     /// # Errors
     /// As [`crate::output::check_writable`].
@@ -50,7 +50,7 @@ impl TraceFile {
         })
     }
 
-    /// Becomes true when the file cannot be written: the work may end then, as there will be no trace.
+    /// Flag that is set once the file cannot be written. The render may end then, as there will be no trace.
     pub fn has_failed(&self) -> Arc<AtomicBool> {
         self.has_failed.clone()
     }
@@ -59,7 +59,7 @@ impl TraceFile {
         if self.buffer.len() > BUFFER - LONGEST_LINE {
             self.compress();
         }
-        // A vector takes all that is written.
+        // Writing to a vector cannot fail.
         let _ = writeln!(self.buffer, "{label} {address:x}");
     }
 
@@ -73,10 +73,10 @@ impl TraceFile {
         self.buffer.clear();
     }
 
-    /// Ends the trace and puts the file in its place.
+    /// Ends the trace and moves the file to its path.
     ///
     /// # Errors
-    /// If any of it could not be written.
+    /// If any part of it could not be written.
     pub fn finish(mut self) -> Result<(), OutputError> {
         self.compress();
         let Self { encoder, path, error, .. } = self;
@@ -88,16 +88,16 @@ impl TraceFile {
     }
 }
 
-/// A memory whose reads are written down, if there is a trace to write them to.
+/// Memory that records its reads in a trace, if it has one.
 pub struct Traced<M> {
     memory: M,
     trace: Option<TraceFile>,
-    /// Reads before the first tile are no tile's, and not written.
+    /// False before the first tile: earlier reads are not recorded.
     in_tiles: bool,
 }
 
 impl<M> Traced<M> {
-    /// Writes the reads of `memory` to `trace`.
+    /// Memory that records the reads of `memory` in `trace`.
     pub fn new(memory: M, trace: Option<TraceFile>) -> Self {
         Self { memory, trace, in_tiles: false }
     }
@@ -107,7 +107,7 @@ impl<M> Traced<M> {
         &self.memory
     }
 
-    /// The trace so far; none is written after it is taken.
+    /// Takes the trace; later reads are not recorded.
     pub fn take_trace(&mut self) -> Option<TraceFile> {
         self.trace.take()
     }

@@ -1,8 +1,8 @@
-//! Colours as one number.
+//! Conversion of colours to one number.
 
 use glam::Vec3;
 
-/// The mean of the channels.
+/// Mean of the channels.
 pub(super) fn mean(colour: Vec3) -> f64 {
     colour.as_dvec3().element_sum() / 3.0
 }

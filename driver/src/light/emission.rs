@@ -68,7 +68,7 @@ impl Mean {
         self.weight += weight;
     }
 
-    /// The weighted mean; zero without weight.
+    /// Weighted mean; zero without weight.
     fn value(&self) -> DVec3 {
         if self.weight > 0.0 { self.sum / self.weight } else { DVec3::ZERO }
     }
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
     use crate::scene::{Encoding, Texture};
 
-    /// Half a quad with a texture that is black but for one texel.
+    /// Half a quad with a texture that is black except for the texel `lit`.
     fn scene(lit: usize) -> Scene {
         scene_of(64, lit)
     }
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_texel_counts_where_the_triangle_shows_it() {
-        // Below the diagonal u = v is the other half.
+        // Points below the diagonal u = v belong to the other half.
         let shown = mean(&scene(10 * 64 + 40));
         assert!((shown / (3.0 / 2048.0) - 1.0).abs() < 0.15, "{shown}");
         assert_eq!(mean(&scene(40 * 64 + 10)), 0.0);

@@ -1,4 +1,4 @@
-//! The environment as a card has it: an `RGB9_E5` texture, and a grid of cells that importance-samples its directions.
+//! Environment in the format of a card: an `RGB9_E5` texture, and a grid of cells that importance-samples its directions.
 
 use std::f64::consts::PI;
 
@@ -26,7 +26,7 @@ pub(crate) struct EnvironmentMap {
     texels: Vec<[u8; 4]>,
     /// Radiance of a texel of value 1, W/(sr m^2).
     pub(crate) radiance: [f32; 3],
-    /// Cells that directions are chosen by.
+    /// Cells for importance sampling.
     pub(crate) cells: Cells,
     /// Fluence rate: integral of the radiance over the sphere, W/m^2, mean of the channels.
     pub(crate) fluence: f64,
@@ -90,7 +90,7 @@ impl EnvironmentMap {
     }
 }
 
-/// The power of two that texels are divided by, so that the brightest is near the maximum of the format.
+/// Power of two that texels are divided by, so that the brightest is near the maximum of the format.
 fn scale(brightest: f32) -> f32 {
     // A division by a power of two is exact unless its result is subnormal.
     let exponent = libm::ilogbf(brightest / BRIGHTEST).clamp(-126, 126) + 1;
@@ -115,7 +115,7 @@ impl Cells {
     fn new(environment: &Environment) -> Self {
         let Environment { width, height, .. } = *environment;
         let [columns, rows] = [width.min(MAX_COLUMNS), height.min(MAX_ROWS)];
-        // Two samples to a texel, each way, see every texel that interpolation brings into a cell.
+        // Two samples per texel in each direction reach every texel that interpolation brings into a cell.
         let [across, down] = [width.div_ceil(columns), height.div_ceil(rows)].map(|texels| 2 * texels);
         let mut weights: Vec<f64> = (0..rows)
             .into_par_iter()

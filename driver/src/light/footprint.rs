@@ -89,7 +89,7 @@ fn across([a, b, c]: [[f64; 2]; 3], top: f64, bottom: f64) -> Option<[f64; 2]> {
     sides
 }
 
-/// The column or row of the image at a coordinate that may lie beyond the image's borders.
+/// Column or row of the image at a coordinate that may lie beyond the image's borders.
 fn wrapped(place: i64, size: u32, wrap: Wrap) -> u32 {
     let size = i64::from(size);
     let texel = match wrap {

@@ -1,4 +1,4 @@
-//! The scene's lights as a card has them: emissive triangles, points and spots in a light tree, distant lights, and the
+//! Lights of a scene in the format of a card: emissive triangles, points and spots in a light tree, distant lights, and the
 //! environment; with the probabilities of choosing each for shadow rays and for photons.
 
 mod colour;
@@ -43,14 +43,14 @@ pub(crate) struct Lights {
     power: f64,
 }
 
-/// A leaf of the light tree: an emissive triangle, a point light or a spot.
+/// Leaf of the light tree: an emissive triangle, a point light or a spot.
 #[derive(Debug)]
 struct SceneEmitter {
     /// Index of the triangle in the scene; `usize::MAX` for a light without extent.
     triangle: usize,
     record: Emitter,
     bounds: Bounds,
-    /// Power in the strongest channel, watts; an upper bound, with the emissive texture taken for white.
+    /// Power in the strongest channel, watts; an upper bound, with the emissive texture assumed white.
     strongest: f64,
 }
 
@@ -126,7 +126,7 @@ impl Lights {
         self.environment.as_ref().map_or(Vec::new(), |environment| environment.cells.thresholds())
     }
 
-    /// The header's part on lights; `texture` is the index of the environment's texture.
+    /// Lights section of the header; `texture` is the index of the environment's texture.
     pub(crate) fn header(&self, texture: u32) -> image::Lights {
         let environment = self.environment.as_ref();
         let cells = environment.map_or([1; 2], |map| [map.cells.columns, map.cells.rows]);

@@ -10,7 +10,7 @@ use crate::scene::{Encoding, Image};
 /// Cells of a level, along each axis, that become one cell of the next level.
 const STEP: u32 = 4;
 
-/// An image at coarser resolutions than its own.
+/// Image at several resolutions coarser than its own.
 pub(super) struct Pyramid {
     /// Levels from fine to coarse; the last is one cell.
     pub(super) levels: Vec<Level>,
@@ -32,7 +32,7 @@ impl Level {
     /// Weight of a cell whose centre is not on the triangle: small, but not 0, as it may be the only one that emits.
     pub(super) const OUTSIDE: f64 = 1.0 / 16.0;
 
-    /// The level above a finer grid of `finer_size` columns and rows; `finer` gives the grid's cells by index.
+    /// Level above a finer grid of `finer_size` columns and rows; `finer` returns the grid's cells by index.
     fn new(finer_size: [u32; 2], finer: impl Fn(usize) -> Vec3) -> Self {
         let size = finer_size.map(|side| side.div_ceil(STEP));
         let range = |axis: usize, cell: u32| {

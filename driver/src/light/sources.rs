@@ -62,8 +62,8 @@ pub(crate) struct ChosenSource {
 
 /// Minimum share of an emitter's light that is assumed to go towards the targets.
 const MIN_AIMED_SHARE: f64 = 1e-3;
-/// Margin of the box beyond the scene's bounds, relative to their longest side or a tenth of their greatest coordinate,
-/// whichever is more.
+/// Margin of the box beyond the scene's bounds, relative to the longest side or a tenth of the maximum coordinate,
+/// whichever is larger.
 const MARGIN: f32 = 1e-4;
 
 impl Sources {
@@ -112,7 +112,7 @@ impl Sources {
         }
     }
 
-    /// The source at `number / 2^64` of the cumulative distribution; `None` if there are no sources.
+    /// Source at `number / 2^64` of the cumulative distribution; `None` if there are no sources.
     pub(crate) fn choose(&self, number: u64) -> Option<ChosenSource> {
         let target = (number >> 32) as u32;
         let index = self.thresholds.partition_point(|&threshold| threshold < target);
@@ -162,8 +162,8 @@ impl AllSources {
         self.strongest.push(strongest);
     }
 
-    /// Adds the cells of the environment, with the power through the area that is `shown` along a cell's direction;
-    /// `same` is that area if it is equal along all directions.
+    /// Adds the cells of the environment. `shown(direction)` is the area that a cell's light passes through; `same` is this
+    /// area if it is equal for all directions.
     fn add_cells(&mut self, lights: &Lights, shown: impl Fn(DVec3) -> f64, same: Option<f64>, size: DVec3) {
         let Some(map) = lights.environment() else { return };
         let cells = &map.cells;
@@ -176,7 +176,7 @@ impl AllSources {
                 let width = 1.0 / cells.columns as f32;
                 let left = column as f32 * width;
                 let middle = environment_direction(left + 0.5 * width, (0.5 * (upper + lower)) as f32);
-                // Light of a cell that covers much of the sphere meets the box from many sides.
+                // Light of a cell that covers much of the sphere meets several sides of the box.
                 let is_wide = cells.columns < 8 || cells.rows < 8;
                 let area = if is_wide { 0.5 * all_sides } else { shown(middle.as_dvec3()) };
                 let weight = cells.weights[(row * cells.columns + column) as usize];

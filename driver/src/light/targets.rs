@@ -1,8 +1,8 @@
 //! Targets of caustic photons: spheres around all surfaces that reflect or transmit perfectly specularly.
 //!
-//! A sphere is chosen in proportion to the solid angle that it subtends, and a direction uniformly within that. Where
-//! spheres overlap, a direction may be chosen through any of them: its density is the number of spheres in that
-//! direction over the sum of the solid angles of all spheres.
+//! A sphere is chosen in proportion to the solid angle that it subtends, and a direction uniformly within this angle. Where
+//! spheres overlap, a direction may be chosen through any of them: its density is the number of spheres in this direction
+//! over the sum of the solid angles of all spheres.
 
 use std::f32::consts::PI;
 
@@ -35,7 +35,7 @@ pub(crate) struct Aim {
 
 /// Maximum number of spheres.
 const MAX_SPHERES: usize = 32;
-/// Margin of a sphere for rounding: relative to its radius; its square relative to the greatest coordinate.
+/// Margin of a sphere for rounding: relative to its radius; its square relative to the maximum coordinate.
 const MARGIN: f32 = 1e-3;
 
 impl Targets {
@@ -46,7 +46,7 @@ impl Targets {
         let all: Vec<[Vec3; 3]> = triangles.map(|triangle| triangle.vertices).collect();
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
         while parts.len() < MAX_SPHERES {
-            // The largest part that may be split.
+            // The largest splittable part.
             let sizes = parts.iter().enumerate().filter(|(_, part)| part.may_be_split);
             let Some((index, _)) = sizes.max_by(|(_, a), (_, b)| a.sphere.radius.total_cmp(&b.sphere.radius))
             else {
@@ -155,7 +155,7 @@ impl SolidCone {
 }
 
 impl Sphere {
-    /// The directions from a point through the sphere: all, from within.
+    /// Cone of directions from a point to the sphere; all directions from within.
     fn cone(&self, from: Vec3) -> SolidCone {
         let way = self.centre - from;
         let sine_squared = self.radius * self.radius / way.length_squared();

@@ -35,7 +35,7 @@ pub(super) struct LightTree {
 const BINS: usize = 12;
 /// Margin of a cone's angle for the rounding of its axis and cosine, radians.
 const CONE_MARGIN: f64 = 5e-4;
-/// Margin of a sphere's radius for rounding, relative to the greatest coordinate.
+/// Margin of a sphere's radius for rounding, relative to the maximum coordinate.
 const SPHERE_MARGIN: f64 = 1e-6;
 
 impl LightTree {
@@ -111,7 +111,7 @@ fn halves<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o mu
 }
 
 impl Bounds {
-    /// The centre of the bounding box.
+    /// Centre of the bounding box.
     fn middle(&self) -> DVec3 {
         let [lower, upper] = self.sides();
         (lower + upper) * 0.5
@@ -123,7 +123,7 @@ impl Bounds {
     }
 }
 
-/// A split along an axis: bins up to and with `last` are on the lower side.
+/// Split along an axis: bins up to and including `last` are on the lower side.
 struct Split {
     axis: usize,
     lower: f64,
@@ -185,7 +185,7 @@ impl Cone {
         Self { axis, angle }
     }
 
-    /// The smallest cone that contains both, but for rounding.
+    /// Smallest cone that contains both, except for rounding.
     fn union(self, other: Self) -> Self {
         let [wide, narrow] = if self.angle >= other.angle { [self, other] } else { [other, self] };
         let between = libm::acos(wide.axis.dot(narrow.axis).clamp(-1.0, 1.0));
@@ -219,8 +219,7 @@ struct Summary {
     count: usize,
     lower: DVec3,
     upper: DVec3,
-    /// Greatest distance of a corner from the box's centre, metres; computed by [`Self::new`] alone, 0 in partial
-    /// summaries.
+    /// Maximum distance of a corner from the box's centre, metres; computed by [`Self::new`] alone, 0 in partial summaries.
     radius: f64,
     cone: Cone,
     power: f64,
@@ -279,7 +278,7 @@ impl Summary {
         self.power * self.cone.measure() * area
     }
 
-    /// The record of the emitters as a child of a node of `power` watts.
+    /// Record of the emitters as a child of a node of `power` watts.
     fn child(&self, power: f64, link: LightLink) -> LightChild {
         let middle = self.middle();
         let greatest = self.lower.abs().max(self.upper.abs()).max_element();
@@ -317,7 +316,7 @@ mod tests {
         (0..count).map(triangle).collect()
     }
 
-    /// Follows the trail of an emitter; `check` sees every child on the way. Returns the levels.
+    /// Follows the trail of an emitter; `check` is called for every child on it. Returns the number of levels.
     fn follow(tree: &LightTree, emitter: u32, check: &mut dyn FnMut(&LightChild)) -> usize {
         let (mut node, mut trail) = (0, tree.trails[emitter as usize]);
         for level in 1..=LIGHT_TREE_LEVELS {
@@ -369,7 +368,7 @@ mod tests {
 
     #[test]
     fn no_trail_is_too_long_where_splits_would_be_uneven() {
-        // Each a tenth as far as the one before: the best split takes one away at a time.
+        // Each at a tenth of the previous distance: the best split separates one at a time.
         let point = |i: i32| Bounds {
             corners: vec![DVec3::X * 10.0_f64.powi(-i)],
             cone: Cone::ALL,

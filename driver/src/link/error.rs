@@ -1,9 +1,9 @@
-//! Why a link could not be opened.
+//! Errors of links that cannot be opened.
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind};
 
-/// Why a link could not be opened: the address, what is wrong with it, and what to do.
+/// Error of a link that cannot be opened: action, address, reason and remedy.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 #[error("cannot {action} {address}: {reason}")]
 #[diagnostic(help("{remedy}"))]
@@ -17,7 +17,7 @@ pub struct LinkError {
 const UNIX_ONLY: &str = "only Unix systems have such links";
 
 impl LinkError {
-    /// A serial port that could not be opened.
+    /// Error of opening a serial port.
     pub(super) fn open(address: impl Display, error: &io::Error) -> Self {
         let (reason, remedy) = match error.kind() {
             ErrorKind::NotFound => ("there is no such device", "check the cable and the device's name"),
@@ -25,7 +25,7 @@ impl LinkError {
                 "no permission to use the device",
                 "join the group that owns it, often `dialout`, or change its permissions",
             ),
-            // An exclusive lock that is taken.
+            // Another process holds the exclusive lock.
             ErrorKind::WouldBlock | ErrorKind::ResourceBusy => {
                 ("the device is busy", "end the program that uses it, or wait until it is done")
             }
@@ -40,7 +40,7 @@ impl LinkError {
         Self::new("open", address, reason, remedy)
     }
 
-    /// A socket that could not be connected to.
+    /// Error of connecting to a socket.
     pub(super) fn connect(address: impl Display, error: &io::Error) -> Self {
         let (reason, remedy) = match error.kind() {
             ErrorKind::NotFound => {
@@ -61,7 +61,7 @@ impl LinkError {
         Self::new("connect to", address, reason, remedy)
     }
 
-    /// An address that could not be listened on.
+    /// Error of listening on an address.
     pub(super) fn listen(address: impl Display, error: &io::Error) -> Self {
         let (reason, remedy) = match error.kind() {
             ErrorKind::AddrInUse => ("it is in use", "choose another, or end what listens there"),
@@ -79,7 +79,7 @@ impl LinkError {
         Self::new("listen on", address, reason, remedy)
     }
 
-    /// Serial ports that could not be listed.
+    /// Error of listing serial ports.
     pub(super) fn list(error: &io::Error) -> Self {
         Self::other("list", "serial ports", error, "give the port's path: --card serial:PATH")
     }

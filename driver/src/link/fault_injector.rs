@@ -1,7 +1,7 @@
-//! A bad line: bytes are damaged, lost, repeated, held back and cut into pieces as a seed decides.
+//! Simulation of a bad line: bytes are damaged, lost, repeated, delayed and cut into pieces by random numbers.
 //!
-//! What happens to a byte depends on the seed, its direction and its position among all bytes of that direction: neither on
-//! time nor on how the bytes are cut.
+//! A byte's faults depend on the seed, its direction and its position among all bytes of its direction, not on time or on
+//! the sizes of reads and writes.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -11,22 +11,22 @@ use std::time::{Duration, Instant};
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::link::{Port, PortError};
 
-/// What a line does to bytes: the rate of each fault, 0 to 0.1 a byte.
+/// Rates of a line's faults, each a probability per byte of 0 to 0.1, and the seed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LineFaults {
-    /// One bit is another.
+    /// Rate of bytes with one inverted bit.
     pub flips: f64,
-    /// The byte is lost.
+    /// Rate of lost bytes.
     pub drops: f64,
-    /// The byte comes twice.
+    /// Rate of bytes that arrive twice.
     pub repeats: f64,
-    /// The byte, on its way to the host, and all behind it are held back for some milliseconds.
+    /// Rate of delays, on the way to the host: a byte and all behind it are held back for some milliseconds.
     pub delays: f64,
-    /// What random numbers depend on.
+    /// Seed of the random numbers.
     pub seed: u32,
 }
 
-/// A line on which every fault is likelier destroys every frame.
+/// Maximum rate: a higher one destroys every frame.
 const MOST: f64 = 0.1;
 
 impl FromStr for LineFaults {
@@ -69,34 +69,34 @@ impl fmt::Display for LineFaults {
     }
 }
 
-/// Makes a port a bad one, in both directions.
+/// Port wrapper that injects faults in both directions.
 pub struct FaultInjector {
     faults: LineFaults,
     incoming: Direction,
     outgoing: Direction,
-    /// Until when bytes that come are held back.
+    /// Time until which incoming bytes are held back.
     held: Instant,
 }
 
-/// One direction of a line.
+/// One direction of the line.
 struct Direction {
-    /// What its random numbers depend on.
+    /// Key of its random numbers.
     key: u32,
-    /// Bytes that have entered it.
+    /// Number of bytes that have entered it, modulo 2^32.
     position: u32,
-    /// What of them has not left it.
+    /// Bytes that have not left it.
     bytes: VecDeque<Passing>,
 }
 
-/// A byte that leaves the line.
+/// A byte in the line, after its faults.
 #[derive(Clone, Copy)]
 struct Passing {
     byte: u8,
-    /// How long it is held back.
+    /// Time that it is held back.
     delay: Duration,
 }
 
-/// What a random number is for: the numbers of each kind are others.
+/// Purpose of a random number; each has a sequence of its own.
 #[derive(Clone, Copy)]
 enum Kind {
     Flip,
@@ -108,9 +108,9 @@ enum Kind {
     Piece,
 }
 
-/// Bytes that move at once at the most.
+/// Maximum number of bytes that move at once.
 const PIECE: usize = 600;
-/// The longest delay, milliseconds.
+/// Maximum delay, milliseconds.
 const LONGEST_DELAY: u32 = 20;
 
 impl Direction {
@@ -118,7 +118,7 @@ impl Direction {
         Self { key, position: 0, bytes: VecDeque::new() }
     }
 
-    /// The random number of the next byte. After 2^32 bytes they come again.
+    /// Random number of the next byte, with a period of 2^32 bytes.
     fn random(&self, kind: Kind) -> u32 {
         hash(hash(self.position) ^ hash(self.key ^ hash(kind as u32 + 1)))
     }
@@ -127,7 +127,7 @@ impl Direction {
         f64::from(self.random(kind)) < rate * 4_294_967_296.0
     }
 
-    /// Lets bytes enter the line.
+    /// Sends bytes into the line.
     fn pass(&mut self, bytes: &[u8], faults: &LineFaults) {
         for &byte in bytes {
             let is_delayed = self.happens(Kind::Delay, faults.delays);
@@ -142,31 +142,31 @@ impl Direction {
         }
     }
 
-    /// How many bytes enter at once, at most `most`.
+    /// Number of bytes that enter at once, at most `most`.
     fn piece(&self, most: usize) -> usize {
         (1 + self.random(Kind::Piece) as usize % PIECE).min(most)
     }
 }
 
 impl FaultInjector {
-    /// Faults of the line to card `index`: those of each card are others.
+    /// Faults of the line to card `index`; each card has faults of its own.
     pub fn new(faults: LineFaults, index: usize) -> Self {
         let key = hash(faults.seed) ^ hash(index as u32 + 1);
         let [incoming, outgoing] = [1, 2].map(|direction| Direction::new(hash(key ^ hash(direction))));
         Self { faults, incoming, outgoing, held: Instant::now() }
     }
 
-    /// Reads from a port as [`Port::read`] does.
+    /// Reads from a port like [`Port::read`].
     ///
     /// # Errors
-    /// As the port's.
+    /// As for the port.
     pub fn read(
         &mut self,
         port: &mut dyn Port,
         buffer: &mut [u8],
         wait: Duration,
     ) -> Result<usize, PortError> {
-        // Nothing else may be written for long. That the port is closed, the read tells as well.
+        // The caller may not write again for long, so pending bytes are sent here. The read reports a closed port as well.
         let _ = self.flush(port, Duration::ZERO);
         if self.incoming.bytes.is_empty() {
             let mut bytes = [0; PIECE];
@@ -181,7 +181,7 @@ impl FaultInjector {
         Ok(self.release(buffer))
     }
 
-    /// Gives the bytes that are not held back.
+    /// Copies bytes that are not held back to `buffer`. Returns their number.
     fn release(&mut self, buffer: &mut [u8]) -> usize {
         let mut count = 0;
         while let (Some(target), Some(next)) = (buffer.get_mut(count), self.incoming.bytes.front_mut()) {
@@ -199,10 +199,10 @@ impl FaultInjector {
         count
     }
 
-    /// Writes to a port as [`Port::write`] does.
+    /// Writes to a port like [`Port::write`].
     ///
     /// # Errors
-    /// As the port's.
+    /// As for the port.
     pub fn write(&mut self, port: &mut dyn Port, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
         let mut taken = 0;
         if self.outgoing.bytes.is_empty() {
@@ -213,7 +213,7 @@ impl FaultInjector {
         Ok(taken)
     }
 
-    /// Writes what is on its way to the card.
+    /// Writes pending bytes to the port.
     fn flush(&mut self, port: &mut dyn Port, wait: Duration) -> Result<(), PortError> {
         if self.outgoing.bytes.is_empty() {
             return Ok(());
@@ -268,7 +268,7 @@ mod tests {
             let mut passed = Vec::<u8>::new();
             for piece in bytes.chunks(step) {
                 far.write(piece, SOON).unwrap();
-                // What goes the other way changes nothing.
+                // Traffic in the other direction has no influence.
                 injector.write(&mut near, &bytes[..answers], SOON).unwrap();
                 let mut buffer = [0; 700];
                 let count = injector.read(&mut near, &mut buffer, Duration::ZERO).unwrap();
@@ -276,7 +276,7 @@ mod tests {
             }
             drop(far);
             let mut buffer = [0; 700];
-            // The link is closed once all has come.
+            // The link reports its end after all bytes have arrived.
             while let Ok(count) = injector.read(&mut near, &mut buffer, SOON) {
                 passed.extend(&buffer[..count]);
             }
@@ -304,7 +304,7 @@ mod tests {
             reads += 1;
         }
         assert!(passed == bytes);
-        // About twenty delays of ten milliseconds, and no more reads than there is something to read.
+        // About twenty delays of ten milliseconds, and no reads without bytes.
         assert!(begin.elapsed() > Duration::from_millis(60), "{:?}", begin.elapsed());
         assert!((5..100).contains(&reads), "{reads}");
     }

@@ -1,4 +1,4 @@
-//! A card's port on which hosts come and go.
+//! Port of a card that serves hosts one after another.
 
 use std::fmt;
 use std::sync::Arc;
@@ -10,45 +10,47 @@ use photoncard_shared::link::{Port, PortError};
 
 use super::Listener;
 
-/// The card's end of the links of one host after another.
+/// The card's end of the links to consecutive hosts.
 ///
-/// To the card this is one link that never closes: what it says while no host listens is lost, as on a cable that is
-/// pulled out. Between two hosts the link is cut at the end of a frame in both directions. A host hears nothing before it
-/// has spoken. Hosts that come while another is served are refused: their link is closed at once. Who is on a socket and has
-/// sent no whole frame for some seconds is no host, and is dropped; a host may be silent after its first one, as it packs a scene.
+/// To the card this is one link that never closes. Its output is lost while no host is connected, as on an unplugged cable.
+/// Between two hosts the link is cut at the end of a frame in both directions. A host receives nothing before it has sent a
+/// byte. A second host is refused while one is served: its connection is closed at once. A socket connection that has sent
+/// no whole frame within 10 s is no host, and is closed; after its first frame a host may be silent, as it packs a scene.
 pub struct HostPort {
     listener: Listener,
     stop: Arc<AtomicBool>,
     host: Option<Host>,
-    /// A host that has come while there is one. It is refused as soon as that one is known to be still there.
+    /// Another host that has connected. It is refused as soon as the present one is known to be connected still.
     next: Option<Box<dyn Port + Send>>,
-    /// When the host and those that wait were looked at last.
+    /// Time of the last poll of the host and of the listener.
     looked: Instant,
-    /// Whether the card's last byte was not the end of a frame.
+    /// True if the card's last byte was not the end of a frame.
     in_frame: bool,
-    /// Takes what there is to tell of hosts.
+    /// Sink of messages about hosts.
     say: fn(fmt::Arguments),
 }
 
 struct Host {
     port: Box<dyn Port + Send>,
     since: Instant,
-    /// Looks for its first whole frame, until that has come.
+    /// Parser that waits for the first whole frame; `None` afterwards.
     first_frame: Option<FrameReader>,
     has_spoken: bool,
-    /// Whether the card's present frame began before the host had spoken.
+    /// True while the card sends the rest of a frame that began before the host's first byte.
     skips_frame: bool,
 }
 
-/// A card at work looks at its port after every little step: a system call each time would slow it down.
+/// Minimum time between two polls: a busy card reads its port after every short step, and a system call each time would
+/// slow it down.
 const LOOK_INTERVAL: Duration = Duration::from_micros(200);
-/// How long a host's first whole frame may take.
+/// Time limit of a host's first whole frame.
 const FIRST_FRAME: Duration = Duration::from_secs(10);
-/// The byte between two frames.
+/// Byte that ends a frame.
 const FRAME_END: u8 = 0;
 
 impl HostPort {
-    /// A port for the hosts that come to a listener, until `stop` is set. `say` is told of those that are dropped.
+    /// Port for the hosts that connect to `listener`, until `stop` is set. `say` receives messages about closed
+    /// connections.
     pub fn new(listener: Listener, stop: Arc<AtomicBool>, say: fn(fmt::Arguments)) -> Self {
         Self { listener, stop, host: None, next: None, looked: Instant::now(), in_frame: false, say }
     }
@@ -57,15 +59,16 @@ impl HostPort {
         if self.stop.load(Ordering::Relaxed) { Err(PortError::Closed) } else { Ok(()) }
     }
 
-    /// Notes where in a frame the card's bytes end that were sent or dropped.
+    /// Records whether the card's sent or dropped bytes end within a frame.
     fn pass(&mut self, bytes: &[u8]) {
         if let Some(&last) = bytes.last() {
             self.in_frame = last != FRAME_END;
         }
     }
 
-    /// Looks for hosts that have come meanwhile. What one link says arrives before what happens after it on another: a host
-    /// that was seen before the present one was found silent, but not gone, has come too early.
+    /// Accepts another host, to be refused or served next. The system delivers a link's data before later events on other
+    /// links: a host that was accepted before the present one was found silent, but connected, came too early and is
+    /// refused.
     fn look_for_others(&mut self, is_silent: bool) {
         if is_silent {
             self.next = None;
@@ -75,11 +78,11 @@ impl HostPort {
         }
     }
 
-    /// Takes the next host. The frame that the last one may have left half sent ends here.
+    /// Accepts the next host. Returns the byte that ends a frame that the previous host may have left unfinished.
     fn welcome(&mut self, buffer: &mut [u8], wait: Duration) -> usize {
         let Some(byte) = buffer.first_mut() else { return 0 };
         let Some(port) = self.next.take().or_else(|| self.listener.accept(wait)) else { return 0 };
-        // A terminal that is dropped is open still, and keeps nobody out.
+        // A pseudo terminal has no connection to close: there is no time limit.
         let first_frame = self.listener.is_socket().then(FrameReader::new);
         self.host =
             Some(Host { port, since: Instant::now(), first_frame, has_spoken: false, skips_frame: false });
@@ -89,7 +92,7 @@ impl HostPort {
 }
 
 impl Host {
-    /// Whether it has sent no whole frame yet, with what it sends now.
+    /// Reads the bytes received now. Returns true if no whole frame has arrived so far.
     fn is_none_yet(&mut self, mut bytes: &[u8]) -> bool {
         while let Some(reader) = self.first_frame.as_mut().filter(|_| !bytes.is_empty()) {
             let (taken, frame) = reader.read(bytes);
@@ -120,7 +123,9 @@ impl Port for HostPort {
         }
         if host.is_none_yet(&buffer[..count]) && host.since.elapsed() > FIRST_FRAME {
             let seconds = FIRST_FRAME.as_secs();
-            (self.say)(format_args!("photoncard: who has sent nothing of a host for {seconds} s is dropped"));
+            (self.say)(format_args!(
+                "photoncard: closed a connection that sent no valid frame for {seconds} s"
+            ));
             self.host = None;
             return Ok(0);
         }

@@ -1,4 +1,4 @@
-//! Where hosts come to a card that this process emulates.
+//! Listeners on which hosts reach a card that this process emulates.
 
 use std::io::{self, ErrorKind};
 use std::net::{TcpListener, ToSocketAddrs};
@@ -19,26 +19,26 @@ use super::socket::unix_port;
 use super::socket::{host_name, tcp_address, tcp_port};
 use super::stream::wait_for;
 
-/// Where to wait for hosts: an argument of `--listen`.
+/// Address to listen on: an argument of `--listen`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ListenAddress {
     /// A new pseudo terminal.
     Pty,
     /// A TCP port of this machine.
     Tcp {
-        /// Name or number of the address.
+        /// Name or IP address to bind to.
         host: String,
-        /// The port; 0 for any that is free.
+        /// Port; 0 for any free one.
         port: u16,
     },
     /// A Unix socket.
     Unix {
-        /// Its path.
+        /// Path of the socket.
         path: PathBuf,
     },
 }
 
-/// Without an address, no other machine can reach a card.
+/// Default address: only this machine can reach the card.
 const LOCAL_HOST: &str = "127.0.0.1";
 
 impl FromStr for ListenAddress {
@@ -56,13 +56,13 @@ impl FromStr for ListenAddress {
             }
             ("unix", path) if !path.is_empty() => Ok(Self::Unix { path: path.into() }),
             _ => Err(format!(
-                "{text:?} is nothing to listen on; use pty, tcp:PORT, tcp:ADDRESS:PORT or unix:PATH"
+                "{text:?} is no address to listen on; use pty, tcp:PORT, tcp:ADDRESS:PORT or unix:PATH"
             )),
         }
     }
 }
 
-/// A place where hosts come to a card. A socket's file is removed when it is dropped.
+/// Listener for connections of hosts to a card. Dropping it removes a Unix socket's file.
 pub struct Listener {
     kind: Kind,
     card_address: String,
@@ -77,10 +77,10 @@ enum Kind {
 }
 
 impl Listener {
-    /// Begins to listen.
+    /// Starts to listen.
     ///
     /// # Errors
-    /// If the address is not this machine's, or is taken.
+    /// If the address is not this machine's, or in use.
     pub fn new(address: &ListenAddress) -> Result<Self, LinkError> {
         match address {
             ListenAddress::Tcp { host, port } => {
@@ -116,7 +116,7 @@ impl Listener {
             if error.kind() != ErrorKind::AddrInUse {
                 return Err(error);
             }
-            // The socket of a process that is gone is replaced; any other file is not.
+            // A stale socket, whose process has ended, is replaced; any other file is not.
             match UnixStream::connect(&path) {
                 Err(refused) if refused.kind() == ErrorKind::ConnectionRefused => {
                     use std::os::unix::fs::FileTypeExt;
@@ -140,12 +140,12 @@ impl Listener {
         Ok(Self { kind: Kind::Pty(pty), card_address: format!("serial:{}", path.display()) })
     }
 
-    /// What a host gives as `--card` to reach the card.
+    /// Argument of `--card` with which a host reaches the card.
     pub fn card_address(&self) -> &str {
         &self.card_address
     }
 
-    /// Whether other machines can reach the card.
+    /// Returns whether other machines can reach the card.
     pub fn is_public(&self) -> bool {
         match &self.kind {
             Kind::Tcp(listener) => !listener.local_addr().is_ok_and(|address| address.ip().is_loopback()),
@@ -154,7 +154,7 @@ impl Listener {
         }
     }
 
-    /// Whether hosts come on connections of their own.
+    /// Returns whether each host has a connection of its own.
     pub(super) fn is_socket(&self) -> bool {
         match &self.kind {
             Kind::Tcp(_) => true,
@@ -165,7 +165,8 @@ impl Listener {
         }
     }
 
-    /// The next host, if one comes within `wait`. One that is gone again, or that the system has no room for, is none.
+    /// The next host, if one connects within `wait`; `None` also if it is gone already or the system has no resources for
+    /// it.
     pub(super) fn accept(&mut self, wait: Duration) -> Option<Box<dyn Port + Send>> {
         match &mut self.kind {
             Kind::Tcp(listener) => {
@@ -181,7 +182,7 @@ impl Listener {
             Kind::Pty(pty) => match pty.accept() {
                 Ok(Some(port)) => boxed(port),
                 _ => {
-                    // Nothing tells when a terminal is opened.
+                    // Opening a terminal causes no event.
                     std::thread::sleep(wait);
                     None
                 }
@@ -189,7 +190,7 @@ impl Listener {
         }
     }
 
-    /// A host that has come while there is one, if any has. Those on a terminal lock it themselves.
+    /// Another host that connects while one is served, if any. Hosts on a terminal exclude each other by its lock.
     pub(super) fn accept_other(&mut self) -> Option<Box<dyn Port + Send>> {
         match self.kind {
             Kind::Tcp(_) => self.accept(Duration::ZERO),
@@ -209,7 +210,7 @@ fn boxed(port: impl Port + Send + 'static) -> Option<Box<dyn Port + Send>> {
 impl Drop for Listener {
     fn drop(&mut self) {
         if let Kind::Unix(_, path) = &self.kind {
-            // It may have been removed already.
+            // The file may have been removed already.
             let _ = std::fs::remove_file(path);
         }
     }

@@ -1,4 +1,4 @@
-//! A link inside the process: two bounded queues of bytes, stricter than hardware, which rarely pushes back.
+//! Link within the process: two bounded queues of bytes. They fill up more readily than hardware, which tests flow control.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -13,7 +13,7 @@ struct Direction {
     changed: Condvar,
 }
 
-/// Bytes on their way.
+/// Bytes in transit.
 #[derive(Default)]
 struct ByteQueue {
     bytes: VecDeque<u8>,
@@ -49,7 +49,7 @@ pub struct LoopbackPort {
     capacity: usize,
 }
 
-/// A link of two ends, each direction of which holds `capacity` bytes, at least one.
+/// Creates a link and returns its two ends. Each direction holds `capacity` bytes, at least one.
 pub fn loopback(capacity: usize) -> (LoopbackPort, LoopbackPort) {
     let capacity = capacity.max(1);
     let (a, b) = (Arc::<Direction>::default(), Arc::<Direction>::default());

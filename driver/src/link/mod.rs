@@ -1,8 +1,9 @@
 //! Links to cards: ports of bytes.
 //!
-//! A card in this process is on a [`loopback`]; others are reached over serial ports ([`open_serial`]; [`list_serial_ports`] says which there are) and sockets
-//! ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the other side: where hosts come to a card that this process
-//! emulates, one after another ([`HostPort`]). A [`FaultInjector`] makes any of them a bad one.
+//! A card in this process is on a [`loopback`]; others are reached over serial ports ([`open_serial`], listed by
+//! [`list_serial_ports`]) and sockets ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the opposite end: hosts
+//! connect to it to reach a card that this process emulates, one after another ([`HostPort`]). A [`FaultInjector`]
+//! simulates a bad line on any of them.
 
 mod error;
 mod fault_injector;

@@ -1,4 +1,4 @@
-//! The card's end of a pseudo terminal: what hosts open as a serial port.
+//! The card's end of a pseudo terminal, which hosts open as a serial port.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -16,13 +16,13 @@ use rustix::termios::{self, OptionalActions};
 use super::StreamPort;
 use super::stream::wait_for;
 
-/// A pseudo terminal that waits for hosts to open it.
+/// Pseudo terminal that waits for hosts to open it.
 pub(super) struct Pty {
     controller: File,
 }
 
 impl Pty {
-    /// A pseudo terminal for raw bytes, and its path.
+    /// Opens a pseudo terminal in raw mode. Returns it with its path.
     pub(super) fn open() -> io::Result<(Self, PathBuf)> {
         let controller = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
         rustix::io::fcntl_setfd(&controller, FdFlags::CLOEXEC)?;
@@ -31,7 +31,7 @@ impl Pty {
         let path = PathBuf::from(OsString::from_vec(ptsname(&controller, Vec::new())?.into_bytes()));
         let flags = rustix::fs::fcntl_getfl(&controller)?;
         rustix::fs::fcntl_setfl(&controller, flags | OFlags::NONBLOCK)?;
-        // A terminal tells that nobody has it open only once somebody had.
+        // The hang-up state, which shows that no host has the terminal open, is reported only after it was opened once.
         let terminal =
             rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
         let mut settings = termios::tcgetattr(&terminal)?;
@@ -40,12 +40,12 @@ impl Pty {
         Ok((Self { controller: File::from(controller) }, path))
     }
 
-    /// The port to the host that has the terminal open, if one has.
+    /// Port to the host that has the terminal open, if any.
     pub(super) fn accept(&mut self) -> io::Result<Option<StreamPort<File>>> {
         if !wait_for(&self.controller, PollFlags::IN, Duration::ZERO).contains(PollFlags::HUP) {
             return Ok(Some(StreamPort::new(self.controller.try_clone()?)));
         }
-        // What a host wrote that is gone already is for nobody; at its end the read fails.
+        // Drops the bytes of a host that is gone; at their end the read fails.
         let mut buffer = [0; 512];
         while self.controller.read(&mut buffer).is_ok_and(|count| count > 0) {}
         Ok(None)

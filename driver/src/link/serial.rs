@@ -15,26 +15,26 @@ use serialport::{ClearBuffer, DataBits, FlowControl, Parity, SerialPort as _, Se
 use super::LinkError;
 use super::stream::moved;
 
-/// A line without a byte for so long has nothing stale left.
+/// Silence after which a line has no stale bytes.
 const QUIET: Duration = Duration::from_millis(50);
-/// What a busy card still says is listened to for so long.
+/// Maximum time in which stale bytes of a busy card are dropped.
 const STALE: Duration = Duration::from_secs(1);
-/// A speed may differ from the one asked for by one part in so many: a frame of ten bits tolerates more.
+/// Inverse of the maximum relative deviation of the speed, 2 %: a frame of ten bits tolerates more.
 const SPEED_TOLERANCE: u32 = 50;
-/// Windows takes a wait of zero for one without an end.
+/// Minimum timeout: Windows treats 0 as infinite.
 const MIN_WAIT: Duration = if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };
 
-/// A link over a serial port or a pseudo terminal. Every call is bounded: by `poll` before a read or write that does not
-/// block, on Windows by the driver's timeouts, of which the shortest is a millisecond.
+/// Link over a serial port or a pseudo terminal. Every call is bounded: by `poll` before a non-blocking read or write, on
+/// Windows by the driver's timeouts, whose minimum is a millisecond.
 pub struct SerialLink {
     port: SystemPort,
 }
 
-/// Opens a serial port, or a pseudo terminal, for a session that begins: 8 bits, no parity, one stop bit, no flow
-/// control. What an earlier session left on the line is dropped. No other photoncard can open it meanwhile.
+/// Opens a serial port, or a pseudo terminal, for a new session: 8 bits, no parity, one stop bit, no flow control. Stale
+/// bytes of an earlier session are dropped. The port is locked against other photoncard processes.
 ///
 /// # Errors
-/// If there is no such device, it is not a serial port, cannot be used, is in use or has no such speed.
+/// If the device does not exist, is no serial port, cannot be used, is in use, or does not support the speed.
 pub fn open_serial(path: &Path, baud: u32) -> Result<SerialLink, LinkError> {
     open(path, baud).map_err(|error| LinkError::open(format_args!("serial:{}", path.display()), &error))
 }
@@ -59,11 +59,11 @@ fn open(path: &Path, baud: u32) -> io::Result<SerialLink> {
     Ok(link)
 }
 
-/// Opens a port and locks it for this process. Reads and writes of it end at once: `serialport` opens it so that a write waits
-/// for as long as the line is full.
+/// Opens a port, locks it for this process and sets `O_NONBLOCK`: `serialport` leaves the port blocking, and a write would
+/// wait for as long as the line is full.
 ///
-/// Its own lock is a shared one, taken before anything is set: it fails where another session has the exclusive one. Its
-/// exclusive mode, TIOCEXCL, is left out: on a pseudo terminal it would outlive a host that is killed, and refuse the next.
+/// `serialport` takes a shared lock before it configures the port, and fails if another session has the exclusive lock. Its
+/// exclusive mode, TIOCEXCL, is not used: on a pseudo terminal it would outlive a killed host, and exclude the next one.
 #[cfg(unix)]
 fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
     use std::os::fd::AsRawFd;
@@ -78,30 +78,30 @@ fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
     Ok(port)
 }
 
-/// Opens a port, which Windows does for one process alone.
+/// Opens a port, exclusively as always on Windows.
 #[cfg(windows)]
 fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
     settings.open_native().map_err(device_error)
 }
 
-/// Whether a path names a pseudo terminal of macOS, which refuses any speed; `serialport` sets none if it is 0.
+/// Returns whether a path names a pseudo terminal of macOS, which rejects any speed; `serialport` sets none if it is 0.
 fn is_without_speed(path: &Path) -> bool {
     let is_terminal = |path: &Path| path.to_str().is_some_and(|name| name.starts_with("/dev/ttys"));
     cfg!(target_os = "macos") && path.canonicalize().is_ok_and(|path| is_terminal(&path))
 }
 
-/// What `serialport` has found, as the system would say it.
+/// Converts an error of `serialport` to the system's kind of error.
 fn device_error(error: serialport::Error) -> io::Error {
     match error.kind() {
-        // On Unix alone it means a port that is locked; on Windows its words tell which.
+        // On Unix `NoDevice` always means a locked port; on Windows only its message distinguishes the causes.
         serialport::ErrorKind::NoDevice if cfg!(unix) => ErrorKind::ResourceBusy.into(),
         serialport::ErrorKind::NoDevice => io::Error::other(error),
         _ => error.into(),
     }
 }
 
-/// Ends a frame that an earlier session has left half sent, and drops what the card still says of it: up to a quiet
-/// line, or from a busy card up to the end of a frame.
+/// Ends a frame that an earlier session may have left unfinished, and drops stale bytes: until the line is quiet or, from a
+/// busy card, up to the end of a frame.
 fn begin(port: &mut impl Port) -> Result<(), PortError> {
     port.write(&[0], QUIET)?;
     let start = Instant::now();
@@ -122,7 +122,7 @@ fn begin(port: &mut impl Port) -> Result<(), PortError> {
 }
 
 impl SerialLink {
-    /// Bounds the next read or write.
+    /// Sets the timeout of the next read or write.
     fn limit(&mut self, wait: Duration) -> Result<(), PortError> {
         let wait = wait.max(MIN_WAIT);
         // On Windows each change is a call of the driver.
@@ -151,7 +151,7 @@ impl Port for SerialLink {
     }
 }
 
-/// The bytes that have moved; none if the time was over before.
+/// Number of bytes moved; 0 on a timeout.
 fn moved_in_time(result: io::Result<usize>) -> Result<usize, PortError> {
     match result {
         Err(error) if error.kind() == ErrorKind::TimedOut => Ok(0),

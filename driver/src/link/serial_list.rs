@@ -9,18 +9,18 @@ use super::LinkError;
 /// A serial port of this machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ListedPort {
-    /// Its path, on Windows its name.
+    /// Path, on Windows name.
     pub path: String,
-    /// Manufacturer and product as a USB device tells them, any text at all; empty for other ports.
+    /// Manufacturer and product as a USB device reports them, arbitrary text; empty for other ports.
     pub usb_name: String,
-    /// The serial number that a USB device tells, any text at all; empty where there is none.
+    /// Serial number as a USB device reports it, arbitrary text; empty if there is none.
     pub serial_number: String,
 }
 
-/// The serial ports of this machine, in the order of their paths. Pseudo terminals are not among them.
+/// Lists the serial ports of this machine by path, without pseudo terminals.
 ///
 /// # Errors
-/// If the system does not tell.
+/// If the system does not list them.
 pub fn list_serial_ports() -> Result<Vec<ListedPort>, LinkError> {
     let mut ports = available().map_err(|error| LinkError::list(&error))?;
     ports.sort_by(|a, b| a.path.cmp(&b.path));
@@ -28,7 +28,7 @@ pub fn list_serial_ports() -> Result<Vec<ListedPort>, LinkError> {
 }
 
 fn available() -> io::Result<Vec<ListedPort>> {
-    // Without it, `serialport` panics: a container may have no /sys.
+    // `serialport` panics without /sys, which a container may lack.
     if cfg!(target_os = "linux") {
         std::fs::read_dir("/sys/class/tty")?;
     }

@@ -12,23 +12,23 @@ use rustix::net::sockopt;
 
 use super::{LinkError, StreamPort};
 
-/// How long a connection may take to be made.
+/// Time limit of a connection attempt.
 const CONNECT_WAIT: Duration = Duration::from_secs(5);
 
 /// Connects to a card that listens on a TCP port.
 ///
 /// # Errors
-/// If the host has no address, or none that accepts within seconds.
+/// If the host has no address, or none accepts within 5 s.
 pub fn connect_tcp(host: &str, port: u16) -> Result<StreamPort<TcpStream>, LinkError> {
     connect(host, port).map_err(|error| LinkError::connect(tcp_address(host, port), &error))
 }
 
-/// How a TCP address is written as an argument.
+/// Formats a TCP address as an argument of `--card`.
 pub(crate) fn tcp_address(host: &str, port: u16) -> String {
     if host.contains(':') { format!("tcp:[{host}]:{port}") } else { format!("tcp:{host}:{port}") }
 }
 
-/// The host of an address, without the brackets that an IPv6 address is written in.
+/// Host of an address, without the brackets of an IPv6 address.
 pub(crate) fn host_name(text: &str) -> Result<String, String> {
     match text.strip_prefix('[').and_then(|text| text.strip_suffix(']')) {
         Some(address) if !address.is_empty() => Ok(address.into()),
@@ -48,7 +48,7 @@ fn connect(host: &str, port: u16) -> io::Result<StreamPort<TcpStream>> {
     Err(last)
 }
 
-/// A port on a TCP connection: small frames go at once, and an end that vanishes is noticed.
+/// Port on a TCP connection: small frames are sent at once, and a vanished peer is detected.
 pub(super) fn tcp_port(stream: TcpStream) -> io::Result<StreamPort<TcpStream>> {
     stream.set_nonblocking(true)?;
     stream.set_nodelay(true)?;
@@ -58,7 +58,8 @@ pub(super) fn tcp_port(stream: TcpStream) -> io::Result<StreamPort<TcpStream>> {
     Ok(StreamPort::new(stream))
 }
 
-/// Ends a connection that is silent for a minute and answers no probe. Elsewhere the system's own hours pass.
+/// Enables keep-alive: a connection ends after a minute of silence without an answer to probes. On other systems their
+/// default of hours holds.
 #[cfg(target_os = "linux")]
 fn probe_soon(stream: &TcpStream) -> io::Result<()> {
     sockopt::set_tcp_keepidle(stream, Duration::from_secs(30))?;
@@ -70,7 +71,7 @@ fn probe_soon(stream: &TcpStream) -> io::Result<()> {
 /// Connects to a card that listens on a Unix socket.
 ///
 /// # Errors
-/// If there is no such socket, or nothing listens on it.
+/// If the socket does not exist, or nothing listens on it.
 #[cfg(unix)]
 pub fn connect_unix(path: &Path) -> Result<StreamPort<UnixStream>, LinkError> {
     UnixStream::connect(path)
@@ -78,7 +79,7 @@ pub fn connect_unix(path: &Path) -> Result<StreamPort<UnixStream>, LinkError> {
         .map_err(|error| LinkError::connect(format_args!("unix:{}", path.display()), &error))
 }
 
-/// A port on a connection of a Unix socket.
+/// Port on a connection of a Unix socket.
 #[cfg(unix)]
 pub(super) fn unix_port(stream: UnixStream) -> io::Result<StreamPort<UnixStream>> {
     stream.set_nonblocking(true)?;

@@ -1,4 +1,4 @@
-//! A port on a stream of the system: a socket, or the card's end of a pseudo terminal.
+//! Port on a stream of the system: a socket, or the card's end of a pseudo terminal.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::time::Duration;
@@ -7,13 +7,13 @@ use photoncard_shared::link::{Port, PortError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::AsFd;
 
-/// A port on a stream that does not block: waiting is done by `poll`, so that every call is bounded.
+/// Port on a non-blocking stream; `poll` bounds the wait of every call.
 pub struct StreamPort<S> {
     stream: S,
 }
 
 impl<S: Read + Write + AsFd> StreamPort<S> {
-    /// A port on a stream. It must have been set not to block.
+    /// Port on a stream, which must be non-blocking.
     pub(super) fn new(stream: S) -> Self {
         Self { stream }
     }
@@ -44,7 +44,7 @@ impl<S: Read + Write + AsFd> Port for StreamPort<S> {
     fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
         match self.try_write(bytes)? {
             0 if !bytes.is_empty() => {
-                // A terminal that nobody has open neither takes bytes nor fails to.
+                // A terminal that no host has open accepts no bytes and reports no error.
                 if wait_for(&self.stream, PollFlags::OUT, wait).contains(PollFlags::HUP) {
                     return Err(PortError::Closed);
                 }
@@ -55,16 +55,16 @@ impl<S: Read + Write + AsFd> Port for StreamPort<S> {
     }
 }
 
-/// Waits until one of `events` happens to a stream or the time is over. Returns what has happened.
+/// Waits until one of `events` occurs on a stream, at most for `wait`. Returns the events that occurred.
 pub(super) fn wait_for(stream: &impl AsFd, events: PollFlags, wait: Duration) -> PollFlags {
     let mut streams = [PollFd::new(stream, events)];
-    // A signal ends the wait early; a time beyond the system's is none.
+    // A signal ends the wait early. A time beyond the system's maximum means no limit.
     let timeout = Timespec::try_from(wait).ok();
     let _ = poll(&mut streams, timeout.as_ref());
     streams[0].revents()
 }
 
-/// The bytes that have moved; none if they could not yet.
+/// Number of bytes moved; 0 if the stream would block.
 pub(super) fn moved(result: io::Result<usize>) -> Result<usize, PortError> {
     result.or_else(|error| match error.kind() {
         ErrorKind::WouldBlock | ErrorKind::Interrupted => Ok(0),
@@ -73,20 +73,20 @@ pub(super) fn moved(result: io::Result<usize>) -> Result<usize, PortError> {
         | ErrorKind::BrokenPipe
         | ErrorKind::NotConnected
         | ErrorKind::TimedOut => Err(PortError::Closed),
-        // A terminal whose other end is gone; a serial adapter that was pulled out.
+        // A terminal whose other end is closed; a serial adapter that was unplugged.
         _ if is_gone(&error) => Err(PortError::Closed),
         _ => Err(PortError::Device(error.raw_os_error().unwrap_or(0).unsigned_abs())),
     })
 }
 
-/// Whether the device of a terminal is gone.
+/// Returns whether the device of a terminal is gone.
 #[cfg(unix)]
 fn is_gone(error: &io::Error) -> bool {
     use rustix::io::Errno;
     Errno::from_io_error(error).is_some_and(|errno| [Errno::IO, Errno::NODEV, Errno::NXIO].contains(&errno))
 }
 
-/// Sockets, the only streams elsewhere, say it by the kind of the error.
+/// Sockets, the only streams on other systems, report it by the kind of the error.
 #[cfg(not(unix))]
 fn is_gone(_: &io::Error) -> bool {
     false

@@ -1,11 +1,11 @@
-//! Links that only Unix systems have.
+//! Replacements for links that only Unix systems have.
 
 use std::io::ErrorKind;
 use std::path::Path;
 
 use super::{LinkError, LoopbackPort};
 
-/// Connects to no Unix socket.
+/// Fails: this system has no Unix sockets.
 ///
 /// # Errors
 /// Always.

@@ -1,4 +1,4 @@
-//! The card image: its header, and all its lines.
+//! The card image: its header and its lines.
 
 use std::ops::Range;
 
@@ -9,9 +9,9 @@ use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::{Header, Section, SectionKind};
 use photoncard_shared::layout::{BvhNode, NodeBox, WideNode};
 
-/// A card image.
+/// Card image.
 pub struct CardImage {
-    /// The header that the first lines hold.
+    /// Header, as encoded in the first lines.
     pub(super) header: Header,
     pub(super) lines: Vec<Line>,
 }
@@ -37,27 +37,27 @@ impl CardImage {
         &self.lines[self.range(kind)]
     }
 
-    /// The lines of a section, to be changed in place.
+    /// The lines of a section, mutable.
     pub(crate) fn section_mut(&mut self, kind: SectionKind) -> &mut [Line] {
         let range = self.range(kind);
         &mut self.lines[range]
     }
 
-    /// The numbers of a section's lines.
+    /// Indices of a section's lines.
     fn range(&self, kind: SectionKind) -> Range<usize> {
         let Section { first_line, records } = self.header.section(kind);
         let first = first_line as usize;
         first..first + records.div_ceil(kind.records_per_line()) as usize
     }
 
-    /// The box around the scene, larger by what the root's 8-bit grid rounds; `None` without triangles.
+    /// Bounding box of the scene, enlarged by the rounding of the root's 8-bit grid; `None` without triangles.
     pub(super) fn bounds(&self) -> Option<NodeBox> {
         let Line(root) = self.section(SectionKind::Nodes).first()?;
         let children = 0..WideNode(root).children() as usize;
         children.filter_map(|child| BvhNode(root).bounds(child)).reduce(NodeBox::union)
     }
 
-    /// The diagonal of the box around the scene, metres; 1 without triangles.
+    /// Diagonal of the scene's bounding box, metres; 1 without triangles.
     pub fn diagonal(&self) -> f32 {
         self.bounds().map_or(1.0, |NodeBox { lower, upper }| Vec3::from(upper).distance(Vec3::from(lower)))
     }

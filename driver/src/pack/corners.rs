@@ -1,4 +1,4 @@
-//! Attributes of triangles' corners as records of the card image.
+//! Vertex attributes of triangles as records of the card image.
 
 use photoncard_shared::layout::{self, LeafAttributes};
 
@@ -6,16 +6,16 @@ use crate::bvh::LeafTriangles;
 use crate::light::Lights;
 use crate::scene::{NO_ATTRIBUTES, Scene, VertexAttributes};
 
-/// The attributes of the triangles of all leaves. Leaves whose triangles have none have no records.
+/// Vertex attributes of the triangles of all leaves. Leaves without attributes have no records.
 pub(super) struct PackedCorners {
-    /// The entry of each leaf; none if no leaf has any.
+    /// Entry of each leaf; empty if no leaf has attributes.
     pub(super) leaves: Vec<u32>,
-    /// The records of the leaves that have some.
+    /// Records of the leaves with attributes.
     pub(super) records: Vec<layout::Attributes>,
 }
 
 impl PackedCorners {
-    /// The attributes of a scene whose triangles are in these leaves.
+    /// Attributes of a scene whose triangles are in `leaves`.
     pub(super) fn new(scene: &Scene, lights: &Lights, leaves: &[LeafTriangles]) -> Self {
         let mut packed = Self { leaves: Vec::with_capacity(leaves.len()), records: Vec::new() };
         for leaf in leaves {
@@ -53,7 +53,7 @@ impl PackedCorners {
     }
 }
 
-/// The record of some attributes with one set of texture coordinates, of a triangle that may be an emitter.
+/// Record of vertex attributes with one set of texture coordinates; `emitter` is the triangle's emitter, if any.
 fn record(attributes: &VertexAttributes, set: usize, emitter: Option<u32>) -> layout::Attributes {
     layout::Attributes {
         normals: attributes.normals.map(|normals| normals.map(|normal| normal.to_array())),

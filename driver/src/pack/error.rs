@@ -1,18 +1,18 @@
-//! Scenes that do not fit a card.
+//! Errors of packing a scene.
 
 use photoncard_shared::layout::NO_TEXTURE;
 
 use crate::allocation;
 use crate::bvh::HierarchyError;
 
-/// Why a scene does not fit a card.
+/// Error of a scene that does not fit a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum PackError {
-    /// The hierarchy is not one for a chip.
+    /// Error of the bounding volume hierarchy.
     #[error(transparent)]
     #[diagnostic(help("simplify the scene's geometry"))]
     Hierarchy(#[from] HierarchyError),
-    /// The process cannot have the memory for packing.
+    /// Error of memory that packing needs and the system refuses.
     #[error("packing {triangles} triangles takes {bytes} bytes of memory, which the system does not give")]
     #[diagnostic(help("simplify the scene's geometry, or {}", allocation::REMEDY))]
     Memory {
@@ -21,21 +21,21 @@ pub enum PackError {
         /// Bytes of memory.
         bytes: u64,
     },
-    /// More lines than a line address can number.
+    /// Error of more lines than a line address can number.
     #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
     #[diagnostic(help("lower --photons, use smaller textures, or simplify the scene"))]
     TooLarge {
         /// Bytes of the image.
         bytes: u64,
     },
-    /// More textures than the index in a material's record can name.
+    /// Error of more textures than the index in a material's record can name.
     #[error("the scene has {textures} textures; a card image can index at most {}", NO_TEXTURE)]
     #[diagnostic(help("use one texture wherever image and sampler are equal, or split the scene"))]
     TooManyTextures {
         /// Textures of the scene.
         textures: usize,
     },
-    /// The image is larger than the card's memory.
+    /// Error of an image that is larger than the card's memory.
     #[error(
         "the card image takes {needed} bytes ({photons} of them photons), the card's DRAM budget is {available} bytes"
     )]
@@ -47,7 +47,7 @@ pub enum PackError {
         photons: u64,
         /// Bytes of the card's DRAM.
         available: u64,
-        /// What to lower, and how far.
+        /// Setting to lower, and its maximum.
         remedy: String,
     },
 }

@@ -26,7 +26,7 @@ pub(super) fn records(scene: &Scene, lights: &Lights) -> impl ExactSizeIterator<
         .map(|(material, has_attributes)| record(material, has_attributes))
 }
 
-/// True if photons are stored on some triangle, as the chip reads its material from the image.
+/// Returns whether any triangle's material stores photons, as the chip decides from the image.
 pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Lines)) -> bool {
     let mut is_used = vec![false; scene.materials.len()];
     for triangle in &scene.triangles {
@@ -35,13 +35,13 @@ pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Line
     let mut used = scene.materials.iter().zip(is_used).filter(|(_, is_used)| *is_used);
     used.any(|(material, _)| {
         let material = layout::Material::read(&record(material, true));
-        // The image is our own. Were it not sound, tracing photons would say so.
+        // The image was just packed. If it were malformed, tracing photons would report it.
         keeps_photons(&image, &mut memory, &material).unwrap_or(true)
     })
 }
 
-/// The record of a material, some of whose triangles may have attributes. Its textures are as many as the scene's, which `u16`
-/// tells apart.
+/// Record of a material; `has_attributes` is true if any of its triangles may have attributes. `u16` indexes all textures
+/// of the scene.
 fn record(material: &Material, has_attributes: bool) -> [u8; RECORD_BYTES] {
     let transmission = transmission_of(material);
     let mut flags = if material.double_sided { DOUBLE_SIDED } else { 0 };
@@ -67,7 +67,7 @@ fn record(material: &Material, has_attributes: bool) -> [u8; RECORD_BYTES] {
     .to_bytes()
 }
 
-/// The alpha cutoff for the product of texture and corner, the factor of the material divided out.
+/// Alpha cutoff for the product of texture and vertex alpha: the material's cutoff over its alpha factor.
 fn cutoff(material: &Material) -> f32 {
     match material.alpha_cutoff {
         Some(cutoff) if cutoff > 0.0 => cutoff / material.alpha,
@@ -75,7 +75,7 @@ fn cutoff(material: &Material) -> f32 {
     }
 }
 
-/// The transmission of a surface that lets light through.
+/// Transmission of a material that transmits light.
 fn transmission_of(material: &Material) -> Option<Transmission> {
     match material.reflection {
         Reflection::MetallicRoughness { transmission, metallic, .. }
@@ -87,7 +87,7 @@ fn transmission_of(material: &Material) -> Option<Transmission> {
     }
 }
 
-/// The share of a dielectric's reflectance that a material states, of one of the index of refraction.
+/// Stated specular reflectance of a dielectric over the reflectance of its index of refraction.
 fn specular_share(dielectric: Vec3, ior: f32) -> f32 {
     let amplitude = (ior - 1.0) / (ior + 1.0);
     let of_index = amplitude * amplitude;

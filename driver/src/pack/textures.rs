@@ -1,4 +1,4 @@
-//! Textures as records and lines of texels of the card image.
+//! Textures as records and texel lines of the card image.
 
 use photoncard_shared::address::Line;
 use photoncard_shared::layout::{self, NO_TEXTURE, TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat};
@@ -7,10 +7,10 @@ use super::error::PackError;
 use crate::light::EnvironmentMap;
 use crate::scene::{Encoding, Image, Scene, Wrap};
 
-/// The records of a scene's textures, the environment's last. Those of one image share its texels.
+/// Records of a scene's textures, the environment's last. Textures of one image share its texels.
 ///
 /// # Errors
-/// If they are more than materials can tell apart.
+/// If they are more than a material's record can index.
 pub(super) fn records(
     scene: &Scene,
     environment: Option<&EnvironmentMap>,
@@ -24,7 +24,8 @@ pub(super) fn records(
         .iter()
         .map(|image| {
             let texture = layout::Texture { first_line, ..bare(image) };
-            // No overflow: lines are counted when they are appended, and an image has fewer than its texels.
+            // An overflow is impossible after `lines` are appended: lines are counted there, and an image has fewer lines
+            // than texels.
             first_line = first_line.wrapping_add(texture.lines());
             texture
         })
@@ -40,7 +41,7 @@ pub(super) fn records(
     Ok(textures.chain(environment.map(|map| map.texture(first_line))).collect())
 }
 
-/// The lines of all images' texels, one after the other, the environment's last.
+/// Lines of all images' texels, one image after the other, the environment's last.
 pub(super) fn lines(scene: &Scene, environment: Option<&EnvironmentMap>) -> impl Iterator<Item = Line> {
     let of_images = scene.images.iter().flat_map(|image| {
         tiles(bare(image), |x, y| image.texels[y as usize * image.width as usize + x as usize])
@@ -50,7 +51,7 @@ pub(super) fn lines(scene: &Scene, environment: Option<&EnvironmentMap>) -> impl
     of_images.chain(of_environment)
 }
 
-/// The lines of a texture with these texels by column and row.
+/// Lines of a texture; `texel` returns the texel at a column and a row.
 fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl Iterator<Item = Line> {
     let [width, height] = texture.size.map(u32::from);
     let across = width.div_ceil(TILE_WIDTH);
@@ -58,7 +59,7 @@ fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl 
         let [column, row] = [tile % across * TILE_WIDTH, tile / across * TILE_HEIGHT];
         let mut line = Line::ZERO;
         for (place, bytes) in (0..TEXELS_PER_LINE).zip(line.0.as_chunks_mut().0) {
-            // Beyond the borders the last texels go on.
+            // Tiles that extend beyond the borders repeat the last texels.
             let x = (column + place % TILE_WIDTH).min(width - 1);
             let y = (row + place / TILE_WIDTH).min(height - 1);
             *bytes = texel(x, y);
@@ -67,11 +68,11 @@ fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl 
     })
 }
 
-/// The texture of an image, with texels from line 0 on.
+/// Texture of an image, with texels from line 0 on.
 fn bare(image: &Image) -> layout::Texture {
     layout::Texture {
         first_line: 0,
-        // The loader refuses what is larger.
+        // The loader rejects larger images.
         size: [image.width, image.height].map(|side| side as u16),
         wrap: [layout::Wrap::Repeat; 2],
         nearest: false,

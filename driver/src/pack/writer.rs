@@ -1,4 +1,4 @@
-//! A card image under construction: sections appended one after another, in lines.
+//! Construction of a card image: sections are appended one after another, in lines.
 
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::{HEADER_LINES, Header, Section, SectionKind};
@@ -7,30 +7,30 @@ use photoncard_shared::layout::PhotonGrid;
 use super::card_image::CardImage;
 use super::error::PackError;
 
-/// Writes a card image, or goes on writing one: appends sections behind its last line.
+/// Writer of a card image: appends sections after the last line.
 pub(crate) struct ImageWriter {
     header: Header,
     lines: Vec<Line>,
 }
 
 impl ImageWriter {
-    /// An image without sections. `header` gives its units and lights; lines and sections are counted here.
+    /// Writer of an image without sections. `header` holds its units and lights; lines and sections are counted here.
     pub(super) fn new(header: Header) -> Self {
         Self { header, lines: vec![Line::ZERO; HEADER_LINES] }
     }
 
-    /// Goes on with an image that was finished before.
+    /// Writer that appends to a finished image.
     pub(crate) fn resume(CardImage { header, lines }: CardImage) -> Self {
         Self { header, lines }
     }
 
-    /// Sets the grid of photons' positions, and the watts that a photon power of 1 stands for.
+    /// Sets the grid of photon positions, and the power of a stored photon of value 1, watts.
     pub(crate) fn set_photons(&mut self, grid: PhotonGrid, power_unit: f32) {
         self.header.photon_grid = grid;
         self.header.photon_power_unit = power_unit;
     }
 
-    /// Sets the watts that a power of 1 of a caustic photon stands for.
+    /// Sets the power of a stored caustic photon of value 1, watts.
     pub(crate) fn set_caustic_power_unit(&mut self, power_unit: f32) {
         self.header.caustic_power_unit = power_unit;
     }
@@ -46,7 +46,7 @@ impl ImageWriter {
     ) -> Result<(), PackError> {
         let lines = records.len().div_ceil(LINE_BYTES / N);
         self.header.sections[kind as usize] = section(self.lines.len(), records.len(), lines)?;
-        // Exactly: an image is most of what the host holds.
+        // Reserves exactly: the image is most of the host's memory.
         self.lines.reserve_exact(lines);
         self.lines.extend(pack_lines(records));
         Ok(())
@@ -104,7 +104,7 @@ impl ImageWriter {
     }
 }
 
-/// A section of so many records in so many lines from line `first` on.
+/// Section of `records` records in `lines` lines from line `first` on.
 fn section(first: usize, records: usize, lines: usize) -> Result<Section, PackError> {
     let end = first + lines;
     let too_large = |_| PackError::TooLarge { bytes: end as u64 * LINE_BYTES as u64 };
@@ -113,7 +113,7 @@ fn section(first: usize, records: usize, lines: usize) -> Result<Section, PackEr
     end.and(Ok(Section { first_line: first_line?, records: records? }))
 }
 
-/// Packs records into lines, none of them across a border.
+/// Packs records into lines; no record straddles two lines.
 fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl Iterator<Item = Line> {
     let per_line = LINE_BYTES / N;
     let mut records = records.peekable();

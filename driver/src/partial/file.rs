@@ -1,5 +1,5 @@
-//! The file itself, opened with care: no link is followed, no pipe waited for, and nothing written or removed that is not a
-//! file of finished tiles.
+//! The file of a partial render, opened safely: links are not followed, pipes do not block, and no foreign file is written
+//! or removed.
 
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
@@ -8,23 +8,23 @@ use std::path::Path;
 use super::error::PartialError;
 use crate::output::kind_of;
 
-/// What the first line of any version begins with; the version's number follows.
+/// Beginning of the first line in all versions; the version's number follows.
 pub(super) const FAMILY: &str = "photoncard partial render ";
-/// The longest first line: a number of 10 digits and the line's end.
+/// Maximum length of the first line: a number of 10 digits and the line feed.
 const MAX_TITLE: u64 = FAMILY.len() as u64 + 11;
-/// Times that a file is opened which others remove meanwhile.
+/// Maximum number of attempts to open a file that other processes create or remove at the same time.
 const MAX_TRIES: usize = 16;
 
-/// The first line of a file of finished tiles.
+/// First line of a partial render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Title {
-    /// The file ends before the line does: it holds no tile.
+    /// The file ends within the line: it holds no tile.
     CutOff,
-    /// The version of what follows.
+    /// Version of the format.
     Version(u32),
 }
 
-/// Reads the first line; `None` if the file is not of this program.
+/// Reads the first line; `None` if the file is no partial render.
 pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>> {
     let mut line = Vec::new();
     reader.take(MAX_TITLE).read_until(b'\n', &mut line)?;
@@ -34,7 +34,7 @@ pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>>
     let number = line.strip_prefix(FAMILY.as_bytes()).and_then(|number| str::from_utf8(number).ok());
     Ok(number.and_then(|number| match number.strip_suffix('\n') {
         Some(number) => number.parse().ok().map(Title::Version),
-        // A longer line is no title, cut off or not.
+        // A longer line is no title, even if truncated.
         None => {
             let is_cut_off =
                 (line.len() as u64) < MAX_TITLE && number.bytes().all(|byte| byte.is_ascii_digit());
@@ -43,7 +43,7 @@ pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>>
     }))
 }
 
-/// Opens the file and makes it this render's own. One that is not there is made if `create` says so.
+/// Opens and locks the file. If it does not exist, it is created if `create` is true; otherwise the result is `None`.
 pub(super) fn open(path: &Path, create: bool) -> Result<Option<File>, PartialError> {
     let failed = |source| PartialError::File { path: path.to_owned(), source };
     for _ in 0..MAX_TRIES {
@@ -57,13 +57,13 @@ pub(super) fn open(path: &Path, create: bool) -> Result<Option<File>, PartialErr
             Err(_) => File::options().read(true).write(true).create_new(true).open(path),
         };
         let file = match file {
-            // Made or removed by another meanwhile.
+            // Another process has created or removed the file meanwhile.
             Err(error) if [ErrorKind::AlreadyExists, ErrorKind::NotFound].contains(&error.kind()) => continue,
             file => file.map_err(failed)?,
         };
         check_kind(path, &file.metadata().map_err(failed)?)?;
         check_lock(path, &file.try_lock())?;
-        // Whoever had it may have removed it before it was locked.
+        // The previous owner may have removed the file before it was locked.
         if is_at(&file, path).map_err(failed)? {
             let title = read_title(&mut BufReader::new(&file)).map_err(failed)?;
             let foreign = PartialError::Foreign { path: path.to_owned() };
@@ -73,7 +73,7 @@ pub(super) fn open(path: &Path, create: bool) -> Result<Option<File>, PartialErr
     Err(PartialError::Busy { path: path.to_owned() })
 }
 
-/// Opens what is there for reading and writing, unless it has become a link, and does not wait if it has become a pipe.
+/// Opens an existing file for reading and writing, without following a link and without blocking on a pipe.
 #[cfg(unix)]
 fn open_there(path: &Path) -> io::Result<File> {
     use rustix::fs::{Mode, OFlags};
@@ -86,7 +86,7 @@ fn open_there(path: &Path) -> io::Result<File> {
     File::options().read(true).write(true).open(path)
 }
 
-/// Refuses what is no file, or has another name by which somebody else may know it.
+/// Refuses anything but a regular file, and a file with several hard links, which may belong to somebody else.
 fn check_kind(path: &Path, found: &Metadata) -> Result<(), PartialError> {
     let linked = has_other_names(found).then_some("file with other hard links");
     match kind_of(found.file_type()).or(linked) {
@@ -100,13 +100,13 @@ fn has_other_names(found: &Metadata) -> bool {
     std::os::unix::fs::MetadataExt::nlink(found) > 1
 }
 
-/// Not every system tells.
+/// Not every system reports the number of links.
 #[cfg(not(unix))]
 fn has_other_names(_: &Metadata) -> bool {
     false
 }
 
-/// Tells whether another render has the file. Where the system has no locks, or refuses them, nothing is known.
+/// Checks that no other render has locked the file. A system without locks, or one that refuses them, passes.
 pub(super) fn check_lock(path: &Path, locked: &Result<(), TryLockError>) -> Result<(), PartialError> {
     match locked {
         Err(TryLockError::WouldBlock) => Err(PartialError::Busy { path: path.to_owned() }),
@@ -114,7 +114,7 @@ pub(super) fn check_lock(path: &Path, locked: &Result<(), TryLockError>) -> Resu
     }
 }
 
-/// Removes the file, unless another has taken its name.
+/// Removes the file, unless its path names another file by now.
 pub(super) fn remove(file: &File, path: &Path) -> io::Result<()> {
     if !is_at(file, path)? {
         return Ok(());
@@ -125,7 +125,7 @@ pub(super) fn remove(file: &File, path: &Path) -> io::Result<()> {
     }
 }
 
-/// Whether a path still names a file that was opened there.
+/// Returns whether `path` still names the opened file.
 #[cfg(unix)]
 pub(super) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
@@ -137,7 +137,7 @@ pub(super) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Elsewhere a file that is open keeps its name.
+/// On other systems an open file keeps its name.
 #[cfg(not(unix))]
 pub(super) fn is_at(_: &File, _: &Path) -> io::Result<bool> {
     Ok(true)

@@ -1,4 +1,4 @@
-//! The records of finished tiles in their file: `magic number | x, y, width, height | pixels | CRC-32C`.
+//! Records of finished tiles in a partial render: `magic number | x, y, width, height | pixels | CRC-32C`.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
@@ -10,18 +10,18 @@ use photoncard_shared::message::{PixelRecord, Tile, record_bytes};
 use crate::film::Film;
 use crate::sink::{FinishedTile, pixel_positions};
 
-/// What a record begins with. As of a PNG file, a transfer that alters the ends of lines or the eighth bits is found out.
+/// Magic number of a record. As in PNG, a transfer that alters line ends or eighth bits destroys it.
 pub(super) const MAGIC: [u8; 8] = *b"\x89TILE\r\n\x1a";
-/// Bytes of the magic number, and of the tile's place and size.
+/// Size of magic number, position and size of the tile, bytes.
 pub(super) const HEAD_BYTES: usize = MAGIC.len() + 16;
 pub(super) const CHECKSUM_BYTES: usize = 4;
-/// Pixels of a tile at the most: no chip has a larger budget.
+/// Maximum number of pixels of a tile: the largest budget of a chip.
 const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
-/// Bytes that a file may make a reader take for tiles in vain, besides as many as it has: some hundred of the largest tiles.
-/// Without an end a hostile file would take hours.
+/// Limit of the bytes that a reader may spend on invalid tiles, in addition to the file's size: some hundred of the largest
+/// tiles. Without a limit, a hostile file would take hours.
 const MAX_IN_VAIN: u64 = 32 << 20;
 
-/// What is kept of a finished tile.
+/// Encodes the record of a finished tile.
 pub(super) fn record(finished: &FinishedTile) -> Vec<u8> {
     let Tile { x, y, width, height, .. } = *finished.tile();
     let mut bytes = MAGIC.to_vec();
@@ -31,9 +31,8 @@ pub(super) fn record(finished: &FinishedTile) -> Vec<u8> {
     bytes
 }
 
-/// Reads all sound tiles of a file, from `start` on, into the film. Returns where the last one ends. After what is no sound
-/// record the next one is looked for behind the magic number. What is behind a file's worth of bytes, and [`MAX_IN_VAIN`] more,
-/// that were taken for tiles in vain is given up.
+/// Reads all valid tiles from offset `start` on into the film. Returns the end of the last one. After invalid bytes the
+/// search continues at the next magic number. It stops when the invalid tiles exceed the file's size plus [`MAX_IN_VAIN`].
 pub(super) fn read_tiles(reader: &mut BufReader<&File>, start: u64, film: &mut Film) -> io::Result<u64> {
     let end = reader.get_ref().metadata()?.len();
     let (mut at, mut sound) = (start, start);
@@ -58,7 +57,7 @@ pub(super) fn read_tiles(reader: &mut BufReader<&File>, start: u64, film: &mut F
     Ok(sound)
 }
 
-/// Goes on behind the next magic number. Returns the bytes up to there; `None` if the file ends before.
+/// Skips to the end of the next magic number. Returns the number of bytes skipped; `None` if the file ends before.
 fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     let (mut skipped, mut matched) = (0, 0);
     loop {
@@ -68,7 +67,7 @@ fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
             return Ok(None);
         }
         for (byte, count) in buffer.iter().zip(1..) {
-            // Its first byte is not among its others: where a match fails none has begun within it.
+            // The first byte of the magic number does not recur in it: no other match can begin within a failed one.
             matched = if *byte == MAGIC[matched] { matched + 1 } else { usize::from(*byte == MAGIC[0]) };
             if matched == MAGIC.len() {
                 reader.consume(count);
@@ -80,7 +79,8 @@ fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     }
 }
 
-/// Reads what follows a magic number into the film, at most `available` bytes. Returns how many it was; `None` if it is damaged.
+/// Reads a tile after its magic number into the film, at most `available` bytes. Returns their number; `None` if it is
+/// invalid.
 fn read_tile(reader: &mut impl Read, available: u64, film: &mut Film) -> io::Result<Option<u64>> {
     let mut bytes = MAGIC.to_vec();
     bytes.resize(HEAD_BYTES, 0);
@@ -103,13 +103,13 @@ fn read_tile(reader: &mut impl Read, available: u64, film: &mut Film) -> io::Res
         return Ok(None);
     }
     for ((x, y), record) in pixel_positions(&tile).zip(bytes[HEAD_BYTES..].chunks_exact(pixel_bytes)) {
-        // The tile lies inside the window, and records have their length.
+        // Cannot fail: the tile lies inside the window, and records have their full length.
         let _ = PixelRecord::read(record).map(|record| film.write_record(x, y, &record));
     }
     Ok(Some(behind_magic))
 }
 
-/// The tile of a place and a size, if the film and a chip have room for it.
+/// Decodes position and size of a tile; `None` unless it lies in the film's window and within a chip's budget.
 fn tile_at(bytes: &[u8], film: &Film) -> Option<Tile> {
     let number = |index: usize| bytes.as_chunks().0.get(index).map(|bytes| u32::from_le_bytes(*bytes));
     let tile = Tile { id: 0, x: number(0)?, y: number(1)?, width: number(2)?, height: number(3)? };
@@ -122,7 +122,7 @@ fn tile_at(bytes: &[u8], film: &Film) -> Option<Tile> {
     (is_inside && tile.pixels() <= MAX_PIXELS).then_some(tile)
 }
 
-/// Fills a buffer. Returns whether there were so many bytes.
+/// Fills a buffer. Returns false at the end of the file.
 fn read_all(reader: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
     match reader.read_exact(buffer) {
         Ok(()) => Ok(true),

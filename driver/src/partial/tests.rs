@@ -12,7 +12,7 @@ use crate::film::Window;
 use crate::sink::pixel_positions;
 
 const TILES: u32 = 6;
-/// Bytes of a tile's record.
+/// Size of a tile's record, bytes.
 const RECORD_BYTES: usize = HEAD_BYTES + 12 * PIXEL_BYTES + CHECKSUM_BYTES;
 
 fn film() -> Film {
@@ -23,13 +23,13 @@ fn tile(id: u32) -> Tile {
     Tile { id, x: 4 * id, y: 0, width: 4, height: 3 }
 }
 
-/// A tile of nothing.
+/// A tile of black pixels.
 fn blank(tile: &Tile) -> FinishedTile {
     let records = vec![0; PIXEL_BYTES * tile.pixels() as usize];
     FinishedTile::new(*tile, records, false, Counters::ZERO).unwrap()
 }
 
-/// The settings of a file in a folder.
+/// Settings of a partial render in a folder.
 fn partial(folder: &tempfile::TempDir, resume: bool) -> PartialSettings {
     PartialSettings { path: folder.path().join("partial"), resume }
 }
@@ -49,14 +49,14 @@ fn written(folder: &tempfile::TempDir) -> Vec<u8> {
     fs::read(settings.path).unwrap()
 }
 
-/// The tiles that a render that is gone on with takes over.
+/// Tiles that a resumed render takes over.
 fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
     let settings = partial(folder, true);
     fs::write(&settings.path, bytes).unwrap();
     let mut film = film();
     let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
     let taken: Vec<u32> = (0..TILES).filter(|&id| film.has(&tile(id))).collect();
-    // What is missing is kept behind the rest.
+    // Missing tiles are appended.
     for id in (0..TILES).filter(|id| !taken.contains(id)) {
         partial.put(&blank(&tile(id)));
     }
@@ -78,7 +78,7 @@ fn damage_loses_the_tile_that_it_hits_alone() {
         damaged[start + 2 * RECORD_BYTES + place] ^= 0x81;
         assert_eq!(taken_over(&folder, &damaged), [0, 1, 3, 4, 5], "{place}");
     }
-    // Bytes that are lost, or come twice.
+    // Lost and repeated bytes.
     let middle = start + 2 * RECORD_BYTES;
     for range in [middle + 30..middle + 50, middle..middle + 1, middle..middle + HEAD_BYTES] {
         let mut shorter = bytes.clone();
@@ -91,7 +91,7 @@ fn damage_loses_the_tile_that_it_hits_alone() {
     assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
 }
 
-/// The card that rendered them has lied: until another has rendered them they are not taken over, and then as that one has.
+/// Tiles of an outvoted card: they are not taken over until another card has rendered them, and then as that card has.
 #[test]
 fn revoked_tiles_are_struck_out_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
@@ -114,7 +114,7 @@ fn revoked_tiles_are_struck_out_and_replaced() {
     assert_eq!((0..TILES).filter(|&id| !again.has(&tile(id))).collect::<Vec<_>>(), [1]);
     let depth = |id: u32| again.pixel(4 * id, 0).unwrap().depth;
     assert_eq!([depth(3), depth(4), depth(5)], [1.0, 2.0, 1.0]);
-    // What an earlier render has left is not this one's to strike out.
+    // Tiles of the earlier render are not struck out.
     render.revoke(&tile(0));
     render.check().unwrap();
     assert!(render.holds_tiles());
@@ -148,7 +148,7 @@ fn the_later_record_of_a_tile_holds() {
         film.pixel(5, 1).unwrap().depth
     };
     assert_eq!(depth(&bytes).to_bits(), (-1.0_f32).to_bits());
-    // Unless it is damaged.
+    // A damaged tile is rendered again.
     *bytes.last_mut().unwrap() ^= 1;
     assert_eq!(depth(&bytes).to_bits(), (4.0 * TILES as f32 + 5.0).to_bits());
 }
@@ -178,7 +178,7 @@ fn a_file_has_one_render() {
     let folder = tempfile::tempdir().unwrap();
     let [mut one, mut two, mut three] = [film(), film(), film()];
     let begin = |resume, film: &mut Film| PartialRender::begin(&partial(&folder, resume), json!({}), film);
-    // Neither has made the file yet.
+    // Neither render has created the file yet.
     let (first, second) = (begin(false, &mut one).unwrap(), begin(false, &mut two).unwrap());
     for partial in [&first, &second] {
         partial.put(&blank(&tile(0)));
@@ -188,14 +188,14 @@ fn a_file_has_one_render() {
     for resume in [false, true] {
         assert!(matches!(begin(resume, &mut three), Err(PartialError::Busy { .. })));
     }
-    // That one has none: the file is the first one's.
+    // The second render has not created the file: it belongs to the first.
     second.remove().unwrap();
     assert!(partial(&folder, false).path.exists());
     first.remove().unwrap();
     begin(false, &mut three).unwrap();
 }
 
-/// A file of nothing but places of the largest tile: each is read and summed for nothing.
+/// A file of headers of the largest tile: each is read and summed in vain.
 #[test]
 fn a_hostile_file_does_not_take_hours() {
     let folder = tempfile::tempdir().unwrap();
@@ -231,12 +231,12 @@ fn a_file_that_cannot_be_begun_is_not_left() {
     let mut film = film();
     let partial = PartialRender::begin(&partial(&folder, false), json!({}), &mut film).unwrap();
     fs::write(&path, b"").unwrap();
-    // It takes no byte, as on a disk that is full.
+    // A file opened for reading only fails on writes, like a full disk.
     partial.lock().file = Some(File::open(&path).unwrap());
     partial.put(&blank(&tile(0)));
     assert!(matches!(partial.check(), Err(PartialError::File { .. })));
     assert!(!path.exists() && !partial.holds_tiles());
-    // There is room again: it is begun anew.
+    // Once there is room again, the file is begun anew.
     partial.put(&blank(&tile(0)));
     partial.check().unwrap();
     assert!(partial.holds_tiles() && fs::read(&path).unwrap().starts_with(title().as_bytes()));
@@ -262,7 +262,7 @@ fn locks_that_the_system_refuses_hinder_no_render() {
     assert!(check_lock(path, &Err(TryLockError::WouldBlock)).is_err());
 }
 
-/// What is under the name of the file, and is none of this program's, is refused and left as it is.
+/// A foreign file of the partial render's name is refused and unchanged.
 #[test]
 fn a_foreign_file_is_refused_and_stays() {
     let folder = tempfile::tempdir().unwrap();
@@ -283,7 +283,7 @@ fn a_foreign_file_is_refused_and_stays() {
         }
         assert_eq!(fs::read(&path).unwrap(), foreign.as_bytes());
     }
-    // One that comes later is not written or removed either.
+    // Neither written nor removed, if it appears later.
     fs::remove_file(&path).unwrap();
     let film = &mut film();
     let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
@@ -292,7 +292,7 @@ fn a_foreign_file_is_refused_and_stays() {
     assert!(matches!(begun.check(), Err(PartialError::Foreign { .. })));
     begun.remove().unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"notes");
-    // Neither is one that has taken the name of a file that was begun.
+    // Nor if it replaces a file that was begun.
     fs::remove_file(&path).unwrap();
     let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
     begun.put(&blank(&tile(0)));
@@ -322,7 +322,7 @@ fn another_version_is_told_and_begun_anew_without_resume() {
     assert!(fs::read(&path).unwrap().starts_with(b"photoncard partial render 2\n{}\n\x89TILE"));
 }
 
-/// Links lead to what is somebody else's, and a pipe would be waited for: neither is opened.
+/// Links lead to others' files, and a pipe would block: neither is opened.
 #[cfg(unix)]
 #[test]
 fn what_is_no_file_of_its_own_is_refused_and_stays() {
@@ -330,7 +330,7 @@ fn what_is_no_file_of_its_own_is_refused_and_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = partial(&folder, false).path;
     let own = folder.path().join("own");
-    // Even to a file that could be gone on with.
+    // Even if the link's target is a partial render.
     let bytes = written(&folder);
     fs::rename(&path, &own).unwrap();
     let make_pipe = || Ok(rustix::fs::mkfifoat(rustix::fs::CWD, &path, rustix::fs::Mode::RWXU)?);

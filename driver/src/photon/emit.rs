@@ -1,8 +1,8 @@
 //! Emission: the first ray of a photon path, and its power.
 //!
-//! The first four random numbers of a path, the place and the direction, are a low-discrepancy sequence in the number
-//! of the path (the additive recurrence of Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*),
-//! shifted by the seed. Those of the bounces are hashes of (seed, path, bounce).
+//! The first four random numbers of a path, for position and direction, are a low-discrepancy sequence in the number of the
+//! path (the additive recurrence of Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*), shifted by
+//! the seed. Random numbers of bounces are hashes of (seed, path, bounce).
 
 use std::f32::consts::PI;
 
@@ -18,12 +18,12 @@ use photoncard_shared::message::Fault;
 
 use crate::light::{Aim, SolidCone, Source, Sources, Targets};
 
-/// A photon on its way.
+/// Emitted photon: the first ray of a path, and its power.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Emission {
-    /// The way.
+    /// First ray of the path.
     pub(super) ray: Ray,
-    /// Watts per channel, for one path in all.
+    /// Power per channel, watts, as if it were the only path.
     pub(super) power: Vec3,
 }
 
@@ -31,7 +31,7 @@ pub(super) struct Emission {
 const RECURRENCE: [u64; 4] =
     [0xdb4f_0b91_75ae_2165, 0xbbe0_5633_03a4_615f, 0xa0f2_ec75_a1fe_1575, 0x89e1_8285_7d9e_d688];
 
-/// The random numbers of one path.
+/// Random numbers of one path.
 #[derive(Clone, Copy)]
 pub(super) struct PathRandom {
     seed: u32,
@@ -43,7 +43,7 @@ impl PathRandom {
         Self { seed, path }
     }
 
-    /// The low-discrepancy point of the emission, each number of 2^64.
+    /// Low-discrepancy point of the emission, in units of 2^-64.
     fn emission(self) -> [u64; 4] {
         std::array::from_fn(|dimension| {
             let shift = (hash(self.seed ^ hash(dimension as u32 + 1)) as u64) << 32;
@@ -51,14 +51,14 @@ impl PathRandom {
         })
     }
 
-    /// The random numbers of a bounce.
+    /// Random numbers of a bounce.
     pub(super) fn bounce(self, bounce: u32) -> BounceRandom {
         let path = hash(hash(self.seed ^ 0x2c1b_3c6d).wrapping_add(self.path as u32));
         BounceRandom { key: hash(hash(path.wrapping_add((self.path >> 32) as u32)).wrapping_add(bounce)) }
     }
 }
 
-/// The random numbers of one bounce.
+/// Random numbers of one bounce.
 #[derive(Clone, Copy)]
 pub(super) struct BounceRandom {
     key: u32,
@@ -69,22 +69,22 @@ impl BounceRandom {
         hash(self.key.wrapping_add(index.wrapping_mul(0x9e37_79b9)))
     }
 
-    /// A point of the unit square, for the direction.
+    /// Point of the unit square that selects the direction.
     pub(super) fn point(self) -> [f32; 2] {
         [1, 2].map(|index| unit_interval(self.bits(index)))
     }
 
-    /// A number in [0, 1), for the survival.
+    /// Number in [0, 1) for Russian roulette.
     pub(super) fn survival(self) -> f32 {
         unit_interval(self.bits(3))
     }
 
-    /// A number in [0, 1), for the way on at a perfectly specular surface.
+    /// Number in [0, 1) that selects reflection or transmission at a perfectly specular surface.
     pub(super) fn choice(self) -> f32 {
         unit_interval(self.bits(5))
     }
 
-    /// Bits for the rounding of the power.
+    /// Random bits for the rounding of the power.
     pub(super) fn dither(self) -> u32 {
         self.bits(4)
     }
@@ -98,7 +98,8 @@ fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 / 16_777_216.0
 }
 
-/// The start of a path: a source by its power, a place and a direction. `None` where it is not worth following, and without lights.
+/// Emission of a path: samples a source by its power, a position and a direction. `None` if Russian roulette ends the path,
+/// the direction carries no light, or there are no sources.
 pub(super) fn emit(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -123,22 +124,22 @@ pub(super) fn emit(
     };
     let emission =
         emission.map(|emission| Emission { power: emission.power / chosen.probability, ..emission });
-    // Another random number than those of the bounces, which are fewer.
+    // Bounces are fewer than `u32::MAX`: this random number is used once.
     Ok(emission.and_then(|emission| roulette(emission, sources.power, random.bounce(u32::MAX).survival())))
 }
 
-/// Russian roulette where an emitter is darker than its mean, as one with a texture is in places: photons that are
-/// of one power make less noise than strong and weak ones.
+/// Russian roulette where an emitter is darker than its mean, as in dark parts of an emissive texture: photons of equal
+/// power have less variance.
 fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emission> {
     let probability = (f64::from(emission.power.element_sum()) / (3.0 * mean_power)) as f32;
-    // What differs by rounding is left as it is.
+    // Differences by rounding are ignored.
     if probability > 0.99 {
         return Some(emission);
     }
     (roulette < probability).then(|| Emission { power: emission.power / probability, ..emission })
 }
 
-/// Emission of an emitter as the only source; towards targets, if there are any.
+/// Emission of an emitter as the only source, towards the targets if there are any.
 fn from_emitter(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -179,7 +180,7 @@ fn from_emitter(
     })
 }
 
-/// A direction in the cone that light goes to, or towards targets, if there are any.
+/// Direction in the cone of emission, or towards the targets if there are any.
 fn aim(targets: &Targets, from: Vec3, cone: SolidCone, square: [f32; 2]) -> Option<Aim> {
     if targets.is_empty() {
         return Some(Aim { towards: cone.direction(square), measure: cone.solid_angle() });
@@ -187,7 +188,7 @@ fn aim(targets: &Targets, from: Vec3, cone: SolidCone, square: [f32; 2]) -> Opti
     targets.direction(from, square)
 }
 
-/// Emission of a point on a triangle by the cosine, per square metre; from both sides of a double-sided one.
+/// Emission of a point on a triangle, cosine-weighted, per square metre; from both sides if double-sided.
 fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Option<Emission> {
     let (sides, is_back, c) = if double_sided {
         (2.0, c >= 0.5, if c >= 0.5 { 2.0 * c - 1.0 } else { 2.0 * c })
@@ -195,7 +196,7 @@ fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Opti
         (1.0, false, c)
     };
     let normal = if is_back { -point.normal } else { point.normal };
-    // A white Lambertian surface reflects by the cosine, as the emitter emits.
+    // A white Lambertian surface has the cosine distribution of the emitter.
     let white = Surface::white(point.position, normal, point.magnitude);
     white.reflector().sample([c, d]).map(|sampled| Emission {
         ray: Ray::new(white.offset_origin(), sampled.direction),
@@ -203,7 +204,7 @@ fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Opti
     })
 }
 
-/// Emission of a point on a triangle towards targets, per square metre.
+/// Emission of a point on a triangle towards the targets, per square metre.
 fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f32; 2]) -> Option<Emission> {
     let Aim { towards, measure } = targets.direction(point.position, square)?;
     let cosine = point.normal.dot(towards);
@@ -215,19 +216,20 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
     })
 }
 
-/// Emission from infinitely far along a direction, by the irradiance of a surface that faces it; towards targets, if there are any.
+/// Emission from infinitely far along `direction`, towards the targets if there are any; `irradiance` is that of a surface
+/// facing the light.
 fn from_afar(sources: &Sources, direction: Vec3, irradiance: Vec3, square: [f32; 2]) -> Option<Emission> {
     if sources.targets.is_empty() {
         return Some(through_box(sources.bounds, direction, irradiance, square));
     }
     let Aim { towards, measure } = sources.targets.place(direction, square)?;
-    // Before everything on its way.
+    // The origin lies before the whole scene.
     let corners = sources.bounds.map(|corner| corner * direction);
     let origin = towards + direction * corners[0].min(corners[1]).element_sum();
     Some(Emission { ray: Ray::new(origin, direction), power: irradiance * measure })
 }
 
-/// Emission from infinitely far through the faces of the scene's box that face it, each by its projected area.
+/// Emission from infinitely far through the faces of the scene's bounding box, each in proportion to its projected area.
 fn through_box([lower, upper]: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
     let size = upper - lower;
     let shown = direction.abs() * Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y);

@@ -4,10 +4,10 @@ use photoncard_shared::message::Fault;
 
 use crate::pack::PackError;
 
-/// Why there is no photon map.
+/// Error that prevents a photon map.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum PhotonError {
-    /// Hardly any path meets a surface.
+    /// Error of paths of which hardly any meets a surface.
     #[error(
         "only {stored} photons were stored of {paths} traced from the lights: they meet hardly any surface"
     )]
@@ -16,12 +16,12 @@ pub enum PhotonError {
          so that their fronts face each other, or make them double-sided; and check that surfaces reflect"
     ))]
     Lost {
-        /// Photons stored.
+        /// Number of photons stored.
         stored: usize,
-        /// Paths traced.
+        /// Number of paths traced.
         paths: u64,
     },
-    /// Photons could not be told apart: the scene is too wide for so small a gather.
+    /// Error of a photon grid that is too coarse for the maximum distance of gathers: the scene is too wide.
     #[error(
         "the scene is too wide: a cell of the grid of photon positions has a side of {cell} m, and a gather reaches only \
          {max_distance} m"
@@ -33,17 +33,17 @@ pub enum PhotonError {
     TooWide {
         /// Side of a cell of the grid, metres.
         cell: f32,
-        /// Greatest distance of a gather, metres.
+        /// Maximum distance of a gather, metres.
         max_distance: f32,
     },
-    /// The packed scene is not sound.
+    /// Error of a packed scene that is malformed.
     #[error("the packed scene is not sound: {0:?}")]
     Unsound(Fault),
-    /// The image with the photons is too large.
+    /// Error of an image that is too large with its photons.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Pack(#[from] PackError),
-    /// The caller asked to stop.
+    /// The caller stopped the photon pass.
     #[error("stopped")]
     Stopped,
 }

@@ -1,6 +1,6 @@
-//! The photon pass: light is traced from the emitters and stored where it arrives.
+//! The photon pass: paths are traced from the lights, and photons stored where they meet surfaces.
 //!
-//! It depends on the scene, the seed and the number of photons alone, never on threads, camera, tile or chip.
+//! Photons depend on the scene, the seed and their number alone, never on threads, camera, tile or chip.
 
 mod emit;
 mod error;

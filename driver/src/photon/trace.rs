@@ -1,4 +1,4 @@
-//! Photon paths: Russian roulette on the albedo, every arrival at a surface that is not perfectly specular stored.
+//! Photon paths: Russian roulette on the albedo; a photon is stored at every surface that is not perfectly specular.
 
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
@@ -16,29 +16,29 @@ use super::stored::{Photons, StoredPhoton};
 use crate::light::Sources;
 use crate::pack::PackedScene;
 
-/// The result of the photon pass.
+/// Result of the photon pass.
 pub struct PhotonPass {
-    /// Photons in the order of their paths, exactly as many as were asked for.
+    /// Photons in the order of their paths, as many as requested.
     pub photons: Photons,
-    /// Paths that were begun for them.
+    /// Number of paths traced.
     pub paths: u64,
 }
 
-/// Paths that may be traced before each photon stored; beyond them there must be a photon to every thousand paths.
+/// Number of paths after which at least one photon per thousand further paths must be stored.
 const FRUITLESS_PATHS: u64 = 1_000_000;
-/// Paths that may be traced for each photon of caustics that is stored, besides those: where fewer of them lead to one there is
-/// little light in caustics, and few photons estimate it.
+/// Maximum number of paths per stored caustic photon, beyond [`FRUITLESS_PATHS`]: a lower yield means that caustics carry
+/// little light, for which few photons suffice.
 const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
-/// Paths that one task traces.
+/// Number of paths of one task.
 const PATHS_PER_TASK: u64 = 2048;
-/// A path with more bounces than this has met surfaces that lose nothing; it ends.
+/// Maximum number of bounces of a path; only surfaces without loss let a path reach it.
 const MAX_BOUNCES: u32 = 512;
 
-/// Traces paths until `count` photons are stored; none if no surface keeps any. `progress` gets their number, and returns
-/// whether to go on.
+/// Traces paths until `count` photons are stored; none if no surface stores photons. `progress` is called with the number
+/// of photons, and returns whether to go on.
 ///
 /// # Errors
-/// If hardly any path meets a surface, or if `progress` says to stop.
+/// If hardly any path meets a surface, or `progress` returns false.
 pub fn trace(
     packed: &PackedScene,
     seed: u32,
@@ -59,11 +59,11 @@ pub fn trace(
     Err(PhotonError::Stopped)
 }
 
-/// Traces paths until `count` photons of caustics are stored, or so many paths have led to too few of them that what is left
-/// out is not to be seen. `go_on` is asked whether to go on.
+/// Traces paths until `count` caustic photons are stored, or until the yield is so low that the missing ones are invisible.
+/// `go_on` returns whether to go on.
 ///
 /// # Errors
-/// If `go_on` says to stop.
+/// If `go_on` returns false.
 pub fn trace_caustics(
     packed: &PackedScene,
     seed: u32,
@@ -78,7 +78,7 @@ pub fn trace_caustics(
     if go_on() { Ok(traced.photons) } else { Err(PhotonError::Stopped) }
 }
 
-/// Traces paths until `count` photons are stored, or until `go_on` returns false of their number and that of paths.
+/// Traces paths until `count` photons are stored, or `go_on(photons, paths)` returns false.
 fn trace_while(
     packed: &PackedScene,
     (seed, purpose): (u32, Purpose),
@@ -89,7 +89,8 @@ fn trace_while(
         let photons = Photons { list: Vec::new(), grid: packed.photon_grid(), power_unit: 1.0 };
         return Ok(PhotonPass { photons, paths: 0 });
     }
-    // Few photons are stronger than they were emitted: twice at a Phong lobe, 16 times where glass hardly reflects but for its mirror.
+    // Photons rarely gain power after emission: factor 2 at a Phong lobe, 16 at glass whose reflection is almost the
+    // mirror's alone.
     let aimed = packed.aimed_sources().filter(|_| purpose == Purpose::Caustics);
     let sources = aimed.unwrap_or(packed.sources());
     let path_unit = power_of_two_above(sources.strongest.into());
@@ -118,52 +119,52 @@ fn trace_while(
     Ok(PhotonPass { photons: Photons { list, grid: tracer.grid, power_unit }, paths })
 }
 
-/// Tasks of the next round: as many as the photons per path so far promise to need, at most a share of all, so that
-/// progress shows. Which paths are traced does not depend on it.
+/// Number of tasks of the next round, from the photons per path so far; at most 64, so that progress shows. It does not
+/// affect which paths are traced.
 fn next_tasks(missing: usize, stored: usize, paths: u64) -> u64 {
     let photons_per_path = if stored > 0 { stored as f64 / paths as f64 } else { 4.0 };
     let needed = (missing as f64 / photons_per_path) as u64;
     needed.div_ceil(PATHS_PER_TASK).clamp(1, 64)
 }
 
-/// The photons of a task's paths.
+/// Photons of a task's paths.
 struct Traced {
     /// Photons in the order of their paths.
     photons: Vec<StoredPhoton>,
-    /// Of each path, the photons there were at its end.
+    /// Number of photons at the end of each path.
     ends: Vec<u32>,
 }
 
 impl Traced {
-    /// The paths that leave `count` photons, the last begun only; all if they leave fewer.
+    /// Number of paths until `count` photons are stored, the last path included; all paths if they store fewer.
     fn paths_until(&self, count: usize) -> u64 {
         let before = self.ends.partition_point(|&end| (end as usize) < count);
         (before + 1).min(self.ends.len()) as u64
     }
 }
 
-/// The map that photons are traced for.
+/// Map that photons are traced for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
-    /// Every arrival at a surface that is not perfectly specular.
+    /// The photon map: a photon at every surface that is not perfectly specular.
     Indirect,
-    /// The first arrival there of paths that have met others before.
+    /// The caustic map: a photon at the first such surface, of paths that have met perfectly specular surfaces before.
     Caustics,
 }
 
-/// The parameters of all paths.
+/// Parameters of all paths.
 struct Tracer<'s> {
     scene: SceneImage,
     sources: &'s Sources,
     grid: PhotonGrid,
-    /// Watts of a path by itself that a photon power of 1 stands for.
+    /// Power of a photon of value 1 if the path were the only one, watts.
     path_unit: f32,
     seed: u32,
     purpose: Purpose,
 }
 
 impl Tracer<'_> {
-    /// Follows the paths of a task.
+    /// Traces the paths of a task.
     fn trace(&self, memory: &mut impl MemoryPort, first: u64) -> Result<Traced, Fault> {
         let mut traced = Traced { photons: Vec::new(), ends: Vec::with_capacity(PATHS_PER_TASK as usize) };
         for path in first..first + PATHS_PER_TASK {
@@ -224,7 +225,7 @@ impl Tracer<'_> {
         Ok(())
     }
 
-    /// A photon that has arrived at a surface.
+    /// Record of a photon that arrives at a surface.
     fn stored(&self, surface: &Surface, power: Vec3, direct: bool, dither: u32) -> StoredPhoton {
         let photon = Photon {
             position: surface.position.to_array(),
@@ -239,11 +240,11 @@ impl Tracer<'_> {
     }
 }
 
-/// The greatest share of [`shading_share`].
+/// Maximum of [`shading_share`].
 const MAX_SHADING_SHARE: f32 = 4.0;
 
-/// The factor of a photon's power where a smooth normal turns it: photons arrive and leave by the area of the
-/// triangle, light is reflected by that of the smooth surface (Veach 1997, *Robust Monte Carlo methods for light transport
+/// Correction of a photon's power for a shading normal `n` at a triangle with the normal `g`: `|n.i| |g.o| / (|n.o| |g.i|)`
+/// with the directions of incidence `i` and exitance `o` (Veach 1997, *Robust Monte Carlo methods for light transport
 /// simulation*, section 5.3).
 fn shading_share(surface: &Surface, left: Vec3) -> f32 {
     let Surface { normal, geometric_normal, outgoing: arrived, .. } = *surface;
@@ -255,8 +256,8 @@ fn shading_share(surface: &Surface, left: Vec3) -> f32 {
     if share < MAX_SHADING_SHARE { share } else { MAX_SHADING_SHARE }
 }
 
-/// Russian roulette: a photon goes on with the probability that its strongest channel keeps, and then carries the
-/// power it came with in that channel.
+/// Russian roulette: a photon survives with the probability `reflected / arrived` of its strongest channel, over which its
+/// power is divided.
 fn survive(arrived: Vec3, reflected: Vec3, roulette: f32) -> Option<Vec3> {
     let probability = (reflected.max_element() / arrived.max_element()).min(1.0);
     (roulette < probability).then(|| reflected / probability)

@@ -1,4 +1,4 @@
-//! The memory of a card that an image takes, and what to lower where there is less.
+//! Memory of a card that an image takes, and the settings to lower if it is too much.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::Budget;
@@ -10,14 +10,14 @@ use super::settings::{PhotonLayout, PhotonSettings};
 use super::store::{CAUSTIC_SECTIONS, PHOTON_SECTIONS};
 use crate::pack::{CardImage, PackError, PackedScene};
 
-/// Photons of a line of leaves, the inner nodes' lines counted in, about.
+/// Approximate number of photons per line, lines of inner nodes included.
 const PHOTONS_OF_A_LEAF: usize = 9;
 
-/// Checks that the image of a packed scene with a photon map of these settings may fit a card's memory. Lines of leaves are
-/// estimated; [`check_image`] counts them.
+/// Checks whether the image of a packed scene with a photon map of these settings may fit a card's memory. The lines of
+/// leaves are estimated; [`check_image`] counts them.
 ///
 /// # Errors
-/// [`PackError::Dram`], which says what to lower.
+/// [`PackError::Dram`], with the setting to lower.
 pub fn check_packed(
     packed: &PackedScene,
     settings: &PhotonSettings,
@@ -41,7 +41,7 @@ pub fn check_packed(
     let free = available.saturating_sub(scene_bytes) / LINE_BYTES as u64;
     let room = match points_per_line {
         None => free * per_line as u64,
-        // Both last lines may be short.
+        // The last line of either section may be partly filled.
         Some(points) => free.saturating_sub(1) * (per_line * points) as u64 / (per_line + points) as u64,
     };
     let texels = bytes(packed.image(), SectionKind::Texels);
@@ -56,7 +56,7 @@ pub fn check_packed(
 /// Checks that an image fits a card's memory.
 ///
 /// # Errors
-/// [`PackError::Dram`], which says what to lower.
+/// [`PackError::Dram`], with the setting to lower.
 pub fn check_image(image: &CardImage, budget: &Budget) -> Result<(), PackError> {
     let (needed, available) = (image.bytes(), budget.dram_bytes as u64);
     if needed <= available {
@@ -70,23 +70,23 @@ pub fn check_image(image: &CardImage, budget: &Budget) -> Result<(), PackError> 
     Err(PackError::Dram { needed, photons, available, remedy })
 }
 
-/// The bytes of a section's lines.
+/// Size of a section's lines, bytes.
 fn bytes(image: &CardImage, kind: SectionKind) -> u64 {
     image.section(kind).len() as u64 * LINE_BYTES as u64
 }
 
-/// True for more than half of all.
+/// Returns whether a part is more than half of all.
 fn is_most(part: u64, all: u64) -> bool {
     part > all / 2
 }
 
-/// The remedy for photons that do not fit, or for texels if they take most of the image.
+/// Remedy for photons that do not fit, or for texels if they take most of the image.
 fn lower(photons: &str, texels: u64, needed: u64) -> String {
     let textures = if is_most(texels, needed) { ", use smaller textures" } else { "" };
     format!("{photons}{textures}, or use a card with more memory")
 }
 
-/// The remedy for a scene that is too large without any photons.
+/// Remedy for a scene that is too large without photons.
 fn simplify(scene: u64, texels: u64) -> String {
     let part = if is_most(texels, scene) {
         format!(", {texels} of them texels: use smaller textures or a smaller environment")
@@ -105,7 +105,7 @@ mod tests {
     use crate::photon_map::map_photons;
     use crate::scene::{Encoding, Image, Material, Reflection, Scene, Texture, Triangle};
 
-    /// A triangle, and an image of so many texels a side.
+    /// A triangle with a texture of `side` x `side` texels.
     fn textured(side: u32) -> PackedScene {
         let texels = vec![[0; 4]; (side * side) as usize];
         let image =
@@ -148,7 +148,7 @@ mod tests {
         assert!(!remedy(&textured(64), 1_000_000, 5 << 20).contains("textures"));
     }
 
-    /// Where photons of caustics take the memory, fewer others would not help.
+    /// If caustic photons take most of the memory, lowering the number of other photons would not help.
     #[test]
     fn the_larger_of_the_photon_maps_is_to_be_lowered() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-spheres.glb");

@@ -1,8 +1,10 @@
-//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): at every photon the chip's own
-//! density estimate, of a white diffuser there, is stored in the image. A gather takes that of the nearest point of its surface.
+//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): the chip's own density estimate at
+//! every photon, for a white diffuser, is stored in the image. A gather takes the irradiance of the nearest point on its
+//! surface.
 //!
-//! At a photon a density estimate is too high by one photon, its own. But to come from any place to the nearest of some points
-//! is to know that none is on the way, which is one less: of photons that lie at random the mean is right.
+//! At a photon the density estimate is too high by one photon, the photon itself. The nearest point to a given position,
+//! however, is known to have no other between them, which lowers the estimate by one photon. For photons in random
+//! positions both cancel in the mean.
 
 use glam::Vec3;
 use photoncard_firmware::gather::HilbertCode;
@@ -21,17 +23,17 @@ use super::store::store_irradiance;
 use crate::pack::CardImage;
 use crate::photon::{PhotonError, StoredPhoton};
 
-/// Points that one task does; `go_on` is asked before each.
+/// Number of points of one task; `go_on` is called before each task.
 const POINTS_OF_A_TASK: usize = 256;
 
-/// A grid point and the code of a surface normal.
+/// Grid point and code of a surface normal.
 type SurfacePoint = ([u32; 3], u8);
 
-/// Adds irradiance points to an image with photons, for gathers of `neighbors` photons within `max_distance`, metres: the same
-/// for the same photons, whatever the layout of their map. `go_on` is asked now and then.
+/// Adds irradiance points to an image with photons, for gathers of `neighbors` photons within `max_distance`, metres. They
+/// depend on the photons alone, not on the layout of their map. `go_on` is called before each task.
 ///
 /// # Errors
-/// If the image is not sound or grows too large, or `go_on` says no.
+/// If the image is malformed or grows too large, or `go_on` returns false.
 pub fn precompute_irradiance(
     image: CardImage,
     neighbors: u32,
@@ -54,7 +56,7 @@ pub fn precompute_irradiance(
         )
         .collect();
     let cell = image.view().0.header.photon_grid.cell;
-    // About as far as the nearest of the photons of a gather lies.
+    // Approximate distance of the nearest photon of a gather.
     let distance = max_distance / (neighbors as f32).sqrt();
     let mut points = points?.concat();
     match PhotonTree::new(&mut points, f64::from(distance / cell)) {
@@ -88,7 +90,7 @@ impl<'a> Estimator<'a> {
     }
 }
 
-/// The places of photons with the normals of their surfaces, each once; along a curve through each surface.
+/// Positions and surface normals of photons without repetition, sorted along a Hilbert curve for each normal.
 fn surface_points(image: &CardImage) -> Result<Vec<SurfacePoint>, Fault> {
     let (scene, mut memory) = image.view();
     let grid = scene.header.photon_grid;
@@ -107,7 +109,7 @@ fn surface_points(image: &CardImage) -> Result<Vec<SurfacePoint>, Fault> {
         let leaf = PhotonLeaf::read(line);
         (0..leaf.photons()).for_each(|photon| add(leaf.point(photon), leaf.content(photon)));
     }
-    // Along a curve: neighbours have most of their photons in common.
+    // Neighbours on the curve have most of their photons in common, and the memory of their searches.
     points.par_sort_by_cached_key(|&(point, normal)| (normal, HilbertCode::new(&grid, grid.position(point))));
     points.dedup();
     Ok(points)

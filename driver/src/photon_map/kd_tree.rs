@@ -1,4 +1,4 @@
-//! The left-balanced kd-tree (Jensen 2001, ch. 6): the tree of its photons without gaps, in the order of a heap.
+//! The left-balanced kd-tree (Jensen 2001, ch. 6): a complete binary tree, stored without gaps in heap order.
 
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{Photon, PhotonLeaf, Record};
@@ -7,11 +7,11 @@ use super::store::PHOTON_SECTIONS;
 use crate::pack::{CardImage, ImageWriter, PackError};
 use crate::photon::StoredPhoton;
 
-/// Below this number of photons a subtree is built by one thread.
+/// Number of photons below which a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
 
-/// Moves the photons of an image from leaves into the tree; irradiance points and caustics are left out. Searches find the same
-/// photons.
+/// Moves the photons of an image from leaves into a kd-tree; irradiance points and caustic photons are removed. Searches
+/// find the same photons in both layouts.
 ///
 /// # Errors
 /// [`PackError::TooLarge`] if there are more lines than an address can number.
@@ -34,7 +34,7 @@ pub fn to_kd_tree(image: CardImage) -> Result<CardImage, PackError> {
     Ok(image.finish())
 }
 
-/// The photons of an image's leaves.
+/// Photons of an image's leaves.
 fn photons_of_leaves(image: &CardImage) -> Vec<StoredPhoton> {
     let leaves = || image.section(SectionKind::PhotonLeaves).iter().map(|line| PhotonLeaf::read(&line.0));
     let mut photons = Vec::with_capacity(leaves().map(|leaf| leaf.photons() as usize).sum());
@@ -44,16 +44,15 @@ fn photons_of_leaves(image: &CardImage) -> Vec<StoredPhoton> {
     photons
 }
 
-/// Nodes in the left subtree of a left-balanced tree of `count` nodes, at least one.
+/// Number of nodes in the left subtree of a left-balanced tree of `count` nodes, at least one.
 fn left_nodes(count: usize) -> usize {
     let last_level = 1 << count.ilog2();
     let in_last_level = count - (last_level - 1);
     (last_level / 2).saturating_sub(1) + in_last_level.min(last_level / 2)
 }
 
-/// Sorts photons so that every subtree is a run, its left subtree first, its root next: from left to right. Each is
-/// split along the longest side of its bounding box. The same tree for the same photons, whatever their order and the
-/// threads.
+/// Sorts photons into in-order: of every subtree first the left subtree, then the root, then the right subtree. Each is
+/// split along the longest side of its bounding box. The tree does not depend on the photons' initial order or on threads.
 fn balance(photons: &mut [StoredPhoton]) {
     if photons.len() < 2 {
         return;
@@ -79,10 +78,10 @@ fn longest_side(photons: &[StoredPhoton]) -> usize {
     (0..3).max_by_key(side).unwrap_or(0)
 }
 
-/// Calls `put` for every node of a balanced tree with its place in the heap, where the children of `i` are at `2 i + 1` and
-/// `2 i + 2`.
+/// Calls `put` for every node of a balanced tree with its index in the heap, where the children of `i` are `2 i + 1` and `2
+/// i + 2`.
 fn for_each_in_heap(photons: &[StoredPhoton], put: &mut impl FnMut(usize, StoredPhoton)) {
-    // Subtrees still to come: the places of their roots, and their photons from left to right.
+    // Subtrees to visit: the heap index of each root, and the photons in-order.
     let mut waiting = vec![(0, photons)];
     while let Some((node, run)) = waiting.pop() {
         if run.is_empty() {
@@ -108,7 +107,7 @@ mod tests {
         (0..count).map(|i| StoredPhoton::at([0, 1, 2].map(|axis| coordinate(i, axis)), [0; 8])).collect()
     }
 
-    /// The tree as a heap.
+    /// The tree in heap order.
     fn heap(count: u32) -> Vec<StoredPhoton> {
         let mut sorted = photons(count);
         balance(&mut sorted);

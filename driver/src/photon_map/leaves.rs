@@ -1,10 +1,10 @@
-//! The photon map in lines: leaves that fill a line each, split where a search is least likely to need both sides, and
-//! inner nodes of up to sixteen children, a line each.
+//! The line layout of the photon map: leaves of one line each, split where a search is least likely to visit both sides,
+//! and inner nodes of up to sixteen children, one line each.
 //!
-//! A plane is chosen by the voxel volume heuristic (Wald, Günther, Slusallek 2004, *Balancing considered harmful*): the
-//! chance that a search reaches a part of space grows with its volume, blown up by the search's radius. Numbers of photons
-//! are kept to whole leaves, so that lines are full. The binary tree is then folded into wide nodes so that a search
-//! reads the fewest of them, by the same measure.
+//! Splitting planes are chosen by the voxel volume heuristic (Wald, Günther, Slusallek 2004, *Balancing considered
+//! harmful*): the probability that a search visits a box is proportional to its volume after enlargement by the search
+//! radius. Splits are rounded to whole leaves, so that lines are full. The binary tree is then folded into wide nodes of
+//! minimum expected visits, by the same probabilities.
 
 use std::num::NonZeroU8;
 
@@ -15,44 +15,43 @@ use photoncard_shared::layout::{GridBox, LEAF_PHOTONS, PhotonLeaf, PhotonNode, l
 use crate::fold::{Folded, Tree};
 use crate::photon::StoredPhoton;
 
-/// Below this number of photons a subtree is built by one thread.
+/// Number of photons below which a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
-/// Intervals of a side between which planes are tried, at the most and at the least.
+/// Maximum and minimum number of intervals of a side, whose borders are the candidate planes.
 const INTERVALS: usize = 32;
 const MIN_INTERVALS: usize = 8;
-/// Photons by which planes are chosen: of more, a part is as good.
+/// Maximum number of photons from which a plane is chosen; larger sets are sampled.
 const SAMPLED: usize = 4096;
-/// Photons from which on a part of space is expected to end in leaves of one surface.
+/// Number of photons above which a box is expected to contain several surfaces.
 const MANY: usize = 64;
-/// Levels of a binary tree from which on it is halved.
+/// Depth of the binary tree below which subtrees are split at the median.
 const MAX_SKEWED: usize = 40;
 
-/// The photons of a leaf, in the order of the tree.
+/// Photons of a leaf: a range in the order of the tree.
 #[derive(Clone, Copy)]
 struct Run {
     first: u32,
     count: NonZeroU8,
 }
 
-/// A tree of photons, to be written in lines.
+/// Tree of photons in the line layout.
 pub(super) struct PhotonTree<'a> {
     photons: &'a [StoredPhoton],
     folded: Folded<Run, Extent>,
 }
 
 impl<'a> PhotonTree<'a> {
-    /// Of photons in any order, for searches of about `radius` cells: the same tree for the same photons in the same
-    /// order, whatever the threads. `None` without photons.
+    /// Tree of photons, for searches of about `radius` cells. It does not depend on threads. `None` without photons.
     pub(super) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
         let mut folded = Folded::new(build(photons, 0, radius, 0)?);
         if folded.stack > PHOTON_STACK {
-            // Halves of halves are not the best of trees, but no deeper than their number asks for.
+            // Median splits are slower to search, but have minimum depth.
             folded = Folded::new(build(photons, 0, radius, MAX_SKEWED)?);
         }
         Some(Self { photons, folded })
     }
 
-    /// The lines of the nodes.
+    /// Lines of the nodes.
     pub(super) fn nodes(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
         self.folded.nodes.iter().map(|node| {
             let boxes: Vec<GridBox> = node.children.iter().map(|extent| extent.0).collect();
@@ -61,7 +60,7 @@ impl<'a> PhotonTree<'a> {
         })
     }
 
-    /// The lines of the leaves.
+    /// Lines of the leaves.
     pub(super) fn leaves(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
         self.folded.leaves.iter().map(|run| {
             let photons = self.photons.iter().skip(run.first as usize).take(run.count.get().into());
@@ -72,7 +71,7 @@ impl<'a> PhotonTree<'a> {
     }
 }
 
-/// The tree of the photons from number `first` on; `None` if there is none.
+/// Tree of photons whose first has the index `first`; `None` without photons.
 fn build(photons: &mut [StoredPhoton], first: u32, radius: f64, depth: usize) -> Option<Tree<Run, Extent>> {
     if photons.is_empty() {
         return None;
@@ -98,7 +97,7 @@ fn build(photons: &mut [StoredPhoton], first: u32, radius: f64, depth: usize) ->
     Some(Tree::node([below?, above?], extent, extent.chance(radius) as f32, None))
 }
 
-/// The box of some photons.
+/// Bounding box of photons.
 #[derive(Clone, Copy)]
 struct Extent(GridBox);
 
@@ -120,23 +119,23 @@ impl Extent {
     }
 
     fn longest(&self) -> usize {
-        // The first of equal sides.
+        // The first of several equal sides.
         (0..3).rev().max_by_key(|&axis| self.side(axis)).unwrap_or(0)
     }
 
-    /// A measure of the chance that a search reaches it.
+    /// Relative probability that a search visits the box.
     fn chance(&self, radius: f64) -> f64 {
         chance([0, 1, 2].map(|axis| f64::from(self.side(axis))), radius)
     }
 
-    /// Photons of a leaf somewhere in here, about.
+    /// Approximate number of photons per leaf in the box.
     fn leaf_photons(&self, photons: usize) -> usize {
         let axes = (0..3).filter(|&axis| self.side(axis) > 0).count();
-        // Photons lie on surfaces; many on several, few on one, that may well be oblique.
+        // Photons lie on surfaces: many photons on several, few photons on one, which may be oblique to the axes.
         leaf_capacity(if photons > MANY { axes.min(2) } else { axes })
     }
 
-    /// The axis to split on, and how many photons go below the plane: a whole number of leaves, if there is more than one.
+    /// Axis of the split, and the number of photons below the plane: a whole number of leaves, if there is more than one.
     fn split(&self, photons: &[StoredPhoton], radius: f64) -> (usize, usize) {
         let (axis, below) = self.cheapest(photons, radius);
         let count = photons.len();
@@ -148,7 +147,7 @@ impl Extent {
         (axis, (below + leaf / 2).next_multiple_of(leaf).saturating_sub(leaf).clamp(leaf, most))
     }
 
-    /// The plane of least cost by the voxel volume heuristic: its axis, and the photons below it.
+    /// Plane of minimum cost by the voxel volume heuristic: its axis, and the number of photons below it.
     fn cheapest(&self, photons: &[StoredPhoton], radius: f64) -> (usize, usize) {
         let mut cheapest = (f64::INFINITY, self.longest(), photons.len() / 2);
         let intervals = (photons.len() / 4).clamp(MIN_INTERVALS, INTERVALS);
@@ -156,7 +155,7 @@ impl Extent {
         let sampled = photons.len().div_ceil(step);
         for axis in (0..3).filter(|&axis| self.side(axis) > 0) {
             let side = f64::from(self.side(axis));
-            // Intervals for each cell, times 2^32.
+            // Intervals per cell, times 2^32.
             let scale = ((intervals as u64) << 32) / (u64::from(self.side(axis)) + 1);
             let mut counts = [0_usize; INTERVALS];
             for photon in photons.iter().step_by(step) {
@@ -181,7 +180,7 @@ impl Extent {
     }
 }
 
-/// The volume of a box blown up by the radius of searches.
+/// Volume of a box enlarged by the search radius.
 fn chance(sides: [f64; 3], radius: f64) -> f64 {
     sides.into_iter().map(|side| side + 2.0 * radius).product()
 }
@@ -193,10 +192,10 @@ mod tests {
 
     use super::*;
 
-    /// A photon's grid point, and what else it carries.
+    /// Grid point and content of a photon.
     type Placed = ([u32; 3], [u8; PHOTON_CONTENT_BYTES]);
 
-    /// The lines of both sections.
+    /// Lines of both sections.
     struct PhotonLines {
         nodes: Vec<[u8; LINE_BYTES]>,
         leaves: Vec<[u8; LINE_BYTES]>,
@@ -211,7 +210,7 @@ mod tests {
         }
     }
 
-    /// Photons on the walls of a box: each carries its number.
+    /// Photons on the walls of a box; the content of each is its number.
     fn photons(count: u32, bits: u32) -> Vec<Placed> {
         (0..count)
             .map(|i| {
@@ -222,8 +221,8 @@ mod tests {
             .collect()
     }
 
-    /// Every photon below `child`, each within the boxes that the nodes above give; returns the entries of a stack that
-    /// a search may need.
+    /// Collects every photon below `child`, and checks that it lies within the boxes of all ancestors. Returns the number
+    /// of stack entries that a search needs.
     fn walk(lines: &PhotonLines, child: Child, room: GridBox, found: &mut Vec<Placed>) -> usize {
         let node = match child {
             Child::Leaf(leaf) => {

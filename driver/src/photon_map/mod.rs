@@ -1,7 +1,7 @@
 //! The photon map: photons, trees above them, caustics and irradiance points as sections of the card image.
 //!
-//! It stands above what it joins: [`crate::pack`] writes sections, [`crate::photon`] traces photons, and `density`
-//! measures what a gather on the chip knows beyond them, its greatest distance and the disc fractions.
+//! The module uses [`crate::pack`], which writes sections, [`crate::photon`], which traces photons, and `density`, which
+//! measures the maximum distance of gathers and the disc fractions.
 
 mod budget;
 mod irradiance;
@@ -25,18 +25,18 @@ use crate::density::{automatic_max_distance, caustic_max_distance, measure_discs
 use crate::pack::{CardImage, PackedScene};
 use crate::photon::{PhotonError, PhotonPass, Photons, trace, trace_caustics};
 
-/// Smallest greatest distance of a gather, cells of the photon grid: so that the grid does not show.
+/// Lower bound of the maximum distance of a gather, in cells of the photon grid, so that the grid does not show.
 const MIN_CELLS: f32 = 8.0;
 
-/// A card image with its photon map, ready for gathers.
+/// Card image with its photon map, ready for gathers.
 pub struct MappedImage {
-    /// The image.
+    /// Card image.
     pub image: CardImage,
-    /// Greatest distance of a gather, metres.
+    /// Maximum distance of a gather, metres.
     pub max_distance: f32,
-    /// The gathers of caustics, if there is a map of them.
+    /// Parameters of gathers in the caustic map; `None` without a caustic map.
     pub caustics: Option<CausticGather>,
-    /// Paths that were traced from the lights.
+    /// Number of paths traced from the lights.
     pub paths: u64,
     /// Time of each step.
     pub times: PhotonTimes,
@@ -49,17 +49,17 @@ pub struct PhotonTimes {
     pub tracing: Duration,
     /// Building the tree and writing its lines.
     pub building: Duration,
-    /// Measuring how far gathers look, and the disc fractions.
+    /// Measuring the maximum distance of gathers, and the disc fractions.
     pub measuring: Duration,
-    /// Estimating irradiance at photons, if it is precomputed.
+    /// Precomputing irradiance; zero without it.
     pub estimating: Duration,
 }
 
-/// Traces photons in a packed scene and completes its image with their map. `progress` gets the number of photons
-/// stored, and returns whether to go on; it is asked again while the map is measured.
+/// Traces photons in a packed scene and completes its image with the photon map. `progress` is called with the number of
+/// photons stored, also while the map is measured, and returns whether to go on.
 ///
 /// # Errors
-/// If hardly any path meets a surface, the image grows too large, or `progress` says to stop.
+/// If hardly any path meets a surface, the image grows too large, or `progress` returns false.
 pub fn map_photons(
     packed: PackedScene,
     settings: &PhotonSettings,
@@ -76,7 +76,7 @@ pub fn map_photons(
     times.building = start.elapsed();
     let start = Instant::now();
     let max_distance = match settings.max_distance {
-        // Farther than the scene is wide is as good as that wide.
+        // A distance beyond the scene's diagonal has no further effect.
         Some(distance) => distance.min(image.diagonal()),
         None => automatic_max_distance(&image, settings.neighbors)?,
     };
@@ -107,7 +107,7 @@ pub fn map_photons(
     Ok(MappedImage { image, max_distance, caustics, paths, times })
 }
 
-/// The photons of caustics, if any are asked for and there are any: without a map of them gather rays bring their light.
+/// Caustic photons, if requested and if any are found. Without a caustic map gather rays carry the light of caustics.
 fn caustics(
     packed: &PackedScene,
     settings: &PhotonSettings,

@@ -1,20 +1,20 @@
-//! The radius of a typical gather, which the trees above photons are built for.
+//! Radius of a typical gather, for which the trees of photons are built.
 
 use rayon::prelude::*;
 
 use crate::photon::{Photons, StoredPhoton};
 
-/// Photons around which [`typical_radius`] looks.
+/// Number of photons around which [`typical_radius`] searches.
 const SAMPLED_PHOTONS: usize = 64;
-/// Photons among which it looks, if they are enough.
+/// Number of photons among which it searches, if enough.
 const SAMPLED_NEIGHBORS: usize = 1 << 16;
-/// Smallest number of neighbours that it looks for, if the photons are not too many for that.
+/// Minimum number of neighbours in the subset if it is smaller than `1 / MIN_STEP` of the photons.
 const MIN_NEIGHBORS: usize = 4;
-/// A part of this share of the photons is as good as all, however few neighbours are looked for.
+/// Inverse of a share of the photons that suffices, however few neighbours it contains.
 const MIN_STEP: usize = 32;
 
-/// The radius of a typical search for so many neighbours, cells of the photons' grid. It is estimated before there is any
-/// tree to search: in a part of the photons for as small a part of the neighbours.
+/// Radius of a typical search for `neighbors` photons, in cells of the photon grid. Before there is a tree to search, it is
+/// estimated in a subset of the photons, for a proportionally smaller number of neighbours.
 pub(super) fn typical_radius(photons: &Photons, neighbors: u32) -> f64 {
     let all = photons.stored();
     let neighbors = neighbors as usize;

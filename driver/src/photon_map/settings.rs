@@ -9,15 +9,15 @@ use crate::choice::choices;
 pub struct PhotonSettings {
     /// Seed of the photon paths.
     pub seed: u32,
-    /// Photons to store.
+    /// Number of photons to store.
     pub photons: usize,
-    /// Photons of a density estimate.
+    /// Number of photons of a density estimate.
     pub neighbors: u32,
-    /// Greatest distance of a gather, metres; `None` for the one that the photons' density suggests.
+    /// Maximum distance of a gather, metres; `None` to derive it from the density of the photons.
     pub max_distance: Option<f32>,
-    /// Caustic photons to store; 0 for no caustic map.
+    /// Number of caustic photons to store; 0 for no caustic map.
     pub caustic_photons: usize,
-    /// Photons of a density estimate in the caustic map.
+    /// Number of photons of a density estimate in the caustic map.
     pub caustic_neighbors: u32,
     /// Layout of the map in card memory.
     pub layout: PhotonLayout,
@@ -25,7 +25,7 @@ pub struct PhotonSettings {
     pub radiance: Radiance,
 }
 
-/// Layout of the photon map in card memory. A gather finds the same photons in either.
+/// Layout of the photon map in card memory. A gather finds the same photons in each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PhotonLayout {
     /// The left-balanced kd-tree of Jensen (2001), of 20-byte records: the dissertation's.

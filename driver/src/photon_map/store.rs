@@ -7,7 +7,7 @@ use super::radius::typical_radius;
 use crate::pack::{CardImage, ImageWriter, PackError, PackedScene};
 use crate::photon::Photons;
 
-/// The sections of the photon map, irradiance points among them: the last of an image.
+/// Sections of the photon map, irradiance points included: the last of an image.
 pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
     SectionKind::Photons,
     SectionKind::PhotonNodes,
@@ -18,7 +18,7 @@ pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
     SectionKind::IrradianceLeaves,
 ];
 
-/// The sections of the map of caustics.
+/// Sections of the caustic map.
 pub(super) const CAUSTIC_SECTIONS: [SectionKind; 2] = [SectionKind::CausticNodes, SectionKind::CausticLeaves];
 
 /// Completes the image of a scene with its photons, in leaves, for searches of about `neighbors` photons.

@@ -1,4 +1,4 @@
-//! Where cards are: an argument of `--card`.
+//! Addresses of cards: the arguments of `--card`.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -9,50 +9,50 @@ use crate::choice::Choice;
 use crate::emulator::ChipKind;
 use crate::link::{host_name, tcp_address};
 
-/// Where cards are: an argument of `--card`.
+/// Address of one card or of several emulated ones: an argument of `--card`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CardAddress {
-    /// Chips in this process.
+    /// Emulated chips in this process.
     Emulated {
-        /// Their kind.
+        /// Kind of the chips.
         kind: ChipKind,
-        /// How many.
+        /// Number of chips.
         chips: usize,
     },
-    /// A card at the other end of a link.
+    /// Card at the other end of a link.
     Remote(RemoteAddress),
 }
 
-/// The link to a card that is not emulated in this process.
+/// Address of a card that is not emulated in this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RemoteAddress {
-    /// A serial port, or a pseudo terminal.
+    /// Serial port, or pseudo terminal.
     Serial {
-        /// The device.
+        /// Path of the device.
         path: PathBuf,
-        /// Bits a second.
+        /// Speed, bits/s.
         baud: u32,
     },
-    /// A TCP port on which the card listens.
+    /// TCP port on which the card listens.
     Tcp {
-        /// Name or number of the host.
+        /// Name or IP address of the host.
         host: String,
-        /// The port.
+        /// Port number.
         port: u16,
     },
-    /// A Unix socket on which the card listens.
+    /// Unix socket on which the card listens.
     Unix {
-        /// The socket's path.
+        /// Path of the socket.
         path: PathBuf,
     },
 }
 
-/// Chips that one process emulates.
+/// Maximum number of chips that one process emulates.
 const MAX_CHIPS: usize = 1024;
-/// The speed of a serial port for which none is given.
+/// Default speed of a serial port, bits/s.
 const DEFAULT_BAUD: u32 = 115_200;
-/// A card acknowledges two whole frames at a time, and is silent meanwhile. Even if one acknowledgement is lost the next is
-/// to come within the 10 s after which a card is taken for lost.
+/// Minimum speed of a serial port, bits/s. A card is silent while it receives two whole frames and acknowledges them. Even
+/// if one acknowledgement is lost, the next has to arrive within the 10 s after which a card counts as lost.
 const MIN_BAUD: u32 = 4800;
 
 impl Default for CardAddress {
@@ -63,18 +63,18 @@ impl Default for CardAddress {
 }
 
 impl CardAddress {
-    /// Chips of a kind in this process, one for each of its processor's cores.
+    /// Emulated chips of a kind, one per core of this machine's processor.
     pub fn emulated(kind: ChipKind) -> Self {
         let chips = std::thread::available_parallelism().map_or(1, usize::from);
         Self::Emulated { kind, chips }
     }
 
-    /// A card on a serial port, at the speed for which none is given.
+    /// Card on a serial port at the default speed.
     pub fn serial(path: impl Into<PathBuf>) -> Self {
         Self::Remote(RemoteAddress::Serial { path: path.into(), baud: DEFAULT_BAUD })
     }
 
-    /// Chips that this process emulates there.
+    /// Number of chips that this process emulates at the address.
     pub(super) fn emulated_chips(&self) -> usize {
         match *self {
             Self::Emulated { chips, .. } => chips,
@@ -82,7 +82,7 @@ impl CardAddress {
         }
     }
 
-    /// The memory of each card there, bytes; of cards elsewhere the most that a card can state.
+    /// Size of each card's memory at the address, bytes; for remote cards the maximum that a card can report.
     pub fn dram_bytes(&self) -> u32 {
         match self {
             Self::Emulated { kind, .. } => kind.budget().dram_bytes,
@@ -91,10 +91,10 @@ impl CardAddress {
     }
 }
 
-/// Checks the number of chips of one process.
+/// Checks the number of emulated chips.
 ///
 /// # Errors
-/// If there are more than [`MAX_CHIPS`].
+/// If there are more than `MAX_CHIPS`.
 pub(super) fn check_chips(chips: usize) -> Result<(), RenderError> {
     if chips <= MAX_CHIPS {
         return Ok(());
@@ -107,12 +107,12 @@ pub(super) fn check_chips(chips: usize) -> Result<(), RenderError> {
     })
 }
 
-/// Returns whether there is one chip at some addresses, and it is emulated.
+/// Returns whether the addresses name exactly one card, and it is emulated.
 pub(super) fn is_one_emulated_chip(addresses: &[CardAddress]) -> bool {
     matches!(addresses, [CardAddress::Emulated { chips: 1, .. }])
 }
 
-/// The first card among some addresses that is not emulated in this process.
+/// First address of a card that is not emulated in this process.
 pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
     addresses.iter().find(|address| !matches!(address, CardAddress::Emulated { .. }))
 }
@@ -167,7 +167,7 @@ fn emulated(kind: ChipKind, chips: Option<&str>) -> Result<CardAddress, String> 
 }
 
 fn serial(text: &str) -> Result<RemoteAddress, String> {
-    // A folder's name may have an @ as well.
+    // The path itself may contain an @.
     let (path, baud) = match text.rsplit_once('@') {
         Some((path, baud)) if !baud.contains('/') => (path, Some(baud)),
         _ => (text, None),

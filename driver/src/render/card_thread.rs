@@ -1,4 +1,4 @@
-//! The thread that a card has on the host: it moves bytes between the card's port and its session.
+//! A card's thread on the host, which moves bytes between the card's port and its session.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use crate::emulator::trace::TraceFile;
 use crate::scheduler::{CardNumber, Standing};
 use crate::session::{Job, LinkBytes, Session, SessionError};
 
-/// What came of one card.
+/// Outcome of one card.
 #[derive(Default)]
 pub(super) struct CardOutcome {
     pub(super) bytes: LinkBytes,
@@ -33,18 +33,18 @@ impl CardOutcome {
     }
 }
 
-/// A card at work.
+/// Card at work.
 struct CardAtWork<'a> {
     number: CardNumber,
     card: OpenCard,
     session: Session<'a>,
-    /// Whether it is lost, which is known, and has not been loaded since.
+    /// True after the card's loss was reported, until it is loaded again.
     is_lost: bool,
     crew: &'a Crew<'a>,
 }
 
-/// Loads the image into a card and renders tiles on it until none is left. A card that is lost is tried again as long as
-/// there are others; one that answers what is wrong, or fails again and again, is not.
+/// Loads the image into a card and renders tiles on it until none is left. A lost card is retried as long as there are
+/// others; a card that answers wrongly, or fails repeatedly, is given up.
 pub(super) fn render_on<'a>(
     number: CardNumber,
     greeted: GreetedCard,
@@ -69,7 +69,7 @@ pub(super) fn render_on<'a>(
 }
 
 impl CardAtWork<'_> {
-    /// Moves bytes and tiles once. Returns whether the card is used any longer.
+    /// Moves bytes and tiles once. Returns false if the card is given up.
     fn go_on(&mut self) -> Result<bool, RenderError> {
         let Self { number, crew, .. } = *self;
         let dispatcher = &crew.dispatcher;
@@ -81,7 +81,7 @@ impl CardAtWork<'_> {
         let exchanged = dispatcher
             .check_card(number)
             .and_then(|()| exchange(&mut self.session, &mut self.card, slowest, crew.start));
-        // What has come before an error counts.
+        // Answers before the error count.
         self.collect()?;
         self.is_lost &= !self.session.is_loaded();
         exchanged.map_or_else(|error| self.recover(error), |()| Ok(true))
@@ -93,7 +93,7 @@ impl CardAtWork<'_> {
         collected.map_err(|error| self.crew.end(error))
     }
 
-    /// Leaves a card's tiles to the others after an error. Returns whether it is tried again.
+    /// Returns a card's tiles to the scheduler after an error. Returns whether the card is retried.
     fn recover(&mut self, error: SessionError) -> Result<bool, RenderError> {
         let Self { number, crew, .. } = *self;
         if let Some(tile) = error.lie() {
@@ -114,7 +114,7 @@ impl CardAtWork<'_> {
         if is_closed { self.reopen() } else { Ok(true) }
     }
 
-    /// Reaches a card again whose link was closed. Returns whether there is any sense in that.
+    /// Reconnects to a card whose link was closed. Returns false for an emulated card, which cannot be reached again.
     fn reopen(&mut self) -> Result<bool, RenderError> {
         let Some(address) = self.card.close() else { return Ok(false) };
         if let Some(port) = reopen(&address, &|longest| self.crew.wait_for_end(longest))? {

@@ -1,4 +1,4 @@
-//! Executor of tiles on cards: they are reached, greeted, and put to work together.
+//! Executor of tiles on cards: connects to all cards, greets them, and renders on them in parallel.
 
 use std::sync::PoisonError;
 use std::sync::atomic::AtomicBool;
@@ -22,22 +22,22 @@ use crate::scheduler::{Scheduler, Standing};
 use crate::session::{Job, PixelLimits};
 use crate::sink::TileSink;
 
-/// Cards that have said hello.
+/// Cards that have answered the greeting.
 pub(super) struct Cards<'a> {
     settings: &'a RenderSettings,
     cards: Vec<(String, GreetedCard)>,
     start: Instant,
     shared: SharedImage,
-    /// Cards that have not said hello.
+    /// Number of cards that have not answered the greeting.
     lost: usize,
 }
 
 impl<'a> Cards<'a> {
-    /// Starts all cards and says hello to each, at the same time. Their memory is modelled if the settings ask for it, the
-    /// first card's with the trace. A card that does not say hello is lost.
+    /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it, the first card's with
+    /// the trace. A card that does not answer counts as lost.
     ///
     /// # Errors
-    /// If the trace cannot be written, or fewer cards are left than are needed.
+    /// If the trace cannot be written, or fewer cards are left than needed.
     pub(super) fn connect(
         settings: &'a RenderSettings,
         observer: &dyn Observer,
@@ -82,10 +82,10 @@ impl<'a> Cards<'a> {
         Ok(this)
     }
 
-    /// Reports cards that have not said hello to the observer.
+    /// Reports cards that have not answered the greeting to the observer.
     ///
     /// # Errors
-    /// If too few are left: the last card's.
+    /// If too few are left: the error of the last lost card.
     fn lose(
         &self,
         mut errors: Vec<(String, CardError)>,
@@ -120,7 +120,7 @@ impl<'a> Cards<'a> {
             let threads: Vec<_> = (cards.into_iter().enumerate())
                 .map(|(number, card)| scope.spawn(move || render_on(number, card, job, crew)))
                 .collect();
-            // A panic of a host thread is a panic of the host.
+            // A panic of a card's thread continues on this thread.
             threads
                 .into_iter()
                 .map(|thread| thread.join().unwrap_or_else(|p| std::panic::resume_unwind(p)))
@@ -155,7 +155,7 @@ impl Executor for Cards<'_> {
 
     fn run(self: Box<Self>, work: Work) -> Result<Outcome, RenderError> {
         let Work { image, frame, tiles, film, sinks, outputs } = work;
-        // Emulated cards that know the image which they are loaded with need not copy it.
+        // Emulated cards that receive the shared image store no copy of it.
         self.shared.give(image.clone());
         let (scene_image, _) = image.view();
         let job = Job {
@@ -173,7 +173,7 @@ impl Executor for Cards<'_> {
 /// Sum of the outcomes of all cards.
 ///
 /// # Errors
-/// That of the card which failed first: it made the others stop.
+/// The first failure: it has stopped the other cards.
 fn sum_up(results: Vec<Result<CardOutcome, RenderError>>) -> Result<CardOutcome, RenderError> {
     let mut sum = CardOutcome::default();
     let mut is_stopped = false;

@@ -1,4 +1,4 @@
-//! What the threads of all cards share.
+//! State that the threads of all cards share.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -9,30 +9,30 @@ use super::{CardError, RenderError};
 use crate::dispatcher::Dispatcher;
 use crate::scheduler::{CardNumber, SchedulerError, Source, Standing, rectangles};
 
-/// What the threads of all cards share.
+/// State that the threads of all cards share.
 pub(super) struct Crew<'a> {
     pub(super) dispatcher: Dispatcher<'a>,
     pub(super) outputs: &'a Outputs<'a>,
     pub(super) start: Instant,
-    /// What errors call each card.
+    /// Name of each card in errors.
     pub(super) names: Vec<String>,
     pub(super) failed: AtomicBool,
 }
 
-/// Ends the threads of the other cards if this one panics: they would wait for its tiles without end.
+/// Guard that stops the threads of the other cards if its own panics: they would wait for its tiles forever.
 pub(super) struct EndOthersOnPanic<'a>(pub(super) &'a AtomicBool);
 
 impl Drop for EndOthersOnPanic<'_> {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            // No thread waits for longer than a moment without looking at this.
+            // No thread waits longer than [`WAIT`] before it reads the flag.
             self.0.store(true, Ordering::Relaxed);
         }
     }
 }
 
 impl Crew<'_> {
-    /// Whether there is nothing left to do.
+    /// Returns whether all tiles are done.
     ///
     /// # Errors
     /// If the observer or the failure of a card has stopped the render.
@@ -45,7 +45,7 @@ impl Crew<'_> {
         Ok(self.dispatcher.scheduler().is_complete())
     }
 
-    /// Waits until there is nothing left to do, not longer than `longest`. Returns whether that is so.
+    /// Waits at most `longest` until all tiles are done. Returns whether they are.
     ///
     /// # Errors
     /// As [`Self::is_complete`].
@@ -56,22 +56,23 @@ impl Crew<'_> {
             if left.is_zero() {
                 return Ok(false);
             }
-            // Nothing wakes this thread when the render is stopped.
+            // A stop of the render does not notify this thread.
             self.dispatcher.wait(left.min(WAIT));
         }
         Ok(true)
     }
 
-    /// Ends the threads of all cards with an error.
+    /// Stops the threads of all cards with an error.
     pub(super) fn fail(&self, error: RenderError) -> RenderError {
         self.failed.store(true, Ordering::Relaxed);
         error
     }
 
-    /// A card is lost, or is used no more; the others go on with its tiles. `was_lost` says that this was told before.
+    /// Handles a card that is lost or given up; the others render its tiles. `was_lost` is true if its loss was reported
+    /// before.
     ///
     /// # Errors
-    /// If no other is left.
+    /// If no other card is left.
     pub(super) fn lose(
         &self,
         card: CardNumber,
@@ -96,7 +97,7 @@ impl Crew<'_> {
         }))
     }
 
-    /// The scheduler sees no way to go on.
+    /// Stops the render with the scheduler's error.
     pub(super) fn end(&self, error: SchedulerError) -> RenderError {
         let name = |source: &Source| match *source {
             Source::Card(card) => self.names[card].clone(),

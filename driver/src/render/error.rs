@@ -1,4 +1,4 @@
-//! Why a render did not end in a picture.
+//! Errors of a render.
 
 use photoncard_shared::message::Fault;
 
@@ -12,121 +12,121 @@ use crate::partial::PartialError;
 use crate::photon::PhotonError;
 use crate::session::SessionError;
 
-/// Why a card cannot be used, or no more.
+/// Error of a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum CardError {
-    /// It could not be started.
+    /// Error of starting an emulated card.
     #[error("it could not be started: {0}")]
     #[diagnostic(help("use fewer cards"))]
     Start(#[source] std::io::Error),
-    /// It could not be reached.
+    /// Error of opening the link.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Link(#[from] LinkError),
-    /// Its link was closed before it had said hello.
+    /// Error of a link that was closed before the card answered the greeting.
     #[error("it closed the link before it said hello")]
     #[diagnostic(help(
         "another host may be using the card: wait until it is done; or check that a card listens at the address"
     ))]
     Refused,
-    /// It does not do what it should.
+    /// Error of the session.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Session(#[from] SessionError),
 }
 
-/// Why a render did not end in a picture.
+/// Error of a render.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum RenderError {
-    /// A setting is not possible.
+    /// Error of a setting that is not possible.
     #[error("{option} {value} is not possible: {reason}")]
     #[diagnostic(help("{remedy}"))]
     Setting {
-        /// The option of the command line.
+        /// Option of the command line.
         option: &'static str,
-        /// Its value.
+        /// Value of the option.
         value: String,
-        /// What is wrong with it.
+        /// Description of the fault.
         reason: String,
-        /// What to do.
+        /// Remedy.
         remedy: String,
     },
-    /// The camera is not in the scene.
+    /// Error of a camera that is not in the scene.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
-    /// The picture's size or crop is not possible.
+    /// Error of the picture's size or crop window.
     #[error(transparent)]
     #[diagnostic(help("change --size or --crop"))]
     Film(#[from] FilmError),
-    /// The scene does not fit the card.
+    /// Error of a scene that does not fit the card.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Pack(#[from] PackError),
-    /// There are no photons.
+    /// Error of the photon pass.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Photons(PhotonError),
-    /// The image that was just packed is not sound.
+    /// Error of a malformed image, though it was just packed.
     #[error("the packed card image is not sound: {0}")]
     #[diagnostic(help("this is a fault of the program: please report it with the scene"))]
     Image(Fault),
-    /// A card failed, and none is left.
+    /// Error of the last card that was left.
     #[error("{card}: {source}")]
     Card {
-        /// Its number, and its address if it is not emulated.
+        /// Number of the card, and its address if it is not emulated.
         card: String,
-        /// What happened.
+        /// Error of the card.
         #[source]
         #[diagnostic_source]
         source: CardError,
     },
-    /// Cards contradict each other, and there is none to decide.
+    /// Error of cards that render a tile differently, with no other card left to decide.
     #[error("{cards} render the tile {tile} differently: at least one of them lies")]
     #[diagnostic(help(
         "render with a third card, which decides; or with one that you trust. Tiles that only one of these cards has rendered are not kept"
     ))]
     Disagreement {
-        /// The tile, as `--crop` takes it.
+        /// The tile as an argument of `--crop`.
         tile: String,
-        /// The cards.
+        /// Names of the cards.
         cards: String,
     },
-    /// Cards contradict the file of an earlier render.
+    /// Error of a tile in the partial file that differs from the one that two cards render.
     #[error(
         "the tile {tile} in the file of finished tiles differs from what two cards render: a card has lied to the render that wrote it"
     )]
     #[diagnostic(help("render without --resume"))]
     KeptDiffers {
-        /// The tile, as `--crop` takes it.
+        /// The tile as an argument of `--crop`.
         tile: String,
     },
-    /// A tile that is to be verified was rendered by one card, and no other is left.
+    /// Error of a tile to be verified when only one card is left.
     #[error("no second card is left to verify the tile {tile}")]
     #[diagnostic(help("go on with --resume and another card, or without --verify"))]
     Unverified {
-        /// The tile, as `--crop` takes it.
+        /// The tile as an argument of `--crop`.
         tile: String,
     },
-    /// Cards crash at some tiles; all others are done.
+    /// Error of tiles at which cards crash; all others are done.
     #[error("cards were lost again and again at work on the tiles {tiles}; all others are done")]
     #[diagnostic(help(
         "each is X0,X1,Y0,Y1 as --crop takes it: watch the card's own messages while it renders one of them alone, or go on with \
          --resume and another kind of card"
     ))]
     Unrendered {
-        /// The tiles, as `--crop` takes them.
+        /// The tiles as arguments of `--crop`.
         tiles: String,
     },
-    /// The chips of a whole frame could not be started.
+    /// Error of starting the chips of whole-frame reordering.
     #[error("the chips could not be started: {0}")]
     #[diagnostic(help("use fewer cards"))]
     Chips(rayon::ThreadPoolBuildError),
-    /// Finished tiles cannot be kept, or gone on with.
+    /// Error of the partial file.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Partial(#[from] PartialError),
-    /// The trace cannot be written.
+    /// Error of writing the trace.
     #[error(transparent)]
     Trace(#[from] OutputError),
     /// The observer stopped the render.
@@ -162,7 +162,7 @@ impl From<PhotonError> for RenderError {
 }
 
 impl RenderError {
-    /// Whether the arguments or the scene are at fault, rather than the work.
+    /// Returns whether the arguments or the scene are at fault.
     pub fn is_input(&self) -> bool {
         match self {
             Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,

@@ -1,4 +1,4 @@
-//! Bytes between a session and its card's port.
+//! Transfer of bytes between a session and its card's port.
 
 use std::time::{Duration, Instant};
 
@@ -6,10 +6,11 @@ use photoncard_shared::link::Port;
 
 use crate::session::{Session, SessionError};
 
-/// How long a port may wait for a byte.
+/// Maximum wait of a port for a byte.
 pub(super) const WAIT: Duration = Duration::from_millis(20);
 
-/// Moves bytes once in each direction, and waits a little if there are none. `slowest` is what [`Session::tick`] takes.
+/// Moves bytes once in each direction; waits at most [`WAIT`] if there are none. `slowest` is an argument of
+/// [`Session::tick`].
 pub(super) fn exchange(
     session: &mut Session,
     port: &mut impl Port,

@@ -1,4 +1,4 @@
-//! Executor: what renders the tiles of a picture.
+//! Trait of executors, which render the tiles of a picture.
 
 use std::sync::{Arc, Mutex};
 
@@ -15,7 +15,7 @@ use crate::scheduler::TileCounts;
 use crate::session::LinkBytes;
 use crate::sink::TileSink;
 
-/// Renders the tiles of a picture.
+/// Executor of a picture's tiles.
 pub(super) trait Executor {
     /// Budget of each chip.
     fn budgets(&self) -> Vec<Budget>;
@@ -40,9 +40,9 @@ pub(super) struct Work<'a> {
     pub(super) tiles: Vec<Tile>,
     /// The picture, with the tiles of the render that is resumed; one of the sinks.
     pub(super) film: &'a Mutex<Film>,
-    /// Takers of finished tiles.
+    /// Destinations of finished tiles.
     pub(super) sinks: Vec<&'a dyn TileSink>,
-    /// Outputs that are looked at in between.
+    /// Outputs that are polled during the work.
     pub(super) outputs: &'a Outputs<'a>,
 }
 
@@ -53,16 +53,16 @@ pub(super) struct Outcome {
     pub(super) counters: Counters,
     /// Bytes over all links.
     pub(super) bytes: LinkBytes,
-    /// Memory traffic, where memory is modelled.
+    /// Memory traffic; `None` if memory is not modelled.
     pub(super) traffic: Option<MemoryTraffic>,
     /// Number of cards.
     pub(super) cards: usize,
-    /// Cards that were given up, or have never said hello.
+    /// Number of cards that were given up, or have never answered the greeting.
     pub(super) cards_given_up: usize,
-    /// Tiles that were more to render than the picture has.
+    /// Numbers of tiles that were rendered more than once or taken over.
     pub(super) tiles: TileCounts,
     /// Time until the last card was loaded, seconds.
     pub(super) load_seconds: f64,
-    /// Time from then on, seconds.
+    /// Time after the last card was loaded, seconds.
     pub(super) render_seconds: f64,
 }

@@ -1,4 +1,4 @@
-//! The first words with a card.
+//! Greeting of a card: the first message and its reply.
 
 use std::hash::{BuildHasher, RandomState};
 use std::time::{Duration, Instant};
@@ -13,16 +13,16 @@ use super::{CardAddress, CardError, Observer, RenderError, Unobserved};
 use crate::emulator::SharedImage;
 use crate::session::{Session, SessionError};
 
-/// A card that has said hello.
+/// Card that has answered the greeting.
 pub(super) struct GreetedCard {
     pub(super) card: OpenCard,
     pub(super) session: Session<'static>,
     pub(super) budget: Budget,
 }
 
-/// Why there is no hello.
+/// Error of a greeting.
 pub(super) enum GreetingError {
-    /// The card is at fault.
+    /// Error of the card.
     Card(CardError),
     /// The observer stopped the render.
     Stopped,
@@ -34,30 +34,30 @@ impl From<CardError> for GreetingError {
     }
 }
 
-/// What a card says of itself.
+/// Information that a card reports about itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CardInfo {
     /// Name and version of its firmware.
     pub build: String,
-    /// What it can hold.
+    /// Capacities and limits of the chip.
     pub budget: Budget,
-    /// What its firmware takes of on-chip memory; `None` of a card that does not measure it.
+    /// On-chip memory that the firmware takes; `None` for a card that does not measure it.
     pub memory_use: Option<MemoryUse>,
 }
 
-/// Says hello to the first card at an address.
+/// Greets the first card at an address.
 ///
 /// # Errors
-/// If it cannot be started or reached, or does not answer as it should.
+/// If the card cannot be started or reached, or its reply is invalid.
 pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
     let GreetedCard { session, budget, .. } = greet_alone(address, open(address)?, Instant::now())?;
     Ok(CardInfo { build: session.build().to_owned(), budget, memory_use: session.memory_use() })
 }
 
-/// Says hello to the first card at an address some times. Returns how long each answer took.
+/// Greets the first card at an address `count` times. Returns the time until each reply.
 ///
 /// # Errors
-/// If it cannot be started or reached, or does not answer as it should.
+/// If the card cannot be started or reached, or its reply is invalid.
 pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, RenderError> {
     let mut card = open(address)?;
     let mut answers = Vec::with_capacity(count);
@@ -81,7 +81,7 @@ fn greet_alone(address: &CardAddress, card: OpenCard, start: Instant) -> Result<
     })
 }
 
-/// What errors call a card: its number, and its address if it is not emulated.
+/// Name of a card in errors: its number, and its address if it is not emulated.
 pub(super) fn card_name(index: usize, address: &CardAddress) -> String {
     match address {
         CardAddress::Emulated { .. } => format!("card {index}"),
@@ -89,7 +89,7 @@ pub(super) fn card_name(index: usize, address: &CardAddress) -> String {
     }
 }
 
-/// Says hello and waits for the answer.
+/// Sends the greeting and waits for the reply.
 pub(super) fn greet(
     mut card: OpenCard,
     start: Instant,
@@ -110,7 +110,8 @@ pub(super) fn greet(
     }
 }
 
-/// A random number: no card or line holds anything of another session of that number, but by a chance of one in 2^32.
+/// Random number of a session, to distinguish it from frames of earlier sessions on the line; two coincide with probability
+/// 2^-32.
 fn session_number() -> u32 {
     // The standard library's hashers have random keys.
     RandomState::new().hash_one(std::process::id()) as u32

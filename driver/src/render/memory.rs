@@ -1,4 +1,4 @@
-//! What card memory was read for: the key `memory` of `--stats`.
+//! Statistics of reads from card memory: the key `memory` of `--stats`.
 
 use photoncard_firmware::memory::Stage;
 use photoncard_shared::address::Structure;
@@ -9,32 +9,32 @@ use crate::emulator::memory_model::{CacheSettings, MemoryTraffic};
 /// Reads of card memory by all tiles, on all chips together. The sums do not depend on the number of chips.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MemoryStatistics {
-    /// The caches, as `--cache` takes them.
+    /// Caches as an argument of `--cache`.
     pub caches: String,
-    /// Of the photon map.
+    /// Reads of the photon map.
     pub photon_map: ReadStatistics,
-    /// Of the scene.
+    /// Reads of the scene.
     pub scene: ReadStatistics,
-    /// By what was read.
+    /// Reads by structure.
     pub structures: StructureReads,
-    /// By what it was read for.
+    /// Reads by stage.
     pub stages: StageReads,
     /// Bytes of the image, written into every card.
     pub written_bytes: u64,
 }
 
-/// Reads of some of card memory.
+/// Reads of a part of card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ReadStatistics {
-    /// Reads by chips, each within a line of card memory.
+    /// Number of reads by chips, each within one line of card memory.
     pub requests: u64,
-    /// Bytes that they asked for.
+    /// Number of bytes requested.
     pub raw_bytes: u64,
-    /// Requests that a cache answered.
+    /// Number of requests that a cache answered.
     pub line_hits: u64,
-    /// Requests for which a line of a cache was fetched.
+    /// Number of requests for which a cache line was fetched.
     pub line_misses: u64,
-    /// Bytes fetched from DRAM.
+    /// Number of bytes fetched from DRAM.
     pub dram_bytes: u64,
 }
 
@@ -47,9 +47,9 @@ pub struct StructureReads {
     pub triangles: ReadStatistics,
     /// Materials.
     pub materials: ReadStatistics,
-    /// Lights, and what chooses one: the light tree and the environment's cells.
+    /// Light tree, lights and the cells of the environment.
     pub emitters: ReadStatistics,
-    /// Inner nodes of a photon map that has its photons in leaves.
+    /// Inner nodes of a photon map in the line layout.
     pub photon_nodes: ReadStatistics,
     /// Photons.
     pub photons: ReadStatistics,
@@ -57,11 +57,11 @@ pub struct StructureReads {
     pub irradiance_nodes: ReadStatistics,
     /// Irradiance points.
     pub irradiance_points: ReadStatistics,
-    /// Inner nodes above the photons of caustics.
+    /// Inner nodes of the caustic map.
     pub caustic_nodes: ReadStatistics,
-    /// Photons of caustics.
+    /// Photons of the caustic map.
     pub caustic_photons: ReadStatistics,
-    /// Normals, texture coordinates and colours of triangles' corners.
+    /// Vertex attributes: normals, texture coordinates and colours.
     pub attributes: ReadStatistics,
     /// Textures and their texels.
     pub textures: ReadStatistics,
@@ -70,11 +70,11 @@ pub struct StructureReads {
 /// Reads by stage of the chip's work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StageReads {
-    /// Rays from the eye.
+    /// Eye rays.
     pub eye: ReadStatistics,
-    /// Rays around irradiance records.
+    /// Rays of irradiance records that survey their surroundings.
     pub survey: ReadStatistics,
-    /// Gathers that tables of directions are made of.
+    /// Photon gathers that fill importance tables.
     pub table: ReadStatistics,
     /// Shadow rays.
     pub shadow: ReadStatistics,
@@ -82,12 +82,12 @@ pub struct StageReads {
     pub gather_ray: ReadStatistics,
     /// Photon gathers at the ends of final gather rays.
     pub gather: ReadStatistics,
-    /// Gathers of photons of caustics.
+    /// Gathers in the caustic map.
     pub caustic: ReadStatistics,
 }
 
 impl MemoryStatistics {
-    /// Of what was read through some caches.
+    /// Statistics of the traffic through some caches.
     pub(super) fn new((caches, traffic): (CacheSettings, &MemoryTraffic)) -> Self {
         let of = |chosen: fn(Structure) -> bool| reads(traffic, |_, structure| chosen(structure));
         let structure = |chosen| reads(traffic, |_, structure| structure == chosen);
@@ -124,7 +124,7 @@ impl MemoryStatistics {
     }
 }
 
-/// The reads of tiles that are chosen by stage and structure.
+/// Sum of the reads for tiles whose stage and structure are chosen.
 fn reads(traffic: &MemoryTraffic, chosen: impl Fn(Stage, Structure) -> bool) -> ReadStatistics {
     let of_tiles = |stage: Stage, structure: Structure| stage != Stage::Begin && chosen(stage, structure);
     let requested = traffic.requested.sum(of_tiles);

@@ -51,23 +51,22 @@ use crate::partial::PartialRender;
 use crate::scene::Scene;
 use crate::scheduler::{GatherOrder, tiles};
 
-/// A finished picture.
+/// Finished picture.
 pub struct Rendering {
-    /// Its pixels.
+    /// Pixels of the picture.
     pub film: Film,
-    /// What it took.
+    /// Statistics of the work.
     pub statistics: Statistics,
-    /// Where finished tiles are kept: to be removed when the picture is written.
+    /// File of finished tiles, to be removed after the picture is written.
     pub partial: Option<PartialRender>,
 }
 
 /// Renders a scene.
 ///
-/// A serial port may still be held for about a second after the end: one that was just being opened again is on a thread that
-/// nobody waits for.
+/// A serial port may be held open for about a second after the end: an attempt to reopen it runs on a detached thread.
 ///
 /// # Errors
-/// If settings or scene do not fit the cards, a card fails, or the observer stops it.
+/// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
 pub fn render(
     scene: &Scene,
     settings: &RenderSettings,
@@ -80,7 +79,7 @@ pub fn render(
     for budget in &budgets {
         settings.check(budget)?;
     }
-    // Not before the settings are known to be possible: a film may be large.
+    // A film may be large: it is allocated after the settings are checked.
     let mut film = settings.film()?;
     let tiles = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
     let outputs = Outputs::open(scene, settings, &tiles, &mut film, observer)?;
@@ -103,7 +102,7 @@ pub fn render(
 /// The executor of the settings.
 ///
 /// # Errors
-/// If the settings contradict each other, or too few cards say hello.
+/// If the settings contradict each other, or too few cards answer the greeting.
 fn executor<'a>(
     settings: &'a RenderSettings,
     observer: &dyn Observer,

@@ -1,14 +1,14 @@
-//! What watches a render, and can stop it.
+//! Observer of a render, which can stop it.
 
 use super::error::CardError;
 use crate::display::DisplayError;
 
-/// What a render is doing.
+/// Phase of a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Tracing photons: progress in photons.
     Photons,
-    /// Building the photon map and the card image: no progress.
+    /// Building the photon map and the card image: without progress.
     Pack,
     /// Loading the image into the cards: progress in bytes.
     Load,
@@ -16,28 +16,28 @@ pub enum Phase {
     Tiles,
 }
 
-/// Watches a render, and can stop it.
+/// Observer of a render, which can stop it. Its methods are called from the threads of the render.
 pub trait Observer: Sync {
-    /// Tells how far a phase is.
+    /// Reports the progress of a phase: `done` of `total`.
     fn progress(&self, phase: Phase, done: u64, total: u64);
 
-    /// Whether the render is to stop as soon as it can.
+    /// Returns whether the render should stop as soon as possible.
     fn is_stopped(&self) -> bool;
 
-    /// Tells that so many of all tiles were rendered before.
+    /// Reports that `done` of `total` tiles are taken over from an earlier render.
     fn resumed(&self, _done: usize, _total: usize) {}
 
-    /// Tells that finished tiles are kept, so that a render that ends early can be gone on with.
+    /// Reports that finished tiles are in the partial file, so that a render that ends early can be resumed.
     fn kept(&self) {}
 
-    /// Tells that a card was lost, or is used no more; the others go on with its tiles.
+    /// Reports that a card was lost or given up; the others render its tiles.
     fn lost(&self, _card: &str, _error: &CardError) {}
 
-    /// Tells that the picture is not shown on the display server, or no more; the render goes on.
+    /// Reports that the display server does not show the picture, or has ceased to; the render goes on.
     fn not_shown(&self, _error: &DisplayError) {}
 }
 
-/// Watches nothing and never stops.
+/// Observer that ignores all reports and never stops the render.
 pub struct Unobserved;
 
 impl Observer for Unobserved {

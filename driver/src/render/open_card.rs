@@ -1,4 +1,4 @@
-//! A card at the host's end of its link.
+//! Open connections to cards.
 
 use std::time::Duration;
 
@@ -9,10 +9,10 @@ use super::address::{CardAddress, RemoteAddress};
 use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage};
 use crate::link::{FaultInjector, LineFaults, LinkError, connect_tcp, connect_unix, open_serial};
 
-/// The host's end of a link.
+/// Host's end of a link.
 pub(super) type BoxedPort = Box<dyn Port + Send>;
 
-/// A card that can be talked to.
+/// Card with an open connection, and faults of its line if any are injected.
 pub(super) struct OpenCard {
     connection: Connection,
     injector: Option<FaultInjector>,
@@ -21,7 +21,7 @@ pub(super) struct OpenCard {
 /// Connection to a card.
 enum Connection {
     Emulated(EmulatedCard),
-    /// Its port is closed before it is opened again, as a device may have one user at a time.
+    /// The port is closed before it is reopened, as a device may allow one user at a time.
     Remote {
         address: RemoteAddress,
         port: Option<BoxedPort>,
@@ -29,8 +29,8 @@ enum Connection {
 }
 
 impl OpenCard {
-    /// Starts or reaches the card at an address, the first if it has many. One that is emulated may have a model of its
-    /// memory, and shares an image with the host. Faults of its line are those of the number `index`.
+    /// Starts or connects to the card at an address, the first if there are several. An emulated card may have a model of
+    /// its memory, and shares the host's image. `index` is the card's number, on which injected faults depend.
     pub(super) fn open(
         index: usize,
         address: &CardAddress,
@@ -49,7 +49,7 @@ impl OpenCard {
         Ok(Self { connection, injector: faults.map(|faults| FaultInjector::new(faults, index)) })
     }
 
-    /// Closes the link to a card. Returns where it can be reached again: an emulated card does not come back.
+    /// Closes the link to a card. Returns the address to reconnect to; `None` for an emulated card.
     pub(super) fn close(&mut self) -> Option<RemoteAddress> {
         match &mut self.connection {
             Connection::Emulated(_) => None,
@@ -60,19 +60,19 @@ impl OpenCard {
         }
     }
 
-    /// Goes on with a link that was opened again.
+    /// Continues with a reopened link.
     pub(super) fn go_on_with(&mut self, opened: BoxedPort) {
         if let Connection::Remote { port, .. } = &mut self.connection {
             *port = Some(opened);
         }
     }
 
-    /// Whether its trace cannot be written.
+    /// Returns whether writing the trace has failed.
     pub(super) fn trace_has_failed(&self) -> bool {
         matches!(&self.connection, Connection::Emulated(card) if card.trace_has_failed())
     }
 
-    /// Ends an emulated card, or the link to another. Returns what its memory leaves, if it is modelled.
+    /// Ends an emulated card, or closes the link to a remote one. Returns the record of a modelled memory.
     pub(super) fn finish(self) -> Option<MemoryRecord> {
         match self.connection {
             Connection::Emulated(card) => card.finish(),
@@ -93,7 +93,7 @@ impl Connection {
     }
 }
 
-/// The host's end of the link.
+/// Host's end of the link, with injected faults.
 impl Port for OpenCard {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
         let port = self.connection.port()?;

@@ -71,7 +71,7 @@ impl<'a> Outputs<'a> {
         }
     }
 
-    /// Reports to the observer, once, why the picture is not shown.
+    /// Reports to the observer, once, the error that keeps the picture from being shown.
     pub(super) fn report_display(&self) {
         if let Some(error) = self.display.as_ref().and_then(Display::failure) {
             self.observer.not_shown(&error);

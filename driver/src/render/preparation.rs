@@ -12,7 +12,7 @@ use crate::pack::{CardImage, PackedScene};
 use crate::photon_map::{self, MappedImage, PhotonTimes, map_photons};
 use crate::scene::Scene;
 
-/// A card image with what its frame has to know of it.
+/// Card image with the parameters that a frame derives from it.
 pub(super) struct Prepared {
     pub(super) image: Arc<CardImage>,
     /// Maximum distance of a gather, metres.

@@ -1,4 +1,4 @@
-//! Reaching a card again whose link was closed.
+//! Reconnection to a card whose link was closed.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
@@ -8,16 +8,16 @@ use super::address::RemoteAddress;
 use super::exchange::WAIT;
 use super::open_card::{BoxedPort, reach};
 
-/// How long a lost card is left alone.
+/// Pause before each attempt to reconnect.
 const RETRY: Duration = Duration::from_millis(500);
 
-/// Tries to reach a card until it is there, or nothing is left to do: which `wait_for_end` waits for, not longer than it is
-/// given.
+/// Tries to reconnect to a card until it succeeds, or all tiles are done. `wait_for_end` waits at most for the time given,
+/// and returns whether they are.
 pub(super) fn reopen(
     address: &RemoteAddress,
     wait_for_end: &dyn Fn(Duration) -> Result<bool, RenderError>,
 ) -> Result<Option<BoxedPort>, RenderError> {
-    // Before the first try as well: what closes each link at once is not to be asked without a pause.
+    // The first attempt waits as well: a peer that closes every link at once must not be contacted in a tight loop.
     while !wait_for_end(RETRY)? {
         let attempt = try_to_reach(address.clone());
         loop {
@@ -32,15 +32,15 @@ pub(super) fn reopen(
     Ok(None)
 }
 
-/// Tries once, on a thread of its own: an address may take seconds to be looked up or to answer, and a render that ends does
-/// not wait for it. A port that nobody receives is closed.
+/// Tries once, on a thread of its own: looking up or connecting to an address may take seconds, and a render that ends does
+/// not wait for it. A port that is not received is closed.
 fn try_to_reach(address: RemoteAddress) -> Receiver<Option<BoxedPort>> {
     let (sender, receiver) = channel();
     let work = move || {
-        // The render may have ended.
+        // The receiver is gone if the render has ended.
         let _ = sender.send(reach(&address).ok());
     };
-    // Without a thread, the next try comes later.
+    // If no thread can be started, the next attempt follows later.
     let _ = std::thread::Builder::new().name("reopen".into()).spawn(work);
     receiver
 }

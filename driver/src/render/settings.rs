@@ -1,4 +1,4 @@
-//! What a render is asked to do.
+//! Settings of a render.
 
 mod check;
 mod dependence;
@@ -22,44 +22,44 @@ use crate::photon_map::PhotonSettings;
 use crate::scene::{Camera, Scene};
 use crate::scheduler::GatherOrder;
 
-/// Settings of a render: each field is an option of the command line, and each group a part of them.
+/// Settings of a render: each field is an option of the command line, in groups.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderSettings {
     /// The picture and the camera that sees it.
     pub picture: Picture,
-    /// The photon map and the caustic map.
+    /// Photon map and caustic map.
     pub photons: PhotonMaps,
-    /// The estimate of light by rays.
+    /// Estimation of light by rays.
     pub integrator: Integrator,
-    /// The order of the work.
+    /// Order of the work.
     pub schedule: Schedule,
-    /// The cards that do it.
+    /// Cards that render.
     pub cards: CardSet,
     /// Destinations of finished tiles besides the film.
     pub outputs: TileOutputs,
 }
 
-/// Direction bins: three to an entry of the table that directions are sampled by.
+/// Default number of direction bins: three per entry of the table that samples directions.
 const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 
-/// Photons of the caustic map of a scene with anything perfectly specular in it, unless others are asked for.
+/// Default number of caustic photons for a scene with a perfectly specular surface.
 pub const DEFAULT_CAUSTIC_PHOTONS: usize = 200_000;
 
 impl RenderSettings {
-    /// These settings with a change.
+    /// Settings with a change.
     #[must_use]
     pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
         change(&mut self);
         self
     }
 
-    /// The part to render.
+    /// Window of the picture to render.
     pub fn window(&self) -> Window {
         self.picture.crop.unwrap_or(Window::full(self.picture.width, self.picture.height))
     }
 
-    /// The side of a tile where none is asked for, pixels: one that the cards have room for, as far as that is known
-    /// without asking them.
+    /// Default side of a tile, pixels. Unless all cards are emulated reference chips, it is limited to the tile of the
+    /// smallest kind of chip, as remote cards are not known yet.
     pub fn default_tile(layers: &Layers, cards: &[CardAddress]) -> u32 {
         let are_large =
             cards.iter().all(|card| matches!(card, CardAddress::Emulated { kind: ChipKind::Reference, .. }));
@@ -67,24 +67,24 @@ impl RenderSettings {
         if are_large { side } else { side.min(MICRO.pixels_of_tile(layers.are_of_chip()).isqrt()) }
     }
 
-    /// An empty film for the picture.
+    /// Empty film for the picture.
     ///
     /// # Errors
-    /// If its size or its crop is not possible.
+    /// If its size or its crop window is not possible.
     pub fn film(&self) -> Result<Film, FilmError> {
         let new = if self.picture.layers.are_of_chip() { Film::with_layers } else { Film::new };
         new(self.picture.width, self.picture.height, self.window())
     }
 
-    /// The caches that memory is modelled with, if it is.
+    /// Caches of the memory model; `None` if memory is not modelled.
     pub fn modelled_caches(&self) -> Option<CacheSettings> {
         self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| CacheSettings::default()))
     }
 
-    /// Checks that the reads of the cards can be traced, if they are to be.
+    /// Checks that the reads of the cards can be traced, if a trace is requested.
     ///
     /// # Errors
-    /// If there is no one order of them.
+    /// If the reads have no single order: with the order `hilbert`, several chips, or a chip that is not emulated.
     pub fn check_trace(&self) -> Result<(), RenderError> {
         let Some(trace) = &self.cards.trace else { return Ok(()) };
         let refuse = |reason: &str, remedy: &str| {
@@ -98,20 +98,20 @@ impl RenderSettings {
         };
         if self.schedule.order == GatherOrder::Hilbert {
             return refuse(
-                "with --order hilbert no one chip reads the photon map",
+                "with --order hilbert no single chip reads the photon map",
                 "use another --order, such as sort",
             );
         }
         if !is_one_emulated_chip(&self.cards.addresses) {
             return refuse(
-                "several chips read in no one order, and a chip that is not emulated tells nothing of its reads",
+                "several chips have no common order of reads, and a chip that is not emulated does not report its reads",
                 "use --card emulated:1 or --card emulated-micro:1",
             );
         }
         Ok(())
     }
 
-    /// Checks that the memory of every card can be modelled, if it is to be.
+    /// Checks that the memory of every card can be modelled, if requested.
     ///
     /// # Errors
     /// If a card is not emulated in this process.
@@ -127,7 +127,8 @@ impl RenderSettings {
         }
     }
 
-    /// Checks that there are tiles to go on with: gathers along a curve through the frame complete all tiles at once.
+    /// Checks that the order can resume a render: `hilbert` finishes all tiles together, so that there are none to take
+    /// over.
     pub(super) fn check_resume(&self) -> Result<(), RenderError> {
         if !self.outputs.partial.as_ref().is_some_and(|partial| partial.resume) {
             return Ok(());
@@ -140,14 +141,14 @@ impl RenderSettings {
         })
     }
 
-    /// Photons of a scene's caustic map; 0 for no map.
+    /// Number of photons in a scene's caustic map; 0 for no map.
     fn caustic_photons(&self, scene: &Scene) -> usize {
         let asked = self.photons.caustic_photons.unwrap_or(DEFAULT_CAUSTIC_PHOTONS);
         if scene.is_specular() { asked } else { 0 }
     }
 
-    /// Settings that give a scene the same pixels, alike for all that do: the caustic map is that of the scene, and
-    /// without one its gathers are the default's.
+    /// Canonical settings, equal for all settings that give the scene equal pixels: the number of caustic photons is the
+    /// scene's, and without a caustic map the neighbours of its gathers are the default's.
     #[must_use]
     pub fn resolved(&self, scene: &Scene) -> Self {
         let caustic_photons = self.caustic_photons(scene);
@@ -159,7 +160,7 @@ impl RenderSettings {
         })
     }
 
-    /// What the photon maps of a scene are to be.
+    /// Parameters of the photon maps of a scene.
     pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
         PhotonSettings {
             caustic_photons: self.caustic_photons(scene),
@@ -173,7 +174,7 @@ impl RenderSettings {
         }
     }
 
-    /// The frame's parameters for a camera of the scene.
+    /// Parameters of the frame for a camera of the scene.
     pub fn frame(
         &self,
         camera: &Camera,
@@ -201,7 +202,8 @@ impl RenderSettings {
         }
     }
 
-    /// The vertical field of view is the camera's, the horizontal one follows from the size.
+    /// Pinhole camera of the frame. The vertical field of view is the camera's; the horizontal one follows from the
+    /// picture's size.
     fn pinhole(&self, camera: &Camera) -> message::Camera {
         let half_height = libm::tanf(0.5 * camera.vertical_fov);
         let half_width = half_height * self.picture.width as f32 / self.picture.height as f32;

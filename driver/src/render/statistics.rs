@@ -1,4 +1,4 @@
-//! What a render took: the keys of `--stats`.
+//! Statistics of a render: the keys of `--stats`.
 
 use photoncard_shared::message::FrameParameters;
 use serde::Serialize;
@@ -9,74 +9,75 @@ use super::times::Times;
 use super::{MemoryStatistics, RenderSettings};
 use crate::cost_model::Flops;
 
-/// The contents of the statistics file. Keys are stable.
+/// Contents of the statistics file. The keys are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Statistics {
-    /// Pixels in a row of the whole picture.
+    /// Width of the whole picture, pixels.
     pub width: u32,
-    /// Rows of the whole picture.
+    /// Height of the whole picture, pixels.
     pub height: u32,
-    /// Samples a pixel.
+    /// Number of samples per pixel.
     pub samples: u32,
-    /// Photons in the map.
+    /// Number of photons in the map.
     pub photons: u64,
-    /// Paths traced from the lights for them.
+    /// Number of paths traced from the lights for the photons.
     pub photon_paths: u64,
-    /// Greatest distance of a gather, metres.
+    /// Maximum distance of a gather, metres.
     pub max_distance: f32,
-    /// Cards, one chip each.
+    /// Number of cards, one chip each.
     pub cards: usize,
-    /// Cards that were given up, or have never said hello.
+    /// Number of cards that were given up, or have never answered the greeting.
     pub cards_given_up: usize,
-    /// Tiles that two cards have rendered alike.
+    /// Number of tiles that two cards have rendered equally.
     pub verified_tiles: usize,
-    /// Tiles that were rendered once more, to verify them or as another card took too long: no other number counts them.
+    /// Number of tiles rendered once more, for verification or because another card took too long; no other number counts
+    /// them.
     pub repeated_tiles: usize,
-    /// Tiles that were rendered again, as their card has lied: counted once.
+    /// Number of tiles rendered again because their card was outvoted; other numbers count them once.
     pub revoked_tiles: usize,
-    /// Seconds of each phase.
+    /// Time of each phase, seconds.
     pub time_s: Times,
-    /// Rays cast on the chips.
+    /// Number of rays cast on the chips.
     pub rays: Rays,
-    /// Paths that met more perfectly specular surfaces than are followed, or one that takes everything: they bring nothing.
+    /// Number of paths that exceeded the limit of perfectly specular bounces, or met a surface that absorbs all light; they
+    /// contribute nothing.
     pub lost_paths: u64,
-    /// Searches of the caustic map.
+    /// Number of searches of the caustic map.
     pub caustic_gathers: u64,
-    /// Searches of the photon map.
+    /// Number of searches of the photon map.
     pub gathers: u64,
-    /// Those of them that made a table of directions.
+    /// Number of these searches that filled an importance table.
     pub tables: u64,
-    /// Irradiance records gathered; one that two tiles use counts twice.
+    /// Number of irradiance records; a record that two tiles use counts twice.
     pub records: u64,
-    /// Of the samples that see a surface with a Lambertian part, the share whose irradiance was interpolated.
+    /// Share of interpolated irradiance among the samples that see a surface with a Lambertian part.
     pub interpolated_share: f64,
-    /// Photons whose distance was computed.
+    /// Number of photons whose distance was computed.
     pub photons_tested: u64,
-    /// Photons that were near enough to become candidates of a search.
+    /// Number of photons that became candidates of a search.
     pub photons_taken: u64,
-    /// Candidates that selections of the nearest went through.
+    /// Number of candidates processed by selections of the k nearest.
     pub photons_selected: u64,
-    /// Photons that the searches returned.
+    /// Number of photons that the searches returned.
     pub photons_found: u64,
-    /// Searches for the nearest irradiance point.
+    /// Number of searches for the nearest irradiance point.
     pub lookups: u64,
-    /// Irradiance points whose distance was computed.
+    /// Number of irradiance points whose distance was computed.
     pub points_tested: u64,
-    /// Times that waiting gathers were taken out of a chip's queue.
+    /// Number of times that a chip's queue of gathers was emptied.
     pub drains: u64,
-    /// The most gathers that waited at once, on any chip.
+    /// Maximum number of gathers that waited at once on any chip.
     pub most_waiting: u64,
-    /// Floating-point operations that the cost model of `docs/scaling.md` counts for the work; it has no lookups of
-    /// irradiance, and counts none.
+    /// Floating-point operations of the work by the cost model of `docs/scaling.md`, without lookups of irradiance.
     pub flops: Flops,
     /// Bytes of the card image.
     pub image_bytes: u64,
     /// Bytes over all links.
     pub link: LinkStatistics,
-    /// Reads of card memory; absent where none is modelled.
+    /// Reads of card memory; absent if memory is not modelled.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory: Option<MemoryStatistics>,
-    /// The most memory the process has held, bytes; absent where the system does not tell.
+    /// Maximum resident memory of the process, bytes; absent if the system does not report it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub peak_memory_bytes: Option<u64>,
 }
@@ -146,38 +147,38 @@ impl Statistics {
 /// Rays by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Rays {
-    /// From the eye: twice to each sample, with the irradiance cache thrice, and to points of its lattice.
+    /// Eye rays: one per sample, cast twice, with the irradiance cache three times; and rays to points of its lattice.
     pub eye: u64,
-    /// Towards emitters.
+    /// Shadow rays.
     pub shadow: u64,
     /// Final gather rays.
     pub gather: u64,
-    /// Around irradiance records.
+    /// Rays that survey the surroundings of irradiance records.
     pub survey: u64,
-    /// From perfectly specular surfaces, on the way of any of these but shadow rays.
+    /// Rays from perfectly specular surfaces, continuing any of these but shadow rays.
     pub specular: u64,
 }
 
 /// Bytes over all links.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct LinkStatistics {
-    /// Image lines and pixels.
+    /// Bytes of image lines and pixels.
     pub payload_bytes: u64,
     /// All bytes in both directions.
     pub wire_bytes: u64,
     /// Frames sent more than once.
     pub retransmitted_frames: u64,
-    /// Frames of cards that came damaged.
+    /// Damaged frames from cards.
     pub damaged_frames: u64,
-    /// Frames of cards that came again.
+    /// Repeated frames from cards.
     pub duplicate_frames: u64,
-    /// Times that a silent card was asked what has come.
+    /// Number of probes sent to silent cards.
     pub probes: u64,
-    /// Times that a card was greeted again.
+    /// Number of times that a card was greeted again.
     pub resets: u64,
 }
 
-/// The process's peak resident memory, where `/proc` tells.
+/// Peak resident memory of the process, bytes, from `/proc`.
 fn peak_memory_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -11,18 +11,18 @@ pub struct Times {
     pub photons: f64,
     /// Building hierarchy, photon map and card image.
     pub pack: f64,
-    /// Of these, the hierarchy and the other parts of the scene.
+    /// Part of `pack`: the hierarchy and the other sections of the scene.
     pub hierarchy: f64,
-    /// Of these, the photon map.
+    /// Part of `pack`: the photon map.
     pub photon_map: f64,
-    /// Of these, how far gathers look, and how much of the discs around photons is surface.
+    /// Part of `pack`: the maximum distance of gathers, and disc fractions.
     pub discs: f64,
-    /// Of these, irradiance at photons, if it is precomputed.
+    /// Part of `pack`: irradiance points, if irradiance is precomputed.
     pub irradiance: f64,
     /// Loading the slowest card.
     pub load: f64,
     /// Rendering, after the last card was loaded.
     pub render: f64,
-    /// All of it.
+    /// Total.
     pub total: f64,
 }

@@ -1,4 +1,4 @@
-//! Tiles that two cards render, to see whether they agree.
+//! Verification: tiles that two cards render for comparison.
 
 use photoncard_shared::message::Tile;
 
@@ -6,10 +6,11 @@ use super::{RenderError, RenderSettings};
 use crate::scheduler::{GatherOrder, Scheduler};
 
 impl RenderSettings {
-    /// Checks that tiles can be verified, if they are to be.
+    /// Checks that tiles can be verified, if requested.
     ///
     /// # Errors
-    /// If there are not two cards, the share is none, or reads are counted, which would be those of both cards.
+    /// If there are fewer than two cards, the share is out of range, the order is `hilbert`, or memory is modelled, since
+    /// the reads of both cards would count.
     pub fn check_verification(&self) -> Result<(), RenderError> {
         let Some(share) = self.cards.verify else { return Ok(()) };
         let chips: usize = self.cards.addresses.iter().map(|card| card.emulated_chips().max(1)).sum();
@@ -20,7 +21,7 @@ impl RenderSettings {
         } else if chips < 2 {
             ["a tile is verified by a second card", "give two --card or more, or --card emulated:2"]
         } else if self.modelled_caches().is_some() {
-            ["memory is counted of each tile once", "leave --counters, --cache and --trace out"]
+            ["reads of memory are counted once for each tile", "leave --counters, --cache and --trace out"]
         } else {
             return Ok(());
         };
@@ -28,12 +29,12 @@ impl RenderSettings {
         Err(RenderError::Setting { option: "--verify", value, reason, remedy })
     }
 
-    /// Cards that must have said hello.
+    /// Minimum number of cards.
     pub(super) fn needed_cards(&self) -> usize {
         if self.cards.verify.is_some() { 2 } else { 1 }
     }
 
-    /// Deals tiles to so many cards. Where memory is modelled each tile is rendered once: all reads are counted.
+    /// Scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice: all reads count.
     pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
         let scheduler = Scheduler::new(tiles, cards);
         if self.modelled_caches().is_some() {

@@ -19,7 +19,7 @@ pub(super) struct WholeFrame {
 }
 
 impl WholeFrame {
-    /// The chips of the settings.
+    /// Executor with the chips of the settings.
     ///
     /// # Errors
     /// If there is a card of another kind, or the render is to be resumed.
@@ -60,10 +60,10 @@ impl Executor for WholeFrame {
     }
 }
 
-/// Number of emulated reference chips at some addresses.
+/// Number of emulated reference chips at the addresses.
 ///
 /// # Errors
-/// If there is any other card among them, or there are too many.
+/// If the addresses name any other card, or too many chips.
 fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
     let counts = addresses.iter().map(|address| match *address {
         CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),

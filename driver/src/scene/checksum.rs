@@ -7,7 +7,7 @@ use photoncard_shared::checksum::Checksum;
 use super::Scene;
 
 impl Scene {
-    /// CRC-32C of everything that a render reads of the scene, as eight hexadecimal digits.
+    /// CRC-32C of all contents of the scene that a render reads, as eight hexadecimal digits.
     pub fn checksum(&self) -> String {
         let mut sum = Checksum::default();
         for triangle in &self.triangles {
@@ -31,7 +31,7 @@ impl Scene {
         format!("{:08x}", sum.value())
     }
 
-    /// Everything but triangles, attributes and texels, as text with floating-point numbers that read back exactly.
+    /// Text of all contents except triangles, attributes and texels, with floating-point numbers that parse back exactly.
     fn description(&self) -> String {
         let mut text = String::new();
         let _ = write!(text, "{:?}{:?}{:?}{:?}", self.materials, self.cameras, self.textures, self.lights);

@@ -1,4 +1,4 @@
-//! Light from infinitely far.
+//! Environment light from infinitely far.
 
 use std::fs;
 use std::io;
@@ -25,22 +25,22 @@ const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 /// map is -z, where a camera of glTF looks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
-    /// Texels of a row.
+    /// Width, texels.
     pub width: u32,
-    /// Rows.
+    /// Height, texels.
     pub height: u32,
-    /// Rows from the top. Finite, and 0 or more.
+    /// Texels, rows from the top; finite, and 0 or more.
     pub texels: Vec<[f32; 3]>,
 }
 
 impl Environment {
-    /// The same radiance from everywhere.
+    /// Environment of equal radiance in all directions.
     pub fn constant(radiance: Vec3) -> Self {
         Self { width: 1, height: 1, texels: vec![radiance.to_array()] }
     }
 
     /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that has the
-    /// channels R, G and B. Which of them a file is, its first bytes tell.
+    /// channels R, G and B. The first bytes of the file determine its format.
     ///
     /// # Errors
     /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged, larger
@@ -83,7 +83,7 @@ impl Environment {
         })
     }
 
-    /// Whether any light comes from it.
+    /// Returns whether any texel emits light.
     pub fn is_lit(&self) -> bool {
         self.texels.iter().flatten().any(|radiance| *radiance > 0.0)
     }

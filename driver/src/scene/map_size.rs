@@ -1,11 +1,11 @@
-//! The size of an environment map.
+//! Size limit of environment maps.
 
 use std::fmt::Display;
 
 use super::raster::{Fault, check_size};
 use super::texture::MAX_SIDE;
 
-/// The most texels of an environment: each is twelve bytes here and four more for a card.
+/// Maximum number of texels of an environment: each takes twelve bytes here and four more on a card.
 pub const MAX_ENVIRONMENT_TEXELS: u64 = 1 << 26;
 
 /// Checks a map's size against the limits.

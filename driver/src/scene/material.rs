@@ -86,16 +86,16 @@ pub struct Transmission {
 pub(super) struct OutOfRange {
     /// The property that is out of range.
     pub(super) property: Property,
-    /// The fault, a clause for people.
+    /// Description of the fault, a clause.
     pub(super) reason: String,
-    /// The valid range or another remedy, a clause for people.
+    /// Valid range or another remedy, a clause.
     pub(super) remedy: &'static str,
 }
 
-/// A property of a material that has a range.
+/// Property of a material that has a range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Property {
-    /// The diffuse albedo, or the base colour.
+    /// Diffuse albedo, or base colour.
     Diffuse,
     Specular,
     Exponent,
@@ -165,7 +165,7 @@ impl Material {
         }
     }
 
-    /// True if the material is not metal everywhere: by the factor, or by a texture of metalness.
+    /// Returns whether the material may have dielectric parts: `metallic` is below 1, or a texture varies it.
     pub(crate) fn may_be_dielectric(&self, metallic: f32) -> bool {
         metallic < 1.0 || self.metallic_roughness_texture.is_some()
     }

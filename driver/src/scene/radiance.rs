@@ -5,16 +5,16 @@ use super::map_size::check_map_size;
 use super::raster::Fault;
 use crate::allocation;
 
-/// The first bytes; the program's name follows.
+/// First bytes of a file, followed by a program's name.
 pub(super) const MAGIC: &[u8] = b"#?";
 
-/// No header is longer.
+/// Maximum size of a header, bytes.
 const MAX_HEADER: usize = 1 << 16;
 
-/// Two bytes stand for up to 127 values of one of four channels.
+/// Maximum number of texels per byte: two bytes encode up to 127 values of one of four channels.
 const TEXELS_OF_A_BYTE: u64 = 16;
 
-/// Rows of these lengths may be run-length encoded by channels.
+/// Widths of rows that may be run-length encoded by channel.
 const ENCODED_WIDTHS: std::ops::Range<usize> = 8..32_768;
 
 const EXPORT_AGAIN: &str =
@@ -28,12 +28,12 @@ fn ends_early() -> Fault {
     damaged("the picture ends before its last row")
 }
 
-/// What the header tells.
+/// Contents of the header.
 struct Header {
     size: [u32; 2],
-    /// Whether the first row is the lowest, and the first column the rightmost.
+    /// True if the first column is the rightmost, and if the first row is the lowest.
     flipped: [bool; 2],
-    /// What the radiances were multiplied by.
+    /// Factor by which the radiance was multiplied.
     exposure: f32,
 }
 
@@ -62,7 +62,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<([u32; 2], Vec<[f32; 3]>), Fault> {
     Ok((header.size, texels))
 }
 
-/// Three mantissas with one exponent, in the reading that takes a mantissa of 0 for none.
+/// Decodes `m 2^(e - 136) / exposure` for three mantissas with a common exponent `e`; `e = 0` is black. A mantissa of 0
+/// gives 0, unlike in readers that add a half.
 fn radiance([red, green, blue, exponent]: [u8; 4], exposure: f32) -> [f32; 3] {
     if exponent == 0 {
         return [0.0; 3];
@@ -71,7 +72,7 @@ fn radiance([red, green, blue, exponent]: [u8; 4], exposure: f32) -> [f32; 3] {
     [red, green, blue].map(|mantissa| (f64::from(mantissa) * scale) as f32)
 }
 
-/// The header, and what follows it.
+/// Header, and the bytes after it.
 fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
     let (mut exposure, mut rest) = (1.0_f32, bytes);
     loop {
@@ -86,7 +87,7 @@ fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
                 let reason = format!("its texels are {other:.40}, and only 32-bit_rle_rgbe is read");
                 return Err(Fault { reason, remedy: "store the picture as RGB, not XYZ" });
             }
-            // Several multiply each other.
+            // Several exposures multiply.
             ("EXPOSURE", value) => {
                 let factor = value.parse::<f32>().ok().filter(|factor| factor.is_normal() && *factor > 0.0);
                 exposure *= factor.ok_or_else(|| damaged(format!("its exposure is {value:.40}")))?;
@@ -105,7 +106,7 @@ fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
     Ok((Header { size, flipped, exposure }, rest))
 }
 
-/// Takes a line of the header off the bytes.
+/// Removes and returns a line of the header.
 fn next_line(rest: &mut &[u8]) -> Result<String, Fault> {
     let header = rest.get(..MAX_HEADER.min(rest.len())).unwrap_or_default();
     let end =
@@ -115,7 +116,7 @@ fn next_line(rest: &mut &[u8]) -> Result<String, Fault> {
     Ok(line)
 }
 
-/// `-Y HEIGHT +X WIDTH`, with any signs: the size, and whether columns and rows are turned.
+/// Parses `-Y HEIGHT +X WIDTH` with any signs: the size, and whether columns and rows are reversed.
 fn parse_resolution(line: &str) -> Option<([u32; 2], [bool; 2])> {
     let words: Vec<_> = line.split_whitespace().collect();
     let &[y, height, x, width] = &words[..] else { return None };
@@ -127,7 +128,7 @@ fn parse_resolution(line: &str) -> Option<([u32; 2], [bool; 2])> {
     Some(([width.parse().ok()?, height.parse().ok()?], [flipped[0]?, flipped[1]?]))
 }
 
-/// Reads a row, and returns what follows it.
+/// Reads a row. Returns the bytes after it.
 fn read_row<'a>(rest: &'a [u8], row: &mut [[u8; 4]]) -> Result<&'a [u8], Fault> {
     let width = row.len();
     if let Some(&[2, 2, high, low]) = rest.first_chunk::<4>()
@@ -148,7 +149,7 @@ fn read_row<'a>(rest: &'a [u8], row: &mut [[u8; 4]]) -> Result<&'a [u8], Fault> 
     Ok(rest)
 }
 
-/// The channels of a row one after the other, each in runs of a value and in values.
+/// Reads a run-length encoded row: the channels one after another, in runs and literals.
 fn read_encoded<'a>(mut rest: &'a [u8], row: &mut [[u8; 4]]) -> Result<&'a [u8], Fault> {
     for channel in 0..4 {
         let mut done = 0;

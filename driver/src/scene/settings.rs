@@ -32,7 +32,7 @@ impl Property {
         ("emission", Self::Emission),
     ];
 
-    /// Name of the property in an error, if it is one number.
+    /// Name of the property in an error; `None` if its value is a colour.
     fn as_number(self) -> Option<&'static str> {
         match self {
             Self::Exponent => Some("the exponent"),
@@ -53,8 +53,9 @@ impl Scene {
     /// not emit was not loaded, as a notice says. The material's name may itself contain dots.
     /// [`Scene::check_light`] checks that the scene still has a light once all assignments are applied.
     ///
-    /// # Errors If the text is not of this form, no material has the name, a material lacks the property, or a value
-    /// would be out of range; the scene stays as it was.
+    /// # Errors
+    /// If the text is not of this form, no material has the name, a material lacks the property, or a value would be out of
+    /// range; the scene stays as it was.
     pub fn apply(&mut self, assignment: &str) -> Result<(), SceneError> {
         let fault = |reason: String, remedy| SceneError::Setting {
             assignment: assignment.to_owned(),
@@ -83,7 +84,7 @@ impl Scene {
                 nearest: nearest(name, &self.materials),
             });
         }
-        // All are checked before any is changed: two materials of one name may differ in what they allow.
+        // All materials are checked before any is changed: materials of one name may differ in their valid properties.
         let mut changed = Vec::with_capacity(selected.len());
         for index in selected {
             let mut material = self.materials[index].clone();
@@ -142,7 +143,7 @@ fn parse(text: &str) -> Option<Vec<f32>> {
     values.filter(|values| matches!(values.len(), 1 | 3))
 }
 
-/// The materials' names nearest to an unknown name, as a list in text.
+/// Names of materials that are most similar to an unknown name, as a list in text.
 fn nearest(name: &str, materials: &[Material]) -> String {
     let mut names: Vec<_> = materials.iter().map(|material| material.name.as_str()).collect();
     names.sort_by_cached_key(|candidate| edit_distance(name, candidate));
@@ -152,7 +153,7 @@ fn nearest(name: &str, materials: &[Material]) -> String {
     if rest == 0 { listed.join(", ") } else { format!("{} ({rest} more)", listed.join(", ")) }
 }
 
-/// Levenshtein distance of the first 64 characters, letter case aside.
+/// Levenshtein distance of the first 64 characters, ignoring case.
 fn edit_distance(a: &str, b: &str) -> usize {
     const COMPARED: usize = 64;
     let letters = |text: &str| text.chars().take(COMPARED).flat_map(char::to_lowercase).collect::<Vec<_>>();

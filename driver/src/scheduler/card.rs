@@ -1,35 +1,35 @@
-//! What the scheduler knows of a card.
+//! State of a card in the scheduler.
 
 use std::time::Duration;
 
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::Tile;
 
-/// A card, by its place among those of a render.
+/// Index of a card among the cards of a render.
 pub type CardNumber = usize;
 
-/// Whether a card can have tiles.
+/// Availability of a card for tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
-    /// It can.
+    /// The card renders tiles.
     Living,
-    /// It is silent, or its link is closed: it may come back.
+    /// The card is silent, or its link is closed; it may return.
     Lost,
-    /// It is used no more.
+    /// The card is not used any more.
     GivenUp,
 }
 
-/// What the scheduler knows of a card.
+/// State of a card in the scheduler.
 #[derive(Debug)]
 pub(super) struct Card {
     pub(super) standing: Standing,
-    /// The tile that it has lied about.
+    /// Tile of which the card sent wrong pixels.
     pub(super) lie: Option<Tile>,
-    /// Indices of the tiles that are at it, the one that it is at first.
+    /// Indices of the tiles assigned to the card; it works on the first.
     pub(super) tiles: Vec<usize>,
-    /// Work on the tiles that the picture has of this card alone.
+    /// Work on the tiles that this card alone has rendered.
     pub(super) counters: Counters,
-    /// The most seconds that a ray or a gather of a whole tile has taken on average.
+    /// Maximum over its tiles of the mean time of a ray or gather, seconds.
     pub(super) slowest: Option<f64>,
 }
 
@@ -39,7 +39,7 @@ impl Card {
         Self { standing: Standing::Living, lie: None, tiles, counters: Counters::ZERO, slowest: None }
     }
 
-    /// The card has taken so long for a tile of so much work.
+    /// Updates [`Self::slowest`] by the time and the work of a tile.
     pub(super) fn count_time(&mut self, took: Duration, work: &Counters) {
         let rays = work.rays_and_gathers();
         if rays > 0 {
@@ -49,7 +49,7 @@ impl Card {
     }
 }
 
-/// Times that tiles have taken, until their answers came.
+/// Mean of the times from a tile's assignment to its answer.
 #[derive(Debug, Default)]
 pub(super) struct TileTimes {
     sum: Duration,
@@ -62,7 +62,7 @@ impl TileTimes {
         self.count = self.count.saturating_add(1);
     }
 
-    /// The mean; `None` before the first tile.
+    /// Mean time; `None` before the first tile.
     pub(super) fn mean(&self) -> Option<Duration> {
         self.sum.checked_div(self.count)
     }

@@ -1,4 +1,4 @@
-//! The tile that a card is given next.
+//! Selection of the next tile for a card.
 
 use std::time::Duration;
 
@@ -7,20 +7,20 @@ use super::entry::{Copy, Entry};
 use super::{CRASHES_APART, Scheduler};
 use crate::session::Assignment;
 
-/// How long a tile is left to a card, in mean times of tiles, before an idle one takes it as well.
+/// Time after which an idle card duplicates another card's tile, in mean times of tiles.
 const HELP_AFTER: u32 = 2;
-/// How long a tile is left to a card before any tile is done.
+/// Time after which an idle card duplicates another card's tile while no tile is done.
 const HELP_WITHOUT_MEAN: Duration = Duration::from_secs(1);
-/// Tiles that wait to be compared among which a card looks for one that it has not rendered, while any other tile waits.
+/// Number of tiles awaiting comparison that are searched for a card before other waiting tiles are considered.
 pub(super) const COMPARED_AT_ONCE: usize = 256;
 
 impl Scheduler {
-    /// The next tile for a card with a free credit.
+    /// Next tile for a card with a free credit.
     pub fn take(&mut self, card: CardNumber, now: Duration) -> Option<Assignment> {
         if self.cards[card].standing != Standing::Living {
             return None;
         }
-        // A card renders a suspect tile alone: if it crashes, it is known at which.
+        // A card renders a suspect tile alone, so that a crash is attributed to the right tile.
         let tiles = &self.cards[card].tiles;
         if tiles.iter().any(|&index| self.is_suspect(index)) {
             return None;
@@ -37,18 +37,18 @@ impl Scheduler {
         Some(Assignment { tile: entry.tile, is_suspect: !entry.crashes.is_empty() })
     }
 
-    /// Whether a card has crashed at a tile.
+    /// Returns whether any card has crashed at a tile.
     fn is_suspect(&self, index: usize) -> bool {
         !self.entries[index].crashes.is_empty()
     }
 
-    /// The next tile that no card has; a suspect one for an idle card alone.
+    /// Next tile that no card has; a suspect one only for an idle card.
     fn next_waiting(&mut self, is_idle: bool) -> Option<usize> {
         let next = self.waiting.iter().position(|&index| is_idle || !self.is_suspect(index))?;
         self.waiting.remove(next)
     }
 
-    /// A tile that another card has rendered and this one can verify.
+    /// Tile that another card has rendered and this one can verify.
     fn next_compared(&mut self, card: CardNumber) -> Option<usize> {
         while self.compared.front().is_some_and(|&index| !self.entries[index].is_open()) {
             self.compared.pop_front();
@@ -56,18 +56,19 @@ impl Scheduler {
         self.compared_for(card, COMPARED_AT_ONCE)
     }
 
-    /// The first of so many compared tiles that a card can verify.
+    /// First of the next `tiles` tiles awaiting comparison that the card can verify.
     fn compared_for(&self, card: CardNumber, tiles: usize) -> Option<usize> {
         self.compared.iter().take(tiles).copied().find(|&index| self.is_for(card, index))
     }
 
-    /// Whether a card can verify a tile that no other is at.
+    /// Returns whether a card can verify a tile that no other card is rendering.
     pub(super) fn is_for(&self, card: CardNumber, index: usize) -> bool {
         let entry = &self.entries[index];
         entry.is_open() && entry.copies.is_empty() && !entry.has_answer_of(card)
     }
 
-    /// A tile that is set apart, once all others are done: of the cards those take it that have crashed at it least.
+    /// Next tile that is set apart, once all others are done, for one of the cards that have crashed at it the minimum
+    /// number of times.
     fn next_set_apart(&mut self, card: CardNumber) -> Option<usize> {
         if self.set_apart.is_empty() || self.open_entries().any(|entry| entry.crashes.len() < CRASHES_APART) {
             return None;
@@ -92,7 +93,8 @@ impl Scheduler {
         self.entries.iter().filter(|entry| entry.is_open())
     }
 
-    /// The tile that has been at others for the longest time, if that is too long: of those that the fewest are at.
+    /// Tile that an idle card duplicates, because other cards have had it for too long: one with the minimum number of
+    /// copies, and among these the oldest.
     fn next_to_help(&mut self, card: CardNumber, now: Duration) -> Option<usize> {
         if !self.has_helpers || !self.cards[card].tiles.is_empty() || now < self.next_help {
             return None;
@@ -114,7 +116,7 @@ impl Scheduler {
             }
         }
         let (_, _, index) = candidates.into_iter().min()?;
-        // Others of them may be for the next idle card.
+        // Another candidate may be left for the next idle card.
         self.next_help = now;
         Some(index)
     }

@@ -1,4 +1,4 @@
-//! Whether a render can go on.
+//! Detection of renders that cannot be completed.
 
 use std::time::Duration;
 
@@ -9,14 +9,14 @@ use super::dealing::COMPARED_AT_ONCE;
 use super::entry::{Entry, Progress};
 use super::{CRASHES_APART, Scheduler, SchedulerError};
 
-/// How long a card that is lost is waited for where no other can go on.
+/// Time to wait for lost cards when no other card can continue.
 const WAIT_FOR_LOST: Duration = Duration::from_secs(30);
 
 impl Scheduler {
-    /// Checks that the render can go on, as far as cards are left.
+    /// Checks that the remaining cards can complete the render.
     ///
     /// # Errors
-    /// If cards contradict each other, or none can render the tiles that are left.
+    /// If cards disagree with none left to decide, or no card can render the remaining tiles.
     pub fn check(&mut self, now: Duration) -> Result<(), SchedulerError> {
         if let Some(error) = self.undecidable() {
             return Err(error);
@@ -31,7 +31,7 @@ impl Scheduler {
         if !is_any(Standing::Living) || may_come_back { Ok(()) } else { Err(self.what_is_left()) }
     }
 
-    /// A tile that cards render differently, with none left to decide.
+    /// Error of a tile that cards render differently, with none left to decide.
     fn undecidable(&self) -> Option<SchedulerError> {
         let disputed = self.compared.iter().take(COMPARED_AT_ONCE).map(|&index| &self.entries[index]);
         let can_decide = |entry: &Entry| {
@@ -43,10 +43,10 @@ impl Scheduler {
         Some(SchedulerError::Disagreement { tile: entry.tile, sources })
     }
 
-    /// Returns whether a tile is on its way to the sinks, any card is at work, or can have a tile.
+    /// Returns whether a tile is in transit to the sinks, or a card is at work or can take a tile.
     fn can_go_on(&self) -> bool {
         let is_at_work = || self.cards.iter().any(|card| !card.tiles.is_empty());
-        // Another thread has a tile that is found: not done yet, and nobody's to render.
+        // A found tile is not done yet, but needs no card: another thread passes it to the sinks.
         let is_found = || self.entries.iter().any(|entry| matches!(entry.progress, Progress::Found(_)));
         if self.is_complete() || !self.waiting.is_empty() || is_at_work() || is_found() {
             return true;
@@ -58,7 +58,7 @@ impl Scheduler {
         !self.set_apart.is_empty() && self.living().next().is_some() || can_compare()
     }
 
-    /// Why the tiles that are left cannot be rendered.
+    /// Error that names the reason why the remaining tiles cannot be rendered.
     fn what_is_left(&self) -> SchedulerError {
         match self.open_entries().find(|entry| !entry.answers.is_empty()) {
             Some(entry) if entry.is_disputed() => {
@@ -70,7 +70,7 @@ impl Scheduler {
         }
     }
 
-    /// The tiles that are left, if cards have crashed at each often enough for it to be set apart.
+    /// Remaining tiles, if all of them are set apart because cards have crashed at them.
     pub fn crashed_at(&self) -> Vec<Tile> {
         let left = || self.entries.iter().filter(|entry| !matches!(entry.progress, Progress::Done(_)));
         if left().any(|entry| entry.crashes.len() < CRASHES_APART) {

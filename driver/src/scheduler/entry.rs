@@ -1,4 +1,4 @@
-//! A tile, who is at work on it, and what has come of it.
+//! State of a tile: its copies on cards, and their answers.
 
 use std::time::Duration;
 
@@ -9,28 +9,28 @@ use super::card::CardNumber;
 use super::error::Source;
 use crate::sink::FinishedTile;
 
-/// How far a tile is.
+/// Progress of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Progress {
-    /// It is still to be rendered, or to be verified.
+    /// To be rendered or verified.
     Open,
-    /// It is found, and on its way to the sinks; its only source, unless two cards agree on it.
+    /// Rendered, and in transit to the sinks; with its card unless two cards agree on it.
     Found(Option<CardNumber>),
-    /// The sinks have it.
+    /// Stored by all sinks; with its card unless two cards agree on it.
     Done(Option<CardNumber>),
-    /// Cards have crashed at it too often.
+    /// Abandoned after five crashes.
     Abandoned,
 }
 
-/// A tile at a card.
+/// Copy of a tile on a card.
 #[derive(Debug)]
 pub(super) struct Copy {
     pub(super) card: CardNumber,
-    /// When the card can have begun with it.
+    /// Earliest time at which the card can have started it.
     pub(super) since: Duration,
 }
 
-/// A tile that waits to be compared.
+/// Rendered tile that awaits comparison.
 #[derive(Debug)]
 pub(super) struct Answer {
     pub(super) source: Source,
@@ -38,27 +38,27 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    /// Whether two cards have rendered the same, bit for bit.
+    /// Returns whether two answers are equal bit for bit.
     fn agrees_with(&self, other: &Self) -> bool {
         let is_kept = [self, other].iter().any(|answer| answer.source == Source::Kept);
         let work = |answer: &Self| {
-            // How gathers wait is up to the room that a chip has.
+            // These counters depend on the capacity of the chip's queue.
             Counters { drains: 0, most_waiting: 0, ..answer.tile.counters }
         };
         self.tile.records() == other.tile.records() && (is_kept || work(self) == work(other))
     }
 }
 
-/// A tile, who is at work on it, and what has come of it.
+/// State of a tile: its copies on cards, and their answers.
 #[derive(Debug)]
 pub(super) struct Entry {
     pub(super) tile: Tile,
     pub(super) progress: Progress,
-    /// Whether two cards must agree on it.
+    /// True if two cards must agree on the tile.
     pub(super) is_verified: bool,
     pub(super) copies: Vec<Copy>,
     pub(super) answers: Vec<Answer>,
-    /// The cards that were reset or lost at work on it, one as often as it was.
+    /// Cards that were reset or lost while they rendered the tile, once per crash.
     pub(super) crashes: Vec<CardNumber>,
 }
 
@@ -72,7 +72,7 @@ impl Entry {
         self.progress == Progress::Open
     }
 
-    /// Whether a card has a part in it already.
+    /// Returns whether a card has a copy of the tile or has answered.
     pub(super) fn concerns(&self, card: CardNumber) -> bool {
         self.copies.iter().any(|copy| copy.card == card) || self.has_answer_of(card)
     }
@@ -91,12 +91,12 @@ impl Entry {
         pairs.into_iter().find(|&[first, second]| self.answers[first].agrees_with(&self.answers[second]))
     }
 
-    /// Whether answers differ, and no two agree.
+    /// Returns whether there are several answers, which then differ pairwise.
     pub(super) fn is_disputed(&self) -> bool {
         self.is_open() && self.answers.len() > 1
     }
 
-    /// Takes all answers. Returns what two agree on, whether an earlier render has left that, and the sources of others.
+    /// Removes all answers if two of them agree, and returns the verdict.
     pub(super) fn judge(&mut self) -> Option<Judgement> {
         let [first, second] = self.agreeing()?;
         let answers = std::mem::take(&mut self.answers);
@@ -108,7 +108,8 @@ impl Entry {
     }
 }
 
-/// What is found of a tile that is verified.
+/// Verdict on a verified tile: the tile of the majority, whether a partial file has it already, and the sources of other
+/// answers.
 pub(super) struct Judgement {
     pub(super) tile: FinishedTile,
     pub(super) was_kept: bool,

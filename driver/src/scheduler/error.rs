@@ -1,4 +1,4 @@
-//! Why tiles cannot be had, though cards are left.
+//! Errors of the scheduler.
 
 use std::fmt;
 
@@ -6,17 +6,17 @@ use photoncard_shared::message::Tile;
 
 use super::card::CardNumber;
 
-/// Who has rendered a tile.
+/// Source of a rendered tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// A card of this render.
+    /// Card of this render.
     Card(CardNumber),
-    /// An earlier render, which has left the tile in its file.
+    /// Partial file of an earlier render.
     Kept,
 }
 
 impl Source {
-    /// The card, if it is one.
+    /// The card; `None` for a partial file.
     pub(crate) fn card(self) -> Option<CardNumber> {
         match self {
             Self::Card(card) => Some(card),
@@ -25,30 +25,30 @@ impl Source {
     }
 }
 
-/// Why tiles cannot be had, though cards are left.
+/// Error that ends a render though cards are left.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SchedulerError {
-    /// Cards render a tile differently, and none is left to decide.
+    /// Error of a tile that cards render differently, with none left to decide.
     #[error("the tile {} is rendered differently by {sources:?}", Rectangle(tile))]
     Disagreement {
-        /// The tile.
+        /// The disputed tile.
         tile: Tile,
-        /// Who has rendered it.
+        /// Sources of its answers.
         sources: Vec<Source>,
     },
-    /// Two cards agree on a tile, and the file of an earlier render has another.
+    /// Error of a tile in a partial file that differs from the one that two cards render.
     #[error("the tile {} in the file of finished tiles differs from what cards render", Rectangle(tile))]
     KeptDiffers {
-        /// The tile.
+        /// The disputed tile.
         tile: Tile,
     },
-    /// No second card is left that could render a tile which is to be verified.
+    /// Error of a tile to be verified without a second card.
     #[error("no second card is left to verify the tile {}", Rectangle(tile))]
     Unverified {
-        /// The tile.
+        /// The unverified tile.
         tile: Tile,
     },
-    /// All other tiles are done; cards have crashed at these.
+    /// Error of tiles at which cards have crashed; all others are done.
     #[error("cards crash at the tiles {}", rectangles(tiles))]
     Unrendered {
         /// The tiles.
@@ -56,7 +56,7 @@ pub enum SchedulerError {
     },
 }
 
-/// A tile as `--crop` takes it: first column and one past the last, first row and one past the last.
+/// Formats a tile as an argument of `--crop`: first column and one past the last, first row and one past the last.
 pub(crate) struct Rectangle<'a>(pub(crate) &'a Tile);
 
 impl fmt::Display for Rectangle<'_> {
@@ -66,7 +66,7 @@ impl fmt::Display for Rectangle<'_> {
     }
 }
 
-/// Some tiles as `--crop` takes them.
+/// Formats tiles as arguments of `--crop`.
 pub(crate) fn rectangles(tiles: &[Tile]) -> String {
     let texts: Vec<String> = tiles.iter().map(|tile| Rectangle(tile).to_string()).collect();
     texts.join(" and ")

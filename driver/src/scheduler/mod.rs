@@ -1,16 +1,16 @@
-//! Which card renders which tile.
+//! Assignment of tiles to cards.
 //!
-//! Tiles wait in one queue. A card with a free credit takes the next one; no card waits for another, and results come in
-//! any order. A tile's pixels do not depend on who renders it, nor when.
+//! Tiles wait in one queue. A card with a free credit takes the next one; no card waits for another, and results arrive in
+//! any order. A tile's pixels do not depend on its card or its time.
 //!
-//! - A tile that is to be verified is rendered by a second card as soon as one is free. If they differ, a third decides; what
-//!   the odd one has rendered alone is rendered again.
-//! - A tile that two cards have crashed at is set apart until all others are done, then goes to the cards that have crashed at
-//!   it least, and is abandoned after five crashes.
-//! - When nothing waits, an idle card takes the tile that has been at another for the longest time, if that is longer than tiles
-//!   take. The first answer wins.
+//! - A tile to be verified is rendered by a second card as soon as one is free. If they differ, a third decides; the tiles
+//!   that the outvoted card alone has rendered are rendered again.
+//! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the cards that have
+//!   crashed at it the minimum number of times, and is abandoned after five crashes.
+//! - If no tile waits, an idle card duplicates the tile that another card has had for the longest time, once that exceeds
+//!   twice the mean time of a tile. The first answer counts.
 //!
-//! The scheduler has no thread, lock or clock: [`crate::dispatcher`] is between it, sessions and sinks.
+//! The scheduler has no thread, lock or clock: [`crate::dispatcher`] connects it to sessions and sinks.
 
 mod card;
 mod dealing;
@@ -38,66 +38,66 @@ use self::entry::{Answer, Entry, Judgement, Progress};
 use crate::film::Film;
 use crate::sink::FinishedTile;
 
-/// Crashes after which a tile is set apart.
+/// Number of crashes after which a tile is set apart.
 const CRASHES_APART: usize = 2;
-/// Crashes after which a tile is abandoned.
+/// Number of crashes after which a tile is abandoned.
 const MAX_CRASHES: usize = 5;
-/// How much longer than on average of its slowest tile a ray may take a card.
+/// Maximum time of a ray over the mean of the card's slowest tile.
 const SLOWER_THAN_BEFORE: f64 = 50.0;
-/// How much longer than on the slowest other card, as long as a card has rendered no tile: a Cortex-M4F takes some 400 times
-/// as long as a chip that a desktop computer emulates.
+/// Maximum time of a ray over the mean of the slowest tile of all cards, for a card without rendered tiles: a Cortex-M4F
+/// takes some 400 times as long as a chip that a desktop computer emulates.
 const SLOWER_THAN_OTHERS: f64 = 1000.0;
 
-/// The tiles of a picture, and how far they are.
+/// Tiles of a picture, with their progress.
 #[derive(Debug)]
 pub struct Scheduler {
     entries: Vec<Entry>,
     by_id: HashMap<u32, usize>,
-    /// Tiles that no card has, the next first.
+    /// Queue of tiles that no card has.
     waiting: VecDeque<usize>,
-    /// Tiles with an answer that wait for another card's.
+    /// Tiles with an answer that await a second one.
     compared: VecDeque<usize>,
-    /// Open tiles that cards have crashed at too often to be given to others before the end.
+    /// Open tiles at which cards have crashed so often that they wait until all others are done.
     set_apart: Vec<usize>,
     cards: Vec<Card>,
     has_helpers: bool,
-    /// Before then no tile is at a card for too long.
+    /// Time before which no card has had a tile for too long.
     next_help: Duration,
-    /// Since when no card can go on, though some are left.
+    /// Time since which no card can continue, though the render is not complete.
     stuck_since: Option<Duration>,
     times: TileTimes,
-    /// Work on tiles that were verified.
+    /// Work on verified tiles.
     verified_work: Counters,
     done: usize,
     counts: TileCounts,
 }
 
-/// Tiles that were more to render than a picture has.
+/// Numbers of tiles that were taken over or rendered more than once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileCounts {
-    /// Tiles that an earlier render has left, but for those that are verified.
+    /// Tiles taken over from an earlier render, without those to be verified.
     pub kept: usize,
-    /// Tiles that two cards agree on.
+    /// Tiles on which two cards agree.
     pub verified: usize,
-    /// Tiles that were rendered once more: to verify them, or by an idle card.
+    /// Tiles rendered once more, for verification or by an idle card.
     pub repeated: usize,
-    /// Tiles that were taken back, as their card has lied.
+    /// Tiles revoked because their card was outvoted.
     pub revoked: usize,
 }
 
-/// What an answer has led to.
+/// Consequences of an answer.
 #[derive(Debug, Default)]
 pub struct Answered {
-    /// A tile for the sinks; [`Scheduler::complete`] tells that they have it.
+    /// Tile for the sinks; [`Scheduler::complete`] confirms that they have it.
     pub found: Option<FinishedTile>,
-    /// Cards that have lied about that tile: for [`Scheduler::expel`].
+    /// Cards that were outvoted at the tile: arguments of [`Scheduler::expel`].
     pub liars: Vec<CardNumber>,
-    /// What ends the render.
+    /// Error that ends the render.
     pub fault: Option<SchedulerError>,
 }
 
 impl Scheduler {
-    /// All tiles wait for so many cards.
+    /// Scheduler of `tiles` for `cards` cards.
     pub fn new(tiles: Vec<Tile>, cards: usize) -> Self {
         Self {
             by_id: tiles.iter().zip(0..).map(|(tile, index)| (tile.id, index)).collect(),
@@ -116,13 +116,13 @@ impl Scheduler {
         }
     }
 
-    /// Lets idle cards render what has been at others for too long.
+    /// Enables idle cards to duplicate tiles that other cards have had for too long.
     #[must_use]
     pub fn with_helpers(self) -> Self {
         Self { has_helpers: true, ..self }
     }
 
-    /// Has a share of the tiles rendered by two cards, one tile at least. Which ones is up to the seed.
+    /// Has a share of the tiles, selected by a hash of the seed, rendered by two cards; at least one tile.
     #[must_use]
     pub fn verifying(mut self, share: f64, seed: u32) -> Self {
         let chance = |entry: &Entry| hash(hash(seed) ^ entry.tile.id);
@@ -134,7 +134,7 @@ impl Scheduler {
         self
     }
 
-    /// Takes over the tiles that are in a film. Those that are to be verified are compared with what a card renders.
+    /// Takes over the tiles of a film. Tiles to be verified are compared with a card's.
     #[must_use]
     pub fn with_kept(mut self, film: &Film) -> Self {
         for (index, entry) in self.entries.iter_mut().enumerate() {
@@ -153,7 +153,7 @@ impl Scheduler {
         self
     }
 
-    /// A card has rendered a tile.
+    /// Handles a tile that a card has rendered.
     pub fn answer(&mut self, card: CardNumber, tile: FinishedTile, now: Duration) -> Answered {
         let Some((index, since)) = self.remove_copy(card, tile.tile().id, now) else {
             return Answered::default();
@@ -198,7 +198,7 @@ impl Scheduler {
         Answered { found: (!was_kept).then_some(tile), liars, fault }
     }
 
-    /// The sinks have a tile.
+    /// Marks a tile as stored by all sinks.
     pub fn complete(&mut self, id: u32) {
         let Some(entry) = self.by_id.get(&id).map(|&index| &mut self.entries[index]) else { return };
         if let Progress::Found(source) = entry.progress {
@@ -207,8 +207,8 @@ impl Scheduler {
         }
     }
 
-    /// A tile is not at a card any more, which has not rendered it: the next card takes it before all others, as it has waited
-    /// longest. `has_crashed` says that the card was at work on it.
+    /// Removes a tile from a card that has not rendered it. It goes to the front of the queue, as it has waited longest.
+    /// `has_crashed` is true if the card was working on it.
     pub fn give_back(&mut self, card: CardNumber, id: u32, has_crashed: bool, now: Duration) {
         let Some((index, _)) = self.remove_copy(card, id, now) else { return };
         let entry = &mut self.entries[index];
@@ -229,7 +229,7 @@ impl Scheduler {
         }
     }
 
-    /// Takes a tile from a card. Returns its index, and since when it was there.
+    /// Removes a tile from a card. Returns its index and the time since which the card had it.
     fn remove_copy(&mut self, card: CardNumber, id: u32, now: Duration) -> Option<(usize, Duration)> {
         let index = *self.by_id.get(&id)?;
         let copies = &mut self.entries[index].copies;
@@ -237,7 +237,7 @@ impl Scheduler {
         let since = copies.remove(copy).since;
         let tiles = &mut self.cards[card].tiles;
         tiles.retain(|&tile| tile != index);
-        // Not before now can the card have begun with the next.
+        // The card can start its next tile no earlier than now.
         if let Some(&next) = tiles.first() {
             let copies = &mut self.entries[next].copies;
             copies
@@ -248,30 +248,30 @@ impl Scheduler {
         Some((index, since))
     }
 
-    /// Tells how a card stands.
+    /// Sets the availability of a card; a card that was given up stays so.
     pub fn set_standing(&mut self, card: CardNumber, standing: Standing) {
         if self.cards[card].standing != Standing::GivenUp {
             self.cards[card].standing = standing;
         }
     }
 
-    /// How a card stands.
+    /// Availability of a card.
     pub fn standing(&self, card: CardNumber) -> Standing {
         self.cards[card].standing
     }
 
-    /// Whether any card can have tiles.
+    /// Returns whether any card is available.
     pub fn has_living(&self) -> bool {
         self.living().next().is_some()
     }
 
-    /// The tile that a card has lied about.
+    /// Tile at which a card was outvoted.
     pub fn lie_of(&self, card: CardNumber) -> Option<Tile> {
         self.cards[card].lie
     }
 
-    /// Gives up a card that has lied about a tile, and all that it alone has rendered. Returns the tiles that the sinks are to
-    /// forget. None of this card may be on its way to them.
+    /// Gives up a card that sent wrong pixels of the tile `about`, with all tiles that it alone has rendered. Returns the
+    /// tiles for the sinks to revoke. None of its tiles may be in transit to the sinks.
     pub fn expel(&mut self, card: CardNumber, about: Tile) -> Vec<Tile> {
         self.cards[card].standing = Standing::GivenUp;
         self.cards[card].lie = Some(about);
@@ -297,24 +297,25 @@ impl Scheduler {
         revoked
     }
 
-    /// The most seconds that a ray, or the gather at its end, may take a card, if tiles that were rendered tell.
+    /// Maximum time of a ray or its gather on a card, seconds, from the times of rendered tiles; `None` before the first
+    /// tile of any card.
     pub fn slowest(&self, card: CardNumber) -> Option<f64> {
         let before = self.cards[card].slowest.map(|seconds| seconds * SLOWER_THAN_BEFORE);
         let others = self.cards.iter().filter_map(|card| card.slowest).reduce(f64::max);
         before.or(others.map(|seconds| seconds * SLOWER_THAN_OTHERS))
     }
 
-    /// Whether all tiles are done.
+    /// Returns whether all tiles are done.
     pub fn is_complete(&self) -> bool {
         self.done == self.entries.len()
     }
 
-    /// Tiles that are done, and all of them, but for those that an earlier render has left.
+    /// Number of tiles that are done, and of all tiles, both without tiles taken over from an earlier render.
     pub fn progress(&self) -> (usize, usize) {
         (self.done - self.counts.kept, self.entries.len() - self.counts.kept)
     }
 
-    /// Tiles that were more to render than a picture has.
+    /// Numbers of tiles that were taken over or rendered more than once.
     pub fn counts(&self) -> TileCounts {
         self.counts
     }
@@ -326,7 +327,7 @@ impl Scheduler {
         sum
     }
 
-    /// Work on the tiles that the picture has of one card alone.
+    /// Work on the tiles that a card alone has rendered.
     pub fn counters_of(&self, card: CardNumber) -> &Counters {
         &self.cards[card].counters
     }

@@ -4,7 +4,7 @@ use super::*;
 
 const SECOND: Duration = Duration::from_secs(1);
 
-/// A scheduler of so many tiles of a pixel each.
+/// Scheduler of `tiles` tiles of one pixel each.
 fn scheduler(tiles: u32, cards: usize) -> Scheduler {
     Scheduler::new((0..tiles).map(tile).collect(), cards)
 }
@@ -18,12 +18,12 @@ fn finished(id: u32, value: u8) -> FinishedTile {
     FinishedTile::new(tile(id), vec![value; PIXEL_BYTES], false, counters).unwrap()
 }
 
-/// Takes a tile for a card.
+/// Assigns the next tile to a card.
 fn take(scheduler: &mut Scheduler, card: CardNumber, now: Duration) -> Option<u32> {
     scheduler.take(card, now).map(|assignment| assignment.tile.id)
 }
 
-/// Answers with a tile, which the sinks take. Returns who has lied.
+/// Answers with a tile and passes it to the sinks. Returns the outvoted cards.
 fn answer(scheduler: &mut Scheduler, card: CardNumber, id: u32, value: u8, now: Duration) -> Vec<CardNumber> {
     let answered = scheduler.answer(card, finished(id, value), now);
     scheduler.complete(id);
@@ -37,14 +37,14 @@ fn an_idle_card_takes_what_is_at_another_for_too_long_and_the_first_answer_count
         assert_eq!(take(&mut scheduler, card, Duration::ZERO), Some(id));
     }
     answer(&mut scheduler, 2, 3, 0, SECOND);
-    // A tile took a second: two are to pass.
+    // The mean time is a second: tiles are duplicated after two.
     assert_eq!(take(&mut scheduler, 2, 3 * SECOND / 2), None);
     assert_eq!(take(&mut scheduler, 2, 2 * SECOND), Some(0));
     assert_eq!(take(&mut scheduler, 2, 9 * SECOND), None, "it is at work");
     answer(&mut scheduler, 2, 0, 0, 3 * SECOND);
     answer(&mut scheduler, 0, 0, 0, 4 * SECOND);
     assert_eq!((scheduler.counts().repeated, scheduler.counters().eye_rays), (1, 20));
-    // The second tile of a card is not late before the first is done.
+    // A card's second tile is not late while it works on the first.
     answer(&mut scheduler, 1, 1, 0, 5 * SECOND);
     assert_eq!(take(&mut scheduler, 0, 6 * SECOND), None);
     answer(&mut scheduler, 1, 2, 0, 6 * SECOND);
@@ -59,7 +59,7 @@ fn a_render_goes_on_while_its_last_tile_is_on_its_way_to_the_sinks() {
     }
     assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));
     assert!(scheduler.answer(0, finished(0, 0), SECOND).found.is_some());
-    // The other card's thread looks before the sinks have the tile.
+    // The other card's thread checks before the sinks have the tile.
     scheduler.check(SECOND).unwrap();
     scheduler.complete(0);
     scheduler.check(SECOND).unwrap();
@@ -82,7 +82,7 @@ fn a_card_finds_what_it_can_verify_behind_many_tiles_of_its_own() {
     scheduler.set_standing(1, Standing::GivenUp);
     assert_eq!(take(&mut scheduler, 0, SECOND), Some(0));
     answer(&mut scheduler, 0, 0, 0, SECOND);
-    // Nobody is left to verify the others.
+    // No card is left to verify the others.
     assert!(matches!(scheduler.check(SECOND), Err(SchedulerError::Unverified { .. })));
 }
 
@@ -107,7 +107,7 @@ fn a_majority_of_three_tells_who_lies_and_all_its_tiles_are_rendered_again() {
     for liar in 0..3 {
         let mut scheduler = scheduler(2, 3).verifying(1e-9, 7);
         let verified = scheduler.entries.iter().position(|entry| entry.is_verified).unwrap() as u32;
-        // The liar renders the tile that is not verified, and differs in the one that is.
+        // The wrong card renders the tile that is not verified, and a different version of the verified one.
         let [second, third] = [(liar + 1) % 3, (liar + 2) % 3];
         let [first, other] = if verified == 0 { [second, liar] } else { [liar, second] };
         assert_eq!(

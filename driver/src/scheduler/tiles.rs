@@ -1,39 +1,40 @@
-//! The tiles of a picture, and the orders of the gathers in them.
+//! Tiles of a picture, and orders of their gathers.
 
 use photoncard_shared::message::{Drain, Tile};
 
 use crate::choice::choices;
 use crate::film::Window;
 
-/// In which order photon gathers are done. The picture is the same.
+/// Order of photon gathers. The picture does not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GatherOrder {
-    /// Pixels along scanlines, the rays of each in the sampler's order.
+    /// Pixels along scanlines, each with its rays in the sampler's order.
     Naive,
-    /// The same within square tiles.
+    /// Pixels along the scanlines of square tiles, each with its rays in the sampler's order.
     Tiled,
-    /// Within a tile, the rays of one direction bin for all pixels, then those of the next.
+    /// Within a tile, the rays of one direction bin for all pixels, then the rays of the next bin.
     DirectionBins,
-    /// Rays by direction bins; gathers wait in the queue and are done by a spatial hash of their place.
+    /// Rays by direction bins; gathers wait in the queue and are sorted by a spatial hash of their positions.
     Hash,
-    /// Rays by direction bins; gathers wait in the queue and are done along a Hilbert curve.
+    /// Rays by direction bins; gathers wait in the queue and are sorted along a Hilbert curve.
     Sort,
-    /// All gathers of the frame along one Hilbert curve: on emulated cards alone, which leave them to the host.
+    /// All gathers of the frame along one Hilbert curve. Only emulated chips can do it: they leave their gathers to the
+    /// host.
     Hilbert,
 }
 
 choices!(GatherOrder {
     Naive = "naive": "Pixels along scanlines",
     Tiled = "tiled": "Pixels along the scanlines of a tile",
-    DirectionBins = "dirbin": "Rays of one direction bin for all pixels of a tile, then those of the next",
-    Hash = "hash": "By direction bins; gathers wait and are done by a spatial hash of their place",
-    Sort = "sort": "By direction bins; gathers wait and are done along a Hilbert curve",
+    DirectionBins = "dirbin": "Rays of one direction bin for all pixels of a tile, then of the next bin",
+    Hash = "hash": "By direction bins; gathers wait and are sorted by a spatial hash of their positions",
+    Sort = "sort": "By direction bins; gathers wait and are sorted along a Hilbert curve",
     Hilbert = "hilbert":
         "All gathers of the frame along a Hilbert curve, on emulated cards alone: the bound to compare with",
 });
 
 impl GatherOrder {
-    /// When a chip does its gathers.
+    /// Policy by which a chip empties its queue of gathers.
     pub fn drain(self) -> Drain {
         match self {
             Self::Naive | Self::Tiled | Self::DirectionBins => Drain::Immediate,
@@ -53,7 +54,7 @@ impl GatherOrder {
     }
 }
 
-/// The tiles of a window, each at most `side * side` pixels, numbered from 0.
+/// Tiles of a window, each of at most `side * side` pixels, numbered from 0.
 pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     let side = side.max(1);
     let (tile_width, tile_height) = match order {

@@ -1,42 +1,40 @@
-//! How long a card may be silent or come no further, and when it is asked whether it is there.
+//! Clock of a session: time limits of silence and of missing progress, and times of probes.
 
 use std::time::Duration;
 
 use super::SessionError;
 
-/// How long a card may be silent while an answer is due: it answers between any two pieces of its work.
+/// Maximum silence of a card while an answer is due: it answers between any two steps of its work.
 const SILENCE: Duration = Duration::from_secs(10);
-/// How long it may be silent before it is asked; after each question without an answer twice as long.
+/// Silence before the first probe; it doubles with each probe that is not answered.
 const PATIENCE: Duration = Duration::from_millis(200);
 const MAX_PATIENCE: Duration = Duration::from_secs(1);
-/// How long a card that answers may leave a hello without its reply, from its first answer on. A slow serial line takes a
-/// second or two.
+/// Maximum time from a card's first answer to its reply to the hello. A slow serial line takes a second or two.
 const GREETING: Duration = Duration::from_secs(5);
-/// The shortest time for a tile, where those that were rendered tell how long one may take.
+/// Lower bound of the time limit of a tile, if times of rendered tiles are known.
 const TILE: Duration = Duration::from_secs(30);
-/// How long a card that answers may take to come further with all but tiles. The longest is to look through a whole image
-/// that has come, and takes seconds.
+/// Maximum time without progress, except for tiles. The longest step, the verification of a received image, takes seconds.
 const STANDSTILL: Duration = Duration::from_secs(120);
-/// What a ray with its gather may add to that for a tile, whose pixels may all come at its end, as long as no tile was
-/// rendered: some fifty times of what the slowest chip takes that has been measured.
+/// Time per ray with its gather that extends [`STANDSTILL`] while a tile is rendered and no times are known, as all pixels
+/// may arrive at its end: some fifty times the slowest chip measured.
 const RAY: Duration = Duration::from_millis(20);
 
-/// The most time between two looks at a link of a host that runs. For the rest it is absent: stopped, or without a
-/// processor.
+/// Maximum time between two polls of the link that counts as time. Longer gaps mean that the host itself was stopped, or
+/// without a processor.
 const MAX_BETWEEN_LOOKS: Duration = Duration::from_secs(1);
 
-/// When a card was heard.
+/// Times of a session's link.
 pub(super) struct Clock {
-    /// When the first of the session came.
+    /// Time of the first frame received in the session.
     heard: Option<Duration>,
-    /// When silence began that counts.
+    /// Start of the present silence.
     since: Duration,
-    /// When a message passed last, in either direction.
+    /// Time of the last message that was delivered, in either direction.
     passed: Duration,
-    /// When there was last a reason to wait for an answer.
+    /// Time from which the present wait for an answer counts.
     asked: Duration,
     patience: Duration,
-    /// When the host looked last.
+    /// Time of the last poll.
     looked: Duration,
 }
 
@@ -45,7 +43,7 @@ impl Clock {
         Self { heard: None, since: now, passed: now, asked: now, patience: PATIENCE, looked: now }
     }
 
-    /// Something of the session came.
+    /// Records that a frame of the session was received.
     pub(super) fn heard(&mut self, now: Duration) {
         self.heard.get_or_insert(now);
         self.since = now;
@@ -53,22 +51,22 @@ impl Clock {
         self.patience = PATIENCE;
     }
 
-    /// A message came that is the next, or one was taken.
+    /// Records that a message was delivered, in either direction.
     pub(super) fn passed(&mut self, now: Duration) {
         self.passed = now;
     }
 
-    /// Whether anything of the session ever came.
+    /// Returns whether any frame of the session was received.
     pub(super) fn has_heard(&self) -> bool {
         self.heard.is_some()
     }
 
-    /// Something was sent: its answer takes its time. A line that takes no byte is silent.
+    /// Records that bytes were sent, whose answer takes its time. A line that accepts no bytes counts as silent.
     pub(super) fn sent(&mut self, now: Duration) {
         self.asked = now;
     }
 
-    /// The host looks at the link. What it was absent is not the card's silence.
+    /// Records a poll of the link. Time in which the host did not run is not the card's silence.
     pub(super) fn look(&mut self, now: Duration) {
         let absent = now.saturating_sub(self.looked).saturating_sub(MAX_BETWEEN_LOOKS);
         self.looked = now;
@@ -78,14 +76,14 @@ impl Clock {
         }
     }
 
-    /// Nothing is expected.
+    /// Restarts all limits: no answer is due.
     pub(super) fn rest(&mut self, now: Duration) {
         self.since = now;
         self.passed = now;
         self.asked = now;
     }
 
-    /// Whether to ask now.
+    /// Returns whether to probe now.
     pub(super) fn must_ask(&mut self, now: Duration) -> bool {
         let must_ask = now.saturating_sub(self.asked) > self.patience;
         if must_ask {
@@ -95,22 +93,22 @@ impl Clock {
         must_ask
     }
 
-    /// Whether a card that is greeted answers, but not with a hello.
+    /// Returns whether the card answers a greeting without a hello for too long.
     pub(super) fn is_greeted_in_vain(&self, now: Duration) -> bool {
         self.heard.is_some_and(|heard| now.saturating_sub(heard) > GREETING)
     }
 
-    /// Checks that the silence is not too long, nor the standstill of a card at work on tiles of `rays` rays at the most, each of
-    /// `slowest` seconds at the most if that is known.
+    /// Checks the silence, and the time without progress, of a card whose largest tile has `rays` rays. `slowest` is the
+    /// maximum time of a ray or its gather, seconds, if known.
     ///
     /// # Errors
-    /// If one is.
+    /// If either is too long.
     pub(super) fn check(&self, rays: u64, slowest: Option<f64>, now: Duration) -> Result<(), SessionError> {
         if now.saturating_sub(self.since) > SILENCE {
             return Err(SessionError::Silent(SILENCE));
         }
         let limit = match slowest.filter(|_| rays > 0) {
-            // A ray has a gather at its end.
+            // Each ray may have a gather.
             Some(slowest) => time(2.0 * rays as f64 * slowest).max(TILE),
             None => STANDSTILL.saturating_add(RAY.saturating_mul(rays.try_into().unwrap_or(u32::MAX))),
         };
@@ -121,7 +119,7 @@ impl Clock {
     }
 }
 
-/// A time of some seconds, up to the longest there is.
+/// Duration of `seconds` seconds, at most [`Duration::MAX`].
 fn time(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
 }

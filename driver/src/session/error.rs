@@ -1,4 +1,4 @@
-//! Why a card could not be used.
+//! Errors of a session with a card.
 
 use std::time::Duration;
 
@@ -7,70 +7,70 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::link::PortError;
 use photoncard_shared::message::{Fault, PROTOCOL_VERSION, Tile, Versions};
 
-/// Why a card could not be used.
+/// Error of a session with a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum SessionError {
-    /// The card speaks another protocol.
+    /// Error of a card with another version of the protocol.
     #[error("the card speaks protocol {card}, this program {host}")]
     #[diagnostic(help("install the firmware and the program of one release"))]
     Protocol {
-        /// The card's version.
+        /// Version of the card.
         card: u16,
-        /// This program's version.
+        /// Version of this program.
         host: u16,
     },
-    /// The card reads other images.
+    /// Error of a card with another version of the image layout.
     #[error("the card reads card images of layout {card}, this program writes {host}")]
     #[diagnostic(help("install the firmware and the program of one release"))]
     Layout {
-        /// The card's version.
+        /// Version of the card.
         card: u16,
-        /// This program's version.
+        /// Version of this program.
         host: u16,
     },
-    /// The card takes no tile.
+    /// Error of a card without credits for tiles.
     #[error("the card says that it has room for no tile command at all")]
     #[diagnostic(help("correct `tiles` in the budget of the card's firmware"))]
     NoTiles,
-    /// It is another card than at first, or has another firmware.
+    /// Error of a card that returns with another budget: it was replaced, or its firmware was.
     #[error("the card has come back with another budget than it had at first")]
     #[diagnostic(help(
         "leave a card and its firmware as they are while a picture is rendered; to use it as it is now, begin again with \
          --resume"
     ))]
     OtherBudget,
-    /// The card could not do a command.
+    /// Error of a command that the card reports as failed.
     #[error("the card answers with a fault: {0}")]
     #[diagnostic(help(
         "this is a fault of the program or of the card: please report it with the command used"
     ))]
     Fault(Fault),
-    /// A message is not what the session expects.
+    /// Error of a message that violates the protocol.
     #[error("the card's answer is out of order: {0}")]
     #[diagnostic(help("install the firmware and the program of one release"))]
     Unexpected(&'static str),
-    /// Nothing came for too long.
+    /// Error of silence.
     #[error("the card has not answered for {} s", .0.as_secs())]
     #[diagnostic(help("check that the card is powered and its firmware runs"))]
     Silent(Duration),
-    /// It answers, and comes no further.
+    /// Error of a card that answers without progress.
     #[error("the card answers, but has come no further for {} s", .0.as_secs())]
     #[diagnostic(help(
         "its line may damage nearly all (--stats counts `damaged_frames`): check cable and speed; if it does not, this is a \
          fault of the card's firmware: please report it with the command used"
     ))]
     Standstill(Duration),
-    /// It was reset or came no further, again and again.
+    /// Error of repeated resets, or repeated lack of progress.
     #[error("the card was reset or came no further {0} times without completing a tile")]
     #[diagnostic(help(
         "it may crash at a tile, lack power, or have a line that damages nearly all (--stats counts `damaged_frames`): \
          watch the card's own messages, check the cable; then try another card, or --crop"
     ))]
     Failures(u32),
-    /// The link failed.
+    /// Error of the link.
     #[error("the link to the card is closed ({0:?})")]
     Port(PortError),
-    /// A pixel has a value that no chip can give it.
+    /// Error of a pixel value that no chip can produce.
     #[error(
         "the card lies: pixel ({x}, {y}) of the tile {},{},{},{} has {channel} {value}, which no chip can render",
         .tile.x, .tile.x + .tile.width, .tile.y, .tile.y + .tile.height
@@ -80,18 +80,18 @@ pub enum SessionError {
          beside cards that you trust"
     ))]
     Value {
-        /// The tile.
+        /// Tile of the pixel.
         tile: Tile,
-        /// The pixel's column.
+        /// Column of the pixel.
         x: u32,
-        /// The pixel's row.
+        /// Row of the pixel.
         y: u32,
-        /// What has the value.
+        /// Name of the channel.
         channel: &'static str,
-        /// The value.
+        /// Wrong value.
         value: f32,
     },
-    /// Other cards render a tile otherwise.
+    /// Error of a tile that two other cards render differently.
     #[error(
         "the card lies: its tile {},{},{},{} differs from what two other cards render",
         .tile.x, .tile.x + .tile.width, .tile.y, .tile.y + .tile.height
@@ -100,13 +100,12 @@ pub enum SessionError {
         "the memory of the card may be bad, or its firmware altered: its tiles are rendered again by other cards"
     ))]
     Outvoted {
-        /// The tile.
+        /// The disputed tile.
         tile: Tile,
     },
 }
 
-/// Compares a card's versions with this program's. They are read before the rest of a hello, which another version of the
-/// protocol may have changed.
+/// Checks a card's versions. They are decoded before the rest of a hello, whose format may differ between versions.
 pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
     if card.protocol != PROTOCOL_VERSION {
         return Err(SessionError::Protocol { card: card.protocol, host: PROTOCOL_VERSION });
@@ -117,7 +116,7 @@ pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// Checks that a card can be used with its budget. Settings, image and tiles were checked against the one that it said first.
+/// Checks a card's budget against the first one that it reported, for which settings, image and tiles were checked.
 pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<(), SessionError> {
     if budget.tiles == 0 {
         return Err(SessionError::NoTiles);
@@ -129,7 +128,7 @@ pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<()
 }
 
 impl SessionError {
-    /// The tile that the card has lied about, if it has: nothing that it has rendered can be trusted.
+    /// Tile of which the card sent wrong pixels, if this is the error: none of its pixels can be trusted then.
     pub fn lie(&self) -> Option<Tile> {
         match *self {
             Self::Value { tile, .. } | Self::Outvoted { tile } => Some(tile),
@@ -137,7 +136,7 @@ impl SessionError {
         }
     }
 
-    /// Whether the card may be used again once it answers: nothing that it has said is wrong.
+    /// Returns whether the card may be retried: it has been silent, slow or disconnected, but not wrong.
     pub fn may_pass(&self) -> bool {
         matches!(self, Self::Silent(_) | Self::Standstill(_) | Self::Port(_))
     }

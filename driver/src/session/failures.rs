@@ -1,45 +1,45 @@
-//! What a card is at fault for: a link that was closed, or a silent one, is not.
+//! Count of a card's failures: resets and lack of progress. Closed links and silence are no failures.
 
 use super::SessionError;
 
-/// Times that a card may fail without having completed a tile: what it crashes at, it is given again.
+/// Maximum number of failures without a completed tile: a card receives the tile at which it crashed again.
 const MAX_FAILURES: u32 = 4;
 
-/// What a card was at fault for.
+/// Failures of a card.
 #[derive(Default)]
 pub(super) struct Failures {
-    /// Times that it was reset or came no further, since it completed a tile.
+    /// Number of resets or standstills since the last completed tile.
     failed: u32,
-    /// Lines that it has written: fewer in its next hello tell that it was reset.
+    /// Number of lines that the card has written; a smaller number in its next hello shows a reset.
     written_lines: u32,
 }
 
 impl Failures {
-    /// It was reset or came no further.
+    /// Counts a reset or a standstill.
     ///
     /// # Errors
-    /// If it has failed too often.
+    /// If there are more than [`MAX_FAILURES`].
     pub(super) fn count(&mut self) -> Result<(), SessionError> {
         self.failed += 1;
         if self.failed > MAX_FAILURES { Err(SessionError::Failures(self.failed)) } else { Ok(()) }
     }
 
-    /// It is known to have been reset: its next hello tells nothing new.
+    /// Marks a known reset, so that the next hello does not count it again.
     pub(super) fn forget_lines(&mut self) {
         self.written_lines = 0;
     }
 
-    /// It says hello. Returns whether it was reset since it was loaded.
+    /// Compares the written lines of a hello. Returns whether the card was reset since it was loaded.
     pub(super) fn says_hello(&mut self, written_lines: u32) -> bool {
         std::mem::replace(&mut self.written_lines, written_lines) > written_lines
     }
 
-    /// It has an image of so many lines.
+    /// Records that the card has an image of `lines` lines.
     pub(super) fn is_loaded(&mut self, lines: u32) {
         self.written_lines = lines;
     }
 
-    /// It has completed a tile.
+    /// Restarts the count after a completed tile.
     pub(super) fn completes_tile(&mut self) {
         self.failed = 0;
     }

@@ -1,4 +1,4 @@
-//! What a session is given to do, and what it says has come of it.
+//! Input and output of a session: jobs, tiles and events.
 
 use photoncard_shared::address::Line;
 use photoncard_shared::message::{FrameParameters, Tile};
@@ -6,40 +6,40 @@ use photoncard_shared::message::{FrameParameters, Tile};
 use super::PixelLimits;
 use crate::sink::FinishedTile;
 
-/// What a card is to do, the same for every card.
+/// Work of all cards of a render.
 #[derive(Clone, Copy)]
 pub struct Job<'a> {
     /// The card image.
     pub image: &'a [Line],
     /// [`photoncard_shared::checksum::image_checksum`] of the image.
     pub checksum: u64,
-    /// The frame's parameters.
+    /// Parameters of the frame.
     pub frame: &'a FrameParameters,
-    /// The values that its pixels can have.
+    /// Range of valid pixel values.
     pub limits: PixelLimits,
 }
 
-/// A tile for a card.
+/// Assignment of a tile to a card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assignment {
-    /// The tile.
+    /// The assigned tile.
     pub tile: Tile,
-    /// Whether a card has crashed at it: if another does, that is not the card's fault.
+    /// True if a card has crashed at the tile before: another crash at it is not the card's fault.
     pub is_suspect: bool,
 }
 
-/// What has come of a session.
+/// Event of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// The card has image and frame.
+    /// The card has received image and frame.
     Ready,
-    /// The card has rendered a tile; its values are possible ones.
+    /// The card has rendered a tile with valid values.
     TileDone(FinishedTile),
-    /// The card was reset or is lost: this tile is not at it any more.
+    /// The card was reset or lost before it completed a tile.
     TileLost {
-        /// The tile.
+        /// The returned tile.
         tile: Tile,
-        /// Whether the card was at work on it: it may be what the card crashes at.
+        /// True if the card was working on the tile, which may be the cause.
         was_at_work: bool,
     },
 }

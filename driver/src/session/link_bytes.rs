@@ -1,22 +1,22 @@
-//! What went over a link.
+//! Statistics of a link's bytes.
 
 use photoncard_shared::transport::LineStatistics;
 
-/// Bytes that went over a link, and what was repaired on it.
+/// Bytes that passed a link, and repairs on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkBytes {
-    /// Image lines and pixels.
+    /// Bytes of image lines and pixels.
     pub payload: u64,
     /// All bytes in both directions.
     pub wire: u64,
-    /// What the host's end has seen of the line.
+    /// Frames that the host's end has repeated or received damaged or repeated.
     pub line: LineStatistics,
-    /// Times that the card was greeted again.
+    /// Number of times that the card was greeted again.
     pub resets: u64,
 }
 
 impl LinkBytes {
-    /// Adds those of another link.
+    /// Adds the statistics of another link.
     pub fn add(&mut self, other: &Self) {
         self.payload += other.payload;
         self.wire += other.wire;

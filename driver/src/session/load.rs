@@ -1,4 +1,4 @@
-//! Loading the image: what the card has of it already is not sent again.
+//! Loading of the image: chunks that the card has already, by their checksums, are not sent.
 
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::checksum::image_checksum;
@@ -7,35 +7,35 @@ use photoncard_shared::transport::Transport;
 
 use super::SessionError;
 
-/// How far the image is loaded.
+/// Progress of loading.
 #[derive(Default)]
 pub(super) struct Load {
-    /// Lines that the card has written, of any image.
+    /// Number of lines that the card has written, of any image.
     written: u32,
-    /// Chunks that were asked for.
+    /// Number of chunks whose checksums were requested.
     asked: u32,
-    /// Those of them whose checksums have come.
+    /// Number of chunks whose checksums were received.
     compared: u32,
-    /// Chunks of the image that the card has.
+    /// Indices of chunks that the card has.
     there: Vec<u32>,
-    /// The next line to look at.
+    /// Index of the next line.
     next: usize,
 }
 
 impl Load {
-    /// Nothing is known but how many lines the card has written.
+    /// Start of loading; `written` is the number of lines that the card has written.
     pub(super) fn new(written: u32) -> Self {
         Self { written, ..Self::default() }
     }
 
-    /// Lines that are done with.
+    /// Number of lines that the card has or that were sent.
     pub(super) fn done(&self) -> usize {
         self.next
     }
 
-    /// The question for the next checksums; `None` if all that can be known is.
+    /// Request for the next checksums; `None` after all chunks that the card has written.
     pub(super) fn next_question(&mut self, image: &[Line]) -> Option<Command<'static>> {
-        // A chunk that either ends within is not compared.
+        // An incomplete chunk, of the card or of the image, is not compared.
         let chunks = (self.written.min(image.len() as u32)) / CHUNK_LINES;
         let first = self.asked;
         let count = chunks.saturating_sub(first).min(CHECKSUMS_PER_REPLY);
@@ -43,10 +43,10 @@ impl Load {
         (count > 0).then_some(Command::ReadChecksums { first, count })
     }
 
-    /// Compares the checksums of some chunks with the image's.
+    /// Compares received checksums with the image's.
     ///
     /// # Errors
-    /// If they are not those that were asked for last.
+    /// If they are not the checksums that were last requested.
     pub(super) fn compare(&mut self, image: &[Line], first: u32, data: &[u8]) -> Result<(), SessionError> {
         let (checksums, rest) = data.as_chunks::<8>();
         let end = first.checked_add(checksums.len() as u32);
@@ -64,7 +64,7 @@ impl Load {
         Ok(())
     }
 
-    /// Sends the next lines that the card does not have. Returns their bytes; 0 if it has all.
+    /// Sends the next lines that the card lacks. Returns their size in bytes; 0 at the end of the image.
     pub(super) fn next_lines(&mut self, image: &[Line], transport: &mut Transport) -> usize {
         while self.there.binary_search(&(self.next as u32 / CHUNK_LINES)).is_ok() {
             self.next = (self.next / CHUNK_LINES as usize + 1) * CHUNK_LINES as usize;

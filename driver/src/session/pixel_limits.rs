@@ -1,30 +1,30 @@
-//! The values that a chip can give a pixel: one outside is a card's lie, or its memory's.
+//! Ranges of pixel values that a chip can produce: a value outside shows that the card or its memory is wrong.
 
 use photoncard_shared::image::Header;
 use photoncard_shared::message::{FrameParameters, Pixel, PixelLayers, PixelRecord, record_bytes};
 
-/// A fixed-point sum of light, in radiance units, at its greatest.
+/// Maximum of a fixed-point sum of light, in radiance units.
 const GREATEST_SUM: f32 = (1 << 23) as f32;
-/// Rounding of a sum of light to `f32`, and of a few numbers added up: relative.
+/// Relative rounding error of a sum of light in `f32`, and of the sum of a few.
 const LIGHT_ROUNDING: f64 = 1.0 / (1 << 22) as f64;
-/// Rounding of one operation in `f32`: relative.
+/// Relative rounding error of one operation in `f32`.
 const ROUNDING: f64 = 1.0 / (1 << 23) as f64;
-/// Operations that a unit normal and its mean take, besides one for each sample.
+/// Number of operations that a unit normal and its mean take, in addition to one per sample.
 const OPERATIONS: f64 = 16.0;
-/// Rounding of a surface's position along the view's axis, relative to the scene's greatest coordinate.
+/// Rounding error of a surface's position along the view's axis, relative to the scene's maximum coordinate.
 const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
-/// Cells of the photon grid along the scene's longest side at the most.
+/// Maximum number of cells of the photon grid along the scene's longest side.
 const GRID_CELLS: f32 = (1 << 20) as f32;
 
-/// The values that the pixels of a frame can have.
+/// Ranges of a frame's pixel values.
 ///
 /// | value | range |
 /// |---|---|
-/// | radiance, direct, indirect, caustic | 0 to 2^23 radiance units, finite; the three add up to the first, but for rounding |
+/// | radiance, direct, indirect, caustic | 0 to 2^23 radiance units, finite; radiance is the sum of the others, except for rounding |
 /// | albedo | 0 to 1 |
 /// | normal | length 0 to 1, and (n + 16) 2^-23 for the rounding of n samples |
-/// | depth | not below 0 by more than 2^-19 of the greatest coordinate: a surface in the eye's plane; infinite where nothing is seen |
-/// | gathers | a whole number from 0 to n |
+/// | depth | at least -2^-19 times the maximum coordinate, for a surface in the eye's plane; infinite where nothing is seen |
+/// | gathers | an integer from 0 to n |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
     greatest_light: f32,
@@ -34,7 +34,7 @@ pub struct PixelLimits {
     has_layers: bool,
 }
 
-/// A value that is not possible.
+/// Invalid value of a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BadValue {
     pub(super) channel: &'static str,
@@ -42,7 +42,7 @@ pub(super) struct BadValue {
 }
 
 impl PixelLimits {
-    /// The limits of a frame of the image with this header.
+    /// Limits of a frame of the image with the header `header`.
     pub fn new(header: &Header, frame: &FrameParameters) -> Self {
         let grid = &header.photon_grid;
         let corners = grid.origin.iter().map(|&origin| (origin as f32).abs() * grid.cell);
@@ -57,17 +57,17 @@ impl PixelLimits {
         }
     }
 
-    /// Whether pixels have layers.
+    /// Returns whether pixels have layers.
     pub(super) fn has_layers(&self) -> bool {
         self.has_layers
     }
 
-    /// Bytes of one record.
+    /// Size of one record, bytes.
     pub(super) fn record_bytes(&self) -> usize {
         record_bytes(self.has_layers)
     }
 
-    /// The first value of a pixel that is not possible.
+    /// First invalid value of a pixel.
     pub(super) fn find_bad(&self, record: &PixelRecord) -> Option<BadValue> {
         let Pixel { radiance, albedo, normal, depth } = record.pixel;
         let is_light = |value: f32| value.is_finite() && (0.0..=self.greatest_light).contains(&value);
@@ -93,7 +93,7 @@ impl PixelLimits {
             })
     }
 
-    /// A component of radiance that is not the sum of its layers. A sum that reaches the greatest value stays there.
+    /// Component of radiance that is not the sum of its layers. A sum above the maximum is clamped, which is valid.
     fn find_other_sum(&self, radiance: &[f32; 3], layers: &PixelLayers) -> Option<BadValue> {
         let PixelLayers { direct, indirect, caustic, .. } = layers;
         let parts = direct.iter().zip(indirect).zip(caustic);

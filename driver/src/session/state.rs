@@ -1,20 +1,20 @@
-//! How far a session is.
+//! States of a session.
 
-/// How far a session is.
+/// State of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// Hello is sent.
+    /// The hello is sent.
     Greeting,
-    /// The card is known and has nothing to do.
+    /// The card has answered the greeting, and has no job.
     Ready,
-    /// It is asked which chunks it has.
+    /// Checksums of the card's chunks are requested.
     Comparing,
-    /// Lines are still to be sent.
+    /// Lines of the image are being sent.
     Loading,
     /// All lines are sent.
     Accepting,
-    /// The frame's parameters are sent.
+    /// Parameters of the frame are sent.
     Framing,
-    /// Image and frame are there: tiles may come.
+    /// The card has image and frame, and accepts tiles.
     Rendering,
 }

@@ -1,4 +1,4 @@
-//! The tiles at a card.
+//! Tiles assigned to a card.
 
 use std::collections::VecDeque;
 
@@ -9,13 +9,13 @@ use super::pixel_limits::{BadValue, PixelLimits};
 use super::{Assignment, Event, SessionError};
 use crate::sink::FinishedTile;
 
-/// The tiles at a card, in the order in which it was given them.
+/// Tiles assigned to a card, in the order of assignment.
 #[derive(Default)]
 pub(super) struct TilesInFlight(Vec<TileInFlight>);
 
 struct TileInFlight {
     assignment: Assignment,
-    /// Records of the pixels that have come: all are possible.
+    /// Records of the pixels received so far, all valid.
     records: Vec<u8>,
 }
 
@@ -32,12 +32,12 @@ impl TilesInFlight {
         self.0.push(TileInFlight { assignment, records: Vec::new() });
     }
 
-    /// Whether the tile that the card is at is one that cards have crashed at.
+    /// Returns whether cards have crashed before at the tile that the card is working on.
     pub(super) fn is_at_suspect(&self) -> bool {
         self.0.first().is_some_and(|in_flight| in_flight.assignment.is_suspect)
     }
 
-    /// Takes a tile's next pixels.
+    /// Receives the next pixels of a tile.
     pub(super) fn take_pixels(
         &mut self,
         id: u32,
@@ -70,7 +70,7 @@ impl TilesInFlight {
         Ok(())
     }
 
-    /// The card is done with a tile: it must have sent all pixels.
+    /// Completes a tile, whose pixels must all have been received.
     pub(super) fn complete(
         &mut self,
         id: u32,
@@ -90,14 +90,14 @@ impl TilesInFlight {
         FinishedTile::new(tile, records, limits.has_layers(), counters).ok_or(not_complete)
     }
 
-    /// Gives back all tiles, from the last. The one that the card was at comes last.
+    /// Returns all tiles as events, in reverse order; the one that the card was working on is the last.
     pub(super) fn give_back(&mut self, events: &mut VecDeque<Event>) {
         while let Some(TileInFlight { assignment, .. }) = self.0.pop() {
             events.push_back(Event::TileLost { tile: assignment.tile, was_at_work: self.0.is_empty() });
         }
     }
 
-    /// The rays of the largest tile, roughly.
+    /// Approximate number of rays of the largest tile.
     pub(super) fn most_rays(&self, frame: &FrameParameters) -> u64 {
         let pixels = self.0.iter().map(|in_flight| in_flight.assignment.tile.pixels()).max().unwrap_or(0);
         let rays_of_sample = 2 + u64::from(frame.shadow_rays) + u64::from(frame.gather_rays);

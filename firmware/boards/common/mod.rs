@@ -2,7 +2,7 @@
 //! served from here.
 
 mod board;
-#[expect(unsafe_code, reason = "the linker script tells where card memory is")]
+#[expect(unsafe_code, reason = "the linker script defines the address of card memory")]
 mod dram;
 mod measure;
 #[expect(unsafe_code, reason = "a static is handed out once")]

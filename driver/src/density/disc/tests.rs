@@ -1,4 +1,4 @@
-//! Discs by rays and by the list of triangles.
+//! Properties of disc fractions: rays and the list of triangles agree.
 
 use super::*;
 use crate::pack::PackedScene;
@@ -6,7 +6,7 @@ use crate::photon::trace;
 use crate::photon_map::store_photons;
 use crate::scene::gltf;
 
-/// In rooms and on curved columns: what is tested against a list of triangles is what rays find.
+/// In rooms and on curved columns.
 #[test]
 fn the_triangles_around_a_photon_are_what_rays_meet() {
     for (name, photons) in [("cornell.gltf", 3000), ("atrium.glb", 10_000)] {

@@ -1,4 +1,4 @@
-//! The settings against what a card can hold.
+//! Check of the settings against a card's budget.
 
 use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_shared::budget::{Budget, MAX_BINS};
@@ -6,17 +6,17 @@ use photoncard_shared::budget::{Budget, MAX_BINS};
 use super::{MIN_IRRADIANCE_ERROR, RenderSettings};
 use crate::render::RenderError;
 
-/// Photons that a gather of caustics looks for at the least.
+/// Minimum number of photons that a gather of caustics searches for.
 const MIN_CAUSTIC_NEIGHBORS: u64 = 8;
 
-/// Photons that can be asked for.
+/// Maximum number of photons.
 const MAX_PHOTONS: usize = 1 << 27;
 
 impl RenderSettings {
-    /// Checks the settings against what a card can hold.
+    /// Checks the settings against a card's budget.
     ///
     /// # Errors
-    /// The first setting that is not possible.
+    /// If a setting is not possible: the first one.
     pub fn check(&self, budget: &Budget) -> Result<(), RenderError> {
         within("--size", self.picture.width.max(self.picture.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
         within("--photons", self.photons.count as u64, 1, MAX_PHOTONS as u64)?;
@@ -56,7 +56,7 @@ impl RenderSettings {
         }
     }
 
-    /// Checks that a chip has room for a tile with layers, if the picture has any of chips.
+    /// Checks that a chip has room for a tile with layers, if the picture has layers of chips.
     fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
         let most = budget.pixels_of_tile(self.picture.layers.are_of_chip()).isqrt();
         if self.schedule.tile <= most {
@@ -80,19 +80,19 @@ impl RenderSettings {
     }
 }
 
-/// Checks that a value lies in the range of a card.
+/// Checks that a value lies between a card's limits.
 fn within(option: &'static str, value: u64, least: u64, most: u64) -> Result<(), RenderError> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
     let (reason, remedy) = if most < least {
         let reason = format!("it must be {least} or more, and this card has room for {most}");
-        (reason, "no value will do on this card: render on another; `photoncard card info` tells what a card can hold".into())
+        (reason, "no value will do on this card: render on another; `photoncard card info` prints the limits of a card".into())
     } else {
         let remedy = if value < least {
             format!("choose {least} or more")
         } else {
-            format!("choose {most} or less; `photoncard card info` tells what a card can hold")
+            format!("choose {most} or less; `photoncard card info` prints the limits of a card")
         };
         (format!("it must be {least} to {most} on this card"), remedy)
     };

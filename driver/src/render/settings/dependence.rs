@@ -1,6 +1,7 @@
-//! Settings by the names of their options, in two lists: pixels depend on the first, and on nothing of the second.
+//! Settings by the names of their options, in two lists: those that pixels depend on, and those that only the work depends
+//! on.
 //!
-//! Both lists take the groups apart field by field, so that a new field cannot be forgotten.
+//! Both lists destructure the groups field by field, so that a new field cannot be forgotten.
 
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Map, Value, json};
@@ -14,7 +15,7 @@ use crate::scene::Scene;
 pub type NamedSettings = Map<String, Value>;
 
 impl RenderSettings {
-    /// Every setting that pixels depend on.
+    /// All settings that pixels depend on.
     pub fn of_pixels(&self) -> NamedSettings {
         let Self { picture, photons, integrator, schedule, cards, outputs } = self;
         let Schedule { tile: _, order: _, bins: _, queue: _ } = schedule;

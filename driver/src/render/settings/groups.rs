@@ -17,15 +17,15 @@ use crate::scheduler::GatherOrder;
 /// The picture and the camera that sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Pixels in a row.
+    /// Width, pixels.
     pub width: u32,
-    /// Rows.
+    /// Height, pixels.
     pub height: u32,
-    /// The part to render; `None` for the whole.
+    /// Window to render; `None` for the whole picture.
     pub crop: Option<Window>,
     /// Name of the camera; `None` for the first.
     pub camera: Option<String>,
-    /// The layers that the picture has besides radiance.
+    /// Layers of the picture besides radiance.
     pub layers: Layers,
 }
 
@@ -35,21 +35,21 @@ impl Default for Picture {
     }
 }
 
-/// The photon map and the caustic map.
+/// Photon map and caustic map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhotonMaps {
-    /// Photons in the map.
+    /// Number of photons in the map.
     pub count: usize,
     /// Layout of the photon map in card memory; no pixel depends on it.
     pub layout: PhotonLayout,
-    /// Photons that a gather looks for.
+    /// Number of photons that a gather searches for.
     pub neighbors: u32,
-    /// Greatest distance of a gather, metres; `None` for the one that the photons' density suggests.
+    /// Maximum distance of a gather, metres; `None` to derive it from the density of the photons.
     pub max_distance: Option<f32>,
-    /// Photons in the caustic map; `None` for [`DEFAULT_CAUSTIC_PHOTONS`](super::DEFAULT_CAUSTIC_PHOTONS) if anything in
-    /// the scene is perfectly specular, and no map otherwise.
+    /// Number of photons in the caustic map; `None` for [`DEFAULT_CAUSTIC_PHOTONS`](super::DEFAULT_CAUSTIC_PHOTONS) if the
+    /// scene has a perfectly specular surface, and no map otherwise.
     pub caustic_photons: Option<usize>,
-    /// Photons that a gather of caustics looks for.
+    /// Number of photons that a gather of caustics searches for.
     pub caustic_neighbors: u32,
     /// Estimate of the radiance at the ends of gather rays.
     pub radiance: Radiance,
@@ -69,20 +69,20 @@ impl Default for PhotonMaps {
     }
 }
 
-/// The estimate of light by rays.
+/// Estimation of light by rays.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Integrator {
-    /// Seed of all random numbers, those of photon paths included.
+    /// Seed of all random numbers, including photon paths.
     pub seed: u32,
-    /// Samples a pixel.
+    /// Number of samples per pixel.
     pub samples: u32,
-    /// Final gather rays a sample.
+    /// Number of final gather rays per sample.
     pub gather_rays: u32,
-    /// Shadow rays a sample.
+    /// Number of shadow rays per sample.
     pub shadow_rays: u32,
-    /// Density by which the directions of gather rays are sampled.
+    /// Sampling density of the directions of gather rays.
     pub sampling: Sampling,
-    /// Relative error that interpolated irradiance may have; `None` to interpolate none.
+    /// Maximum relative error of interpolated irradiance; `None` to interpolate none.
     pub irradiance_error: Option<f32>,
 }
 
@@ -99,16 +99,16 @@ impl Default for Integrator {
     }
 }
 
-/// The order of the work. No pixel depends on it.
+/// Order of the work. No pixel depends on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     /// Side of a tile, pixels.
     pub tile: u32,
     /// Order of the photon gathers.
     pub order: GatherOrder,
-    /// Direction bins of the gather rays, where the order has any; `None` for the default.
+    /// Number of direction bins of the gather rays, for orders with bins; `None` for the default.
     pub bins: Option<u32>,
-    /// Gathers that may wait on a chip, where the order lets any; `None` for as many as it has room for.
+    /// Maximum number of gathers that wait on a chip, for orders with a queue; `None` for the chip's capacity.
     pub queue: Option<u32>,
 }
 
@@ -118,18 +118,18 @@ impl Default for Schedule {
     }
 }
 
-/// The cards that render, and the tests that they are put to. No pixel depends on them.
+/// Cards that render, with tests and models of them. No pixel depends on them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CardSet {
     /// Addresses of the cards.
     pub addresses: Vec<CardAddress>,
-    /// Faults of the links to the cards, to try their repair; `None` for nothing.
+    /// Injected faults of the links to the cards; `None` for no faults.
     pub faults: Option<LineFaults>,
-    /// Share of the tiles that two cards render, to see whether they agree; `None` for no tile.
+    /// Share of the tiles that two cards render for comparison; `None` for no tile.
     pub verify: Option<f64>,
-    /// Caches that a chip's memory is modelled with; `None` to model none, which costs nothing.
+    /// Caches of the memory model; `None` to model none, which costs nothing.
     pub caches: Option<CacheSettings>,
-    /// File that every read of the chip is written to. It takes one chip; without `caches` those of the default.
+    /// Trace file of every read of the chip. It takes a single chip; without `caches` the default caches are modelled.
     pub trace: Option<PathBuf>,
 }
 
@@ -148,9 +148,9 @@ impl Default for CardSet {
 /// Destinations of finished tiles besides the film. No pixel depends on them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TileOutputs {
-    /// File in which finished tiles are kept until the picture is written; `None` to keep none. Not with the order
-    /// [`Hilbert`](GatherOrder::Hilbert), which has no finished tiles before the end.
+    /// File in which finished tiles are kept until the picture is written; `None` to keep none. Not possible with the order
+    /// [`Hilbert`](GatherOrder::Hilbert), whose tiles are finished at the end together.
     pub partial: Option<PartialSettings>,
-    /// Viewer that shows tiles as they land; `None` to show none.
+    /// Viewer that shows tiles as they are finished; `None` to show none.
     pub display: Option<DisplaySettings>,
 }

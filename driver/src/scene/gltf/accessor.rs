@@ -1,7 +1,6 @@
-//! The elements an accessor describes, read in place after every bound was checked.
+//! Elements of accessors, read in place after every bound is checked.
 //!
-//! Nothing is allocated: an accessor's count need not be backed by bytes (glTF fills with zeros), so it says nothing
-//! about what a reader can afford.
+//! Nothing is allocated for an accessor's count: it need not be backed by bytes (glTF fills with zeros).
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -16,33 +15,33 @@ use crate::error::SceneError;
 
 const REMEDY: &str = "export the scene again; the accessor, its buffer view and its buffer do not fit";
 
-/// The buffers of a document and their bytes.
+/// Buffers of a document with their bytes.
 pub(super) struct Source<'a> {
     pub(super) document: &'a Document,
     buffers: &'a [Bytes<'a>],
-    /// Accessors whose sparse indices were found to increase: many primitives may share one.
+    /// Cache of accessors whose sparse indices were found to be increasing: many primitives may share one.
     increasing: RefCell<BTreeSet<usize>>,
 }
 
-/// What an accessor may hold at some place.
+/// Valid formats of an accessor, depending on its use.
 pub(super) struct Format {
     pub(super) types: &'static [Type],
     pub(super) components: &'static [ComponentType],
     pub(super) integers: Integers,
 }
 
-/// What integer components stand for (glTF 2.0, 3.11 "Accessors").
+/// Interpretation of integer components (glTF 2.0, 3.11 "Accessors").
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Integers {
-    /// Themselves.
+    /// Integers as they are.
     Whole,
-    /// The range 0 to 1, or -1 to 1 of signed ones.
+    /// The range 0 to 1, or -1 to 1 if signed.
     Normalized,
-    /// The one or the other, as the accessor states.
+    /// Either of them, by the accessor's `normalized`.
     AsStated,
 }
 
-/// The elements of one accessor.
+/// Elements of one accessor.
 pub(super) struct Elements<'a> {
     pub(super) count: u64,
     component: ComponentType,
@@ -52,7 +51,7 @@ pub(super) struct Elements<'a> {
     sparse: Option<Sparse<'a>>,
 }
 
-/// Equal elements at equal distances.
+/// Elements of equal size at a constant stride.
 struct Strided<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -66,7 +65,7 @@ impl<'a> Strided<'a> {
     }
 }
 
-/// Elements that replace those of the base, in order of their indices.
+/// Elements that replace elements of the base, sorted by index.
 struct Sparse<'a> {
     count: usize,
     indices: Strided<'a>,
@@ -92,7 +91,7 @@ impl<'a> Sparse<'a> {
     }
 }
 
-/// A component as a number.
+/// Decodes a component.
 fn number(component: ComponentType, is_normalized: bool, bytes: &[u8]) -> f32 {
     let scaled = |value: f32, whole: f32| if is_normalized { (value / whole).max(-1.0) } else { value };
     match (component, bytes) {
@@ -111,7 +110,7 @@ fn unsigned(bytes: &[u8]) -> u64 {
 }
 
 impl<'a> Elements<'a> {
-    /// The accessor `index`, which `item` refers to and which must be of a format.
+    /// Elements of the accessor `index`, which `item` refers to and which must have a valid format.
     pub(super) fn new(
         source: &Source<'a>,
         index: usize,
@@ -162,13 +161,13 @@ impl<'a> Elements<'a> {
         Ok(Self { count, component, components, is_normalized, base, sparse })
     }
 
-    /// The bytes of an element, or `None` where glTF says zero.
+    /// Bytes of an element; `None` if glTF defines it as zero.
     fn bytes(&self, index: u64) -> Option<&'a [u8]> {
         let replaced = self.sparse.as_ref().and_then(|sparse| sparse.get(index));
         replaced.or_else(|| self.base.as_ref()?.get(usize::try_from(index).ok()?))
     }
 
-    /// An element as numbers. Components that elements of this accessor do not have are those of `absent`.
+    /// An element as numbers; components that the accessor lacks are taken from `absent`.
     pub(super) fn floats<const N: usize>(&self, index: u64, absent: [f32; N]) -> [f32; N] {
         let mut vector = absent;
         let present = vector.iter_mut().take(self.components);
@@ -210,7 +209,7 @@ impl<'a> Source<'a> {
         Self { document, buffers, increasing: RefCell::default() }
     }
 
-    /// The bytes of a buffer view, which `item` refers to.
+    /// Bytes of the buffer view `view`, which `item` refers to.
     pub(super) fn bytes(&self, view: usize, item: &str) -> Result<&'a [u8], SceneError> {
         let (bytes, _) = self.view(view)?;
         bytes.ok_or_else(|| {
@@ -219,7 +218,7 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// `count` elements of `size` bytes that start `offset` bytes into a buffer view.
+    /// `count` elements of `size` bytes, starting `offset` bytes into a buffer view.
     fn strided(
         &self,
         view: usize,
@@ -254,7 +253,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// A buffer view's bytes, `None` if they are not inside the buffer, and its stride.
+    /// Bytes of a buffer view, `None` if they exceed the buffer, and its stride.
     fn view(&self, index: usize) -> Result<(Option<&'a [u8]>, Option<usize>), SceneError> {
         let view = self.document.root.buffer_views.get(index).ok_or_else(|| {
             self.document.invalid("bufferViews", format!("buffer view {index} does not exist"), REMEDY)
@@ -297,7 +296,7 @@ impl<'a> Source<'a> {
             size,
             &format!("{item}.values"),
         )?;
-        // The bytes are there, so the count fits.
+        // The elements have bytes, so the count fits `usize`.
         let count = usize::try_from(count).map_err(|_| fault(".count", "it is too large"))?;
         let sparse = Sparse { count, indices, values };
         if !self.increasing.borrow_mut().insert(accessor) {

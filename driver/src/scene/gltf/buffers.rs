@@ -1,4 +1,4 @@
-//! The bytes of a scene's buffers: the BIN chunk, data URIs, and files inside the scene's folder.
+//! Bytes of a scene's buffers, from the BIN chunk, data URIs and files in the scene's folder.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::error::SceneError;
 
 const EXPORT_AGAIN: &str = "export the scene again; the buffer and its description do not fit";
 
-/// The bytes of every buffer, each at least as long as the file states.
+/// Bytes of every buffer, each at least as long as `byteLength`.
 pub(super) fn load(document: &Document) -> Result<Vec<Bytes<'_>>, SceneError> {
     (0..document.root.buffers.len()).map(|index| load_one(document, index)).collect()
 }

@@ -1,4 +1,4 @@
-//! Cameras: those of the file, or one that shows the whole scene.
+//! Cameras of the file, or a default one that shows the whole scene.
 
 use std::collections::BTreeSet;
 
@@ -11,13 +11,13 @@ use super::notices::Notices;
 use crate::error::SceneError;
 use crate::scene::{Camera, Scene};
 
-/// How much wider than the scene the framed view is.
+/// Width of the default camera's view over the scene's width.
 const MARGIN: f32 = 1.05;
 
-/// The tangent of half of 45 degrees, the framed view.
+/// Tangent of half the default camera's field of view, 45 degrees.
 const HALF_VIEW_TANGENT: f32 = std::f32::consts::SQRT_2 - 1.0;
 
-/// Places cameras into a scene.
+/// Conversion of glTF's cameras to the scene's.
 pub(super) struct CameraPlacer<'a> {
     document: &'a Document,
     names: BTreeSet<String>,
@@ -28,7 +28,7 @@ impl<'a> CameraPlacer<'a> {
         Self { document, names: BTreeSet::new() }
     }
 
-    /// Adds the camera `index` as `node` places it. Scale and skew do not change a view, as glTF has it.
+    /// Adds the camera `index` with the transform of `node`; scale and skew are ignored, as glTF requires.
     pub(super) fn place(
         &mut self,
         index: usize,
@@ -65,7 +65,7 @@ impl<'a> CameraPlacer<'a> {
         Ok(())
     }
 
-    /// The camera's name, or its node's if another camera has it already, or `camera N`.
+    /// Name of the camera; that of its node if another camera has the name already; or `camera N`.
     fn name(&mut self, index: usize, node: usize) -> String {
         let root = &self.document.root;
         let stated = [root.cameras[index].name.as_ref(), root.nodes[node].name.as_ref()];
@@ -76,7 +76,7 @@ impl<'a> CameraPlacer<'a> {
     }
 }
 
-/// The camera's place and its right-handed unit axes, if the transform has any.
+/// Position and right-handed unit axes of the camera; `None` for a degenerate transform.
 fn axes(world: &DMat4) -> Option<(Vec3, Vec3, Vec3, Vec3)> {
     let determinant = world.determinant();
     if determinant == 0.0 || !determinant.is_finite() {
@@ -91,7 +91,7 @@ fn axes(world: &DMat4) -> Option<(Vec3, Vec3, Vec3, Vec3)> {
     placed.0.is_finite().then_some(placed)
 }
 
-/// A camera in front of the scene's bounding box that sees all of it in a square picture or a wider one.
+/// Default camera in front of the scene's bounding box, which sees the whole scene in a square or wider picture.
 pub(super) fn frame(scene: &Scene) -> Camera {
     let (low, high) = scene.bounds();
     let centre = low + (high - low) * 0.5;

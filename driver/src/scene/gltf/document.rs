@@ -1,4 +1,4 @@
-//! A glTF file as JSON and bytes: GLB's chunks, the JSON, and the rules of glTF that the JSON must keep.
+//! A glTF file: the chunks of a GLB, the parsed JSON, and its validation.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -22,14 +22,14 @@ const CHUNK_HEADER: usize = 8;
 const CHUNK_JSON: u32 = u32::from_le_bytes(*b"JSON");
 const CHUNK_BIN: u32 = u32::from_le_bytes(*b"BIN\0");
 
-/// A parsed file whose indices all refer to something.
+/// Parsed file whose indices are all valid.
 pub(super) struct Document {
     pub(super) path: PathBuf,
     pub(super) root: json::Root,
-    /// The file, and where in it the BIN chunk of a GLB is.
+    /// Bytes of the file; a range of them is the BIN chunk of a GLB.
     bytes: Vec<u8>,
     blob: Option<Range<usize>>,
-    /// The files beside it that were read.
+    /// Files in its folder that were read.
     pub(super) files: Files,
 }
 
@@ -45,18 +45,18 @@ impl Document {
         Ok(document)
     }
 
-    /// The BIN chunk of a GLB.
+    /// BIN chunk of a GLB.
     pub(super) fn blob(&self) -> Option<&[u8]> {
         self.bytes.get(self.blob.clone()?)
     }
 
-    /// Whether vertices may be integers.
+    /// Returns whether `KHR_mesh_quantization` allows integer vertex attributes.
     pub(super) fn is_quantized(&self) -> bool {
         let Self { root, .. } = self;
         root.extensions_used.iter().chain(&root.extensions_required).any(|name| name == QUANTIZATION)
     }
 
-    /// The place `item` of this file.
+    /// Location of `item` in this file.
     pub(super) fn location(&self, item: impl Into<String>) -> Location {
         Location::new(&self.path, item)
     }
@@ -94,7 +94,7 @@ impl Document {
         Err(self.invalid("asset.version", reason, "export the scene as glTF 2.0"))
     }
 
-    /// The `gltf` crate's validation indexes the accessor list with a primitive's POSITION unchecked.
+    /// Checks the POSITION of primitives, which the `gltf` crate's validation uses as an index unchecked.
     fn check_positions(&self) -> Result<(), SceneError> {
         let accessors = self.root.accessors.len();
         for (m, mesh) in self.root.meshes.iter().enumerate() {
@@ -123,12 +123,12 @@ impl Document {
             Fault::Oversize => "the size is beyond this machine's limits",
             Fault::Unsupported => "it is not supported",
         };
-        // The types' names of the extension's fields are not those of the file.
+        // The crate names the extension's fields by their types; the file has other names.
         let item = path.as_str().replace("khrLightsPunctual", "KHR_lights_punctual");
         Err(self.invalid(item, reason, "export the scene again, or correct this item of the file"))
     }
 
-    /// The first rule that is broken and matters, and where.
+    /// First violation of glTF that matters to the loader, with its JSON path.
     fn first_fault(&self) -> Result<Option<(json::Path, Fault)>, SceneError> {
         let mut first = None;
         let mut report = |path: &dyn Fn() -> json::Path, fault| {
@@ -136,11 +136,11 @@ impl Document {
                 return;
             }
             let path = path();
-            // Bounds are not used, so that files without them load too.
+            // `min` and `max` are not used: files without them are accepted.
             let is_bound = path.as_str().ends_with(".min") || path.as_str().ends_with(".max");
-            // An accessor without bytes is of zeros, as exporters write morph targets that move nothing.
+            // An accessor without a buffer view is all zeros: exporters write such morph targets.
             let is_zeros = fault == Fault::Missing && is_accessors_view(path.as_str());
-            // Which extensions may be required was checked before.
+            // `extensionsRequired` was checked before.
             if !is_bound && !is_zeros && fault != Fault::Unsupported {
                 first = Some((path, fault));
             }
@@ -156,7 +156,7 @@ impl Document {
     }
 }
 
-/// Whether a place is the buffer view of an accessor, not of its sparse elements.
+/// Returns whether a JSON path names the buffer view of an accessor, not of its sparse elements.
 fn is_accessors_view(path: &str) -> bool {
     path.strip_prefix("accessors[")
         .and_then(|rest| rest.split_once(']'))
@@ -168,7 +168,7 @@ fn u32_at(bytes: &[u8], offset: usize) -> Option<u32> {
     Some(u32::from_le_bytes(*word))
 }
 
-/// Where in a GLB its JSON and its BIN chunk are. Chunks of other types are skipped, as the format demands.
+/// Ranges of the JSON and the BIN chunk in a GLB. Chunks of other types are skipped, as the format requires.
 fn split_glb(path: &Path, bytes: &[u8]) -> Result<(Range<usize>, Option<Range<usize>>), SceneError> {
     let truncated = |what, needed: u64, available: usize| SceneError::Truncated {
         file: path.to_owned(),
@@ -233,7 +233,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<json::Root, SceneError> {
 
 const CONTRADICTION: &str = "its structure contradicts itself";
 
-/// The error with an excerpt of the text: a line of glTF may be a whole buffer in base64.
+/// Syntax error with an excerpt of the text: a line of glTF may contain a whole buffer in base64.
 fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError {
     const CONTEXT: usize = 100;
     let line = text.lines().nth(error.line().saturating_sub(1)).unwrap_or_default();
@@ -241,7 +241,7 @@ fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError 
     let start = char_boundary(line, at.saturating_sub(CONTEXT));
     let end = char_boundary(line, at + CONTEXT);
     let next = at + line[at..].chars().next().map_or(0, char::len_utf8);
-    // Shown as it stands, and pointed into: its parts are escaped here.
+    // The excerpt is escaped here, in three parts, since the error points into it by offset.
     let [before, here, after] = [start..at, at..next, next..end.max(next)].map(|part| printable(&line[part]));
     let file = path.display().to_string();
     SceneError::Json {
@@ -252,7 +252,7 @@ fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError 
     }
 }
 
-/// The last boundary between characters at or before `index`.
+/// Last character boundary at or before `index`.
 fn char_boundary(text: &str, index: usize) -> usize {
     let index = index.min(text.len());
     (0..=index).rev().find(|&index| text.is_char_boundary(index)).unwrap_or(0)

@@ -1,6 +1,6 @@
-//! Extensions of glTF.
+//! glTF extensions that the loader supports.
 
-/// Extensions whose meaning the loader knows.
+/// Names of the supported extensions.
 pub(super) const SUPPORTED_EXTENSIONS: [&str; 10] = [
     INSTANCING,
     "KHR_lights_punctual",
@@ -8,15 +8,15 @@ pub(super) const SUPPORTED_EXTENSIONS: [&str; 10] = [
     "KHR_materials_ior",
     "KHR_materials_specular",
     "KHR_materials_transmission",
-    // Lit all the same, which a notice tells.
+    // Rendered with lighting nevertheless, which a notice reports.
     "KHR_materials_unlit",
     "KHR_materials_volume",
     QUANTIZATION,
     "KHR_texture_transform",
 ];
 
-/// Vertices may be integers.
+/// Vertex attributes as integers.
 pub(super) const QUANTIZATION: &str = "KHR_mesh_quantization";
 
-/// Meshes that a node shows many times.
+/// Instances of a node's mesh.
 pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";

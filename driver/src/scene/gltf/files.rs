@@ -1,5 +1,4 @@
-//! The bytes that a scene's buffers and images are made of, and the files beside it, each of which is read once however
-//! often the scene refers to it.
+//! Bytes of buffers and images, and a cache of the files in the scene's folder, so that each is read once.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -9,11 +8,11 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The bytes of a buffer or an image.
+/// Bytes of a buffer or an image.
 pub(super) enum Bytes<'a> {
-    /// A part of the scene file or of a buffer.
+    /// A range of the scene file or of a buffer.
     Part(&'a [u8]),
-    /// A file, or what a data URI holds.
+    /// A file, or the contents of a data URI.
     Shared(Arc<Vec<u8>>),
 }
 
@@ -28,12 +27,12 @@ impl Deref for Bytes<'_> {
     }
 }
 
-/// Files that were read, by their canonical paths.
+/// Cache of files by their canonical paths.
 #[derive(Default)]
 pub(super) struct Files(RefCell<BTreeMap<PathBuf, Arc<Vec<u8>>>>);
 
 impl Files {
-    /// The bytes of a file.
+    /// Contents of a file.
     pub(super) fn read(&self, path: &Path) -> io::Result<Bytes<'static>> {
         let canonical = fs::canonicalize(path)?;
         if let Some(bytes) = self.0.borrow().get(&canonical) {
@@ -45,7 +44,7 @@ impl Files {
     }
 }
 
-/// Reads a regular file; a pipe or a device could go on for ever.
+/// Reads a regular file; a pipe or a device might never end.
 pub(super) fn read_file(path: &Path) -> io::Result<Vec<u8>> {
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));

@@ -1,4 +1,4 @@
-//! The images of a file that its textures refer to, decoded in parallel.
+//! Images that textures refer to, decoded in parallel.
 
 use std::sync::Arc;
 
@@ -14,17 +14,17 @@ use crate::scene::{Encoding, Image, MAX_TEXELS};
 
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
 
-/// An image whose header was read.
+/// An image whose header is read.
 struct Found<'a> {
     kind: Kind,
     size: [u32; 2],
     bytes: Bytes<'a>,
 }
 
-/// Bytes of all image files together. No texel takes more than eight in either format.
+/// Maximum size of all image files together, bytes: in both formats a texel takes at most eight.
 const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
 
-/// The images of these indices, all of which exist, in these encodings.
+/// Decodes images by index and encoding. All indices exist.
 pub(super) fn load(
     source: &Source<'_>,
     wanted: &[(usize, Encoding)],
@@ -52,7 +52,7 @@ pub(super) fn load(
         .into_par_iter()
         .map(|image| (image.size, image.kind.decode(&image.bytes, image.size)))
         .collect();
-    // The first error in the order of the file is told, whichever thread was the first to find one.
+    // The first error in the order of the file is returned, whichever thread failed first.
     let images = decoded.into_iter().zip(wanted).map(|(([width, height], texels), &(index, encoding))| {
         let texels = texels.map_err(|Fault { reason, remedy }| fault(source, index, "", reason, remedy))?;
         Ok(Image { name: name(source, index), width, height, texels, encoding })
@@ -71,7 +71,7 @@ fn fault(
     SceneError::Image { location, reason: reason.into(), remedy }
 }
 
-/// The image's name, or that of its file, or `image N`.
+/// Name of the image, or of its file, or `image N`.
 fn name(source: &Source<'_>, index: usize) -> String {
     let image = &source.document.root.images[index];
     let file = image.uri.as_ref().filter(|uri| !is_data(uri));
@@ -91,10 +91,10 @@ fn find<'a>(source: &Source<'a>, index: usize) -> Result<Found<'a>, SceneError> 
     Ok(Found { kind, size, bytes })
 }
 
-/// Where a media type is stated, and which.
+/// JSON path and value of a stated media type.
 type Stated<'a> = Option<(&'static str, &'a str)>;
 
-/// An image's media type, if it is stated, and its bytes.
+/// Stated media type of an image, and its bytes.
 fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<(Stated<'a>, Bytes<'a>), SceneError> {
     let document = source.document;
     let image = &document.root.images[index];

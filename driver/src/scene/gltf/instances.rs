@@ -1,4 +1,4 @@
-//! Meshes that a node shows many times (`EXT_mesh_gpu_instancing`).
+//! Instances of a node's mesh (`EXT_mesh_gpu_instancing`).
 
 use glam::{DMat4, DVec3};
 use gltf::json;
@@ -26,7 +26,7 @@ struct Extension {
     attributes: InstanceAttributes,
 }
 
-/// Accessors. Others than these are for applications.
+/// Accessors of the transforms; attributes with other names are application-specific.
 #[derive(Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 struct InstanceAttributes {
@@ -35,7 +35,7 @@ struct InstanceAttributes {
     scale: Option<usize>,
 }
 
-/// The instances of a node's mesh.
+/// Instances of a node's mesh.
 pub(super) struct Instances<'a> {
     item: String,
     pub(super) count: u64,
@@ -45,7 +45,7 @@ pub(super) struct Instances<'a> {
 }
 
 impl<'a> Instances<'a> {
-    /// The instances that a node states, if it does.
+    /// Instances of a node, if it has the extension.
     pub(super) fn of(
         source: &Source<'a>,
         index: usize,
@@ -80,7 +80,7 @@ impl<'a> Instances<'a> {
         Ok(Some(Self { item, count, translation, rotation, scale }))
     }
 
-    /// The transform of an instance in the node's own space.
+    /// Transform of an instance in the node's local space.
     pub(super) fn transform(&self, source: &Source<'a>, instance: u64) -> Result<DMat4, SceneError> {
         let vector = |elements: &Option<Elements<'a>>, default: DVec3| {
             elements.as_ref().map_or(default, |found| DVec3::from(found.vec3(instance).map(f64::from)))

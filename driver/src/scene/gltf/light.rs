@@ -1,4 +1,4 @@
-//! Lights of `KHR_lights_punctual`, placed by nodes.
+//! Lights of `KHR_lights_punctual` with the transforms of their nodes.
 
 use glam::{DMat4, DVec3, Vec3};
 use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
@@ -9,20 +9,20 @@ use crate::error::SceneError;
 use crate::scene::limits::EMISSION;
 use crate::scene::{PunctualKind, PunctualLight, Scene};
 
-/// The narrowest step, in cosines, between the two cones of a spot light, as `KHR_lights_punctual` recommends.
-/// Exporters write equal angles for a sharp edge.
+/// Minimum difference of the cosines of a spot light's cones, as `KHR_lights_punctual` recommends. Exporters write equal
+/// angles for a sharp edge.
 const MIN_PENUMBRA: f32 = 0.001;
 
-/// How far beyond a right angle a spot light's rounded outer angle may lie.
+/// Tolerance by which a rounded outer cone angle may exceed a right angle.
 const ANGLE_TOLERANCE: f32 = 1e-4;
 
-/// All lights of the file.
+/// Lights of the file.
 pub(super) fn lights(document: &Document) -> &[Light] {
     let extensions = document.root.extensions.as_ref();
     extensions.and_then(|root| root.khr_lights_punctual.as_ref()).map_or(&[], |extension| &extension.lights)
 }
 
-/// Adds the light `index`, which exists, as `node` places it.
+/// Adds the light `index`, which exists, with the transform of `node`.
 pub(super) fn place(
     document: &Document,
     index: usize,
@@ -61,7 +61,7 @@ pub(super) fn place(
             let direction = direction.ok_or_else(misplaced)?;
             PunctualKind::Spot { position, direction, inner_cosine, outer_cosine }
         }
-        // Other types were refused by the document's rules.
+        // Validation has rejected other types.
         Checked::Valid(Type::Point) | Checked::Invalid => PunctualKind::Point { position },
     };
     let name = light.name.clone().unwrap_or_else(|| format!("light {index}"));
@@ -69,7 +69,7 @@ pub(super) fn place(
     Ok(())
 }
 
-/// The cosines of the inner and the outer angle of a spot light.
+/// Cosines of the inner and the outer cone angle of a spot light.
 fn cones(light: &Light) -> Option<(f32, f32)> {
     let spot = light.spot.as_ref()?;
     let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);

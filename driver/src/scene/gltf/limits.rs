@@ -1,4 +1,4 @@
-//! Bounds of a scene file.
+//! Limits of a scene file.
 
-/// The most triangles a scene may hold, those of zero area included.
+/// Maximum number of triangles of a scene, including triangles of zero area.
 pub const MAX_TRIANGLES: usize = 1 << 24;

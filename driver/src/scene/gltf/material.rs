@@ -1,4 +1,4 @@
-//! Materials: base colour, emission, and the Phong lobe that `extras` may state.
+//! Materials: base colour, metalness, roughness, transmission, emission, and the Phong lobe in `extras`.
 
 use glam::Vec3;
 use gltf::json;
@@ -13,7 +13,7 @@ use crate::error::SceneError;
 use crate::scene::material::{OutOfRange, Property};
 use crate::scene::{Encoding, Material, Reflection, Transmission};
 
-/// What `extras` may hold for this renderer; everything else in `extras` is other programs' business.
+/// Contents of `extras` for this renderer; other keys belong to other programs.
 #[derive(Deserialize)]
 struct Extras {
     photoncard: Option<Photoncard>,
@@ -32,12 +32,12 @@ struct Phong {
     exponent: f32,
 }
 
-/// The material of primitives that state none: glTF's default, a rough white metal.
+/// Default material of glTF for primitives that state none: a rough white metal.
 pub(super) fn default_material() -> Material {
     Material::new("default", metallic_roughness(&json::Material::default(), Vec3::ONE))
 }
 
-/// Every material of the file, in its order.
+/// Materials of the file, in its order.
 pub(super) fn load(document: &Document, textures: &mut Textures) -> Result<Vec<Material>, SceneError> {
     let materials = document.root.materials.iter().enumerate();
     materials.map(|(index, material)| load_one(document, index, material, textures)).collect()
@@ -94,7 +94,7 @@ fn load_one(
     Ok(material)
 }
 
-/// Adds those textures that the material's reflection and emission have a use for.
+/// Adds the textures that the material's reflection and emission use.
 fn add_textures(
     material: &mut Material,
     index: usize,
@@ -118,7 +118,7 @@ fn add_textures(
     Ok(())
 }
 
-/// Checks what cannot be told from the reflection any more.
+/// Checks values of extensions that [`Reflection`] does not keep.
 fn check_extensions(extensions: Option<&json::extensions::material::Material>) -> Result<(), OutOfRange> {
     let Some(extensions) = extensions else { return Ok(()) };
     if let Some(specular) = &extensions.specular {
@@ -139,18 +139,18 @@ fn check_extensions(extensions: Option<&json::extensions::material::Material>) -
     }
 }
 
-/// The index of refraction of materials that state none.
+/// Default index of refraction (`KHR_materials_ior`).
 const IOR: f32 = 1.5;
 
-/// Beyond this, 1/m, nothing is seen through a film of atoms.
+/// Maximum absorption coefficient, 1/m: with it a layer of atomic thickness is opaque.
 const MAX_ABSORPTION: f32 = 1e12;
 
-/// glTF's reflection, with the extensions for dielectrics.
+/// Metallic-roughness reflection, with the extensions for dielectrics.
 fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection {
     let pbr = &source.pbr_metallic_roughness;
     let extensions = source.extensions.as_ref();
     let ior = extensions.and_then(|extensions| extensions.ior.as_ref()).map_or(IOR, |ior| ior.ior.0);
-    // With an index of 0, which stands for an infinite one, this is 1, as KHR_materials_ior has it.
+    // An index of 0 stands for infinity; its reflectance is then 1 (`KHR_materials_ior`).
     let amplitude = (f64::from(ior) - 1.0) / (f64::from(ior) + 1.0);
     let normal_reflectance = (amplitude * amplitude) as f32;
     let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
@@ -162,24 +162,24 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
         metallic: pbr.metallic_factor.0,
         roughness: pbr.roughness_factor.0,
         dielectric: (normal_reflectance * colour).min(Vec3::ONE) * factor,
-        // What reflects everything transmits nothing.
+        // A reflectance of 1 leaves no light to transmit.
         transmission: if ior == 0.0 { None } else { transmission(extensions, ior) },
     }
 }
 
-/// The radiance that the factors state, W/(sr m^2).
+/// Emitted radiance: `emissiveFactor` times `emissiveStrength`, W/(sr m^2).
 fn emission(material: &json::Material) -> Vec3 {
     let strength = material.extensions.as_ref().and_then(|extensions| extensions.emissive_strength.as_ref());
     Vec3::from(material.emissive_factor.0) * strength.map_or(1.0, |strength| strength.emissive_strength.0)
 }
 
-/// Whether the material has a texture for its emission, and none for it to multiply.
+/// Returns whether the material has an emissive texture that is multiplied by zero.
 pub(super) fn has_dark_texture(material: &json::Material) -> bool {
     material.emissive_texture.is_some() && emission(material) == Vec3::ZERO
 }
 
-/// Whether all that the material does is to scatter: `KHR_materials_specular` takes the reflection off the dielectric
-/// part, and off that part alone, so that a metal, which glTF means where it states no metalness, goes on to reflect.
+/// Returns whether the material is purely diffuse: `KHR_materials_specular` with factor 0 removes the reflection of the
+/// dielectric part. A metal, which is the default metalness of glTF, keeps its reflection.
 fn is_lambertian(material: &json::Material) -> bool {
     let specular = material.extensions.as_ref().and_then(|extensions| extensions.specular.as_ref());
     specular.is_some_and(|specular| specular.specular_factor.0 == 0.0)
@@ -187,7 +187,7 @@ fn is_lambertian(material: &json::Material) -> bool {
         && !is_transmissive(material)
 }
 
-/// Whether light passes the material's surface.
+/// Returns whether the material transmits light.
 pub(super) fn is_transmissive(material: &json::Material) -> bool {
     let transmission = material.extensions.as_ref().and_then(|extensions| extensions.transmission.as_ref());
     transmission.is_some_and(|transmission| transmission.transmission_factor.0 > 0.0)
@@ -199,7 +199,7 @@ fn transmission(extensions: Option<&json::extensions::material::Material>, ior: 
     let absorption = volume.map_or(Vec3::ZERO, |volume| {
         let distance = volume.attenuation_distance.0;
         let coefficient = |colour: f32| match -libm::logf(colour) / distance {
-            // Black, or white without a distance.
+            // A black attenuation colour, or a distance of 0.
             infinite if infinite == f32::INFINITY => MAX_ABSORPTION,
             coefficient => coefficient.min(MAX_ABSORPTION),
         };
@@ -215,12 +215,12 @@ fn read_phong(
     name: &str,
 ) -> Result<Option<Phong>, SceneError> {
     let Some(extras) = &source.extras else { return Ok(None) };
-    // `extras` may be of any type; only an object can be meant for us.
+    // `extras` may be of any type; only an object can hold this renderer's key.
     if !extras.get().trim_start().starts_with('{') {
         return Ok(None);
     }
     let extras: Extras = serde_json::from_str(extras.get()).map_err(|error| {
-        // The line and column are those of the extract, which helps nobody.
+        // Line and column refer to the extract, not to the file.
         let message = error.to_string();
         let message = message.split(" at line ").next().unwrap_or_default();
         SceneError::Material {

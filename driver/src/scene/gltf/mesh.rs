@@ -1,4 +1,4 @@
-//! Meshes: triangles placed into the world by each node that shows them.
+//! Meshes: triangles in world space for each node and instance.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
@@ -17,15 +17,15 @@ use crate::allocation;
 use crate::error::SceneError;
 use crate::scene::{Scene, Triangle};
 
-/// Places meshes into a scene.
+/// Conversion of meshes to triangles of the scene.
 pub(super) struct MeshPlacer<'a> {
     source: &'a Source<'a>,
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,
-    /// How often each mesh is placed.
+    /// Number of instances of each mesh.
     placed: BTreeMap<usize, u64>,
-    /// Triangles and primitives to be placed, those of zero area too.
+    /// Number of triangles and primitives to convert, including zero area.
     work: u64,
-    /// Meshes that were placed with normals or colours that are not finite.
+    /// Meshes with normals or colours that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
 }
 
@@ -40,7 +40,7 @@ impl<'a> MeshPlacer<'a> {
         }
     }
 
-    /// Counts the triangles of so many instances of mesh `index`.
+    /// Counts the triangles of `instances` instances of mesh `index`.
     pub(super) fn count(
         &mut self,
         index: usize,
@@ -60,10 +60,10 @@ impl<'a> MeshPlacer<'a> {
         Ok(())
     }
 
-    /// Checks that a card has room for all that was counted.
+    /// Checks that a card has room for all counted triangles.
     pub(super) fn check_room(&self, room: &mut Room) -> Result<(), SceneError> {
         let triangles = self.placed().map(|(primitive, times)| primitive.triangles * times).sum();
-        // Where corners meet is looked for only if it matters.
+        // Shared vertices are counted only if the upper bound exceeds the room.
         if room.fits_any(triangles) {
             return Ok(());
         }
@@ -78,7 +78,7 @@ impl<'a> MeshPlacer<'a> {
         room.triangles(triangles, bytes)
     }
 
-    /// The primitives that were counted, and how often each is placed.
+    /// Counted primitives, with the number of instances of each.
     fn placed(&self) -> impl Iterator<Item = (&Primitive<'a>, u64)> {
         self.placed.iter().flat_map(|(mesh, &times)| {
             let primitives = self.prepared.get(mesh).into_iter().flat_map(|primitives| primitives.iter());
@@ -97,12 +97,12 @@ impl<'a> MeshPlacer<'a> {
         primitives.iter().try_for_each(|primitive| self.place_primitive(index, primitive, pose, scene))
     }
 
-    /// Whether mesh `index` has a primitive of triangles.
+    /// Returns whether mesh `index` has a primitive of triangles.
     pub(super) fn has_triangles(&mut self, index: usize, scene: &mut Scene) -> Result<bool, SceneError> {
         Ok(!self.primitives(index, scene)?.is_empty())
     }
 
-    /// The primitives of triangles of mesh `index`.
+    /// Primitives of triangles of mesh `index`.
     fn primitives(&mut self, index: usize, scene: &mut Scene) -> Result<Rc<Vec<Primitive<'a>>>, SceneError> {
         if let Some(primitives) = self.prepared.get(&index) {
             return Ok(Rc::clone(primitives));
@@ -116,7 +116,7 @@ impl<'a> MeshPlacer<'a> {
         let mut prepared = Vec::new();
         for (index, primitive) in self.source.document.root.meshes[mesh].primitives.iter().enumerate() {
             let Some(topology) = Topology::of(primitive) else { continue };
-            // The default material comes after those of the file.
+            // The default material follows the materials of the file.
             let default = self.source.document.root.materials.len();
             let material = primitive.material.map_or(default, |material| material.value());
             if material >= scene.materials.len() {
@@ -146,7 +146,7 @@ impl<'a> MeshPlacer<'a> {
             let [a, b, c] = corners;
             let mut transforms =
                 [reader.transform(pose, a)?, reader.transform(pose, b)?, reader.transform(pose, c)?];
-            // A mirror turns the front to the back; turning the order of the corners restores it.
+            // A mirroring transform swaps front and back; reversing the order of vertices restores them.
             if transforms[0].is_mirror {
                 corners.swap(1, 2);
                 transforms.swap(1, 2);

@@ -1,8 +1,8 @@
 //! Scenes from glTF 2.0 files, `.gltf` and `.glb`.
 //!
-//! The `gltf` crate supplies the JSON's types and the rules it must keep. Its readers of binary data trust the file
-//! and panic on a bad one, so the bytes are read here: every offset, stride and count is checked before use, and
-//! nothing is allocated for a count alone.
+//! The `gltf` crate supplies the types of the JSON and its validation. Its readers of binary data trust the file and panic
+//! on malformed ones, so the bytes are read here: every offset, stride and count is checked before use, and nothing is
+//! allocated for a count alone.
 
 mod accessor;
 mod buffers;

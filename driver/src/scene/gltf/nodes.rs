@@ -1,4 +1,4 @@
-//! The nodes of a scene with their transforms in the world, and what they show.
+//! Nodes of a scene: world transforms, and conversion of their meshes, lights and cameras.
 
 use std::collections::BTreeMap;
 
@@ -18,12 +18,12 @@ use super::transform;
 use crate::error::SceneError;
 use crate::scene::Scene;
 
-/// The deepest hierarchy of nodes.
+/// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
 
-/// Places the meshes, lights and cameras of the scene's nodes.
+/// Adds the meshes, lights and cameras of the scene's nodes.
 ///
-/// Triangles are counted before the first is placed.
+/// All triangles are counted before the first is added.
 pub(super) fn place(
     source: &Source<'_>,
     scene: &mut Scene,
@@ -55,7 +55,7 @@ struct Placer<'a> {
     meshes: MeshPlacer<'a>,
     cameras: CameraPlacer<'a>,
     skins: BTreeMap<usize, Skin>,
-    /// The transforms of the nodes that are part of the scene.
+    /// World transforms; `None` for nodes that are not in the scene.
     worlds: Vec<Option<DMat4>>,
 }
 
@@ -64,7 +64,7 @@ impl Placer<'_> {
     fn count(&mut self, index: usize, scene: &mut Scene) -> Result<(), SceneError> {
         let node = &self.source.document.root.nodes[index];
         let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { return Ok(()) };
-        // Instances count by the triangles and primitives they place: those of nothing would be without a limit.
+        // Instances are limited by their triangles and primitives; an empty mesh would have no limit.
         if !self.meshes.has_triangles(mesh, scene)? {
             return Ok(());
         }
@@ -135,7 +135,7 @@ impl Placer<'_> {
     }
 }
 
-/// The nodes of the default scene, or of the first, each parent before its children.
+/// Nodes of the default scene, or of the first, with their world transforms; each parent precedes its children.
 fn walk(document: &Document) -> Result<Vec<(usize, DMat4)>, SceneError> {
     let root = &document.root;
     let chosen = root.scene.map_or(0, |scene| scene.value());
@@ -144,7 +144,7 @@ fn walk(document: &Document) -> Result<Vec<(usize, DMat4)>, SceneError> {
     };
     let mut placed = Vec::new();
     let mut seen = vec![false; root.nodes.len()];
-    // The node, the transform of its parents, and its depth; the next one last.
+    // Stack of nodes with the transform of the parent and the depth.
     let mut open: Vec<_> = chosen.nodes.iter().rev().map(|node| (node.value(), DMat4::IDENTITY, 0)).collect();
     while let Some((index, parent, depth)) = open.pop() {
         let fault = |reason, remedy| Err(document.invalid(format!("nodes[{index}]"), reason, remedy));

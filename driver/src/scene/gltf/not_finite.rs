@@ -1,10 +1,10 @@
-//! Attributes that are read even where they are not finite.
+//! Record of attributes that are not finite, which are loaded nevertheless.
 
-/// A value for each attribute that may be NaN or infinite.
+/// One value for each attribute that may be NaN or infinite.
 #[derive(Default)]
 pub(super) struct NotFinite<T> {
-    /// Of normals.
+    /// Value of normals.
     pub(super) normals: T,
-    /// Of colours.
+    /// Value of colours.
     pub(super) colours: T,
 }

@@ -1,4 +1,5 @@
-//! What a file holds and the renderer does not use: one sentence for each thing, with the names of where it is.
+//! Notices: contents of a file that the renderer does not use, one sentence for each feature, with the names of the
+//! objects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,21 +15,21 @@ use super::names::mesh_name;
 use super::not_finite::NotFinite;
 use super::primitive::Topology;
 
-/// Names listed in one notice; the others are counted.
+/// Maximum number of names in a notice; further ones are counted.
 const LISTED: usize = 8;
 
-/// What loading found; the rest is in the JSON.
+/// Facts that loading collects; other notices follow from the JSON.
 #[derive(Default)]
 pub(super) struct Notices {
-    /// Orthographic cameras.
+    /// Names of orthographic cameras.
     pub(super) orthographic: Vec<String>,
-    /// Whether the scene has no camera and was framed.
+    /// True if the scene has no camera and received a default one.
     pub(super) framed: bool,
     /// Meshes with normals or colours that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
 }
 
-/// `kind 'a', 'b' and 3 more`.
+/// Formats `kind 'a', 'b' and 3 more`.
 fn list(kind: &str, names: &[String]) -> String {
     let mut seen = BTreeSet::new();
     let unique: Vec<_> = names.iter().filter(|name| seen.insert(*name)).collect();
@@ -40,7 +41,7 @@ fn list(kind: &str, names: &[String]) -> String {
     format!("{kind} {}{more}", listed.join(", "))
 }
 
-/// The names of those items that `holds` selects.
+/// Names of the items for which `holds` is true.
 fn names<'a, T: 'a>(
     kind: &str,
     items: &'a [T],
@@ -60,7 +61,7 @@ fn meshes(root: &json::Root, holds: impl Fn(&json::mesh::Primitive) -> bool) -> 
 }
 
 impl Notices {
-    /// All notices for a document, in a fixed order.
+    /// All notices of a document, in a fixed order.
     pub(super) fn finish(self, document: &Document) -> Vec<String> {
         let root = &document.root;
         let mut sentences = Vec::new();
@@ -103,7 +104,7 @@ impl Notices {
     }
 }
 
-/// What of the materials is not used.
+/// Notices on unused features of materials.
 fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String])) {
     let normal = materials(root, |material| material.normal_texture.is_some());
     note("normal textures are ignored, the surface is rendered without its bumps", "material", &normal);
@@ -125,7 +126,7 @@ fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String]
     note("unlit materials are rendered as lit ones", "material", &unlit);
 }
 
-/// Whether an extension whose factors are used states a texture.
+/// Returns whether an extension whose factors are used has a texture.
 fn has_extension_texture(material: &json::Material) -> bool {
     let Some(extensions) = &material.extensions else { return false };
     let specular = extensions.specular.as_ref();
@@ -136,7 +137,7 @@ fn has_extension_texture(material: &json::Material) -> bool {
         || volume.is_some_and(|volume| volume.thickness_texture.is_some())
 }
 
-/// Every extension in use that means nothing to the loader, and the materials, meshes and nodes that use it.
+/// Unsupported extensions in use, with the materials, meshes and nodes that use them.
 fn other_extensions(root: &json::Root) -> BTreeMap<String, Vec<String>> {
     let mut users: BTreeMap<String, BTreeMap<&str, Vec<String>>> = BTreeMap::new();
     let is_ignored = |name: &str| !SUPPORTED_EXTENSIONS.contains(&name);

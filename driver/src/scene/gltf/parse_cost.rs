@@ -1,8 +1,8 @@
-//! Memory that a file's JSON takes once it is parsed, bounded before it is.
+//! Upper bound of the memory of a parsed JSON text, computed before parsing.
 //!
-//! Two characters may become a material of hundreds of bytes. The text is read once without being kept, and each value counts
-//! as what the largest value of its kind takes in the types of glTF and in what the loader makes of them, twice, as lists grow
-//! by doubling.
+//! Two characters may become a material of hundreds of bytes. The text is scanned without being stored. Each value counts
+//! as the largest value of its kind, in the types of the `gltf` crate and in the loader's, times two, as lists grow by
+//! doubling.
 
 use std::cell::Cell;
 use std::fmt;
@@ -13,25 +13,25 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 
 use crate::scene::{Camera, Material};
 
-/// Bytes of memory that JSON may take for each of its own.
+/// Maximum number of bytes of memory per byte of JSON.
 pub(super) const BYTES_OF_A_BYTE: u64 = 32;
 
-/// Bytes of memory that any JSON may take.
+/// Number of bytes of memory that any JSON may take.
 pub(super) const BYTES_OF_ANY: u64 = 256 << 20;
 
-/// Bytes of a value in a list that is no list of the root: `serde_json::Value` or less, twice.
+/// Bytes of a value in a list that is not a list of the root: twice the maximum, `serde_json::Value`.
 const VALUE: u64 = 64;
 
 /// Bytes of an object that is not in a list of the root: a node of a `BTreeMap` with one key, or a primitive.
 const OBJECT: u64 = 640;
 
-/// What the parsed text may take, bytes.
+/// Maximum memory of the parsed text, bytes.
 pub(super) fn limit(text: &str) -> u64 {
     BYTES_OF_ANY + BYTES_OF_A_BYTE * text.len() as u64
 }
 
-/// The memory that a text takes once it is parsed, bytes, or `None` if that is more than [`limit`] allows. Of a text that is not
-/// JSON, that of the values before the first fault.
+/// Estimated memory of the parsed text, bytes; `None` above [`limit`]. If the text is no JSON, only values before the first
+/// error count.
 pub(super) fn estimate(text: &str) -> Option<u64> {
     let (count, limit) = (Cell::new(0), limit(text));
     let root = Value { kind: Kind::Root, count: &count, limit };
@@ -39,7 +39,7 @@ pub(super) fn estimate(text: &str) -> Option<u64> {
     Some(count.get()).filter(|count| *count <= limit)
 }
 
-/// Bytes of an element of a list of the root, twice, with what the loader makes of it.
+/// Bytes of an element of a list of the root, including the loader's data, times two.
 fn element(list: &str) -> u64 {
     let placed =
         size_of::<(usize, DMat4)>() + size_of::<Option<DMat4>>() + size_of::<(usize, DMat4, usize)>();
@@ -62,18 +62,18 @@ fn element(list: &str) -> u64 {
     2 * bytes as u64
 }
 
-/// Where a value is.
+/// Position of a value in the document.
 #[derive(Clone, Copy)]
 enum Kind {
     Root,
-    /// A value of the root; its elements take so many bytes each, if it is a list.
+    /// A value of the root. If it is a list, each of its elements counts this number of bytes.
     List(u64),
-    /// An element of a list of the root: counted already.
+    /// An element of a list of the root, which is counted by its list.
     Element,
     Other,
 }
 
-/// A value that is counted and not kept.
+/// Visitor that counts a value without storing it.
 struct Value<'c> {
     kind: Kind,
     count: &'c Cell<u64>,
@@ -155,7 +155,7 @@ impl<'de> Visitor<'de> for Value<'_> {
     }
 }
 
-/// A key, and the bytes of the elements of the root's list of that name.
+/// Visitor of a key of the root; returns the bytes per element of the list of this name.
 struct Key;
 
 impl<'de> DeserializeSeed<'de> for Key {

@@ -1,4 +1,4 @@
-//! The pose of a mesh: its node's transform, or its skin's matrices.
+//! Pose of a mesh: the transform of its node, or the joint matrices of its skin.
 
 use std::borrow::Cow;
 
@@ -8,22 +8,22 @@ use super::primitive::Primitive;
 use super::skin::Skin;
 use super::transform::Transform;
 
-/// The transforms of a mesh's vertices into the world.
+/// World transforms of a mesh's vertices.
 pub(super) struct Pose<'s> {
     transform: Transform,
     skin: Option<&'s Skin>,
 }
 
 impl<'s> Pose<'s> {
-    /// The node's own transform, or the pose of the skin, beside which the node's does not count.
+    /// Pose with the node's world transform, which primitives with joints ignore if there is a skin.
     pub(super) fn new(world: DMat4, skin: Option<&'s Skin>) -> Self {
         Self { transform: Transform::new(world), skin }
     }
 
-    /// The transform of a vertex.
+    /// World transform of a vertex.
     ///
     /// # Errors
-    /// If the joints or weights of the vertex are not valid, with the reason.
+    /// If the joints or weights of the vertex are not valid: the reason.
     pub(super) fn of(&self, primitive: &Primitive<'_>, vertex: u64) -> Result<Cow<'_, Transform>, String> {
         match self.skin {
             Some(skin) if !primitive.influences.is_empty() => {

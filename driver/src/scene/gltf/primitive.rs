@@ -1,4 +1,4 @@
-//! A primitive of a mesh: which vertices make its triangles, and what the vertices carry.
+//! Primitives of a mesh: topology, and accessors of vertex attributes.
 
 use std::collections::HashSet;
 
@@ -14,7 +14,7 @@ use crate::error::SceneError;
 
 const FLOATS: &[ComponentType] = &[ComponentType::F32];
 const FRACTIONS: &[ComponentType] = &[ComponentType::F32, ComponentType::U8, ComponentType::U16];
-/// Those of `KHR_mesh_quantization`.
+/// Component types of `KHR_mesh_quantization`.
 const QUANTIZED: &[ComponentType] =
     &[ComponentType::F32, ComponentType::I8, ComponentType::U8, ComponentType::I16, ComponentType::U16];
 
@@ -33,7 +33,7 @@ const JOINTS: Format = Format {
 const WEIGHTS: Format =
     Format { types: &[Type::Vec4], components: FRACTIONS, integers: Integers::Normalized };
 
-// With `KHR_mesh_quantization` or without it:
+// Formats with `KHR_mesh_quantization`, and without it.
 
 const fn positions(is_quantized: bool) -> Format {
     let components = if is_quantized { QUANTIZED } else { FLOATS };
@@ -51,7 +51,7 @@ const fn coordinates(is_quantized: bool) -> Format {
     Format { types: &[Type::Vec2], components, integers }
 }
 
-/// How vertices in their order make triangles.
+/// Topology of triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Topology {
     List,
@@ -60,7 +60,7 @@ pub(super) enum Topology {
 }
 
 impl Topology {
-    /// That of a primitive, if it is made of triangles.
+    /// Topology of a primitive, if it consists of triangles.
     pub(super) fn of(primitive: &json::mesh::Primitive) -> Option<Self> {
         match primitive.mode {
             Checked::Valid(Mode::Triangles) => Some(Self::List),
@@ -70,7 +70,7 @@ impl Topology {
         }
     }
 
-    /// How many triangles so many vertices make, if they make whole ones.
+    /// Number of triangles of `vertices` vertices; `None` if some are left over.
     fn triangles(self, vertices: u64) -> Option<u64> {
         match self {
             Self::List => vertices.is_multiple_of(3).then_some(vertices / 3),
@@ -79,7 +79,7 @@ impl Topology {
         }
     }
 
-    /// Which vertices a triangle has, counter-clockwise (glTF 2.0, 3.7.2.1).
+    /// Vertices of a triangle, counter-clockwise (glTF 2.0, 3.7.2.1).
     fn vertices(self, triangle: u64) -> [u64; 3] {
         let odd = triangle % 2;
         match self {
@@ -90,25 +90,25 @@ impl Topology {
     }
 }
 
-/// A primitive of triangles whose accessors are in bounds.
+/// Primitive of triangles whose accessors are within bounds.
 pub(super) struct Primitive<'a> {
     pub(super) index: usize,
-    /// How many triangles it has.
+    /// Number of triangles.
     pub(super) triangles: u64,
     topology: Topology,
     pub(super) positions: Elements<'a>,
     pub(super) indices: Option<Elements<'a>>,
     pub(super) normals: Option<Elements<'a>>,
-    /// Sets of texture coordinates, those that its material uses.
+    /// Sets of texture coordinates that the material uses.
     pub(super) coordinates: [Option<Elements<'a>>; 2],
     pub(super) colours: Option<Elements<'a>>,
-    /// Joints and their weights, four to a pair.
+    /// Joints with their weights, four in each pair.
     pub(super) influences: Vec<(Elements<'a>, Elements<'a>)>,
-    /// The index of its material in the scene.
+    /// Index of the material in the scene.
     pub(super) material: u32,
 }
 
-/// Reads the attributes of one primitive.
+/// Reader of the attributes of one primitive.
 struct AttributeReader<'s, 'a> {
     source: &'s Source<'a>,
     item: String,
@@ -124,7 +124,7 @@ impl<'a> AttributeReader<'_, 'a> {
         Elements::new(self.source, accessor.value(), &item, format).map(Some)
     }
 
-    /// Refuses an attribute of another number of vertices than there are positions.
+    /// Rejects an attribute whose count differs from the positions'.
     fn of_count(
         &self,
         count: u64,
@@ -145,7 +145,7 @@ impl<'a> AttributeReader<'_, 'a> {
 }
 
 impl<'a> Primitive<'a> {
-    /// The primitive `index` of a mesh, with those sets of texture coordinates that are used.
+    /// Primitive `index` of a mesh, with the sets of texture coordinates that are used.
     pub(super) fn new(
         source: &Source<'a>,
         mesh: usize,
@@ -197,7 +197,7 @@ impl<'a> Primitive<'a> {
         })
     }
 
-    /// Whether its triangles carry more than their places, as far as accessors tell.
+    /// Returns whether its triangles may have attributes beyond positions, by the accessors present.
     pub(super) fn may_have_attributes(&self) -> bool {
         self.is_mapped() || self.normals.is_some() || self.colours.is_some()
     }
@@ -206,18 +206,18 @@ impl<'a> Primitive<'a> {
         self.coordinates.iter().any(Option::is_some)
     }
 
-    /// Bytes of a card's memory that it takes each time it is placed, or less.
+    /// Lower bound of a card's memory that each instance takes, bytes.
     ///
     /// # Errors
-    /// If there is no memory for a list of its corners.
+    /// If the process cannot have the memory for a set of its vertices.
     pub(super) fn bytes_of_a_card(&self) -> Result<u64, OutOfMemory> {
         let sets = 1 + u64::from(self.coordinates[1].is_some());
-        // Normals may turn out to be those of the triangles, and colours white.
+        // Normals may equal the triangles' own, and colours may be white: these need no records.
         let attributes = if self.is_mapped() { room::attributes(self.triangles, sets) } else { 0 };
         Ok(Room::geometry(self.triangles, self.corners_in_different_places()?) + attributes)
     }
 
-    /// Nothing is allocated for a count alone: no more places differ than the file has bytes for.
+    /// Number of distinct vertex positions. The memory of the set is bounded by the file's bytes, not by a count in it.
     fn corners_in_different_places(&self) -> Result<u64, OutOfMemory> {
         let mut places = HashSet::new();
         for corner in (0..self.triangles).flat_map(|triangle| self.corners(triangle)) {
@@ -228,7 +228,7 @@ impl<'a> Primitive<'a> {
         Ok(places.len() as u64)
     }
 
-    /// The places, in the list of indices or of vertices, of a triangle's corners.
+    /// Positions of a triangle's corners in the list of indices or, without one, of vertices.
     pub(super) fn corners(&self, triangle: u64) -> [u64; 3] {
         self.topology.vertices(triangle)
     }
@@ -253,7 +253,7 @@ fn influences<'a>(
 mod tests {
     use super::*;
 
-    /// A strip and a fan of a quadrilateral have its two triangles, and both of its orientation.
+    /// The triangles of a quadrilateral have equal orientation in a strip and in a fan.
     #[test]
     fn strips_and_fans_keep_their_side() {
         assert_eq!([0, 1].map(|triangle| Topology::List.vertices(triangle)), [[0, 1, 2], [3, 4, 5]]);

@@ -1,8 +1,8 @@
-//! The part of a card's memory that a scene takes, counted from accessors, instances and headers before anything is expanded.
+//! Lower bound of the card memory that a scene takes, from accessors, instances and image headers, before anything is
+//! expanded.
 //!
-//! Counts are lower bounds: what is refused here fits no card of the size, and what passes is measured once it is packed
-//! (`pack::budget`). Triangles of a primitive are counted as in the fullest leaves, and without corners that they share
-//! with those of other primitives.
+//! A scene that is rejected here fits no card of the size; others are measured once they are packed (`pack::budget`).
+//! Triangles of a primitive are counted as in full leaves; sharing of vertices between primitives is ignored.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use photoncard_shared::layout::{
 
 use crate::error::SceneError;
 
-/// What is left of a card's memory.
+/// Memory of a card, and the part that is taken.
 pub(super) struct Room {
     file: PathBuf,
     available: u64,
@@ -29,25 +29,25 @@ impl Room {
         self.take((count * Material::BYTES) as u64, || format!("{count} materials"))
     }
 
-    /// The texels of one more image.
+    /// Counts the texels of one more image.
     pub(super) fn texels(&mut self, [width, height]: [u32; 2]) -> Result<(), SceneError> {
         let tiles = u64::from(width.div_ceil(TILE_WIDTH)) * u64::from(height.div_ceil(TILE_HEIGHT));
         self.take(tiles * LINE_BYTES as u64, || "images and materials".to_owned())
     }
 
-    /// Whether so many triangles fit wherever their corners are.
+    /// Returns whether `triangles` triangles fit even without shared vertices.
     pub(super) fn fits_any(&self, triangles: u64) -> bool {
         let corners = triangles.saturating_mul(3);
         self.available - self.taken
             >= Self::geometry(triangles, corners).saturating_add(attributes(triangles, 2))
     }
 
-    /// The triangles of a scene: all of them, and bytes of leaves, nodes and attributes.
+    /// Counts all triangles of a scene; `bytes` is the size of their leaves, nodes and attributes.
     pub(super) fn triangles(&mut self, triangles: u64, bytes: u64) -> Result<(), SceneError> {
         self.take(bytes, || format!("{triangles} triangles, images and materials"))
     }
 
-    /// Bytes of leaves, and of the nodes above them, for triangles with so many different corners.
+    /// Minimum size of leaves and nodes for triangles with `corners` distinct vertices, bytes.
     pub(super) fn geometry(triangles: u64, corners: u64) -> u64 {
         let leaves = triangles.div_ceil(LEAF_TRIANGLES as u64).max(corners.div_ceil(LEAF_VERTICES as u64));
         let nodes = leaves.saturating_sub(1) / (NODE_CHILDREN as u64 - 1);
@@ -65,7 +65,7 @@ impl Room {
     }
 }
 
-/// Bytes of the attributes of triangles with so many sets of texture coordinates.
+/// Size of the attributes of triangles with `sets` sets of texture coordinates, bytes.
 pub(super) fn attributes(triangles: u64, sets: u64) -> u64 {
     triangles.saturating_mul(sets.max(1) * Attributes::BYTES as u64)
 }

@@ -1,4 +1,4 @@
-//! Skins: meshes in the pose of their joints, as the scene stands (glTF 2.0, 3.7.3.3).
+//! Skins: joint matrices in the pose of the scene (glTF 2.0, 3.7.3.3).
 
 use glam::DMat4;
 use gltf::json::accessor::{ComponentType, Type};
@@ -12,14 +12,14 @@ const REMEDY: &str = "export the rigged mesh again, or apply its pose in the mod
 const MATRICES: Format =
     Format { types: &[Type::Mat4], components: &[ComponentType::F32], integers: Integers::Whole };
 
-/// Where the joints of a skin take the vertices that follow them.
+/// Joint matrices of a skin.
 pub(super) struct Skin {
     index: usize,
     joints: Vec<DMat4>,
 }
 
 impl Skin {
-    /// The skin `index`, which exists, with the nodes' transforms of the scene.
+    /// Skin `index`, which exists, with the world transforms of the scene's nodes.
     pub(super) fn new(
         source: &Source<'_>,
         index: usize,
@@ -55,8 +55,7 @@ impl Skin {
         Ok(Self { index, joints })
     }
 
-    /// The mean of the joints' transforms that a vertex follows, by their weights. A vertex without weights follows the
-    /// first of its joints.
+    /// Joint matrix of a vertex: the weighted mean of its joints. A vertex without weights follows its first joint.
     pub(super) fn matrix(&self, primitive: &Primitive<'_>, vertex: u64) -> Result<DMat4, String> {
         let mut first = None;
         let (mut sum, mut total) = (DMat4::ZERO, 0.0);

@@ -1,4 +1,4 @@
-//! The textures that materials use, each once, with their samplers and transforms.
+//! Textures of materials, each once, with their samplers and transforms.
 
 use std::collections::BTreeMap;
 
@@ -14,14 +14,14 @@ use super::room::Room;
 use crate::error::SceneError;
 use crate::scene::{Encoding, Image, Texture, Wrap};
 
-/// The largest number of a transform: in single precision, coordinates beyond it tell texels apart no more.
+/// Maximum absolute value in a texture transform: beyond it single precision cannot resolve texels.
 const MAX_TRANSFORM: f32 = 1e6;
 
-/// Textures as materials ask for them.
+/// Textures in the order in which materials refer to them.
 pub(super) struct Textures<'a> {
     document: &'a Document,
     textures: Vec<Texture>,
-    /// The index of a texture by its bits.
+    /// Index of each texture, by the bits of its fields.
     known: BTreeMap<[u32; 11], u32>,
     images: Vec<(usize, Encoding)>,
     image_indices: BTreeMap<(usize, Encoding), u32>,
@@ -38,7 +38,7 @@ impl<'a> Textures<'a> {
         }
     }
 
-    /// The index of the texture that the `textureInfo` at `item` describes.
+    /// Index of the texture that the `textureInfo` at `item` describes.
     pub(super) fn add(
         &mut self,
         item: &str,
@@ -91,7 +91,7 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// All textures, and the images that they refer to.
+    /// All textures, with the images that they refer to.
     pub(super) fn finish(
         self,
         source: &Source<'_>,
@@ -101,14 +101,14 @@ impl<'a> Textures<'a> {
     }
 }
 
-/// A matrix and an offset.
+/// Matrix and offset.
 type Affine = ([[f32; 2]; 2], [f32; 2]);
 
 const IDENTITY: Affine = ([[1.0, 0.0], [0.0, 1.0]], [0.0; 2]);
 
-/// `KHR_texture_transform`: the coordinates are scaled, then rotated counter-clockwise, then moved. As v points down,
-/// that is clockwise by the signs of its equations; those in the extension's text turn the other way, against its
-/// words, its example and its implementations (KhronosGroup/glTF issue 1563).
+/// Transform of `KHR_texture_transform`: scale, then counter-clockwise rotation, then offset. As v points down, the matrix
+/// is that of a clockwise rotation. The equations in the extension's text have the opposite sign, against its words, its
+/// example and its implementations (KhronosGroup/glTF issue 1563).
 fn affine(transform: &TextureTransform) -> Option<Affine> {
     let (offset, [width, height]) = (transform.offset.0, transform.scale.0);
     let angle = transform.rotation.0;
@@ -123,7 +123,7 @@ fn affine(transform: &TextureTransform) -> Option<Affine> {
     Some((matrix, offset))
 }
 
-/// How the sampler wraps, and whether it takes the nearest texel.
+/// Wrap modes of the sampler, and whether it selects the nearest texel.
 fn sampler(document: &Document, texture: &json::Texture) -> ([Wrap; 2], bool) {
     let Some(sampler) = texture.sampler.and_then(|index| document.root.samplers.get(index.value())) else {
         return ([Wrap::Repeat; 2], false);
@@ -131,7 +131,7 @@ fn sampler(document: &Document, texture: &json::Texture) -> ([Wrap; 2], bool) {
     let wrap = |mode: Checked<WrappingMode>| match mode {
         Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
         Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
-        // Anything else was refused by the document's rules.
+        // Validation has rejected other values.
         _ => Wrap::Repeat,
     };
     let nearest = sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest));

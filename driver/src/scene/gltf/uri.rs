@@ -1,5 +1,4 @@
-//! What a URI of a scene refers to: data in itself, or a file inside the scene's folder. All that is read besides the
-//! scene file itself is found here.
+//! URIs of a scene: data URIs, and files in the scene's folder. All files besides the scene file are located here.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +7,7 @@ use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
-/// Writers disagree on padding, and what is missing is caught by the buffer's stated length.
+/// Padding is optional, as writers disagree on it; missing bytes are detected by the buffer's stated length.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new()
@@ -16,16 +15,16 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// The remedy for a URI that names no file that may be read.
+/// Remedy for a URI that names no readable file.
 pub(super) const INSIDE_FOLDER: &str =
     "put the file beside the scene and refer to it by its name, or export the scene as .glb";
 
-/// Whether the URI is data itself.
+/// Returns whether the URI is a data URI.
 pub(super) fn is_data(uri: &str) -> bool {
     uri.starts_with("data:")
 }
 
-/// The media type that a data URI states, empty if none, and its bytes.
+/// Media type of a data URI, empty if it has none, and its bytes.
 pub(super) fn decode_data(uri: &str) -> Result<(&str, Vec<u8>), String> {
     let (head, data) = uri.split_once(',').ok_or("the data URI has no comma")?;
     let kind = head.strip_prefix("data:").unwrap_or_default().split(';').next().unwrap_or_default();
@@ -54,7 +53,7 @@ fn percent_decode(text: &str) -> Result<Vec<u8>, String> {
     Ok(decoded)
 }
 
-/// The file a URI names, if that is inside the scene's folder: a scene from elsewhere reads nothing but its own.
+/// Path of the file that a URI names. It must be in the scene's folder, so that a downloaded scene cannot read other files.
 pub(super) fn locate(scene: &Path, uri: &str) -> Result<PathBuf, String> {
     let refused = |why: &str| format!("the uri {uri:?} {why}");
     let decoded = String::from_utf8(percent_decode(uri)?).map_err(|_| refused("is not UTF-8"))?;
@@ -73,7 +72,7 @@ pub(super) fn locate(scene: &Path, uri: &str) -> Result<PathBuf, String> {
     }
     let folder = scene.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let file = folder.join(&decoded);
-    // A link may lead elsewhere. A file that is missing is reported when it is opened.
+    // A symbolic link may lead out of the folder. A missing file is reported when it is opened.
     match (fs::canonicalize(folder), fs::canonicalize(&file)) {
         (Ok(folder), Ok(target)) if !target.starts_with(&folder) => {
             Err(refused("leads out of the scene's folder through a link"))

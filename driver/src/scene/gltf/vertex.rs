@@ -1,4 +1,4 @@
-//! The vertices of a primitive: their indices, their places in the world, and what else they carry.
+//! Vertices of a primitive: indices, world positions and other attributes.
 
 use std::borrow::Cow;
 use std::cell::Cell;
@@ -14,21 +14,21 @@ use super::transform::Transform;
 use crate::error::SceneError;
 use crate::scene::{Triangle, VertexAttributes};
 
-/// The largest coordinate in metres: products of three stay far inside what single precision holds.
+/// Maximum coordinate, metres: products of three are far below the maximum of single precision.
 pub(super) const MAX_COORDINATE: f32 = 1e8;
 
-/// The largest texture coordinate: in single precision, those beyond it tell texels apart no more.
+/// Maximum texture coordinate: beyond it single precision cannot resolve texels.
 const MAX_TEXTURE_COORDINATE: f32 = 1e6;
 
-/// The distance of unit vectors, that of a tenth of a degree, up to which a vertex normal counts as the triangle's.
+/// Maximum distance of a vertex normal from the triangle's, both unit vectors, at which they count as equal: 0.1 degrees.
 const FLAT_DISTANCE: f64 = 0.001_745;
 
-/// Reads the vertices of one primitive.
+/// Reader of the vertices of one primitive.
 pub(super) struct VertexReader<'r, 'a> {
     pub(super) source: &'r Source<'a>,
     pub(super) mesh: usize,
     pub(super) primitive: &'r Primitive<'a>,
-    /// Whether any normal or colour that was read was not finite.
+    /// True for attributes of which a value was not finite.
     pub(super) not_finite: NotFinite<Cell<bool>>,
 }
 
@@ -45,7 +45,7 @@ impl VertexReader<'_, '_> {
         }
     }
 
-    /// The three vertices of a triangle.
+    /// Indices of a triangle's vertices.
     pub(super) fn indices(&self, triangle: u64) -> Result<[u64; 3], SceneError> {
         let primitive = self.primitive;
         let places = primitive.corners(triangle);
@@ -68,7 +68,7 @@ impl VertexReader<'_, '_> {
         }
     }
 
-    /// What takes a vertex into the world.
+    /// World transform of a vertex.
     pub(super) fn transform<'p>(
         &self,
         pose: &'p Pose<'_>,
@@ -77,7 +77,7 @@ impl VertexReader<'_, '_> {
         pose.of(self.primitive, vertex).map_err(|reason| self.fault("JOINTS_0", vertex, reason))
     }
 
-    /// A vertex in world space.
+    /// World position of a vertex.
     pub(super) fn place(&self, vertex: u64, transform: &Transform) -> Result<Vec3, SceneError> {
         let local = Vec3::from(self.primitive.positions.vec3(vertex));
         let placed = transform.place(local);
@@ -93,7 +93,7 @@ impl VertexReader<'_, '_> {
         Err(self.fault("POSITION", vertex, reason))
     }
 
-    /// What the corners of a triangle carry, if it is more than their places.
+    /// Attributes of a triangle's corners beyond positions; `None` if they are the default ones.
     pub(super) fn attributes(
         &self,
         corners: [u64; 3],
@@ -129,19 +129,19 @@ impl VertexReader<'_, '_> {
         Err(self.fault(&format!("TEXCOORD_{set}"), vertex, reason))
     }
 
-    /// The vertex's colour in the range that glTF demands (2.0, 3.7.2.1); white without one.
+    /// Colour of a vertex, clamped to 0 to 1 (glTF 2.0, 3.7.2.1); white if it has none.
     fn colour(&self, vertex: u64) -> [f32; 4] {
         let colours = self.primitive.colours.as_ref();
         let colour = colours.map_or([1.0; 4], |colours| colours.floats(vertex, [1.0; 4]));
         if !colour.iter().all(|channel| channel.is_finite()) {
             self.not_finite.colours.set(true);
         }
-        // What is not a number becomes 0.
+        // NaN becomes 0.
         colour.map(|channel| if channel > 0.0 { channel.min(1.0) } else { 0.0 })
     }
 
-    /// The corners' normals, unless they are the triangle's own. The triangle's own takes the place of a normal that is
-    /// none or lies on the other side.
+    /// Vertex normals of the corners; `None` if they equal the triangle's normal. The triangle's normal replaces a vertex
+    /// normal that is degenerate or on the back.
     fn normals(
         &self,
         corners: [u64; 3],

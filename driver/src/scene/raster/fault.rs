@@ -2,19 +2,19 @@
 
 use crate::allocation::{self, OutOfMemory};
 
-/// Why an image is not read.
+/// Error of an image file: reason and remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::scene) struct Fault {
-    /// What is wrong.
+    /// Description of the fault.
     pub(in crate::scene) reason: String,
-    /// What to do.
+    /// Remedy.
     pub(in crate::scene) remedy: &'static str,
 }
 
 const COPY_AGAIN: &str = "export the image again, or copy it again: it is damaged or was cut off on the way";
 
 impl Fault {
-    /// A file for which there is no memory.
+    /// Error of an image whose memory the process cannot have.
     pub(in crate::scene) fn memory(error: OutOfMemory) -> Self {
         Self { reason: format!("decoding it takes much memory: {error}"), remedy: allocation::REMEDY }
     }

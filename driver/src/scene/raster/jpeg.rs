@@ -1,4 +1,4 @@
-//! JPEG: baseline and progressive, grey or colour.
+//! Decoding of JPEG: baseline and progressive, grey or colour.
 
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
@@ -10,25 +10,26 @@ use crate::scene::texture::MAX_SIDE;
 
 pub(super) const MAGIC: &[u8] = b"\xff\xd8\xff";
 
-/// A block of samples takes a bit at least, and however coarsely components are sampled, each 128 texels have a block.
+/// Maximum number of texels per byte: a block of samples takes at least one bit, and there is a block for each 128 texels,
+/// however coarsely components are sampled.
 const TEXELS_OF_A_BYTE: u64 = 8 * 128;
 
 type Decoder<'a> = JpegDecoder<ZCursor<&'a [u8]>>;
 
 fn decoder(bytes: &[u8]) -> Decoder<'_> {
     let side = MAX_SIDE as usize;
-    // Strictly: else what is cut off would be grey.
+    // Strict mode: otherwise truncated parts would be grey.
     let options = DecoderOptions::new_safe().set_strict_mode(true).set_max_width(side).set_max_height(side);
     JpegDecoder::new_with_options(ZCursor::new(bytes), options)
 }
 
-/// Width and height, and the most texels that a file of this length can hold.
+/// Width and height, and the maximum number of texels of a file of this length.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let frame = frame_header(bytes).ok_or_else(|| Fault::damaged("it has no frame header"))?;
     Ok((frame, TEXELS_OF_A_BYTE * bytes.len() as u64))
 }
 
-/// Width and height in the frame header (ITU-T T.81, B.2.2), which the decoder tells only within its own limits.
+/// Width and height in the frame header (ITU-T T.81, B.2.2), which the decoder reports only within its own limits.
 fn frame_header(bytes: &[u8]) -> Option<[u32; 2]> {
     let mut rest = bytes.get(2..)?;
     loop {
@@ -36,15 +37,15 @@ fn frame_header(bytes: &[u8]) -> Option<[u32; 2]> {
         let marker = *rest.get(start + 1)?;
         rest = rest.get(start + 1..)?;
         match marker {
-            // Fill bytes, stuffed bytes, and markers that stand alone.
+            // Fill bytes, stuffed bytes, and markers without a segment.
             0xff => {}
             0x00 | 0x01 | 0xd0..=0xd8 => rest = rest.get(1..)?,
-            // Scans and the end come after the frame.
+            // The frame header precedes scans and the end of the image.
             0xd9 | 0xda => return None,
             _ => {
                 let length = u16::from_be_bytes(*rest.get(1..)?.first_chunk()?);
                 let segment = rest.get(1..1 + length as usize)?;
-                // All of C0 to CF are frames but tables (C4), an extension (C8) and arithmetic conditions (CC).
+                // Frames are C0 to CF except tables (C4), an extension (C8) and arithmetic conditioning (CC).
                 if matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc) {
                     let side = |at: usize| Some(u16::from_be_bytes(*segment.get(at..)?.first_chunk()?));
                     return Some([side(5)?.into(), side(3)?.into()]);

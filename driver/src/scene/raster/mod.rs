@@ -1,8 +1,7 @@
-//! PNG and JPEG files as texels of 8-bit RGBA.
+//! Decoding of PNG and JPEG files to 8-bit RGBA texels.
 //!
-//! Sizes are checked in the header, before anything is allocated for them: against limits, and against what a file of
-//! its length can hold however well it is compressed. What a file says of its own colour space is ignored, as glTF
-//! demands.
+//! Sizes are checked in the header, before anything is allocated for them: against limits, and against the maximum that a
+//! file of its length can hold at the best compression. A file's colour space is ignored, as glTF requires.
 
 mod fault;
 mod jpeg;
@@ -13,15 +12,16 @@ use super::texture::{MAX_SIDE, MAX_TEXELS};
 use crate::allocation;
 use crate::foreign;
 
-/// Bytes of memory that decoding takes for a texel: itself, interlaced rows of PNG of 16 bits, or coefficients of progressive JPEG.
+/// Bytes of memory per texel while decoding: the texel itself, and interlaced rows of 16-bit PNG or coefficients of
+/// progressive JPEG.
 const DECODING_BYTES: u64 = 16;
 
-/// Runs a decoder; one that panics has found a damaged file.
+/// Runs a decoder; a panic is reported as a damaged file.
 pub(super) fn walled<T>(decoder: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
     foreign::decode(decoder, || Fault::damaged("its structure contradicts itself"))
 }
 
-/// A kind of image file.
+/// Format of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Png,
@@ -29,7 +29,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// The kind that the first bytes tell.
+    /// Format by the first bytes of a file.
     pub(super) fn of(bytes: &[u8]) -> Result<Self, Fault> {
         const REMEDY: &str = "convert the image to PNG or JPEG";
         const OTHERS: [(&[u8], &str); 6] = [
@@ -55,7 +55,7 @@ impl Kind {
         Err(Fault { reason, remedy: REMEDY })
     }
 
-    /// Its media type, as glTF states it.
+    /// Media type as in glTF.
     pub(super) fn media_type(self) -> &'static str {
         match self {
             Self::Png => "image/png",
@@ -63,7 +63,7 @@ impl Kind {
         }
     }
 
-    /// Width and height, from the header, if the limits and the file's length allow them.
+    /// Width and height from the header, checked against the limits and the file's length.
     pub(super) fn size(self, bytes: &[u8]) -> Result<[u32; 2], Fault> {
         let (size, most_texels) = walled(|| match self {
             Self::Png => png::size(bytes),
@@ -78,7 +78,7 @@ impl Kind {
         Ok(size)
     }
 
-    /// The texels of an image of that size, as [`Kind::size`] has told it, rows from the top.
+    /// Texels of an image, rows from the top; `size` is the result of [`Kind::size`].
     pub(super) fn decode(self, bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
         let bytes_needed = DECODING_BYTES * u64::from(size[0]) * u64::from(size[1]);
         allocation::check(bytes_needed).map_err(Fault::memory)?;

@@ -1,4 +1,4 @@
-//! PNG.
+//! Decoding of PNG.
 
 use std::io::Cursor;
 
@@ -8,28 +8,28 @@ use super::fault::Fault;
 
 pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// A byte of Deflate stands for 1032 at most; a byte of texels for 8 at most, of one bit each.
+/// Maximum number of texels per byte: Deflate expands a byte to at most 1032, and a byte holds at most 8 texels of one bit.
 const TEXELS_OF_A_BYTE: u64 = 1032 * 8;
 
-/// What the decoder may hold besides rows: chunks of text or colour profiles.
+/// Maximum memory of the decoder besides rows, bytes: chunks of text or colour profiles.
 const ANCILLARY_BYTES: usize = 16 << 20;
 
-/// Bytes of 256 entries of a palette.
+/// Maximum size of a palette, bytes: 256 entries.
 const MAX_PALETTE: usize = 3 * 256;
 
-/// Bytes after the data of a chunk.
+/// Size of the CRC after a chunk's data, bytes.
 const CHECKSUM: usize = 4;
 
 fn decoder(bytes: &[u8]) -> Decoder<Cursor<&[u8]>> {
     let mut decoder = Decoder::new(Cursor::new(bytes));
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
-    // Palettes, transparent colours and less than 8 bits become channels of 8 bits; 16 bits stay.
+    // Expands palettes, transparent colours and depths below 8 bits to channels of 8 bits; 16 bits stay.
     decoder.set_transformations(Transformations::EXPAND);
     decoder
 }
 
-/// Width and height, and the most texels that a file of this length can hold.
+/// Width and height, and the maximum number of texels of a file of this length.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let mut decoder = decoder(bytes);
     let info = decoder.read_header_info().map_err(Fault::damaged)?;
@@ -39,7 +39,7 @@ pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     Ok(([info.width, info.height], TEXELS_OF_A_BYTE * bytes.len() as u64))
 }
 
-/// Refuses a palette of other than 1 to 256 entries of three bytes, which the decoder indexes beyond
+/// Rejects a palette of other than 1 to 256 entries of three bytes, for which the decoder indexes out of bounds
 /// (image-rs/image-png issue 682).
 fn check_palette(bytes: &[u8]) -> Result<(), Fault> {
     let palette = chunks(bytes).take_while(|(kind, _)| kind != b"IDAT").find(|(kind, _)| kind == b"PLTE");
@@ -49,12 +49,12 @@ fn check_palette(bytes: &[u8]) -> Result<(), Fault> {
                 "a palette of {length} bytes: three for each of 1 to 256 colours are possible"
             )))
         }
-        // The decoder refuses an image without its palette.
+        // The decoder itself rejects an indexed image without a palette.
         _ => Ok(()),
     }
 }
 
-/// The type and the stated length of each chunk.
+/// Type and stated length of each chunk.
 fn chunks(bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], usize)> {
     let mut rest = bytes.get(MAGIC.len()..).unwrap_or_default();
     std::iter::from_fn(move || {
@@ -68,7 +68,7 @@ fn chunks(bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], usize)> {
 
 pub(super) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
     let mut decoder = decoder(bytes);
-    // A row before and after its filter, each of up to eight bytes a texel.
+    // A row before and after filtering, each of up to eight bytes per texel.
     decoder.set_limits(png::Limits { bytes: ANCILLARY_BYTES + 64 * width as usize });
     let mut reader = decoder.read_info().map_err(Fault::damaged)?;
     let mut texels = Vec::new();
@@ -86,7 +86,7 @@ pub(super) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<[u8;
     Ok(texels)
 }
 
-/// Appends rows as the reader's transformations have left them.
+/// Appends rows in the decoder's output format.
 fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, BitDepth)) {
     let samples = colour.samples();
     match depth {
@@ -100,7 +100,7 @@ fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, B
                 rgba(colour, rounded)
             }));
         }
-        // `EXPAND` leaves nothing below 8 bits.
+        // `EXPAND` leaves no depth below 8 bits.
         _ => texels.extend(rows.chunks_exact(samples).map(|pixel| {
             let mut values = [0; 4];
             values.iter_mut().zip(pixel).for_each(|(value, &sample)| *value = sample);
@@ -109,7 +109,7 @@ fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, B
     }
 }
 
-/// The nearest of 8 bits.
+/// Nearest 8-bit value.
 fn to_8_bits(value: u16) -> u8 {
     ((u32::from(value) * 255 + 32_767) / 65_535) as u8
 }
@@ -119,7 +119,7 @@ fn rgba(colour: ColorType, [a, b, c, d]: [u8; 4]) -> [u8; 4] {
         ColorType::Grayscale => [a, a, a, 255],
         ColorType::GrayscaleAlpha => [a, a, a, b],
         ColorType::Rgb => [a, b, c, 255],
-        // `EXPAND` leaves no index.
+        // `EXPAND` leaves no indexed colour.
         ColorType::Rgba | ColorType::Indexed => [a, b, c, d],
     }
 }

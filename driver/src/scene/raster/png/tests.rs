@@ -60,7 +60,7 @@ fn sixteen_bits_are_rounded_to_the_nearest_of_eight() {
     }
 }
 
-/// Adam7: one texel a pass would be read in another order.
+/// A picture of 2 x 2 texels, interlaced by Adam7.
 #[test]
 fn interlaced_rows_come_in_order() {
     const INTERLACED: &[u8] = &[
@@ -69,7 +69,7 @@ fn interlaced_rows_come_in_order() {
     ];
     let mut bytes = INTERLACED.to_vec();
     bytes.extend(crc32(&INTERLACED[12..]).to_be_bytes());
-    // Passes 1, 6 and 7 of a picture of 2 x 2 texels, each row behind its filter, stored as it is.
+    // Passes 1, 6 and 7 of a picture of 2 x 2 texels; each row follows its filter byte, 0 for none.
     let rows = [0, 1, 0, 2, 0, 3, 4];
     let mut stream = vec![0x78, 0x01, 0x01, rows.len() as u8, 0, !(rows.len() as u8), 0xff];
     stream.extend(rows);
@@ -83,7 +83,7 @@ fn interlaced_rows_come_in_order() {
     assert_eq!(decoded(&bytes), [1, 2, 3, 4].map(|value| [value, value, value, 255]));
 }
 
-/// A file of one texel with a palette of so many bytes.
+/// A file of one texel with a palette of `length` bytes.
 fn of_palette(length: usize) -> Vec<u8> {
     let mut file = MAGIC.to_vec();
     let header = [0, 0, 0, 1, 0, 0, 0, 1, 8, 3, 0, 0, 0];
@@ -134,7 +134,7 @@ fn cut_files_and_false_sizes_are_refused() {
         let result = Kind::Png.size(bytes).and_then(|size| Kind::Png.decode(bytes, size));
         assert!(result.is_err(), "{length}");
     }
-    // The header's checksum is right, and 16384 x 16384 texels are in reach of no file of this length.
+    // The header's checksum is right, but no file of this length can hold 16384 x 16384 texels.
     let mut large = whole;
     large[16..24].copy_from_slice(&[0, 0, 0x40, 0, 0, 0, 0x40, 0]);
     let sum = crc32(&large[12..29]);
