@@ -1,6 +1,5 @@
 //! Standard streams: a closed or full one never makes the program panic. All output passes through this module, and foreign
 //! text is escaped.
-//! here, and text of others is escaped.
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stderr, stdout};

@@ -2,7 +2,6 @@
 
 /// Board with one UART, one clock and one processor. As there is one of each, functions have no `self`. The module
 /// `hardware` of an image defines `ThisBoard`.
-/// image calls its own `ThisBoard`.
 pub(crate) trait Board {
     /// Name of the board.
     const NAME: &'static str;
