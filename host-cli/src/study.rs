@@ -59,7 +59,7 @@ impl Selection {
     /// Name of all studies together.
     const ALL: &str = "all";
 
-    /// Parser of the names of studies, and of [`ALL`].
+    /// Parser of the names of studies, and of `all`.
     fn parser() -> impl TypedValueParser<Value = Self> {
         let all = PossibleValue::new(Self::ALL).help("All of them, each in a folder of its own");
         let studies = Study::ALL.iter().copied().map(possible_value);
