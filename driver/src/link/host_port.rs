@@ -123,7 +123,9 @@ impl Port for HostPort {
         }
         if host.is_none_yet(&buffer[..count]) && host.since.elapsed() > FIRST_FRAME {
             let seconds = FIRST_FRAME.as_secs();
-            (self.say)(format_args!("photoncard: closed a connection that sent no valid frame for {seconds} s"));
+            (self.say)(format_args!(
+                "photoncard: closed a connection that sent no valid frame for {seconds} s"
+            ));
             self.host = None;
             return Ok(0);
         }
