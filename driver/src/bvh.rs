@@ -62,8 +62,8 @@ pub enum HierarchyError {
     NotFinite,
 }
 
-/// Maximum number of triangles. Each may have a leaf of its own, and a triangle's index in the card image is `leaf *
-/// LEAF_TRIANGLES + slot`.
+/// Maximum number of triangles. Each may have a leaf of its own, and a triangle's index in the card image is
+/// `leaf * LEAF_TRIANGLES + slot`.
 const MAX_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 
 /// Cost of a visit of a leaf, relative to a visit of a node.

@@ -58,7 +58,7 @@ choices!(Sampling {
 });
 
 choices!(Radiance {
-    Density = "density": "The density of the photons nearest to it",
+    Density = "density": "The density of the nearest photons",
     Precomputed = "precomputed":
         "An approximation: the irradiance that the host has estimated at the nearest photon of the surface",
 });

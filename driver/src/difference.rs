@@ -13,7 +13,7 @@ const RELATIVE_FLOOR: f64 = 0.01;
 
 /// Difference of a picture from a reference. The JSON keys are stable.
 ///
-/// Where blocks are excluded, all values are of the pixels and blocks that remain.
+/// If blocks are excluded, all values refer to the remaining pixels and blocks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
     /// Columns of both pictures.

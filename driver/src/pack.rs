@@ -134,7 +134,7 @@ fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
     let mut indices = vec![0; scene.triangles.len()];
     for (leaf, triangles) in leaves.iter().enumerate() {
         for (slot, &triangle) in triangles.iter().enumerate() {
-            // [`bvh`](crate::bvh) has checked that indices fit.
+            // `bvh` has checked that indices fit.
             indices[triangle as usize] = (leaf * LEAF_TRIANGLES + slot) as u32;
         }
     }

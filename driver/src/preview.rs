@@ -29,9 +29,9 @@ pub enum ToneCurve {
 }
 
 choices!(ToneCurve {
-    None = "none": "Nothing: what is above 1 is clipped",
+    None = "none": "No compression: values above 1 are clipped",
     Reinhard = "reinhard": "Reinhard's extended curve of luminance, with the white point 4; it keeps hues",
-    Aces = "aces": "Narkowicz' fit of the filmic curve of ACES, of each channel",
+    Aces = "aces": "Narkowicz' fit of the filmic curve of ACES, for each channel",
 });
 
 impl ToneCurve {

@@ -1,4 +1,4 @@
-//! A card's port on which hosts come and go, and the addresses that it can listen on.
+//! Links: a card's port for consecutive hosts, and the addresses that it can listen on.
 #![cfg(unix)]
 
 use std::io::{Read, Write};
@@ -23,7 +23,7 @@ fn card(folder: &Path) -> (HostPort, PathBuf, Arc<AtomicBool>) {
     (HostPort::new(listener, stop.clone(), |_| {}), path, stop)
 }
 
-/// What the card reads next.
+/// Next bytes that the card reads.
 fn heard(card: &mut HostPort) -> Vec<u8> {
     let mut buffer = [0; 64];
     let count = card.read(&mut buffer, PATIENCE).unwrap();
@@ -131,7 +131,7 @@ fn terminals_carry_every_byte() {
     }
 }
 
-/// A write of more than the line has room for ends with what went, and one on a full line with nothing.
+/// A write that exceeds the line's capacity returns the number of bytes written; on a full line it is 0.
 #[test]
 fn a_full_serial_line_holds_nobody() {
     let listener = Listener::new(&ListenAddress::Pty).unwrap();
@@ -150,7 +150,7 @@ fn a_full_serial_line_holds_nobody() {
     let (mut host, sent) = receiver.recv_timeout(PATIENCE).expect("no write blocks");
     let mut card = HostPort::new(listener, Arc::default(), |_| {});
     assert_eq!(heard(&mut card), b"\0");
-    // The byte before is the end of what another may have left.
+    // The preceding byte ends a frame that another host may have left unfinished.
     let mut received = 0;
     while received < sent + 1 {
         received += heard(&mut card).len();

@@ -1,4 +1,4 @@
-//! What a render does with a card that is lost, while another goes on.
+//! Lost cards: the render continues on the others.
 #![cfg(unix)]
 
 mod scripted_card;
@@ -20,7 +20,7 @@ use scripted_card::{Answer, Card, sound};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Notes which cards are lost, and stops when as many are as it says, or after a minute.
+/// Observer that records lost cards, and stops the render after a number of them or after a minute.
 struct Losses {
     told: Mutex<Vec<String>>,
     most: usize,
@@ -62,7 +62,7 @@ fn render_with(path: &Path, side: u32, losses: &Losses) -> Result<Rendering, Ren
     render(&gltf::load(scene.as_ref()).unwrap(), &settings, losses)
 }
 
-/// Answers a host until it has been given a frame, or leaves.
+/// Answers a host until it sends a frame, or leaves.
 fn serve(mut stream: UnixStream, answer: Answer) {
     let mut card = Card::new(answer);
     let mut buffer = [0; 4096];
@@ -91,7 +91,7 @@ fn a_card_that_comes_back_as_another_is_told_of_and_given_up() {
         serve(listener.accept().unwrap().0, other);
     });
     let losses = Losses::new(2);
-    // It would take hours.
+    // The whole render would take hours.
     assert!(matches!(render_with(&path, 4096, &losses), Err(RenderError::Stopped)));
     let told = losses.told.into_inner().unwrap();
     assert!(told.len() == 2 && told[0].contains("closed") && told[1].contains("speaks protocol"), "{told:?}");
@@ -107,7 +107,7 @@ fn a_render_ends_while_a_lost_card_is_tried() {
     std::thread::scope(|scope| {
         let first = scope.spawn(|| {
             let stream = UnixStream::from(rustix::net::accept(&listener).unwrap());
-            // The queue of hosts is full from now on: who connects waits.
+            // From now on the listener's queue is full: further connections wait.
             for _ in 0..3 {
                 let path = path.clone();
                 std::thread::spawn(move || drop(UnixStream::connect(path)));
@@ -122,7 +122,7 @@ fn a_render_ends_while_a_lost_card_is_tried() {
     });
 }
 
-/// The answers of a card of another version.
+/// Answers of a card of another version.
 fn other_version(command: &Command) -> Option<Reply<'static>> {
     match sound(command)? {
         Reply::Hello { layout, budget, written_lines, memory_use, build, .. } => {
@@ -149,7 +149,7 @@ fn a_card_that_fails_its_first_hello_is_lost_beside_another_and_told_once() {
     }
 }
 
-/// It answers all that the transport asks, and never renders a tile.
+/// The card answers everything that the transport requests, but never renders a tile.
 #[test]
 fn a_card_that_never_renders_holds_up_no_other() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! A thread of the host that panics: the render ends in that panic, and does not wait for ever.
+//! Panics of a host's thread: the render ends with the panic, and does not hang.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,7 +11,7 @@ use photoncard_driver::scene::gltf;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Panics in the thread of the card that tells of tiles first.
+/// Observer that panics in the thread of the card that first reports tiles.
 struct Panics {
     has_panicked: AtomicBool,
     begin: Instant,

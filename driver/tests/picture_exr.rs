@@ -1,4 +1,4 @@
-//! A film written as `OpenEXR` is read back as it was, and damaged files are refused.
+//! `OpenEXR` files: a written film reads back unchanged, and damaged files are rejected.
 
 use std::fs;
 use std::path::Path;
@@ -57,7 +57,7 @@ fn radiance_is_read_back_to_the_format_s_precision() {
     }
 }
 
-/// A block of DWA states sizes that are allocated unseen: no such picture may reach its decoder.
+/// Blocks of DWA state sizes that are allocated unchecked: no such picture may reach its decoder.
 #[test]
 fn compressions_whose_sizes_cannot_be_checked_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -100,7 +100,7 @@ fn windows_channels_and_provenance_are_as_documented() {
     assert_eq!(json["scene"], "Küche 🍳");
 }
 
-/// The channels of a file: their names, whether they are in single precision, and their values.
+/// Channels of a file: name, whether single precision, and values.
 fn channels(path: &Path) -> Vec<(String, bool, Vec<f32>)> {
     let image = exr::prelude::read()
         .no_deep_data()
@@ -251,7 +251,7 @@ proptest! {
         write(&path, &film, &Layers::default(), "{}", SampleFormat::Half).unwrap();
         let mut bytes = fs::read(&path).unwrap();
         for (at, value, in_header) in flips {
-            // Half of the damage goes where the sizes are.
+            // Half of the damage is in the header, which holds the sizes.
             let at = at % if in_header { bytes.len().min(700) } else { bytes.len() };
             bytes[at] ^= value;
         }

@@ -1,4 +1,4 @@
-//! A damaged scene is loaded or refused, quickly and without a panic.
+//! Damaged scenes are loaded or rejected, quickly and without a panic.
 
 mod scene_support;
 
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// A GLB with everything the loader reads: hierarchy, sparse positions, normals, Phong extras.
+/// GLB with every feature that the loader reads: hierarchy, sparse positions, normals, Phong extras.
 fn rich() -> (Value, Vec<u8>) {
     let mut json = triangle_json();
     json["nodes"][0]["children"] = json!([2]);
@@ -30,7 +30,7 @@ fn is_quick(load: impl FnOnce()) {
     assert!(start.elapsed() < PATIENCE);
 }
 
-/// Replaces the `nth` number in the JSON, counted round and round.
+/// Replaces the `nth` number in the JSON, modulo their count.
 fn replace_number(json: &mut Value, nth: usize, value: &Value) {
     fn numbers(value: &mut Value) -> Vec<&mut Value> {
         match value {

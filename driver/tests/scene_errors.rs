@@ -1,4 +1,4 @@
-//! Every bad scene is refused by an error that names the place and says what to do.
+//! Invalid scenes are rejected by errors that name the location and the remedy.
 
 mod scene_support;
 
@@ -22,7 +22,7 @@ fn check(error: &SceneError, parts: &[&str]) {
     assert!(error.help().is_some_and(|help| !help.to_string().is_empty()), "{text}: no remedy");
 }
 
-/// Expects each change of the triangle to give an error whose text holds all of the parts.
+/// Checks that each change of the triangle gives an error whose text contains all parts.
 fn refused(cases: &[(&[&str], Change)]) {
     for (parts, change) in cases {
         match load_changed(change) {
@@ -64,7 +64,7 @@ fn json_errors_point_into_the_text() {
     let source = error.source_code().unwrap();
     let shown = source.read_span(label.inner(), 0, 0).unwrap();
     assert_eq!(shown.data(), b"}");
-    // A line of megabytes is not shown whole.
+    // A line of megabytes is shortened.
     let long = format!("{{\"asset\": {{\"version\": \"{}\"}}, }}", "ü".repeat(10_000));
     let error = load_bytes("scene.gltf", long.as_bytes()).unwrap_err();
     let SceneError::Json { text, .. } = &error else { panic!("{error}") };
@@ -153,7 +153,7 @@ fn accessors_that_reach_out_of_bounds() {
             json["bufferViews"][1]["byteLength"] = json!(8);
         }),
         (&["more than", "triangles"], |json| {
-            // Zeros that no bytes stand for.
+            // Zeros without bytes.
             json["accessors"][0].as_object_mut().unwrap().remove("bufferView");
             json["accessors"][0]["count"] = json!(3u64 << 50);
             json["accessors"][0]["sparse"] = json!({

@@ -1,4 +1,4 @@
-//! What a glTF file says is what the scene holds, and what is not used is named.
+//! Loading of scenes: all contents of a glTF file that are used arrive, and unused ones are named.
 
 mod scene_support;
 
@@ -98,7 +98,7 @@ fn interleaved_vertices_are_read_by_their_stride() {
     }
     bytes.extend([0, 0, 1, 0, 2, 0]);
     let mut json = triangle_json();
-    // The last vertex ends where its bytes do: its padding need not be there.
+    // The padding after the last element may be missing.
     json["bufferViews"] = json!([
         {"buffer": 0, "byteOffset": 0, "byteLength": 52, "byteStride": 20},
         {"buffer": 0, "byteOffset": 60, "byteLength": 6}
@@ -179,7 +179,7 @@ fn nodes_place_meshes_by_matrix_or_by_parts_through_their_parents() {
     }
 }
 
-/// A mirror keeps the front the front: the normal turns with the surface, not against it.
+/// A mirroring transform keeps the front: the normal turns with the surface.
 #[test]
 fn mirrored_nodes_keep_their_front() {
     for (scale, normal) in [
@@ -309,7 +309,7 @@ fn cameras_are_found_by_name_and_have_unit_axes() {
     assert!(help.contains("'eye'") && help.contains("'second'"), "{help}");
 }
 
-/// Each thing the renderer does not use gives exactly one notice that names where it is.
+/// Each unused feature gives exactly one notice that names its location.
 #[test]
 fn what_is_not_used_is_named_once() {
     type Change = fn(&mut Value);

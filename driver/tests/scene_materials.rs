@@ -1,4 +1,4 @@
-//! Materials of glTF and its extensions become reflections; values out of range are refused.
+//! Materials of glTF and its extensions become reflections; values out of range are rejected.
 
 mod scene_support;
 
@@ -8,7 +8,7 @@ use photoncard_driver::scene::{Material, Reflection, Transmission};
 use scene_support::load_changed;
 use serde_json::{Value, json};
 
-/// The only material, without the extension and the factor that make it Lambertian, after a change of it.
+/// The only material after a change, without the extension and the factor that make it Lambertian.
 fn material(change: impl FnOnce(&mut Value)) -> Material {
     let scene = load_changed(|json| {
         let material = &mut json["materials"][0];
@@ -68,7 +68,8 @@ fn the_reflectance_at_normal_incidence_follows_from_ior_and_specular() {
     close(dielectric(json!({"KHR_materials_specular": bright})), Vec3::new(0.5, 0.02, 0.02));
 }
 
-/// A specular factor of 0 takes the reflection off the dielectric part alone; what states no metalness is metal.
+/// A specular factor of 0 removes the reflection of the dielectric part alone; without a stated metalness the material is
+/// metal.
 #[test]
 fn metal_reflects_whatever_the_specular_factor() {
     for (factor, metallic) in [(None, 1.0), (Some(1.0), 1.0), (Some(0.25), 0.25)] {
@@ -96,10 +97,10 @@ fn transmission_is_through_a_wall_or_into_a_volume() {
     let part = json!({"transmissionFactor": 0.75});
     assert_eq!(transmission(json!({"KHR_materials_transmission": part})), Some(wall));
     assert_eq!(transmission(json!({"KHR_materials_transmission": {}})), None);
-    // A mirror's index of refraction leaves nothing to transmit.
+    // An infinite index of refraction leaves no light to transmit.
     let mirror = json!({"KHR_materials_transmission": part, "KHR_materials_ior": {"ior": 0}});
     assert_eq!(transmission(mirror), None);
-    // Without a thickness, what a volume would absorb does not count.
+    // Without a thickness the absorption of a volume is ignored.
     let thin = json!({"attenuationDistance": 1.0, "attenuationColor": [0, 0, 0]});
     let thin = json!({"KHR_materials_transmission": part, "KHR_materials_volume": thin});
     assert_eq!(transmission(thin), Some(wall));
@@ -121,7 +122,7 @@ fn transmission_is_through_a_wall_or_into_a_volume() {
     assert!(black.is_finite() && black.min_element() > 1e6, "{black}");
 }
 
-/// A specular factor of 0 makes a surface Lambertian, but not one that lets light through.
+/// A specular factor of 0 makes a surface Lambertian, unless it transmits light.
 #[test]
 fn glass_without_reflection_is_glass() {
     let scene = load_changed(|json| {

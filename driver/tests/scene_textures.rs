@@ -1,5 +1,4 @@
-//! Textures arrive as texels, samplers and transforms; images that cannot be had are refused with the place and the
-//! remedy.
+//! Textures arrive as texels, samplers and transforms; unreadable images are rejected with location and remedy.
 
 mod scene_support;
 
@@ -35,7 +34,7 @@ fn pbr(json: &mut Value) -> &mut Value {
     &mut json["materials"][0]["pbrMetallicRoughness"]
 }
 
-/// The same with an image in a buffer view.
+/// [`textured`] with an image in a buffer view.
 fn embedded(bytes: &[u8], kind: &str) -> Extended {
     let mut scene = textured(&json!(null));
     let view = scene.view(bytes);
@@ -48,7 +47,7 @@ fn base64(bytes: &[u8]) -> String {
     base64::engine::general_purpose::STANDARD.encode(bytes)
 }
 
-/// Loads a scene in a folder where these files lie.
+/// Loads a scene in a folder with `files`.
 fn load_beside(scene: &Extended, files: &[(&str, &[u8])]) -> Result<Scene, SceneError> {
     let folder = tempfile::tempdir().unwrap();
     let inside = folder.path().join("scene");
@@ -90,7 +89,7 @@ fn an_image_is_the_same_wherever_it_lies() {
     assert_eq!(in_view.load().unwrap().images[0].name, "paint");
 }
 
-/// Both kinds of JPEG keep colours to within what its quality and coarser chroma leave.
+/// Both kinds of JPEG keep colours within the error of their quality and chroma subsampling.
 #[test]
 fn jpegs_are_decoded() {
     for bytes in [COLOUR, PROGRESSIVE] {
@@ -143,7 +142,7 @@ fn samplers_and_transforms_are_taken() {
     }
 }
 
-/// Scaling comes before turning.
+/// Scaling precedes rotation.
 #[test]
 fn a_transform_scales_turns_and_moves_in_this_order() {
     let mut scene = embedded(TEXEL, "image/png");
@@ -156,7 +155,7 @@ fn a_transform_scales_turns_and_moves_in_this_order() {
     }
 }
 
-/// One image for colours and one for numbers, although the file has only one; equal textures are one.
+/// One image for colours and one for numbers, although the file has only one; equal textures are merged.
 #[test]
 fn images_and_textures_are_there_once_for_each_use() {
     let mut scene = embedded(TEXEL, "image/png");
@@ -175,13 +174,13 @@ fn images_and_textures_are_there_once_for_each_use() {
     assert!(scene.images.iter().all(|image| image.texels == [[255, 128, 0, 51]]));
 }
 
-/// What no surface shows is not read: it may be missing, or not an image.
+/// Images of unused textures are not read: they may be missing, or invalid.
 #[test]
 fn images_without_a_use_are_not_read() {
     let mut scene = embedded(TEXEL, "image/png");
     push(&mut scene.json, "images", json!({"uri": "absent.png"}));
     push(&mut scene.json, "textures", json!({"source": 1}));
-    // A Lambertian material has no use for roughness, and one that does not emit none for emission.
+    // A Lambertian material does not use roughness, and one without emission no emissive texture.
     pbr(&mut scene.json)["metallicRoughnessTexture"] = json!({"index": 1});
     assert_eq!(scene.load().unwrap().images.len(), 1);
     scene.json["materials"][0]["emissiveFactor"] = json!([0, 0, 0]);
@@ -229,7 +228,7 @@ fn images_that_cannot_be_had_are_refused() {
     check(&beyond.load().unwrap_err(), &["images[0].bufferView", "beyond"]);
 }
 
-/// A header alone, with a right checksum, of a size that is too large or that no file of its length can have.
+/// A header alone, with a correct checksum, and a size that is too large or impossible for the file's length.
 #[test]
 fn sizes_are_refused_by_the_header() {
     let header = |width: u32, height: u32| {
@@ -242,7 +241,7 @@ fn sizes_are_refused_by_the_header() {
         bytes[29..33].copy_from_slice(&(!crc).to_be_bytes());
         bytes
     };
-    // As many bytes as an image of one bit a texel may have, all of them missing: the sum is refused before.
+    // As many missing bytes as an image of one bit per texel may have: the sum is rejected first.
     let mut large = header(16_384, 16_384);
     large.resize(1 << 16, 0);
     let mut two = embedded(&large, "image/png");
@@ -252,7 +251,7 @@ fn sizes_are_refused_by_the_header() {
     two.json["materials"][0]["emissiveTexture"] = json!({"index": 1});
     let words = ["images and materials take 1073741888 bytes", "the card has 536870912"];
     check(&two.load().unwrap_err(), &words);
-    // A card of the greatest memory has room for them.
+    // A card of maximum memory has room for them.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.glb");
     fs::write(&path, glb(two.json, &two.bytes)).unwrap();
@@ -325,7 +324,7 @@ fn checksums_tell_texels_and_samplers_apart() {
     assert_eq!(scene.checksum(), embedded(TEXEL, "image/png").load().unwrap().checksum());
 }
 
-/// The file's own folder may be reached through a link.
+/// The scene's own folder may be reached through a link.
 #[cfg(unix)]
 #[test]
 fn a_scene_in_a_linked_folder_reads_what_is_beside_it() {

@@ -1,4 +1,4 @@
-//! What vertices carry arrives at the corners of the right triangles, in world space.
+//! Vertex attributes arrive at the corners of the right triangles, in world space.
 
 mod scene_support;
 
@@ -48,7 +48,7 @@ fn normals_of_the_triangles_themselves_are_flat() {
     }
 }
 
-/// Normals stay at right angles to a sphere's surface where it is stretched to an ellipsoid.
+/// Normals stay perpendicular to a sphere's surface that is stretched to an ellipsoid.
 #[test]
 fn normals_are_transformed_by_the_inverse_transposed() {
     let scene = with_normals(TILTED, |json| json["nodes"][0]["scale"] = json!([2, 1, 1]));
@@ -103,7 +103,7 @@ fn colours_of_every_format_are_linear_rgba() {
     add(&|scene| scene.floats("VEC3", &[[0.5, 0.25, 1.0]; 3]), [0.5, 0.25, 1.0, 1.0]);
     add(&|scene| scene.floats("VEC4", &[[2.0, -1.0, 1e9, 0.5]; 3]), [1.0, 0.0, 1.0, 0.5]);
     add(&|scene| scene.accessor("VEC4", 5121, 3, &[255, 0, 51, 102].repeat(3)), [1.0, 0.0, 0.2, 0.4]);
-    // Six bytes an element are padded to no multiple of four: the stride says how far the next one is.
+    // Elements of six bytes are not padded to a multiple of four: the stride states the distance.
     add(&|scene| scene.accessor("VEC3", 5123, 3, &shorts), [1.0, 0.0, 0.2, 1.0]);
     for (mut scene, accessor, expected) in cases {
         scene.primitive()["attributes"]["COLOR_0"] = json!(accessor);
@@ -157,8 +157,8 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
     assert_eq!(scene.notices, Vec::<String>::new());
 }
 
-/// Many nodes may share a list of instances, which costs the file next to nothing: where there is nothing to place, it
-/// is not gone through. The rotations of this one are zeros, and would be refused.
+/// Many nodes may share a list of instances at almost no cost in bytes: without triangles the list is not traversed. The
+/// zero rotations of this one would be rejected.
 #[test]
 fn instances_of_points_are_not_looked_at() {
     let mut scene = Extended::new();
@@ -179,7 +179,7 @@ fn instances_of_points_are_not_looked_at() {
     assert!(scene.load().unwrap_err().to_string().contains("zero rotation"));
 }
 
-/// Two joints: one stands still, the other has moved by 3 along x; its bind pose was at 1.
+/// Two joints: one at rest, the other moved by 3 along x; its bind pose was at 1.
 fn skinned(weights: [[f32; 4]; 3]) -> Extended {
     let mut scene = Extended::new();
     let joints = scene.accessor("VEC4", 5121, 3, &[0, 1, 0, 0].repeat(3));
@@ -194,7 +194,7 @@ fn skinned(weights: [[f32; 4]; 3]) -> Extended {
     scene.primitive()["attributes"]["WEIGHTS_0"] = json!(weights);
     scene.json["skins"] = json!([{"joints": [2, 3], "inverseBindMatrices": inverse}]);
     scene.json["nodes"][0]["skin"] = json!(0);
-    // The node's own transform does not count.
+    // The node's own transform is ignored.
     scene.json["nodes"][0]["translation"] = json!([100, 0, 0]);
     let nodes = scene.json["nodes"].as_array_mut().unwrap();
     nodes.push(json!({"children": [3]}));
@@ -278,7 +278,7 @@ fn attributes_that_do_not_fit_are_refused() {
     }
 }
 
-/// Coordinates come with the corners, and only where a texture takes them.
+/// Texture coordinates are loaded for the sets that a texture uses.
 #[test]
 fn texture_coordinates_are_those_of_the_sets_in_use() {
     let shorts: Vec<u8> =

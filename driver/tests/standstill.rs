@@ -1,4 +1,5 @@
-//! Cards that answer all that the transport asks, and come no further, or whose answers are wrong: the session ends in words.
+//! Standstill: cards that answer everything that the transport requests, without progress, or with wrong answers. The
+//! session ends in a clear error.
 
 mod scripted_card;
 
@@ -45,12 +46,12 @@ fn limits(frame: &FrameParameters) -> PixelLimits {
     PixelLimits::new(&Header { photon_grid, ..Header::EMPTY }, frame)
 }
 
-/// A session in virtual time.
+/// Session in virtual time.
 struct Bench<'a> {
     session: Session<'a>,
     /// Tiles that wait for the card.
     waiting: Vec<Tile>,
-    /// What the render knows of how long rays take.
+    /// Maximum time of a ray, seconds, if known.
     slowest: Option<f64>,
     events: Vec<Event>,
     now: Duration,
@@ -63,7 +64,7 @@ impl<'a> Bench<'a> {
         Self { session, waiting: vec![TILE], slowest: None, events: Vec::new(), now: Duration::ZERO }
     }
 
-    /// What the host has to say now.
+    /// Bytes that the host sends now.
     fn outgoing(&mut self) -> Vec<u8> {
         if self.session.wants_tile()
             && let Some(tile) = self.waiting.pop()
@@ -76,7 +77,7 @@ impl<'a> Bench<'a> {
         bytes
     }
 
-    /// Takes what the card says a moment later.
+    /// Receives bytes of the card a moment later.
     fn take(&mut self, bytes: &[u8]) -> Result<(), SessionError> {
         self.now += STEP;
         let result = self.session.receive(bytes, self.now).and_then(|()| {
@@ -87,7 +88,7 @@ impl<'a> Bench<'a> {
         result
     }
 
-    /// Takes what has come of the session: what the card has lost waits again.
+    /// Handles events: lost tiles wait again.
     fn collect(&mut self) {
         while let Some(event) = self.session.next_event() {
             if let Event::TileLost { tile, .. } = event {
@@ -102,7 +103,7 @@ impl<'a> Bench<'a> {
         self.collect();
     }
 
-    /// Lets both ends speak for some time.
+    /// Exchanges bytes for some time.
     fn go(&mut self, card: &mut Card, time: Duration) -> Result<(), SessionError> {
         let end = self.now + time;
         while self.now < end {
@@ -113,12 +114,12 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Runs a session with a card until it fails. Returns why, when, and what came of it.
+/// Runs a session with a card until it fails. Returns the error, its time, and the events.
 fn fail(answer: Answer) -> (SessionError, Duration, Vec<Event>) {
     fail_of_pace(answer, None)
 }
 
-/// Runs a session with a card until it fails, where a ray is known to take so many seconds at the most.
+/// Runs a session with a card until it fails, with a known maximum time of a ray.
 fn fail_of_pace(answer: Answer, slowest: Option<f64>) -> (SessionError, Duration, Vec<Event>) {
     let frame = frame();
     let mut bench = Bench { slowest, ..Bench::new(&frame) };
@@ -129,7 +130,7 @@ fn fail_of_pace(answer: Answer, slowest: Option<f64>) -> (SessionError, Duration
     (error, bench.now, bench.events)
 }
 
-/// The answers of a card that keeps what it was loaded with.
+/// Answers of a card that keeps its image.
 fn keeping(command: &Command) -> Option<Reply<'static>> {
     match command {
         Command::ReadChecksums { first, .. } => Some(Reply::Checksums { first: *first, data: &[0; 8] }),
@@ -198,7 +199,7 @@ fn the_hosts_own_absence_is_not_the_cards_silence() {
         bench.go(&mut card, short).unwrap();
         bench.now += absence;
         bench.go(&mut card, short).unwrap();
-        // A card that is silent is lost all the same.
+        // A silent card is lost nevertheless.
         let begin = bench.now;
         let error = loop {
             bench.outgoing();
@@ -222,7 +223,7 @@ fn a_flapping_link_is_not_the_cards_fault() {
     }
 }
 
-/// Its link closes at each crash: that it has lost what it was loaded with is all that tells of it.
+/// The link closes at each crash: only the lost image reveals it.
 #[test]
 fn a_card_that_crashes_at_a_tile_is_given_up_whatever_its_link_does() {
     let frame = frame();
@@ -264,7 +265,7 @@ fn a_card_that_comes_back_with_another_budget_is_told_of() {
     assert!(matches!(error, SessionError::OtherBudget), "{error}");
 }
 
-/// The card is switched on late, and takes its time.
+/// The card is switched on late, and starts slowly.
 #[test]
 fn a_greeting_has_its_time_from_the_first_answer_on() {
     let frame = frame();
@@ -289,7 +290,7 @@ fn a_greeting_has_its_time_from_the_first_answer_on() {
     assert_eq!(bench.session.link_bytes().resets, 0);
 }
 
-/// The pixels of a tile of which the first one's red has these bits.
+/// Pixels of a tile whose first red value has these bits.
 macro_rules! pixels_of_red {
     ($red:expr) => {{
         const PIXELS: [u8; PIXEL_BYTES * 16] = {
@@ -323,7 +324,7 @@ fn a_value_that_no_chip_can_render_is_named_with_its_pixel_and_tile() {
         assert!(said.contains("pixel (0, 0) of the tile 0,4,0,4 has radiance"), "{said}");
         assert!(!events.iter().any(|event| matches!(event, Event::TileDone(_))));
     }
-    // The greatest sum of a chip's is possible.
+    // The maximum of a chip's sum is valid.
     let (error, ..) = pixels_of_red!(8_388_608.0);
     assert!(matches!(error, SessionError::Standstill(_)), "{error}");
 }

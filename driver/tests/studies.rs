@@ -1,4 +1,4 @@
-//! Studies as a whole, on tiny pictures: what they write, what they find again, and that samples add up.
+//! Studies as a whole, on tiny pictures: their files, reuse of finished points, and sums of samples.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,7 +14,7 @@ use photoncard_driver::study::{
     Laboratory, SampleRate, Scale, Study, StudyError, StudyObserver, StudyOptions, run,
 };
 
-/// Counts the points that are measured, and stops after some.
+/// Observer that counts measured points, and stops the study after a number of them.
 struct Counting {
     measured: AtomicUsize,
     most: usize,
@@ -169,7 +169,7 @@ fn all_tiles_add_up_to_the_render() {
     }
 }
 
-/// The reference is made with as many rays of the same sampling: the error is nothing.
+/// The reference has as many rays of the same sampling: the error is zero.
 #[test]
 fn a_render_like_its_reference_has_no_error_and_fewer_rays_have_some() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! A host says which version it would need, however much of another version's hello it can read.
+//! Versions: the host's error names the required version, even if it cannot decode the rest of a hello.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use photoncard_driver::session::{Session, SessionError};
 use photoncard_shared::message::PROTOCOL_VERSION;
 use photoncard_shared::transport::Transport;
 
-/// What a host makes of a card that answers its hello with some bytes.
+/// Error of a session whose hello is answered by `answer`.
 fn greeted_with(answer: &[u8]) -> SessionError {
     let mut session = Session::new(1, Duration::ZERO);
     let mut card = Transport::card();

@@ -1,4 +1,4 @@
-//! The arguments of every command, and what they mean.
+//! Command-line arguments of all commands.
 
 mod cards;
 pub(crate) mod choice;
@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// The arguments of the process. Wrong ones end it, and a message that names them has them escaped.
+    /// Parses the arguments of the process. Invalid ones end it with a message in which they are escaped.
     pub(crate) fn parse_printably() -> Self {
         let given = std::env::args_os();
         Self::try_parse().unwrap_or_else(|error| {
@@ -46,10 +46,10 @@ impl Arguments {
 pub(crate) enum Command {
     /// Render a glTF scene to an EXR picture
     Render(Box<RenderOptions>),
-    /// Look at a scene
+    /// Print information on a scene
     #[command(subcommand)]
     Scene(SceneCommand),
-    /// Look at a card
+    /// Query a card, or list serial ports
     #[command(subcommand)]
     Card(CardCommand),
     /// Serve an emulated card to other processes, one host at a time, until interrupted
@@ -62,7 +62,7 @@ pub(crate) enum Command {
 
 #[derive(Subcommand)]
 pub(crate) enum SceneCommand {
-    /// Tell what a scene holds, and what of it is ignored
+    /// Print the contents of a scene, and those that are ignored
     Info {
         /// A glTF 2.0 file, .gltf or .glb
         scene: PathBuf,
@@ -73,18 +73,18 @@ pub(crate) enum SceneCommand {
 pub(crate) enum CardCommand {
     /// List the serial ports of this machine: path, USB name, serial number, and the address for --card
     List,
-    /// Tell what a card can hold
+    /// Print the limits of a card
     Info {
         /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
         #[arg(long, default_value = "emulated:1")]
         card: CardAddress,
     },
-    /// Say hello some times, and tell how long the card takes to answer
+    /// Greet a card repeatedly, and print the time until each answer
     Ping {
         /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
         #[arg(long, default_value = "emulated:1")]
         card: CardAddress,
-        /// Number of hellos
+        /// Number of greetings
         #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
         count: u16,
     },
@@ -92,17 +92,17 @@ pub(crate) enum CardCommand {
 
 #[derive(Args)]
 pub(crate) struct EmulateOptions {
-    /// Where hosts come: pty, tcp:PORT on this machine alone, tcp:ADDRESS:PORT or unix:PATH; port 0 is any
+    /// Address to listen on: pty, tcp:PORT on this machine alone, tcp:ADDRESS:PORT or unix:PATH; port 0 for any
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) listen: ListenAddress,
-    /// The kind of card
+    /// Kind of the card
     #[arg(long, default_value = "emulated", value_parser = choice::<ChipKind>())]
     pub(crate) card: ChipKind,
 }
 
 #[derive(Args)]
 pub(crate) struct DiffOptions {
-    /// The picture taken as right
+    /// The reference picture
     pub(crate) reference: PathBuf,
     /// The picture to compare
     pub(crate) image: PathBuf,

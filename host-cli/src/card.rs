@@ -8,8 +8,8 @@ use photoncard_driver::render::{CardAddress, MAX_BINS, MemoryUse, card_info, car
 use crate::console::print;
 use crate::failure::Failure;
 
-/// Prints what a card says of itself in its hello, as a board what it has measured of its memory and, of an emulated
-/// one, what its firmware takes of the chip.
+/// Prints the budget that a card reports, the memory use that a board has measured and, for an emulated card, the
+/// firmware's buffers.
 pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     let info = card_info(address)?;
     let budget = info.budget;
@@ -44,7 +44,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     print(&lines)
 }
 
-/// What the firmware of a board takes of on-chip memory, as the board has measured it.
+/// Rows of the on-chip memory that a board's firmware takes, as measured by the board.
 fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     let MemoryUse { static_bytes, stack_bytes, stack_used } = memory_use;
     [
@@ -53,7 +53,7 @@ fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     ]
 }
 
-/// What the firmware's buffers take of a chip, which the host knows of the chips that it emulates.
+/// Rows of the firmware's buffers, which are known for emulated chips.
 fn sram_rows(kind: ChipKind, sram_bytes: usize) -> [String; 5] {
     let techniques = kind.techniques();
     [
@@ -65,7 +65,7 @@ fn sram_rows(kind: ChipKind, sram_bytes: usize) -> [String; 5] {
     ]
 }
 
-/// Says hello to a card some times, and prints how long each answer took.
+/// Greets a card `count` times, and prints the time until each answer.
 pub(crate) fn ping(address: &CardAddress, count: u16) -> Result<(), Failure> {
     let answers = card_ping(address, count.into())?;
     let mut lines = Vec::new();

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 
 const COLUMNS: [&str; 4] = ["path", "USB name", "serial number", "--card"];
 
-/// Prints the serial ports of this machine, a line each, below a line of the columns' names. Without any nothing is printed.
+/// Prints the serial ports of this machine, one per line, below the names of the columns; nothing if there are none.
 pub(crate) fn run() -> Result<(), Failure> {
     let ports = list_serial_ports().map_err(Failure::work)?;
     if ports.is_empty() {
@@ -21,7 +21,7 @@ pub(crate) fn run() -> Result<(), Failure> {
     print(&table(&ports))
 }
 
-/// Columns that are as wide as their longest entry, two blanks apart; a dash stands for what a port does not tell.
+/// Columns as wide as their longest entry, separated by two blanks; a dash stands for missing values.
 fn table(ports: &[ListedPort]) -> Vec<String> {
     let rows: Vec<[String; 4]> =
         [COLUMNS.map(str::to_owned)].into_iter().chain(ports.iter().map(row)).collect();

@@ -1,5 +1,5 @@
-//! The standard streams, either of which may be closed or full: neither makes the program panic. All that is written goes through
-//! here, and text of others is escaped.
+//! Standard streams: a closed or full one never makes the program panic. All output passes through this module, and foreign
+//! text is escaped.
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stderr, stdout};
@@ -8,12 +8,12 @@ use photoncard_driver::printable::printable;
 
 use crate::failure::Failure;
 
-/// Writes a line for people. If nobody can read it, the work goes on.
+/// Writes a line to standard error. If that fails, the work goes on.
 pub(crate) fn say(line: Arguments) {
     let _ = writeln!(stderr(), "{}", printable(&line.to_string()));
 }
 
-/// Writes a failure for people, in lines of its own; its report escapes text of others.
+/// Writes a failure to standard error, on lines of its own; its report escapes foreign text.
 pub(crate) fn say_failure(failure: &Failure) {
     let _ = writeln!(stderr(), "{failure}");
 }
@@ -28,7 +28,7 @@ pub(crate) fn print_json(text: &str) -> Result<(), Failure> {
     write_out(&(printable_json(text) + "\n"))
 }
 
-/// The same JSON with all escaped that does not print as itself. It is in strings alone, but for the ends of lines.
+/// Escapes all characters of JSON that do not print as themselves. Except for line ends, they occur in strings alone.
 pub(crate) fn printable_json(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -45,7 +45,7 @@ pub(crate) fn printable_json(text: &str) -> String {
     escaped
 }
 
-/// Writes data to standard output. A reader that closes it early has what it wanted.
+/// Writes text to standard output. A reader that closes it early is no error.
 fn write_out(text: &str) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

@@ -8,7 +8,7 @@ use crate::console::{print, say};
 use crate::failure::Failure;
 use crate::progress::stop_on_signals;
 
-/// Serves an emulated card to one host after another, until an interrupt.
+/// Serves an emulated card to hosts, one after another, until an interrupt.
 pub(crate) fn run(options: &EmulateOptions) -> Result<(), Failure> {
     let stop = stop_on_signals().map_err(|error| Failure::work_error(&error))?;
     let listener = Listener::new(&options.listen).map_err(Failure::work)?;

@@ -1,4 +1,4 @@
-//! The environment of a render: `--environment`.
+//! The option `--environment`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -7,12 +7,12 @@ use photoncard_driver::scene::{BRIGHTEST, Environment};
 
 use crate::failure::Failure;
 
-/// Light from infinitely far, as an option tells it.
+/// Environment light as the argument of an option.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum EnvironmentOption {
-    /// The same radiance from everywhere, W/(sr m^2).
+    /// Constant radiance, W/(sr m^2).
     Constant([f32; 3]),
-    /// The map of a file.
+    /// Path of an environment map.
     File(PathBuf),
 }
 
@@ -34,7 +34,7 @@ impl FromStr for EnvironmentOption {
 }
 
 impl EnvironmentOption {
-    /// The environment itself.
+    /// Loads the environment.
     pub(crate) fn load(&self) -> Result<Environment, Failure> {
         match self {
             Self::Constant(radiance) => Ok(Environment::constant((*radiance).into())),
@@ -42,7 +42,7 @@ impl EnvironmentOption {
         }
     }
 
-    /// What the picture's provenance says of it.
+    /// Description of the environment in the picture's provenance.
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Constant([red, green, blue]) => format!("{red},{green},{blue}"),

@@ -1,4 +1,4 @@
-//! Failures of a command: the text for people, and the exit status.
+//! Failures of a command: message and exit status.
 
 use std::fmt;
 use std::process::ExitCode;
@@ -6,45 +6,45 @@ use std::process::ExitCode;
 use miette::{Diagnostic, MietteDiagnostic, Report};
 use photoncard_driver::render::RenderError;
 
-/// Why a command did not do its work.
+/// Failure of a command.
 pub(crate) enum Failure {
-    /// Wrong arguments or unreadable input: status 2.
+    /// Invalid arguments or unreadable input: status 2.
     Input(Report),
     /// The work failed: status 1.
     Work(Report),
-    /// An interrupt: status 130, as of a process ended by SIGINT. It tells what is left.
+    /// An interrupt: status 130, as for a process ended by SIGINT. The text names the files that remain.
     Stopped(&'static str),
 }
 
 impl Failure {
-    /// A failure of input that tells its own remedy.
+    /// Failure of input, with a remedy.
     pub(crate) fn input(error: impl Diagnostic + Send + Sync + 'static) -> Self {
         Self::Input(Report::new(error))
     }
 
-    /// A failure of the work that tells its own remedy.
+    /// Failure of the work, with a remedy.
     pub(crate) fn work(error: impl Diagnostic + Send + Sync + 'static) -> Self {
         Self::Work(Report::new(error))
     }
 
-    /// A failure of input that is an error only, with its causes.
+    /// Failure of input, with its causes and without a remedy.
     pub(crate) fn input_error(error: &(dyn std::error::Error + 'static)) -> Self {
         Self::Input(Report::new(MietteDiagnostic::new(with_causes(error))))
     }
 
-    /// A failure of the work that is an error only, with its causes.
+    /// Failure of the work, with its causes and without a remedy.
     pub(crate) fn work_error(error: &(dyn std::error::Error + 'static)) -> Self {
         Self::Work(Report::new(MietteDiagnostic::new(with_causes(error))))
     }
 
-    /// Standard output that takes no data.
+    /// Failure of writing to standard output.
     pub(crate) fn output(error: &std::io::Error) -> Self {
         let text = format!("cannot write to standard output: {error}");
         let help = "check the space of the file or the device that it is directed to";
         Self::Work(Report::new(MietteDiagnostic::new(text).with_help(help)))
     }
 
-    /// The exit status.
+    /// Exit status.
     pub(crate) fn status(&self) -> ExitCode {
         match self {
             Self::Input(_) => ExitCode::from(2),
@@ -55,7 +55,7 @@ impl Failure {
 }
 
 impl fmt::Display for Failure {
-    /// The text for people, with its remedy.
+    /// Message and remedy.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Input(report) | Self::Work(report) => write!(f, "{report:?}"),

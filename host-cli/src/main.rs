@@ -1,6 +1,6 @@
 //! The `photoncard` command: arguments and printing, no rendering.
 //!
-//! Standard output is for data, standard error for people. Exit status: 0 done; 1 the work failed; 2 wrong arguments or
+//! Standard output is for data, standard error for messages. Exit status: 0 done; 1 the work failed; 2 invalid arguments or
 //! unreadable input; 130 stopped by an interrupt.
 //!
 //! | module | contents |
@@ -34,7 +34,7 @@ use std::process::ExitCode;
 use crate::arguments::{Arguments, CardCommand, Command, SceneCommand};
 
 fn main() -> ExitCode {
-    // Wrong arguments end here, with status 2.
+    // Invalid arguments end the process here, with status 2.
     let arguments = Arguments::parse_printably();
     report::lay_out_errors();
     let result = match &arguments.command {

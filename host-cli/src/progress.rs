@@ -1,4 +1,4 @@
-//! Progress of a render: a bar on a terminal, a line now and then elsewhere.
+//! Progress of a render: a bar on a terminal, otherwise a line for each tenth of a phase.
 
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,7 +11,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::console::say;
 
-/// Shows progress, and is stopped by SIGINT and SIGTERM.
+/// Display of a render's progress; SIGINT and SIGTERM stop the render.
 pub(crate) struct Progress {
     stopped: Arc<AtomicBool>,
     kept: AtomicBool,
@@ -22,12 +22,12 @@ struct Display {
     phase: Option<Phase>,
     bar: ProgressBar,
     on_terminal: bool,
-    /// Tenths of the phase that were told, where there is no terminal.
+    /// Number of tenths of the phase that were printed, without a terminal.
     told: u64,
 }
 
 impl Progress {
-    /// Shows nothing if `quiet`. The first signal stops the render, a second one ends the process.
+    /// Starts the display, which is empty if `quiet`. The first signal stops the render, a second one ends the process.
     pub(crate) fn start(quiet: bool) -> std::io::Result<Self> {
         let display = Display {
             phase: None,
@@ -39,12 +39,12 @@ impl Progress {
         Ok(Self { stopped: stop_on_signals()?, kept: AtomicBool::new(false), display })
     }
 
-    /// Whether finished tiles are kept.
+    /// Returns whether finished tiles are in the partial file.
     pub(crate) fn has_kept(&self) -> bool {
         self.kept.load(Ordering::Relaxed)
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(crate) fn finish(&self) {
         if let Some(display) = &self.display {
             display.lock().unwrap_or_else(PoisonError::into_inner).bar.finish_and_clear();
@@ -87,7 +87,7 @@ impl Display {
         if self.phase.is_none_or(|shown| (shown as u8) < phase as u8) {
             self.begin(phase, total);
         }
-        // A card that is still loading tells of it while another renders.
+        // A card that is still loading reports it while another one renders already.
         if self.phase != Some(phase) {
             return;
         }
@@ -112,7 +112,7 @@ impl Display {
             Phase::Pack => "{msg:8} {elapsed}",
             Phase::Photons | Phase::Tiles => "{msg:8} {bar:40} {pos}/{len} {per_sec} {eta} left",
         };
-        // A template that is not one shows indicatif's own.
+        // The fallback is indicatif's own template.
         self.bar.set_style(
             ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
         );
@@ -120,7 +120,7 @@ impl Display {
     }
 }
 
-/// Set by SIGINT and SIGTERM; a second one ends the process.
+/// Flag that SIGINT and SIGTERM set; a second signal ends the process.
 pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     let stopped = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {

@@ -18,7 +18,7 @@ use crate::environment::EnvironmentOption;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
-/// Renders a scene and writes the picture and what else was asked for.
+/// Renders a scene, and writes the picture and all other requested outputs.
 pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let settings = options.settings();
     for path in outputs(options) {
@@ -49,7 +49,7 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Tells in a few lines what was read of card memory.
+/// Prints a table of the reads of card memory.
 fn tell_memory(memory: &MemoryStatistics, statistics: &Statistics) {
     let gathers = statistics.gathers;
     let rays = &statistics.rays;
@@ -101,7 +101,7 @@ fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
 }
 
 fn read_scene(options: &RenderOptions, settings: &RenderSettings) -> Result<Scene, Failure> {
-    // An image goes into every card.
+    // The image must fit every card.
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
     let mut scene = load_for(&options.scene, dram_bytes).map_err(Failure::input)?;
     for assignment in &options.assignments {
@@ -126,7 +126,7 @@ fn read_scene(options: &RenderOptions, settings: &RenderSettings) -> Result<Scen
     Ok(scene)
 }
 
-/// Does some work on a pool of so many threads.
+/// Runs `work` on a pool of `threads` threads.
 fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
     let Some(threads) = threads else { return Ok(work()) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -173,7 +173,7 @@ fn provenance(
     add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
     add("set", json!(options.assignments));
     add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));
-    // That of the photons' density, where none is asked for.
+    // The automatic distance, if none is given.
     add("max-distance", json!(rendering.statistics.max_distance));
     provenance.into()
 }

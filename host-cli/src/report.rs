@@ -1,4 +1,4 @@
-//! The layout of errors: in colours and broken lines on a terminal, and with text of others escaped.
+//! Layout of errors: with colours and line breaks on a terminal, and with foreign text escaped.
 
 use std::error::Error;
 use std::fmt::{Display, Formatter, Result};
@@ -9,17 +9,17 @@ use miette::{
 };
 use photoncard_driver::printable::printable;
 
-/// Lines are broken on a terminal only: elsewhere a path in a message stays in one piece.
+/// Installs the layout. Lines are broken on a terminal only: elsewhere a path in a message stays in one piece.
 pub(crate) fn lay_out_errors() {
     let build = |_: &_| {
         let options = MietteHandlerOpts::new().wrap_lines(stderr().is_terminal()).break_words(false);
         Box::new(PrintableHandler(options.build())) as Box<dyn ReportHandler>
     };
-    // Only a second hook is refused.
+    // `set_hook` fails only if there is a hook already.
     let _ = miette::set_hook(Box::new(build));
 }
 
-/// Lays out every error with its texts escaped, before colours and line ends come in.
+/// Handler that escapes the texts of every error before colours and line breaks are added.
 struct PrintableHandler(MietteHandler);
 
 impl ReportHandler for PrintableHandler {
@@ -28,8 +28,8 @@ impl ReportHandler for PrintableHandler {
     }
 }
 
-/// A diagnostic with its texts escaped, and its causes. An excerpt of a file is escaped by whoever cuts it out, as marks
-/// point into it.
+/// Diagnostic with its texts and causes escaped. An excerpt of a file is escaped by its author instead, as labels point
+/// into it by offset.
 #[derive(Debug)]
 struct Printable<'a> {
     diagnostic: &'a dyn Diagnostic,
@@ -97,7 +97,7 @@ impl Diagnostic for Printable<'_> {
     }
 }
 
-/// An error with its text escaped, and its causes.
+/// Error with its text and causes escaped.
 #[derive(Debug)]
 struct PrintableError {
     message: String,

@@ -10,7 +10,7 @@ use photoncard_driver::scene::{
 use crate::console::print;
 use crate::failure::Failure;
 
-/// Prints what a scene holds.
+/// Prints the contents of a scene.
 pub(crate) fn info(path: &Path) -> Result<(), Failure> {
     let scene = load(path).map_err(Failure::input)?;
     let (lower, upper) = scene.bounds();

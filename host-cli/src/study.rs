@@ -20,27 +20,27 @@ use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::stop_on_signals;
 
-/// What is said of an interrupted study.
+/// Message of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
 
 #[derive(Args)]
 pub(crate) struct StudyArguments {
-    /// What to study
+    /// Study to run
     #[arg(value_name = "NAME", value_parser = Selection::parser())]
     name: Selection,
-    /// The folder for reports and finished points; it is made if it is missing
+    /// Folder for reports and finished points; it is created if it is missing
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// A small picture and few values: about a minute a study
+    /// Use a small picture and few values: about a minute per study
     #[arg(long)]
     quick: bool,
-    /// The share of the tiles that is rendered where not all are needed
+    /// Share of the tiles to render in studies that do not need all
     #[arg(long, value_name = "SHARE", default_value = "1/17", allow_hyphen_values = true)]
     sample: SampleRate,
-    /// The folder of photoncard's own scenes
+    /// Folder of photoncard's own scenes
     #[arg(long, value_name = "DIR", default_value = "scenes")]
     scenes: PathBuf,
-    /// Threads, an emulated chip on each [default: a thread a core]
+    /// Threads, each emulating a chip [default: one per core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     threads: Option<usize>,
     /// Show no progress
@@ -48,7 +48,7 @@ pub(crate) struct StudyArguments {
     quiet: bool,
 }
 
-/// Studies by a name.
+/// One study or all studies.
 #[derive(Clone, Copy, Debug)]
 enum Selection {
     One(Study),
@@ -56,10 +56,10 @@ enum Selection {
 }
 
 impl Selection {
-    /// The name of all studies together.
+    /// Name of all studies together.
     const ALL: &str = "all";
 
-    /// Parser of the studies' names and of the one for all.
+    /// Parser of the names of studies, and of `all`.
     fn parser() -> impl TypedValueParser<Value = Self> {
         let all = PossibleValue::new(Self::ALL).help("All of them, each in a folder of its own");
         let studies = Study::ALL.iter().copied().map(possible_value);
@@ -76,7 +76,7 @@ impl Selection {
     }
 }
 
-/// Makes the reports of some studies.
+/// Writes the reports of some studies.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
     let options = StudyOptions {
         studies: arguments.name.studies(),
@@ -97,13 +97,13 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
     })
 }
 
-/// What was typed, the program by its name alone.
+/// Command line as typed, with the program's name without its folder.
 fn command_line() -> String {
     let arguments = std::env::args_os().skip(1).map(|argument| quoted(&argument.to_string_lossy()));
     std::iter::once("photoncard".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
-/// An argument as a shell reads it.
+/// Quotes an argument for a shell.
 fn quoted(argument: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
     if !argument.is_empty() && argument.chars().all(is_plain) {
@@ -113,7 +113,7 @@ fn quoted(argument: &str) -> String {
     }
 }
 
-/// A bar over the points of a study on a terminal, a line now and then elsewhere.
+/// Progress of a study: a bar on a terminal, otherwise a line for each tenth.
 struct StudyProgress {
     stopped: Arc<AtomicBool>,
     display: Option<Mutex<Display>>,
@@ -123,7 +123,7 @@ struct Display {
     study: String,
     bar: ProgressBar,
     on_terminal: bool,
-    /// Tenths of the study that were told, where there is no terminal.
+    /// Number of tenths of the study that were printed, without a terminal.
     told: usize,
 }
 
@@ -186,7 +186,7 @@ impl Display {
             if self.on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         self.bar = ProgressBar::with_draw_target(Some(total as u64), target);
         let template = "{msg:11} {bar:40} {pos}/{len} points {elapsed} {eta} left";
-        // A template that is not one shows indicatif's own.
+        // The fallback is indicatif's own template.
         self.bar.set_style(
             ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
         );

@@ -1,4 +1,4 @@
-//! Wrong arguments and unreadable input: status 2, the place and the remedy, and no file touched.
+//! Invalid arguments and unreadable input: status 2, an error with location and remedy, and unchanged files.
 
 mod support;
 
@@ -7,7 +7,7 @@ use std::fs;
 use serde_json::{Value, json};
 use support::{Outcome, Room, scene, scene_bytes, scene_of, shipped};
 
-/// Checks that a command is refused with these words in its message, and nothing on standard output.
+/// Checks that a command is rejected with these words in its message, and nothing on standard output.
 fn check_refused(outcome: &Outcome, words: &[&str], case: &str) {
     let Outcome { status, stdout, stderr } = outcome;
     assert_eq!(*status, Some(2), "{case}: {stderr}");
@@ -17,7 +17,7 @@ fn check_refused(outcome: &Outcome, words: &[&str], case: &str) {
     }
 }
 
-/// Checks that a render is refused, that its old picture is untouched and that no other file appears.
+/// Checks that a render is rejected, that its old picture is unchanged and that no other file appears.
 fn refused(room: &Room, scene: &str, options: &[&str], words: &[&str]) {
     let case = format!("{scene} {options:?}");
     room.write("out.exr", "old picture");
@@ -32,7 +32,7 @@ fn refused(room: &Room, scene: &str, options: &[&str], words: &[&str]) {
     assert_eq!(room.read("out.exr"), b"old picture", "{case}");
 }
 
-/// Checks that a scene is refused.
+/// Checks that a scene is rejected.
 fn refused_scene(scene: &Value, words: &[&str]) {
     let room = Room::new();
     room.write_scene("scene.gltf", scene);
@@ -99,7 +99,7 @@ fn scenes_that_show_nothing() {
     let room = Room::new();
     room.write_scene("dark.gltf", &dark);
     refused(&room, "dark.gltf", &[], &["no light", "emissiveFactor", "help:"]);
-    // The lamp shines on a floor that keeps all light.
+    // The lamp shines on a floor that reflects no light.
     let black = json!([0.0, 0.0, 0.0, 1.0]);
     room.write_scene(
         "lost.gltf",
@@ -251,7 +251,7 @@ fn outputs_that_cannot_be_written() {
     check_refused(&outcome, &["out.exr.partial: it is another output as well", own_name], "partial");
 }
 
-/// No output is written through a name that is no file: a pipe would be waited for, a device or a link replaced.
+/// No output is written to a name that is no regular file: a pipe would block, a device or a link would be replaced.
 #[cfg(unix)]
 #[test]
 fn outputs_that_are_no_files() {

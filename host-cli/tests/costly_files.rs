@@ -1,5 +1,5 @@
-//! Small files that would grow without a bound: each is refused with its remedy, or takes little, within 4 GB of address space
-//! and some seconds (docs/architecture.md, "What a file may cost").
+//! Small files with costly contents: each is rejected with a remedy, or takes little, within 4 GB of address space and some
+//! seconds (docs/architecture.md, "What a file may cost").
 #![cfg(unix)]
 
 mod support;
@@ -7,11 +7,11 @@ mod support;
 use serde_json::{Value, json};
 use support::{Outcome, Room, glb, scene};
 
-/// Seconds of a processor: far more than any of these takes.
+/// Limit of processor time, seconds: far more than any of these files takes.
 const SECONDS: u32 = 100;
 const KILOBYTES: u32 = 4_000_000;
 
-/// Runs the command with limited memory and time. A limit of time ends it by a signal, which is no status.
+/// Runs the command with limited memory and time. The time limit ends it by a signal, which is no status.
 fn limited(room: &Room, arguments: &[&str]) -> Outcome {
     let mut shell = std::process::Command::new("sh");
     let script = format!("ulimit -v {KILOBYTES} && ulimit -t {SECONDS} && exec \"$0\" \"$@\"");
@@ -20,7 +20,7 @@ fn limited(room: &Room, arguments: &[&str]) -> Outcome {
     Outcome::of(&shell.output().unwrap())
 }
 
-/// Checks that a render of a scene is refused with these words.
+/// Checks that a render of a scene is rejected with these words.
 fn refused(room: &Room, words: &[&str]) {
     let outcome =
         limited(room, &["render", "scene.glb", "-o", "out.exr", "--size", "8x8", "--photons", "100"]);
@@ -37,7 +37,7 @@ fn refused_scene(json: &Value, bytes: &[u8], words: &[&str]) {
     refused(&room, words);
 }
 
-/// A scene with so many elements of next to nothing in a list.
+/// Checks that a scene with `count` nearly empty elements in a list is rejected.
 fn refused_list(list: &str, element: &str, count: usize) {
     let room = Room::new();
     let mut elements = vec![element; count - 1].join(",");
@@ -46,7 +46,7 @@ fn refused_list(list: &str, element: &str, count: usize) {
     refused(&room, &["of JSON would take more than", "leave out what is empty"]);
 }
 
-/// A mesh that emits light, of primitives of one accessor of positions each, and of indices if there are any.
+/// Mesh that emits light, of primitives with one accessor of positions each, and of indices if there are any.
 fn meshes(primitives: usize, indices: Option<usize>) -> Value {
     let mut primitive = json!({"attributes": {"POSITION": 0}, "material": 0});
     if let Some(indices) = indices {
@@ -61,7 +61,7 @@ fn meshes(primitives: usize, indices: Option<usize>) -> Value {
     })
 }
 
-/// Vertices at places that differ.
+/// Vertices at pairwise different positions.
 fn places(count: u32) -> Vec<u8> {
     let scattered = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
     (0..3 * count).flat_map(|i| scattered(i).to_le_bytes()).collect()

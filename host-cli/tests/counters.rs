@@ -1,4 +1,4 @@
-//! Modelled memory: what is counted adds up, what is traced is what is counted, and the picture is the same.
+//! Modelled memory: counters add up, the trace holds the counted reads, and the picture does not change.
 
 mod support;
 
@@ -14,13 +14,13 @@ fn statistics(room: &Room, name: &str) -> Value {
     serde_json::from_slice(&room.read(name)).unwrap()
 }
 
-/// A count below `memory`.
+/// A counter below `memory`.
 fn count(statistics: &Value, pointer: &str, key: &str) -> u64 {
     let count = statistics.pointer(&format!("/memory/{pointer}/{key}")).and_then(Value::as_u64);
     count.unwrap_or_else(|| panic!("no memory/{pointer}/{key} in {statistics:#}"))
 }
 
-/// The sum of a count over some parts.
+/// Sum of a counter over some parts.
 fn sum(statistics: &Value, part: &str, names: &[&str], key: &str) -> u64 {
     names.iter().map(|name| count(statistics, &format!("{part}/{name}"), key)).sum()
 }
@@ -161,7 +161,7 @@ fn what_is_no_cache_is_refused_with_what_is() {
     }
 }
 
-/// A shell that lets a process write no larger file: the trace is the first that grows beyond it.
+/// A shell that limits the size of files: the trace is the first to exceed it.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_trace_that_cannot_be_written_ends_the_render() {

@@ -1,4 +1,4 @@
-//! What a display server sees of a render.
+//! Display server: a viewer receives the picture.
 
 mod support;
 
@@ -9,20 +9,20 @@ use std::thread::{self, JoinHandle};
 use photoncard_driver::exr::read_rgb;
 use support::{Room, scene};
 
-/// An image as a viewer has it, made from packets alone.
+/// Image of a viewer, from packets alone.
 #[derive(Default)]
 struct Viewed {
     name: String,
     width: usize,
     height: usize,
     channels: Vec<String>,
-    /// The values of each channel, in rows.
+    /// Values of each channel, row by row.
     values: Vec<Vec<f32>>,
-    /// Packets that updated it.
+    /// Number of packets that updated it.
     updates: usize,
 }
 
-/// Reads the fields of a packet.
+/// Parser of the fields of a packet.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
@@ -98,7 +98,7 @@ impl Viewed {
     }
 }
 
-/// A viewer that takes one connection until it ends.
+/// Viewer that serves one connection until it ends.
 fn viewer() -> (SocketAddr, JoinHandle<Viewed>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();

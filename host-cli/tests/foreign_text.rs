@@ -1,4 +1,4 @@
-//! Text of others: names in scenes, cards, paths and files do not reach the terminal as control characters.
+//! Foreign text: names in scenes, cards, paths and files do not reach the terminal as control characters.
 
 mod support;
 
@@ -14,15 +14,15 @@ use photoncard_shared::transport::Transport;
 use serde_json::{Value, json};
 use support::{Outcome, Room, scene, scene_bytes, scene_of, small_render};
 
-/// Clears the screen, ends a text, a line and begins a forged one, turns the rest round.
+/// Text that clears the screen, ends a line, begins a forged one, and reverses the direction of the rest.
 const HOSTILE: &str = "x\u{1b}[2J\0\u{9b}31m\r\nforged\u{202e}\u{2066}\u{7f}";
-/// As it is shown.
+/// [`HOSTILE`] as it is printed.
 const SHOWN: &str = "x\\u{1b}[2J\\0\\u{9b}31m\\r\\nforged\\u{202e}\\u{2066}\\u{7f}";
-/// The same of a path or an argument, which ends at a zero.
+/// [`HOSTILE`] as a path or an argument, which ends at a zero byte.
 const HOSTILE_PATH: &str = "x\u{1b}[2J\u{9b}31m\r\nforged\u{202e}";
 const SHOWN_PATH: &str = "x\\u{1b}[2J\\u{9b}31m\\r\\nforged\\u{202e}";
 
-/// Checks that a command has ended so, and shown a text a number of times or more, and nothing that does not print.
+/// Checks the status of a command, that it printed a text at least `times` times, and no unprintable character.
 fn check_shown(outcome: &Outcome, status: i32, shown: &str, times: usize) {
     let Outcome { status: found, stdout, stderr } = outcome;
     assert_eq!(*found, Some(status), "{stderr}");
@@ -35,7 +35,7 @@ fn check_shown(outcome: &Outcome, status: i32, shown: &str, times: usize) {
     assert!(found >= times, "{shown} is there {found} times: {stdout}{stderr}");
 }
 
-/// A scene of which everything that has a name has a hostile one.
+/// Scene whose objects all have a hostile name.
 fn hostile_scene(mut scene: Value) -> Value {
     scene["extensionsUsed"] = json!(["KHR_materials_specular", "KHR_lights_punctual"]);
     let light = json!({"name": HOSTILE, "type": "point", "range": 5.0});
@@ -77,7 +77,7 @@ fn errors_about_a_scene_are_escaped() {
     let mut absent = scene();
     absent["buffers"][0]["uri"] = json!(HOSTILE_PATH);
     refused(&absent, SHOWN_PATH);
-    // An excerpt of the file is shown, with a mark below the place.
+    // An excerpt of the file is printed, with a mark below the location.
     room.write("scene.gltf", "{\"\u{9b}31m\u{202e}\u{7f}\": \u{202e}}");
     let outcome = room.run(&["scene", "info", "scene.gltf"]);
     check_shown(&outcome, 2, "{\"\\u{9b}31m\\u{202e}\\u{7f}\": \\u{202e}}", 1);
@@ -95,7 +95,7 @@ fn paths_and_arguments_are_shown_escaped() {
     let folder = format!("{HOSTILE_PATH}/a.exr");
     check_shown(&room.render("scene.gltf", &["-o", &folder]), 2, SHOWN_PATH, 1);
     check_shown(&room.run(&["diff", HOSTILE_PATH, HOSTILE_PATH]), 2, SHOWN_PATH, 1);
-    // What the command line's reader itself refuses.
+    // Arguments that the parser itself rejects.
     for arguments in
         [&[HOSTILE_PATH][..], &["diff", "a", "b", HOSTILE_PATH], &["card", "info", "--card", HOSTILE_PATH]]
     {
@@ -113,7 +113,7 @@ fn settings_of_a_kept_file_are_shown_escaped() {
     room.write_scene("scene.gltf", &scene());
     let settings = json!({HOSTILE: HOSTILE});
     room.write("a.exr.partial", format!("photoncard partial render 2\n{settings}\n"));
-    // Within JSON, a part of it is escaped before.
+    // Within JSON a part of the text is escaped before.
     check_shown(&room.render("scene.gltf", &["-o", "a.exr", "--resume"]), 2, SHOWN, 1);
 }
 
@@ -134,7 +134,7 @@ fn the_name_of_a_picture_is_shown_escaped_by_a_viewer() {
     assert!(bytes[6..].starts_with(b"a\\u{1b}[2J.exr\0"), "{:?}", &bytes[..40]);
 }
 
-/// Answers a host's hello with a build of its own, until the host goes.
+/// Answers a host's hello with the given build, until the host leaves.
 fn serve_hello(mut host: TcpStream, build: &str) {
     let mut transport = Transport::card();
     host.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
@@ -185,7 +185,7 @@ fn the_build_of_a_card_is_shown_escaped() {
     server.join().unwrap();
 }
 
-/// The options of a render are those of a small one, whatever names it has.
+/// The options of a small render.
 #[test]
 fn a_material_of_a_hostile_name_can_be_set() {
     let room = Room::new();

@@ -1,4 +1,4 @@
-//! What the other commands print, and what becomes of it where nobody reads.
+//! Output of the other commands, also to closed streams.
 
 mod support;
 
@@ -18,7 +18,7 @@ fn scene_info_tells_what_a_scene_holds() {
     assert!(outcome.stdout.ends_with('\n'));
 }
 
-/// A scene of every kind of thing: what is used is told with its numbers, and what is not is named as ignored.
+/// A scene with every feature: used ones are printed with their numbers, others are named as ignored.
 #[test]
 fn scene_info_tells_of_textures_lights_and_what_is_ignored() {
     let outcome = Room::new().run(&[
@@ -40,7 +40,7 @@ fn scene_info_tells_of_textures_lights_and_what_is_ignored() {
     }
 }
 
-/// The ports that a machine has are its own; each line gives the address of one, by its path.
+/// The machine's own ports; each line has the address of one, by its path.
 #[test]
 fn card_list_gives_an_address_for_every_serial_port() {
     let outcome = Room::new().run(&["card", "list"]);
@@ -106,7 +106,7 @@ fn every_command_has_help() {
     }
 }
 
-/// A pipe whose reader is gone.
+/// A pipe whose reader is closed.
 fn closed_pipe() -> Stdio {
     let (_, writer) = std::io::pipe().unwrap();
     writer.into()

@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 
 use support::{Room, shipped, small_render};
 
-/// How long a stopped render may go on; a loaded machine needs some of it to be heard at all.
+/// Time limit of a stopped render, generous for a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Waits for the end, and ends a process that goes on for too long.
+/// Waits for the end of a process, and kills it after the time limit.
 fn wait(child: &mut Child) -> ExitStatus {
     let start = Instant::now();
     while start.elapsed() < PATIENCE {
@@ -26,7 +26,7 @@ fn wait(child: &mut Child) -> ExitStatus {
     panic!("the render went on for {PATIENCE:?}");
 }
 
-/// Interrupts a render as soon as it has told of `phase`.
+/// Interrupts a render as soon as it has printed `phase`.
 fn interrupt(phase: &str, options: &[&str]) {
     let room = Room::new();
     room.write("out.exr", "old picture");
@@ -53,6 +53,6 @@ fn while_photons_are_traced() {
 
 #[test]
 fn while_a_picture_is_rendered() {
-    // The image is loaded, and one tile alone would take minutes.
+    // The image is loaded, and a single tile would take minutes.
     interrupt("load", &["--size", "256x256", "--spp", "4096", "--gather-rays", "64", "--tile", "32"]);
 }

@@ -1,4 +1,4 @@
-//! Cards of other processes: the same pictures over every link, and what is said where there is none.
+//! Cards of other processes: equal pictures over every link, and clear errors without one.
 #![cfg(unix)]
 
 mod support;
@@ -36,7 +36,7 @@ fn the_same_bytes_over_every_link() {
     let emulators = LISTEN.map(|listen| Emulator::start(&room, listen, &[]));
     let micro = Emulator::start(&room, "tcp:127.0.0.1:0", &["--card", "emulated-micro"]);
     for Emulator { address, .. } in emulators.iter().chain([&micro]) {
-        // The second is another host to the same card.
+        // The second host connects to the same card as the first.
         for _ in 0..2 {
             assert!(render("a.exr", &[address]) == expected, "{address}");
         }
@@ -55,7 +55,7 @@ fn a_card_goes_on_after_a_host_that_was_killed() {
     let expected = room.read("a.exr");
     for listen in LISTEN {
         let emulator = Emulator::start(&room, listen, &[]);
-        // One tile alone would take minutes.
+        // A single tile would take minutes.
         let endless = ["--size", "64x64", "--spp", "4096", "--gather-rays", "64", "--tile", "32"];
         let options = [&endless[..], &["-o", "b.exr", "--card", &emulator.address]].concat();
         let mut command = room.command();
@@ -112,7 +112,7 @@ fn who_is_no_host_does_not_hold_a_card() {
             std::thread::sleep(Duration::from_millis(200));
         }
         assert!(begin.elapsed() > Duration::from_secs(5), "{said:?}");
-        assert!(emulator.end("-INT").1.contains("for 10 s is dropped"));
+        assert!(emulator.end("-INT").1.contains("no valid frame for 10 s"));
     };
     std::thread::scope(|scope| {
         for said in [&b""[..], b"GET / HTTP/1.0\r\n\r\n", b"\0\0\0"] {
@@ -140,7 +140,7 @@ fn cards_that_are_not_there() {
         let words = [words[0], words[1], name, "card 0", "help:"];
         let options = ["-o", "a.exr", "--stats", "a.json", "--card", card];
         check_failed(&room, &room.render(&cornell, &options), &words, &["file"]);
-        // Beside another it is a card that is lost.
+        // Beside another card it counts as lost.
         let options = [&options[..], &["--card", "emulated:1"]].concat();
         let outcome = room.render(&cornell, &options);
         assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
@@ -174,7 +174,7 @@ fn an_emulator_ends_in_order() {
         assert_eq!(emulator.end(signal), (Some(130), "photoncard: stopped; the card is gone\n".into()));
         assert!(room.names().is_empty(), "{listen}");
     }
-    // What a killed one leaves is no obstacle.
+    // The socket file of a killed process is no obstacle.
     Emulator::start(&room, "unix:card", &[]).end("-KILL");
     assert_eq!(room.names(), ["card"]);
     assert_eq!(Emulator::start(&room, "unix:card", &[]).end("-INT").0, Some(130));

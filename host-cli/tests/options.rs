@@ -1,4 +1,4 @@
-//! Options that need others: without them they change nothing, and it is said.
+//! Options that require others: without them they have no effect, which is reported.
 
 mod support;
 

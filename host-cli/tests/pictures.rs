@@ -1,4 +1,4 @@
-//! What a render writes, and that nothing but the scene and its settings changes the picture.
+//! Outputs of a render; the picture depends on nothing but the scene and its settings.
 
 mod support;
 
@@ -28,7 +28,7 @@ fn layers_are_asked_for_by_name_and_leave_the_picture_as_it_is() {
             sizes.push(other.len());
         }
     }
-    // What is asked for is in the file, and nothing else.
+    // The file has the requested channels, and no others.
     let [default, all, again, none, _, some, _] = sizes[..] else { panic!("{sizes:?}") };
     assert!(all == again && all > default && none < some && none < default, "{sizes:?}");
 
@@ -66,7 +66,7 @@ fn exposure_and_tone_curve_change_the_preview_alone() {
 fn a_render_writes_picture_preview_and_statistics() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
-    // One card: what is on its way to another when the last tile is done counts as payload, and not yet as sent.
+    // One card: bytes in transit to another at the end count as payload, but not yet as sent.
     let files = ["-o", "a.exr", "--preview", "a.png", "--stats", "a.json", "--card", "emulated:1"];
     let outcome = room.rendered(&cornell, &files);
     assert_eq!(room.names(), ["a.exr", "a.json", "a.png"]);
@@ -144,7 +144,7 @@ fn a_crop_is_a_part_of_the_whole() {
 fn a_setting_of_a_material_changes_the_picture() {
     let room = Room::new();
     let glossy = shipped("cornell-glossy.gltf");
-    // The glossy lobe reflects what final gather rays find: a few are not enough to see a difference.
+    // The glossy lobe reflects the light of final gather rays: with few of them the difference is visible.
     let common = ["--size", "16x16", "--gather-rays", "16", "--quiet"];
     room.rendered(&glossy, &[&common[..], &["-o", "a.exr"]].concat());
     room.rendered(&glossy, &[&common[..], &["-o", "b.exr", "--set", "floor.exponent=2"]].concat());
@@ -162,7 +162,7 @@ fn an_environment_lights_the_picture() {
     let plain = pixels(&[]);
     assert!(plain == pixels(&["--environment", "0,0,0"]));
     assert!(plain != pixels(&["--environment", "1, 2, 3"]));
-    // A picture of the scene is as good a map as any.
+    // A picture of the scene serves as the map.
     room.rendered("scene.gltf", &["-o", "map.exr"]);
     assert!(plain != pixels(&["--environment", "map.exr"]));
 }
@@ -185,7 +185,7 @@ fn triangles_of_no_area_are_counted_and_left_out() {
 fn what_is_ignored_is_said_once() {
     let room = Room::new();
     let mut scene = scene();
-    // An image that no texture in use refers to is not looked for.
+    // An image of an unused texture is not read.
     scene["images"] = json!([{"uri": "absent.png"}]);
     scene["textures"] = json!([{"source": 0}]);
     scene["materials"][0]["normalTexture"] = json!({"index": 0});

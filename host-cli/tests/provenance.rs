@@ -1,4 +1,4 @@
-//! Provenance of a picture: the attribute of the EXR file that holds all that its pixels depend on.
+//! Provenance of a picture: the attribute of the EXR file with everything that its pixels depend on.
 
 mod support;
 
@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 use support::{Room, scene, shipped};
 
-/// Options that pixels depend on: a value of each but the default, its key in the provenance, and what is said there.
+/// Options that pixels depend on: a value of each that is not the default, its key in the provenance, and the value there.
 fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
     vec![
         (&["--size", "9x7"], "size", json!([9, 7])),
@@ -54,10 +54,10 @@ const OTHERS: [&[&str]; 18] = [
     &["--stats", "a.json"],
 ];
 
-/// Options that say how samples are stored, which the file says itself, and what is printed.
+/// Options on the storage of samples, which the file states itself, and on messages.
 const OF_THE_FILE: [&str; 4] = ["--output", "--sample-type", "--quiet", "--help"];
 
-/// The provenance in an EXR file: the text of the attribute `photoncard`.
+/// Provenance in an EXR file: the text of the attribute `photoncard`.
 fn provenance(file: &[u8]) -> Value {
     let head = b"photoncard\0string\0";
     let start = file.windows(head.len()).position(|bytes| bytes == head).expect("the attribute") + head.len();
@@ -65,7 +65,7 @@ fn provenance(file: &[u8]) -> Value {
     serde_json::from_slice(&text[..u32::from_le_bytes(*length) as usize]).expect("JSON")
 }
 
-/// The provenance of a render of a scene with mirrors and glass.
+/// Provenance of a render of a scene with mirrors and glass.
 fn rendered(room: &Room, options: &[&str]) -> Value {
     let small = if options.contains(&"--caustic-photons") { &[][..] } else { &["--caustic-photons", "99"] };
     room.rendered(&shipped("cornell-spheres.glb"), &[&["-o", "a.exr"], small, options].concat());
@@ -105,7 +105,7 @@ fn scenes_of_one_name_that_differ_have_another_provenance() {
     assert_ne!(dark, light);
 }
 
-/// An option that is added is to be in one of the lists above.
+/// A new option must be in one of the lists above.
 #[test]
 fn every_option_is_known_to_change_pixels_or_not_to() {
     let help = Room::new().run(&["render", "--help"]).stdout;

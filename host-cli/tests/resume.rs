@@ -1,4 +1,4 @@
-//! What is lost when something ends in the middle of a render: cards, their links, or the host. Finished tiles are kept.
+//! Interrupted renders: when a card, its link or the host ends, finished tiles are kept.
 #![cfg(unix)]
 
 mod support;
@@ -11,9 +11,9 @@ use support::{Emulator, Room, shipped};
 
 /// A picture of 64 tiles that takes a second or two.
 const PICTURE: [&str; 6] = ["--size", "128x128", "--photons", "2000", "--gather-rays", "50"];
-/// Bytes of a tile in the file of finished tiles.
+/// Size of a tile in the file of finished tiles, bytes.
 const TILE_BYTES: u64 = 8 + 16 + 40 * 256 + 4;
-/// How long anything here may take.
+/// Time limit of every wait.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 fn arguments<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a str> {
@@ -38,7 +38,7 @@ fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
     host
 }
 
-/// The picture that nothing has disturbed.
+/// The picture of an undisturbed render.
 fn expected() -> Vec<u8> {
     let room = Room::new();
     let outcome = room.run(&arguments(&shipped("cornell.gltf"), &["--quiet"]));
@@ -47,7 +47,7 @@ fn expected() -> Vec<u8> {
     room.read("a.exr")
 }
 
-/// Goes on with a render, and checks that it had finished some tiles and becomes the picture.
+/// Resumes a render, and checks that it had finished some tiles and gives the expected picture.
 fn resumes(room: &Room, options: &[&str], expected: &[u8]) {
     let options = [options, &["--resume"]].concat();
     let outcome = room.run(&arguments(&shipped("cornell.gltf"), &options));
@@ -65,11 +65,11 @@ fn a_host_that_is_killed_loses_the_tiles_in_flight_alone() {
     host.kill().unwrap();
     host.wait().unwrap();
     assert_eq!(room.names(), ["a.exr.partial"]);
-    // A tile that was being written.
+    // An incomplete tile.
     let mut bytes = room.read("a.exr.partial");
     bytes.truncate(bytes.len() - 100);
     room.write("a.exr.partial", &bytes);
-    // Other tiles and another order do not matter.
+    // Tiles and order may differ.
     resumes(&room, &["--tile", "16", "--order", "hash", "--card", "emulated-micro:2"], &expected);
 }
 
@@ -92,7 +92,7 @@ fn only_the_same_picture_is_gone_on_with() {
     refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene was"]);
     refused(&["--order", "hilbert"], &["--resume with --order hilbert is not possible"]);
     assert!(room.read("a.exr.partial") == kept);
-    // Nothing that this render has kept, or could go on with.
+    // This render has kept no tiles, and has none to resume from.
     let outcome = room.run(&arguments(&cornell, &["--seed", "7", "--card", "unix:absent"]));
     assert_eq!(outcome.status, Some(1), "{}", outcome.stderr);
     assert!(!outcome.stderr.contains("--resume goes on"), "{}", outcome.stderr);

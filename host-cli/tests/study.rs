@@ -41,7 +41,7 @@ fn an_interrupt_ends_a_study_and_keeps_its_points() {
     let finished = |line: &String| -> Option<usize> {
         line.strip_prefix("photoncard: reordering ")?.split(' ').next()?.parse().ok()
     };
-    // Tenths are told: some points are finished when the first is.
+    // Progress is printed in tenths: several points may be finished at the first line.
     let finished = lines.find_map(|line| finished(&line).filter(|&count| count > 0)).unwrap();
     let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(kill.success());

@@ -1,4 +1,4 @@
-//! Tiles that two cards render, to see whether they agree.
+//! Verification: tiles that two cards render for comparison.
 
 mod support;
 

@@ -1,5 +1,5 @@
-//! The Cornell box, scaled to two metres, and three variants: with a glossy floor, with a lamp that faces the ceiling,
-//! and with a mirror ball and a glass ball in place of its blocks.
+//! The Cornell box, scaled to two metres, and three variants: with a glossy floor, with a lamp that faces the ceiling, and
+//! with a mirror ball and a glass ball instead of its blocks.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! The scenes that lie beside this crate are what it makes, and are sound.
+//! The shipped scenes equal the generators' output, and are valid.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use gltf::buffer::Source;
 use gltf::mesh::Mode;
 use gltf::{Gltf, Node, Primitive};
 
-/// A scene's name, the triangles it may have, and its cameras.
+/// Name of each scene, its range of triangles, and its cameras.
 const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 9] = [
     ("cornell.gltf", 36..=36, &["camera"]),
     ("cornell-glossy.gltf", 36..=36, &["camera", "floor"]),
@@ -38,7 +38,7 @@ fn binary(file: &Gltf) -> Vec<u8> {
     }
 }
 
-/// The vertices of each triangle of a primitive.
+/// Vertices of each triangle of a primitive.
 fn joined<'a>(primitive: &Primitive<'_>, indices: &'a [u32]) -> Box<dyn Iterator<Item = [u32; 3]> + 'a> {
     match primitive.mode() {
         Mode::Triangles => Box::new(indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]])),
@@ -48,7 +48,7 @@ fn joined<'a>(primitive: &Primitive<'_>, indices: &'a [u32]) -> Box<dyn Iterator
     }
 }
 
-/// Adds the triangles of a node and of those below it, in world space.
+/// Adds the triangles of a node and its descendants, in world space.
 fn collect(node: &Node<'_>, parent: Mat4, data: &[u8], triangles: &mut Vec<[Vec3; 3]>) {
     let transform = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
     for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {

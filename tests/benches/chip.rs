@@ -31,7 +31,7 @@ fn main() {
 const NEIGHBORS: u32 = 100;
 const PHOTONS: usize = 500_000;
 
-/// A scene with its image.
+/// Scene with its card image.
 struct Prepared {
     scene: Scene,
     image: CardImage,
@@ -70,7 +70,7 @@ fn map(scene: &Scene, photons: usize, layout: PhotonLayout) -> MappedImage {
 }
 
 impl Prepared {
-    /// Places of photons, in the order of the tree's levels or in no order.
+    /// Positions of photons, in the order of the tree's levels or shuffled.
     fn queries(&self, count: u32, shuffled: bool) -> Vec<Vec3> {
         let (scene, mut memory) = self.image.view();
         let photons = scene.header.section(SectionKind::Photons).records;
@@ -83,7 +83,7 @@ impl Prepared {
             .collect()
     }
 
-    /// Rays from where photons arrived, by the cosine: incoherent ones.
+    /// Incoherent rays: from the positions of photons, cosine-weighted.
     fn rays(&self, count: u32) -> Vec<Ray> {
         let (scene, mut memory) = self.image.view();
         let camera = self.scene.camera(None).expect("a camera");
@@ -155,7 +155,7 @@ fn tile_of_cornell(bencher: Bencher, order: &str) {
     render_tile(bencher, order, CORNELL.image.view().1);
 }
 
-/// The same with its reads counted above and below the dissertation's caches.
+/// The tile with its reads counted above and below the dissertation's caches.
 #[divan::bench(sample_count = 10, args = ["tiled", "dirbin", "hash", "sort"])]
 fn tile_of_cornell_counted(bencher: Bencher, order: &str) {
     render_tile(bencher, order, CacheSettings::default().over(CORNELL.image.view().1));

@@ -1,4 +1,4 @@
-//! Fuzzes what reads other programs' bytes.
+//! Fuzzes readers of foreign bytes.
 //!
 //! `cargo run --profile PROFILE -p photoncard-tests --example fuzz -- TARGET|all [--inputs N] [--seed N] [--first N]
 //! [--seconds N] [--folder PATH]`
@@ -19,7 +19,7 @@ use photoncard_tests::fuzz::{NAMES, Report, Settings, fuzz, target};
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// Inputs of a target if no number is given.
+/// Default number of inputs of a target.
 const INPUTS: u64 = 10_000;
 
 fn arguments() -> Result<(Vec<String>, Settings), Box<dyn Error>> {

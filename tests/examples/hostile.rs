@@ -29,7 +29,7 @@ fn defaults(kind: Kind) -> Settings {
     }
 }
 
-/// The arguments of a process that reads: kind, seed, first, inputs and folder.
+/// Arguments of a reader process: kind, seed, first, inputs and folder.
 fn read(arguments: &[String]) -> Result<(), Box<dyn Error>> {
     let [kind, seed, first, inputs, folder] = arguments else { return Err("five arguments".into()) };
     let kind = Kind::of(kind).ok_or("no such kind")?;

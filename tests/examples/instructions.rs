@@ -22,7 +22,7 @@ fn memory() -> Vec<u8> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
     let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
     let packed = PackedScene::new(&scene).expect("it is packed");
-    // One gather a ray, done at once.
+    // One gather per ray, done at once.
     let settings = RenderSettings {
         picture: Picture { width: 64, height: 64, ..Picture::default() },
         photons: PhotonMaps { count: 20_000, neighbors: 100, ..PhotonMaps::default() },
@@ -43,7 +43,7 @@ fn memory() -> Vec<u8> {
     mapped.image.lines().iter().map(|line| line.0).chain([behind]).flatten().collect()
 }
 
-/// What Callgrind counts.
+/// The function in which Callgrind counts.
 #[inline(never)]
 fn measured(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option<Counters> {
     render(chip, lines, work)

@@ -1,10 +1,10 @@
-//! Measures the search for the nearest photons by itself: a million on the faces of a cube.
+//! Measures the search for the nearest photons in isolation: a million on the faces of a cube.
 //!
 //! `cargo run --release -p photoncard-tests --example nearest -- [--write FOLDER] [--repeat N]`
 //!
-//! Prints searches a second of one thread, in a random order of queries and along a Hilbert curve, and the sum of the
-//! squared distances found. `--write` leaves points and queries as little-endian `f32`, for others to do the same work:
-//! `tests/peers/nearest.sh`.
+//! Prints searches per second of one thread, for queries in random order and along a Hilbert curve, and the sum of the
+//! squared distances found. `--write` stores points and queries as little-endian `f32`, so that other libraries can run the
+//! same searches: `tests/peers/nearest.sh`.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -24,11 +24,11 @@ const POINTS: u32 = 1_000_000;
 const QUERIES: u32 = 100_000;
 const NEIGHBORS: u32 = 100;
 const MAX_DISTANCE: f32 = 0.025;
-/// Points of which one lies in a cluster.
+/// One in this number of points lies in a cluster.
 const CLUSTER_SHARE: u32 = 5;
 const CLUSTER_RADIUS: f32 = 0.05;
 
-/// What this thread has taken of its processor, seconds: others' work does not count.
+/// Processor time of this thread, seconds; other processes do not count.
 fn cpu_seconds() -> f64 {
     let taken = clock_gettime(ClockId::ThreadCPUTime);
     taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9
@@ -38,7 +38,7 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// A point on a face of the cube of side 1 around the origin; of some, near the middle of one of two faces.
+/// Point on a face of the cube of side 1 around the origin; some lie near the middle of one of two faces.
 fn point(index: u32) -> [f32; 3] {
     let in_cluster = index.is_multiple_of(CLUSTER_SHARE);
     let face = hash(index ^ 0x5555) % if in_cluster { 2 } else { 6 };
@@ -104,7 +104,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (image, points) = image((0..POINTS).map(point));
     let random: Vec<[f32; 3]> = (0..QUERIES).map(|i| points[(hash(i) % POINTS) as usize]).collect();
     let mut along_curve = random.clone();
-    // What tells a place is its number along the curve.
+    // Queries are sorted by their codes along the curve.
     let grid = image.view().0.header.photon_grid;
     along_curve.sort_by_key(|&query| HilbertCode::new(&grid, query));
     if let Some(folder) = folder {

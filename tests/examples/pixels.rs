@@ -105,13 +105,13 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Whether a technique needs neither an emulated chip nor its buffers.
+/// Returns whether a technique needs neither an emulated chip nor its buffers.
 fn is_for_any_card(technique: &[&str]) -> bool {
     !technique.contains(&"hilbert") && !technique.contains(&"--card")
 }
 
 impl Build {
-    /// The checksums of a picture's samples and of its work.
+    /// Checksums of a picture's samples and of its work.
     fn checksums(
         &self,
         scene: &str,
@@ -124,7 +124,7 @@ impl Build {
         command.arg(Path::new("scenes").join(scene)).args(with_last_of_each(&[&SIZE, of_scene, technique]));
         match &self.card {
             Some(card) => command.args(["--card", card, "--neighbors", "50", "--tile", "8"]),
-            // The bound has no caches of a chip's own.
+            // The order `hilbert` has no caches of its chips.
             None => command.arg("--counters"),
         };
         let output = command.output()?;
@@ -146,7 +146,7 @@ fn with_last_of_each<'a>(lists: &[&[&'a str]]) -> Vec<&'a str> {
     options.into_iter().flat_map(|(name, value)| [name, value]).collect()
 }
 
-/// The checksum of all channels' samples, by name.
+/// Checksum of all channels' samples, by name.
 fn samples(path: &Path) -> Result<u64, exr::error::Error> {
     use exr::prelude::{ReadChannels, ReadLayers, read};
     let image = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
@@ -163,7 +163,7 @@ fn samples(path: &Path) -> Result<u64, exr::error::Error> {
     Ok(checksum.finalize())
 }
 
-/// The checksum of what was counted.
+/// Checksum of the counters.
 fn work(statistics: &Value) -> u64 {
     let mut checksum = CHECKSUM.digest();
     for key in COUNTED {

@@ -1,10 +1,10 @@
-//! Measures the ray caster by itself: incoherent rays from surfaces that a camera sees, by the cosine.
+//! Measures the ray caster in isolation: incoherent rays from surfaces that a camera sees, cosine-weighted.
 //!
 //! `cargo run --release -p photoncard-tests --example rays -- SCENE [--write FOLDER] [--rays N] [--repeat N]`
 //!
-//! Prints rays a second of one thread, to the first triangle and to any, how many rays meet one, the sum of the distances, and
-//! the lines that a ray reads. `--write` leaves triangles and rays as little-endian `f32`, for others to do the same work:
-//! `tests/peers/rays.sh`.
+//! Prints rays per second of one thread, to the first triangle and to any, the number of rays that meet one, the sum of the
+//! distances, and the lines that a ray reads. `--write` stores triangles and rays as little-endian `f32`, so that other
+//! libraries can cast the same rays: `tests/peers/rays.sh`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use photoncard_shared::address::Structure;
 use photoncard_shared::image::SectionKind;
 use rustix::time::{ClockId, clock_gettime};
 
-/// What this thread has taken of its processor, seconds: others' work does not count.
+/// Processor time of this thread, seconds; other processes do not count.
 fn cpu_seconds() -> f64 {
     let taken = clock_gettime(ClockId::ThreadCPUTime);
     taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9
@@ -28,7 +28,7 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Rays that leave what the camera sees in directions of the reflection.
+/// Rays from the surfaces that the camera sees, in sampled directions of reflection.
 fn bounces(scene: &Scene, packed: &PackedScene, count: u32) -> Vec<Ray> {
     let (image, mut memory) = packed.view();
     let camera = scene.camera(None).expect("a scene has a camera");
@@ -41,11 +41,11 @@ fn bounces(scene: &Scene, packed: &PackedScene, count: u32) -> Vec<Ray> {
         let sampled = surface.reflector().sample([random(i, 3), random(i, 4)])?;
         Some(Ray::new(surface.offset_origin(), sampled.direction))
     };
-    // Four of five of the shipped scenes' rays bounce; none do where the camera sees nothing.
+    // Of the rays in shipped scenes four of five bounce; none do if the camera sees nothing.
     (0..count * 10).filter_map(&mut bounce).take(count as usize).collect()
 }
 
-/// How many rays meet a triangle, and the sum of their distances.
+/// Number of rays that meet a triangle, and the sum of their distances.
 fn cast_all(image: &SceneImage, memory: &mut impl MemoryPort, rays: &[Ray], is_any: bool) -> (usize, f64) {
     let (mut hits, mut sum) = (0, 0.0);
     for ray in rays {
@@ -59,7 +59,7 @@ fn cast_all(image: &SceneImage, memory: &mut impl MemoryPort, rays: &[Ray], is_a
     (hits, sum)
 }
 
-/// Nodes and leaves that a ray reads, on average.
+/// Mean numbers of nodes and leaves that a ray reads.
 fn lines_of_a_ray(image: &SceneImage, memory: Lines, rays: &[Ray], is_any: bool) -> [f64; 2] {
     let mut counted = Counted::new(memory);
     cast_all(image, &mut counted, rays, is_any);

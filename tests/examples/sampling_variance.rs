@@ -1,4 +1,4 @@
-//! The variance of each sampling of gather rays, on a photon map that stays as it is.
+//! Variance of each sampling of gather rays, on a fixed photon map.
 //!
 //! `cargo run --release -p photoncard-tests --example sampling_variance [SCENE [camera=NAME] [ASSIGNMENT...]]`
 //!
@@ -46,17 +46,17 @@ impl Moments {
         (self.variance.iter().sum::<f64>() / self.variance.len() as f64).sqrt()
     }
 
-    /// The mean over points and channels, and its standard error.
+    /// Mean over points and channels, and its standard error.
     fn overall(&self) -> (f64, f64) {
         let points = self.mean.len() as f64;
         let mean = self.mean.iter().map(|mean| mean.element_sum() / 3.0).sum::<f64>() / points;
-        // Channels of one point err together: at most three times the variance of one.
+        // Channels of a point are correlated: at most three times the variance of one.
         let variance = self.variance.iter().sum::<f64>() / self.seeds as f64 / (points * points);
         (mean, variance.sqrt())
     }
 }
 
-/// The number of rays at which a line through the logarithms reaches an RMSE.
+/// Number of rays at which a line in logarithmic coordinates reaches an RMSE.
 fn rays_for(rmse: f64, curve: &[(u32, f64)]) -> f64 {
     let log = |(rays, rmse): (u32, f64)| ((rays as f64).ln(), rmse.ln());
     let target = rmse.ln();

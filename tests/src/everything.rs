@@ -1,4 +1,4 @@
-//! One small scene with everything that a scene can hold.
+//! Small scene with every feature of a scene.
 
 use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{

@@ -1,4 +1,4 @@
-//! Shared parts of the tests of the whole: small scenes, renders of them, and a card on a link.
+//! Shared parts of the integration tests: small scenes, renders of them, and a card on a link.
 #![forbid(unsafe_code)]
 
 pub mod everything;

@@ -1,4 +1,4 @@
-//! A set-associative LRU cache in its plainest form, which the firmware's caches are compared with.
+//! Set-associative LRU cache in its simplest form: the oracle for the firmware's caches.
 
 /// A set-associative cache with least-recently-used replacement: for every set its blocks, the last used at the end.
 pub struct LruOracle {

@@ -1,4 +1,4 @@
-//! Scenes with one photon map for several frames, so that two frames differ in the gather alone.
+//! Scenes with one photon map for several frames, so that frames differ in the gather alone.
 
 use glam::Vec3;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
@@ -36,7 +36,7 @@ pub struct Frame {
 }
 
 impl MappedScene {
-    /// Traces photons and packs the card image, as a render with these settings does.
+    /// Traces photons and packs the card image, like a render with these settings.
     ///
     /// # Panics
     /// If the scene cannot be packed, or its photons cannot be traced.

@@ -15,14 +15,14 @@ pub struct Wire<'a> {
     pub card: Box<MicroCard<Dram<'a>>>,
     host: Transport,
     session: u32,
-    /// Whether the frame that was begun last has layers.
+    /// True if the last frame begun has layers.
     layers: bool,
 }
 
 /// A [`Reply`] with owned data, as far as tests need it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// [`Reply::Hello`]: number of lines that are written, and the firmware's use of on-chip memory.
+    /// [`Reply::Hello`]: number of written lines, and the firmware's use of on-chip memory.
     Hello(u32, Option<MemoryUse>),
     /// [`Reply::Checksums`]: bytes of the checksums.
     Checksums(Vec<u8>),

@@ -1,4 +1,4 @@
-//! What boards share and any processor can run: the ring between a UART's interrupt and the port.
+//! Processor-independent parts of boards: the ring between a UART's interrupt and the port.
 
 #[path = "../../firmware/boards/common/ring.rs"]
 mod ring;

@@ -1,4 +1,4 @@
-//! Caches of lines: they hit and miss as their definition does, and hold what memory holds.
+//! Line caches: they hit and miss like an LRU oracle, and return the contents of memory.
 
 use photoncard_firmware::memory::{
     CacheEntry, CacheShape, CardMemory, Counted, Dram, LineCache, LineCaches, Lines, MemoryPort, SetIndex,
@@ -9,7 +9,7 @@ use photoncard_shared::message::{Fault, FaultCode};
 use photoncard_tests::lru::LruOracle;
 use proptest::prelude::*;
 
-/// Lines of which no two are alike.
+/// Lines with pairwise different contents.
 fn numbered(count: u32) -> Vec<Line> {
     (0..count)
         .map(|number| {
@@ -26,14 +26,14 @@ fn cache(shape: CacheShape) -> LineCache<Vec<CacheEntry>, Vec<Line>> {
     LineCache::new(shape, entries, vec![Line::ZERO; shape.lines()]).expect("buffers of its size")
 }
 
-/// Shapes of all kinds: sets and ways, lines of card memory in a line, index.
+/// Shapes of all kinds: number of sets and ways, lines of card memory per cache line, set index.
 fn shapes() -> impl Strategy<Value = (u32, u32, u32, SetIndex)> {
     let sets = prop_oneof![Just(1), Just(4), 1_u32..14];
     let ways = prop_oneof![Just(1), Just(4), 1_u32..10];
     (sets, ways, 1_u32..=8, prop_oneof![Just(SetIndex::Modulo), Just(SetIndex::Hashed)])
 }
 
-/// Addresses below `end`: some anywhere, some again soon, some in a row.
+/// Addresses below `end`: random, repeated and consecutive ones.
 fn addresses(end: u32) -> impl Strategy<Value = Vec<u32>> {
     let run = (0..end, 1_u32..5, 1_usize..40);
     let runs = proptest::collection::vec(run, 1..60);
@@ -80,7 +80,7 @@ proptest! {
         }
     }
 
-    /// Whatever was read before, in whatever order: the right line inside the memory, a fault outside.
+    /// Any sequence of reads returns the right line inside the memory, and a fault outside.
     #[test]
     fn a_cache_has_no_line_that_its_memory_has_not(
         (sets, ways, lines, index) in shapes(),

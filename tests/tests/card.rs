@@ -1,4 +1,4 @@
-//! A card answers whatever a host says with a fault or with pixels, and renders the next good tile.
+//! A card answers any command with a fault or with pixels, and afterwards renders a valid tile.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -78,7 +78,7 @@ fn commands_out_of_order_are_faults_and_the_card_goes_on() {
     });
 }
 
-/// With layers a pixel takes four sums of the buffer: the micro chip has room for those of 64 pixels, and 12 fit a reply.
+/// With layers a pixel takes four sums of the buffer: the micro chip has room for 64 pixels, and 12 fit a reply.
 #[test]
 fn a_tile_with_layers_has_a_fourth_of_the_pixels() {
     with_room_for_a_card(|| {
@@ -117,14 +117,14 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
             FrameParameters { gather_rays: MICRO.gather_rays + 1, ..frame() },
             FrameParameters { neighbors: MICRO.neighbors + 1, ..frame() },
             FrameParameters { max_distance: f32::NAN, ..frame() },
-            // The image has photons and no irradiance points.
+            // The image has photons, but no irradiance points.
             FrameParameters { radiance: Radiance::Precomputed, ..frame() },
         ];
         for bad in bad_frames {
             assert_eq!(wire.say(&Command::BeginFrame(bad)), [Answer::Fault(FaultCode::Parameter)], "{bad:?}");
         }
         assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
-        // An image that is in use is not disturbed by the end of none.
+        // The end of an image without a beginning does not disturb the image in use.
         assert_eq!(wire.say(&Command::EndImage), [Answer::Fault(FaultCode::Order)]);
         assert_eq!(wire.say(&Command::RenderTile(TILE)).last(), Some(&Answer::TileDone(7)));
         let bad_tiles = [
@@ -140,7 +140,7 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
     });
 }
 
-/// A copy of the image with another root node: one of so many children, each of them everywhere.
+/// Copy of the image with another root node of `children` children, whose boxes are unbounded.
 fn with_root(image: &CardImage, children: usize, links: Links) -> Vec<Line> {
     let mut lines = image.lines().to_vec();
     let root =
@@ -219,7 +219,7 @@ fn a_card_tells_what_its_board_measures_of_its_memory() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// Whole messages of any content.
+    /// Whole messages of arbitrary content.
     #[test]
     fn no_messages_stop_a_card(
         messages in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..200), 0..40),
@@ -245,7 +245,7 @@ proptest! {
         });
     }
 
-    /// An image with any line damaged renders, or ends in a fault: never in a panic or a hang.
+    /// An image with a damaged line renders, or ends in a fault: never in a panic or a hang.
     #[test]
     fn no_damaged_image_stops_a_card(
         line in any::<prop::sample::Index>(),

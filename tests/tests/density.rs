@@ -1,4 +1,4 @@
-//! The density estimate is right where the plain one is not: at edges, in corners and on thin walls.
+//! The corrected density estimate is right at edges, in corners and on thin walls.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -13,7 +13,7 @@ use photoncard_tests::{camera, lambertian, quad, room, scene};
 const NEIGHBORS: u32 = 100;
 const ALBEDO: f32 = 0.5;
 
-/// A photon map that can be asked for radiance.
+/// Photon map that gathers radiance.
 struct Map {
     image: CardImage,
     max_distance: f32,
@@ -36,7 +36,7 @@ impl Map {
         Self { image, max_distance }
     }
 
-    /// Radiance, W/(sr m^2), that a Lambertian surface reflects at a place: the same whatever instructions sum it.
+    /// Radiance that a Lambertian surface reflects at a point, W/(sr m^2); it must be equal for all instruction sets.
     fn radiance(&self, position: Vec3, normal: Vec3) -> f64 {
         let (scene, mut memory) = self.image.view();
         let mut buffer = CandidateBuffer::<512>::new();
@@ -58,14 +58,14 @@ impl Map {
         radiance.x as f64
     }
 
-    /// Mean radiance of a hundred places along a line.
+    /// Mean radiance of a hundred points along a line.
     fn mean_along(&self, from: Vec3, to: Vec3, normal: Vec3) -> f64 {
         let places = (0..100).map(|i| from.lerp(to, (i as f32 + 0.5) / 100.0));
         places.map(|place| self.radiance(place, normal)).sum::<f64>() / 100.0
     }
 }
 
-/// In a furnace of walls that emit 1, every place reflects rho / (1 - rho): here 1.
+/// Furnace whose walls emit 1: every point reflects rho / (1 - rho) = 1.
 fn furnace() -> Scene {
     cluttered_furnace(Vec::new(), glowing())
 }
@@ -74,18 +74,18 @@ fn glowing() -> Material {
     Material { emission: Vec3::ONE, ..lambertian("wall", ALBEDO) }
 }
 
-/// The same with other things in it, of one material.
+/// Furnace with other objects in it, of one material.
 fn cluttered_furnace(things: Vec<Triangle>, finish: Material) -> Scene {
     let mut triangles = room([0; 6]);
     triangles.extend(things.into_iter().map(|triangle| Triangle { material: 1, ..triangle }));
     scene(triangles, vec![glowing(), finish], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// A closed box of this size from its lower corner.
+/// Closed box of size `size` from its lower corner.
 fn closed_box(lower: Vec3, size: Vec3) -> impl Iterator<Item = Triangle> {
     room([0; 6]).into_iter().map(move |mut triangle| {
         triangle.vertices = triangle.vertices.map(|corner| lower + size * (0.5 + 0.5 * corner));
-        // The front of a room's wall faces inwards.
+        // The walls of a room face inwards.
         triangle.vertices.reverse();
         triangle
     })
@@ -97,7 +97,7 @@ fn the_radiance_of_a_wall_is_the_same_up_to_its_edges() {
     for distance in [0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 2.0] {
         let x = 1.0 - distance * map.max_distance;
         let mean = map.mean_along(Vec3::new(x, -1.0, -0.8), Vec3::new(x, -1.0, 0.8), Vec3::Y);
-        // At the very edge the nearest photon is always a little inside, where more of the disc is surface.
+        // At the edge itself the nearest photon is always a little inside, where the fraction of the disc is larger.
         let tolerance = if distance == 0.0 { 0.08 } else { 0.05 };
         assert!((mean - 1.0).abs() < tolerance, "at {distance} radii from the edge it is {mean}");
     }
@@ -120,8 +120,7 @@ fn the_mean_radiance_around_a_corner_is_that_of_the_wall() {
     assert!((mean - 1.0).abs() < 0.04, "around the corners it is {mean}");
 }
 
-/// Shelves whose distance is less than a gather's radius: a search finds the photons of several. Boards have one side that
-/// reflects, sheets two.
+/// Shelves closer than a gather's radius: a search finds photons of several. Boards reflect on one side, sheets on both.
 #[test]
 fn the_radiance_of_shelves_above_one_another_is_that_of_the_wall() {
     let top = |shelf: u32| -0.5 + 0.02 * shelf as f32;
@@ -147,15 +146,15 @@ fn the_radiance_of_shelves_above_one_another_is_that_of_the_wall() {
     }
 }
 
-/// Bars narrower than a gather's radius, right above a floor, as far apart as they are wide: a search on the floor finds
-/// their tops, and one on a top the floor. What closes them may be double-sided: within them it is dark.
+/// Bars narrower than a gather's radius, close above a floor, with gaps of their width: a search on the floor finds their
+/// tops, and vice versa. Their end faces may be double-sided: inside them it is dark.
 #[test]
 fn the_radiance_of_bars_and_of_the_floor_between_them_is_that_of_the_wall() {
     let bars = (0..40).flat_map(|bar| {
         closed_box(Vec3::new(-0.4 + 0.02 * bar as f32, -0.998, -0.4), Vec3::new(0.01, 0.015, 0.8))
     });
     let bars: Vec<Triangle> = bars.collect();
-    // What reflects all is as bright as the furnace.
+    // An albedo of 1 is as bright as the furnace.
     let white = Material { double_sided: true, ..lambertian("white", 1.0) };
     for finish in [glowing(), white] {
         let map = Map::new(&cluttered_furnace(bars.clone(), finish), 300_000);
@@ -175,7 +174,7 @@ fn the_radiance_of_bars_and_of_the_floor_between_them_is_that_of_the_wall() {
 
 #[test]
 fn light_on_one_side_of_a_thin_wall_does_not_show_on_the_other() {
-    // A wall of a millimetre across the room: light is on its upper side alone.
+    // A wall of a millimetre across the room, lit on its upper side alone.
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
     let mut triangles = room([0, 0, 0, 1, 0, 0]);
     let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);

@@ -1,5 +1,5 @@
-//! Licences and sources of dependencies, as `deny.toml` allows them. `cargo deny` checks advisories as well; this needs no tool
-//! but cargo.
+//! Licences and sources of dependencies are allowed by `deny.toml`. `cargo deny` checks advisories as well; this test needs
+//! only cargo.
 
 use std::process::Command;
 
@@ -8,32 +8,32 @@ use spdx::{Expression, ParseMode};
 
 const CRATES_IO: &str = "registry+https://github.com/rust-lang/crates.io-index";
 
-/// The table `licenses` of `deny.toml`.
+/// Table `licenses` of `deny.toml`.
 fn licences() -> toml::Table {
     let file: toml::Table = include_str!("../../deny.toml").parse().expect("deny.toml is TOML");
     file["licenses"].as_table().expect("a table").clone()
 }
 
-/// The licences of a list in `deny.toml`.
+/// Licences of a list in `deny.toml`.
 fn names(list: &toml::Value) -> Vec<&str> {
     list.as_array().expect("a list").iter().map(|name| name.as_str().expect("a licence")).collect()
 }
 
-/// The licences that a package may have: those of all, and its own exceptions.
+/// Licences that a package may have: the allowed ones, and its own exceptions.
 fn allowed<'a>(licences: &'a toml::Table, package: &str) -> Vec<&'a str> {
     let exceptions = licences["exceptions"].as_array().expect("a list").iter();
     let of_package = exceptions.filter(|exception| exception["crate"].as_str() == Some(package));
     of_package.flat_map(|exception| names(&exception["allow"])).chain(names(&licences["allow"])).collect()
 }
 
-/// Returns whether allowed licences satisfy an SPDX expression; `None` if it is none. A slash between alternatives is older than
-/// SPDX.
+/// Returns whether allowed licences satisfy an SPDX expression; `None` if it is invalid. A slash between alternatives
+/// predates SPDX.
 fn is_satisfied(expression: &str, allowed: &[&str]) -> Option<bool> {
     let expression = Expression::parse_mode(expression, ParseMode::LAX).ok()?;
     Some(expression.evaluate(|requirement| allowed.contains(&requirement.to_string().as_str())))
 }
 
-/// All packages of the lock file, those for other systems and boards included.
+/// All packages of the lock file, including those for other systems and boards.
 fn packages() -> Vec<Value> {
     let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml");
     let arguments =

@@ -1,4 +1,4 @@
-//! Energy of the photon pass: what lights of every kind emit arrives.
+//! Energy of the photon pass: the emission of every kind of light arrives.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use photoncard_firmware::scene::light::{environment_direction, environment_radia
 use photoncard_tests::{camera, lambertian, quad, room, scene};
 
 const PHOTONS: usize = 200_000;
-/// Nothing is stored where nothing is reflected: a thousandth stands for black.
+/// Albedo of nearly black surfaces, on which photons are still stored.
 const BLACK: f32 = 0.001;
 
 /// Stored power per channel, watts.
@@ -38,7 +38,7 @@ fn inside() -> Scene {
     scene(room([0; 6]), vec![lambertian("wall", BLACK)], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// A black cube seen from outside, of side 2.
+/// Black cube of side 2, seen from outside.
 fn outside() -> Scene {
     let mut cube = inside();
     for Triangle { vertices: [_, b, c], .. } in &mut cube.triangles {
@@ -72,7 +72,7 @@ fn points_and_spots_emit_their_intensity_over_their_directions() {
             outer_cosine: outer as f32,
         };
         room.lights = vec![light(kind, COLOUR)];
-        // By the formula of KHR_lights_punctual, step by step.
+        // Numerical integral of the falloff of `KHR_lights_punctual`.
         let width = (f64::from(inner as f32) - f64::from(outer as f32)).max(0.001);
         let steps = 10_000;
         let share = |i: i32| {
@@ -109,7 +109,7 @@ fn an_environment_brings_its_radiance_to_all_sides() {
     check(&cube, received(&cube), "map");
 }
 
-/// What the cube gets of its environment: the integral over directions of radiance times the area that it shows.
+/// Power that the cube receives from its environment: the integral over directions of radiance times projected area.
 fn received(cube: &Scene) -> [f64; 3] {
     let packed = PackedScene::new(cube).unwrap();
     let (image, mut memory) = packed.view();
@@ -129,7 +129,7 @@ fn received(cube: &Scene) -> [f64; 3] {
 
 #[test]
 fn a_panel_with_a_texture_emits_its_mean_and_all_lights_together_their_sum() {
-    // A panel of which one corner glows, beside a point.
+    // A panel with one glowing corner, beside a point light.
     let mut texels = vec![[0, 0, 0, 255]; 16 * 16];
     for row in 2..6 {
         texels[row * 16 + 3..][..5].fill([255; 4]);
@@ -151,7 +151,7 @@ fn a_panel_with_a_texture_emits_its_mean_and_all_lights_together_their_sum() {
         emissive_texture: Some(0),
         ..lambertian("panel", BLACK)
     });
-    // The mean of the interpolated texture is that of its texels, as it is dark at the borders.
+    // The interpolated texture has the mean of its texels, as it is dark at the borders.
     let panel = 2.0 * PI * 20.0 / 256.0;
     check(&all, times(COLOUR, panel), "panel");
     all.lights = vec![light(PunctualKind::Point { position: Vec3::new(0.0, 0.5, 0.0) }, COLOUR)];

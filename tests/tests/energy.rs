@@ -1,4 +1,4 @@
-//! Energy balance of the photon pass: what is emitted arrives, and arrives again as often as it is reflected.
+//! Energy balance of the photon pass: emitted power arrives, and arrives again as often as it is reflected.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -30,13 +30,13 @@ fn lit_room(walls: Material, emission: Vec3) -> Scene {
     scene(triangles, vec![walls, lamp], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// Watts that the lamp emits for each unit of radiance: pi times its area, on both sides.
+/// Power of the lamp per unit of radiance, W: pi times its area, on both sides.
 const LAMP: f64 = std::f64::consts::PI * 0.64 * 2.0;
 
 #[test]
 fn a_closed_room_stores_the_emitted_power_over_one_minus_the_albedo() {
     let emission = Vec3::new(3.0, 2.0, 0.5);
-    // Nothing is stored where nothing is reflected: a thousandth stands for black.
+    // Black surfaces store no photons: an albedo of 0.001 stands for black.
     for albedo in [[0.001; 3], [0.2; 3], [0.5; 3], [0.8; 3], [0.7, 0.3, 0.1]] {
         let walls = Material::lambertian("wall", albedo.into());
         let stored = stored_power(&pass(&lit_room(walls, emission), 3));
@@ -50,7 +50,7 @@ fn a_closed_room_stores_the_emitted_power_over_one_minus_the_albedo() {
 
 #[test]
 fn a_room_of_black_walls_but_one_stores_that_walls_share() {
-    // The lamp's place in a form factor: a parallel square of side 2 at distance 0.7, seen from a square of side 0.8.
+    // The lamp in a form factor: a parallel square of side 2 at distance 0.7, seen from a square of side 0.8.
     let mut scene = lit_room(lambertian("black", 0.0), Vec3::ONE);
     scene.materials.push(lambertian("floor", 0.001));
     for triangle in &mut scene.triangles {

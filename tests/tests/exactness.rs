@@ -32,7 +32,7 @@ fn card(text: &str) -> CardAddress {
     text.parse().unwrap()
 }
 
-/// Bits of a film: floats compare as numbers, bits as what they are.
+/// Bits of a film: unlike floats they distinguish 0 from -0, and NaN equals itself.
 fn bits(film: &Film) -> Vec<[u32; 10]> {
     film.pixels().iter().map(pixel_bits).collect()
 }
@@ -42,7 +42,7 @@ fn pixel_bits(pixel: &PixelValue) -> [u32; 10] {
     [r, g, b, p, q, s, x, y, z, pixel.depth].map(f32::to_bits)
 }
 
-/// Settings that must not change a bit of the picture.
+/// Settings that no pixel may depend on.
 fn variants() -> Vec<RenderSettings> {
     use GatherOrder::{DirectionBins, Hash, Hilbert, Naive, Sort, Tiled};
     let tile = Schedule::default().tile;
@@ -90,12 +90,12 @@ fn variants() -> Vec<RenderSettings> {
     scheduled.into_iter().chain(dealt).chain(in_kd_tree).collect()
 }
 
-/// Checks all variants with a sampling, without and with records of irradiance.
+/// Checks all variants with a sampling, with and without irradiance records.
 fn check_variants(sampling: Sampling) {
     check_variants_of(&glossy(), &settings().with(|s| s.integrator.sampling = sampling));
 }
 
-/// Checks all variants with the sampling and the radiance of some settings.
+/// Checks all variants with the sampling and the estimate of radiance of `settings_of`.
 fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
     let PhotonMaps { radiance, caustic_photons, .. } = settings_of.photons;
     let sampling = settings_of.integrator.sampling;
@@ -150,7 +150,7 @@ fn nor_do_they_with_textures_cut_outs_mirrors_glass_and_lights_of_every_kind() {
 
 #[test]
 fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
-    // So small an error divides every cell, down to one record at every other pixel: these blocks are halved.
+    // So small an error bound divides every cell, down to one record at every other pixel: these blocks are halved.
     let records = |width: u32, height: u32| (width.div_ceil(2) + 1) * (height.div_ceil(2) + 1);
     assert!(records(61, 61) > REFERENCE.irradiance_records && records(140, 1) > MICRO.irradiance_records);
     let scene = glossy();
@@ -177,7 +177,7 @@ fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
     }
 }
 
-/// Far to the right a place in the picture has few bits below the pixel: it may be rounded to the next pixel's border.
+/// Far to the right a position in the picture has few bits below the pixel: it may be rounded to the next pixel's border.
 #[test]
 fn nor_do_they_where_samples_are_rounded_to_the_next_pixel() {
     let scene = glossy();

@@ -1,4 +1,4 @@
-//! Scenes and settings at the ends of their ranges: large, tilted, dazzling, strongly coloured, with rays of one kind alone.
+//! Scenes and settings at the limits of their ranges: large, tilted, bright, saturated, with rays of one kind alone.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -23,7 +23,7 @@ fn emitting(name: &str, albedo: f32, radiance: Vec3) -> Material {
     Material { emission: radiance, ..lambertian(name, albedo) }
 }
 
-/// A floor tilted about two axes under a parallel lamp, all of it scaled and seen from near.
+/// Floor tilted about two axes under a parallel lamp, scaled, and seen from near.
 fn tilted_floor(half_side: f32) -> Scene {
     let (u, v) = (Vec3::new(0.8, 0.3, 0.2).normalize(), Vec3::new(-0.2, 0.5, -0.9));
     let v = (v - u * u.dot(v)).normalize();
@@ -85,7 +85,7 @@ fn many_samples_next_to_a_dazzling_lamp_do_not_overflow() {
 
 #[test]
 fn direct_light_is_the_same_by_shadow_rays_by_gather_rays_and_by_both() {
-    // Black but for the floor: all light there is direct.
+    // Black except for the floor: all light there is direct.
     let materials =
         vec![lambertian("black", 0.0), lambertian("floor", 0.6), emitting("lamp", 0.0, Vec3::ONE)];
     let scene = scene(room([0, 0, 1, 2, 0, 0]), materials, camera(Vec3::ZERO, Vec3::new(0.01, -1.0, 0.02)));
@@ -127,7 +127,7 @@ fn the_stored_power_of_coloured_light_is_right_in_every_channel() {
     }
 }
 
-/// The Cornell box, whose boxes stand at an angle, and one triangle far away.
+/// The Cornell box, whose blocks are rotated, and one distant triangle.
 fn box_and_far_triangle(distance: f32) -> Scene {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
     let mut scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
@@ -136,7 +136,7 @@ fn box_and_far_triangle(distance: f32) -> Scene {
     scene
 }
 
-/// Places are told apart on a grid over the whole scene: what is far away must not show in what is near.
+/// Photon positions lie on a grid over the whole scene: a distant triangle must not coarsen it visibly.
 #[test]
 fn a_far_triangle_changes_no_picture() {
     let settings = RenderSettings {
@@ -153,7 +153,7 @@ fn a_far_triangle_changes_no_picture() {
     assert!(error.is_input() && error.to_string().contains("too wide"), "{error}");
 }
 
-/// Without gather rays nothing bounds what a shadow ray brings from very near.
+/// Without gather rays nothing bounds the contribution of a shadow ray from very near.
 #[test]
 fn shadow_rays_beside_a_small_lamp_bring_no_darkness() {
     let vertical = |x: f32, side: f32| {

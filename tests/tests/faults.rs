@@ -1,4 +1,4 @@
-//! A render over bad lines is the same picture, and tells what was repaired.
+//! A render over bad lines gives the same picture, and reports the repairs.
 
 use photoncard_driver::film::PixelValue;
 use photoncard_driver::render::{CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Statistics};

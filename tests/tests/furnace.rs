@@ -64,12 +64,12 @@ fn nor_does_it_flicker_by_precomputed_irradiance() {
     }
 }
 
-/// A Phong lobe reflects less at grazing angles. A small wall with one, in a room of one radiance, shows its albedo at
-/// the angle that it is seen at.
+/// A Phong lobe reflects less at grazing angles. A small wall with one, in a room of uniform radiance, shows its
+/// directional albedo.
 #[test]
 fn a_phong_wall_in_a_diffuse_furnace_shows_its_directional_albedo() {
     let (diffuse, specular, exponent) = (0.3, 0.4, 16.0);
-    // A small wall in a room that is far larger: the room's radiance is that of the diffuse furnace.
+    // A small wall in a far larger room: the room's radiance is that of the diffuse furnace.
     let mut triangles = room([0; 6]);
     let size = 0.05;
     let corner = |x: f32, y: f32| Vec3::new(x * size, y * size, 0.0);
@@ -116,8 +116,8 @@ fn lobe_albedo(specular: f64, exponent: f64, angle: f64) -> f64 {
     specular * (exponent + 2.0) / std::f64::consts::TAU * sum * std::f64::consts::TAU / (steps * steps) as f64
 }
 
-/// A room whose walls all have a lobe is no even furnace. What it shows comes from an oracle: a plain path tracer of
-/// that room alone, in double precision.
+/// A room whose walls all have a lobe is no uniform furnace. The expected radiance comes from an oracle: a plain path
+/// tracer of this room, in double precision.
 #[test]
 fn a_phong_furnace_shows_what_a_path_tracer_finds() {
     let (diffuse, specular, exponent) = (0.25, 0.35, 12.0);
@@ -144,7 +144,7 @@ mod oracle {
         pub(super) exponent: f64,
     }
 
-    /// The generator of Steele, Lea and Flood 2014.
+    /// Generator of Steele, Lea and Flood 2014 (`SplitMix64`).
     struct Random(u64);
 
     impl Random {
@@ -197,7 +197,7 @@ mod oracle {
         }
     }
 
-    /// Where a ray from inside meets the cube, and the inward normal there.
+    /// Intersection of a ray from inside with the cube, and the inward normal there.
     fn wall(origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
         let distance = |axis: usize| (direction[axis].signum() - origin[axis]) / direction[axis];
         let axis = (0..3).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Some thousands of mutated inputs of everything that reads what others wrote. The example `fuzz` runs any number.
+//! Some thousands of mutated inputs of all readers of foreign bytes. The example `fuzz` runs any number.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -10,7 +10,7 @@ use photoncard_tests::fuzz::{NAMES, Random, Settings, Target, fuzz, target};
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// Inputs of each target: some seconds of each.
+/// Number of inputs of each target: some seconds each.
 const INPUTS: [(&str, u64); NAMES.len()] = [
     ("frames", 100_000),
     ("messages", 500_000),
@@ -22,7 +22,7 @@ const INPUTS: [(&str, u64); NAMES.len()] = [
     ("exr", 8000),
 ];
 
-/// One test at a time, so that no other's allocations are counted.
+/// Lock that runs one test at a time, so that no allocations of another are counted.
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn settings(inputs: u64, patience: Duration) -> Settings {
@@ -45,12 +45,12 @@ fn no_input_panics_hangs_or_takes_much_memory() {
         println!("{name}: {report:?}");
         assert!(report.failures.is_empty(), "{name}: {:#?}", report.failures);
         assert_eq!(report.inputs, inputs, "{name}");
-        // Inputs that are all refused at once would test nothing.
+        // Inputs that are all rejected at once would test nothing.
         assert!(report.sound * 20 > inputs && report.sound < inputs, "{name}: {report:?}");
     }
 }
 
-/// Fails in every way, at the number that its input tells.
+/// Target that fails in every way, at the number in its input.
 struct Faulty;
 
 impl Target for Faulty {

@@ -1,4 +1,4 @@
-//! The memory that the host takes: for a photon map while it is made, and for an image that emulated cards hold.
+//! Memory of the host: for a photon map under construction, and for an image that emulated cards share.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -14,7 +14,7 @@ use photoncard_driver::scene::{Scene, gltf};
 static MEMORY: PeakAlloc = PeakAlloc;
 
 const PHOTONS: usize = 600_000;
-/// Bytes that each photon may take, the card image included.
+/// Maximum number of bytes per photon, card image included.
 const BYTES_A_PHOTON: usize = 40;
 
 fn cornell() -> Scene {
@@ -36,7 +36,7 @@ fn settings(chips: usize) -> RenderSettings {
     }
 }
 
-/// The most memory in use while tiles are rendered.
+/// Observer that records the maximum memory in use while tiles are rendered.
 #[derive(Default)]
 struct WhileRendering(AtomicUsize);
 
@@ -52,7 +52,7 @@ impl Observer for WhileRendering {
     }
 }
 
-/// Bytes in use while a picture is rendered on so many chips, and those of the image.
+/// Maximum bytes in use while a picture is rendered on `chips` chips, and bytes of the image.
 fn rendering(scene: &Scene, chips: usize) -> (usize, usize) {
     let observer = WhileRendering::default();
     let before = MEMORY.current_usage();
@@ -60,7 +60,7 @@ fn rendering(scene: &Scene, chips: usize) -> (usize, usize) {
     (observer.0.into_inner() - before, rendering.statistics.image_bytes as usize)
 }
 
-// One test: what another allocates at the same time would count.
+// A single test: allocations of another at the same time would count.
 #[test]
 fn a_photon_takes_forty_bytes_at_the_most_and_cards_share_the_image() {
     let scene = cornell();
@@ -77,7 +77,7 @@ fn a_photon_takes_forty_bytes_at_the_most_and_cards_share_the_image() {
     let (with_four, _) = rendering(&scene, 4);
     println!("{with_one} bytes with one chip, {with_four} with four, an image of {image}");
     assert!(with_one >= image);
-    // What one chip has besides the image, three others have too; of the image none has a copy.
+    // Three further chips have everything that the first has, except a copy of the image.
     let chip = with_one - image;
     assert!(
         with_four < image + 4 * chip + image / 2,

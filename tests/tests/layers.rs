@@ -1,4 +1,4 @@
-//! Layers: they add up to the picture, do not change it, and are what they say.
+//! Layers: they add up to the picture, do not change it, and hold the quantities of their names.
 
 use photoncard_driver::film::{Film, FilmPixel, PixelLayers, PixelValue};
 use photoncard_driver::layer::Layers;
@@ -30,17 +30,17 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// The bits of all that every film has.
+/// Bits of the pixels without layers.
 fn picture_bits(film: &Film) -> Vec<u8> {
     film.pixels().iter().flat_map(PixelValue::to_bytes).collect()
 }
 
-/// The bits of layers.
+/// Bits of the layers.
 fn layer_bits(film: &Film) -> Vec<u8> {
     film.all().flat_map(|pixel| pixel.layers.to_bytes()).collect()
 }
 
-/// Checks that what a pixel consists of is its radiance, but for the rounding of each.
+/// Checks that a pixel's components add up to its radiance, except for rounding.
 fn adds_up(FilmPixel { pixel, layers }: FilmPixel) -> bool {
     let PixelLayers { direct, indirect, caustic, .. } = layers;
     (0..3).all(|axis| {
@@ -49,7 +49,7 @@ fn adds_up(FilmPixel { pixel, layers }: FilmPixel) -> bool {
     })
 }
 
-/// Other ways to render the same, with layers.
+/// Other settings with equal pixels, with layers.
 fn variants() -> Vec<RenderSettings> {
     let orders = [
         GatherOrder::Naive,
@@ -112,7 +112,7 @@ fn what_no_photon_brings_is_direct() {
     for FilmPixel { pixel, layers } in film.all() {
         assert_eq!(layers, PixelLayers { direct: pixel.radiance, ..PixelLayers::default() });
     }
-    // Shadow rays are the other way to it: what gather rays meet is weighted against them.
+    // Without shadow rays direct light comes from gather rays alone, whose weight is then 1.
     let without = render_or_panic(&scene, &settings().with(|s| s.integrator.shadow_rays = 0)).film;
     let with = render_or_panic(&scene, &settings()).film;
     for (without, with) in without.all().zip(with.all()) {
@@ -130,7 +130,7 @@ fn every_sample_gathers_that_is_not_interpolated() {
     let scene = load("cornell.gltf");
     let plain = render_or_panic(&scene, &settings());
     for (pixel, gathers) in plain.film.pixels().iter().zip(gathers(&plain)) {
-        // Of samples that look past the box there is neither.
+        // Samples that look past the box have neither.
         assert_eq!(gathers == 0.0, pixel.albedo == [0.0; 3]);
         assert!([0.0, 1.0, 2.0].contains(&gathers));
     }
@@ -141,7 +141,7 @@ fn every_sample_gathers_that_is_not_interpolated() {
     let [with, without] =
         [&cached, &plain].map(|rendering| f64::from(gathers(rendering).iter().sum::<f32>()));
     assert!(with < without);
-    // The box is Lambertian.
+    // All surfaces of the box are Lambertian.
     let share = cached.statistics.interpolated_share;
     assert!((with - (1.0 - share) * without).abs() < 1e-3, "{with} of {without}, share {share}");
 }
@@ -184,7 +184,7 @@ fn tiles_with_layers_that_no_chip_holds_are_refused_with_a_remedy() {
             assert!(remedy.contains(&format!("choose {most} or less")), "{remedy}");
         }
     }
-    // Layers that the host has in any case ask for no room.
+    // Layers that the host always has take no room.
     for aov in ["albedo,N,Z", "none"] {
         let layers = aov.parse().unwrap();
         render_or_panic(

@@ -1,4 +1,4 @@
-//! The light tree: its two functions agree, nothing is missed, and many lights are no noisier than they need be.
+//! Light tree: sampling and density agree, no light is missed, and many lights add little noise.
 
 use std::ops::Range;
 
@@ -65,7 +65,7 @@ fn receiver(index: u32) -> Receiver {
     Receiver { position, normal, origin: position + normal * 1e-5 }
 }
 
-/// Counts the lines that are read.
+/// Memory that counts the lines read.
 struct Counting<'a> {
     lines: Lines<'a>,
     reads: u64,
@@ -116,20 +116,20 @@ fn the_probabilities_of_all_emitters_sum_to_that_of_finding_one() {
             select_emitter(&image, &mut packed.view().1, &receiver, fraction).unwrap().is_some()
         };
         let found = (0..samples).filter(finds).count() as f64 / f64::from(samples);
-        // None is found where a node's children are all behind, though the node as a whole is not.
+        // No light is found if all children of a node are behind the receiver, though the node as a whole is not.
         assert!((found - sum).abs() < 0.02 && sum < 1.0 + 1e-5, "{found} are found of {sum}");
         assert!(sum > 0.3, "{sum}");
     }
 }
 
-/// The estimate of a number's light on a receiver that nothing shades, W/m^2.
+/// Unshadowed light of one random number on a receiver, W/m^2.
 fn estimate(image: &SceneImage, memory: &mut impl MemoryPort, receiver: &Receiver, index: u32) -> f64 {
     let point = [random(index, 50), random(index, 51)];
     let light = sample_light(image, memory, receiver, point, hash(index)).unwrap();
     light.map_or(0.0, |light| f64::from(light.irradiance.x * light.direction.dot(receiver.normal).max(0.0)))
 }
 
-/// What each emitter alone brings a receiver: each chosen alike, with its share of so many samples.
+/// Unshadowed light of each emitter on a receiver, by an equal share of the samples each.
 fn by_each(scene: &Scene, receiver: &Receiver) -> Vec<f64> {
     scene
         .triangles
@@ -180,7 +180,7 @@ fn ten_thousand_emitters_are_less_noisy_than_by_power_at_a_cost_of_the_trees_dep
         better += u32::from(variance < 0.5 * variance_by_power);
     }
     assert!(better >= 18, "at {better} of 20 receivers the tree has less than half the variance");
-    // Seven levels at the least; the emitter's own line.
+    // The minimum is seven levels, and the emitter's own line.
     let reads = memory.reads as f64 / f64::from(20 * samples);
     assert!(reads < 14.0, "{reads} lines a sample");
 }
@@ -212,7 +212,7 @@ fn the_environments_samples_have_the_density_that_it_tells() {
         agreeing += u32::from((told / density - 1.0).abs() < 1e-5);
         inverse += 1.0 / f64::from(density);
     }
-    // At the borders of cells rounding puts a direction into the next one.
+    // At the borders of cells rounding moves a direction into the next one.
     assert!(agreeing * 1000 > all * 998, "{agreeing} of {all}");
     // The mean of the inverse densities is the solid angle of the sphere.
     let sphere = inverse / 20_000.0;
@@ -236,7 +236,7 @@ fn an_unsound_tree_is_a_fault_and_never_the_end() {
         let mut lines = sound.to_vec();
         for line in &mut lines[of_tree.clone()] {
             for child in line.0.as_chunks_mut::<32>().0 {
-                // From everywhere to all sides.
+                // Everywhere, in all directions.
                 child[12..16].copy_from_slice(&1e9_f32.to_le_bytes());
                 child[28..].copy_from_slice(&link.to_le_bytes());
             }

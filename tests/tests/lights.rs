@@ -1,4 +1,4 @@
-//! Lights of every kind: known radiance on a floor, whichever rays bring it.
+//! Lights of every kind: known radiance on a floor, by any kind of rays.
 
 use std::f64::consts::PI;
 
@@ -18,7 +18,7 @@ fn floor(half: f32, material: u32) -> [Triangle; 2] {
     quad([at(-1.0, 1.0), at(1.0, 1.0), at(1.0, -1.0), at(-1.0, -1.0)], material)
 }
 
-/// A camera that sees little more than one place of the floor.
+/// Camera that sees a small area of the floor.
 fn view(place: Vec3) -> Camera {
     let origin = place + Vec3::new(0.3, 1.0, 0.2);
     Camera { vertical_fov: 0.01, ..camera(origin, place - origin) }
@@ -33,7 +33,7 @@ fn lit_by(kind: PunctualKind, intensity: f32, place: Vec3) -> Scene {
     Scene { lights: vec![light], ..bare_floor(place) }
 }
 
-/// So many rays of each kind a sample.
+/// Settings with `shadow_rays` and `gather_rays` per sample.
 fn settings(shadow_rays: u32, gather_rays: u32) -> RenderSettings {
     RenderSettings {
         picture: Picture { width: 8, height: 8, ..Picture::default() },
@@ -57,7 +57,7 @@ fn check(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64
     assert!(error.abs() <= tolerance, "{found} instead of {expected}: off by {error}");
 }
 
-/// What a floor reflects of an irradiance.
+/// Radiance that a floor reflects of an irradiance.
 fn reflected(irradiance: f64) -> f64 {
     f64::from(ALBEDO) / PI * irradiance
 }
@@ -71,7 +71,7 @@ fn a_point_lights_by_the_cosine_and_the_inverse_square_of_its_distance() {
         let distance = (x * x + height * height).sqrt();
         let expected = reflected(7.0 * height / distance.powi(3));
         check(&lit_by(kind, 7.0, place), &settings(1, 0), expected, 0.005);
-        // Neither do gather rays bring any of it, nor take any.
+        // Gather rays neither add nor remove any of this light.
         check(&lit_by(kind, 7.0, place), &settings(1, 16), expected, 0.005);
     }
 }
@@ -113,7 +113,7 @@ fn a_floor_under_a_constant_environment_shows_its_albedo_of_it() {
     let scene = Scene { environment, ..bare_floor(Vec3::ZERO) };
     let expected = 3.0 * f64::from(ALBEDO);
     check(&scene, &settings(64, 0), expected, 0.01);
-    // Without shadow rays each gather ray brings it by the cosine: exactly.
+    // Without shadow rays gather rays carry this light, cosine-weighted: exactly.
     check(&scene, &settings(0, 16), expected, 1e-4);
     check(&scene, &settings(32, 32), expected, 0.01);
 }
@@ -127,7 +127,7 @@ fn sky() -> Environment {
 
 #[test]
 fn the_eye_sees_the_environment() {
-    // The middle of a texel: row 1, column 4 of 8, beside the map's middle.
+    // The centre of a texel: row 1, column 4 of 8, beside the map's centre.
     let (theta, phi) = (PI * 1.5 / 4.0, 2.0 * PI * (4.5 / 8.0 - 0.5));
     let direction =
         Vec3::new((theta.sin() * phi.sin()) as f32, theta.cos() as f32, -(theta.sin() * phi.cos()) as f32);
@@ -211,7 +211,7 @@ fn a_panel_with_a_fine_texture_lights_as_its_mean_does() {
 
 #[test]
 fn a_white_bowl_under_a_white_sky_is_white() {
-    // All light that a bowl of albedo 1 takes it gives back: whatever is seen has the radiance of the sky.
+    // A bowl of albedo 1 reflects all light it receives: every pixel has the radiance of the sky.
     let at = Vec3::new;
     let ring = [at(-1.0, 0.0, 1.0), at(1.0, 0.0, 1.0), at(1.0, 0.0, -1.0), at(-1.0, 0.0, -1.0)];
     let rim = ring.map(|corner| corner * 1.5 + Vec3::Y);

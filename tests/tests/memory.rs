@@ -1,4 +1,4 @@
-//! The model of a chip's memory: it counts what is read and what its caches miss, and it changes no picture.
+//! Model of a chip's memory: it counts reads and cache misses, and does not change the picture.
 
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
@@ -40,11 +40,11 @@ fn caches(text: &str) -> CacheSettings {
     text.parse().unwrap()
 }
 
-/// Small enough to miss a lot.
+/// Caches small enough to miss often.
 const SPLIT: &str = "photon=16K/128/4,scene=16K/128/4";
 const UNIFIED: &str = "unified=9K/384/3,index=hash";
 
-/// A scene's image, and the tiles of a frame of it.
+/// Image of a scene, and the tiles of a frame of it.
 struct Frame {
     mapped: MappedImage,
     frame: photoncard_shared::message::FrameParameters,
@@ -74,7 +74,7 @@ impl Frame {
     }
 }
 
-/// Writes down the lines that a tile reads, and compares them with the image's.
+/// Memory that records the lines a tile reads, and compares them with the image's.
 struct Recorder<'a, M> {
     memory: M,
     image: &'a [Line],
@@ -145,7 +145,7 @@ fn a_tile_hits_and_misses_as_the_definition_of_its_caches_says() {
     });
 }
 
-/// The caches of a board lie in arrays.
+/// A board's caches are stored in arrays.
 #[test]
 fn a_cache_in_arrays_is_the_cache_in_vectors() {
     with_room_for_a_card(|| {
@@ -231,12 +231,12 @@ fn what_is_counted_does_not_depend_on_how_tiles_are_dealt() {
         assert_eq!(one.written_bytes, statistics.image_bytes);
         for chips in 2..4 {
             let (several, statistics) = measured(&with(&format!("emulated:{chips}")));
-            // The others may have done all tiles before a chip is loaded.
+            // The others may have completed all tiles before a chip is loaded.
             let written = statistics.image_bytes..=chips * statistics.image_bytes;
             assert!(written.contains(&several.written_bytes), "{}", several.written_bytes);
             assert_eq!(MemoryStatistics { written_bytes: one.written_bytes, ..several }, one);
         }
-        // Chips without cards, one for all tiles, the last tile first.
+        // Chips without cards, one for all tiles, in reverse order.
         with_room_for_a_card(|| {
             let frame = Frame::new(&with("emulated:1"));
             let mut chip = Box::new(ReferenceChip::new());

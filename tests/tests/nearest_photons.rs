@@ -1,4 +1,4 @@
-//! The k nearest photons of either layout are those of brute force, whatever the photons.
+//! The k nearest photons in both layouts equal those of a brute-force search, for all kinds of photons.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -11,7 +11,8 @@ use photoncard_shared::layout::{FULL_DISC, Photon, Rgbe};
 use photoncard_tests::{camera, lambertian, room, scene};
 use proptest::prelude::*;
 
-/// An image of an empty room with a photon at every place, in either layout. Photons of one place differ in what they carry.
+/// Images of an empty room with a photon at each position, in both layouts. Photons at one position differ in their
+/// contents.
 fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
     let photons = (0_u16..).zip(places).map(|(index, &position)| Photon {
@@ -29,10 +30,10 @@ fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     [to_kd_tree(image()).unwrap(), image()]
 }
 
-/// What tells a photon from another, as far as it matters.
+/// Part of a photon by which tests distinguish it.
 type Found = (u32, [u8; 2]);
 
-/// Distances and directions of the chip's search, nearest first, whatever instructions it uses.
+/// Distances and directions of the chip's search, nearest first; all instruction sets must agree.
 fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<Found> {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let (scene, mut memory) = image.view();
@@ -57,7 +58,7 @@ fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> V
     first.1
 }
 
-/// The same by looking at every photon.
+/// Result of [`found`] by brute force.
 fn expected(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<Found> {
     let (scene, mut memory) = image.view();
     let photons = scene.header.section(SectionKind::Photons).records;
@@ -95,7 +96,7 @@ fn place(range: f32) -> impl Strategy<Value = [f32; 3]> {
     [-range..range, -range..range, -range..range]
 }
 
-/// Places of a kind: anywhere, in clusters, on a coarse grid (many coincide or lie at one distance), in a plane.
+/// Positions of one kind: random, clustered, on a coarse grid (many coincide or are equidistant), or in a plane.
 fn places() -> impl Strategy<Value = Vec<[f32; 3]>> {
     let random = proptest::collection::vec(place(1.0), 1..400);
     let clustered =

@@ -1,5 +1,5 @@
-//! Precomputed irradiance: it is what the chip's own gather estimates at a photon, the point that a search finds is that of brute
-//! force, and the mean over places is right.
+//! Precomputed irradiance: it equals the chip's own density estimate at a photon, searches find the same points as brute
+//! force, and the mean over positions is right.
 
 use core::f32::consts::PI;
 
@@ -21,10 +21,10 @@ use photoncard_shared::layout::{
 use photoncard_tests::{camera, lambertian, room, scene};
 use proptest::prelude::*;
 
-/// A photon's place and its normal's code.
+/// Position of a photon, and the code of its normal.
 type Placed = ([f32; 3], u8);
 
-/// An image of an empty room with photons of power 1, in either layout, and irradiance points.
+/// Images of an empty room with photons of power 1, in both layouts, with irradiance points.
 fn images(photons: &[Placed], neighbors: u32, max_distance: f32) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
     let photons = photons.iter().map(|&(position, normal)| Photon {
@@ -43,7 +43,7 @@ fn images(photons: &[Placed], neighbors: u32, max_distance: f32) -> [CardImage; 
         .map(|image| precompute_irradiance(image, neighbors, max_distance, &|| true).unwrap())
 }
 
-/// All irradiance points: where, and what they carry.
+/// All irradiance points: positions and contents.
 fn points(image: &CardImage) -> Vec<(Vec3, [u8; PHOTON_CONTENT_BYTES])> {
     let (scene, mut memory) = image.view();
     let kind = SectionKind::IrradianceLeaves;
@@ -56,7 +56,7 @@ fn points(image: &CardImage) -> Vec<(Vec3, [u8; PHOTON_CONTENT_BYTES])> {
     points
 }
 
-/// What the chip's search finds, whatever instructions it uses.
+/// Irradiance that the chip's search finds; all instruction sets must agree.
 fn found(image: &CardImage, position: Vec3, normal: u8, max_distance: f32) -> Vec3 {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let (scene, mut memory) = image.view();
@@ -68,7 +68,7 @@ fn found(image: &CardImage, position: Vec3, normal: u8, max_distance: f32) -> Ve
     first.irradiance
 }
 
-/// The same by looking at every point.
+/// Result of [`found`] by brute force.
 fn expected(image: &CardImage, position: Vec3, normal: u8, max_distance: f32) -> Vec3 {
     let unit = |code: u8| Vec3::from(decode_normal(code)).normalize();
     let nearest = points(image)
@@ -102,7 +102,7 @@ fn place(range: f32) -> impl Strategy<Value = [f32; 3]> {
     [-range..range, -range..range, -range..range]
 }
 
-/// Photons of a kind: anywhere, on a coarse grid (many coincide or lie at one distance), in a plane; of a few surfaces.
+/// Photons of one kind: random, on a coarse grid (many coincide or are equidistant), or in a plane; on a few surfaces.
 fn photons() -> impl Strategy<Value = Vec<Placed>> {
     let random = proptest::collection::vec(place(1.0), 1..400);
     let coincident = proptest::collection::vec([-2_i8..3, -2_i8..3, -2_i8..3], 1..400)
@@ -155,13 +155,14 @@ fn no_photons_one_photon_and_photons_in_one_place_have_as_many_points() {
     assert_eq!(found(&image, Vec3::new(-0.1, -1.0, 0.25), up(), 0.5), Vec3::ZERO);
 }
 
-/// Places on the floor that look random, away from its edges if asked for.
+/// Pseudorandom positions on the floor, within `half_side` of its centre.
 fn floor(count: u32, seed: u32, half_side: f32) -> Vec<[f32; 3]> {
     let coordinate = |i: u32| (hash(hash(seed) ^ i) >> 8) as f32 / 8_388_608.0 - 1.0;
     (0..count).map(|i| [half_side * coordinate(2 * i), -1.0, half_side * coordinate(2 * i + 1)]).collect()
 }
 
-/// At a photon a density estimate of k - 1 photons is too high by about 1 / (k - 2); at the photon nearest to a place it is not.
+/// At a photon a density estimate of k - 1 photons is too high by about 1 / (k - 2); at the photon nearest to a position it
+/// is not.
 #[test]
 fn the_mean_over_places_is_right_though_that_over_photons_is_not() {
     let neighbors = 12;
@@ -189,7 +190,7 @@ fn the_mean_over_places_is_right_though_that_over_photons_is_not() {
     assert!((over_points / too_high - 1.0).abs() < 0.015, "{over_points}");
 }
 
-/// Where a gather finds two or three photons, or none, as much light must be there as everywhere.
+/// Regions where a gather finds at most two or three photons must have the mean light.
 #[test]
 fn little_light_is_lost_or_won_where_photons_are_few() {
     for (count, max_distance) in [(500, 0.05), (500, 0.08), (2000, 0.06)] {
@@ -210,7 +211,8 @@ fn little_light_is_lost_or_won_where_photons_are_few() {
     }
 }
 
-/// An irradiance point is what a gather at its place estimates of all photons that count, but for 16 bits of mantissa.
+/// An irradiance point equals the gather's estimate at its position from all photons that count, except for its 16-bit
+/// mantissa.
 #[test]
 fn a_point_is_the_density_of_the_photons_around_it() {
     let neighbors = 30;

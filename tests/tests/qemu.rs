@@ -1,4 +1,4 @@
-//! The firmware's images on the machines that QEMU emulates render what the emulated card renders, bit for bit.
+//! The firmware's images on machines that QEMU emulates render the same bits as the emulated card.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read, Write};
@@ -18,22 +18,22 @@ use photoncard_firmware::memory::Dram;
 use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
 
-/// How long a machine may take to be built and to start.
+/// Time limit of building and starting a machine.
 const START: Duration = Duration::from_secs(600);
-/// Prints a line that is seen although the test passes.
+/// Prints a line that is visible although the test passes.
 fn say(line: &str) {
-    // Where there is nobody to read it the test goes on.
+    // The test goes on if standard error is closed.
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// A running machine, with its image.
+/// Running machine with its image.
 struct Machine {
     process: Child,
-    /// What QEMU and the image print.
+    /// Output of QEMU and of the image.
     lines: Receiver<String>,
 }
 
-/// Sends the lines of a stream.
+/// Forwards the lines of a stream.
 fn forward(stream: impl Read + Send + 'static, sender: Sender<String>) {
     std::thread::spawn(move || {
         for line in BufReader::new(stream).lines().map_while(Result::ok) {
@@ -45,7 +45,7 @@ fn forward(stream: impl Read + Send + 'static, sender: Sender<String>) {
 }
 
 impl Machine {
-    /// Starts a machine and waits until its image is ready. Returns where its UART is as well.
+    /// Starts a machine and waits until its image is ready. Returns it with the address of its UART.
     fn start(name: &str) -> (Self, CardAddress) {
         let mut process = Command::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("qemu.sh"))
             .args([name, "pty"])
@@ -86,13 +86,13 @@ impl Machine {
 
 impl Drop for Machine {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // The machine may have ended already.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
-/// The Cornell box as a small frame, with as many gather rays as `PHOTONCARD_QEMU_GATHER_RAYS` says.
+/// The Cornell box as a small frame, with `PHOTONCARD_QEMU_GATHER_RAYS` gather rays.
 fn settings() -> RenderSettings {
     let gather_rays = std::env::var("PHOTONCARD_QEMU_GATHER_RAYS").map(|text| text.parse());
     RenderSettings {
@@ -108,7 +108,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// The bad lines that are tried: those that `PHOTONCARD_QEMU_FAULTS` says, with blanks between them.
+/// Bad lines to test: those in `PHOTONCARD_QEMU_FAULTS`, separated by blanks.
 fn faults() -> Vec<LineFaults> {
     let asked = std::env::var("PHOTONCARD_QEMU_FAULTS");
     let asked = asked.as_deref().unwrap_or("flips=1e-4,drops=1e-5,repeats=1e-5,delays=1e-4,seed=1");
@@ -124,7 +124,7 @@ fn renders_as_the_emulated_card(name: &str) {
     let scene = gltf::load(&path).expect("a shipped scene loads");
     let (machine, address) = Machine::start(name);
     let cached = settings().with(|s| s.integrator.irradiance_error = Some(0.1));
-    // Other photons: another image, of which the card has little.
+    // Other photons give another image, of which the card has few lines.
     let mut renders = vec![(settings(), None), (cached, None)];
     for (seed, faults) in (1..).zip(faults()) {
         renders.push((
@@ -154,7 +154,7 @@ fn renders_as_the_emulated_card(name: &str) {
         for (index, (pixel, expected)) in pixels.iter().zip(expected.pixels()).enumerate() {
             assert_eq!(pixel.to_bytes(), expected.to_bytes(), "pixel {index}: {pixel:?}, not {expected:?}");
         }
-        // The image that is there already is not sent again.
+        // An image that is loaded already is not sent again.
         assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, number == 1);
     }
     renders_everything(name, &address);
@@ -185,14 +185,14 @@ fn renders_everything(name: &str, address: &CardAddress) {
     }
 }
 
-/// What the image says over its link that it takes of on-chip memory, after all that it has rendered.
+/// Checks the on-chip memory that the image reports over its link after all renders.
 fn stays_within_the_budget(name: &str, address: &CardAddress) {
     let MemoryUse { static_bytes, stack_bytes, stack_used } =
         card_info(address).expect("the card answers").memory_use.expect("a board measures its memory");
     say(&format!("{name}: {static_bytes} bytes of static data, {stack_used} of {stack_bytes} of stack used"));
     assert!(0 < stack_used && stack_used < stack_bytes && stack_bytes <= MICRO.stack_bytes);
     assert!(static_bytes as usize >= size_of::<MicroCard<Dram<'static>>>() / 2, "32-bit pointers take half");
-    // The images have no caches: the memory that the budget has for them is not theirs.
+    // The images have no caches: the memory that the budget has for caches must stay free.
     let caches = MICRO.photon_cache_bytes + MICRO.scene_cache_bytes;
     assert!(static_bytes + stack_bytes + caches <= MICRO.sram_bytes);
 }

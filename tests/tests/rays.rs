@@ -1,4 +1,4 @@
-//! The ray caster finds what brute force finds, the same bits on every processor, and loses no ray at an edge.
+//! The ray caster agrees with brute force, has equal bits on every processor, and loses no ray at an edge.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -19,7 +19,7 @@ fn packed(triangles: Vec<Triangle>) -> PackedScene {
     PackedScene::new(&scene).expect("packs")
 }
 
-/// A number from 0 to 1 that looks random.
+/// Pseudorandom number in [0, 1].
 fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
 }
@@ -28,13 +28,13 @@ fn random_point(index: u32, dimension: u32) -> Vec3 {
     Vec3::from([0, 1, 2].map(|axis| random(index, dimension + axis))) * 2.0 - 1.0
 }
 
-/// A closed surface: a sphere with dents, of `2 rings^2` triangles about.
+/// Closed surface: a sphere with dents, of about `2 rings^2` triangles.
 fn dented_sphere(center: Vec3, radius: f32, rings: u32) -> Vec<Triangle> {
     let segments = 2 * rings;
     let point = |ring: u32, segment: u32| {
         let polar = core::f32::consts::PI * ring as f32 / rings as f32;
         let around = core::f32::consts::TAU * (segment % segments) as f32 / segments as f32;
-        // The poles are one point each, and the last segment ends at the first.
+        // A pole is a single point, and the last segment ends at the first.
         let (sine, cosine) = match ring {
             0 => (0.0, 1.0),
             _ if ring == rings => (0.0, -1.0),
@@ -58,7 +58,7 @@ fn dented_sphere(center: Vec3, radius: f32, rings: u32) -> Vec<Triangle> {
     triangles
 }
 
-/// Boards that cross each other at right angles, flat in an axis each.
+/// Boards that cross at right angles, each flat along one axis.
 fn boards() -> Vec<Triangle> {
     (0..40)
         .flat_map(|i| {
@@ -69,7 +69,7 @@ fn boards() -> Vec<Triangle> {
         .collect()
 }
 
-/// Rays at random, along axes, in the planes of triangles, at corners and edges, and from far away.
+/// Random rays, along axes, in the planes of triangles, at vertices and edges, and from far away.
 fn rays(triangles: &[Triangle], count: u32) -> Vec<Ray> {
     let unit = |v: Vec3| v.normalize_or(Vec3::X);
     (0..count)
@@ -93,7 +93,7 @@ fn rays(triangles: &[Triangle], count: u32) -> Vec<Ray> {
         .collect()
 }
 
-/// The first triangle of all, by distance and then by index.
+/// First hit of all triangles, by distance and then by index.
 fn brute_force(image: &SceneImage, memory: &mut Lines, ray: &Ray) -> Option<Hit> {
     let frame = RayFrame::new(ray);
     let mut nearest: Option<Hit> = None;
@@ -160,7 +160,7 @@ fn no_ray_leaves_a_closed_surface() {
         for (i, triangle) in (0..).zip(triangles.iter().cycle().take(60_000)) {
             let [a, b, _] = triangle.vertices;
             let origin = center + random_point(i, 10) * (0.3 * radius);
-            // At a corner, at an edge, or near one.
+            // At a vertex, at an edge, or near one.
             let target = match i % 4 {
                 0 => a,
                 1 => a.midpoint(b),

@@ -1,7 +1,7 @@
-//! Pictures against path-traced references, by the means of blocks.
+//! Pictures against path-traced references, by block means.
 //!
-//! A render has a fourth of its reference's pixels each way: a block of 16x16 of the one is a block of 4x4 of the other, as both
-//! have a box filter.
+//! A render has a fourth of its reference's pixels along each axis: a block of 16x16 pixels of the reference is one of 4x4
+//! pixels of the render, as both have a box filter.
 
 use std::path::PathBuf;
 
@@ -15,16 +15,16 @@ use photoncard_tests::render_or_panic;
 
 /// Side of a block of a reference, pixels.
 const BLOCK: usize = 16;
-/// How much smaller than its reference a render is.
+/// Ratio of the reference's side to the render's.
 const SHRUNK: usize = 4;
-/// Blocks whose reference exceeds this see the emitter, and are left out.
+/// Radiance above which a block of the reference sees an emitter and is left out.
 const EMITTER: f32 = 5.0;
 
 fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// Mean of each block over pixels and channels, and the greatest channel in it.
+/// Mean of each block over pixels and channels, and its maximum channel.
 fn blocks(pixels: &[[f32; 3]], width: usize, block: usize) -> Vec<(f64, f32)> {
     let across = width / block;
     let block_of = |index: usize| (index / width / block) * across + (index % width) / block;
@@ -37,7 +37,7 @@ fn blocks(pixels: &[[f32; 3]], width: usize, block: usize) -> Vec<(f64, f32)> {
     blocks
 }
 
-/// Checks the mean, and of the blocks' errors the median and the 95th percentile.
+/// Checks the mean of the picture, and the median and 95th percentile of the blocks' errors.
 fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
     let image: Vec<[f32; 3]> = film.pixels().iter().map(|pixel| pixel.radiance).collect();
     let pairs: Vec<(f64, f64)> = blocks(&image, film.width() as usize, BLOCK / SHRUNK)
@@ -58,7 +58,7 @@ fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
     assert!(high < most_high, "the 95th percentile of the blocks is off by {high}");
 }
 
-/// Checks a scene as it is rendered by default, with all that saves gathers, and with precomputed irradiance.
+/// Checks a scene with default settings, with all techniques that save gathers, and with precomputed irradiance.
 fn check(scene: &str, reference: &str) {
     check_with(scene, reference, Sampling::Reflection, None, Radiance::Density);
     check_with(scene, reference, Sampling::Product, Some(0.025), Radiance::Density);

@@ -1,4 +1,4 @@
-//! A card returns to its link after a bounded piece of work, however much there is to do.
+//! A card polls its link after a bounded amount of work, whatever its task.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -22,7 +22,7 @@ use photoncard_shared::message::{self, Command, Fault, FrameParameters, PROTOCOL
 use photoncard_shared::transport::Transport;
 use photoncard_tests::{camera, lambertian, room, scene, with_room_for_a_card};
 
-/// Memory that holds an image already and counts what is read.
+/// Memory that holds an image and counts reads.
 struct CountingMemory<'a> {
     lines: Vec<Line>,
     reads: &'a Cell<u64>,
@@ -49,14 +49,14 @@ impl CardMemory for CountingMemory<'_> {
     }
 }
 
-/// A host that gives one command after the other, each when the card has nothing to do.
+/// Host that sends one command after another, each once the card is idle.
 struct HostPort<'a> {
     host: Transport,
     commands: VecDeque<Command<'static>>,
     reads: &'a Cell<u64>,
-    /// What had been read when the card last looked at its link.
+    /// Number of reads before the last poll of the link.
     before: u64,
-    /// The most that was read between two looks.
+    /// Maximum number of reads between two polls.
     most: u64,
     tiles: usize,
 }
@@ -91,7 +91,7 @@ impl Port for HostPort<'_> {
     }
 }
 
-/// The most lines that a card reads between two looks at its link, while it renders a tile of a lit room.
+/// Maximum number of lines that a card reads between two polls of its link, while it renders a tile of a lit room.
 fn most_reads(frame: &FrameParameters) -> u64 {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;

@@ -25,7 +25,7 @@ fn check(scene: &str, camera: Option<&str>, assignments: &[&str]) {
 }
 
 fn check_sampling(light: &IndirectLight, sampling: Sampling, reference: &[DVec3]) {
-    // The photons' sampling has rare rays of a great weight: few seeds do not tell its variance.
+    // Sampling by photons has rare rays of great weight: few seeds underestimate its variance.
     const SEEDS: u32 = 120;
     const RAYS: u32 = 32;
     let runs: Vec<Vec<Vec3>> = (100..100 + SEEDS).map(|seed| light.radiance(sampling, RAYS, seed)).collect();
@@ -35,7 +35,7 @@ fn check_sampling(light: &IndirectLight, sampling: Sampling, reference: &[DVec3]
         let values = || runs.iter().map(|run| run[point].as_dvec3().element_sum());
         let mean = values().sum::<f64>() / count;
         let variance = values().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0) / count;
-        // The reference's own rays are as good as so many more seeds, at the least.
+        // Lower bound of the reference's variance: its rays count as further seeds.
         let variance =
             variance * (1.0 + count * RAYS as f64 / 10_000.0) + (1e-4 * expected.element_sum()).powi(2);
         let deviation = mean - expected.element_sum();

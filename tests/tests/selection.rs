@@ -1,4 +1,4 @@
-//! The first candidates that are selected are those that sorting puts first, whatever the candidates.
+//! Selection: the first k candidates equal those of sorting, for all kinds of candidates.
 
 use photoncard_firmware::photon::{Candidate, CandidateBuffer, Selection};
 use photoncard_firmware::simd::Level;
@@ -9,7 +9,7 @@ fn candidate(distance: f32, content: u8) -> Candidate {
     Candidate::new(distance, [content, 0, 0, 0, content / 2, 0, content / 4, 0])
 }
 
-/// Distances as on a surface, and such as no guess or pivot divides well.
+/// Distances as on a surface, and distributions that no guess or pivot divides well.
 fn candidates() -> impl Strategy<Value = Vec<Candidate>> {
     let distance = prop_oneof![
         4 => 0.0_f32..1.0,
@@ -37,7 +37,7 @@ fn candidates() -> impl Strategy<Value = Vec<Candidate>> {
         .prop_map(|pairs| pairs.into_iter().map(|(distance, content)| candidate(distance, content)).collect())
 }
 
-/// The last of the first `count` candidates and what is in their place, whatever instructions select them.
+/// The last of the first `count` candidates, and the selected ones; all instruction sets must agree.
 fn select(candidates: &[Candidate], count: usize) -> (Option<Candidate>, Vec<Candidate>) {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let mut buffer = CandidateBuffer::<600>::new();
@@ -77,7 +77,7 @@ fn more_than_there_are_cannot_be_selected() {
     }
 }
 
-/// An order in which the median of three medians is nearly the least at first: many pivots, then bits.
+/// Order in which the median of three medians is nearly the minimum at first: many pivots, then bits.
 #[test]
 fn a_bad_order_is_selected_too() {
     for length in [300, 512] {

@@ -1,4 +1,4 @@
-//! Settings: the pixels depend on those that a picture's provenance names, and on no others.
+//! Settings: pixels depend on the settings that a picture's provenance names, and on no others.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use photoncard_driver::study::{Point, Scale};
 use photoncard_tests::everything::everything;
 use photoncard_tests::{camera, lambertian, quad, render_or_panic, scene};
 
-/// Settings that no default serves instead of.
+/// Settings that all differ from the defaults.
 fn settings() -> RenderSettings {
     RenderSettings {
         picture: Picture { width: 12, height: 10, ..Picture::default() },
@@ -38,22 +38,22 @@ fn cards(text: &str) -> Vec<CardAddress> {
     vec![text.parse().expect("an address")]
 }
 
-/// What depends on a setting.
+/// Results that depend on a setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Dependence {
-    /// Pixels, and the card image.
+    /// Pixels and the card image.
     Image,
-    /// Pixels alone.
+    /// Pixels only.
     Pixels,
-    /// The card image, and no pixel.
+    /// The card image, but no pixel.
     Layout,
-    /// The work of a chip, and no pixel.
+    /// The work of a chip, but no pixel.
     Work,
     /// Neither pixels nor work.
     Nothing,
 }
 
-/// A change of every field, by its name. The compiler refuses a list that lacks one.
+/// List of one change per field, by name. A list that lacks a field does not compile.
 macro_rules! changes {
     ($($group:ident: $type:ident { $($field:ident: $dependence:ident = $value:expr),+ $(,)? })+) => {{
         let RenderSettings { $($group: $type { $($field: _),+ }),+ } = settings();
@@ -106,7 +106,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
         }
         outputs: TileOutputs {
             partial: Nothing = Some(PartialSettings { path: folder.join("a.exr.partial"), resume: false }),
-            // Nobody listens there.
+            // No server listens at this address.
             display: Nothing = Some(DisplaySettings {
                 address: "127.0.0.1:1".parse().expect("an address"),
                 image: "a.exr".to_owned(),
@@ -121,7 +121,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
     changes
 }
 
-/// The scene with everything, seen by two cameras.
+/// Scene with every feature, seen by two cameras.
 fn with_two_cameras() -> Scene {
     let mut scene = everything();
     let mut second = scene.cameras[0].clone();
@@ -131,7 +131,7 @@ fn with_two_cameras() -> Scene {
     scene
 }
 
-/// The bits of all that a film holds, with its size and window.
+/// Bits of a film's contents, size and window.
 fn bits(film: &Film) -> Vec<u32> {
     let window = film.window();
     let size = [film.width(), film.height(), window.x0, window.x1, window.y0, window.y1];

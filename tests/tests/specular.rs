@@ -1,5 +1,4 @@
-//! Mirrors and glass of known radiance, on every path of light: what the eye sees in them, what gather rays bring through
-//! them, and the caustics that they cast.
+//! Mirrors and glass of known radiance, on every path of light: seen by eye rays, by gather rays, and as caustics.
 
 use glam::Vec3;
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
@@ -11,7 +10,7 @@ use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_pani
 
 const EMISSION: f32 = 1.0;
 const ALBEDO: f32 = 0.5;
-/// Of a closed room whose walls emit [`EMISSION`] and reflect [`ALBEDO`].
+/// Radiance of a closed room whose walls emit [`EMISSION`] and reflect [`ALBEDO`].
 const FURNACE: f64 = (EMISSION / (1.0 - ALBEDO)) as f64;
 
 fn settings() -> RenderSettings {
@@ -50,14 +49,14 @@ fn glass(is_volume: bool, absorption: f32) -> Material {
     Material::new("glass", reflection)
 }
 
-/// The share of light that a face of that glass reflects at normal incidence.
+/// Reflectance of a glass surface at normal incidence.
 const FACE: f64 = 0.04;
 
 fn wall() -> Material {
     Material { emission: Vec3::splat(EMISSION), ..lambertian("wall", ALBEDO) }
 }
 
-/// A closed room of one radiance, with something in it.
+/// Closed room of uniform radiance with an object in it.
 fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Scene {
     let view = camera(Vec3::new(0.1, 0.05, 0.9), Vec3::new(-0.1, -0.05, -1.0));
     let mut scene = scene(room([0; 6]), vec![wall(), thing], view);
@@ -65,7 +64,7 @@ fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Scene {
     scene
 }
 
-/// Checks the mean over the picture, and that over each of its 8x8 blocks.
+/// Checks the mean over the picture, and over each of its 8x8 blocks.
 fn shows(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64) {
     let all = radiances(&render_or_panic(scene, settings).film);
     let error = mean(&all) / expected - 1.0;
@@ -78,8 +77,8 @@ fn shows(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64
     }
 }
 
-/// Whatever reflects or lets through all light is not to be seen in a room of one radiance, and the walls around it, that
-/// light comes to by way of it, are no darker and no brighter.
+/// An object without loss is invisible in a room of uniform radiance, and the walls, which receive light through it, are
+/// neither darker nor brighter.
 #[test]
 fn nothing_that_loses_no_light_shows_in_a_furnace() {
     let ball = |scene: &mut Scene| add_ball(scene, Vec3::new(-0.2, -0.1, 0.0), 0.4, 24, 1);
@@ -88,12 +87,12 @@ fn nothing_that_loses_no_light_shows_in_a_furnace() {
     shows(&furnace_with(glass(true, 0.0), block), &settings(), FURNACE, 0.03);
     shows(&furnace_with(mirror(1.0), ball), &settings(), FURNACE, 0.04);
     shows(&furnace_with(glass(true, 0.0), ball), &settings(), FURNACE, 0.04);
-    // Gather rays bring what the caustic map would.
+    // Gather rays carry the light that the caustic map would.
     let without_map = settings().with(|s| s.photons.caustic_photons = Some(0));
     shows(&furnace_with(glass(true, 0.0), ball), &without_map, FURNACE, 0.04);
 }
 
-/// A picture of one small part of what is in front of the camera, at the origin, from the distance 1.
+/// Mean of a picture of a small area in front of the camera, at the origin, from distance 1.
 fn glance(triangles: Vec<photoncard_driver::scene::Triangle>, materials: Vec<Material>, from: Vec3) -> f64 {
     let mut view = camera(from, -from);
     view.vertical_fov = 0.02;
@@ -107,7 +106,7 @@ fn glance(triangles: Vec<photoncard_driver::scene::Triangle>, materials: Vec<Mat
     mean(&radiances(&render_or_panic(&scene, &settings).film))
 }
 
-/// A wall that emits, in the plane z = `z`, turned to +z; or to -z, if `sign` is -1.
+/// Emitting wall in the plane z = `z`, facing +z; or -z, if `sign` is -1.
 fn lamp(z: f32, sign: f32) -> [photoncard_driver::scene::Triangle; 2] {
     let corner = |x: f32, y: f32| Vec3::new(x * sign, y, z);
     quad([corner(-9., -9.), corner(9., -9.), corner(9., 9.), corner(-9., 9.)], 0)
@@ -154,7 +153,7 @@ fn a_mirror_shows_its_reflectance_at_the_angle_it_is_seen_at() {
     }
 }
 
-/// Seen from within glass a surface has the square of the index of refraction times the radiance that it shows outside.
+/// From within glass a surface has its radiance outside times the square of the index of refraction.
 #[test]
 fn what_is_inside_of_glass_shows_its_radiance_over_the_square_of_the_index() {
     let mut triangles = cuboid(Vec3::ZERO, Vec3::new(1.0, 1.0, 0.2), 1);
@@ -165,7 +164,7 @@ fn what_is_inside_of_glass_shows_its_radiance_over_the_square_of_the_index() {
     assert!((seen / expected - 1.0).abs() < 0.01, "{seen} instead of {expected}");
 }
 
-/// Light of a lamp behind a pane falls on a floor as a caustic alone: what the pane leaves of it.
+/// Light of a lamp behind a pane reaches a floor as a caustic alone, reduced by the pane's transmittance.
 #[test]
 fn a_caustic_through_a_pane_is_the_lamp_dimmed() {
     let square = |half: f32, y: f32, sign: f32, material: u32| {
@@ -183,12 +182,12 @@ fn a_caustic_through_a_pane_is_the_lamp_dimmed() {
         let scene = scene(triangles, vec![black_lamp(), floor.clone(), glass(false, 0.0)], view);
         mean(&radiances(&render_or_panic(&scene, &settings().with(|s| s.integrator.gather_rays = 0)).film))
     };
-    // Most light comes steeply: the pane leaves little less than at normal incidence.
+    // Most light is near normal incidence, so the mean transmittance is little less than there.
     let share = look(true) / look(false);
     assert!((0.88..0.925).contains(&share), "{share}");
 }
 
-/// A coat or a mirror alone casts no caustic on anything: what it shows is the sky, and what its base reflects of it.
+/// A coat or a mirror alone casts no caustic on any surface: it shows the sky, and its base's reflection of the sky.
 #[test]
 fn specular_things_alone_under_a_sky_show_it() {
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
@@ -216,7 +215,7 @@ fn specular_things_alone_under_a_sky_show_it() {
     }
 }
 
-/// A texture may say that what the factors make a metal is glass.
+/// A texture may turn a metal by its factors into glass.
 #[test]
 fn where_a_texture_says_that_there_is_no_metal_glass_lets_light_through() {
     let texel = |blue: u8| {

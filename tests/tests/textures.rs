@@ -1,4 +1,4 @@
-//! Textures, colours and normals of corners, and cut-outs, where what they must show is known.
+//! Textures, vertex colours, vertex normals and cut-outs of known appearance.
 
 use glam::Vec3;
 use photoncard_driver::film::Film;
@@ -31,7 +31,7 @@ fn with_texture(mut scene: Scene, image: Image, texture: Texture) -> Scene {
     scene
 }
 
-/// A square of side 2 in the plane z = 0 that faces the camera and fills the picture, with texture coordinates of 0 to 1 from
+/// Square of side 2 in the plane z = 0 that faces the camera and fills the picture, with texture coordinates of 0 to 1 from
 /// the upper left corner.
 fn canvas(material: Material) -> Scene {
     let mut view = camera(Vec3::Z, Vec3::NEG_Z);
@@ -100,7 +100,7 @@ fn textured_room(wall: Material) -> Scene {
     scene
 }
 
-/// A closed room whose walls reflect what a texture, colours of corners, or both say.
+/// Closed room whose albedo comes from a texture, vertex colours, or both.
 fn furnace(albedo: f32, texel: u8, colour: f32) -> Scene {
     let wall = Material {
         emission: Vec3::ONE,
@@ -111,7 +111,7 @@ fn furnace(albedo: f32, texel: u8, colour: f32) -> Scene {
     for attributes in &mut scene.attributes {
         attributes.colours = [[colour, colour, colour, 1.0]; 3];
     }
-    // Two texels that repeat, mirrored one way: one light, one dark, of a known mean nowhere but in the mean.
+    // Two repeated texels, mirrored along one axis: one light, one dark; only their mean is known.
     let repeated = Texture { wrap: [Wrap::Mirror, Wrap::Repeat], ..Texture::new(0) };
     with_texture(scene, image(3, Encoding::Linear, vec![[texel; 4]; 6]), repeated)
 }
@@ -126,7 +126,8 @@ fn a_textured_furnace_glows_evenly() {
     }
 }
 
-/// What a texture's green and blue say of roughness and metalness: metal of roughness 0.3 here, a dull dielectric there.
+/// A texture's green and blue are roughness and metalness: metal of roughness 0.3 in one half, a rough dielectric in the
+/// other.
 #[test]
 fn roughness_and_metalness_follow_their_texture() {
     let reflection = Reflection::MetallicRoughness {
@@ -145,7 +146,7 @@ fn roughness_and_metalness_follow_their_texture() {
     scene.triangles.extend(quad([corner(-9., -9.), corner(9., -9.), corner(9., 9.), corner(-9., 9.)], 1));
     let film = film(&scene);
     let albedo = |x: usize| Vec3::from(film.pixels()[24 * 48 + x].albedo);
-    // What the coat reflects of normal and of grazing reflectance: the firmware's fit.
+    // Reflectance of the coat from normal and grazing reflectance: the firmware's fit.
     let coat = |alpha: f32| {
         let grazing = 1.0 + 1.5 * alpha + 19.5 * alpha * alpha;
         [20.0 / 21.0 / (1.0 + 1.6 * alpha * alpha), 1.0 / 21.0 / grazing]
@@ -159,8 +160,8 @@ fn roughness_and_metalness_follow_their_texture() {
     assert!((albedo(37) - dull).abs().max_element() < 1e-3, "{}", albedo(37));
 }
 
-/// A mirror by its factors, of which a texture leaves no metal, is Lambertian: photons lie on it, and the areas of their discs are
-/// measured. One of which a texture leaves all is a mirror.
+/// A mirror by its factors whose texture makes it a dielectric is Lambertian: photons are stored on it, and their disc
+/// fractions measured. One whose texture leaves it a metal is a mirror.
 #[test]
 fn a_texture_decides_what_a_mirror_is() {
     let film = |metallic, texture: Option<u8>| {
@@ -188,7 +189,7 @@ fn a_texture_decides_what_a_mirror_is() {
     assert_eq!(film(1.0, Some(255)), film(1.0, None), "all metal is left");
 }
 
-/// A lattice before a lamp: what is cut out lets eye rays, shadow rays, gather rays and photons through.
+/// A lattice before a lamp: eye rays, shadow rays, gather rays and photons pass where it is cut out.
 #[test]
 fn where_alpha_cuts_out_there_is_nothing() {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
@@ -210,7 +211,7 @@ fn where_alpha_cuts_out_there_is_nothing() {
         mean(&radiances(&render_or_panic(&scene, &settings().with(|s| s.integrator.samples = 1)).film))
     };
     let [closed, open] = [[255; 4], [0; 4]].map(sky);
-    // Photons above it, on the walls, are gathered a little below as well.
+    // Photons on the walls above it are gathered a little below it as well.
     assert!(closed < 0.01 * open, "{closed} of {open}");
     let half = sky([0, 255, 255, 0]);
     let bare = {
@@ -222,7 +223,7 @@ fn where_alpha_cuts_out_there_is_nothing() {
     assert!(half > 0.15 * open && half < 0.5 * open, "{half} of {open}");
 }
 
-/// The normals that the eye sees are those of the ball, however few its faces are.
+/// Interpolated normals equal the ball's, however few its faces are.
 #[test]
 fn smooth_normals_are_interpolated_between_corners() {
     let mut ball = scene(Vec::new(), vec![Material { emission: Vec3::ONE, ..lambertian("ball", 0.0) }], {
@@ -235,18 +236,18 @@ fn smooth_normals_are_interpolated_between_corners() {
     let mut places = 0;
     for (index, pixel) in film(&ball).pixels().iter().enumerate() {
         let [x, y] = [index % 48, index / 48].map(|i| (i as f32 + 0.5) / 24.0 - 1.0);
-        // Towards the edge of the ball a facet lies far behind it.
+        // Near the silhouette of the ball facets lie far behind it.
         if x * x + y * y > 0.4 {
             continue;
         }
         places += 1;
         let direction = Vec3::new(x * 0.2_f32.tan(), -y * 0.2_f32.tan(), -1.0).normalize();
-        // Where the ray meets the ball of radius 1.
+        // Intersection of the ray with the ball of radius 1.
         let along = 4.0 * -direction.z;
         let position =
             Vec3::new(0.0, 0.0, 4.0) + direction * (along - (along * along - 15.0).max(0.0).sqrt());
         worst = worst.max((Vec3::from(pixel.normal).normalize() - position).length());
     }
-    // A facet's own normal is off by up to 0.13.
+    // The geometric normal of a facet deviates by up to 0.13.
     assert!(worst < 0.03 && places > 600, "{worst} at {places} places");
 }

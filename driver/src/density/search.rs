@@ -58,8 +58,8 @@ impl<'a> Searcher<'a> {
     }
 }
 
-/// Automatic maximum distance of gathers, metres: the 95th percentile of the distance of the k-th neighbour, `k =
-/// neighbors`.
+/// Automatic maximum distance of gathers, metres: the 95th percentile of the distance of the k-th neighbour,
+/// `k = neighbors`.
 ///
 /// # Errors
 /// If the image is malformed.

@@ -47,8 +47,8 @@ pub enum FrameError {
         /// Gathers that the frame may have: gather rays of all pixels and samples.
         gathers: u64,
     },
-    /// The image is not sound.
-    #[error("the card image is not sound: {0}")]
+    /// Error of a malformed image.
+    #[error("the card image is malformed: {0}")]
     Image(Fault),
     /// The threads cannot be started.
     #[error("the chips could not be started: {0}")]

@@ -37,7 +37,7 @@ pub enum PhotonError {
         max_distance: f32,
     },
     /// Error of a packed scene that is malformed.
-    #[error("the packed scene is not sound: {0:?}")]
+    #[error("the packed scene is malformed: {0:?}")]
     Unsound(Fault),
     /// Error of an image that is too large with its photons.
     #[error(transparent)]

@@ -78,8 +78,8 @@ fn longest_side(photons: &[StoredPhoton]) -> usize {
     (0..3).max_by_key(side).unwrap_or(0)
 }
 
-/// Calls `put` for every node of a balanced tree with its index in the heap, where the children of `i` are `2 i + 1` and `2
-/// i + 2`.
+/// Calls `put` for every node of a balanced tree with its index in the heap, where the children of `i` are `2 i + 1` and
+/// `2 i + 2`.
 fn for_each_in_heap(photons: &[StoredPhoton], put: &mut impl FnMut(usize, StoredPhoton)) {
     // Subtrees to visit: the heap index of each root, and the photons in-order.
     let mut waiting = vec![(0, photons)];

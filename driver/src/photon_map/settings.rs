@@ -37,5 +37,5 @@ pub enum PhotonLayout {
 
 choices!(PhotonLayout {
     Jensen = "jensen": "A left-balanced kd-tree of 20-byte photons",
-    Lines = "lines": "Leaves that fill a line of memory each",
+    Lines = "lines": "Leaves of one memory line each",
 });

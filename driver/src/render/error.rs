@@ -68,7 +68,7 @@ pub enum RenderError {
     #[diagnostic(transparent)]
     Photons(PhotonError),
     /// Error of a malformed image, though it was just packed.
-    #[error("the packed card image is not sound: {0}")]
+    #[error("the packed card image is malformed: {0}")]
     #[diagnostic(help("this is a fault of the program: please report it with the scene"))]
     Image(Fault),
     /// Error of the last card that was left.

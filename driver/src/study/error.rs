@@ -7,10 +7,10 @@ use super::store::StoreError;
 use crate::error::SceneError;
 use crate::render::RenderError;
 
-/// Error that leaves a study without a report.
+/// Error that prevents a report.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum StudyError {
-    /// The folder of scenes lacks a scene.
+    /// Error of a scene that is missing from the folder of scenes.
     #[error("cannot find the scene {scene} in the folder {}", folder.display())]
     #[diagnostic(help(
         "give the folder of photoncard's own scenes with --scenes; they are in `scenes` of its sources"
@@ -21,23 +21,23 @@ pub enum StudyError {
         /// The folder of scenes.
         folder: PathBuf,
     },
-    /// A scene cannot be used.
+    /// Error of a scene that cannot be used.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
-    /// A point cannot be measured.
+    /// Error of a point that cannot be measured.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Render(#[from] RenderError),
-    /// A finished point cannot be stored, or the store's folder cannot be made.
+    /// Error of a finished point that cannot be stored, or of the store's folder.
     #[error("{0}")]
     #[diagnostic(help("choose another folder with --out, or make room in it"))]
     Store(#[from] StoreError),
-    /// The report cannot be written.
+    /// Error of writing the report.
     #[error("{0}")]
     #[diagnostic(help("choose another folder with --out, or make room in it"))]
     Report(#[from] ReportError),
-    /// The chips' threads cannot be started.
+    /// Error of starting the chips' threads.
     #[error("the chips' threads could not be started: {0}")]
     #[diagnostic(help("use fewer with --threads"))]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -25,10 +25,10 @@ pub trait StudyObserver: Sync {
     /// was read from the store.
     fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
 
-    /// Reports, as a sentence, why a stored point cannot be used; the point is measured anew.
+    /// Reports, as a sentence, the reason why a stored point cannot be used; the point is measured again.
     fn notice(&self, text: &str);
 
-    /// Returns whether the study is to stop as soon as possible.
+    /// Returns whether the study should stop as soon as possible.
     fn is_stopped(&self) -> bool;
 }
 
@@ -201,7 +201,7 @@ impl<'a> Laboratory<'a> {
         if let Some(last) = self.last.take_if(|last| last.key == key) {
             return Ok(last);
         }
-        // Dropped first: two images may not fit into memory.
+        // The previous image is dropped first: two images may not fit into memory.
         self.last = None;
         let mut scene = self.load(point.scene)?.scene.clone();
         for assignment in &point.assignments {

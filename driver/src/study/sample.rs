@@ -1,9 +1,9 @@
 //! Stratified sample of a picture's tiles, and estimates of totals from it.
 //!
-//! Tiles are sorted along the Z-order curve of their centres and cut into as many strata (*stretches*) as there are
-//! tiles to choose, of equal size but for one tile; a hash chooses one tile of each, which stands for its stretch. So a
-//! sample is spread over the picture whatever the shape of the tiles, does not alias with regular patterns of the
-//! scene, and is the same in every run.
+//! Tiles are sorted along the Z-order curve of their centres and cut into as many strata (*stretches*) as there are tiles
+//! to choose, of equal size except for one tile. A hash chooses one tile of each stretch, which represents it. The sample
+//! is thus spread over the picture whatever the shape of the tiles, does not alias with regular patterns of the scene, and
+//! is reproducible.
 
 use std::fmt;
 use std::str::FromStr;
@@ -58,7 +58,7 @@ impl FromStr for SampleRate {
 pub struct Chosen {
     /// The tile.
     pub tile: Tile,
-    /// Tiles of the picture that the tile stands for: the size of its stretch.
+    /// Weight: number of tiles in the stretch that the tile represents.
     pub stands_for: usize,
 }
 

@@ -19,11 +19,11 @@ use crate::output::{self, OutputError, kind_of};
 /// Name of the points' folder within the study's folder.
 const POINTS: &str = "points";
 
-/// Error of the store of points.
+/// Error of the store.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StoreError {
-    /// The folder cannot be made.
+    /// Error of creating the folder.
     #[error("cannot create the folder {}; check the permissions of the folder that it is to be in", folder.display())]
     Folder {
         /// The folder.
@@ -32,7 +32,7 @@ pub enum StoreError {
         #[source]
         source: io::Error,
     },
-    /// The name is not a portable file name.
+    /// Error of a name that is not a portable file name.
     #[error(
         "'{name}' cannot name a point; use up to 100 letters, digits, '-' and '.', the first and the last of them no dot"
     )]
@@ -40,7 +40,7 @@ pub enum StoreError {
         /// The name.
         name: String,
     },
-    /// JSON cannot hold the result.
+    /// Error of a result that JSON cannot represent.
     #[error("the result of the point '{name}' cannot be kept as JSON; its maps must have text for keys")]
     NotJson {
         /// The point's name.
@@ -90,7 +90,7 @@ impl PointStore {
     pub fn get<T: DeserializeOwned>(&mut self, name: &str, key: &Value) -> Option<T> {
         let path = self.path(name, key).ok()?;
         let read = match fs::metadata(&path).map(|found| kind_of(found.file_type())) {
-            // A pipe would be waited for.
+            // Reading a pipe would block.
             Ok(Some(kind)) => Err(format!("is a {kind}")),
             Ok(None) => match fs::read(&path) {
                 Err(error) => Err(format!("cannot be read ({error})")),
@@ -127,7 +127,7 @@ impl PointStore {
         Ok(output::write(&path, &bytes)?)
     }
 
-    /// Sentences for people on the files that [`Self::get`] could not use.
+    /// Sentences about the files that [`Self::get`] could not use.
     pub fn notices(&self) -> &[String] {
         &self.notices
     }

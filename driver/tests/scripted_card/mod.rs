@@ -1,4 +1,4 @@
-//! A card of which a test says what it answers.
+//! Scripted card: a test defines its answers.
 
 use photoncard_firmware::kind::MICRO;
 use photoncard_shared::frame::MAX_PAYLOAD;
@@ -6,14 +6,14 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, Command, PROTOCOL_VERSION, Reply};
 use photoncard_shared::transport::Transport;
 
-/// What a card answers to a command, if anything.
+/// Answer of a card to a command, if any.
 pub(crate) type Answer = fn(&Command) -> Option<Reply<'static>>;
 
-/// The other end of a session: what it answers is up to a function of the command.
+/// Card whose answers are a function of the command.
 pub(crate) struct Card {
     transport: Transport,
     answer: Answer,
-    /// Whether it was given a frame.
+    /// True once a frame was received.
     pub(crate) has_frame: bool,
 }
 
@@ -22,7 +22,7 @@ impl Card {
         Self { transport: Transport::card(), answer, has_frame: false }
     }
 
-    /// Takes what has come and answers it. Returns what it sends.
+    /// Receives bytes and answers them. Returns the bytes to send.
     pub(crate) fn step(&mut self, mut bytes: &[u8]) -> Vec<u8> {
         while !bytes.is_empty() {
             let (taken, _) = self.transport.receive(bytes);
@@ -46,7 +46,7 @@ impl Card {
     }
 }
 
-/// The answers of a card that takes any image and renders no tile.
+/// Answers of a card that accepts any image and renders no tile.
 pub(crate) fn sound(command: &Command) -> Option<Reply<'static>> {
     match command {
         Command::Hello { .. } => Some(Reply::Hello {

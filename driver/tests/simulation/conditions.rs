@@ -1,4 +1,4 @@
-//! The conditions of a run: its cards, and what befalls them and their lines.
+//! Conditions of a run: its cards, and the faults of cards and lines.
 
 use std::collections::HashMap;
 
@@ -8,21 +8,21 @@ use crate::liar::Lie;
 use crate::line::Faults;
 use crate::world::Fixture;
 
-/// A run.
+/// Conditions of a run.
 #[derive(Clone)]
 pub(crate) struct Run<'a> {
     pub(crate) fixture: &'a Fixture,
     pub(crate) faults: Faults,
     pub(crate) cards: usize,
-    /// Cards, the first ones, that never do anything.
+    /// Number of cards, the first ones, that never act.
     pub(crate) stopped: usize,
-    /// The tiles at which every card crashes.
+    /// Tiles at which every card crashes.
     pub(crate) poison: Vec<u32>,
-    /// What cards lie, and about one of how many tiles.
+    /// Wrong pixels that cards send, and the share of tiles concerned: one of this number.
     pub(crate) liars: HashMap<CardNumber, (Lie, u32)>,
-    /// Of how many steps of its work at tiles a card does one; `None` if it does none.
+    /// Slowdown of cards: a card does one of this number of steps of its work on tiles; `None` if it does none.
     pub(crate) lazy: HashMap<CardNumber, Option<usize>>,
-    /// The share of the tiles that is verified.
+    /// Share of the tiles that is verified.
     pub(crate) verify: Option<f64>,
     pub(crate) seed: u32,
 }

@@ -1,4 +1,4 @@
-//! What a card says, as it says it or altered: lies that a card's memory or its maker may tell.
+//! Falsified output of a card, as by bad memory or altered firmware.
 
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::frame::{Frame, FrameReader, MAX_FRAME, MAX_PAYLOAD, write_frame};
@@ -6,17 +6,17 @@ use photoncard_shared::message::{self, PIXEL_BYTES, Reply};
 
 use crate::line::Random;
 
-/// A lie about a pixel.
+/// Falsification of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Lie {
-    /// A number of a pixel's record has a value that is not possible.
+    /// An impossible value of one number in a pixel's record.
     Impossible { number: usize, value: f32 },
-    /// Red is brighter by a factor.
+    /// Red multiplied by a factor.
     Brighter(f32),
 }
 
 impl Lie {
-    /// A lie that shows in the pixel itself.
+    /// Falsification that the pixel itself reveals.
     pub(crate) fn impossible(random: &mut Random) -> Self {
         const LIES: [(usize, f32); 10] = [
             (0, f32::NAN),
@@ -40,7 +40,7 @@ impl Lie {
             Self::Impossible { number, value } => (number, value),
             Self::Brighter(factor) => {
                 let red = f32::from_le_bytes(pixel[word(0)].try_into().unwrap());
-                // A dark pixel would be as dark.
+                // A factor would not change a black pixel.
                 (0, (red + 1e-3) * factor)
             }
         };
@@ -48,14 +48,14 @@ impl Lie {
     }
 }
 
-/// A card's voice: reads the frames that it sends, and sends them on.
+/// Filter of a card's output, which parses its frames and forwards them.
 pub(crate) struct Voice {
     reader: FrameReader,
-    /// What it lies, and about which share of the tiles: one of so many.
+    /// Falsification, and the share of tiles concerned: one of this number.
     pub(crate) lie: Option<(Lie, u32)>,
-    /// Bytes of whole frames that are to be sent.
+    /// Bytes of whole frames to be sent.
     pub(crate) said: Vec<u8>,
-    /// Tiles that it has said to be done, from the oldest.
+    /// Tiles reported as done, the oldest first.
     pub(crate) done: Vec<u32>,
 }
 
@@ -64,12 +64,12 @@ impl Voice {
         Self { reader: FrameReader::new(), lie: None, said: Vec::new(), done: Vec::new() }
     }
 
-    /// Whether it lies about a tile.
+    /// Falsification of a tile, if any.
     fn lies_about(&self, tile: u32) -> Option<Lie> {
         self.lie.filter(|(_, one_of)| hash(tile).is_multiple_of(*one_of)).map(|(lie, _)| lie)
     }
 
-    /// Takes what the card sends.
+    /// Processes bytes that the card sends.
     pub(crate) fn hear(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.read(bytes);

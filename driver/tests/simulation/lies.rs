@@ -1,4 +1,4 @@
-//! Cards that lie, and cards that are lazy, among others: the picture is right, or an error names the card.
+//! Cards with falsified pixels, and slow cards, among others: the picture is right, or an error names the card.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -13,18 +13,18 @@ use crate::run::{End, Outcome};
 use crate::world::Fixture;
 use crate::{seeds, with_room_for_a_card};
 
-/// Runs of each test, if nothing else is asked for.
+/// Default seeds of each test.
 const SEEDS: Range<u32> = 1..100;
 
-/// Checks that all tiles that the sinks have are right.
+/// Checks that all tiles in the sinks are right.
 fn check_tiles(outcome: &Outcome, alone: &Outcome, seed: u32) {
     for (id, tile) in &outcome.tiles {
-        // How gathers wait is not a matter of the picture.
+        // Some counters depend on the capacity of the queue, not on the picture.
         assert!(tile.records() == alone.tiles[id].records(), "seed {seed}: a lie about tile {id} is kept");
     }
 }
 
-/// Checks the runs of all seeds against the run of one card without faults, each with random numbers of its own.
+/// Checks the runs of all seeds against the run of one card without faults; each has random numbers of its own.
 fn check_seeds(salt: u32, mut check: impl FnMut(&Fixture, &Outcome, u32, &mut Random)) {
     let fixture = Fixture::new();
     let alone = Run::new(&fixture, 1, 0).go();
@@ -33,7 +33,7 @@ fn check_seeds(salt: u32, mut check: impl FnMut(&Fixture, &Outcome, u32, &mut Ra
     }
 }
 
-/// Cards of a seed: of the first, some lie and some are lazy.
+/// Cards of a seed: some of the first ones falsify pixels, some are slow.
 fn troubled<'a>(fixture: &'a Fixture, seed: u32, random: &mut Random) -> Run<'a> {
     let cards = 2 + random.below(5);
     let troubled = 1 + random.below(cards - 1);
@@ -70,7 +70,7 @@ fn impossible_values_and_laziness_never_reach_the_picture_nor_stop_it() {
     });
 }
 
-/// Lies and laziness among resets, stalls and bad lines.
+/// Falsified pixels and slow cards among resets, stalls and bad lines.
 #[test]
 fn liars_and_lazy_cards_among_faults_end_in_the_picture_or_in_words() {
     with_room_for_a_card(|| {
@@ -96,7 +96,7 @@ fn liars_and_lazy_cards_among_faults_end_in_the_picture_or_in_words() {
     });
 }
 
-/// Some of the cards lie what no chip's limits tell, each in its own way.
+/// Falsifications within the range of valid pixels, a different one for each card.
 fn plausible(cards: usize, liars: usize, random: &mut Random) -> HashMap<CardNumber, (Lie, u32)> {
     let lie = |card: usize| (card, (Lie::Brighter(1.5 + card as f32), 1 << random.below(4)));
     (0..liars.min(cards)).map(lie).collect()
@@ -143,7 +143,7 @@ fn verified_lies_are_outvoted_or_named() {
     });
 }
 
-/// Of a card that is caught nothing stays in the picture, whatever part of its tiles was verified.
+/// No pixel of a detected card stays in the picture, whatever share of its tiles was verified.
 #[test]
 fn what_a_caught_liar_has_rendered_is_rendered_again() {
     with_room_for_a_card(|| {
@@ -173,7 +173,7 @@ fn what_a_caught_liar_has_rendered_is_rendered_again() {
     });
 }
 
-/// A card that answers and never renders takes no more time than the others need for its tiles, and some tiles' time.
+/// A card that answers but never renders delays a render by the time of some tiles only.
 #[test]
 fn a_lazy_card_holds_up_a_render_for_some_tiles_time() {
     with_room_for_a_card(|| {

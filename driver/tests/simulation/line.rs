@@ -1,10 +1,10 @@
-//! Links that harm bytes as a seed decides.
+//! Links that damage bytes at random, as determined by a seed.
 
 use std::collections::VecDeque;
 
 use photoncard_firmware::sampler::hash;
 
-/// Numbers that a seed decides.
+/// Random numbers of a seed.
 pub(crate) struct Random(pub(crate) u32);
 
 impl Random {
@@ -19,7 +19,7 @@ impl Random {
     }
 }
 
-/// What a line does to a million bytes, and what happens to cards in a million of their steps.
+/// Rates of faults: of lines per million bytes, of cards per million steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Faults {
     pub(crate) flips: usize,
@@ -31,7 +31,7 @@ pub(crate) struct Faults {
 }
 
 impl Faults {
-    /// Some faults, many of them or few.
+    /// Random faults, frequent or rare.
     pub(crate) fn of(random: &mut Random) -> Self {
         let rates = [0, 1, 10, 100, 1000];
         let lines = |random: &mut Random| rates[random.below(rates.len())];
@@ -48,7 +48,7 @@ impl Faults {
     }
 }
 
-/// One direction of a link: it holds few bytes, and may harm them.
+/// One direction of a link: a queue of small capacity, which may damage bytes.
 pub(crate) struct Queue {
     pub(crate) bytes: VecDeque<u8>,
     capacity: usize,
@@ -56,11 +56,11 @@ pub(crate) struct Queue {
 
 impl Queue {
     pub(crate) fn new(random: &mut Random) -> Self {
-        // From hardly any to more than a frame.
+        // From one byte to more than a frame.
         Self { bytes: VecDeque::new(), capacity: 1 << random.below(13) }
     }
 
-    /// Takes the first of `bytes`, at most `most`; returns how many.
+    /// Appends the first of `bytes`, at most `most`. Returns their number.
     pub(crate) fn push(&mut self, bytes: &[u8], most: usize, faults: &Faults, random: &mut Random) -> usize {
         let count = bytes.len().min(most).min(self.capacity.saturating_sub(self.bytes.len()));
         for &byte in &bytes[..count] {
@@ -74,7 +74,7 @@ impl Queue {
         count
     }
 
-    /// Gives the first bytes, at most `most`.
+    /// Removes and returns the first bytes, at most `most`.
     pub(crate) fn pop(&mut self, most: usize) -> Vec<u8> {
         self.bytes.drain(..most.min(self.bytes.len())).collect()
     }

@@ -1,8 +1,8 @@
-//! Whatever befalls cards and links, a render ends in the same picture, or in a clear error: real sessions, real cards, and links
-//! whose every step and fault a seed decides, in one thread and in virtual time.
+//! Simulation: whatever faults cards and links have, a render ends in the same picture, or in a clear error. Real sessions
+//! and cards run in one thread and in virtual time, over links whose every step and fault is determined by a seed.
 //!
-//! A seed that fails is run again alone by `PHOTONCARD_SEEDS=SEED cargo test -p photoncard-driver --test simulation`, many
-//! by `PHOTONCARD_SEEDS=1..10000`.
+//! `PHOTONCARD_SEEDS=SEED cargo test -p photoncard-driver --test simulation` repeats the run of a failing seed alone,
+//! `PHOTONCARD_SEEDS=1..10000` runs many.
 
 mod conditions;
 mod liar;
@@ -28,10 +28,10 @@ use self::run::{End, MAX_STEPS};
 use self::station::Station;
 use self::world::Fixture;
 
-/// Runs of each test, if nothing else is asked for.
+/// Default seeds of each test.
 const SEEDS: Range<u32> = 1..300;
 
-/// The seeds to run: those that are asked for.
+/// Seeds to run: from the environment, or the default.
 fn seeds(unasked: Range<u32>) -> Range<u32> {
     let Ok(asked) = std::env::var("PHOTONCARD_SEEDS") else { return unasked };
     let number = |text: &str| text.parse().expect("PHOTONCARD_SEEDS is a seed, or the first..past the last");
@@ -41,7 +41,7 @@ fn seeds(unasked: Range<u32>) -> Range<u32> {
     }
 }
 
-/// Does some work on a thread with room on its stack for a card's buffers, which are built there.
+/// Runs `work` on a thread whose stack has room for a card's buffers.
 fn with_room_for_a_card(work: impl FnOnce() + Send) {
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, work);
@@ -66,7 +66,7 @@ fn any_delays_end_in_the_same_picture_and_nothing_is_sent_twice() {
             shared += u32::from(delayed.working > 1);
             runs += 1;
         }
-        // Delays may leave all to one card, but not as a rule.
+        // Delays may leave all tiles to one card, but only rarely.
         assert!(shared >= runs / 3, "{shared} of {runs} runs have several cards at work");
     });
 }

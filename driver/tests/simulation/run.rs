@@ -1,4 +1,4 @@
-//! A run, from cards that were just switched on to the picture, or to the error that a render would end with.
+//! A run, from cards that were just switched on to the picture, or to the render's error.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -16,10 +16,10 @@ use crate::conditions::Run;
 use crate::line::Random;
 use crate::station::{Health, Station};
 
-/// Steps of a run after which it is taken for stuck.
+/// Number of steps after which a run counts as stuck.
 pub(crate) const MAX_STEPS: u64 = 20_000_000;
 
-/// How a run ends.
+/// End of a run.
 #[derive(Debug, PartialEq)]
 pub(crate) enum End {
     Complete,
@@ -28,28 +28,28 @@ pub(crate) enum End {
     Fault(SchedulerError),
 }
 
-/// What came of a run.
+/// Outcome of a run.
 pub(crate) struct Outcome {
     pub(crate) end: End,
-    /// The film's, if it is complete.
+    /// Pixels of the film, if it is complete.
     pub(crate) pixels: Option<Vec<PixelValue>>,
-    /// The tiles that the sinks have.
+    /// Tiles in the sinks.
     pub(crate) tiles: HashMap<u32, FinishedTile>,
-    /// Of the tiles of the picture.
+    /// Counters of the picture's tiles.
     pub(crate) counters: Counters,
     pub(crate) counts: TileCounts,
     pub(crate) bytes: LinkBytes,
-    /// Cards of which the picture has tiles.
+    /// Number of cards that rendered tiles of the picture.
     pub(crate) working: usize,
-    /// Cards that have failed too often, or have lied.
+    /// Number of cards that have failed too often, or were outvoted.
     pub(crate) given_up: usize,
-    /// Cards that were found to have lied.
+    /// Cards that were outvoted.
     pub(crate) caught: Vec<CardNumber>,
     /// Virtual time, in steps.
     pub(crate) steps: u64,
 }
 
-/// Notes which tiles a sink has.
+/// Sink that records its tiles.
 #[derive(Default)]
 pub(crate) struct Ledger(Mutex<HashMap<u32, FinishedTile>>);
 
@@ -65,7 +65,7 @@ impl TileSink for Ledger {
 }
 
 impl<'a> Run<'a> {
-    /// The cards of the run, just switched on.
+    /// Cards of the run, just switched on.
     fn stations(&self, random: &mut Random) -> Vec<Station<'a>> {
         let station = |number| {
             let mut station = Station::new(number, self.fixture, random);

@@ -1,4 +1,4 @@
-//! A card, its link and its session, and what befalls them.
+//! A card with its link, its session and its faults.
 
 use std::time::Duration;
 
@@ -16,42 +16,42 @@ use crate::world::{Fixture, Memory};
 
 /// Virtual time of a step.
 const STEP: Duration = Duration::from_micros(100);
-/// Turns of a chip for one step of its work: bytes go over a line in the meantime.
+/// Number of turns of a chip per step of its work: bytes move over the line in the meantime.
 const TURNS_OF_CHIP: usize = 8;
 
-/// How a card is.
+/// Condition of a card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Health {
     Well,
-    /// It does nothing before this step.
+    /// Inactive until this step.
     Stalled(u64),
-    /// It does nothing any more.
+    /// Inactive for ever.
     Dead,
 }
 
-/// A card, its link and its session.
+/// Card with its link and its session.
 pub(crate) struct Station<'a> {
     pub(crate) number: CardNumber,
     pub(crate) card: Box<MicroCard<Memory>>,
     pub(crate) session: Session<'a>,
-    /// Whether it has been silent for too long, and has not been loaded since.
+    /// True after the card was silent for too long, until it is loaded again.
     pub(crate) is_lost: bool,
-    /// Why it is used no more.
+    /// Error for which the card was given up.
     pub(crate) given_up: Option<SessionError>,
     pub(crate) health: Health,
     pub(crate) started: bool,
-    /// Of how many steps of its work at tiles it does one; `None` if it does none.
+    /// The card does one of this number of steps of its work on tiles; `None` if it does none.
     pub(crate) diligence: Option<usize>,
     pub(crate) voice: Voice,
-    /// Commands as they come to the card.
+    /// Parser of commands that reach the card.
     commands: FrameReader,
-    /// The tiles that it was given and has not done, from the first.
+    /// Tiles that the card has received and not completed, the first first.
     tiles: Vec<u32>,
     to_card: Queue,
     to_host: Queue,
-    /// Bytes that move in one step at most.
+    /// Maximum number of bytes that move in one step.
     burst: usize,
-    /// How often this card gets a step.
+    /// Relative frequency of this card's steps.
     pub(crate) speed: usize,
 }
 
@@ -76,12 +76,12 @@ impl<'a> Station<'a> {
         }
     }
 
-    /// Whether it may still render a tile.
+    /// Returns whether the card may still render a tile.
     pub(crate) fn is_used(&self) -> bool {
         !self.is_lost && self.given_up.is_none()
     }
 
-    /// One step of the host, of the card or of its chip: whichever the seed says.
+    /// One step of the host, of the card or of its chip, as the seed selects.
     pub(crate) fn step(
         &mut self,
         run: &Run<'a>,
@@ -142,7 +142,7 @@ impl<'a> Station<'a> {
         }
     }
 
-    /// Notes the tiles that come to the card.
+    /// Records the tiles that reach the card.
     fn note_tiles(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let (taken, frame) = self.commands.read(bytes);
@@ -189,7 +189,7 @@ impl<'a> Station<'a> {
         self.recover(error, run, dispatcher, now)
     }
 
-    /// What a render does with an error.
+    /// Handles an error like a render.
     fn recover(
         &mut self,
         error: SessionError,
@@ -218,7 +218,7 @@ impl<'a> Station<'a> {
         Ok(())
     }
 
-    /// What happens to the card in a step of its own.
+    /// Faults of the card in a step of its own.
     fn befall(&mut self, run: &Run, step: u64, random: &mut Random) {
         if self.health == Health::Dead {
             return;
@@ -228,14 +228,14 @@ impl<'a> Station<'a> {
         } else if random.happens(run.faults.resets) {
             self.reset_card(run);
         } else if random.happens(run.faults.stalls) {
-            // Half of them for longer than the host waits.
+            // Half of them last longer than the host waits.
             self.health = Health::Stalled(step + random.below(200_000) as u64);
         } else if matches!(self.health, Health::Stalled(until) if until <= step) {
             self.health = Health::Well;
         }
     }
 
-    /// The card forgets all, what its end of the line holds too.
+    /// Resets the card, which forgets everything, including its end of the line.
     pub(crate) fn reset_card(&mut self, run: &Run) {
         self.card = run.fixture.card();
         self.to_card.bytes.clear();

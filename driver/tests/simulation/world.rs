@@ -1,4 +1,4 @@
-//! What all runs have in common: a scene, its image, and cards that were just switched on.
+//! Shared state of all runs: a scene, its image, and cards that were just switched on.
 
 use std::ops::Range;
 
@@ -58,7 +58,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Card memory of its own.
+/// Card memory with a buffer of its own.
 pub(crate) struct Memory {
     lines: Vec<Line>,
 }
@@ -85,7 +85,7 @@ impl CardMemory for Memory {
     }
 }
 
-/// What the runs have in common.
+/// Shared state of all runs.
 pub(crate) struct Fixture {
     settings: RenderSettings,
     pub(crate) mapped: MappedImage,
@@ -113,7 +113,7 @@ impl Fixture {
         }
     }
 
-    /// A card that was just switched on.
+    /// Card that was just switched on.
     pub(crate) fn card(&self) -> Box<MicroCard<Memory>> {
         let lines = self.mapped.image.lines().len();
         Box::new(MicroCard::new(Memory { lines: vec![Line::ZERO; lines] }))
@@ -123,7 +123,7 @@ impl Fixture {
         self.settings.film().unwrap()
     }
 
-    /// The tiles of the picture, of which a share is verified.
+    /// Scheduler of the picture's tiles, a share of which is verified.
     pub(crate) fn scheduler(&self, cards: usize, verify: Option<f64>, seed: u32) -> Scheduler {
         let Schedule { tile, order, .. } = self.settings.schedule;
         let scheduler = Scheduler::new(tiles(self.settings.window(), tile, order), cards).with_helpers();

@@ -1,32 +1,32 @@
-//! The interface between a board's hardware and the code that all images share.
+//! Interface between a board's hardware and the code that all images share.
 
-/// A board: one UART, one clock, one processor. There is one of each, so nothing has a `self`. The module `hardware` of an
-/// image calls its own `ThisBoard`.
+/// Board with one UART, one clock and one processor. As there is one of each, functions have no `self`. The module
+/// `hardware` of an image defines `ThisBoard`.
 pub(crate) trait Board {
-    /// Its name.
+    /// Name of the board.
     const NAME: &'static str;
 
-    /// Does what comes before the first message.
+    /// Prepares the board for its first message.
     fn prepare() {}
 
-    /// Sets up clock and UART, and lets interrupts in.
+    /// Initializes clock and UART, and enables interrupts.
     fn start();
 
-    /// A byte that the UART has received.
+    /// Reads a byte from the UART's receiver, if there is one.
     fn receive() -> Option<u8>;
 
-    /// Hands the UART a byte to send. Returns whether it had room.
+    /// Writes a byte to the UART's transmitter. Returns false if the transmitter is full.
     fn transmit(byte: u8) -> bool;
 
-    /// Whether a received byte is an interrupt.
+    /// Enables or disables the UART's receive interrupt.
     fn listen(is_interrupt: bool);
 
     /// Time since the start, milliseconds, modulo 2^32.
     fn milliseconds() -> u32;
 
-    /// Does some work without interrupts.
+    /// Runs `work` with interrupts masked.
     fn masked<R>(work: impl FnOnce() -> R) -> R;
 
-    /// Sleeps until there is an interrupt to be taken, masked or not: a byte's, or the clock's within a millisecond.
+    /// Sleeps until an interrupt is pending, masked or not: the UART's, or within a millisecond the clock's.
     fn sleep();
 }

@@ -1,17 +1,17 @@
-//! Card memory: where the linker script says.
+//! Card memory, at the address in the linker script.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use photoncard_shared::address::{LINE_BYTES, Line};
 
 unsafe extern "C" {
-    /// First byte of card memory, at a multiple of a line.
+    /// Start of card memory, aligned to a line.
     static mut __card_dram: [Line; 0];
-    /// Past the last.
+    /// End of card memory, exclusive.
     static mut __card_dram_end: [Line; 0];
 }
 
-/// All of card memory, holding whatever it held at power-on; `None` if it has been taken.
+/// Takes all of card memory, with its contents at power-on; `None` if it was taken before.
 pub(super) fn take() -> Option<&'static mut [Line]> {
     static TAKEN: AtomicBool = AtomicBool::new(false);
     if TAKEN.swap(true, Ordering::Relaxed) {
@@ -19,7 +19,7 @@ pub(super) fn take() -> Option<&'static mut [Line]> {
     }
     let (start, end) = (&raw mut __card_dram, &raw mut __card_dram_end);
     let lines = (end.addr() - start.addr()) / LINE_BYTES;
-    // SAFETY: the linker script places nothing else between the two symbols, which are aligned to a line; a line is
-    // bytes, of which any value is one; it is taken once, so no other reference exists.
+    // SAFETY: the linker script reserves the memory between the two symbols, which are aligned to a line; any bytes are a
+    // valid line; it is taken once, so no other reference exists.
     Some(unsafe { core::slice::from_raw_parts_mut(start.cast(), lines) })
 }

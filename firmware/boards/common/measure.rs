@@ -1,5 +1,5 @@
-//! What a gather costs, in a processor's instructions: one tile rendered three times, with more of its work each time. The
-//! differences are the cost of gather rays, and that of the gathers at their ends. `tests/instructions.sh` runs it.
+//! Instruction counts: one tile is rendered three times, each time with one more kind of work. The differences are the cost
+//! of gather rays, and of the gathers at their ends. `tests/instructions.sh` runs it.
 
 use photoncard_firmware::chip::{MicroChip, Progress};
 use photoncard_firmware::gather::GatherRequest;
@@ -11,14 +11,14 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::image::Header;
 use photoncard_shared::message::{self, FrameParameters, Tile};
 
-/// How much of the work is done.
+/// Work to be done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Work {
     /// Eye and shadow rays.
     Eye,
-    /// Gather rays as well.
+    /// Eye, shadow and gather rays.
     Rays,
-    /// And the gathers at their ends.
+    /// All rays, and the gathers at the ends of gather rays.
     Gathers,
 }
 
@@ -26,18 +26,18 @@ impl Work {
     pub(crate) const ALL: [Self; 3] = [Self::Eye, Self::Rays, Self::Gathers];
 }
 
-/// Pixels in a row and a column of the tile, which lies in the middle of the picture.
+/// Side of the tile, which lies in the middle of the picture, pixels.
 const TILE_SIDE: u32 = 16;
 
-/// Drops gathers.
+/// Outlet that drops gathers.
 struct Nowhere;
 
 impl GatherOutlet for Nowhere {
     fn take(&mut self, _: GatherRequest) {}
 }
 
-/// Renders the tile. The frame's parameters lie in the line behind the image, after their length. Returns what was counted;
-/// `None` if the memory holds anything else.
+/// Renders the tile. The line after the image holds the length of the frame's parameters, and the parameters. Returns the
+/// counters; `None` if the memory holds anything else.
 pub(crate) fn render(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option<Counters> {
     let scene = SceneImage { header: Header::read(lines.first_chunk()?).ok()? };
     let (&length, bytes) = lines.get(scene.header.lines as usize)?.0.split_first()?;

@@ -1,5 +1,4 @@
-//! What the images of all boards share, their `main` among it: a board tells its registers, time and interrupts, and is
-//! served from here.
+//! Code that the images of all boards share, including `main`. A board implements registers, time and interrupts.
 
 mod board;
 #[expect(unsafe_code, reason = "the linker script defines the address of card memory")]
@@ -39,10 +38,10 @@ pub(crate) use self::port::receive_all;
 use self::report::StackCheck;
 use crate::hardware::ThisBoard;
 
-/// The card. Made by the compiler: its buffers never lie on the stack.
+/// The card, initialized at compile time: its buffers are never on the stack.
 static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(Dram::new(&mut [])));
 
-// The buffers of the image beside the card's are small change, and still fit with the caches that the budget has.
+// The image's buffers besides the card's fit into the memory that the budget has for caches.
 const _: () = assert!(sram_bytes::<Micro>() + port::STATIC_BYTES <= MICRO.sram_bytes as usize);
 
 #[entry]
@@ -50,7 +49,7 @@ fn main() -> ! {
     run::<ThisBoard>();
 }
 
-/// Serves the card on the board's UART for ever.
+/// Serves the card on the board's UART; never returns.
 fn run<B: Board>() -> ! {
     B::prepare();
     stack::paint();
@@ -75,8 +74,8 @@ fn run<B: Board>() -> ! {
     semihosting::fail(format_args!("the port failed: {error:?}\n"));
 }
 
-/// Prints what each work of [`measure`] counts, and its time, milliseconds: where a clock ticks with the instructions, as QEMU's
-/// does with `-icount shift=0`, a millisecond is a million of them.
+/// Prints the counters and the time in milliseconds of each work of [`measure`]. With QEMU's `-icount shift=0` the clock
+/// advances 1 ns per instruction, so a millisecond is a million instructions.
 fn measure_and_exit<B: Board>(lines: &[Line]) -> ! {
     static CHIP: Once<MicroChip> = Once::new(MicroChip::new());
     let Some(chip) = CHIP.take() else { semihosting::fail(format_args!("the chip is in use\n")) };

@@ -1,24 +1,24 @@
-//! Statics that are taken once, to be changed by whoever took them.
+//! Statics that one owner may take, mutable.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// A value in a static that one owner may take.
+/// Value of a static that one owner may take.
 pub(super) struct Once<T> {
     taken: AtomicBool,
     value: UnsafeCell<T>,
 }
 
-// SAFETY: the value is reached through `take` alone, which hands it out once: it moves between threads, and is not shared.
+// SAFETY: the value is accessible through `take` alone, which returns it once: it moves between threads, and is not shared.
 unsafe impl<T: Send> Sync for Once<T> {}
 
 impl<T> Once<T> {
-    /// A value that is not yet taken.
+    /// Value that was not taken yet.
     pub(super) const fn new(value: T) -> Self {
         Self { taken: AtomicBool::new(false), value: UnsafeCell::new(value) }
     }
 
-    /// The value; `None` if it has been taken.
+    /// Takes the value; `None` if it was taken before.
     #[expect(clippy::mut_from_ref, reason = "it is the only reference: see below")]
     pub(super) fn take(&'static self) -> Option<&'static mut T> {
         if self.taken.swap(true, Ordering::Acquire) {

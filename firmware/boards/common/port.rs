@@ -1,4 +1,4 @@
-//! A board's UART as a port: received by interrupts into a ring, sent by looking.
+//! A board's UART as a port: interrupts store received bytes in a ring, and sending polls the transmitter.
 
 use core::marker::PhantomData;
 use core::time::Duration;
@@ -8,16 +8,16 @@ use photoncard_shared::link::{Port, PortError};
 use super::board::Board;
 use super::ring::Ring;
 
-/// Received bytes that wait: far more than a host sends while a card computes, which is a few tile commands.
+/// Capacity of the ring of received bytes: far more than the few tile commands that a host sends while a card computes.
 const RECEIVED_BYTES: usize = 512;
 
 static RECEIVED: Ring<RECEIVED_BYTES> = Ring::new();
 
-/// What ports take of on-chip memory.
+/// On-chip memory of the port, bytes.
 pub(super) const STATIC_BYTES: usize = size_of::<Ring<RECEIVED_BYTES>>();
 
-/// Moves what the UART has received into the ring: what the interrupt of a byte does. In a full ring it does not wait:
-/// the rest stays in the UART, which interrupts no more until [`BoardPort`] has read.
+/// Handler of the UART's interrupt: moves received bytes into the ring. If the ring is full it does not wait: the rest
+/// stays in the UART, whose interrupt is disabled until [`BoardPort`] has read.
 pub(crate) fn receive_all<B: Board>() {
     while !RECEIVED.is_full() {
         let Some(byte) = B::receive() else { return };
@@ -26,17 +26,17 @@ pub(crate) fn receive_all<B: Board>() {
     B::listen(false);
 }
 
-/// The port of a board.
+/// Port on a board's UART.
 pub(super) struct BoardPort<B>(PhantomData<B>);
 
 impl<B: Board> BoardPort<B> {
-    /// The one port.
+    /// The only port of the board.
     pub(super) const fn new() -> Self {
         Self(PhantomData)
     }
 }
 
-/// A bound on waiting.
+/// Time limit of a wait.
 struct Deadline {
     start: u32,
     wait: u32,
@@ -62,7 +62,7 @@ impl<B: Board> Port for BoardPort<B> {
                 *target = byte;
                 count += 1;
             }
-            // The ring has room again. An interrupt may have been refused for want of it.
+            // The ring has room again: the interrupt may have been disabled because it was full.
             B::masked(|| {
                 B::listen(true);
                 receive_all::<B>();

@@ -1,4 +1,4 @@
-//! What an image tells of its memory: a debugger at the start, and hosts whenever they ask.
+//! Reports of an image's memory: to a debugger at the start, and to hosts on request.
 
 use core::time::Duration;
 
@@ -43,7 +43,7 @@ pub(super) fn sections(board: &str) {
     ));
 }
 
-/// What the image takes of on-chip memory, and has taken of its stack.
+/// On-chip memory of the image's static data and stack, and the maximum use of the stack.
 pub(super) fn memory_use() -> MemoryUse {
     MemoryUse {
         static_bytes: (data_bytes() + zeroed_bytes()) as u32,
@@ -52,7 +52,7 @@ pub(super) fn memory_use() -> MemoryUse {
     }
 }
 
-/// A port that fails the image when its stack has been used to the end: what lies there may be lost already.
+/// Port wrapper that stops the image when its stack was used up: data below it may be corrupt.
 pub(super) struct StackCheck<P>(pub(super) P);
 
 impl<P: Port> Port for StackCheck<P> {

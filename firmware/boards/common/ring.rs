@@ -1,36 +1,36 @@
-//! Bytes on their way from an interrupt to the program: one puts, one takes, and neither waits.
+//! Single-producer, single-consumer ring of bytes from an interrupt to the program, without waiting.
 
 use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
-/// A ring of `N` bytes, a power of two.
+/// Ring of `N` bytes, a power of two.
 pub(crate) struct Ring<const N: usize> {
     bytes: [AtomicU8; N],
-    /// Bytes ever put, modulo 2^32 or 2^64.
+    /// Number of bytes ever put, modulo the range of `usize`.
     put: AtomicUsize,
-    /// Bytes ever taken.
+    /// Number of bytes ever taken, modulo the range of `usize`.
     taken: AtomicUsize,
 }
 
 impl<const N: usize> Ring<N> {
     const IS_POWER_OF_TWO: () = assert!(N.is_power_of_two());
 
-    /// An empty ring.
+    /// Empty ring.
     pub(crate) const fn new() -> Self {
         let () = Self::IS_POWER_OF_TWO;
         Self { bytes: [const { AtomicU8::new(0) }; N], put: AtomicUsize::new(0), taken: AtomicUsize::new(0) }
     }
 
-    /// Whether there is nothing to take.
+    /// Returns whether the ring is empty.
     pub(crate) fn is_empty(&self) -> bool {
         self.put.load(Ordering::Acquire) == self.taken.load(Ordering::Relaxed)
     }
 
-    /// Whether there is no room.
+    /// Returns whether the ring is full.
     pub(crate) fn is_full(&self) -> bool {
         self.put.load(Ordering::Relaxed).wrapping_sub(self.taken.load(Ordering::Acquire)) >= N
     }
 
-    /// Puts a byte. Returns whether there was room.
+    /// Puts a byte. Returns false if the ring is full.
     pub(crate) fn put(&self, byte: u8) -> bool {
         let put = self.put.load(Ordering::Relaxed);
         let Some(place) = self.bytes.get(put % N).filter(|_| !self.is_full()) else { return false };
@@ -39,7 +39,7 @@ impl<const N: usize> Ring<N> {
         true
     }
 
-    /// Takes the oldest byte.
+    /// Takes the oldest byte, if any.
     pub(crate) fn take(&self) -> Option<u8> {
         let taken = self.taken.load(Ordering::Relaxed);
         let byte = self.bytes.get(taken % N).filter(|_| !self.is_empty())?.load(Ordering::Relaxed);

@@ -1,5 +1,5 @@
-//! Messages and exit by a debugger, which QEMU is one of (Arm's specification "Semihosting"; that of
-//! RISC-V differs in the instructions alone).
+//! Semihosting: messages and exit through a debugger or QEMU (Arm's specification "Semihosting"; RISC-V's differs in the
+//! trap instructions alone).
 
 use core::arch::asm;
 use core::fmt::{self, Write};
@@ -7,16 +7,16 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 const WRITE0: usize = 0x04;
 const EXIT_EXTENDED: usize = 0x20;
-/// The program ended by its own will: the reason that carries an exit code.
+/// Reason of an exit by the program itself, which carries an exit code.
 const APPLICATION_EXIT: usize = 0x20026;
-/// What Rust programs that panic exit with.
+/// Exit status of Rust programs that panic.
 const FAILED: usize = 101;
 
-/// Whether nobody takes messages.
+/// True if no debugger receives messages.
 static IS_ALONE: AtomicBool = AtomicBool::new(false);
 
-/// Tells that there is no debugger: messages are dropped. A failure still makes its call, which is then a fault of the
-/// processor: the board's handler of faults is what ends the program.
+/// Declares that there is no debugger: messages are dropped. A failure still makes its call, which is then a fault of the
+/// processor, and the board's fault handler ends the program.
 #[allow(dead_code, reason = "a board in QEMU has a debugger")]
 pub(crate) fn leave_alone() {
     IS_ALONE.store(true, Ordering::Relaxed);
@@ -25,7 +25,7 @@ pub(crate) fn leave_alone() {
 /// Calls the debugger.
 ///
 /// # Safety
-/// `argument` is what `operation` takes.
+/// `argument` must be valid for `operation`.
 unsafe fn call(operation: usize, argument: *const ()) {
     #[cfg(target_arch = "arm")]
     // SAFETY: the debugger reads what the argument points to, and answers in r0.
@@ -33,7 +33,7 @@ unsafe fn call(operation: usize, argument: *const ()) {
         asm!("bkpt 0xab", inout("r0") operation => _, in("r1") argument, options(nostack));
     }
     #[cfg(target_arch = "riscv32")]
-    // SAFETY: as above, in a0. The three instructions are known by their words, uncompressed and in one page.
+    // SAFETY: as above, in a0. A debugger recognizes the three instructions if they are uncompressed and in one page.
     unsafe {
         asm!(
             ".balign 16",
@@ -48,7 +48,7 @@ unsafe fn call(operation: usize, argument: *const ()) {
     }
 }
 
-/// Collects text into pieces that end with a zero.
+/// Buffer that collects text into zero-terminated pieces.
 struct Console {
     bytes: [u8; 128],
     length: usize,
@@ -91,7 +91,7 @@ pub(crate) fn print(message: fmt::Arguments) {
     console.flush();
 }
 
-/// Prints a message and ends the program with an exit status that tells of a failure.
+/// Prints a message and ends the program with an exit status of failure.
 pub(crate) fn fail(message: fmt::Arguments) -> ! {
     print(message);
     exit(FAILED);

@@ -1,18 +1,18 @@
-//! How much of the stack is used: it is painted at the start, and what is no longer paint was used.
+//! Stack use: the stack is painted at the start, and words that lost their paint were used.
 
-/// What the unused stack holds.
+/// Value of unused words.
 const PAINT: u32 = 0x5AFE_57AC;
 
-/// Words at the end of the stack that nothing may use: a frame may leave some of its own as they were.
+/// Number of words at the end of the stack that must not be used: a frame may leave some of its words unwritten.
 const GUARD: usize = 16;
 
-/// Bytes below the caller's frame that the painting itself may use.
+/// Number of bytes below the caller's frame that painting itself may use.
 const MARGIN: usize = 512;
 
 unsafe extern "C" {
-    /// The lowest word of the stack.
+    /// Lowest word of the stack.
     static mut _stack_end: [u32; 0];
-    /// Past its highest.
+    /// End of the stack, exclusive.
     static mut _stack_start: [u32; 0];
 }
 
@@ -20,19 +20,19 @@ fn lowest() -> *mut u32 {
     (&raw mut _stack_end).cast()
 }
 
-/// Size of the stack.
+/// Size of the stack, bytes.
 pub(super) fn bytes() -> usize {
     (&raw mut _stack_start).addr() - lowest().addr()
 }
 
-/// Paints what is not yet used. To be called first, before interrupts come.
+/// Paints the unused stack. To be called first, before interrupts are enabled.
 #[inline(never)]
 pub(super) fn paint() {
     let here = 0_u32;
     let end = (&raw const here).addr().saturating_sub(MARGIN);
     let mut word = lowest();
     while word.addr() < end {
-        // SAFETY: the word belongs to the stack, and lies so far below this frame that nothing uses it.
+        // SAFETY: the word belongs to the stack, and is so far below this frame that nothing uses it.
         unsafe {
             word.write_volatile(PAINT);
             word = word.add(1);
@@ -40,13 +40,13 @@ pub(super) fn paint() {
     }
 }
 
-/// Whether the stack has been used to its last words.
+/// Returns whether the stack was used down to its guard words.
 pub(super) fn is_used_up() -> bool {
     // SAFETY: as below.
     (0..GUARD).any(|word| (unsafe { lowest().add(word).read_volatile() }) != PAINT)
 }
 
-/// The most bytes of the stack that have been in use at once.
+/// Maximum use of the stack, bytes.
 pub(super) fn high_water() -> usize {
     let words = bytes() / size_of::<u32>();
     let mut unused = 0;

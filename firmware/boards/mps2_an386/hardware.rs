@@ -9,10 +9,10 @@ use cortex_m_rt::{ExceptionFrame, exception};
 use crate::common::register::Register;
 use crate::common::{Board, receive_all, semihosting};
 
-/// Cycles of the processor's clock in a millisecond: 25 MHz.
+/// Processor cycles per millisecond, at 25 MHz.
 const CYCLES: u32 = 25_000;
 
-/// The UART's interrupt when a byte has come.
+/// Number of the UART's receive interrupt.
 const UART_RECEIVED: i16 = 0;
 
 // SAFETY: the registers of UART 0, of the system's timer and of the interrupt controller, by the documents above.
@@ -31,12 +31,12 @@ const STATE_RECEIVED: u32 = 2;
 const CONTROL_ENABLE: u32 = 3;
 const CONTROL_RECEIVE_INTERRUPT: u32 = 8;
 const INTERRUPT_RECEIVED: u32 = 2;
-/// The least divisor that the UART takes: the fastest.
+/// Minimum divisor of the UART's clock: the maximum speed.
 const MIN_DIVISOR: u32 = 16;
 
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
 
-/// The board.
+/// Arm's MPS2 board with the image AN386.
 pub(crate) struct Mps2An386;
 
 pub(crate) type ThisBoard = Mps2An386;
@@ -47,7 +47,7 @@ impl Board for Mps2An386 {
     fn start() {
         TIMER_RELOAD.write(CYCLES - 1);
         TIMER_VALUE.write(0);
-        // On, with an exception, by the processor's clock.
+        // Enabled, with interrupt, on the processor's clock.
         TIMER_CONTROL.write(7);
         UART_DIVISOR.write(MIN_DIVISOR);
         Self::listen(true);
@@ -55,7 +55,7 @@ impl Board for Mps2An386 {
     }
 
     fn receive() -> Option<u8> {
-        // Before the byte is read: the next one interrupts again.
+        // Cleared before the byte is read, so that the next byte interrupts again.
         UART_INTERRUPT.write(INTERRUPT_RECEIVED);
         (UART_STATE.read() & STATE_RECEIVED != 0).then(|| UART_DATA.read() as u8)
     }
@@ -79,7 +79,7 @@ impl Board for Mps2An386 {
 
     fn masked<R>(work: impl FnOnce() -> R) -> R {
         let was_masked: u32;
-        // SAFETY: interrupts are off while the work is done, and on again afterwards if they were before.
+        // SAFETY: interrupts are masked during the work, and afterwards restored to their previous state.
         unsafe { asm!("mrs {}, PRIMASK", "cpsid i", out(reg) was_masked, options(nostack, preserves_flags)) };
         let result = work();
         if was_masked & 1 == 0 {
@@ -90,7 +90,7 @@ impl Board for Mps2An386 {
     }
 
     fn sleep() {
-        // SAFETY: waits, and changes nothing.
+        // SAFETY: waits for an interrupt without changing any state.
         unsafe { asm!("wfi", options(nostack, preserves_flags)) };
     }
 }

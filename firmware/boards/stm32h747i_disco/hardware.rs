@@ -1,5 +1,5 @@
-//! The board's clocks, registers and exceptions (ST, "RM0399", "UM2411"; "Armv7-M", DDI 0403). It has been compiled and
-//! not run.
+//! The board's clocks, registers and exceptions (ST, "RM0399", "UM2411"; "Armv7-M", DDI 0403). The code compiles, but was
+//! not run on the board.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -14,37 +14,38 @@ use super::sdram::{self, Ports};
 use crate::common::{Board, receive_all, semihosting};
 
 const HERTZ: u32 = 400_000_000;
-/// What the debugger's serial port and the board's both divide.
+/// Speed that the clocks of both the debugger's serial port and the board can produce.
 const BAUD: u32 = 921_600;
 
-/// Base of card memory, as `memory.x` has it.
+/// Base address of card memory, as in `memory.x`.
 const SDRAM: u32 = 0xD000_0000;
-/// The region's size, 32 MB, as the exponent of two less one.
+/// Size of the MPU region: `log2(32 MB) - 1`.
 const SDRAM_SIZE: u32 = 25 - 1;
 
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
 
-/// The board.
+/// ST's board STM32H747I-DISCO.
 pub(crate) struct Disco;
 
 pub(crate) type ThisBoard = Disco;
 
 impl Disco {
-    /// The UART that the debugger's serial port is of.
+    /// UART that is connected to the debugger's serial port.
     fn uart() -> &'static pac::usart1::RegisterBlock {
         // SAFETY: every register that is written here is written by single stores, with interrupts masked where
         // the interrupt writes it too.
         unsafe { &*USART1::ptr() }
     }
 
-    /// Without a region of its own the memory at this address is a device's: slow, and unaligned words fault.
+    /// Maps card memory as normal, cacheable memory. By default its addresses are device memory: slow, and unaligned
+    /// accesses fault.
     fn make_cacheable(mpu: &MPU, scb: &mut SCB) {
-        // SAFETY: nothing lies there that is in use. Read and write by all, normal memory, write-through, no code.
+        // SAFETY: the region is not in use yet. Full access, normal memory, write-through, execute never.
         unsafe {
             mpu.rnr.write(0);
             mpu.rbar.write(SDRAM);
             mpu.rasr.write(1 << 28 | 3 << 24 | 1 << 17 | SDRAM_SIZE << 1 | 1);
-            // On, over the default map.
+            // MPU enabled, with the default map as background.
             mpu.ctrl.write(1 << 2 | 1);
         }
         cortex_m::asm::dsb();
@@ -56,7 +57,7 @@ impl Disco {
 impl Board for Disco {
     const NAME: &'static str = "stm32h747i-disco";
 
-    /// Without a debugger nobody takes messages, and a failure is a fault, which resets: see below.
+    /// Without a debugger messages are dropped, and a failure is a fault, whose handler resets the chip.
     fn prepare() {
         if !DCB::is_debugger_attached() {
             semihosting::leave_alone();
@@ -67,7 +68,7 @@ impl Board for Disco {
         let (Some(mut core), Some(chip)) = (cortex_m::Peripherals::take(), pac::Peripherals::take()) else {
             semihosting::fail(format_args!("the chip's devices are already in use\n"));
         };
-        // The board feeds the core by the switching regulator.
+        // The board supplies the core through the switching regulator.
         let power = chip.PWR.constrain().smps().freeze();
         let clocks = chip.RCC.constrain().sys_ck(HERTZ.Hz()).hclk(200.MHz()).freeze(power, &chip.SYSCFG);
         let ports = Ports {
@@ -81,7 +82,7 @@ impl Board for Disco {
         let mut memory = sdram::controller(chip.FMC, ports, clocks.peripheral.FMC, &clocks.clocks);
         let mut delay = core.SYST.delay(clocks.clocks);
         let _: *mut u32 = memory.init(&mut delay);
-        // Not before: the processor may read normal memory ahead, and nothing answers there yet.
+        // Only now: the processor may prefetch normal memory, which answers no earlier.
         Self::make_cacheable(&core.MPU, &mut core.SCB);
         let gpioa = chip.GPIOA.split(clocks.peripheral.GPIOA);
         let pins = (gpioa.pa9.into_alternate(), gpioa.pa10.into_alternate());
@@ -96,13 +97,13 @@ impl Board for Disco {
         timer.clear_current();
         timer.enable_interrupt();
         timer.enable_counter();
-        // SAFETY: the handler is below, and no critical section is open.
+        // SAFETY: the handler is defined below, and no critical section is active.
         unsafe { NVIC::unmask(Interrupt::USART1) };
     }
 
     fn receive() -> Option<u8> {
         let uart = Self::uart();
-        // An overrun interrupts until it is cleared; the frame that lost a byte comes again.
+        // An overrun interrupts until it is cleared; the damaged frame is sent again.
         uart.icr.write(|clear| clear.orecf().set_bit());
         uart.isr.read().rxne().bit_is_set().then(|| uart.rdr.read().rdr().bits() as u8)
     }

@@ -1,4 +1,4 @@
-//! The pins and the chip of external memory (ST, "UM2411", schematic MB1248, `STM32CubeH7`; ISSI, "IS42S32800").
+//! Pins and timing of external memory (ST, "UM2411", schematic MB1248, `STM32CubeH7`; ISSI, "IS42S32800").
 
 use stm32_fmc::Sdram;
 use stm32_fmc::devices::is42s32800g_6::Is42s32800g;
@@ -7,7 +7,7 @@ use stm32h7xx_hal::pac::FMC;
 use stm32h7xx_hal::prelude::*;
 use stm32h7xx_hal::rcc::{CoreClocks, rec};
 
-/// The ports that the memory's pins are of.
+/// GPIO ports of the memory's pins.
 pub(crate) struct Ports {
     pub(crate) d: gpiod::Parts,
     pub(crate) e: gpioe::Parts,
@@ -23,7 +23,7 @@ macro_rules! pins {
     };
 }
 
-/// The controller of the memory, which is not yet started.
+/// Memory controller, not yet started.
 pub(crate) fn controller(
     fmc: FMC,
     Ports { d, e, f, g, h, i }: Ports,

@@ -8,10 +8,10 @@ use riscv_rt::{TrapFrame, core_interrupt};
 use crate::common::register::Register;
 use crate::common::{Board, receive_all, semihosting};
 
-/// Ticks of the machine's timer in a millisecond: 10 MHz.
+/// Timer ticks per millisecond, at 10 MHz.
 const TICKS: u64 = 10_000;
 
-/// The UART's number at the interrupt controller.
+/// Interrupt number of the UART.
 const UART: u32 = 10;
 
 // SAFETY: the registers of the UART, of hart 0's timer and of the interrupt controller, by the documents above.
@@ -33,10 +33,10 @@ const STATUS_RECEIVED: u8 = 1;
 const STATUS_TRANSMIT_EMPTY: u8 = 1 << 5;
 /// Eight bits, no parity, one stop bit.
 const LINE_8N1: u8 = 3;
-/// First in, first out; both directions emptied.
+/// FIFO enabled, receiver and transmitter cleared.
 const FIFO_ON: u8 = 7;
 
-/// The machine.
+/// QEMU's machine `virt`.
 pub(crate) struct Virt;
 
 pub(crate) type ThisBoard = Virt;
@@ -52,7 +52,7 @@ impl Virt {
     }
 
     fn wake_at(ticks: u64) {
-        // No compare value in between is early.
+        // The high word is the maximum while the low word changes: no intermediate compare value is in the past.
         TIMER_COMPARE_HIGH.write(u32::MAX);
         TIMER_COMPARE.write(ticks as u32);
         TIMER_COMPARE_HIGH.write((ticks >> 32) as u32);
@@ -70,7 +70,7 @@ impl Board for Virt {
         PRIORITY.write(1);
         ENABLE.write(1 << UART);
         THRESHOLD.write(0);
-        // SAFETY: both interrupts have their handlers below.
+        // SAFETY: the handlers of both interrupts are defined below.
         unsafe {
             mie::set_mext();
             mie::set_mtimer();
@@ -122,7 +122,7 @@ fn external() {
     CLAIM.write(source);
 }
 
-// SAFETY: the name by which the start-up crate knows the handler of all exceptions.
+// SAFETY: the start-up crate calls the handler of all exceptions by this name.
 #[unsafe(export_name = "ExceptionHandler")]
 fn exception(_: &TrapFrame) -> ! {
     semihosting::fail(format_args!(
@@ -133,7 +133,7 @@ fn exception(_: &TrapFrame) -> ! {
     ));
 }
 
-// What goes wrong before `main` has no stack yet: a status without a message.
+// Before `main` there is no stack: a failure exits with a status and without a message.
 core::arch::global_asm!(
     ".section .text.abort, \"ax\"",
     ".global _pre_init_trap",

@@ -1,4 +1,4 @@
-//! Options of the cards, and of the tests that they are put to.
+//! Options of the cards, and of their tests.
 
 use std::path::PathBuf;
 
@@ -10,19 +10,19 @@ use photoncard_driver::render::{CardAddress, CardSet};
 
 #[derive(Args)]
 pub(crate) struct CardOptions {
-    /// Where to render: emulated:CHIPS, emulated-micro:CHIPS, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH; may be
-    /// repeated [default: a chip a core]
+    /// Cards to render on: emulated:CHIPS, emulated-micro:CHIPS, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH; may be
+    /// repeated [default: emulated chips, one per core]
     #[arg(long = "card", value_name = "CARD")]
     cards: Vec<CardAddress>,
-    /// Have two cards render a share of the tiles, above 0 and up to 1, and compare them bit for bit; of three cards the odd one lies,
-    /// and others render its tiles
+    /// Share of the tiles, above 0 and at most 1, that two cards render and that are compared bit for bit; of three cards
+    /// the outvoted one is given up, and others render its tiles
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     verify: Option<f64>,
-    /// Make the links to the cards bad ones, to try how that is repaired: rates a byte as flips=1e-5,drops=1e-6,repeats=1e-6,
-    /// delays=1e-4,seed=1
+    /// Inject faults into the links to the cards, to test their repair: rates per byte as
+    /// flips=1e-5,drops=1e-6,repeats=1e-6,delays=1e-4,seed=1
     #[arg(long, value_name = "FAULTS")]
     pub(super) faults: Option<LineFaults>,
-    /// Model the memory of emulated chips, and tell in the statistics what was read of it
+    /// Model the memory of emulated chips, and report its reads in the statistics
     #[arg(long)]
     counters: bool,
     /// Caches of the modelled memory, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=... [default:
@@ -35,7 +35,7 @@ pub(crate) struct CardOptions {
 }
 
 impl CardOptions {
-    /// The settings that the options stand for.
+    /// Settings of these options.
     pub(super) fn settings(&self) -> CardSet {
         let emulated = || vec![CardAddress::emulated(ChipKind::Reference)];
         CardSet {

@@ -1,9 +1,9 @@
-//! Options whose argument is one of few names.
+//! Options whose argument is one of a list of names.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use photoncard_driver::choice::Choice;
 
-/// Parser of a choice's names.
+/// Parser of the names of a [`Choice`].
 pub(crate) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(T::ALL.iter().copied().map(possible_value))
         .try_map(|name: String| T::of_name(&name))

@@ -1,4 +1,4 @@
-//! Options of the estimate of light by rays.
+//! Options of the estimation of light by rays.
 
 use clap::{ArgAction, Args};
 use photoncard_driver::choice::Choice;
@@ -11,31 +11,31 @@ pub(crate) struct IntegratorOptions {
     /// Seed of all random numbers
     #[arg(long, default_value_t = Integrator::default().seed, allow_negative_numbers = true)]
     pub(super) seed: u32,
-    /// Final gather rays a sample
+    /// Final gather rays per sample
     #[arg(long, default_value_t = Integrator::default().gather_rays, allow_negative_numbers = true)]
     pub(super) gather_rays: u32,
-    /// Shadow rays a sample
+    /// Shadow rays per sample
     #[arg(long, default_value_t = Integrator::default().shadow_rays, allow_negative_numbers = true)]
     pub(super) shadow_rays: u32,
-    /// Samples a pixel
+    /// Samples per pixel
     #[arg(long, default_value_t = Integrator::default().samples, allow_negative_numbers = true)]
     pub(super) spp: u32,
-    /// What the directions of gather rays are chosen by; it never changes what the picture converges to
+    /// Sampling density of the directions of gather rays; it never changes the picture's expected value
     #[arg(long, default_value = Integrator::default().sampling.name(), value_parser = choice::<Sampling>())]
     pub(super) sampling: Sampling,
-    /// Gather the indirect light of Lambertian surfaces at some places and interpolate between them
+    /// Gather the indirect light of Lambertian surfaces at sparse points, and interpolate between them
     #[arg(long, default_value = "off", value_parser = switch(), action = ArgAction::Set)]
     pub(super) irradiance_cache: bool,
-    /// Relative error that interpolated irradiance may have [default: 0.025]
+    /// Maximum relative error of interpolated irradiance [default: 0.025]
     #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true)]
     pub(super) ic_error: Option<f32>,
 }
 
-/// Relative error of interpolated irradiance, unless another is asked for.
+/// Default maximum relative error of interpolated irradiance.
 const DEFAULT_IC_ERROR: f32 = 0.025;
 
 impl IntegratorOptions {
-    /// The settings that the options stand for.
+    /// Settings of these options.
     pub(super) fn settings(&self) -> Integrator {
         let is_cached = self.irradiance_cache && self.gather_rays > 0;
         Integrator {

@@ -1,4 +1,4 @@
-//! Options of the files and of the viewer that the picture goes to.
+//! Options of output files and of the display server.
 
 use std::path::{Path, PathBuf};
 
@@ -13,8 +13,8 @@ use super::choice::choice;
 
 #[derive(Args)]
 pub(crate) struct OutputOptions {
-    /// Go on with a render that was stopped or has failed: the tiles it finished are kept beside the picture, in
-    /// OUT.exr.partial, until that is written
+    /// Continue a render that was stopped or has failed: its finished tiles are kept beside the picture, in
+    /// OUT.exr.partial, until the picture is written
     #[arg(long)]
     resume: bool,
     /// Type of the picture's samples; Z and gathers are always float
@@ -23,7 +23,7 @@ pub(crate) struct OutputOptions {
     /// Write a tone-mapped PNG as well
     #[arg(long, value_name = "OUT.png")]
     pub(crate) preview: Option<PathBuf>,
-    /// Exposure of that PNG in stops: radiance is doubled so often; or auto, which makes its log-average 0.18
+    /// Exposure of the PNG in stops: radiance is multiplied by 2^EXPOSURE; or auto, which makes its log-average 0.18
     #[arg(
         long,
         value_name = "EV",
@@ -33,7 +33,7 @@ pub(crate) struct OutputOptions {
         allow_negative_numbers = true
     )]
     exposure: Exposure,
-    /// What compresses the radiance of that PNG
+    /// Tone curve of the PNG
     #[arg(
         long = "tonemap",
         value_name = "CURVE",
@@ -42,10 +42,10 @@ pub(crate) struct OutputOptions {
         value_parser = choice::<ToneCurve>()
     )]
     tone_curve: ToneCurve,
-    /// Show tiles as they land, in tev or another viewer that speaks its protocol; port 14158 without one
+    /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port: 14158]
     #[arg(long, value_name = "HOST:PORT")]
     display_server: Option<DisplayAddress>,
-    /// Write what the render took, as JSON
+    /// Write statistics of the render as JSON
     #[arg(long, value_name = "OUT.json")]
     pub(crate) stats: Option<PathBuf>,
 }
@@ -57,7 +57,7 @@ enum Exposure {
 }
 
 impl OutputOptions {
-    /// The settings that the options stand for, of the picture in the file `output`.
+    /// Settings of these options for the picture in the file `output`.
     pub(super) fn settings(&self, output: &Path) -> TileOutputs {
         TileOutputs {
             partial: Some(PartialSettings { path: partial_path(output), resume: self.resume }),
@@ -65,14 +65,14 @@ impl OutputOptions {
         }
     }
 
-    /// Where the picture is shown, by the name of its file.
+    /// Display server, and the picture's name on it: that of its file.
     fn display(&self, output: &Path) -> Option<DisplaySettings> {
         let address = self.display_server.clone()?;
         let image = output.file_name().unwrap_or(output.as_os_str());
         Some(DisplaySettings { address, image: image.to_string_lossy().into_owned() })
     }
 
-    /// How the PNG shows radiance.
+    /// Tone mapping of the PNG.
     pub(crate) fn tone_mapping(&self) -> ToneMapping {
         ToneMapping {
             exposure: match self.exposure {
@@ -84,7 +84,7 @@ impl OutputOptions {
     }
 }
 
-/// The file in which finished tiles are kept until the picture is written.
+/// Path of the file in which finished tiles are kept until the picture is written.
 pub(super) fn partial_path(output: &Path) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
     name.push(".partial");

@@ -15,21 +15,22 @@ pub(crate) struct PhotonOptions {
     /// Layout of the photon map in card memory; it never changes the picture
     #[arg(long, default_value = PhotonMaps::default().layout.name(), value_parser = choice::<PhotonLayout>())]
     pub(super) photon_map: PhotonLayout,
-    /// Photons that a gather looks for
+    /// Photons that a gather searches for
     #[arg(long, default_value_t = PhotonMaps::default().neighbors, allow_negative_numbers = true)]
     pub(super) neighbors: u32,
-    /// Photons of the caustic map: light that has met mirrors and glass alone [default: 200000 if anything in the scene is
-    /// perfectly specular]. With 0 gather rays bring that light, with more noise, and that of punctual lights is lost
+    /// Photons of the caustic map: light from specular paths, by mirrors and glass alone [default: 200000 if anything in
+    /// the scene is perfectly specular]. With 0 gather rays carry this light, with more noise, and that of punctual lights
+    /// is lost
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) caustic_photons: Option<usize>,
-    /// Photons that a gather of caustics looks for, at least 8: fewer are sharper, more are smoother
-    /// [default: 50]
+    /// Photons that a gather of caustics searches for, at least 8: fewer are sharper, more are smoother [default: 50]
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     pub(super) caustic_neighbors: Option<u32>,
-    /// Greatest distance of a gather in metres, or auto: from the photons' density
+    /// Maximum distance of a gather in metres, or auto: by the density of the photons
     #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true)]
     pub(super) max_distance: MaxDistance,
-    /// What tells the radiance of a Lambertian surface at the end of a gather ray; one with a Phong lobe is always by density
+    /// Estimate of the radiance of a Lambertian surface at the end of a gather ray; one with a Phong lobe always uses
+    /// density
     #[arg(long, default_value = PhotonMaps::default().radiance.name(), value_parser = choice::<Radiance>())]
     pub(super) radiance: Radiance,
 }
@@ -41,7 +42,7 @@ pub(super) enum MaxDistance {
 }
 
 impl PhotonOptions {
-    /// The settings that the options stand for.
+    /// Settings of these options.
     pub(super) fn settings(&self) -> PhotonMaps {
         PhotonMaps {
             count: self.photons,

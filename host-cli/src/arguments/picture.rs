@@ -23,7 +23,7 @@ pub(crate) struct PictureOptions {
 }
 
 impl PictureOptions {
-    /// The settings that the options stand for.
+    /// Settings of these options.
     pub(super) fn settings(&self) -> Picture {
         let Self { size: (width, height), crop, camera, aov } = self;
         Picture { width: *width, height: *height, crop: *crop, camera: camera.clone(), layers: aov.clone() }

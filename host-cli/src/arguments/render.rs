@@ -1,4 +1,4 @@
-//! The options of `photoncard render`.
+//! Options of `photoncard render`.
 
 use std::path::PathBuf;
 
@@ -18,14 +18,14 @@ use crate::environment::EnvironmentOption;
 pub(crate) struct RenderOptions {
     /// A glTF 2.0 file, .gltf or .glb
     pub(crate) scene: PathBuf,
-    /// The picture, an EXR file: linear RGB radiance and the layers of --aov
+    /// The picture to write, an EXR file: linear RGB radiance and the layers of --aov
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: PathBuf,
     /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness or emission; may be repeated
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
-    /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and top is y;
-    /// or the same radiance from everywhere
+    /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and
+    /// top is y; or a constant radiance
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]
     pub(crate) environment: Option<EnvironmentOption>,
     #[command(flatten)]
@@ -40,7 +40,7 @@ pub(crate) struct RenderOptions {
     pub(crate) cards: CardOptions,
     #[command(flatten)]
     pub(crate) outputs: OutputOptions,
-    /// Threads of the host's own work [default: a thread a core]
+    /// Threads for the host's own work [default: one per core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     /// Show no progress
@@ -49,7 +49,7 @@ pub(crate) struct RenderOptions {
 }
 
 impl RenderOptions {
-    /// The settings that the options stand for.
+    /// Settings of these options.
     pub(crate) fn settings(&self) -> RenderSettings {
         let cards = self.cards.settings();
         RenderSettings {
@@ -62,7 +62,7 @@ impl RenderOptions {
         }
     }
 
-    /// The file in which finished tiles are kept until the picture is written.
+    /// Path of the file in which finished tiles are kept until the picture is written.
     pub(crate) fn partial_path(&self) -> PathBuf {
         partial_path(&self.output)
     }

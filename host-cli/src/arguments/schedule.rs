@@ -10,23 +10,23 @@ use super::choice::choice;
 
 #[derive(Args)]
 pub(crate) struct ScheduleOptions {
-    /// Side of a tile, pixels [default: 16; 8 with direct, indirect, caustic or gathers in --aov, but on cards of the kind
-    /// emulated]
+    /// Side of a tile, pixels [default: 16; 8 with direct, indirect, caustic or gathers in --aov, unless all cards are of
+    /// the kind emulated]
     #[arg(long, allow_negative_numbers = true)]
     pub(super) tile: Option<u32>,
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = Schedule::default().order.name(), value_parser = choice::<GatherOrder>())]
     pub(super) order: GatherOrder,
-    /// Direction bins of the gather rays, for the orders that have any [default: 99]
+    /// Direction bins of the gather rays, for orders with bins [default: 99]
     #[arg(long)]
     pub(super) bins: Option<u32>,
-    /// Gathers that may wait on a chip, for the orders that let any [default: as many as it has room for]
+    /// Gathers that may wait on a chip, for orders with a queue [default: the chip's capacity]
     #[arg(long)]
     pub(super) queue: Option<u32>,
 }
 
 impl ScheduleOptions {
-    /// The settings that the options stand for, of a picture with some layers on some cards.
+    /// Settings of these options for a picture with the layers `layers` on `cards`.
     pub(super) fn settings(&self, layers: &Layers, cards: &[CardAddress]) -> Schedule {
         Schedule {
             tile: self.tile.unwrap_or_else(|| RenderSettings::default_tile(layers, cards)),

@@ -1,6 +1,6 @@
-//! The number of threads that an option asks for.
+//! Parser of numbers of threads.
 
-/// Threads that can be asked for: a system that runs out of them half-way ends the process.
+/// Maximum number of threads: a system that runs out of them while they start ends the process.
 const MAX_THREADS: usize = 1024;
 
 /// Parses a number of threads.

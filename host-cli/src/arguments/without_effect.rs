@@ -1,4 +1,4 @@
-//! Options that are given and change nothing, as others that they need are not.
+//! Notices on options without effect, because an option that they need is not given.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::render::Radiance;
@@ -8,7 +8,7 @@ use photoncard_driver::scheduler::GatherOrder;
 use super::render::RenderOptions;
 
 impl RenderOptions {
-    /// A sentence on each option that has no effect on the render of a scene.
+    /// One sentence for each option that has no effect on the render of `scene`.
     pub(crate) fn without_effect(&self, scene: &Scene) -> Vec<String> {
         let order = self.schedule.order;
         let name = order.name();

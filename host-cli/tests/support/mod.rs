@@ -1,4 +1,4 @@
-//! Runs the command in a folder of its own, on small scenes made here.
+//! Runs the command in a temporary folder, on small scenes.
 #![allow(dead_code, reason = "not every test file uses all of it")]
 
 use std::fmt::Write;
@@ -10,7 +10,7 @@ use std::process::{Child, Command, Output, Stdio};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// Options of the smallest render; a test adds what it is about.
+/// Options of a minimal render; a test adds its own.
 const SMALL: [(&str, &str); 5] = [
     ("--size", "8x8"),
     ("--photons", "200"),
@@ -19,7 +19,7 @@ const SMALL: [(&str, &str); 5] = [
     ("--shadow-rays", "1"),
 ];
 
-/// What a command did.
+/// Result of a command.
 pub(crate) struct Outcome {
     pub(crate) status: Option<i32>,
     pub(crate) stdout: String,
@@ -27,7 +27,7 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// What came out of a process, which may not have panicked.
+    /// Status and output of a process, which must not have panicked.
     pub(crate) fn of(output: &Output) -> Self {
         let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
         let outcome =
@@ -37,7 +37,7 @@ impl Outcome {
     }
 }
 
-/// A folder in which commands run.
+/// Temporary folder in which commands run.
 pub(crate) struct Room(TempDir);
 
 impl Room {
@@ -61,7 +61,7 @@ impl Room {
         self.write(name, serde_json::to_vec(scene).unwrap());
     }
 
-    /// The names of all files, sorted.
+    /// Names of all files, sorted.
     pub(crate) fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(self.0.path()).unwrap();
         let mut names: Vec<_> =
@@ -80,12 +80,12 @@ impl Room {
         Outcome::of(&self.command().args(arguments).output().unwrap())
     }
 
-    /// A small render; `options` replace or join those of [`SMALL`].
+    /// Small render; `options` replace or extend [`SMALL`].
     pub(crate) fn render(&self, scene: &str, options: &[&str]) -> Outcome {
         self.run(&small_render(scene, options))
     }
 
-    /// A small render that succeeds.
+    /// Small render that must succeed.
     pub(crate) fn rendered(&self, scene: &str, options: &[&str]) -> Outcome {
         let outcome = self.render(scene, options);
         assert_eq!(outcome.status, Some(0), "{options:?}: {}", outcome.stderr);
@@ -94,7 +94,7 @@ impl Room {
     }
 }
 
-/// A card that another process serves, until it is dropped.
+/// Card that another process serves, until it is dropped.
 pub(crate) struct Emulator {
     pub(crate) process: Child,
     pub(crate) address: String,
@@ -111,13 +111,13 @@ impl Emulator {
         Self { process, address: address.trim_end().to_owned() }
     }
 
-    /// Sends it a signal.
+    /// Sends the process a signal.
     pub(crate) fn signal(&self, signal: &str) {
         let id = self.process.id().to_string();
         assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
     }
 
-    /// Ends it by a signal. Returns its exit status and what it said.
+    /// Ends the process by a signal. Returns its exit status and its output.
     pub(crate) fn end(mut self, signal: &str) -> (Option<i32>, String) {
         self.signal(signal);
         let status = self.process.wait().unwrap().code();
@@ -129,13 +129,13 @@ impl Emulator {
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        // Both fail if it has ended.
+        // Both fail if the process has ended.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
-/// The arguments of a small render; `options` replace or join those of [`SMALL`].
+/// Arguments of a small render; `options` replace or extend [`SMALL`].
 pub(crate) fn small_render<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a str> {
     let mut arguments = vec!["render", scene];
     for (option, value) in SMALL {
@@ -147,13 +147,13 @@ pub(crate) fn small_render<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a s
     arguments
 }
 
-/// The path of a scene that ships.
+/// Path of a scene that ships.
 pub(crate) fn shipped(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(name);
     path.to_str().unwrap().to_owned()
 }
 
-/// The bytes of [`scene`]: four corners of the floor, three of the lamp, six indices of the floor.
+/// Bytes of [`scene`]: four corners of the floor, three of the lamp, six indices of the floor.
 pub(crate) fn scene_bytes() -> Vec<u8> {
     let floor = [-1f32, 0., 1., 1., 0., 1., 1., 0., -1., -1., 0., -1.];
     let lamp = [0f32, 1., 0., 0.5, 1., 0., 0., 1., 0.5];
@@ -167,7 +167,7 @@ pub(crate) fn scene() -> Value {
     scene_of(&scene_bytes())
 }
 
-/// The scene of these bytes.
+/// Scene with these bytes.
 pub(crate) fn scene_of(bytes: &[u8]) -> Value {
     json!({
         "asset": {"version": "2.0"},
@@ -212,7 +212,7 @@ fn data_uri(bytes: &[u8]) -> String {
     })
 }
 
-/// A GLB of some JSON and bytes.
+/// GLB of JSON and bytes.
 pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let padded = |bytes: &[u8], padding: u8| {
         let mut chunk = bytes.to_vec();

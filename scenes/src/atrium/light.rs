@@ -1,9 +1,8 @@
 //! The sky over the court and the sun in it.
 //!
-//! Space beyond the scene is black, so the sky is a wedge that stands on the roof and closes the opening:
-//! low in the north, high in the south. Its shape cannot be seen, as its radiance is uniform; it is small
-//! because light from one part of it to another is lost. The sun hangs in its high corner, so that light
-//! falls over the southern eaves slantwise on the northern side.
+//! Space beyond the scene is black, so the sky is a wedge on the roof that closes the opening: low in the north, high in
+//! the south. Its shape is invisible, as its radiance is uniform. It is small, because light from one part of it to another
+//! is lost. The sun is in its high corner, so that light falls over the southern eaves obliquely on the northern side.
 
 use glam::Vec3;
 

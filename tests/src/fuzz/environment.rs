@@ -1,4 +1,4 @@
-//! Environments in Radiance pictures. Those in `OpenEXR` are read as all such pictures are.
+//! Fuzzing of environments in Radiance pictures. Those in `OpenEXR` are covered by `picture`.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound};
 
-/// The target.
+/// Target of environments.
 pub(super) struct Environments {
     seeds: Vec<Vec<u8>>,
     folder: TempDir,
@@ -19,7 +19,7 @@ pub(super) struct Environments {
 /// Columns of the run-length encoded picture.
 const WIDTH: u8 = 12;
 
-/// Pictures in plain rows and in encoded ones.
+/// Pictures with plain and with run-length encoded rows.
 pub(crate) fn pictures() -> Vec<Vec<u8>> {
     let header = b"#?RADIANCE\nSOFTWARE=any\nEXPOSURE=2.0\nFORMAT=32-bit_rle_rgbe\n\n";
     let mut flat = [&header[..], b"-Y 2 +X 3\n"].concat();
@@ -28,7 +28,7 @@ pub(crate) fn pictures() -> Vec<Vec<u8>> {
     for row in 0..3 {
         encoded.extend([2, 2, 0, WIDTH]);
         for channel in 0..4 {
-            // A run, and values.
+            // A run, and literals.
             encoded.extend([128 + WIDTH - 4, 120 + channel, 4, row, 2 * row, 3, 128]);
         }
     }
@@ -51,7 +51,7 @@ impl Target for Environments {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // Two bytes stand for up to 127 values of one of four channels, a texel for twelve bytes.
+        // Two bytes encode up to 127 values of one of four channels; a texel takes twelve bytes.
         bound(input, 16 * 12)
     }
 

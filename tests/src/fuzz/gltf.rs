@@ -1,4 +1,4 @@
-//! Scenes: glTF as text and as GLB, loaded and packed.
+//! Fuzzing of scenes: glTF as text and as GLB, loaded and packed.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,21 +11,21 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound};
 
-/// Scenes of more triangles are loaded only.
+/// Maximum number of triangles of a scene that is packed; larger ones are loaded only.
 const MAX_PACKED: usize = 2000;
 
-/// The target.
+/// Target of scenes.
 pub(super) struct Scenes {
     texts: Vec<Vec<u8>>,
-    /// The JSON and the bytes of scenes in GLB.
+    /// JSON and binary chunk of scenes in GLB.
     binaries: Vec<(Vec<u8>, Vec<u8>)>,
-    /// All of them as files.
+    /// All scenes as files.
     files: Vec<Vec<u8>>,
     folder: TempDir,
 }
 
-/// Everything that the loader reads: a hierarchy, sparse positions, normals, coordinates, colours, a skin, instances, a
-/// strip, textures, a lobe, glass, lights, an orthographic camera.
+/// Scene with every feature that the loader reads: a hierarchy, sparse positions, normals, coordinates, colours, a skin,
+/// instances, a strip, textures, a lobe, glass, lights, an orthographic camera.
 const RICH: &[u8] = include_bytes!("../../fuzz/rich.gltf");
 const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/furnace.gltf"),
@@ -33,12 +33,12 @@ const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/cornell-glossy.gltf"),
 ];
 
-/// Images, each at a multiple of four bytes, after the triangle's numbers.
+/// Images, each at a multiple of four bytes, after the triangle's data.
 const PNG: &[u8] = include_bytes!("../../../driver/tests/images/texel.png");
 const JPEG: &[u8] = include_bytes!("../../../driver/tests/images/grey.jpg");
 
-/// A triangle's vertices, its indices, an index and a position that take the place of another, coordinates, colours,
-/// joints, weights, a matrix, and images.
+/// Bytes of a triangle: vertices, indices, an index and a position of a sparse accessor, coordinates, colours, joints,
+/// weights, a matrix, and images.
 fn triangle_bytes() -> Vec<u8> {
     let vertices = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let indices = [0_u16, 1, 2, 1].map(u16::to_le_bytes);
@@ -69,7 +69,7 @@ fn triangle_bytes() -> Vec<u8> {
     bytes
 }
 
-/// A scene whose bytes are in its text.
+/// Scene whose bytes are in its text.
 fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let data: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
     let text = String::from_utf8_lossy(text);
@@ -78,7 +78,7 @@ fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     text.replace(&stated, &format!("{stated}, \"uri\": \"data:,{data}\"")).into_bytes()
 }
 
-/// A GLB of some JSON and bytes. What its header and chunks say of their lengths is true.
+/// GLB of JSON and bytes, with correct lengths in its headers.
 pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let mut text = text.to_vec();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -94,7 +94,7 @@ pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     file
 }
 
-/// The JSON and the bytes of a GLB of two chunks.
+/// JSON and bytes of a GLB of two chunks.
 pub(crate) fn split_glb(file: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
     let chunk = |at: usize| {
         let length = u32::from_le_bytes(*file.get(at..)?.first_chunk()?) as usize;
@@ -104,7 +104,7 @@ pub(crate) fn split_glb(file: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
     Some((text.to_vec(), chunk(12 + 8 + text.len())?.to_vec()))
 }
 
-/// A scene of everything that the loader reads, as text.
+/// Scene with every feature that the loader reads, as text.
 pub(crate) fn rich() -> Vec<u8> {
     with_data(RICH, &triangle_bytes())
 }
@@ -125,7 +125,7 @@ impl Scenes {
     }
 }
 
-/// Makes few edits: one alone is refused more often than not.
+/// Makes few edits: most single ones are rejected already.
 fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     for _ in 0..1 + random.edits() / 3 {
         mutation::edit_json(text, random);
@@ -138,7 +138,7 @@ impl Target for Scenes {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // A node of JSON is a few bytes as text, and some hundred once it is read.
+        // A node takes a few bytes of JSON, and some hundred in memory.
         bound(input, 1024)
     }
 

@@ -1,4 +1,4 @@
-//! Card images: a card that loads one renders a tile of it, or answers a fault.
+//! Fuzzing of card images: a card that loads one renders a tile of it, or answers with a fault.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -19,18 +19,18 @@ use crate::everything::everything;
 use crate::wire::{Answer, Wire};
 use crate::{camera, lambertian, room, scene};
 
-/// Lines of the card's memory.
+/// Number of lines of the card's memory.
 const DRAM_LINES: usize = 1024;
-/// A tile in the middle of the picture, which sees the lamp's and other walls.
+/// Tile in the middle of the picture, which sees several walls.
 const TILE: Tile = Tile { id: 7, x: 2, y: 2, width: 4, height: 4 };
 
-/// The target. An input is a byte that chooses the techniques, and an image.
+/// Target of card images. An input is a byte that selects the techniques, and an image.
 pub(super) struct Image {
     seeds: Vec<Vec<u8>>,
 }
 
-/// A lit room with a few photons, in both layouts of the photon map, and irradiance points; and a scene of everything, with a caustic
-/// map.
+/// Images of a lit room with a few photons, in both layouts of the photon map, with irradiance points; and of a scene with
+/// every feature, with a caustic map.
 fn images() -> [CardImage; 3] {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;
@@ -54,7 +54,7 @@ fn images() -> [CardImage; 3] {
     [tree, leaves, mapped.image]
 }
 
-/// The frame that a byte chooses: every technique.
+/// Frame whose techniques a byte selects.
 fn frame(choice: u8) -> FrameParameters {
     let settings = RenderSettings {
         picture: Picture { width: 8, height: 8, ..Picture::default() },
@@ -86,13 +86,13 @@ impl Image {
     }
 }
 
-/// Makes one edit of an image that mostly leaves lines where they are.
+/// Makes one edit of an image that mostly keeps the positions of lines.
 fn edit(image: &mut Vec<u8>, seeds: &[Vec<u8>], random: &mut Random) {
     let lines = image.len() / LINE_BYTES;
     if lines == 0 {
         return;
     }
-    // The words of a line, of the header some of the time: all but the first are numbers.
+    // A word of a line, sometimes of the header: all but the first are numbers.
     let place = match random.below(4) {
         0 => 12 + 4 * random.below(HEADER_LINES * LINE_BYTES / 4 - 3),
         1 => LINE_BYTES * random.below(lines) + random.below(LINE_BYTES),
@@ -129,7 +129,7 @@ impl Target for Image {
         for _ in 0..random.edits() {
             edit(&mut image, &self.seeds, random);
         }
-        // An image whose lines are fewer or more than its header says is refused: seldom worth a try.
+        // An image with more or fewer lines than its header states is rejected: rarely worth a try.
         if !random.once_in(16) && image.len() >= LINE_BYTES {
             let lines = (image.len() / LINE_BYTES) as u32;
             image[12..16].copy_from_slice(&lines.to_le_bytes());
@@ -144,7 +144,7 @@ impl Target for Image {
         let mut memory = vec![Line::ZERO; DRAM_LINES];
         let mut wire = Wire::new(&mut memory);
         wire.hello();
-        // Where there is no room for it, each of its commands is a fault.
+        // If there is no room for the image, each of its commands is a fault.
         match wire.load(&lines).last() {
             Some(Answer::ImageAccepted) => {}
             Some(Answer::Fault(_)) => return false,
@@ -152,7 +152,7 @@ impl Target for Image {
         }
         match wire.say(&Command::BeginFrame(frame(choice)))[..] {
             [Answer::FrameAccepted] => {}
-            // The image may have lost its irradiance points.
+            // The edited image may have lost its irradiance points.
             [Answer::Fault(FaultCode::Parameter)] if frame(choice).radiance == Radiance::Precomputed => {
                 return false;
             }
@@ -170,7 +170,7 @@ impl Target for Image {
     }
 }
 
-/// The pixels that came.
+/// Number of pixels received.
 fn pixels(answers: &[Answer]) -> usize {
     let count = |answer: &Answer| if let Answer::Pixels(count) = answer { *count } else { 0 };
     answers.iter().map(count).sum()

@@ -1,4 +1,4 @@
-//! Messages: payloads of frames that are commands, replies, or neither.
+//! Fuzzing of messages: payloads of frames that are commands, replies, or neither.
 
 use photoncard_firmware::kind::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
@@ -12,12 +12,12 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound};
 
-/// The target.
+/// Target of messages.
 pub(super) struct Messages {
     seeds: Vec<Vec<u8>>,
 }
 
-/// A frame that any chip renders.
+/// Frame that any chip renders.
 pub(super) fn frame() -> FrameParameters {
     let camera = Camera {
         origin: [0.0, 1.0, 5.0],
@@ -46,7 +46,7 @@ pub(super) fn frame() -> FrameParameters {
     }
 }
 
-/// One of every command.
+/// One of each command.
 pub(super) fn commands() -> Vec<Vec<u8>> {
     let data = [0x5a; 256];
     let commands = [
@@ -61,7 +61,7 @@ pub(super) fn commands() -> Vec<Vec<u8>> {
     commands.iter().map(|command| written(MAX_PAYLOAD, |bytes| message::encode(command, bytes))).collect()
 }
 
-/// One of every reply.
+/// One of each reply.
 pub(super) fn replies() -> Vec<Vec<u8>> {
     let data = [0x5a; 400];
     let hello = |budget, memory_use| Reply::Hello {
@@ -99,13 +99,13 @@ impl Messages {
     }
 }
 
-/// Writes a command that was read: in no more bytes.
+/// Decodes and encodes a command; the result must not be longer.
 fn rewritten_command(input: &[u8]) -> Option<Vec<u8>> {
     let command = message::decode::<Command>(input)?;
     Some(written(input.len(), |bytes| message::encode(&command, bytes)))
 }
 
-/// Writes a reply that was read: in no more bytes.
+/// Decodes and encodes a reply; the result must not be longer.
 fn rewritten_reply(input: &[u8]) -> Option<Vec<u8>> {
     let reply = message::decode::<Reply>(input)?;
     Some(written(input.len(), |bytes| message::encode(&reply, bytes)))

@@ -1,7 +1,7 @@
-//! Fuzzing of everything that reads what others wrote: mutated inputs, each a function of its target, a seed and a number.
+//! Fuzzing of all readers of foreign bytes: mutated inputs, each a function of its target, a seed and a number.
 //!
-//! No input may panic, take longer than some seconds, or allocate more than a bound. What that finds is what a coverage
-//! guided fuzzer would be used for; this one needs no other compiler, and a failing input is replayed by its number.
+//! No input may panic, take longer than some seconds, or allocate more than a bound. A coverage-guided fuzzer would do
+//! more, but needs another compiler; here a failing input is replayed by its number.
 
 pub(crate) mod environment;
 pub(crate) mod gltf;
@@ -23,11 +23,11 @@ pub use self::random::Random;
 pub use self::run::{Failure, Report, Settings, fuzz};
 pub use self::target::Target;
 
-/// The names of all targets.
+/// Names of all targets.
 pub const NAMES: [&str; 8] =
     ["frames", "messages", "session", "image", "gltf", "textures", "environments", "exr"];
 
-/// The target of a name.
+/// Target with the name `name`.
 pub fn target(name: &str) -> Option<Arc<dyn Target>> {
     match name {
         "frames" => Some(Arc::new(transport::Frames::new())),

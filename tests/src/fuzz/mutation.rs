@@ -1,15 +1,15 @@
-//! Edits of bytes, and of the tokens of JSON text.
+//! Mutations of bytes, and of the tokens of JSON text.
 
 use std::ops::Range;
 
 use super::random::Random;
 
-/// No edit makes an input longer.
+/// Maximum length of a mutated input.
 const MAX_BYTES: usize = 1 << 17;
-/// The longest chunk that is inserted, deleted, repeated or taken from another input.
+/// Maximum length of a chunk that is inserted, deleted, repeated or taken from another input.
 const CHUNK: usize = 256;
 
-/// Words at the borders of what fields hold.
+/// Words at the limits of integer fields.
 const WORDS: [u64; 24] = [
     0,
     1,
@@ -37,7 +37,7 @@ const WORDS: [u64; 24] = [
     u64::MAX,
 ];
 
-/// Floats at the borders of what arithmetic holds.
+/// Floats at the limits of arithmetic.
 const FLOATS: [f32; 14] = [
     0.0,
     -0.0,
@@ -55,20 +55,20 @@ const FLOATS: [f32; 14] = [
     16_777_216.0,
 ];
 
-/// A place and a length of a chunk of `bytes`.
+/// Random range of `bytes`.
 fn chunk(bytes: usize, random: &mut Random) -> Range<usize> {
     let start = random.below(bytes);
     let most = CHUNK.min(bytes - start);
     start..start + random.below(most + 1)
 }
 
-/// Puts a word at the borders of what fields hold, of 1, 2, 4 or 8 bytes, over the bytes from `place` on.
+/// Overwrites the bytes from `place` on by a word of 1, 2, 4 or 8 bytes at the limits of integer fields.
 pub(crate) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
     let word = if random.once_in(3) {
         u64::from(random.pick(&FLOATS).to_bits())
     } else {
         let word = *random.pick(&WORDS);
-        // Around it, some of the time.
+        // Sometimes a neighbour of the word.
         if random.once_in(4) { word.wrapping_sub(random.below(64) as u64) } else { word }
     };
     let mut word = word.to_le_bytes();
@@ -81,7 +81,7 @@ pub(crate) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
     }
 }
 
-/// Makes one edit of any bytes; chunks come from the bytes themselves and from `others`.
+/// Makes one edit of arbitrary bytes; inserted chunks come from the bytes themselves and from `others`.
 pub(crate) fn edit_bytes(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
     if bytes.is_empty() {
         bytes.push(random.next() as u8);
@@ -118,14 +118,14 @@ pub(crate) fn edit_bytes(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut R
     bytes.truncate(MAX_BYTES);
 }
 
-/// Makes some edits of any bytes.
+/// Makes several edits of arbitrary bytes.
 pub(crate) fn edit(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
     for _ in 0..random.edits() {
         edit_bytes(bytes, others, random);
     }
 }
 
-/// What numbers of JSON are replaced by.
+/// Replacements of JSON numbers.
 const NUMBERS: [&str; 28] = [
     "0",
     "-0",
@@ -157,7 +157,7 @@ const NUMBERS: [&str; 28] = [
     "[1,2,3]",
 ];
 
-/// What strings of JSON are replaced by.
+/// Replacements of JSON strings.
 const STRINGS: [&str; 14] = [
     "\"\"",
     "\"data:,\"",
@@ -175,7 +175,7 @@ const STRINGS: [&str; 14] = [
     "0",
 ];
 
-/// The places of numbers, or of strings with their quotes.
+/// Ranges of numbers, or of strings with their quotes.
 fn tokens(text: &[u8], strings: bool) -> Vec<Range<usize>> {
     let mut found = Vec::new();
     let mut at = 0;
@@ -203,7 +203,7 @@ fn tokens(text: &[u8], strings: bool) -> Vec<Range<usize>> {
     found
 }
 
-/// The end of the value that begins at `start`: the comma or bracket after it.
+/// End of the value that begins at `start`: the comma or bracket after it.
 fn value_end(text: &[u8], start: usize) -> usize {
     let (mut depth, mut is_string) = (0, false);
     for (offset, &byte) in text[start..].iter().enumerate() {
@@ -218,7 +218,7 @@ fn value_end(text: &[u8], start: usize) -> usize {
     text.len()
 }
 
-/// Makes one edit of JSON text that leaves most of its structure whole.
+/// Makes one edit of JSON text that keeps most of its structure.
 pub(crate) fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     let is_string = random.once_in(3);
     let found = tokens(text, is_string);
@@ -229,7 +229,7 @@ pub(crate) fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     let other = text[random.pick(&found).clone()].to_vec();
     match random.below(16) {
         0 => drop(text.splice(place, other)),
-        // A small change keeps indices and factors in reach.
+        // A small change keeps indices and factors in range.
         1..=5 if !is_string => {
             let digit = place.start + random.below(place.len());
             if text[digit].is_ascii_digit() {
@@ -246,19 +246,19 @@ pub(crate) fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
             drop(text.splice(place, new.into_bytes()));
         }
         12 => {
-            // A value once more, as the next of its array or object.
+            // Repeats a value as the next of its array or object.
             let end = value_end(text, place.start);
             let mut copy = text[place.start..end].to_vec();
             copy.push(b',');
             drop(text.splice(place.start..place.start, copy));
         }
         13 => {
-            // A value less, with its comma.
+            // Deletes a value with its comma.
             let end = (value_end(text, place.start) + 1).min(text.len());
             drop(text.drain(place.start..end));
         }
         _ => {
-            // Nested, some of the time deeper than a reader may follow.
+            // Nests a value, sometimes deeper than a reader may follow.
             let depth = if random.once_in(4) { 200 + random.below(4000) } else { random.below(4) };
             let nested = [vec![b'['; depth], other, vec![b']'; depth]].concat();
             drop(text.splice(place, nested));

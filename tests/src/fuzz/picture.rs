@@ -1,4 +1,4 @@
-//! Pictures: `OpenEXR` files of every compression, read and compared.
+//! Fuzzing of pictures: `OpenEXR` files of every compression, read and compared.
 
 use std::fs;
 use std::io::Cursor;
@@ -19,10 +19,10 @@ use super::target::{Target, bound};
 
 /// Columns and rows of the pictures.
 const SIZE: [usize; 2] = [20, 36];
-/// Larger pictures are read only.
+/// Maximum number of pixels of a picture that is compared; larger ones are read only.
 const MAX_COMPARED: usize = 1 << 16;
 
-/// The target.
+/// Target of pictures.
 pub(super) struct Pictures {
     seeds: Vec<Vec<u8>>,
     folder: TempDir,
@@ -47,7 +47,7 @@ fn picture(compression: Compression, blocks: Blocks, is_half: bool) -> Option<Ve
     Some(bytes.into_inner())
 }
 
-/// A picture of each compression that is written, in rows and in tiles.
+/// Pictures of each compression that is written, in scanlines and in tiles.
 pub(crate) fn pictures() -> Vec<Vec<u8>> {
     let compressions = [
         Compression::Uncompressed,
@@ -88,13 +88,14 @@ impl Target for Pictures {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // Deflate makes a byte at most 1100: of halves of three channels, which are read as floats twice that, and three blocks.
+        // Deflate expands a byte to at most 1100: halves of three channels, which are read as floats of twice the size, and
+        // three blocks.
         bound(input, 8192)
     }
 
     fn input(&self, random: &mut Random) -> Vec<u8> {
         let mut file = random.pick(&self.seeds).clone();
-        // The header is a small part of a file, and has most of its meaning.
+        // The header is a small part of a file, but its most meaningful one.
         let header = 400.min(file.len());
         for _ in 0..random.edits() {
             let place = random.below(header);

@@ -1,18 +1,18 @@
-//! PNG files taken apart into chunks: edits that leave lengths and checksums right, so that what chunks say is read.
+//! Mutations of PNG chunks with correct lengths and checksums, so that decoders read their contents.
 
 use super::{Random, mutation};
 
-/// The first bytes of every file.
+/// Signature of PNG.
 pub(crate) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// A chunk's type and data.
+/// Type and data of a chunk.
 type Chunk = ([u8; 4], Vec<u8>);
 
-/// Types of chunks that mean something to a decoder.
+/// Types of chunks that a decoder interprets.
 const TYPES: [&[u8; 4]; 9] =
     [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND", b"gAMA", b"iCCP", b"acTL", b"fcTL"];
 
-/// Makes one edit of the chunks of a file: of the data of one, or of which there are. What is behind them is lost.
+/// Makes one edit of the chunks of a file: of one chunk's data, or of their list. Bytes after the chunks are lost.
 pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
     let mut chunks = split(file);
     if chunks.is_empty() {
@@ -38,7 +38,7 @@ pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
     *file = join(&chunks);
 }
 
-/// Makes the checksums of chunks right, and leaves all else.
+/// Corrects the checksums of chunks, and changes nothing else.
 pub(crate) fn mend_checksums(file: &mut [u8]) {
     let mut at = MAGIC.len();
     while let Some(length) = file.get(at..).and_then(|rest| rest.first_chunk::<4>()) {
@@ -73,7 +73,7 @@ fn join(chunks: &[Chunk]) -> Vec<u8> {
     file
 }
 
-/// The CRC-32 of a chunk's type and data (PNG, annex D).
+/// CRC-32 of a chunk's type and data (PNG, annex D).
 fn checksum(bytes: &[u8]) -> [u8; 4] {
     let sum = bytes.iter().fold(u32::MAX, |sum, &byte| {
         (0..8).fold(sum ^ u32::from(byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xedb8_8320))
@@ -99,7 +99,7 @@ mod tests {
         assert_eq!(damaged, FILE);
     }
 
-    /// Palettes of other lengths than whole colours are among the edits: what a decoder once panicked at.
+    /// The edits include palettes whose length is no multiple of three, for which a decoder has panicked.
     #[test]
     fn palettes_of_odd_lengths_are_reached() {
         let odd = |number| {

@@ -1,12 +1,12 @@
-//! Random numbers that make an input a function of its target, seed and number: `SplitMix64` (Steele, Lea, Flood 2014).
+//! Random numbers as a function of target, seed and input number: `SplitMix64` (Steele, Lea, Flood 2014).
 
-/// A sequence of random numbers.
+/// Sequence of random numbers.
 pub struct Random(u64);
 
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 impl Random {
-    /// The sequence of input `number` of a target.
+    /// Sequence of input `number` of a target.
     pub fn new(target: &str, seed: u64, number: u64) -> Self {
         let mut random = Self(0);
         for part in target.bytes().map(u64::from).chain([seed, number]) {
@@ -16,7 +16,7 @@ impl Random {
         random
     }
 
-    /// The next number.
+    /// Next number.
     #[expect(clippy::should_implement_trait, reason = "a sequence without an end")]
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(STEP);
@@ -26,22 +26,22 @@ impl Random {
         value ^ value >> 31
     }
 
-    /// A number below `limit`; 0 for a limit of 0.
+    /// Random number below `limit`; 0 for a limit of 0.
     pub fn below(&mut self, limit: usize) -> usize {
         (self.next() % (limit.max(1) as u64)) as usize
     }
 
-    /// True once in `n` times.
+    /// Returns true with probability `1 / n`.
     pub fn once_in(&mut self, n: usize) -> bool {
         self.below(n) == 0
     }
 
-    /// One of some items, of which there is at least one.
+    /// Random item of a non-empty list.
     pub fn pick<'a, T>(&mut self, items: &'a [T]) -> &'a T {
         &items[self.below(items.len())]
     }
 
-    /// How many edits to make: one half of the time, each further number half as often.
+    /// Number of edits, geometrically distributed: 1 with probability 1/2, each further one half as likely.
     pub fn edits(&mut self) -> u32 {
         1 + self.next().trailing_zeros().min(7)
     }

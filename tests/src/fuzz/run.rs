@@ -1,4 +1,4 @@
-//! Runs inputs on a thread of their own, and watches over it: panics, hangs and allocations.
+//! Runs inputs on a thread of their own, and detects panics, hangs and excessive allocations.
 
 use std::cell::RefCell;
 use std::fmt::Write as _;
@@ -17,55 +17,56 @@ use peak_alloc::PeakAlloc;
 use super::random::Random;
 use super::target::Target;
 
-/// The worker's name: its panics are findings, and printed as such.
+/// Name of the worker thread, whose panics are findings.
 const WORKER: &str = "fuzz";
-/// Room for a card's buffers, which are built on the stack.
+/// Stack size: a card's buffers are built on the stack.
 const STACK: usize = 16 << 20;
-/// How often the watch looks.
+/// Interval at which the watchdog polls.
 const GLANCE: Duration = Duration::from_millis(100);
-/// Failures after which a run ends.
+/// Number of failures after which a run ends.
 const MAX_FAILURES: usize = 20;
 
-/// What to run.
+/// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The seed of all inputs.
+    /// Seed of all inputs.
     pub seed: u64,
-    /// The number of the first input.
+    /// Number of the first input.
     pub first: u64,
-    /// How many inputs.
+    /// Number of inputs.
     pub inputs: u64,
-    /// Ends the run after this time, if it is reached before the last input.
+    /// Time after which the run ends, even before the last input.
     pub time: Option<Duration>,
-    /// How long one input may take.
+    /// Time limit of one input.
     pub patience: Duration,
-    /// The folder that failing inputs are written to, and the number of the present one.
+    /// Folder for failing inputs, and for the number of the present one.
     pub folder: PathBuf,
 }
 
-/// An input that failed.
+/// Failed input.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// Its number.
+    /// Number of the input.
     pub number: u64,
-    /// What happened.
+    /// Description of the failure.
     pub what: String,
 }
 
-/// What a run found.
+/// Result of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// Inputs that were read.
+    /// Number of inputs that were read.
     pub inputs: u64,
-    /// Inputs that were sound.
+    /// Number of inputs that were valid.
     pub sound: u64,
-    /// The most bytes that one input had allocated at once, and its number; 0 where [`PeakAlloc`] is not the allocator.
+    /// Maximum number of bytes that one input had allocated at once, with the input's number; 0 if [`PeakAlloc`] is not the
+    /// allocator.
     pub peak: (usize, u64),
-    /// The longest time that one input took, and its number.
+    /// Maximum time of an input, with the input's number.
     pub slowest: (Duration, u64),
-    /// The time of all.
+    /// Total time.
     pub elapsed: Duration,
-    /// Inputs that failed.
+    /// Failed inputs.
     pub failures: Vec<Failure>,
 }
 
@@ -73,7 +74,8 @@ thread_local! {
     static LAST_PANIC: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Keeps the words of a worker's panic instead of printing them: some are caught by what is tested.
+/// Installs a hook that stores the message of a worker's panic instead of printing it: some panics are caught by the tested
+/// code.
 fn keep_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -91,7 +93,7 @@ fn keep_panics() {
 /// Runs inputs of a target.
 ///
 /// # Panics
-/// If the system has no thread for it.
+/// If the system cannot start a thread.
 pub fn fuzz(target: &Arc<dyn Target>, settings: &Settings) -> Report {
     keep_panics();
     let begin = Instant::now();
@@ -116,7 +118,7 @@ pub fn fuzz(target: &Arc<dyn Target>, settings: &Settings) -> Report {
     report
 }
 
-/// Waits for the worker's report, or for an input that takes too long. A thread cannot be ended: it is left to itself.
+/// Waits for the worker's report, or for an input that takes too long. As a thread cannot be killed, it keeps running.
 fn watch(reports: &Receiver<Report>, at: &AtomicU64, patience: Duration) -> Report {
     let (mut last, mut since) = (at.load(Ordering::Relaxed), Instant::now());
     loop {
@@ -142,7 +144,7 @@ fn watch(reports: &Receiver<Report>, at: &AtomicU64, patience: Duration) -> Repo
 fn run(target: &dyn Target, settings: &Settings, at: &AtomicU64) -> Report {
     let mut report = Report::default();
     let begin = Instant::now();
-    // What ends the process, as a stack that overflows, leaves the number behind.
+    // A failure that ends the process, such as a stack overflow, leaves this number behind.
     let trace =
         settings.folder.join(format!("{}-{}-from-{}.at", target.name(), settings.seed, settings.first));
     let file = std::fs::create_dir_all(&settings.folder).and_then(|()| File::create(&trace)).ok();
@@ -176,7 +178,7 @@ fn run(target: &dyn Target, settings: &Settings, at: &AtomicU64) -> Report {
     report
 }
 
-/// A dump that `xxd -r -p` turns back into bytes.
+/// Hexadecimal dump, which `xxd -r -p` converts back.
 fn hex(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len() * 2 + bytes.len() / 32 + 1);
     for row in bytes.chunks(32) {

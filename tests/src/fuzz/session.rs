@@ -1,4 +1,4 @@
-//! A host's session with a hostile card: replies that it did not ask for, mutated, in any order, and cards that are reset.
+//! Fuzzing of a host's session by a hostile card: mutated replies in any order, without a request, and resets.
 
 use std::sync::Mutex;
 use std::time::Duration;
@@ -23,32 +23,32 @@ use super::random::Random;
 use super::target::{Target, bound};
 use super::{messages, mutation};
 
-/// Lines of the image: some chunks and a part of one.
+/// Number of lines of the image: several chunks and a part of one.
 const LINES: u32 = 200;
-/// Sides of a tile, of which the picture is two.
+/// Side of a tile; the picture has two tiles.
 const SIDE: u32 = 6;
 /// Time of a step.
 const STEP: Duration = Duration::from_millis(50);
-/// Frames that the ends send each other in a step at the most.
+/// Maximum number of frames that the ends exchange in a step.
 const MAX_FRAMES: usize = 64;
-/// Steps in which a session fails of which the card is silent.
+/// Number of steps after which a session with a silent card has failed.
 const MAX_STEPS: usize = 400;
 
-/// What the card does in a step: the first byte of each record of an input, of which the first byte of all says whether the frame
-/// has layers. Any other sends the reply that follows.
+/// Action of the card in a step: the first byte of each record of an input. Other values send the reply that follows. The
+/// first byte of the input determines whether the frame has layers.
 const RESET: u8 = 0xff;
 const WAIT: u8 = 0xfe;
 
-/// The target.
+/// Target of sessions.
 pub(super) struct Sessions {
-    /// The replies of a sound session, in order: without layers, and with them.
+    /// Replies of a valid session in order: without layers, and with layers.
     replies: [Vec<Vec<u8>>; 2],
     others: Vec<Vec<u8>>,
     image: Vec<Line>,
     frames: [FrameParameters; 2],
 }
 
-/// The replies of a sound session, in order.
+/// Replies of a valid session in order.
 fn sound_replies(hello: Reply, layers: bool) -> Vec<Vec<u8>> {
     let tile_pixels = vec![0; (SIDE * SIDE) as usize * record_bytes(layers)];
     let pixels_of_reply = PIXELS_BYTES / record_bytes(layers);
@@ -93,7 +93,7 @@ impl Sessions {
         }
     }
 
-    /// A reply of a card that may be hostile.
+    /// Reply of a card that may be hostile.
     fn reply(&self, replies: &[Vec<u8>], sound: &[u8], random: &mut Random) -> Vec<u8> {
         let mut bytes = match random.below(16) {
             0 => random.pick(&self.others).clone(),
@@ -108,14 +108,14 @@ impl Sessions {
     }
 }
 
-/// Appends a record of an input.
+/// Appends a record to an input.
 fn put(input: &mut Vec<u8>, what: u8, reply: &[u8]) {
     input.push(what);
     input.extend((reply.len() as u16).to_le_bytes());
     input.extend(reply);
 }
 
-/// The next record of an input: what the card does, and its reply.
+/// Next record of an input: the card's action, and its reply.
 fn next_record<'a>(input: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
     let (&[what, low, high], rest) = input.split_first_chunk()?;
     let length = usize::from(u16::from_le_bytes([low, high])).min(rest.len()).min(MAX_PAYLOAD);
@@ -133,7 +133,7 @@ struct Ends<'a> {
 }
 
 impl Ends<'_> {
-    /// Lets all pass that either end has to say, and some time.
+    /// Exchanges all pending frames, and advances the time.
     fn step(&mut self, is_silent: bool) -> Result<(), SessionError> {
         for _ in 0..MAX_FRAMES {
             self.dispatcher.supply(0, &mut self.session, self.now);
@@ -160,7 +160,7 @@ impl Ends<'_> {
         self.session.tick(self.dispatcher.scheduler().slowest(0), self.now)
     }
 
-    /// What a render does with an error. Returns whether it goes on.
+    /// Handles an error like a render. Returns whether the session continues.
     fn goes_on(&mut self, result: &Result<(), SessionError>) -> bool {
         let may_pass = result.as_ref().err().is_some_and(SessionError::may_pass);
         if may_pass {

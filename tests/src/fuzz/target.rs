@@ -1,26 +1,26 @@
-//! Fuzzing targets: readers of bytes that other programs wrote.
+//! Fuzzing targets: readers of foreign bytes.
 
 use super::random::Random;
 
-/// A reader of bytes that other programs wrote.
+/// Reader of foreign bytes.
 pub trait Target: Send + Sync {
-    /// Its name on the command line.
+    /// Name on the command line.
     fn name(&self) -> &'static str;
 
-    /// The most bytes that it may have allocated at once for an input of so many bytes.
+    /// Maximum number of bytes that an input of `input` bytes may have allocated at once.
     fn allocation_bound(&self, input: usize) -> usize;
 
     /// Makes an input.
     fn input(&self, random: &mut Random) -> Vec<u8>;
 
-    /// Reads an input. Returns whether it was sound.
+    /// Reads an input. Returns whether it is valid.
     ///
     /// # Panics
-    /// If it is read otherwise than it must be.
+    /// If the input is read incorrectly.
     fn read(&self, input: &[u8]) -> bool;
 }
 
-/// A bound on allocations, bytes: 64 MiB, and `for_each` for each byte of the input.
+/// Bound of allocations, bytes: 64 MiB, and `for_each` for each byte of the input.
 pub(super) const fn bound(input: usize, for_each: usize) -> usize {
     (64 << 20) + input * for_each
 }

@@ -1,4 +1,4 @@
-//! Textures: PNG and JPEG files in a scene that is otherwise sound.
+//! Fuzzing of textures: PNG and JPEG files in a valid scene.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,13 +11,13 @@ use super::random::Random;
 use super::target::{Target, bound};
 use super::{mutation, png};
 
-/// The target. An input is an image file.
+/// Target of textures. An input is an image file.
 pub(super) struct Textures {
     seeds: Vec<Vec<u8>>,
     folder: TempDir,
 }
 
-/// Of all colour types of PNG between them: an edit of a byte makes no palette where there is none.
+/// Images of all colour types of PNG: no edit of a byte adds a palette.
 const SEEDS: [&[u8]; 7] = [
     include_bytes!("../../../driver/tests/images/texel.png"),
     include_bytes!("../../../driver/tests/images/palette.png"),
@@ -28,7 +28,7 @@ const SEEDS: [&[u8]; 7] = [
     include_bytes!("../../../driver/tests/images/grey.jpg"),
 ];
 
-/// A scene whose second buffer view, of so many bytes, is the base colour of its only triangle.
+/// Scene whose second buffer view, of `image_bytes` bytes, is the base colour of its only triangle.
 fn scene(image_bytes: usize) -> String {
     let length = TRIANGLE_BYTES + image_bytes;
     format!(
@@ -46,7 +46,7 @@ fn scene(image_bytes: usize) -> String {
 
 const TRIANGLE_BYTES: usize = 36;
 
-/// A scene of a triangle with an image file as its base colour.
+/// Scene of a triangle with an image file as its base colour.
 pub(crate) fn textured(image: &[u8]) -> Vec<u8> {
     let triangle = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let bytes = [triangle.as_flattened(), image].concat();
@@ -70,7 +70,8 @@ impl Target for Textures {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // Deflate makes a byte at most 1032, of eight texels each if they are of one bit, and 16 bytes are asked for to decode one.
+        // Deflate expands a byte to at most 1032, each of eight texels if they have one bit; decoding requests 16 bytes per
+        // texel.
         bound(input, 1032 * 8 * 17)
     }
 

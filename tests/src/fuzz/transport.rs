@@ -1,4 +1,4 @@
-//! Frames and the transport: bytes that come to either end.
+//! Fuzzing of frames and the transport: bytes received by either end.
 
 use photoncard_shared::frame::{
     Frame, FrameHeader, FrameKind, FrameReader, MAX_FRAME, MAX_PAYLOAD, write_frame,
@@ -9,16 +9,16 @@ use super::random::Random;
 use super::target::{Target, bound};
 use super::{messages, mutation};
 
-/// The session of both ends.
+/// Session number of both ends.
 const SESSION: u32 = 7;
-/// What the messages of the ends are.
+/// Message that both ends send.
 const MESSAGE: &[u8] = b"message";
-/// Frames that an end sends without hearing anything: its messages, and what it tells besides.
+/// Maximum number of frames that an end sends without receiving any: its messages, and control frames.
 const MAX_FRAMES: usize = WINDOW + 4;
 
-/// The target.
+/// Target of frames.
 pub(super) struct Frames {
-    /// Frames of all kinds, in an order in which they may come.
+    /// Frames of all kinds in a valid order.
     seeds: Vec<(FrameHeader, Vec<u8>)>,
     wires: Vec<Vec<u8>>,
 }
@@ -46,7 +46,7 @@ impl Frames {
         Self { seeds, wires }
     }
 
-    /// A frame whose checksum is right and whose header may be odd.
+    /// Frame with a correct checksum and an arbitrary header.
     fn frame(&self, random: &mut Random) -> Vec<u8> {
         let (mut header, mut payload) = random.pick(&self.seeds).clone();
         if random.once_in(2) {
@@ -75,7 +75,7 @@ fn wire(header: &FrameHeader, payload: &[u8]) -> Vec<u8> {
     wire.to_vec()
 }
 
-/// Reads all frames; each that is whole is so again once it is written. Returns whether there was one.
+/// Reads all frames; each valid one must be equal after encoding it again. Returns whether there was one.
 fn read_frames(input: &[u8], step: usize) -> bool {
     let mut reader = FrameReader::new();
     let mut is_whole = false;
@@ -96,7 +96,7 @@ fn read_frames(input: &[u8], step: usize) -> bool {
     is_whole
 }
 
-/// Sends all that an end has to send: bounded, and whole frames.
+/// Sends everything that an end has to send: a bounded number of valid frames.
 fn drain(end: &mut Transport) {
     for _ in 0..MAX_FRAMES {
         let wire = end.outgoing();
@@ -136,7 +136,7 @@ fn feed(end: &mut Transport, input: &[u8], step: usize) {
     }
 }
 
-/// Whatever has come, a host that begins another session is heard.
+/// Checks that a host that begins another session is heard, whatever was received before.
 fn is_heard(card: &mut Transport) -> bool {
     card.receive(&[0]);
     (SESSION + 1000..).take(2).any(|session| {

@@ -1,4 +1,4 @@
-//! Damaged files.
+//! Inputs: damaged files.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use super::Kind;
 use crate::fuzz::{Random, environment, gltf, mutation, picture, png, texture};
 
-/// The longest part of a file that is edited at once.
+/// Maximum length of the part of a file that is edited at once.
 const WINDOW: usize = 1 << 12;
 
 /// A file before it is damaged.
@@ -15,7 +15,7 @@ struct Seed {
     bytes: Vec<u8>,
 }
 
-/// The files of a kind.
+/// Files of one kind.
 pub struct Inputs {
     kind: Kind,
     seeds: Vec<Seed>,
@@ -48,10 +48,10 @@ const IMAGES: [&str; 11] = [
 ];
 
 impl Inputs {
-    /// The files of a kind that ship, and such pictures as do not.
+    /// Files of a kind that ship with the project, and generated pictures.
     ///
     /// # Panics
-    /// If one of them is not there.
+    /// If a file is missing.
     pub fn new(kind: Kind) -> Self {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let shipped = |name: &&str| Seed {
@@ -86,7 +86,7 @@ impl Inputs {
         (&chosen.extension, bytes)
     }
 
-    /// Makes one edit, half of the time one that knows the format.
+    /// Makes one edit, in half of the cases one that respects the format.
     fn edit(&self, bytes: &mut Vec<u8>, extension: &str, random: &mut Random) {
         match (random.below(8), extension) {
             (0..=3, "png") => png::edit_chunks(bytes, random),
@@ -103,7 +103,7 @@ impl Inputs {
         }
     }
 
-    /// Puts a part of another file of the format in the place of a part of this.
+    /// Replaces a part of the file by a part of another file of its format.
     fn splice(&self, bytes: &mut Vec<u8>, extension: &str, random: &mut Random) {
         let others: Vec<_> = self.seeds.iter().filter(|seed| seed.extension == extension).collect();
         let other = &random.pick(&others).bytes;
@@ -114,7 +114,7 @@ impl Inputs {
     }
 }
 
-/// The file that an input is read from, with its extension: of a texture the scene around it.
+/// File to read for an input, with its extension: for a texture the scene around it.
 pub(super) fn as_file(extension: &str, bytes: Vec<u8>) -> (&str, Vec<u8>) {
     match extension {
         "png" | "jpg" => ("glb", texture::textured(&bytes)),
@@ -142,7 +142,7 @@ fn edit_header(bytes: &mut [u8], random: &mut Random) {
     }
 }
 
-/// Edits the JSON or the binary chunk of a GLB, and makes its lengths right.
+/// Edits the JSON or the binary chunk of a GLB, and corrects its lengths.
 fn edit_glb(bytes: &mut Vec<u8>, random: &mut Random) {
     let Some((mut text, mut data)) = gltf::split_glb(bytes) else { return };
     if random.below(4) < 3 {

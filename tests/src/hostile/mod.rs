@@ -1,8 +1,8 @@
-//! Real files, damaged: scenes and images that ship are mutated and read in processes of limited memory.
+//! Damaged real files: scenes and images that ship are mutated and read in processes of limited memory.
 //!
-//! The fuzz targets catch panics in their own process and begin with small made-up files. Here a process reads a batch of
-//! inputs, and what ends it counts: an exit status, a signal, or the silence of an input that takes too long. Every
-//! input is a function of its kind, a seed and a number.
+//! The fuzz targets catch panics in their own process and start from small generated files. Here a process reads a batch of
+//! inputs, and its end is the result: an exit status, a signal, or a time-out. Every input is a function of its kind, a
+//! seed and a number.
 
 mod inputs;
 mod reader;
@@ -15,22 +15,22 @@ pub use self::inputs::Inputs;
 pub use self::reader::read_batch;
 pub use self::supervisor::{Finding, Report, supervise};
 
-/// What is damaged.
+/// Kind of files to damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// PNG and JPEG as textures, Radiance and `OpenEXR` pictures as environments, the latter compared as well.
+    /// PNG and JPEG as textures, Radiance and `OpenEXR` pictures as environments; the latter are compared as well.
     Images,
     /// glTF as text and as GLB, loaded, packed, and rendered with few photons and rays.
     Scenes,
 }
 
 impl Kind {
-    /// The kind of a name on the command line.
+    /// Kind with the name `name` on the command line.
     pub fn of(name: &str) -> Option<Self> {
         [Self::Images, Self::Scenes].into_iter().find(|kind| kind.name() == name)
     }
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Images => "images",
@@ -39,27 +39,27 @@ impl Kind {
     }
 }
 
-/// What to read.
+/// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The kind of files.
+    /// Kind of files.
     pub kind: Kind,
-    /// The seed of all inputs.
+    /// Seed of all inputs.
     pub seed: u64,
-    /// The number of the first input.
+    /// Number of the first input.
     pub first: u64,
-    /// How many inputs.
+    /// Number of inputs.
     pub inputs: u64,
-    /// Inputs of one process.
+    /// Number of inputs per process.
     pub batch: u64,
-    /// How long one input may take.
+    /// Time limit of one input.
     pub patience: Duration,
     /// Address space of a process, kilobytes.
     pub kilobytes: u64,
-    /// The command `photoncard`, which reads every [`Settings::every`]th input as well.
+    /// Command `photoncard`, which reads every [`Settings::every`]th input as well.
     pub command: Option<PathBuf>,
-    /// See [`Settings::command`].
+    /// Interval of inputs that [`Settings::command`] reads.
     pub every: u64,
-    /// The folder that inputs which fail are written to.
+    /// Folder for failing inputs.
     pub folder: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! The process that reads inputs, one after the other.
+//! Process that reads inputs, one after another.
 
 use std::fs;
 use std::io::{Write as _, stdout};
@@ -13,16 +13,17 @@ use photoncard_driver::scene::{Environment, Scene, gltf};
 use super::inputs::as_file;
 use super::{Inputs, Settings};
 
-/// Scenes of more triangles are loaded and packed only once in a while.
+/// Maximum number of triangles of a scene that is always rendered; larger ones are only loaded and packed, with rare
+/// exceptions.
 const MAX_RENDERED: usize = 3000;
 
-/// Larger pictures are read only.
+/// Maximum number of pixels of a picture that is compared; larger ones are read only.
 const MAX_COMPARED: usize = 1 << 18;
 
-/// Reads inputs, and tells each on standard output: its number before, and whether it was sound after.
+/// Reads inputs, and reports each on standard output: its number before reading, and whether it was valid afterwards.
 ///
 /// # Panics
-/// As what reads the inputs does; that is what is looked for.
+/// If the tested reader panics, which is a finding.
 pub fn read_batch(settings: &Settings) {
     let inputs = Inputs::new(settings.kind);
     for number in settings.first..settings.first + settings.inputs {
@@ -33,13 +34,13 @@ pub fn read_batch(settings: &Settings) {
     }
 }
 
-/// A supervisor that is gone needs no answer.
+/// Prints a line; errors are ignored, as the supervisor may be gone.
 fn say(line: std::fmt::Arguments) {
     let mut out = stdout().lock();
     let _ = writeln!(out, "{line}").and_then(|()| out.flush());
 }
 
-/// Reads an input as what its extension says. Returns whether it was sound.
+/// Reads an input as the format of its extension. Returns whether it is valid.
 fn read(folder: &Path, extension: &str, bytes: Vec<u8>, number: u64) -> bool {
     let (kind, file) = as_file(extension, bytes);
     let path = folder.join(format!("input.{kind}"));
@@ -59,7 +60,7 @@ fn read(folder: &Path, extension: &str, bytes: Vec<u8>, number: u64) -> bool {
     }
 }
 
-/// What was read, or nothing; an error is written as its message, which must not panic either.
+/// Result without its error; the error is formatted, which must not panic either.
 fn told<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
     result.inspect_err(|error| drop(error.to_string())).ok()
 }

@@ -1,4 +1,4 @@
-//! The process that starts those which read, and looks at how they end.
+//! Process that starts readers, and observes their ends.
 
 use std::fs;
 use std::io::{self, BufRead, BufReader};
@@ -12,35 +12,35 @@ use std::time::{Duration, Instant};
 use super::inputs::as_file;
 use super::{Inputs, Kind, Settings};
 
-/// How often a command that runs is looked at.
+/// Interval at which a running command is polled.
 const GLANCE: Duration = Duration::from_millis(2);
 
-/// An input that is not read as it must be.
+/// Input that is not read correctly.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// Its number.
+    /// Number of the input.
     pub number: u64,
-    /// What happened.
+    /// Description of the failure.
     pub what: String,
 }
 
-/// What came of some inputs.
+/// Result of some inputs.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// Inputs that were read.
+    /// Number of inputs that were read.
     pub inputs: u64,
-    /// Inputs that were sound.
+    /// Number of inputs that were valid.
     pub sound: u64,
-    /// How often the command ended with status 0, 1 and 2.
+    /// Number of exits of the command with status 0, 1 and 2.
     pub statuses: [u64; 3],
-    /// The longest time that an input took, and its number.
+    /// Maximum time of an input, with the input's number.
     pub slowest: (Duration, u64),
     /// Inputs that ended a process or took too long.
     pub findings: Vec<Finding>,
 }
 
-/// Reads inputs in processes of limited memory: `reader` is the program that calls [`read_batch`](super::read_batch) when it is
-/// given `read KIND SEED FIRST INPUTS FOLDER`.
+/// Reads inputs in processes of limited memory. `reader` is the program that calls [`read_batch`](super::read_batch) for
+/// the arguments `read KIND SEED FIRST INPUTS FOLDER`.
 ///
 /// # Errors
 /// If a process cannot be started or a file cannot be written.
@@ -68,7 +68,7 @@ pub fn supervise(reader: &Path, settings: &Settings, tell: &dyn Fn(&Report)) -> 
     Ok(report)
 }
 
-/// A program with a limit of address space.
+/// Command with a limited address space.
 fn limited(settings: &Settings, program: &Path) -> Command {
     let mut command = Command::new("sh");
     let script = format!("ulimit -v {} && exec \"$0\" \"$@\"", settings.kilobytes);
@@ -76,7 +76,7 @@ fn limited(settings: &Settings, program: &Path) -> Command {
     command
 }
 
-/// Has a process read inputs until it has read all or ended. Returns how many are done with.
+/// Starts a process that reads inputs until the last one or its end. Returns the number of inputs that are done.
 fn read_some(
     reader: &Path,
     settings: &Settings,
@@ -120,7 +120,7 @@ fn read_some(
     Ok(number + 1 - first)
 }
 
-/// The lines of a process, as they come.
+/// Lines of a process's output.
 fn lines(child: &mut Child) -> Receiver<String> {
     let (sender, receiver) = channel();
     if let Some(output) = child.stdout.take() {
@@ -132,7 +132,7 @@ fn lines(child: &mut Child) -> Receiver<String> {
     receiver
 }
 
-/// Has the command read an input, as a user would.
+/// Runs the command on an input, as a user would.
 fn run_command(settings: &Settings, inputs: &Inputs, number: u64, report: &mut Report) -> io::Result<()> {
     let Some(program) = &settings.command else { return Ok(()) };
     let (extension, bytes) = inputs.make(settings.seed, number);
@@ -167,13 +167,13 @@ fn run_command(settings: &Settings, inputs: &Inputs, number: u64, report: &mut R
     Ok(())
 }
 
-/// The smallest of renders.
+/// Minimal render.
 fn render<'c>(command: &'c mut Command, scene: &Path, folder: &Path) -> &'c mut Command {
     let options = "--size 4x4 --photons 200 --neighbors 10 --caustic-photons 50 --gather-rays 2 --shadow-rays 1 --spp 1 --quiet";
     command.arg("render").arg(scene).arg("-o").arg(folder.join("out.exr")).args(options.split(' '))
 }
 
-/// How a process ends within some time; if it does not, it is ended.
+/// Exit status of a process, which is killed if it exceeds the time.
 fn ended(child: &mut Child, patience: Duration) -> io::Result<Option<ExitStatus>> {
     let begun = Instant::now();
     while begun.elapsed() < patience {

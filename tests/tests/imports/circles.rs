@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
-/// Of each file the files that it imports, each with a path that does it.
+/// Files that each file imports, each with a path that does so.
 pub(crate) type Imports = BTreeMap<PathBuf, BTreeMap<PathBuf, String>>;
 
-/// The circles, each file in one of them at most: of each the imports that close it, a line each.
+/// Circles of the graph, without files in common, each as lines of its imports.
 pub(crate) fn circles(imports: &Imports, folder: &Path) -> Vec<String> {
     let mut known = BTreeSet::new();
     let mut circles = Vec::new();
@@ -22,7 +22,7 @@ pub(crate) fn circles(imports: &Imports, folder: &Path) -> Vec<String> {
     circles
 }
 
-/// The shortest way from a file back to itself, the file first; breadth first.
+/// Shortest way from a file back to itself, the file first; by breadth-first search.
 fn shortest_circle<'i>(imports: &'i Imports, start: &'i PathBuf) -> Option<Vec<&'i PathBuf>> {
     let mut importers: BTreeMap<&PathBuf, &PathBuf> = BTreeMap::new();
     let mut waiting = VecDeque::from([start]);

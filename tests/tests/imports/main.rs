@@ -1,8 +1,8 @@
-//! No file imports one that imports it back, directly or around: each can be read without what stands above it.
+//! No file imports one that imports it back, directly or around: each can be read without its users.
 //!
-//! Read are all files of all targets of the workspace. A file imports another if a path in it, of a `use` or of an expression, names
-//! an item that the other defines, whichever module hands the item on by `pub use`. Neither a `mod` declaration nor a `pub use` of a
-//! name that the file itself does not use is an import.
+//! The files of all targets of the workspace are read. A file imports another if a path in it, of a `use` or of an
+//! expression, names an item that the other defines, whichever module re-exports it by `pub use`. Neither a `mod`
+//! declaration nor a `pub use` of a name that the file itself does not use is an import.
 
 mod circles;
 mod modules;
@@ -19,7 +19,7 @@ fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the workspace")
 }
 
-/// The root files of all targets: libraries, programs, tests, examples, benchmarks and build scripts.
+/// Root files of all targets: libraries, programs, tests, examples, benchmarks and build scripts.
 fn roots() -> BTreeSet<PathBuf> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
@@ -33,7 +33,7 @@ fn roots() -> BTreeSet<PathBuf> {
     targets.map(|target| target["src_path"].as_str().expect("a path").into()).collect()
 }
 
-/// All Rust files below a folder.
+/// Rust files below a folder.
 fn rust_files(folder: &Path, found: &mut BTreeSet<PathBuf>) {
     for entry in folder.read_dir().expect("a folder") {
         let path = entry.expect("an entry").path();
@@ -72,7 +72,7 @@ fn no_file_imports_one_that_imports_it_back() {
     assert!(circles.is_empty(), "{} circles:\n{}", circles.len(), circles.join("\n"));
 }
 
-/// The circles of a crate that is made of these files, the first of them its root.
+/// Circles of a crate that consists of `files`, the first of them its root.
 fn circles_of(files: &[(&str, &str)]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in files {
@@ -126,19 +126,19 @@ fn circles_are_found_however_they_are_written() {
 #[test]
 fn what_is_no_circle_is_none() {
     let cases: [&[(&str, &str)]; 4] = [
-        // Declarations, and items that a parent only hands on.
+        // Declarations, and re-exports of a parent.
         &[
             ("main.rs", "mod a; use a::One; fn main() { a::b::two(One) }"),
             ("a/mod.rs", "pub mod b; mod c; pub use self::c::One;"),
             ("a/b.rs", "use super::One; pub fn two(_: One) {}"),
             ("a/c.rs", "pub struct One;"),
         ],
-        // A variable that bears the name of a module.
+        // A variable with the name of a module.
         &[
             ("lib.rs", "mod a; pub fn f(a: u32) -> u32 { a + 1 }"),
             ("a.rs", "use crate::f; pub fn g() { f(1); }"),
         ],
-        // Other crates, and what stands in the same file.
+        // Other crates, and items of the same file.
         &[
             ("lib.rs", "mod a;"),
             (
@@ -146,7 +146,7 @@ fn what_is_no_circle_is_none() {
                 "use std::fs; mod b { use super::One; pub struct Two(One); } use self::b::Two; struct One;",
             ),
         ],
-        // A test that stands above what it tests.
+        // A test module before the items that it tests.
         &[
             ("lib.rs", "mod a; mod b;"),
             ("a.rs", "pub fn f() {} #[cfg(test)] mod tests;"),

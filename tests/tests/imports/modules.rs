@@ -1,4 +1,4 @@
-//! The modules of a crate: which file each stands in, the names that it knows, and the paths that it holds.
+//! Modules of a crate: the file of each, its names, and its paths.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -8,23 +8,23 @@ use syn::{Attribute, Expr, ExprLit, Item, ItemMod, Lit, Meta};
 use super::circles::Imports;
 use super::paths::{Names, PathText, Paths, names_and_paths};
 
-/// The number of a module in its crate.
+/// Index of a module in its crate.
 type ModuleIndex = usize;
 
-/// The names that were looked up for a path, and where: modules may hand on each other's names.
+/// Names that were looked up for a path, with their modules: modules may re-export each other's names.
 type Asked = BTreeSet<(ModuleIndex, String)>;
 
-/// A module, inline or in a file of its own.
+/// Module, inline or in a file of its own.
 struct Module {
     file: PathBuf,
     parent: Option<ModuleIndex>,
-    /// Declarations of one name are several where they are for several systems.
+    /// Child modules by name; a name may be declared several times for several systems.
     children: BTreeMap<String, Vec<ModuleIndex>>,
     names: Names,
     paths: Paths,
 }
 
-/// A target with all its modules, the root first.
+/// Target with all its modules, the root first.
 pub(crate) struct Crate {
     modules: Vec<Module>,
 }
@@ -39,7 +39,7 @@ enum Resolved {
 }
 
 impl Crate {
-    /// Reads a target from its root file on.
+    /// Reads a target from its root file.
     ///
     /// # Panics
     /// If a file is missing, or is no Rust.
@@ -49,7 +49,7 @@ impl Crate {
         modules
     }
 
-    /// Reads the module of a file, whose own modules are in `folder`.
+    /// Reads the module of a file, whose child modules are in `folder`.
     fn read_file(&mut self, file: &Path, parent: Option<ModuleIndex>, folder: &Path) -> ModuleIndex {
         let text =
             std::fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
@@ -66,7 +66,7 @@ impl Crate {
     ) -> ModuleIndex {
         let (names, paths) = names_and_paths(items);
         let index = self.modules.len();
-        // One name for a file that several targets reach by several ways.
+        // Canonical path: targets may reach a file by several ways.
         let file = file.canonicalize().unwrap_or_else(|error| panic!("{}: {error}", file.display()));
         let module = Module { file: file.clone(), parent, children: BTreeMap::new(), names, paths };
         self.modules.push(module);
@@ -79,7 +79,7 @@ impl Crate {
         index
     }
 
-    /// Adds a module where the language looks for it: inline, at its `path`, in `NAME.rs` or in `NAME/mod.rs`.
+    /// Adds a module by the rules of the language: inline, at its `path`, in `NAME.rs` or in `NAME/mod.rs`.
     fn add_child(
         &mut self,
         declared: &ItemMod,
@@ -101,7 +101,7 @@ impl Crate {
         self.read_file(&child, Some(parent), &own_folder)
     }
 
-    /// Adds what each file of the target imports.
+    /// Adds the imports of each file of the target.
     pub(crate) fn add_imports(&self, imports: &mut Imports) {
         let mut first_segments: BTreeMap<&Path, BTreeSet<&String>> = BTreeMap::new();
         for Module { file, paths, .. } in &self.modules {
@@ -123,7 +123,7 @@ impl Crate {
         }
     }
 
-    /// The places that a path of a module leads to; none in another crate.
+    /// Targets of a path in a module; none in another crate.
     fn resolve(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Resolved> {
         let [first, rest @ ..] = path else { return vec![Resolved::Module(module)] };
         match (first.as_str(), self.modules[module].parent) {
@@ -134,15 +134,15 @@ impl Crate {
         }
     }
 
-    /// The places that the rest of a path leads to from a module. What is not found in it, such as what a macro defines, is its
-    /// own.
+    /// Targets of the rest of a path from a module. A name that is not found in it, such as one that a macro defines,
+    /// counts as its own.
     fn walk(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Resolved> {
         let [first, rest @ ..] = path else { return vec![Resolved::Module(module)] };
         let found = self.look_up(module, first, rest, asked);
         if found.is_empty() { vec![Resolved::ItemOf(module)] } else { found }
     }
 
-    /// The places of a name that a module declares, defines or imports, and of the path that follows it.
+    /// Targets of a name that a module declares, defines or imports, and of the path that follows it.
     fn look_up(&self, module: ModuleIndex, name: &str, rest: &[String], asked: &mut Asked) -> Vec<Resolved> {
         if !asked.insert((module, name.to_owned())) {
             return Vec::new();
@@ -170,7 +170,7 @@ impl Crate {
     }
 }
 
-/// The file of `#[path = "FILE"]`.
+/// File of `#[path = "FILE"]`.
 fn path_attribute(attribute: &Attribute) -> Option<String> {
     match &attribute.meta {
         Meta::NameValue(meta) if meta.path.is_ident("path") => match &meta.value {

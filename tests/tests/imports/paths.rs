@@ -1,4 +1,4 @@
-//! The names that a module defines and imports, and all paths that it holds.
+//! Names that a module defines and imports, and all its paths.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,32 +7,32 @@ use syn::punctuated::Punctuated;
 use syn::visit::{self, Visit};
 use syn::{Expr, Item, ItemMod, ItemUse, Macro, Path, Token, UseTree, VisRestricted, Visibility};
 
-/// The segments of a path.
+/// Segments of a path.
 pub(crate) type PathText = Vec<String>;
 
-/// The names of a module, other than those of the modules that it declares.
+/// Names of a module, except for the modules that it declares.
 #[derive(Default)]
 pub(crate) struct Names {
     pub(crate) defined: BTreeSet<String>,
-    /// Paths by the names that `use` gives them.
+    /// Imported paths, by the names that `use` gives them.
     pub(crate) imported: BTreeMap<String, PathText>,
-    /// Paths of modules all of whose names are imported.
+    /// Paths of glob imports.
     pub(crate) globs: Vec<PathText>,
 }
 
-/// The paths of a module.
+/// Paths of a module.
 #[derive(Default)]
 pub(crate) struct Paths {
-    /// Of `use`, and of two segments and more in everything else: a name alone is imported or defined by the module, or is a
-    /// variable's.
+    /// Paths of `use`, and all other paths of at least two segments: a single name is imported or defined by the module, or
+    /// is a variable.
     pub(crate) imports: Vec<PathText>,
-    /// By name, of `pub use`.
+    /// Paths of `pub use`, by name.
     pub(crate) handed_on: BTreeMap<String, PathText>,
-    /// The first segments of all paths but those of `use`.
+    /// First segments of all paths except those of `use`.
     pub(crate) first_segments: BTreeSet<String>,
 }
 
-/// The names and the paths of a module.
+/// Names and paths of a module.
 pub(crate) fn names_and_paths(items: &[Item]) -> (Names, Paths) {
     let mut names = Names::default();
     let mut paths = Paths::default();
@@ -46,7 +46,7 @@ pub(crate) fn names_and_paths(items: &[Item]) -> (Names, Paths) {
     (names, paths)
 }
 
-/// The name that an item defines.
+/// Name that an item defines.
 fn defined_name(item: &Item) -> Option<String> {
     let name = match item {
         Item::Const(item) => &item.ident,
@@ -63,7 +63,7 @@ fn defined_name(item: &Item) -> Option<String> {
     Some(name.to_string())
 }
 
-/// Adds the names that a `use` brings. That of `self` is the last one before it.
+/// Adds the names that a `use` imports. `self` stands for the last segment before it.
 fn add_imported(tree: &UseTree, before: &[String], names: &mut Names) {
     match tree {
         UseTree::Path(path) => add_imported(&path.tree, &with(before, &path.ident), names),
@@ -86,7 +86,7 @@ fn with(before: &[String], name: &syn::Ident) -> PathText {
 }
 
 impl<'ast> Visit<'ast> for Paths {
-    /// Modules have paths of their own.
+    /// Child modules have paths of their own.
     fn visit_item_mod(&mut self, _: &'ast ItemMod) {}
 
     fn visit_item_use(&mut self, item: &'ast ItemUse) {
@@ -99,7 +99,7 @@ impl<'ast> Visit<'ast> for Paths {
         }
     }
 
-    /// Visibility is no import.
+    /// A visibility is no import.
     fn visit_vis_restricted(&mut self, _: &'ast VisRestricted) {}
 
     fn visit_path(&mut self, path: &'ast Path) {
@@ -111,11 +111,11 @@ impl<'ast> Visit<'ast> for Paths {
         visit::visit_path(self, path);
     }
 
-    /// Arguments of a macro are read if they are expressions with commas between them.
+    /// Visits the arguments of a macro if they are comma-separated expressions.
     fn visit_macro(&mut self, called: &'ast Macro) {
         self.visit_path(&called.path);
         let arguments = Punctuated::<Expr, Token![,]>::parse_terminated.parse2(called.tokens.clone());
-        // They live no longer than this call, which the syntax tree outlives: others read them.
+        // The visitor borrows from the syntax tree of the file, which outlives the arguments: another visitor reads them.
         let mut paths = Paths::default();
         arguments.iter().flatten().for_each(|argument| paths.visit_expr(argument));
         self.imports.append(&mut paths.imports);

@@ -46,10 +46,10 @@ pub struct Setup {
 /// Error of [`simulate`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LoadBalanceError {
-    /// There are no tiles.
+    /// Error of an empty picture.
     #[error("there are no tiles to deal; give the cost of one at least")]
     NoTiles,
-    /// There are no chips, or no credits.
+    /// Error of a machine without chips or credits.
     #[error("{chips} chips of {credits} credits render nothing; give one of each at least")]
     NoChips {
         /// Number of chips.
@@ -57,7 +57,7 @@ pub enum LoadBalanceError {
         /// Maximum of unanswered tile commands per chip.
         credits: usize,
     },
-    /// A time is negative, above [`MAX_SECONDS`] or no number.
+    /// Error of a time that is negative, above [`MAX_SECONDS`] or NaN.
     #[error("{0} is no time; give seconds from 0 to {MAX_SECONDS}")]
     Time(f64),
 }
@@ -161,9 +161,9 @@ struct Simulation {
     costs: Vec<u128>,
     chips: Vec<Chip>,
     chip_of_tile: Vec<usize>,
-    /// Results on their way: when they are at the host, of which chip and tile, in order.
+    /// Queue of results in transit: time of arrival at the host, chip and tile.
     results: BinaryHeap<Reverse<(u128, usize, u32)>>,
-    /// Up to when the host has worked or waited.
+    /// Time until which the host has worked or waited.
     now: u128,
     /// Time that the host has spent on messages.
     busy: u128,
@@ -175,7 +175,8 @@ impl Simulation {
         for chip in 0..self.chips.len() {
             self.deal(chip);
         }
-        // A result that is still to be made comes after the one that frees its credit: the heap's first is the next.
+        // A result of a tile dealt later arrives later than the result that frees its credit: the first in the heap is the
+        // next.
         while let Some(Reverse((arrival, chip, id))) = self.results.pop() {
             self.now = self.now.max(arrival) + self.result;
             self.busy += self.result;
@@ -185,7 +186,8 @@ impl Simulation {
         }
     }
 
-    /// A result is at the host. What the scheduler knows of time is for cards that are lost or late: here none is.
+    /// Handles the arrival of a result. The scheduler's clock matters only for lost or late cards, of which there are none
+    /// here.
     fn receive(&mut self, chip: usize, id: u32) {
         let finished = FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], false, Counters::ZERO);
         if let Some(tile) = finished {
@@ -207,7 +209,7 @@ impl Simulation {
             self.results.push(Reverse((at.done + self.latency, chip, id)));
             self.chip_of_tile[id as usize] = chip;
         }
-        // Every tile that is dealt and unanswered has a result on its way.
+        // Each tile that is dealt and unanswered has a result in transit.
         self.most_in_flight = self.most_in_flight.max(self.results.len());
     }
 

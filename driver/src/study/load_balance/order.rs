@@ -1,17 +1,17 @@
-//! The order in which tiles wait to be dealt.
+//! Order in which tiles are dealt.
 
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::message::Tile;
 
-/// The order in which tiles wait to be dealt.
+/// Order in which tiles are dealt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TileOrder {
-    /// The picture's order, row by row, as the driver deals.
+    /// Row by row, as the driver deals.
     #[default]
     Picture,
-    /// An order shuffled by a seed.
+    /// Random permutation by a seed.
     Random(u32),
-    /// The longest first (Graham 1969). Costs are known only after the render, so this is a bound and no policy.
+    /// Descending cost (Graham 1969). Costs are known only after the render, so this is a bound and no policy.
     LongestFirst,
 }
 
@@ -21,7 +21,7 @@ impl TileOrder {
         let mut tiles: Vec<Tile> = (0_u32..).zip(costs).map(|(id, _)| tile(id)).collect();
         match self {
             Self::Picture => {}
-            // The hash is a bijection: there are no ties for the tile's number to break.
+            // The hash is a bijection, so that there are no ties.
             Self::Random(seed) => tiles.sort_by_key(|tile| (hash(hash(seed) ^ tile.id), tile.id)),
             // The sort is stable: tiles of equal cost stay in the picture's order.
             Self::LongestFirst => tiles.sort_by_key(|tile| std::cmp::Reverse(costs[tile.id as usize])),
@@ -30,7 +30,7 @@ impl TileOrder {
     }
 }
 
-/// The tile of a number: of its rectangle nothing is used.
+/// Tile number `id`; its rectangle is not used.
 pub(super) fn tile(id: u32) -> Tile {
     Tile { id, x: id, y: 0, width: 1, height: 1 }
 }

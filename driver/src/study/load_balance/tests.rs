@@ -131,7 +131,7 @@ proptest! {
         prop_assert_eq!(one.speedup(), 1.0);
     }
 
-    /// No schedule of any links beats the longest tile, nor an even share of the work.
+    /// No schedule beats the longest tile, nor an even share of the work.
     #[test]
     fn no_dealing_beats_the_work(
         costs in costs(), order in orders(), chips in 1..40_usize, credits in 1..8_usize, latency in 0.0..0.5_f64,
@@ -145,8 +145,8 @@ proptest! {
         prop_assert!(dealt.most_in_flight <= (chips * credits).min(costs.len()));
     }
 
-    /// Graham 1966: no chip idles while a tile waits, so the last tile to end began when all chips had worked, for at
-    /// most the rest's even share. That takes free links, and one credit: a tile that waits on a chip is no other's.
+    /// Graham 1966: no chip idles while a tile waits, so the last tile starts before an even share of the rest is done.
+    /// This requires free links and one credit: a tile that waits on a chip is not available to others.
     #[test]
     fn one_credit_without_links_keeps_grahams_bound(
         costs in costs(), order in orders(), chips in 1..40_usize,
@@ -157,7 +157,7 @@ proptest! {
         prop_assert!(dealt.makespan_seconds <= bound + ROUNDING);
     }
 
-    /// Graham 1969: the longest first takes at most 4/3 - 1/(3 chips) of the best time.
+    /// Graham 1969: descending cost takes at most `4/3 - 1/(3 chips)` of the optimal time.
     #[test]
     fn the_longest_first_is_within_a_third_of_the_best(
         costs in proptest::collection::vec((0..1000_u32).prop_map(|cost| cost as f64 / 1000.0), 1..8),

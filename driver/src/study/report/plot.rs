@@ -138,7 +138,7 @@ impl Plot {
             let x = axis_label(&panel.x.label, &panel.x.unit, 0);
             parts.push(format!("{title}{y} against {x}."));
             if let XScale::Categories(names) = &panel.x.scale {
-                // Long names may be cut off in the drawing.
+                // Long names may be shortened in the drawing.
                 parts.push(format!("Categories: {}.", names.join("; ")));
             }
         }
@@ -150,7 +150,7 @@ impl Plot {
     }
 }
 
-/// Says which points are missing, and why.
+/// Notes that report missing points with their reasons.
 fn notes(left_out: &[LeftOut]) -> Vec<String> {
     let mut notes = Vec::new();
     for (reason, why) in [

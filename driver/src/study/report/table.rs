@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::markup::escape;
 use super::number;
 
-/// Significant digits of a measured value, and of its half-width, for people.
+/// Significant digits of a measured value, and of its half-width, in HTML.
 const DIGITS: usize = 4;
 const HALF_WIDTH_DIGITS: usize = 2;
 
@@ -22,7 +22,7 @@ pub struct Table {
 pub struct Column {
     /// Name of the quantity.
     pub name: String,
-    /// Unit of the quantity; empty where there is none.
+    /// Unit of the quantity; empty if it has none.
     pub unit: String,
 }
 

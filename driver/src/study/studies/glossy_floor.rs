@@ -138,8 +138,8 @@ fn curve(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cac
     exponents(scale).into_iter().map(of).collect()
 }
 
-/// Decrease of the bytes from DRAM from the first to the last exponent. Both renders have the same tiles, so it is
-/// estimated from the differences of each tile (paired samples): the variance between tiles cancels.
+/// Decrease of the bytes from DRAM from the first to the last exponent. Both renders have equal tiles, so it is estimated
+/// from the differences of each tile (paired samples): the variance between tiles cancels.
 fn fall(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cached: bool) -> Estimate {
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
     let exponents = exponents(scale);
@@ -151,12 +151,12 @@ fn fall(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cach
     Estimate::of_total(&differences)
 }
 
-/// The last value of a curve over its first.
+/// Ratio of the last value of a curve to its first.
 fn change(curve: &[Estimate]) -> f64 {
     curve.last().zip(curve.first()).map_or(f64::NAN, |(last, first)| last.value / first.value)
 }
 
-/// The greatest value of a curve over its least.
+/// Ratio of the maximum of a curve to its minimum.
 fn spread(curve: &[Estimate]) -> f64 {
     let greatest = curve.iter().map(|estimate| estimate.value).fold(0.0, f64::max);
     greatest / curve.iter().map(|estimate| estimate.value).fold(f64::INFINITY, f64::min)

@@ -11,7 +11,7 @@ use rustix::time::{ClockId, clock_gettime};
 const NEIGHBORS: NonZero<usize> = NonZero::new(100).unwrap();
 const MAX_DISTANCE: f32 = 0.025;
 
-/// What this thread has taken of its processor, seconds: others' work does not count.
+/// Processor time of this thread, seconds; other processes do not count.
 fn cpu_seconds() -> f64 {
     let taken = clock_gettime(ClockId::ThreadCPUTime);
     taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9

@@ -2,81 +2,81 @@
 
 use super::super::number;
 
-/// One pair of axes and the series over them.
+/// Pair of axes with the series over them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
-    /// The panel's own title; empty if it needs none.
+    /// Title of the panel; may be empty.
     pub title: String,
-    /// The horizontal axis.
+    /// Horizontal axis.
     pub x: XAxis,
-    /// The vertical axis.
+    /// Vertical axis.
     pub y: YAxis,
-    /// The data.
+    /// Data.
     pub series: Vec<Series>,
 }
 
-/// What is told horizontally.
+/// Horizontal axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct XAxis {
-    /// The quantity.
+    /// Name of the quantity.
     pub label: String,
-    /// Its unit; empty where there is none.
+    /// Unit of the quantity; empty if it has none.
     pub unit: String,
-    /// How values map to places.
+    /// Mapping of values to positions.
     pub scale: XScale,
 }
 
-/// How horizontal values map to places.
+/// Mapping of horizontal values to positions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum XScale {
-    /// Evenly.
+    /// Linear.
     Linear,
-    /// By their logarithm, labelled at powers of two.
+    /// Logarithmic, with labels at powers of two.
     Log2,
-    /// By their logarithm, labelled at 1, 2 and 5 times powers of ten.
+    /// Logarithmic, with labels at 1, 2 and 5 times powers of ten.
     Log10,
-    /// By name: a point's `x` is the index of its name.
+    /// Categorical: a point's `x` is the index of its name.
     Categories(Vec<String>),
 }
 
-/// What is told vertically.
+/// Vertical axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct YAxis {
-    /// The quantity.
+    /// Name of the quantity.
     pub label: String,
-    /// Its unit; empty where there is none.
+    /// Unit of the quantity; empty if it has none.
     pub unit: String,
-    /// How values map to places.
+    /// Mapping of values to positions.
     pub scale: YScale,
 }
 
-/// How vertical values map to places.
+/// Mapping of vertical values to positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum YScale {
-    /// Evenly, over the range of the data.
+    /// Linear, over the range of the data.
     Linear,
-    /// Evenly, over a range that holds zero.
+    /// Linear, over a range that includes zero.
     LinearFromZero,
-    /// By their logarithm, labelled at 1, 2 and 5 times powers of ten.
+    /// Logarithmic, with labels at 1, 2 and 5 times powers of ten.
     Log10,
 }
 
-/// A named line.
+/// Named line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// What the legend calls it; a series without a name is not in the legend.
+    /// Name in the legend; a series without a name is not in the legend.
     pub name: String,
-    /// In the order in which the line joins them.
+    /// Points in the order in which the line joins them.
     pub points: Vec<Point>,
 }
 
-/// A value, in the units of the axes. Values that are not finite, and those of zero or less on a logarithmic axis,
-/// are left out of the drawing, which says so.
+/// Point in the units of the axes. Values that are not finite, and on a logarithmic axis values of zero or less, are not
+/// drawn; a note below the plot reports them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Horizontally.
+    /// Horizontal value.
     pub x: f64,
-    /// Vertically.
+    /// Vertical value.
     pub y: f64,
     /// Half the width of the confidence interval of `y`: the extent of the error bar in both directions.
     pub half_width: Option<f64>,
@@ -94,7 +94,7 @@ impl Point {
     }
 }
 
-/// The quantity with its unit, and with the power of ten that the tick labels leave out.
+/// Label of an axis: the quantity with its unit, and the power of ten that the tick labels omit.
 pub(super) fn axis_label(label: &str, unit: &str, omitted_exponent: i32) -> String {
     let factor = match omitted_exponent {
         0 => String::new(),

@@ -123,7 +123,7 @@ fn text_box(element: &Element) -> [f64; 4] {
     bounds
 }
 
-/// The points of an element that its attributes state.
+/// Points in the attributes of an element.
 fn coordinates(element: &Element) -> Vec<[f64; 2]> {
     let number = |name: &str| element.number(name).unwrap();
     match element.tag.as_str() {
