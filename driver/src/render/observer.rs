@@ -1,7 +1,8 @@
 //! What watches a render, and can stop it.
 
+use std::error::Error;
+
 use super::error::CardError;
-use crate::display::DisplayError;
 
 /// What a render is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +34,8 @@ pub trait Observer: Sync {
     /// Tells that a card was lost, or is used no more; the others go on with its tiles.
     fn lost(&self, _card: &str, _error: &CardError) {}
 
-    /// Tells that the picture is not shown on the display server, or no more; the render goes on.
-    fn not_shown(&self, _error: &DisplayError) {}
+    /// Tells that a viewer does not show the picture, or no more; the render goes on.
+    fn not_shown(&self, _error: &dyn Error) {}
 }
 
 /// Watches nothing and never stops.

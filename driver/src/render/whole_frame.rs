@@ -45,7 +45,7 @@ impl Executor for WholeFrame {
         let Work { image, frame, tiles, sinks, outputs, .. } = work;
         let progress = |done: u64, total: u64| {
             outputs.observer.progress(Phase::Tiles, done, total);
-            outputs.report_display();
+            outputs.report_failed_viewers();
             !outputs.observer.is_stopped()
         };
         let job = CurveJob { image, frame, tiles: &tiles, chips };
