@@ -7,7 +7,6 @@ use std::time::Instant;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::checksum::image_checksum;
 
-use super::address::{CardAddress, check_chips};
 use super::card_thread::{CardOutcome, render_on};
 use super::crew::Crew;
 use super::executor::{Executor, Outcome, Work};
@@ -47,7 +46,6 @@ impl<'a> Cards<'a> {
         let shared = SharedImage::default();
         let CardSet { addresses, faults, .. } = &settings.cards;
         let caches = settings.modelled_caches();
-        check_chips(addresses.iter().map(CardAddress::emulated_chips).sum())?;
         let each_card = (addresses.iter())
             .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)))
             .enumerate();

@@ -12,15 +12,13 @@ use photoncard_shared::message::{self, CausticGather, FrameParameters};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
-use super::address::{CardAddress, first_remote, is_one_emulated_chip};
-use super::error::RenderError;
+use super::address::CardAddress;
 use crate::emulator::ChipKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::film::{Film, FilmError, Window};
 use crate::layer::Layers;
 use crate::photon_map::PhotonSettings;
 use crate::scene::{Camera, Scene};
-use crate::scheduler::GatherOrder;
 
 /// Settings of a render: each field is an option of the command line, and each group a part of them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -79,65 +77,6 @@ impl RenderSettings {
     /// The caches that memory is modelled with, if it is.
     pub fn modelled_caches(&self) -> Option<CacheSettings> {
         self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| CacheSettings::default()))
-    }
-
-    /// Checks that the reads of the cards can be traced, if they are to be.
-    ///
-    /// # Errors
-    /// If there is no one order of them.
-    pub fn check_trace(&self) -> Result<(), RenderError> {
-        let Some(trace) = &self.cards.trace else { return Ok(()) };
-        let refuse = |reason: &str, remedy: &str| {
-            let value = trace.display().to_string();
-            Err(RenderError::Setting {
-                option: "--trace",
-                value,
-                reason: reason.into(),
-                remedy: remedy.into(),
-            })
-        };
-        if self.schedule.order == GatherOrder::Hilbert {
-            return refuse(
-                "with --order hilbert no one chip reads the photon map",
-                "use another --order, such as sort",
-            );
-        }
-        if !is_one_emulated_chip(&self.cards.addresses) {
-            return refuse(
-                "several chips read in no one order, and a chip that is not emulated tells nothing of its reads",
-                "use --card emulated:1 or --card emulated-micro:1",
-            );
-        }
-        Ok(())
-    }
-
-    /// Checks that the memory of every card can be modelled, if it is to be.
-    ///
-    /// # Errors
-    /// If a card is not emulated in this process.
-    pub fn check_memory_model(&self) -> Result<(), RenderError> {
-        match first_remote(&self.cards.addresses).filter(|_| self.modelled_caches().is_some()) {
-            None => Ok(()),
-            Some(address) => Err(RenderError::Setting {
-                option: "--counters",
-                value: format!("with --card {address}"),
-                reason: "only the memory of cards that are emulated in this process is modelled".into(),
-                remedy: "use --card emulated:CHIPS, or leave --counters and --cache out".into(),
-            }),
-        }
-    }
-
-    /// Checks that there are tiles to go on with: gathers along a curve through the frame complete all tiles at once.
-    pub(super) fn check_resume(&self) -> Result<(), RenderError> {
-        if !self.outputs.partial.as_ref().is_some_and(|partial| partial.resume) {
-            return Ok(());
-        }
-        Err(RenderError::Setting {
-            option: "--resume",
-            value: "with --order hilbert".into(),
-            reason: "that order completes all tiles at the end, and keeps none".into(),
-            remedy: "use another --order, the picture is the same; or leave --resume out".into(),
-        })
     }
 
     /// Photons of a scene's caustic map; 0 for no map.

@@ -5,7 +5,7 @@ use std::time::Instant;
 use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::budget::Budget;
 
-use super::address::{CardAddress, check_chips};
+use super::address::CardAddress;
 use super::executor::{Executor, Outcome, Work};
 use super::{Phase, RenderError, RenderSettings};
 use crate::emulator::ChipKind;
@@ -22,9 +22,8 @@ impl WholeFrame {
     /// The chips of the settings.
     ///
     /// # Errors
-    /// If there is a card of another kind, or the render is to be resumed.
+    /// If there is a card of another kind.
     pub(super) fn new(settings: &RenderSettings) -> Result<Self, RenderError> {
-        settings.check_resume()?;
         let chips = reference_chips(&settings.cards.addresses)?;
         Ok(Self { chips, caches: settings.modelled_caches() })
     }
@@ -63,18 +62,16 @@ impl Executor for WholeFrame {
 /// Number of emulated reference chips at some addresses.
 ///
 /// # Errors
-/// If there is any other card among them, or there are too many.
+/// If there is any other card among them.
 fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
     let counts = addresses.iter().map(|address| match *address {
         CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),
         _ => None,
     });
-    let chips = counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
+    counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
         option: "--order",
         value: "hilbert".into(),
         reason: "it leaves all gathers of the frame to the host, as no chip has room for them".into(),
         remedy: "use --card emulated:CHIPS, or --order sort".into(),
-    })?;
-    check_chips(chips)?;
-    Ok(chips)
+    })
 }

@@ -16,7 +16,7 @@ use crate::emulator::whole_frame::{CurveJob, render_along_curve};
 use crate::photon_map::MappedImage;
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::Scene;
-use crate::scheduler::{GatherOrder, tiles};
+use crate::scheduler::tiles;
 
 /// Reads of one structure of card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -161,8 +161,8 @@ impl Bench<'_> {
         self.pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
     }
 
-    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or, by [`GatherOrder::Hilbert`],
-    /// of the frame as a whole.
+    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or, in an order
+    /// [of the whole frame](crate::scheduler::GatherOrder::is_of_whole_frame), of all.
     ///
     /// # Errors
     /// If the scene has no camera of the settings' name, the card image is malformed, or the bench is stopped.
@@ -175,7 +175,7 @@ impl Bench<'_> {
     ) -> Result<Measurement, RenderError> {
         let frame = self.frame(settings)?;
         let all = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
-        if settings.schedule.order == GatherOrder::Hilbert {
+        if settings.schedule.order.is_of_whole_frame() {
             return self.whole_frame(&frame, &all, caches);
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
