@@ -20,7 +20,7 @@ use crate::scheduler::tiles;
 
 /// Reads of one structure of card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StructureReads {
+pub struct ReadSums {
     /// Read requests of the chip.
     pub requests: u64,
     /// Bytes that the chip requested.
@@ -39,7 +39,7 @@ pub struct TileMeasurement {
     /// Counts of the work.
     pub counters: Counters,
     /// Reads of each structure, in the order of [`Structure::ALL`].
-    pub reads: [StructureReads; STRUCTURES],
+    pub reads: [ReadSums; STRUCTURES],
 }
 
 /// Work and memory traffic of a point.
@@ -53,27 +53,23 @@ impl TileMeasurement {
     fn new(tile: u32, stands_for: usize, counters: Counters, traffic: &MemoryTraffic) -> Self {
         let reads = Structure::ALL.map(|structure| {
             let [requested, fetched] = traffic.of(|other| other == structure);
-            StructureReads {
-                requests: requested.requests,
-                raw_bytes: requested.bytes,
-                dram_bytes: fetched.bytes,
-            }
+            ReadSums { requests: requested.requests, raw_bytes: requested.bytes, dram_bytes: fetched.bytes }
         });
         Self { tile, stands_for, counters, reads }
     }
 
     /// Reads of the photon map.
-    pub fn photon_map(&self) -> StructureReads {
+    pub fn photon_map(&self) -> ReadSums {
         self.reads_of(Structure::is_photon_map)
     }
 
     /// Reads of everything but the photon map.
-    pub fn scene(&self) -> StructureReads {
+    pub fn scene(&self) -> ReadSums {
         self.reads_of(|structure| !structure.is_photon_map())
     }
 
-    fn reads_of(&self, chosen: impl Fn(Structure) -> bool) -> StructureReads {
-        let mut sum = StructureReads::default();
+    fn reads_of(&self, chosen: impl Fn(Structure) -> bool) -> ReadSums {
+        let mut sum = ReadSums::default();
         for (_, reads) in
             Structure::ALL.into_iter().zip(&self.reads).filter(|(structure, _)| chosen(*structure))
         {
