@@ -14,7 +14,8 @@ mod without_effect;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use photoncard_driver::emulator::ChipKind;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::link::ListenAddress;
 use photoncard_driver::printable::printable;
 use photoncard_driver::render::CardAddress;
@@ -75,14 +76,12 @@ pub(crate) enum CardCommand {
     List,
     /// Tell what a card can hold
     Info {
-        /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
-        #[arg(long, default_value = "emulated:1")]
+        #[arg(long, default_value_t, help = format!("The card: {}", CardAddress::forms()))]
         card: CardAddress,
     },
     /// Say hello some times, and tell how long the card takes to answer
     Ping {
-        /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
-        #[arg(long, default_value = "emulated:1")]
+        #[arg(long, default_value_t, help = format!("The card: {}", CardAddress::forms()))]
         card: CardAddress,
         /// Number of hellos
         #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
@@ -96,8 +95,8 @@ pub(crate) struct EmulateOptions {
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) listen: ListenAddress,
     /// The kind of card
-    #[arg(long, default_value = "emulated", value_parser = choice::<ChipKind>())]
-    pub(crate) card: ChipKind,
+    #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>())]
+    pub(crate) card: EmulatedKind,
 }
 
 #[derive(Args)]

@@ -7,13 +7,13 @@ mod groups;
 use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
-use photoncard_firmware::kind::MICRO;
 use photoncard_shared::message::{self, CausticGather, FrameParameters};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
 use super::address::CardAddress;
-use crate::emulator::ChipKind;
+use crate::choice::Choice;
+use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::film::{Film, FilmError, Window};
 use crate::layer::Layers;
@@ -59,10 +59,13 @@ impl RenderSettings {
     /// The side of a tile where none is asked for, pixels: one that the cards have room for, as far as that is known
     /// without asking them.
     pub fn default_tile(layers: &Layers, cards: &[CardAddress]) -> u32 {
-        let are_large =
-            cards.iter().all(|card| matches!(card, CardAddress::Emulated { kind: ChipKind::Reference, .. }));
-        let side = Schedule::default().tile;
-        if are_large { side } else { side.min(MICRO.pixels_of_tile(layers.are_of_chip()).isqrt()) }
+        let kinds = cards.iter().flat_map(|card| match card {
+            CardAddress::Emulated { kind, .. } => std::slice::from_ref(kind),
+            // A card elsewhere may be of any kind.
+            CardAddress::Remote(_) => EmulatedKind::ALL,
+        });
+        let sides = kinds.map(|kind| kind.budget().pixels_of_tile(layers.are_of_chip()).isqrt());
+        sides.fold(Schedule::default().tile, u32::min)
     }
 
     /// An empty film for the picture.

@@ -8,7 +8,7 @@ use photoncard_shared::budget::Budget;
 use super::address::CardAddress;
 use super::executor::{Executor, Outcome, Work};
 use super::{Phase, RenderError, RenderSettings};
-use crate::emulator::ChipKind;
+use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 
@@ -65,7 +65,7 @@ impl Executor for WholeFrame {
 /// If there is any other card among them.
 fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
     let counts = addresses.iter().map(|address| match *address {
-        CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),
+        CardAddress::Emulated { kind: EmulatedKind::Reference, chips } => Some(chips),
         _ => None,
     });
     counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {

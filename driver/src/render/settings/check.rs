@@ -4,6 +4,8 @@ use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_shared::budget::{Budget, MAX_BINS};
 
 use super::{MIN_IRRADIANCE_ERROR, RenderSettings};
+use crate::choice::Choice;
+use crate::emulator::EmulatedKind;
 use crate::film::Film;
 use crate::render::address::{CardAddress, check_chips, first_remote, is_one_emulated_chip};
 use crate::render::error::RenderError;
@@ -125,9 +127,11 @@ impl RenderSettings {
             );
         }
         if !is_one_emulated_chip(&self.cards.addresses) {
+            let one_chip: Vec<_> =
+                EmulatedKind::ALL.iter().map(|kind| format!("--card {}:1", kind.name())).collect();
             return refuse(
                 "several chips read in no one order, and a chip that is not emulated tells nothing of its reads",
-                "use --card emulated:1 or --card emulated-micro:1",
+                &format!("use {}", one_chip.join(" or ")),
             );
         }
         Ok(())
