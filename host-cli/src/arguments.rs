@@ -1,14 +1,15 @@
 //! The arguments of every command, and what they mean.
 
 mod cards;
-pub(crate) mod choice;
+mod choice;
 mod integrator;
 mod outputs;
 mod photons;
 mod picture;
 mod render;
 mod schedule;
-pub(crate) mod threads;
+mod study;
+mod threads;
 mod without_effect;
 
 use std::path::PathBuf;
@@ -22,7 +23,7 @@ use photoncard_driver::render::CardAddress;
 
 use self::choice::choice;
 pub(crate) use self::render::RenderOptions;
-use crate::study::StudyArguments;
+pub(crate) use self::study::StudyArguments;
 
 /// Global illumination by photon mapping on small rendering chips.
 #[derive(Parser)]

@@ -1,80 +1,20 @@
 //! `photoncard study`.
 
 use std::io::IsTerminal;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use photoncard_driver::choice::Choice;
 use photoncard_driver::study::report::Provenance;
-use photoncard_driver::study::{
-    SampleRate, Scale, Study, StudyError, StudyObserver, StudyOptions, run as study,
-};
+use photoncard_driver::study::{Scale, StudyError, StudyObserver, StudyOptions, run as study};
 
-use crate::arguments::choice::possible_value;
-use crate::arguments::threads::threads;
+use crate::arguments::StudyArguments;
 use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::stop_on_signals;
 
 /// What is said of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
-
-#[derive(Args)]
-pub(crate) struct StudyArguments {
-    /// What to study
-    #[arg(value_name = "NAME", value_parser = Selection::parser())]
-    name: Selection,
-    /// The folder for reports and finished points; it is made if it is missing
-    #[arg(short, long, value_name = "DIR")]
-    out: PathBuf,
-    /// A small picture and few values: about a minute a study
-    #[arg(long)]
-    quick: bool,
-    /// The share of the tiles that is rendered where not all are needed
-    #[arg(long, value_name = "SHARE", default_value = "1/17", allow_hyphen_values = true)]
-    sample: SampleRate,
-    /// The folder of photoncard's own scenes
-    #[arg(long, value_name = "DIR", default_value = "scenes")]
-    scenes: PathBuf,
-    /// Threads, an emulated chip on each [default: a thread a core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true)]
-    threads: Option<usize>,
-    /// Show no progress
-    #[arg(long)]
-    quiet: bool,
-}
-
-/// Studies by a name.
-#[derive(Clone, Copy, Debug)]
-enum Selection {
-    One(Study),
-    All,
-}
-
-impl Selection {
-    /// The name of all studies together.
-    const ALL: &str = "all";
-
-    /// Parser of the studies' names and of the one for all.
-    fn parser() -> impl TypedValueParser<Value = Self> {
-        let all = PossibleValue::new(Self::ALL).help("All of them, each in a folder of its own");
-        let studies = Study::ALL.iter().copied().map(possible_value);
-        PossibleValuesParser::new(studies.chain([all])).try_map(|name: String| {
-            if name == Self::ALL { Ok(Self::All) } else { Study::of_name(&name).map(Self::One) }
-        })
-    }
-
-    fn studies(self) -> Vec<Study> {
-        match self {
-            Self::One(study) => vec![study],
-            Self::All => Study::ALL.to_vec(),
-        }
-    }
-}
 
 /// Makes the reports of some studies.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
@@ -83,7 +23,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
         scale: if arguments.quick { Scale::QUICK } else { Scale::FULL }.with_sample(arguments.sample),
         scenes: arguments.scenes.clone(),
         out: arguments.out.clone(),
-        is_collection: matches!(arguments.name, Selection::All),
+        is_collection: arguments.name.is_collection(),
         threads: arguments.threads,
         provenance: Provenance::here(&command_line()),
     };
