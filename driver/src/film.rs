@@ -143,16 +143,8 @@ impl Film {
     /// # Errors
     /// If the picture or the window has no pixels or too many, or the window leaves the picture.
     pub fn new(width: u32, height: u32, window: Window) -> Result<Self, FilmError> {
-        if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-            return Err(FilmError::Size { width, height });
-        }
-        let (columns, rows) = (window.width(), window.height());
-        if columns == 0 || rows == 0 || window.x1 > width || window.y1 > height {
-            return Err(FilmError::Window { window, width, height });
-        }
-        let too_large = FilmError::Memory { width: columns, height: rows };
-        let count = u64::from(columns) * u64::from(rows);
-        let count = usize::try_from(count).ok().filter(|_| count <= MAX_PIXELS).ok_or(too_large)?;
+        let count = Self::check(width, height, window)?;
+        let too_large = FilmError::Memory { width: window.width(), height: window.height() };
         let mut pixels = Vec::new();
         let mut written = Vec::new();
         pixels.try_reserve_exact(count).map_err(|_| too_large)?;
@@ -160,6 +152,20 @@ impl Film {
         pixels.resize(count, PixelValue::default());
         written.resize(count, false);
         Ok(Self { width, height, window, pixels, layers: Vec::new(), written, missing: count })
+    }
+
+    /// Checks that a film can be made, as far as that is known before its memory is asked for. Returns its pixels.
+    pub(crate) fn check(width: u32, height: u32, window: Window) -> Result<usize, FilmError> {
+        if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
+            return Err(FilmError::Size { width, height });
+        }
+        let (columns, rows) = (window.width(), window.height());
+        if columns == 0 || rows == 0 || window.x1 > width || window.y1 > height {
+            return Err(FilmError::Window { window, width, height });
+        }
+        let count = u64::from(columns) * u64::from(rows);
+        let count = usize::try_from(count).ok().filter(|_| count <= MAX_PIXELS);
+        count.ok_or(FilmError::Memory { width: columns, height: rows })
     }
 
     /// [`Self::new`] with layers.

@@ -105,7 +105,7 @@
 //! | links | [`link`], [`session`] | ports of bytes; the host's end of the protocol, without I/O |
 //! | cards | [`emulator`] | chips on threads of this process, memory models and traces |
 //! | tiles to cards | [`scheduler`], [`dispatcher`] | which card renders which tile; finished tiles to the sinks |
-//! | sinks | [`partial`], [`display`] | the file of finished tiles, for `--resume`; the client of a display server |
+//! | sinks | [`viewer`], [`partial`], [`display`] | [`Viewer`](viewer::Viewer), the trait of sinks that show tiles; the file of finished tiles, for `--resume`; the client of a display server |
 //! | cost model | [`cost_model`] | FLOPs and DRAM bytes of a frame by Table 7.1 |
 //! | render | [`render`] | one render from a scene to a complete film; settings, statistics, card addresses |
 //! | studies | [`study`] | measurements of shipped scenes, and reports |
@@ -155,3 +155,4 @@ pub mod scheduler;
 pub mod session;
 pub mod sink;
 pub mod study;
+pub mod viewer;

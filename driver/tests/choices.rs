@@ -1,7 +1,7 @@
 //! Names of choices.
 
 use photoncard_driver::choice::Choice;
-use photoncard_driver::emulator::ChipKind;
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::preview::ToneCurve;
@@ -22,7 +22,7 @@ fn check<T: Choice + PartialEq + std::fmt::Debug>() {
 fn every_value_is_found_by_its_name_and_no_other_name_finds_one() {
     check::<Sampling>();
     check::<Radiance>();
-    check::<ChipKind>();
+    check::<EmulatedKind>();
     check::<SampleFormat>();
     check::<PhotonLayout>();
     check::<ToneCurve>();

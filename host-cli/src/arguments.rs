@@ -1,27 +1,29 @@
 //! Command-line arguments of all commands.
 
 mod cards;
-pub(crate) mod choice;
+mod choice;
 mod integrator;
 mod outputs;
 mod photons;
 mod picture;
 mod render;
 mod schedule;
-pub(crate) mod threads;
+mod study;
+mod threads;
 mod without_effect;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use photoncard_driver::emulator::ChipKind;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::link::ListenAddress;
 use photoncard_driver::printable::printable;
 use photoncard_driver::render::CardAddress;
 
 use self::choice::choice;
 pub(crate) use self::render::RenderOptions;
-use crate::study::StudyArguments;
+pub(crate) use self::study::StudyArguments;
 
 /// Global illumination by photon mapping on small rendering chips.
 #[derive(Parser)]
@@ -75,14 +77,12 @@ pub(crate) enum CardCommand {
     List,
     /// Print the limits of a card
     Info {
-        /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
-        #[arg(long, default_value = "emulated:1")]
+        #[arg(long, default_value_t, help = format!("The card: {}", CardAddress::forms()))]
         card: CardAddress,
     },
     /// Greet a card repeatedly, and print the time until each answer
     Ping {
-        /// The card: emulated, emulated-micro, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH
-        #[arg(long, default_value = "emulated:1")]
+        #[arg(long, default_value_t, help = format!("The card: {}", CardAddress::forms()))]
         card: CardAddress,
         /// Number of greetings
         #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
@@ -95,9 +95,9 @@ pub(crate) struct EmulateOptions {
     /// Address to listen on: pty, tcp:PORT on this machine alone, tcp:ADDRESS:PORT or unix:PATH; port 0 for any
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) listen: ListenAddress,
-    /// Kind of the card
-    #[arg(long, default_value = "emulated", value_parser = choice::<ChipKind>())]
-    pub(crate) card: ChipKind,
+    /// The kind of card
+    #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>())]
+    pub(crate) card: EmulatedKind,
 }
 
 #[derive(Args)]

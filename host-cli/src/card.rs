@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use photoncard_driver::emulator::ChipKind;
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::render::{CardAddress, MAX_BINS, MemoryUse, card_info, card_ping};
 
 use crate::console::print;
@@ -53,8 +53,8 @@ fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     ]
 }
 
-/// Rows of the firmware's buffers, which are known for emulated chips.
-fn sram_rows(kind: ChipKind, sram_bytes: usize) -> [String; 5] {
+/// What the firmware's buffers take of a chip, which the host knows of the chips that it emulates.
+fn sram_rows(kind: EmulatedKind, sram_bytes: usize) -> [String; 5] {
     let techniques = kind.techniques();
     [
         format!("  buffers       {} bytes", kind.buffer_bytes()),

@@ -1,11 +1,11 @@
 //! Progress of a render: a bar on a terminal, otherwise a line for each tenth of a phase.
 
+use std::error::Error;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use photoncard_driver::display::DisplayError;
 use photoncard_driver::render::{CardError, Observer, Phase};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
@@ -77,7 +77,7 @@ impl Observer for Progress {
         say(format_args!("photoncard: {card} is lost: {error}; any others go on"));
     }
 
-    fn not_shown(&self, error: &DisplayError) {
+    fn not_shown(&self, error: &dyn Error) {
         say(format_args!("photoncard: {error}"));
     }
 }

@@ -1,21 +1,14 @@
 //! `photoncard study`.
 
 use std::io::IsTerminal;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use photoncard_driver::choice::Choice;
 use photoncard_driver::study::report::Provenance;
-use photoncard_driver::study::{
-    SampleRate, Scale, Study, StudyError, StudyObserver, StudyOptions, run as study,
-};
+use photoncard_driver::study::{Scale, StudyError, StudyObserver, StudyOptions, run as study};
 
-use crate::arguments::choice::possible_value;
-use crate::arguments::threads::threads;
+use crate::arguments::StudyArguments;
 use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::stop_on_signals;
@@ -23,67 +16,14 @@ use crate::progress::stop_on_signals;
 /// Message of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
 
-#[derive(Args)]
-pub(crate) struct StudyArguments {
-    /// Study to run
-    #[arg(value_name = "NAME", value_parser = Selection::parser())]
-    name: Selection,
-    /// Folder for reports and finished points; it is created if it is missing
-    #[arg(short, long, value_name = "DIR")]
-    out: PathBuf,
-    /// Use a small picture and few values: about a minute per study
-    #[arg(long)]
-    quick: bool,
-    /// Share of the tiles to render in studies that do not need all
-    #[arg(long, value_name = "SHARE", default_value = "1/17", allow_hyphen_values = true)]
-    sample: SampleRate,
-    /// Folder of photoncard's own scenes
-    #[arg(long, value_name = "DIR", default_value = "scenes")]
-    scenes: PathBuf,
-    /// Threads, each emulating a chip [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true)]
-    threads: Option<usize>,
-    /// Show no progress
-    #[arg(long)]
-    quiet: bool,
-}
-
-/// One study or all studies.
-#[derive(Clone, Copy, Debug)]
-enum Selection {
-    One(Study),
-    All,
-}
-
-impl Selection {
-    /// Name of all studies together.
-    const ALL: &str = "all";
-
-    /// Parser of the names of studies, and of `all`.
-    fn parser() -> impl TypedValueParser<Value = Self> {
-        let all = PossibleValue::new(Self::ALL).help("All of them, each in a folder of its own");
-        let studies = Study::ALL.iter().copied().map(possible_value);
-        PossibleValuesParser::new(studies.chain([all])).try_map(|name: String| {
-            if name == Self::ALL { Ok(Self::All) } else { Study::of_name(&name).map(Self::One) }
-        })
-    }
-
-    fn studies(self) -> Vec<Study> {
-        match self {
-            Self::One(study) => vec![study],
-            Self::All => Study::ALL.to_vec(),
-        }
-    }
-}
-
-/// Writes the reports of some studies.
+/// Makes the reports of some studies.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
     let options = StudyOptions {
         studies: arguments.name.studies(),
         scale: if arguments.quick { Scale::QUICK } else { Scale::FULL }.with_sample(arguments.sample),
         scenes: arguments.scenes.clone(),
         out: arguments.out.clone(),
-        is_collection: matches!(arguments.name, Selection::All),
+        is_collection: arguments.name.is_collection(),
         threads: arguments.threads,
         provenance: Provenance::here(&command_line()),
     };

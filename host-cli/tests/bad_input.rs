@@ -203,6 +203,26 @@ fn options_for_emulated_cards_alone() {
 }
 
 #[test]
+fn settings_that_no_card_can_take_are_refused_before_one_is_reached() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for (option, value) in [
+        ("--size", "70000x1"),
+        ("--crop", "0,9,0,8"),
+        ("--photons", "0"),
+        ("--caustic-photons", "99999999999"),
+        ("--bins", "0"),
+        ("--ic-error", "2"),
+        ("--max-distance", "-1"),
+        ("--verify", "2"),
+    ] {
+        // No card is at this address, which is what the error would say.
+        let options = [option, value, "--card", "tcp:127.0.0.1:1", "--irradiance-cache", "on"];
+        refused(&room, "scene.gltf", &options, &[option]);
+    }
+}
+
+#[test]
 fn nothing_to_listen_on() {
     let room = Room::new();
     for (options, words) in [

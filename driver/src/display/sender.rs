@@ -1,5 +1,6 @@
 //! Sender of packets to a display server, on a thread of its own.
 
+use std::error::Error;
 use std::io::{self, ErrorKind, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use super::{DisplayAddress, DisplayError};
 use crate::film::{Film, FilmPixel, Window};
 use crate::layer::Channel;
 use crate::sink::{FinishedTile, TileSink};
+use crate::viewer::Viewer;
 
 /// Time limit of a connection attempt.
 const CONNECT_WAIT: Duration = Duration::from_secs(2);
@@ -46,7 +48,7 @@ pub struct Display {
 }
 
 impl Display {
-    /// Begins to show the crop window `window` with some channels. Errors are reported by [`Self::failure`].
+    /// Begins to show the crop window `window` with some channels. Errors are reported by [`Viewer::failure`].
     pub fn open(settings: &DisplaySettings, window: Window, channels: &[Channel]) -> Self {
         Self::with_room_for(MAX_WAITING, settings, window, channels)
     }
@@ -92,14 +94,45 @@ impl Display {
         update_image(&self.settings.image, &shown, &self.names(), values)
     }
 
-    /// The error that ended the display, returned once. After an error nothing more is shown.
-    pub fn failure(&self) -> Option<DisplayError> {
-        self.queue.lock().take_failure()
+    /// Ends the display as too slow: it lacks the waiting packets, and up to `missed` tiles.
+    fn give_up(&self, missed: usize) {
+        let packets = self.queue.lock().left() + missed;
+        self.fail(DisplayError::Slow { address: self.settings.address.clone(), packets });
+    }
+
+    fn fail(&self, error: DisplayError) {
+        self.queue.change(|queue| queue.fail(error));
+    }
+}
+
+impl TileSink for Display {
+    /// Shows a tile, now or, if too much waits to be sent, when the picture is [finished](Viewer::finish).
+    fn put(&self, tile: &FinishedTile) {
+        if !self.queue.lock().is_open() {
+            return;
+        }
+        let packet = self.packet(tile);
+        self.queue.change(|queue| {
+            if queue.has_room(packet.len(), self.most_waiting) {
+                queue.push(packet);
+            } else {
+                queue.missed.push(*tile.tile());
+            }
+        });
+    }
+
+    /// Pixels shown stay until the tile is put again.
+    fn revoke(&self, _: &Tile) {}
+}
+
+impl Viewer for Display {
+    fn failure(&self) -> Option<Box<dyn Error>> {
+        self.queue.lock().take_failure().map(Into::into)
     }
 
     /// Sends the tiles that found no room before, and waits until all packets are sent: at most 20 s, at most 2 s
     /// without progress.
-    pub fn finish(&self, film: &Film) {
+    fn finish(&self, film: &Film) {
         let missed = std::mem::take(&mut self.queue.lock().missed);
         let mut watch = Watch::new();
         for finished in missed.iter().filter_map(|tile| film.finished(tile)) {
@@ -118,36 +151,6 @@ impl Display {
             self.give_up(0);
         }
     }
-
-    /// Ends the display as too slow: it lacks the waiting packets, and up to `missed` tiles.
-    fn give_up(&self, missed: usize) {
-        let packets = self.queue.lock().left() + missed;
-        self.fail(DisplayError::Slow { address: self.settings.address.clone(), packets });
-    }
-
-    fn fail(&self, error: DisplayError) {
-        self.queue.change(|queue| queue.fail(error));
-    }
-}
-
-impl TileSink for Display {
-    /// Shows a tile, now or, if too much waits to be sent, when the picture is [finished](Display::finish).
-    fn put(&self, tile: &FinishedTile) {
-        if !self.queue.lock().is_open() {
-            return;
-        }
-        let packet = self.packet(tile);
-        self.queue.change(|queue| {
-            if queue.has_room(packet.len(), self.most_waiting) {
-                queue.push(packet);
-            } else {
-                queue.missed.push(*tile.tile());
-            }
-        });
-    }
-
-    /// Pixels shown stay until the tile is put again.
-    fn revoke(&self, _: &Tile) {}
 }
 
 impl Drop for Display {

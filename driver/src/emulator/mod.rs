@@ -29,19 +29,19 @@ use crate::link::{LoopbackPort, loopback};
 
 /// Kind of the chip on an emulated card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChipKind {
+pub enum EmulatedKind {
     /// A chip of the budget [`REFERENCE`](photoncard_firmware::kind::REFERENCE).
     Reference,
     /// A chip of the budget [`MICRO`](photoncard_firmware::kind::MICRO).
     Micro,
 }
 
-choices!(ChipKind {
+choices!(EmulatedKind {
     Reference = "emulated": "The reference chip",
     Micro = "emulated-micro": "The micro chip",
 });
 
-impl ChipKind {
+impl EmulatedKind {
     /// On-chip memory of the firmware, its caches and stack included, bytes.
     pub fn sram_bytes(self) -> usize {
         match self {
@@ -111,7 +111,11 @@ impl EmulatedCard {
     ///
     /// # Errors
     /// If the card's thread cannot be started.
-    pub fn start(kind: ChipKind, model: Option<MemoryModel>, shared: SharedImage) -> std::io::Result<Self> {
+    pub fn start(
+        kind: EmulatedKind,
+        model: Option<MemoryModel>,
+        shared: SharedImage,
+    ) -> std::io::Result<Self> {
         let (host, mut card) = loopback(LINK_CAPACITY);
         let trace = model.as_ref().and_then(|model| model.trace.as_ref());
         let trace_has_failed = trace.map(TraceFile::has_failed);
@@ -163,7 +167,7 @@ impl Drop for EmulatedCard {
 ///
 /// # Panics
 /// If the chip panicked.
-pub fn serve_card(kind: ChipKind, mut port: impl Port + Send) -> std::io::Result<()> {
+pub fn serve_card(kind: EmulatedKind, mut port: impl Port + Send) -> std::io::Result<()> {
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
             .name("chip".into())
@@ -174,7 +178,7 @@ pub fn serve_card(kind: ChipKind, mut port: impl Port + Send) -> std::io::Result
 }
 
 fn run(
-    kind: ChipKind,
+    kind: EmulatedKind,
     model: Option<MemoryModel>,
     shared: SharedImage,
     port: &mut impl Port,
@@ -194,14 +198,14 @@ fn run(
 
 /// Serves a card with some memory until the host drops its end of the link. Returns the result of `end` on the memory.
 fn serve_on<M: CardMemory, R>(
-    kind: ChipKind,
+    kind: EmulatedKind,
     memory: M,
     port: &mut impl Port,
     end: impl FnOnce(&mut M) -> R,
 ) -> R {
     match kind {
-        ChipKind::Reference => serve_kind::<Reference, M, R>(memory, port, end),
-        ChipKind::Micro => serve_kind::<Micro, M, R>(memory, port, end),
+        EmulatedKind::Reference => serve_kind::<Reference, M, R>(memory, port, end),
+        EmulatedKind::Micro => serve_kind::<Micro, M, R>(memory, port, end),
     }
 }
 

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use super::RenderError;
 use crate::choice::Choice;
-use crate::emulator::ChipKind;
+use crate::emulator::EmulatedKind;
 use crate::link::{host_name, tcp_address};
 
 /// Address of one card or of several emulated ones: an argument of `--card`.
@@ -14,9 +14,9 @@ use crate::link::{host_name, tcp_address};
 pub enum CardAddress {
     /// Emulated chips in this process.
     Emulated {
-        /// Kind of the chips.
-        kind: ChipKind,
-        /// Number of chips.
+        /// Their kind.
+        kind: EmulatedKind,
+        /// How many.
         chips: usize,
     },
     /// Card at the other end of a link.
@@ -58,13 +58,13 @@ const MIN_BAUD: u32 = 4800;
 impl Default for CardAddress {
     /// One emulated reference chip.
     fn default() -> Self {
-        Self::Emulated { kind: ChipKind::Reference, chips: 1 }
+        Self::Emulated { kind: EmulatedKind::Reference, chips: 1 }
     }
 }
 
 impl CardAddress {
-    /// Emulated chips of a kind, one per core of this machine's processor.
-    pub fn emulated(kind: ChipKind) -> Self {
+    /// Chips of a kind in this process, one for each of its processor's cores.
+    pub fn emulated(kind: EmulatedKind) -> Self {
         let chips = std::thread::available_parallelism().map_or(1, usize::from);
         Self::Emulated { kind, chips }
     }
@@ -74,7 +74,14 @@ impl CardAddress {
         Self::Remote(RemoteAddress::Serial { path: path.into(), baud: DEFAULT_BAUD })
     }
 
-    /// Number of chips that this process emulates at the address.
+    /// The forms of an address, in a line of help.
+    pub fn forms() -> String {
+        let emulated: String =
+            EmulatedKind::ALL.iter().map(|kind| format!("{}[:CHIPS], ", kind.name())).collect();
+        format!("{emulated}serial:PATH[@BAUD], tcp:HOST:PORT or unix:PATH")
+    }
+
+    /// Chips that this process emulates there.
     pub(super) fn emulated_chips(&self) -> usize {
         match *self {
             Self::Emulated { chips, .. } => chips,
@@ -141,7 +148,7 @@ impl FromStr for CardAddress {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (kind, rest) = text.split_once(':').map_or((text, None), |(kind, rest)| (kind, Some(rest)));
-        if let Ok(kind) = ChipKind::of_name(kind) {
+        if let Ok(kind) = EmulatedKind::of_name(kind) {
             return emulated(kind, rest);
         }
         match kind {
@@ -151,15 +158,12 @@ impl FromStr for CardAddress {
                 Some(path) if !path.is_empty() => Ok(Self::Remote(RemoteAddress::Unix { path: path.into() })),
                 _ => Err("a card on a Unix socket is unix:PATH".into()),
             },
-            _ => Err(format!(
-                "{kind:?} is no kind of card; use emulated[:CHIPS], emulated-micro[:CHIPS], serial:PATH[@BAUD], \
-                 tcp:HOST:PORT or unix:PATH"
-            )),
+            _ => Err(format!("{kind:?} is no kind of card; use {}", Self::forms())),
         }
     }
 }
 
-fn emulated(kind: ChipKind, chips: Option<&str>) -> Result<CardAddress, String> {
+fn emulated(kind: EmulatedKind, chips: Option<&str>) -> Result<CardAddress, String> {
     let Some(text) = chips else { return Ok(CardAddress::emulated(kind)) };
     let chips = text.parse().ok().filter(|count| (1..=MAX_CHIPS).contains(count));
     let chips = chips.ok_or_else(|| format!("{text:?} is no number of chips; use 1 to {MAX_CHIPS}"))?;

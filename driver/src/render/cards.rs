@@ -1,13 +1,14 @@
 //! Executor of tiles on cards: connects to all cards, greets them, and renders on them in parallel.
 
+use std::panic::resume_unwind;
 use std::sync::PoisonError;
 use std::sync::atomic::AtomicBool;
+use std::thread::ScopedJoinHandle;
 use std::time::Instant;
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::checksum::image_checksum;
 
-use super::address::{CardAddress, check_chips};
 use super::card_thread::{CardOutcome, render_on};
 use super::crew::Crew;
 use super::executor::{Executor, Outcome, Work};
@@ -47,27 +48,19 @@ impl<'a> Cards<'a> {
         let shared = SharedImage::default();
         let CardSet { addresses, faults, .. } = &settings.cards;
         let caches = settings.modelled_caches();
-        check_chips(addresses.iter().map(CardAddress::emulated_chips).sum())?;
         let each_card = (addresses.iter())
             .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)))
             .enumerate();
-        let results: Vec<(String, Result<GreetedCard, GreetingError>)> = std::thread::scope(|scope| {
-            let shared = &shared;
-            let threads: Vec<_> = each_card
-                .map(|(index, address)| {
-                    let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
-                    let work = move || {
-                        let card = OpenCard::open(index, address, model, shared, *faults)?;
-                        greet(card, start, observer)
-                    };
-                    (card_name(index, address), scope.spawn(work))
-                })
-                .collect();
-            let join = |thread: std::thread::ScopedJoinHandle<_>| {
-                thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-            };
-            threads.into_iter().map(|(name, thread)| (name, join(thread))).collect()
+        let shared_image = &shared;
+        let greetings = each_card.map(|(index, address)| {
+            let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
+            move || {
+                let card = OpenCard::open(index, address, model, shared_image, *faults);
+                let greeted = card.map_err(GreetingError::from).and_then(|card| greet(card, start, observer));
+                (card_name(index, address), greeted)
+            }
         });
+        let results = on_threads(greetings);
         let mut this = Self { settings, cards: Vec::new(), start, shared, lost: 0 };
         let mut errors = Vec::new();
         for (name, result) in results {
@@ -115,17 +108,11 @@ impl<'a> Cards<'a> {
             names,
             failed: AtomicBool::new(false),
         };
-        let results: Vec<Result<CardOutcome, RenderError>> = std::thread::scope(|scope| {
-            let crew = &crew;
-            let threads: Vec<_> = (cards.into_iter().enumerate())
-                .map(|(number, card)| scope.spawn(move || render_on(number, card, job, crew)))
-                .collect();
-            // A panic of a card's thread continues on this thread.
-            threads
-                .into_iter()
-                .map(|thread| thread.join().unwrap_or_else(|p| std::panic::resume_unwind(p)))
-                .collect()
-        });
+        let crew_of_all = &crew;
+        let results = on_threads(
+            (cards.into_iter().enumerate())
+                .map(|(number, card)| move || render_on(number, card, job, crew_of_all)),
+        );
         let ended = self.start.elapsed();
         let sum = sum_up(results)?;
         let loaded = sum.loaded.max(begun);
@@ -168,6 +155,16 @@ impl Executor for Cards<'_> {
         let scheduler = scheduler.with_kept(&film.lock().unwrap_or_else(PoisonError::into_inner));
         self.render(job, scheduler, sinks, outputs)
     }
+}
+
+/// Does each piece of work on a thread of its own. Returns the results in the order of the work. A panic of one is the
+/// caller's.
+fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) -> Vec<T> {
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = works.map(|work| scope.spawn(work)).collect();
+        let join = |thread: ScopedJoinHandle<T>| thread.join().unwrap_or_else(|panic| resume_unwind(panic));
+        threads.into_iter().map(join).collect()
+    })
 }
 
 /// Sum of the outcomes of all cards.

@@ -40,7 +40,7 @@ impl Crew<'_> {
         if self.failed.load(Ordering::Relaxed) || self.outputs.observer.is_stopped() {
             return Err(RenderError::Stopped);
         }
-        self.outputs.report_display();
+        self.outputs.report_failed_viewers();
         self.outputs.check_partial().map_err(|error| self.fail(error.into()))?;
         Ok(self.dispatcher.scheduler().is_complete())
     }

@@ -49,7 +49,7 @@ use self::whole_frame::WholeFrame;
 use crate::film::Film;
 use crate::partial::PartialRender;
 use crate::scene::Scene;
-use crate::scheduler::{GatherOrder, tiles};
+use crate::scheduler::tiles;
 
 /// Finished picture.
 pub struct Rendering {
@@ -74,10 +74,11 @@ pub fn render(
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
     let camera = scene.camera(settings.picture.camera.as_deref())?;
+    settings.check()?;
     let executor = executor(settings, observer)?;
     let budgets = executor.budgets();
     for budget in &budgets {
-        settings.check(budget)?;
+        settings.check_budget(budget)?;
     }
     // A film may be large: it is allocated after the settings are checked.
     let mut film = settings.film()?;
@@ -102,16 +103,14 @@ pub fn render(
 /// The executor of the settings.
 ///
 /// # Errors
-/// If the settings contradict each other, or too few cards answer the greeting.
+/// If its cards are not of the right kind, or too few say hello.
 fn executor<'a>(
     settings: &'a RenderSettings,
     observer: &dyn Observer,
 ) -> Result<Box<dyn Executor + 'a>, RenderError> {
-    settings.check_trace()?;
-    settings.check_memory_model()?;
-    settings.check_verification()?;
-    Ok(match settings.schedule.order {
-        GatherOrder::Hilbert => Box::new(WholeFrame::new(settings)?),
-        _ => Box::new(Cards::connect(settings, observer)?),
+    Ok(if settings.schedule.order.is_of_whole_frame() {
+        Box::new(WholeFrame::new(settings)?)
+    } else {
+        Box::new(Cards::connect(settings, observer)?)
     })
 }

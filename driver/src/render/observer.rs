@@ -1,7 +1,8 @@
 //! Observer of a render, which can stop it.
 
+use std::error::Error;
+
 use super::error::CardError;
-use crate::display::DisplayError;
 
 /// Phase of a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +34,8 @@ pub trait Observer: Sync {
     /// Reports that a card was lost or given up; the others render its tiles.
     fn lost(&self, _card: &str, _error: &CardError) {}
 
-    /// Reports that the display server does not show the picture, or has ceased to; the render goes on.
-    fn not_shown(&self, _error: &DisplayError) {}
+    /// Tells that a viewer does not show the picture, or no more; the render goes on.
+    fn not_shown(&self, _error: &dyn Error) {}
 }
 
 /// Observer that ignores all reports and never stops the render.

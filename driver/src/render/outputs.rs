@@ -1,4 +1,4 @@
-//! Outputs of a render while it runs: the file of finished tiles, the display server and the observer.
+//! Outputs of a render while it runs: the file of finished tiles, the viewers and the observer.
 
 use std::sync::Mutex;
 
@@ -10,11 +10,12 @@ use crate::film::Film;
 use crate::partial::{PartialError, PartialRender};
 use crate::scene::Scene;
 use crate::sink::TileSink;
+use crate::viewer::Viewer;
 
 /// Outputs of a render while it runs, as far as the settings ask for them.
 pub(super) struct Outputs<'a> {
     partial: Option<PartialRender>,
-    display: Option<Display>,
+    viewers: Vec<Box<dyn Viewer>>,
     pub(super) observer: &'a dyn Observer,
 }
 
@@ -32,14 +33,11 @@ impl<'a> Outputs<'a> {
     ) -> Result<Self, PartialError> {
         let begin = |partial| PartialRender::begin(partial, settings.identity(scene).into(), film);
         let partial = settings.outputs.partial.as_ref().map(begin).transpose()?;
-        let channels = settings.picture.layers.channels();
-        let open = |display| Display::open(display, film.window(), &channels);
-        let display = settings.outputs.display.as_ref().map(open);
-        let outputs = Self { partial, display, observer };
+        let outputs = Self { partial, viewers: viewers(settings, film), observer };
         outputs.report_kept();
         let resumed: Vec<&Tile> = tiles.iter().filter(|tile| film.has(tile)).collect();
-        if let Some(display) = &outputs.display {
-            resumed.iter().filter_map(|tile| film.finished(tile)).for_each(|tile| display.put(&tile));
+        for tile in resumed.iter().filter_map(|tile| film.finished(tile)) {
+            outputs.viewers.iter().for_each(|viewer| viewer.put(&tile));
         }
         if !resumed.is_empty() {
             observer.resumed(resumed.len(), tiles.len());
@@ -47,12 +45,12 @@ impl<'a> Outputs<'a> {
         Ok(outputs)
     }
 
-    /// Sinks of finished tiles: the film, the display server, and the file if tiles are finished early.
+    /// Sinks of finished tiles: the film, the viewers, and the file if tiles are finished early.
     pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>, finished_early: bool) -> Vec<&'s dyn TileSink> {
         let mut sinks: Vec<&dyn TileSink> = vec![film];
         let partial = self.partial.as_ref().filter(|_| finished_early);
         sinks.extend(partial.map(|partial| partial as &dyn TileSink));
-        sinks.extend(self.display.as_ref().map(|display| display as &dyn TileSink));
+        sinks.extend(self.viewers.iter().map(|viewer| viewer.as_ref() as &dyn TileSink));
         sinks
     }
 
@@ -71,19 +69,27 @@ impl<'a> Outputs<'a> {
         }
     }
 
-    /// Reports to the observer, once, the error that keeps the picture from being shown.
-    pub(super) fn report_display(&self) {
-        if let Some(error) = self.display.as_ref().and_then(Display::failure) {
-            self.observer.not_shown(&error);
+    /// Reports to the observer, once for each viewer that has failed, why the picture is not shown.
+    pub(super) fn report_failed_viewers(&self) {
+        for error in self.viewers.iter().filter_map(|viewer| viewer.failure()) {
+            self.observer.not_shown(error.as_ref());
         }
     }
 
     /// Shows the rest of the picture. Returns the file of finished tiles.
     pub(super) fn finish(self, film: &Film) -> Option<PartialRender> {
-        if let Some(display) = &self.display {
-            display.finish(film);
-        }
-        self.report_display();
+        self.viewers.iter().for_each(|viewer| viewer.finish(film));
+        self.report_failed_viewers();
         self.partial
     }
+}
+
+/// The viewers that the settings ask for.
+fn viewers(settings: &RenderSettings, film: &Film) -> Vec<Box<dyn Viewer>> {
+    let channels = settings.picture.layers.channels();
+    let mut viewers: Vec<Box<dyn Viewer>> = Vec::new();
+    if let Some(display) = &settings.outputs.display {
+        viewers.push(Box::new(Display::open(display, film.window(), &channels)));
+    }
+    viewers
 }

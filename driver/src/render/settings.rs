@@ -7,20 +7,18 @@ mod groups;
 use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
-use photoncard_firmware::kind::MICRO;
 use photoncard_shared::message::{self, CausticGather, FrameParameters};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
-use super::address::{CardAddress, first_remote, is_one_emulated_chip};
-use super::error::RenderError;
-use crate::emulator::ChipKind;
+use super::address::CardAddress;
+use crate::choice::Choice;
+use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::film::{Film, FilmError, Window};
 use crate::layer::Layers;
 use crate::photon_map::PhotonSettings;
 use crate::scene::{Camera, Scene};
-use crate::scheduler::GatherOrder;
 
 /// Settings of a render: each field is an option of the command line, in groups.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -61,10 +59,13 @@ impl RenderSettings {
     /// Default side of a tile, pixels. Unless all cards are emulated reference chips, it is limited to the tile of the
     /// smallest kind of chip, as remote cards are not known yet.
     pub fn default_tile(layers: &Layers, cards: &[CardAddress]) -> u32 {
-        let are_large =
-            cards.iter().all(|card| matches!(card, CardAddress::Emulated { kind: ChipKind::Reference, .. }));
-        let side = Schedule::default().tile;
-        if are_large { side } else { side.min(MICRO.pixels_of_tile(layers.are_of_chip()).isqrt()) }
+        let kinds = cards.iter().flat_map(|card| match card {
+            CardAddress::Emulated { kind, .. } => std::slice::from_ref(kind),
+            // A card elsewhere may be of any kind.
+            CardAddress::Remote(_) => EmulatedKind::ALL,
+        });
+        let sides = kinds.map(|kind| kind.budget().pixels_of_tile(layers.are_of_chip()).isqrt());
+        sides.fold(Schedule::default().tile, u32::min)
     }
 
     /// Empty film for the picture.
@@ -81,67 +82,7 @@ impl RenderSettings {
         self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| CacheSettings::default()))
     }
 
-    /// Checks that the reads of the cards can be traced, if a trace is requested.
-    ///
-    /// # Errors
-    /// If the reads have no single order: with the order `hilbert`, several chips, or a chip that is not emulated.
-    pub fn check_trace(&self) -> Result<(), RenderError> {
-        let Some(trace) = &self.cards.trace else { return Ok(()) };
-        let refuse = |reason: &str, remedy: &str| {
-            let value = trace.display().to_string();
-            Err(RenderError::Setting {
-                option: "--trace",
-                value,
-                reason: reason.into(),
-                remedy: remedy.into(),
-            })
-        };
-        if self.schedule.order == GatherOrder::Hilbert {
-            return refuse(
-                "with --order hilbert no single chip reads the photon map",
-                "use another --order, such as sort",
-            );
-        }
-        if !is_one_emulated_chip(&self.cards.addresses) {
-            return refuse(
-                "several chips have no common order of reads, and a chip that is not emulated does not report its reads",
-                "use --card emulated:1 or --card emulated-micro:1",
-            );
-        }
-        Ok(())
-    }
-
-    /// Checks that the memory of every card can be modelled, if requested.
-    ///
-    /// # Errors
-    /// If a card is not emulated in this process.
-    pub fn check_memory_model(&self) -> Result<(), RenderError> {
-        match first_remote(&self.cards.addresses).filter(|_| self.modelled_caches().is_some()) {
-            None => Ok(()),
-            Some(address) => Err(RenderError::Setting {
-                option: "--counters",
-                value: format!("with --card {address}"),
-                reason: "only the memory of cards that are emulated in this process is modelled".into(),
-                remedy: "use --card emulated:CHIPS, or leave --counters and --cache out".into(),
-            }),
-        }
-    }
-
-    /// Checks that the order can resume a render: `hilbert` finishes all tiles together, so that there are none to take
-    /// over.
-    pub(super) fn check_resume(&self) -> Result<(), RenderError> {
-        if !self.outputs.partial.as_ref().is_some_and(|partial| partial.resume) {
-            return Ok(());
-        }
-        Err(RenderError::Setting {
-            option: "--resume",
-            value: "with --order hilbert".into(),
-            reason: "that order completes all tiles at the end, and keeps none".into(),
-            remedy: "use another --order, the picture is the same; or leave --resume out".into(),
-        })
-    }
-
-    /// Number of photons in a scene's caustic map; 0 for no map.
+    /// Photons of a scene's caustic map; 0 for no map.
     fn caustic_photons(&self, scene: &Scene) -> usize {
         let asked = self.photons.caustic_photons.unwrap_or(DEFAULT_CAUSTIC_PHOTONS);
         if scene.is_specular() { asked } else { 0 }

@@ -3,20 +3,19 @@
 use photoncard_shared::message::Tile;
 
 use super::{RenderError, RenderSettings};
-use crate::scheduler::{GatherOrder, Scheduler};
+use crate::scheduler::Scheduler;
 
 impl RenderSettings {
     /// Checks that tiles can be verified, if requested.
     ///
     /// # Errors
-    /// If there are fewer than two cards, the share is out of range, the order is `hilbert`, or memory is modelled, since
-    /// the reads of both cards would count.
-    pub fn check_verification(&self) -> Result<(), RenderError> {
+    /// If there are not two cards, the share is none, or reads are counted, which would be those of both cards.
+    pub(super) fn check_verification(&self) -> Result<(), RenderError> {
         let Some(share) = self.cards.verify else { return Ok(()) };
         let chips: usize = self.cards.addresses.iter().map(|card| card.emulated_chips().max(1)).sum();
         let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
             ["a share of the tiles is above 0 and at most 1", "give a number such as 0.02"]
-        } else if self.schedule.order == GatherOrder::Hilbert {
+        } else if self.schedule.order.is_of_whole_frame() {
             ["with --order hilbert the host does the gathers, and no card a whole tile", "use --order sort"]
         } else if chips < 2 {
             ["a tile is verified by a second card", "give two --card or more, or --card emulated:2"]

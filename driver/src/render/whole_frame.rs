@@ -5,10 +5,10 @@ use std::time::Instant;
 use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::budget::Budget;
 
-use super::address::{CardAddress, check_chips};
+use super::address::CardAddress;
 use super::executor::{Executor, Outcome, Work};
 use super::{Phase, RenderError, RenderSettings};
-use crate::emulator::ChipKind;
+use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
 
@@ -22,9 +22,8 @@ impl WholeFrame {
     /// Executor with the chips of the settings.
     ///
     /// # Errors
-    /// If there is a card of another kind, or the render is to be resumed.
+    /// If there is a card of another kind.
     pub(super) fn new(settings: &RenderSettings) -> Result<Self, RenderError> {
-        settings.check_resume()?;
         let chips = reference_chips(&settings.cards.addresses)?;
         Ok(Self { chips, caches: settings.modelled_caches() })
     }
@@ -45,7 +44,7 @@ impl Executor for WholeFrame {
         let Work { image, frame, tiles, sinks, outputs, .. } = work;
         let progress = |done: u64, total: u64| {
             outputs.observer.progress(Phase::Tiles, done, total);
-            outputs.report_display();
+            outputs.report_failed_viewers();
             !outputs.observer.is_stopped()
         };
         let job = CurveJob { image, frame, tiles: &tiles, chips };
@@ -63,18 +62,16 @@ impl Executor for WholeFrame {
 /// Number of emulated reference chips at the addresses.
 ///
 /// # Errors
-/// If the addresses name any other card, or too many chips.
+/// If there is any other card among them.
 fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
     let counts = addresses.iter().map(|address| match *address {
-        CardAddress::Emulated { kind: ChipKind::Reference, chips } => Some(chips),
+        CardAddress::Emulated { kind: EmulatedKind::Reference, chips } => Some(chips),
         _ => None,
     });
-    let chips = counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
+    counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
         option: "--order",
         value: "hilbert".into(),
         reason: "it leaves all gathers of the frame to the host, as no chip has room for them".into(),
         remedy: "use --card emulated:CHIPS, or --order sort".into(),
-    })?;
-    check_chips(chips)?;
-    Ok(chips)
+    })
 }

@@ -48,6 +48,12 @@ impl GatherOrder {
         matches!(self, Self::Hash | Self::Sort)
     }
 
+    /// Returns whether the gathers of the whole frame are ordered together: the host does them, and all tiles are finished
+    /// at the end.
+    pub fn is_of_whole_frame(self) -> bool {
+        self == Self::Hilbert
+    }
+
     /// Returns whether rays are cast by direction bins.
     pub fn has_bins(self) -> bool {
         !matches!(self, Self::Naive | Self::Tiled)

@@ -170,7 +170,8 @@ impl<'a> Laboratory<'a> {
     }
 
     fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {
-        point.settings.check(&photoncard_firmware::kind::REFERENCE)?;
+        point.settings.check()?;
+        point.settings.check_budget(&photoncard_firmware::kind::REFERENCE)?;
         let mut last = self.image(point)?;
         let is_stopped = || self.observer.is_stopped();
         let bench =

@@ -16,11 +16,11 @@ use crate::emulator::whole_frame::{CurveJob, render_along_curve};
 use crate::photon_map::MappedImage;
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::Scene;
-use crate::scheduler::{GatherOrder, tiles};
+use crate::scheduler::tiles;
 
 /// Reads of one structure of card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StructureReads {
+pub struct ReadSums {
     /// Read requests of the chip.
     pub requests: u64,
     /// Bytes that the chip requested.
@@ -39,7 +39,7 @@ pub struct TileMeasurement {
     /// Counts of the work.
     pub counters: Counters,
     /// Reads of each structure, in the order of [`Structure::ALL`].
-    pub reads: [StructureReads; STRUCTURES],
+    pub reads: [ReadSums; STRUCTURES],
 }
 
 /// Work and memory traffic of a point.
@@ -53,27 +53,23 @@ impl TileMeasurement {
     fn new(tile: u32, stands_for: usize, counters: Counters, traffic: &MemoryTraffic) -> Self {
         let reads = Structure::ALL.map(|structure| {
             let [requested, fetched] = traffic.of(|other| other == structure);
-            StructureReads {
-                requests: requested.requests,
-                raw_bytes: requested.bytes,
-                dram_bytes: fetched.bytes,
-            }
+            ReadSums { requests: requested.requests, raw_bytes: requested.bytes, dram_bytes: fetched.bytes }
         });
         Self { tile, stands_for, counters, reads }
     }
 
     /// Reads of the photon map.
-    pub fn photon_map(&self) -> StructureReads {
+    pub fn photon_map(&self) -> ReadSums {
         self.reads_of(Structure::is_photon_map)
     }
 
     /// Reads of everything but the photon map.
-    pub fn scene(&self) -> StructureReads {
+    pub fn scene(&self) -> ReadSums {
         self.reads_of(|structure| !structure.is_photon_map())
     }
 
-    fn reads_of(&self, chosen: impl Fn(Structure) -> bool) -> StructureReads {
-        let mut sum = StructureReads::default();
+    fn reads_of(&self, chosen: impl Fn(Structure) -> bool) -> ReadSums {
+        let mut sum = ReadSums::default();
         for (_, reads) in
             Structure::ALL.into_iter().zip(&self.reads).filter(|(structure, _)| chosen(*structure))
         {
@@ -161,8 +157,8 @@ impl Bench<'_> {
         self.pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
     }
 
-    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or, by [`GatherOrder::Hilbert`],
-    /// of the frame as a whole.
+    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or, in an order
+    /// [of the whole frame](crate::scheduler::GatherOrder::is_of_whole_frame), of all.
     ///
     /// # Errors
     /// If the scene has no camera of the settings' name, the card image is malformed, or the bench is stopped.
@@ -175,7 +171,7 @@ impl Bench<'_> {
     ) -> Result<Measurement, RenderError> {
         let frame = self.frame(settings)?;
         let all = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
-        if settings.schedule.order == GatherOrder::Hilbert {
+        if settings.schedule.order.is_of_whole_frame() {
             return self.whole_frame(&frame, &all, caches);
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 
 pub use self::error::StudyError;
 pub use self::laboratory::{Laboratory, Outcome, Results, StudyObserver};
-pub use self::measure::{Bench, Measurement, StructureReads, TileMeasurement};
+pub use self::measure::{Bench, Measurement, ReadSums, TileMeasurement};
 pub use self::point::{ImageKey, Point, Task};
 pub use self::quality::{Quality, Reference};
 use self::report::{Provenance, Report};

@@ -3,16 +3,18 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use photoncard_driver::emulator::ChipKind;
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{CardAddress, CardSet};
 
 #[derive(Args)]
 pub(crate) struct CardOptions {
-    /// Cards to render on: emulated:CHIPS, emulated-micro:CHIPS, serial:PATH@BAUD, tcp:HOST:PORT or unix:PATH; may be
-    /// repeated [default: emulated chips, one per core]
-    #[arg(long = "card", value_name = "CARD")]
+    #[arg(
+        long = "card",
+        value_name = "CARD",
+        help = format!("Where to render: {}; may be repeated [default: a chip a core]", CardAddress::forms())
+    )]
     cards: Vec<CardAddress>,
     /// Share of the tiles, above 0 and at most 1, that two cards render and that are compared bit for bit; of three cards
     /// the outvoted one is given up, and others render its tiles
@@ -37,7 +39,7 @@ pub(crate) struct CardOptions {
 impl CardOptions {
     /// Settings of these options.
     pub(super) fn settings(&self) -> CardSet {
-        let emulated = || vec![CardAddress::emulated(ChipKind::Reference)];
+        let emulated = || vec![CardAddress::emulated(EmulatedKind::Reference)];
         CardSet {
             addresses: if self.cards.is_empty() { emulated() } else { self.cards.clone() },
             faults: self.faults,

@@ -3,19 +3,19 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use photoncard_driver::choice::Choice;
 
-/// Parser of the names of a [`Choice`].
-pub(crate) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
+/// Parser of a choice's names.
+pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(T::ALL.iter().copied().map(possible_value))
         .try_map(|name: String| T::of_name(&name))
 }
 
 /// Parser of `on` and `off`.
-pub(crate) fn switch() -> impl TypedValueParser<Value = bool> {
+pub(super) fn switch() -> impl TypedValueParser<Value = bool> {
     PossibleValuesParser::new(["on", "off"]).map(|name: String| name == "on")
 }
 
 /// A value with its line of help.
-pub(crate) fn possible_value<T: Choice>(value: T) -> PossibleValue {
+pub(super) fn possible_value<T: Choice>(value: T) -> PossibleValue {
     let possible = PossibleValue::new(value.name());
     if value.about().is_empty() { possible } else { possible.help(value.about()) }
 }

@@ -4,7 +4,7 @@
 const MAX_THREADS: usize = 1024;
 
 /// Parses a number of threads.
-pub(crate) fn threads(text: &str) -> Result<usize, String> {
+pub(super) fn threads(text: &str) -> Result<usize, String> {
     let count = text.parse().ok().filter(|count| (1..=MAX_THREADS).contains(count));
     count
         .ok_or_else(|| format!("use 1 to {MAX_THREADS} threads, or leave the option out for a thread a core"))

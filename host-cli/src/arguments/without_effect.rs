@@ -3,7 +3,6 @@
 use photoncard_driver::choice::Choice;
 use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::Scene;
-use photoncard_driver::scheduler::GatherOrder;
 
 use super::render::RenderOptions;
 
@@ -53,9 +52,9 @@ impl RenderOptions {
             ),
             (self.photons.caustic_neighbors.is_some() && !has_map, "--caustic-neighbors", without_map),
             (
-                self.cards.faults.is_some() && order == GatherOrder::Hilbert,
+                self.cards.faults.is_some() && order.is_of_whole_frame(),
                 "--faults",
-                "with --order hilbert, which sends nothing over links".to_owned(),
+                format!("with --order {name}, which sends nothing over links"),
             ),
         ];
         let said = cases.into_iter().filter(|(is_idle, ..)| *is_idle);
