@@ -53,8 +53,9 @@ impl Scene {
     /// not emit was not loaded, as a notice says. The material's name may itself contain dots.
     /// [`Scene::check_light`] checks that the scene still has a light once all assignments are applied.
     ///
-    /// # Errors If the text is not of this form, no material has the name, a material lacks the property, or a value
-    /// would be out of range; the scene stays as it was.
+    /// # Errors
+    /// If the text is not of this form, no material has the name, a material lacks the property, or a value would be out
+    /// of range; the scene stays as it was.
     pub fn apply(&mut self, assignment: &str) -> Result<(), SceneError> {
         let fault = |reason: String, remedy| SceneError::Setting {
             assignment: assignment.to_owned(),
