@@ -12,7 +12,7 @@
 //! | [`address`] | 128-byte line | addresses of card memory |
 //! | [`layout`] | record | little-endian photons, nodes, triangles, materials, emitters |
 //! | [`image`] | section | positions of a scene's records in the card image |
-//! | [`budget`] | | capacities of the two kinds of chip |
+//! | [`budget`] | | capacities of a chip, and bounds for every kind |
 //!
 //! Protocol, from bottom to top:
 //!

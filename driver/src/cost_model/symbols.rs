@@ -122,11 +122,6 @@ impl Symbols {
         (self.photons / photons_per_line).ceil() * self.line_bytes
     }
 
-    /// `P R_FG N_FG S_B`: bytes on chip for the partially evaluated reflection functions of all gathers of a tile.
-    pub fn tile_reflection_bytes(&self) -> f64 {
-        self.tile_pixels * self.gathering_share() * self.gather_rays * self.reflection_bytes
-    }
-
     /// All symbols with their values, in the table's order.
     pub fn rows(&self) -> impl Iterator<Item = (&'static Symbol, f64)> + '_ {
         SYMBOLS.iter().map(|symbol| (symbol, (symbol.get)(self)))
@@ -333,13 +328,6 @@ mod tests {
             assert!(error(wrong).contains("cannot be"), "{wrong}");
         }
         assert_eq!(symbols, Symbols::NOMINAL);
-    }
-
-    #[test]
-    fn the_reflections_of_a_tile_take_the_dissertations_bytes() {
-        let all = Symbols { interpolated_share: 0.0, ..Symbols::NOMINAL };
-        assert_eq!(all.tile_reflection_bytes(), 332_800.0);
-        assert!((Symbols::NOMINAL.tile_reflection_bytes() - 133_120.0).abs() < 1e-6);
     }
 
     #[test]

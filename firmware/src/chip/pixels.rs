@@ -129,7 +129,7 @@ impl<K: ChipKind> Chip<K> {
             let share = 1.0 / frame.samples as f32;
             let (rays, is_last) = position.next_rays(of_bin);
             for ray in rays {
-                // A tile has at most TILE_PIXELS pixels, which 16 bits tell apart.
+                // A block has at most `Budget::tile_pixels` pixels, whose indices fit in 16 bits.
                 let end = final_gather::cast(context, &point, index as u16, share, ray)?;
                 let Some(end) = end else { continue };
                 add_light(sums.view_mut(), frame, index as u16, Component::Direct, end.direct);

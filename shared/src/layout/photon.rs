@@ -123,12 +123,6 @@ impl Photon {
         (flags & 3) as u8
     }
 
-    /// The flags with the splitting axis cleared, as in a leaf.
-    #[inline(always)]
-    pub fn flags_without_axis(flags: u16) -> u16 {
-        flags & !3
-    }
-
     /// The photon's content: the record's last eight bytes, power, direction and flags.
     #[inline(always)]
     pub fn content(bytes: &[u8; Self::BYTES]) -> [u8; PHOTON_CONTENT_BYTES] {
