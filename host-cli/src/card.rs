@@ -53,7 +53,7 @@ fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     ]
 }
 
-/// What the firmware's buffers take of a chip, which the host knows of the chips that it emulates.
+/// On-chip memory of the firmware's buffers, which the host knows for emulated chips.
 fn sram_rows(kind: EmulatedKind, sram_bytes: usize) -> [String; 5] {
     let techniques = kind.techniques();
     [

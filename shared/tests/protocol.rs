@@ -1,4 +1,4 @@
-//! What crosses the wire: frames come back whole or not at all, opcodes stay what they are.
+//! Wire formats: frames come back whole or not at all, opcodes stay what they are.
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::checksum::checksum;

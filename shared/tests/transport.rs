@@ -18,7 +18,7 @@ impl Random {
     }
 }
 
-/// What a line does to a million bytes.
+/// Faults of a line per million bytes.
 #[derive(Clone, Copy, Debug)]
 struct Faults {
     flips: u64,
@@ -195,7 +195,7 @@ proptest! {
         repeats in 0_u64..1000,
     ) {
         let [host, card] = converse(12, Faults { flips, drops, repeats }, seed);
-        // What is damaged or lost is repeated, and little else.
+        // Damaged and lost frames are repeated, and few others.
         prop_assert!(host.repeated + card.repeated <= 8 * (1 + host.damaged + card.damaged + host.probes));
     }
 

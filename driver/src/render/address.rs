@@ -16,7 +16,7 @@ pub enum CardAddress {
     Emulated {
         /// Their kind.
         kind: EmulatedKind,
-        /// How many.
+        /// Number of chips.
         chips: usize,
     },
     /// Card at the other end of a link.

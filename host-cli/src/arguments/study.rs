@@ -12,7 +12,7 @@ use super::threads::threads;
 
 #[derive(Args)]
 pub(crate) struct StudyArguments {
-    /// What to study
+    /// Study to run
     #[arg(value_name = "NAME", value_parser = Selection::parser())]
     pub(crate) name: Selection,
     /// The folder for reports and finished points; it is made if it is missing

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Why a card could not do a command, and a number that says where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
-    /// What is wrong.
+    /// The fault.
     pub code: FaultCode,
     /// Where: a line, a record, a value; see the code.
     pub detail: u32,
