@@ -89,7 +89,7 @@ fn only_the_same_picture_is_gone_on_with() {
     };
     refused(&["--seed", "7", "--neighbors", "50"], &["seed was 0 and is 7", "neighbors was 100 and is 50"]);
     refused(&["--radiance", "precomputed"], &["radiance was", "precomputed"]);
-    refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene was"]);
+    refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene-checksum was"]);
     refused(&["--order", "hilbert"], &["--resume with --order hilbert is not possible"]);
     assert!(room.read("a.exr.partial") == kept);
     // This render has kept no tiles, and has none to resume from.
