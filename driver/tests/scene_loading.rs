@@ -257,6 +257,7 @@ fn a_primitive_without_a_material_has_that_of_gltf() {
         metallic: 1.0,
         roughness: 1.0,
         dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
         transmission: None,
     };
     assert_eq!(material, &Material::new("default", white_metal));

@@ -26,7 +26,7 @@ fn plain() -> (Vec3, f32, f32, Vec3, Option<Transmission>) {
 }
 
 fn parts(material: &Material) -> (Vec3, f32, f32, Vec3, Option<Transmission>) {
-    let Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } =
+    let Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission, .. } =
         material.reflection
     else {
         panic!("{material:?}")
@@ -45,6 +45,22 @@ fn a_material_is_metallic_roughness_unless_it_says_otherwise() {
     assert_eq!(rough.emission, Vec3::new(4.0, 2.0, 1.0));
     let lambertian = load_changed(|_| {}).unwrap().materials[0].clone();
     assert_eq!(lambertian.reflection, Material::lambertian("", BASE).reflection);
+}
+
+#[test]
+fn the_reflectance_at_grazing_incidence_is_the_specular_factor() {
+    let grazing = |extensions: Value| {
+        let material = material(|material| {
+            material["extensions"].as_object_mut().unwrap().extend(extensions.as_object().unwrap().clone());
+        });
+        let Reflection::MetallicRoughness { grazing, .. } = material.reflection else {
+            panic!("{material:?}")
+        };
+        grazing
+    };
+    assert_eq!(grazing(json!({})), 1.0);
+    assert_eq!(grazing(json!({"KHR_materials_ior": {"ior": 1.1}})), 1.0);
+    assert_eq!(grazing(json!({"KHR_materials_specular": {"specularFactor": 0.25}})), 0.25);
 }
 
 #[test]

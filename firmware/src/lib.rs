@@ -29,7 +29,8 @@
 //! # Light paths
 //!
 //! Every path is counted once. In Heckbert's notation, with L a light, E the eye, D a reflection by the Lambertian part
-//! or the Phong lobe of a surface, and S a perfectly specular reflection or a refraction:
+//! or a wide lobe of a surface, and S a perfectly specular reflection, a refraction, or a reflection by a narrow lobe
+//! ([`scene::Reflection::has_narrow_lobe`]) that the eye does not see itself:
 //!
 //! - `L S* E`, visible emission: the eye path, followed through S ([`render::eye`]).
 //! - `L D S* E`, direct light: shadow rays, and final gather rays that meet a light, combined by multiple importance

@@ -122,10 +122,20 @@ fn reflection(reflection: &Reflection) -> Vec<String> {
             }
             parts
         }
-        Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
+        Reflection::MetallicRoughness {
+            base_colour,
+            metallic,
+            roughness,
+            dielectric,
+            grazing,
+            transmission,
+        } => {
             let mut parts = vec![format!(
                 "base colour {base_colour}, metallic {metallic}, roughness {roughness}, dielectric {dielectric}"
             )];
+            if *grazing < 1.0 {
+                parts.push(format!("grazing {grazing}"));
+            }
             if let Some(transmission) = transmission {
                 let kind = if transmission.is_volume { "into a volume" } else { "through a thin wall" };
                 parts.push(format!(

@@ -59,6 +59,7 @@ fn materials() -> Vec<Material> {
         metallic,
         roughness,
         dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
         transmission,
     };
     let absorption = Vec3::new(0.1, 0.5, 1.0);

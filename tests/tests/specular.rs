@@ -32,6 +32,7 @@ fn mirror(reflectance: f32) -> Material {
         metallic: 1.0,
         roughness: 0.0,
         dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
         transmission: None,
     };
     Material::new("mirror", reflection)
@@ -44,6 +45,7 @@ fn glass(is_volume: bool, absorption: f32) -> Material {
         metallic: 0.0,
         roughness: 0.0,
         dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
         transmission: Some(Transmission { factor: 1.0, ior: 1.5, is_volume, absorption }),
     };
     Material::new("glass", reflection)
@@ -197,6 +199,7 @@ fn specular_things_alone_under_a_sky_show_it() {
         metallic: 0.0,
         roughness: 0.0,
         dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
         transmission: None,
     };
     for (material, expected) in [(mirror(1.0), 1.0), (Material::new("coat", coat), 0.04 + 0.96 * 0.8)] {
@@ -219,13 +222,20 @@ fn specular_things_alone_under_a_sky_show_it() {
 #[test]
 fn where_a_texture_says_that_there_is_no_metal_glass_lets_light_through() {
     let texel = |blue: u8| {
-        let Reflection::MetallicRoughness { base_colour, roughness, dielectric, transmission, .. } =
-            glass(false, 0.0).reflection
+        let Reflection::MetallicRoughness {
+            base_colour, roughness, dielectric, grazing, transmission, ..
+        } = glass(false, 0.0).reflection
         else {
             unreachable!("glass is metallic-roughness")
         };
-        let reflection =
-            Reflection::MetallicRoughness { base_colour, metallic: 1.0, roughness, dielectric, transmission };
+        let reflection = Reflection::MetallicRoughness {
+            base_colour,
+            metallic: 1.0,
+            roughness,
+            dielectric,
+            grazing,
+            transmission,
+        };
         let material = Material { metallic_roughness_texture: Some(0), ..Material::new("pane", reflection) };
         let mut view = camera(Vec3::Z, Vec3::NEG_Z);
         view.vertical_fov = 0.02;

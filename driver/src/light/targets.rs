@@ -41,8 +41,8 @@ const MARGIN: f32 = 1e-3;
 impl Targets {
     /// The targets of a scene.
     pub(super) fn new(scene: &Scene) -> Self {
-        let is_specular = |material: u32| scene.materials[material as usize].is_specular();
-        let triangles = scene.triangles.iter().filter(|triangle| is_specular(triangle.material));
+        let is_specular = scene.specular_materials();
+        let triangles = scene.triangles.iter().filter(|triangle| is_specular[triangle.material as usize]);
         let all: Vec<[Vec3; 3]> = triangles.map(|triangle| triangle.vertices).collect();
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
         while parts.len() < MAX_SPHERES {
@@ -277,6 +277,7 @@ mod tests {
                 metallic: 1.0,
                 roughness: 0.0,
                 dielectric: Vec3::ZERO,
+                grazing: 0.0,
                 transmission: None,
             },
         );

@@ -99,7 +99,7 @@ fn reflectance(material: &Material) -> Reflectance {
         Reflection::Phong { diffuse, specular, exponent } => {
             Reflectance::Phong { diffuse: diffuse.to_array(), specular: specular.to_array(), exponent }
         }
-        Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, .. } => {
+        Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, grazing, .. } => {
             match transmission_of(material) {
                 Some(Transmission { factor, ior, absorption, .. }) => Reflectance::Glass {
                     base: base_colour.to_array(),
@@ -113,6 +113,7 @@ fn reflectance(material: &Material) -> Reflectance {
                 None => Reflectance::MetallicRoughness {
                     base: base_colour.to_array(),
                     dielectric: dielectric.to_array(),
+                    grazing,
                     metallic,
                     roughness,
                 },
@@ -150,6 +151,7 @@ mod tests {
                     metallic: 0.0,
                     roughness: 0.0,
                     dielectric: Vec3::splat(0.04),
+                    grazing: 1.0,
                     transmission,
                 },
             ))

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
-use photoncard_firmware::render::specular_path::{Arrival, Carried, SpecularPath};
+use photoncard_firmware::render::specular_path::{Arrival, Carried, Passes, SpecularPath};
 use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit, read_surface};
 use photoncard_shared::layout::{
     FULL_DISC, Photon, PhotonGrid, Rgbe, encode_direction, encode_normal, power_of_two_above,
@@ -184,13 +184,14 @@ impl Tracer<'_> {
         let random = PathRandom::new(self.seed, path);
         let Some(emission) = emit(scene, memory, self.sources, random)? else { return Ok(()) };
         let mut power = emission.power;
-        let mut path = SpecularPath::new(emission.ray, Carried::Power);
+        let mut path = SpecularPath::new(emission.ray, Carried::Power, Passes::NarrowLobes);
         let mut is_direct = true;
         for bounce in 0..MAX_BOUNCES {
             let random = random.bounce(bounce);
             let Some(hit) = closest_hit(scene, memory, &path.ray)? else { break };
-            let surface = read_surface(scene, memory, &path.ray, &hit)?;
-            let arrival = path.arrive(&surface, random.choice());
+            let mut surface = read_surface(scene, memory, &path.ray, &hit)?;
+            let [u, v] = random.point();
+            let arrival = path.arrive(&mut surface, [random.choice(), u, v]);
             let arrived = std::mem::replace(&mut path.throughput, Vec3::ONE) * power;
             match arrival {
                 Arrival::Lost => break,
@@ -218,7 +219,7 @@ impl Tracer<'_> {
                     }
                     is_direct = false;
                     let ray = Ray::new(surface.offset_origin(), sampled.direction);
-                    path = SpecularPath::new(ray, Carried::Power);
+                    path = SpecularPath::new(ray, Carried::Power, Passes::NarrowLobes);
                 }
             }
         }

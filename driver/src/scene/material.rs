@@ -1,6 +1,7 @@
 //! Materials, and the valid ranges of their values.
 
 use glam::Vec3;
+use photoncard_firmware::scene::NARROW_ALPHA;
 use photoncard_shared::layout::MAX_PHONG_EXPONENT;
 
 use super::limits::EMISSION;
@@ -60,6 +61,8 @@ pub enum Reflection {
         /// F0 of the dielectric part: `((ior - 1) / (ior + 1))^2` times the colour (the product at most 1) and the
         /// factor of `KHR_materials_specular`.
         dielectric: Vec3,
+        /// F90 of the dielectric part, 0 to 1: the factor of `KHR_materials_specular`.
+        grazing: f32,
         /// Transmission; `None` for opaque surfaces.
         transmission: Option<Transmission>,
     },
@@ -153,14 +156,26 @@ impl Material {
         self.emission.max_element() > 0.0
     }
 
-    /// Returns whether the material reflects or transmits perfectly specularly: mirrors, smooth coats, glass.
-    pub fn is_specular(&self) -> bool {
+    /// Returns whether the material focuses light: it reflects or transmits perfectly specularly (mirrors, smooth coats, glass), or
+    /// by a narrow lobe. `texel` is the minimum roughness of its texture, 1 without one.
+    pub(super) fn is_specular(&self, texel: f32) -> bool {
         match self.reflection {
             Reflection::Phong { .. } => false,
-            Reflection::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
+            Reflection::MetallicRoughness {
+                base_colour,
+                metallic,
+                roughness,
+                dielectric,
+                grazing,
+                transmission,
+            } => {
                 let transmits = transmission.is_some_and(|transmission| transmission.factor > 0.0);
-                let reflects = dielectric.max_element() > 0.0 || metallic * base_colour.max_element() > 0.0;
-                roughness == 0.0 && reflects || transmits && self.may_be_dielectric(metallic)
+                let reflects = dielectric.max_element() > 0.0
+                    || grazing > 0.0
+                    || metallic * base_colour.max_element() > 0.0;
+                let roughness = roughness * texel;
+                roughness * roughness < NARROW_ALPHA && reflects
+                    || transmits && self.may_be_dielectric(metallic)
             }
         }
     }
@@ -198,8 +213,15 @@ impl Reflection {
     fn check(&self) -> Result<(), OutOfRange> {
         match *self {
             Self::Phong { diffuse, specular, exponent } => check_phong(diffuse, specular, exponent),
-            Self::MetallicRoughness { base_colour, metallic, roughness, dielectric, transmission } => {
-                check_metallic_roughness(base_colour, metallic, roughness, dielectric)?;
+            Self::MetallicRoughness {
+                base_colour,
+                metallic,
+                roughness,
+                dielectric,
+                grazing,
+                transmission,
+            } => {
+                check_metallic_roughness(base_colour, metallic, roughness, dielectric, grazing)?;
                 transmission.map_or(Ok(()), |transmission| transmission.check())
             }
         }
@@ -233,6 +255,7 @@ fn check_metallic_roughness(
     metallic: f32,
     roughness: f32,
     dielectric: Vec3,
+    grazing: f32,
 ) -> Result<(), OutOfRange> {
     if !every(base_colour, is_share) {
         let reason = format!("the base colour is {base_colour}");
@@ -243,6 +266,10 @@ fn check_metallic_roughness(
     }
     if !is_share(roughness) {
         return fault(Property::Roughness, format!("the roughness is {roughness}"), "roughness is 0 to 1");
+    }
+    if !is_share(grazing) {
+        let reason = format!("the reflectance at grazing incidence is {grazing}");
+        return fault(Property::Dielectric, reason, "the specular factor is 0 to 1");
     }
     if !every(dielectric, is_share) {
         let reason = format!("the reflectance at normal incidence is {dielectric}");

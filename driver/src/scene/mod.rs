@@ -89,12 +89,23 @@ impl Scene {
             || self.triangles.iter().any(is_light)
     }
 
-    /// Returns whether any triangle reflects or transmits perfectly specularly.
+    /// Returns whether any triangle focuses light: [`Self::specular_materials`].
     pub fn is_specular(&self) -> bool {
-        let is_specular = |triangle: &Triangle| {
-            self.materials.get(triangle.material as usize).is_some_and(Material::is_specular)
-        };
-        self.triangles.iter().any(is_specular)
+        let is_specular = self.specular_materials();
+        self.triangles.iter().any(|triangle| is_specular.get(triangle.material as usize) == Some(&true))
+    }
+
+    /// For each material, whether it focuses light: it reflects or transmits perfectly specularly, or by a narrow lobe.
+    pub fn specular_materials(&self) -> Vec<bool> {
+        self.materials.iter().map(|material| material.is_specular(self.minimum_roughness(material))).collect()
+    }
+
+    /// Minimum of a material's roughness texture, 0 to 1; 1 without one.
+    fn minimum_roughness(&self, material: &Material) -> f32 {
+        let texture = material.metallic_roughness_texture.and_then(|index| self.textures.get(index as usize));
+        let image = texture.and_then(|texture| self.images.get(texture.image as usize));
+        let minimum = image.and_then(|image| image.texels.iter().map(|[_, roughness, ..]| *roughness).min());
+        f32::from(minimum.unwrap_or(u8::MAX)) / 255.0
     }
 
     /// Checks that the scene has a light, once settings were applied and an environment was added.

@@ -186,6 +186,7 @@ mod tests {
         metallic: 1.0,
         roughness: 0.5,
         dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
         transmission: None,
     };
 

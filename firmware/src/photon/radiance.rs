@@ -155,7 +155,7 @@ impl<'a> Sums<'a> {
     fn add(&mut self, photon: &Candidate) {
         self.power.add_rgbe(photon.power());
         if !self.reflection.is_lambertian() {
-            let factor = self.reflection.lobe_factor(&self.decoded, photon.direction());
+            let factor = PartialReflection::lobe_factor(&self.decoded, photon.direction());
             self.lobe.add(Vec3::from_array(photon.power().decode()) * factor);
         }
     }

@@ -10,7 +10,7 @@ use super::search::search;
 use super::{Context, GatherPoint};
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, reflected_radiance};
-use crate::scene::PartialReflection;
+use crate::scene::{PartialReflection, Reflector};
 
 /// Radiance of reflected caustics at a point, in the image's radiance units.
 ///
@@ -24,7 +24,9 @@ pub fn reflected<M: MemoryPort>(
     let frame = context.frame;
     let Some(CausticGather { neighbors, max_distance }) = frame.caustics else { return Ok(Vec3::ZERO) };
     let photons = context.scene.header.section(SectionKind::CausticLeaves).records;
-    if photons == 0 || point.surface.reflection.is_black() {
+    // A narrow lobe's gather rays follow light to its source.
+    let reflection = point.surface.reflection.without_narrow_lobe();
+    if photons == 0 || reflection.is_black() {
         return Ok(Vec3::ZERO);
     }
     context.memory.enter(Stage::Caustic);
@@ -36,8 +38,11 @@ pub fn reflected<M: MemoryPort>(
     let unit = header.caustic_power_unit / header.radiance_unit;
     // Reflection is by the shading normal; photons carry the geometric one.
     let surface = &point.surface;
-    let reflection =
-        PartialReflection::encode(&surface.reflector(), Vec3::splat(unit), point.pattern.dither(0))
-            .among(encode_normal(surface.geometric_normal.to_array()));
+    let reflection = PartialReflection::encode(
+        &Reflector { reflection, ..surface.reflector() },
+        Vec3::splat(unit),
+        point.pattern.dither(0),
+    )
+    .among(encode_normal(surface.geometric_normal.to_array()));
     Ok(reflected_radiance(&nearest, position, &reflection))
 }

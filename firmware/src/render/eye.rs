@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_shared::message::Fault;
 
-use super::specular_path::{Carried, PathEnd, SpecularPath};
+use super::specular_path::{Carried, Passes, PathEnd, SpecularPath};
 use super::{Context, PixelSample};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
@@ -33,6 +33,7 @@ pub struct View {
 
 /// End of an eye path.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "a chip has no heap, and one sight at a time")]
 pub enum Sight {
     /// A surface.
     Surface(View),
@@ -66,7 +67,7 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
         0 => pattern.point(pattern.index_in_all(0, sample, samples), samples)[0],
         _ => pattern.choice(sample, bounce),
     };
-    let mut path = SpecularPath::new(ray, Carried::Radiance);
+    let mut path = SpecularPath::new(ray, Carried::Radiance, Passes::Specular);
     let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
         return background(context, &path);
     };

@@ -5,14 +5,14 @@
 use glam::Vec3;
 use photoncard_shared::message::{Fault, Radiance};
 
-use super::specular_path::{Carried, PathEnd, SpecularPath};
+use super::specular_path::{Carried, Passes, PathEnd, SpecularPath};
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, HilbertCode};
 use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
 use crate::scene::light::environment_radiance;
-use crate::scene::{PartialReflection, Ray, closest_hit, read_surface};
+use crate::scene::{PartialReflection, Ray, Reflector, closest_hit, read_surface};
 
 /// Contribution of one final gather ray.
 #[derive(Clone, Copy, Debug)]
@@ -44,14 +44,14 @@ pub fn cast<M: MemoryPort>(
     };
     let ray = Ray::new(point.surface.offset_origin(), sampled.direction);
     context.counters.gather_rays += 1;
-    let mut path = SpecularPath::new(ray, Carried::Radiance);
+    let mut path = SpecularPath::new(ray, Carried::Radiance, Passes::NarrowLobes);
     // The division by the number of rays is done here: sums stay within the fixed-point range.
     let weight = sampled.weight * (share / point.rays as f32);
     let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
         return escaped(context, point, &path, &sampled, weight);
     };
     let mut met = read_surface(context.scene, context.memory, &ray, &hit)?;
-    if !met.specular.is_none() {
+    if path.may_pass(&met) {
         let random = |bounce| point.pattern.choice(index, bounce);
         match path.follow(context, &mut met, &mut hit, &random)? {
             PathEnd::Surface => {}
@@ -60,13 +60,13 @@ pub fn cast<M: MemoryPort>(
         }
     }
     met.normal = met.geometric_normal;
-    let weight = weight * path.throughput;
     let emitted = if path.bounces == 0 {
-        direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density)?
+        weight * direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density)?
     } else {
-        met.emission * beyond_specular(context)
+        beyond_specular(context, point, &sampled, weight) * met.emission
     };
-    let unit = 1.0 / context.scene.header.radiance_unit;
+    let direct = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit);
+    let weight = weight * path.throughput;
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
         position: HilbertCode::new(&header.photon_grid, met.position.to_array()),
@@ -78,7 +78,7 @@ pub fn cast<M: MemoryPort>(
         target,
         cell: sampled.cell,
     });
-    Ok(Some(GatherRayEnd { cell: sampled.cell, direct: emitted * weight * unit, request }))
+    Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request }))
 }
 
 /// The environment's light where a gather ray leaves the scene; `None` without an environment.
@@ -94,18 +94,33 @@ fn escaped<M: MemoryPort>(
         return Ok(None);
     }
     let emitted = if path.bounces == 0 {
-        direct::escaped(context, point, path.ray.direction, sampled.density)?
+        weight * direct::escaped(context, point, path.ray.direction, sampled.density)?
     } else {
-        environment_radiance(context.scene, context.memory, path.ray.direction)? * beyond_specular(context)
+        let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
+        beyond_specular(context, point, sampled, weight) * radiance
     };
-    let direct = emitted * weight * path.throughput * (1.0 / context.scene.header.radiance_unit);
+    let direct = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit);
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
 }
 
-/// Weight of emission at the end of a gather ray that passed perfectly specular surfaces: 0 with a caustic map, which brings it, and 1
-/// without. No shadow ray brings it.
-fn beyond_specular<M>(context: &Context<M>) -> f32 {
-    if context.frame.caustics.is_none() { 1.0 } else { 0.0 }
+/// Weight of emission at the end of a gather ray that passed specular surfaces or narrow lobes: `weight` without a caustic map, and
+/// with one, which brings that light to all other reflection, the narrow lobe's part of it. No shadow ray brings it.
+fn beyond_specular<M>(
+    context: &Context<M>,
+    point: &GatherPoint,
+    sampled: &GatherDirection,
+    weight: Vec3,
+) -> Vec3 {
+    if context.frame.caustics.is_none() {
+        return weight;
+    }
+    let reflector = point.reflector();
+    let lobe = Reflector { reflection: reflector.reflection.narrow_lobe(), ..reflector };
+    if lobe.reflection.is_black() {
+        return Vec3::ZERO;
+    }
+    let [part, whole] = [lobe, reflector].map(|reflector| reflector.evaluate(sampled.direction));
+    weight * Vec3::select(whole.cmpgt(Vec3::ZERO), part / whole, Vec3::ZERO)
 }
 
 /// Executes a gather. Returns its radiance, in the image's radiance units.

@@ -1,8 +1,9 @@
-//! Paths through perfectly specular surfaces: mirrors, smooth coats, smooth glass.
+//! Paths through specular surfaces: mirrors, smooth coats, smooth glass, and for gather rays and photons narrow lobes
+//! ([`crate::scene::Reflection::has_narrow_lobe`]).
 //!
-//! At such a surface a path takes one continuation at random, in proportion to its share of the light: reflection, transmission, or an
-//! end at the surface for the rest of its reflection. The samples of a pixel cover all of them. A path is black after
-//! [`SPECULAR_BOUNCES`].
+//! At such a surface a path takes one continuation at random, in proportion to its share of the light: reflection, transmission, a
+//! direction of the narrow lobe, or an end at the surface for the rest of its reflection. The samples of a pixel cover all of them. A
+//! path is black after [`SPECULAR_BOUNCES`].
 //!
 //! Absorption follows the Beer-Lambert law, with the coefficient of the glass entered last; nested glass is not tracked.
 
@@ -12,7 +13,7 @@ use photoncard_shared::message::Fault;
 
 use super::Context;
 use crate::memory::MemoryPort;
-use crate::scene::{Hit, Ray, Surface, closest_hit, read_surface};
+use crate::scene::{Hit, Ray, Reflection, Reflector, Surface, closest_hit, read_surface};
 use crate::vector::{max, max_component};
 
 /// Minimum ratio of the probabilities to end at a surface and to go on, if its reflection is not black.
@@ -31,6 +32,8 @@ pub struct SpecularPath {
     pub first_distance: f32,
     /// Transported quantity.
     carried: Carried,
+    /// Surfaces that the path passes.
+    passes: Passes,
     /// Absorption coefficient around the ray, 1/m.
     absorption: Vec3,
 }
@@ -43,6 +46,15 @@ pub enum Carried {
     Radiance,
     /// Power: the path is a photon's.
     Power,
+}
+
+/// Surfaces that a path passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Passes {
+    /// Perfectly specular surfaces: for the eye, whose gather points have rays for their lobes.
+    Specular,
+    /// Narrow lobes besides: for gather rays and photons ([`crate::scene::Reflection::has_narrow_lobe`]).
+    NarrowLobes,
 }
 
 /// The continuation of a path at a surface.
@@ -70,33 +82,65 @@ pub enum PathEnd {
 impl SpecularPath {
     /// A path along a ray.
     #[inline(always)]
-    pub fn new(ray: Ray, carried: Carried) -> Self {
-        Self { ray, throughput: Vec3::ONE, bounces: 0, first_distance: 0.0, carried, absorption: Vec3::ZERO }
+    pub fn new(ray: Ray, carried: Carried, passes: Passes) -> Self {
+        Self {
+            ray,
+            throughput: Vec3::ONE,
+            bounces: 0,
+            first_distance: 0.0,
+            carried,
+            passes,
+            absorption: Vec3::ZERO,
+        }
     }
 
-    /// Arrives at a surface; `random` in [0, 1) chooses the continuation.
+    /// Returns whether the path may go on at a surface.
     #[inline(always)]
-    pub fn arrive(&mut self, surface: &Surface, random: f32) -> Arrival {
-        if surface.specular.is_none() && self.absorption == Vec3::ZERO {
+    pub fn may_pass(&self, surface: &Surface) -> bool {
+        !surface.specular.is_none() || self.passes_lobe(surface)
+    }
+
+    #[inline(always)]
+    fn passes_lobe(&self, surface: &Surface) -> bool {
+        self.passes == Passes::NarrowLobes && surface.reflection.has_narrow_lobe()
+    }
+
+    /// Arrives at a surface. Of `random`, in [0, 1), the first chooses the continuation, the others a direction. Where the path
+    /// ends the surface loses a lobe that the path passes.
+    #[inline(always)]
+    pub fn arrive(&mut self, surface: &mut Surface, random: [f32; 3]) -> Arrival {
+        if !self.may_pass(surface) && self.absorption == Vec3::ZERO {
             return Arrival::Ends;
         }
         self.arrive_at_specular(surface, random)
     }
 
     #[inline(never)]
-    fn arrive_at_specular(&mut self, surface: &Surface, random: f32) -> Arrival {
+    fn arrive_at_specular(&mut self, surface: &mut Surface, [random, u, v]: [f32; 3]) -> Arrival {
         let inside = surface.absorption != Vec3::ZERO;
         let absorption = if inside { surface.absorption } else { self.absorption };
         self.throughput *= Vec3::from_array((absorption * -surface.distance).to_array().map(libm::expf));
         if self.bounces == 0 {
             self.first_distance = surface.distance;
         }
-        let specular = &surface.specular;
-        if specular.is_none() {
+        if !self.may_pass(surface) {
             return Arrival::Ends;
         }
+        let lobe = Reflector {
+            reflection: if self.passes_lobe(surface) {
+                surface.reflection.narrow_lobe()
+            } else {
+                Reflection::BLACK
+            },
+            ..surface.reflector()
+        };
+        if !lobe.reflection.is_black() {
+            surface.reflection = surface.reflection.without_narrow_lobe();
+        }
+        let specular = &surface.specular;
         let [reflected, transmitted] = [specular.reflected, specular.transmitted].map(max_component);
-        let goes = reflected + transmitted;
+        let [_, glossy] = lobe.albedos();
+        let goes = reflected + transmitted + glossy;
         let stays = max_component(surface.reflector().albedo());
         // A minimum probability bounds the weight of ending here: no fireflies. At an emitter it is one half.
         let stays = if stays > 0.0 { max(stays, goes * MIN_STAY) } else { 0.0 };
@@ -111,7 +155,15 @@ impl SpecularPath {
             return Arrival::Lost;
         }
         self.bounces += 1;
-        if chosen < stays + reflected || transmitted <= 0.0 {
+        let past_specular = chosen - (stays + reflected + transmitted);
+        if glossy > 0.0 && (past_specular >= 0.0 || reflected + transmitted <= 0.0) {
+            let direction = lobe.sample_lobe([u, v]);
+            if !surface.is_above(direction) {
+                return Arrival::Lost;
+            }
+            self.throughput *= lobe.lobe_weight(direction) * (all / glossy);
+            self.ray = Ray::new(surface.offset_origin(), direction);
+        } else if chosen < stays + reflected || transmitted <= 0.0 {
             self.throughput *= specular.reflected * (all / reflected);
             self.ray = Ray::new(surface.offset_origin(), surface.mirrored());
         } else {
@@ -123,8 +175,8 @@ impl SpecularPath {
         Arrival::GoesOn
     }
 
-    /// Follows the path from a perfectly specular surface to its end, which replaces `surface` and `hit`. `random` gives a number
-    /// in [0, 1) for each bounce.
+    /// Follows the path from a surface that it may pass to its end, which replaces `surface` and `hit`. `random` gives a number in
+    /// [0, 1) for each choice: [`SPECULAR_BOUNCES`] choices of continuations, then two of a direction for each.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -137,7 +189,10 @@ impl SpecularPath {
         random: &dyn Fn(u32) -> f32,
     ) -> Result<PathEnd, Fault> {
         loop {
-            match self.arrive(surface, random(self.bounces)) {
+            let [first, second] = [1, 2].map(|k| k * (SPECULAR_BOUNCES + 1) + self.bounces);
+            let direction =
+                if self.passes_lobe(surface) { [random(first), random(second)] } else { [0.0; 2] };
+            match self.arrive(surface, [random(self.bounces), direction[0], direction[1]]) {
                 Arrival::Ends => return Ok(PathEnd::Surface),
                 Arrival::Lost => {
                     context.counters.lost_paths += 1;

@@ -14,7 +14,7 @@ mod triangle;
 
 pub use bvh::{AnyHit, ClosestHit, closest_hit, is_occluded};
 pub use reflection::{
-    DecodedLobe, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,
+    DecodedLobe, NARROW_ALPHA, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,
 };
 pub use seen::Seen;
 pub use specular::Specular;

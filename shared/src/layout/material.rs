@@ -55,6 +55,8 @@ pub enum Reflectance {
         base: [f32; 3],
         /// F0 of the dielectric: its reflectance at normal incidence.
         dielectric: [f32; 3],
+        /// F90 of the dielectric: its reflectance at grazing incidence, 0 to 1.
+        grazing: f32,
         /// Metalness, 0 to 1.
         metallic: f32,
         /// Roughness, 0 (perfectly specular) to 1.
@@ -99,6 +101,7 @@ impl Material {
                 METALLIC_ROUGHNESS => Reflectance::MetallicRoughness {
                     base: first,
                     dielectric: second,
+                    grazing: read_f32(bytes, 60),
                     metallic: a,
                     roughness: b,
                 },
@@ -125,7 +128,8 @@ impl Material {
         let mut bytes = [0; Self::BYTES];
         let (kind, first, second, a, b) = match self.reflectance {
             Reflectance::Phong { diffuse, specular, exponent } => (0, diffuse, specular, exponent, 0.0),
-            Reflectance::MetallicRoughness { base, dielectric, metallic, roughness } => {
+            Reflectance::MetallicRoughness { base, dielectric, grazing, metallic, roughness } => {
+                write_f32(&mut bytes, 60, grazing);
                 (METALLIC_ROUGHNESS, base, dielectric, metallic, roughness)
             }
             Reflectance::Glass { base, absorption, transmission, ior, .. } => {
@@ -163,6 +167,7 @@ mod tests {
             Reflectance::MetallicRoughness {
                 base: first,
                 dielectric: second,
+                grazing: 0.9,
                 metallic: 0.25,
                 roughness: 0.75,
             },

@@ -162,6 +162,7 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
         metallic: pbr.metallic_factor.0,
         roughness: pbr.roughness_factor.0,
         dielectric: (normal_reflectance * colour).min(Vec3::ONE) * factor,
+        grazing: factor,
         // A reflectance of 1 leaves no light to transmit.
         transmission: if ior == 0.0 { None } else { transmission(extensions, ior) },
     }

@@ -48,6 +48,8 @@ pub(in crate::scene) struct Scattering {
 #[inline(always)]
 pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &View) -> Scattering {
     let View { outgoing, normals, is_front } = *view;
+    let [normal, _] = normals;
+    let cosine = normal.dot(outgoing);
     let mut scattering =
         Scattering { reflection: Reflection::BLACK, specular: Specular::NONE, absorption: Vec3::ZERO };
     match material.reflectance {
@@ -55,18 +57,18 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
             let diffuse = Vec3::from(diffuse) * texel.colour;
             scattering.reflection = Reflection::phong(diffuse, specular.into(), exponent);
         }
-        Reflectance::MetallicRoughness { base, dielectric, metallic, roughness } => {
+        Reflectance::MetallicRoughness { base, dielectric, grazing, metallic, roughness } => {
             let surface = MetallicRoughness {
                 base: Vec3::from(base) * texel.colour,
                 dielectric: dielectric.into(),
+                grazing,
                 metallic: metallic * texel.metallic,
                 roughness: roughness * texel.roughness,
             };
             if roughness > 0.0 {
-                scattering.reflection = surface.reflection();
+                scattering.reflection = surface.reflection(cosine);
             } else {
-                let [normal, _] = normals;
-                (scattering.reflection, scattering.specular) = surface.smooth(normal.dot(outgoing));
+                (scattering.reflection, scattering.specular) = surface.smooth(cosine);
             }
         }
         Reflectance::Glass { base, absorption, transmission, ior, specular, metallic, roughness } => {
@@ -76,8 +78,9 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
             let (diffuse, specular) = glass.at(outgoing, normals, !is_front);
             // Metal is opaque.
             let [metallic, roughness] = [metallic * texel.metallic, roughness * texel.roughness];
-            let metal = MetallicRoughness { base, dielectric: Vec3::ZERO, metallic: 1.0, roughness };
-            scattering.reflection = metal.lobe_beside(diffuse * (1.0 - metallic), metallic);
+            let metal =
+                MetallicRoughness { base, dielectric: Vec3::ZERO, grazing: 0.0, metallic: 1.0, roughness };
+            scattering.reflection = metal.lobe_beside(diffuse * (1.0 - metallic), metallic, cosine);
             scattering.specular = specular.dimmed(1.0 - metallic);
             if !(is_front || is_thin) {
                 scattering.absorption = absorption;
@@ -97,21 +100,29 @@ pub fn keeps_photons(
     material: &Material,
 ) -> Result<bool, Fault> {
     let [_, texture, _] = material.textures;
-    // A texture of metalness is read where it decides.
-    if texture == NO_TEXTURE || reflects(material, 0.0) == reflects(material, 1.0) {
-        return Ok(reflects(material, 1.0));
+    let any = |roughness: [f32; 2], metallic: [f32; 2]| {
+        let of = |roughness| metallic.into_iter().any(|metallic| keeps(material, roughness, metallic));
+        roughness.into_iter().any(of)
+    };
+    if texture == NO_TEXTURE {
+        return Ok(keeps(material, 1.0, 1.0));
+    }
+    // The texture is read where it decides.
+    if !any([0.0, 1.0], [0.0, 1.0]) {
+        return Ok(false);
     }
     let texture = read_texture(scene, memory, u32::from(texture))?;
-    let [_, _, metallic, _] = channel_ranges(scene, memory, &texture)?;
-    Ok(metallic.into_iter().any(|metallic| reflects(material, metallic)))
+    let [_, roughness, metallic, _] = channel_ranges(scene, memory, &texture)?;
+    Ok(any(roughness, metallic))
 }
 
-/// `true` if a texel of a given metalness, white otherwise, has a reflection that is not black at normal incidence, where smooth coats
-/// reflect least and the base most. Over a range of metalness, one of the ends reflects if any value does.
-fn reflects(material: &Material, metallic: f32) -> bool {
-    let texel = Texel { metallic, ..Texel::WHITE };
+/// `true` if photons are stored at a texel of a roughness and a metalness, white besides: its reflection without a narrow lobe
+/// is not black. The light comes along the normal, where smooth coats reflect the least and leave the most. Of ranges of
+/// roughness and metalness, one end keeps photons if any value does.
+fn keeps(material: &Material, roughness: f32, metallic: f32) -> bool {
+    let texel = Texel { roughness, metallic, ..Texel::WHITE };
     let view = View { outgoing: Vec3::Y, normals: [Vec3::Y; 2], is_front: true };
-    !scattering(material, &texel, &view).reflection.is_black()
+    !scattering(material, &texel, &view).reflection.without_narrow_lobe().is_black()
 }
 
 #[cfg(test)]
@@ -132,7 +143,13 @@ mod tests {
             let [first, second] = [[a; 3], [b; 3]];
             [
                 Reflectance::Phong { diffuse: first, specular: second, exponent: 100.0 * c },
-                Reflectance::MetallicRoughness { base: first, dielectric: second, metallic: c, roughness: d },
+                Reflectance::MetallicRoughness {
+                    base: first,
+                    dielectric: second,
+                    grazing: b,
+                    metallic: c,
+                    roughness: d,
+                },
                 Reflectance::Glass {
                     base: first,
                     absorption: [0.0; 3],
@@ -173,10 +190,12 @@ mod tests {
                 .flat_map(sights)
                 .collect();
             for material in materials() {
-                let some = sights
-                    .iter()
-                    .any(|(texel, view)| !scattering(&material, texel, view).reflection.is_black());
-                let ends = metallic.into_iter().any(|metallic| reflects(&material, metallic));
+                let some = sights.iter().any(|(texel, view)| {
+                    !scattering(&material, texel, view).reflection.without_narrow_lobe().is_black()
+                });
+                let ends = metallic.into_iter().any(|metallic| {
+                    [0.0, 1.0].into_iter().any(|roughness| keeps(&material, roughness, metallic))
+                });
                 assert_eq!(ends, some, "{material:?} of a metalness in {metallic:?}");
             }
         }

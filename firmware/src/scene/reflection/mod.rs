@@ -11,6 +11,9 @@
 //! A reflection is a Lambertian part and one lobe. Callers name neither the lobe's model nor its parameters: a model is a file
 //! here, as `phong` is, and a case in [`Reflection`], [`Reflector`] and [`PartialReflection`].
 
+mod ggx;
+mod ggx_albedo;
+mod lobe;
 mod material;
 mod metallic_roughness;
 mod phong;
@@ -25,14 +28,18 @@ pub use reflector::{ReflectedDirection, Reflector};
 use glam::Vec3;
 
 use crate::vector::max_component;
+use lobe::Lobe;
 use phong::PhongLobe;
+
+/// `a = roughness^2` below which a GGX lobe is narrow: half of its light is within 28 degrees, an eighth of the hemisphere.
+pub const NARROW_ALPHA: f32 = 0.25;
 
 /// The parameters of a reflection function `f`: a Lambertian part and a lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflection {
     /// Lambertian albedo, 0 to 1.
     diffuse: Vec3,
-    lobe: PhongLobe,
+    lobe: Lobe,
 }
 
 impl Reflection {
@@ -41,13 +48,13 @@ impl Reflection {
 
     /// A Lambertian reflection of an albedo, 0 to 1.
     pub const fn lambertian(albedo: Vec3) -> Self {
-        Self { diffuse: albedo, lobe: PhongLobe::BLACK }
+        Self { diffuse: albedo, lobe: Lobe::BLACK }
     }
 
     /// A Lambertian reflection with one Phong lobe: `f = diffuse / pi + specular (n + 2) / (2 pi) max(0, cos alpha)^n`, alpha
     /// measured from the mirror direction, `n` the exponent.
     pub const fn phong(diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
-        Self { diffuse, lobe: PhongLobe { albedo: specular, exponent } }
+        Self { diffuse, lobe: Lobe::Phong(PhongLobe { albedo: specular, exponent }) }
     }
 
     /// `true` if `f = 0` everywhere.
@@ -68,6 +75,29 @@ impl Reflection {
         !self.lobe.reflects()
     }
 
+    /// `true` with a lobe that photons cannot resolve: an estimate by the k nearest would be a few of them, or none. Such a
+    /// lobe is followed by a ray, as perfectly specular surfaces are, but where the eye sees it.
+    #[inline(always)]
+    pub fn has_narrow_lobe(&self) -> bool {
+        match &self.lobe {
+            Lobe::Phong(_) => false,
+            Lobe::Ggx(lobe) => lobe.alpha() < NARROW_ALPHA && lobe.reflects(),
+        }
+    }
+
+    /// The reflection that photons estimate: without a narrow lobe.
+    #[inline(always)]
+    #[must_use]
+    pub fn without_narrow_lobe(self) -> Self {
+        if self.has_narrow_lobe() { Self::lambertian(self.diffuse) } else { self }
+    }
+
+    /// The narrow lobe alone; black without one.
+    #[must_use]
+    pub fn narrow_lobe(self) -> Self {
+        if self.has_narrow_lobe() { self.without_lambertian() } else { Self::BLACK }
+    }
+
     /// The lobe alone.
     #[inline(always)]
     #[must_use]
@@ -80,7 +110,7 @@ impl Reflection {
     #[must_use]
     pub fn dimmed(mut self, throughput: Vec3) -> Self {
         self.diffuse *= throughput;
-        self.lobe.albedo *= throughput;
+        self.lobe = self.lobe.dimmed(throughput);
         self
     }
 }

@@ -4,21 +4,21 @@ use glam::Vec3;
 use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode_normal};
 
 use super::Reflector;
+use super::ggx::{GgxLobe, Kernel};
+use super::lobe::Lobe;
 use super::phong::{self, PhongLobe};
 use crate::fixed_point::ColourSum;
-use crate::vector::{from_upper_half, mirror, unit, upper_half};
+use crate::vector::{from_upper_half, max, mirror, unit, upper_half};
 
 /// A reflection function, evaluated but for what depends on a photon: 13 bytes, the dissertation's `S_B` (section 7.4).
 ///
 /// Stage one, [`Self::encode`], is done once a query: albedos, weight, units and the lobe's factor become two colours.
-/// Stage two is done once a photon: [`Self::lobe_factor`]. Colours are rounded to a shared exponent, directions to
-/// two bytes, the lobe's exponent to eight bits of mantissa: in every order alike.
+/// Stage two is done once a photon: [`Self::lobe_factor`]. Colours are rounded to a shared exponent, in every order alike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PartialReflection {
     diffuse: Rgbe,
     lobe: Rgbe,
-    mirror: [u8; 2],
-    exponent: [u8; 2],
+    shape: Shape,
     normal: u8,
 }
 
@@ -30,16 +30,21 @@ impl PartialReflection {
     // One copy for final gathers and caustics: code is memory on a chip.
     #[inline(never)]
     pub fn encode(reflector: &Reflector, weight: Vec3, dither: u32) -> Self {
-        let Reflector { normal, outgoing, reflection } = reflector;
-        let mirror = mirror(*outgoing, *normal);
-        let exponent = upper_half(reflection.lobe.exponent).to_be_bytes();
-        let factor = PhongLobe::factor(decode_exponent(exponent));
+        let (shape, colour, factor) = match &reflector.reflection.lobe {
+            Lobe::Phong(lobe) => {
+                let shape = Shape::phong(reflector, lobe);
+                (shape, lobe.albedo, PhongLobe::factor(shape.exponent()))
+            }
+            Lobe::Ggx(lobe) => {
+                let shape = Shape::ggx(reflector, lobe);
+                (shape, lobe.colour(), shape.kernel().bound())
+            }
+        };
         Self {
             diffuse: Rgbe::encode((reflector.lambertian() * weight).to_array(), dither),
-            lobe: Rgbe::encode((reflection.lobe.albedo * weight * factor).to_array(), dither),
-            mirror: encode_direction(mirror.to_array()),
-            exponent,
-            normal: encode_normal(normal.to_array()),
+            lobe: Rgbe::encode((colour * weight * factor).to_array(), dither),
+            shape,
+            normal: encode_normal(reflector.normal.to_array()),
         }
     }
 
@@ -53,7 +58,7 @@ impl PartialReflection {
     pub fn diffuser(normal: u8) -> Self {
         // 1 is a power of two: nothing is rounded.
         let diffuse = Rgbe::encode([1.0; 3], 0);
-        Self { diffuse, lobe: Rgbe::default(), mirror: [0; 2], exponent: [0; 2], normal }
+        Self { diffuse, lobe: Rgbe::default(), shape: Shape([0; 4]), normal }
     }
 
     /// `true` without a lobe: irradiance is enough, whatever the photons' directions.
@@ -71,16 +76,20 @@ impl PartialReflection {
     /// Decodes the lobe, once for all photons of a gather.
     #[inline(always)]
     pub fn decode_lobe(&self) -> DecodedLobe {
-        let mirror =
-            if self.is_lambertian() { Vec3::ZERO } else { unit(decode_direction(self.mirror).into()) };
-        DecodedLobe { mirror }
+        if self.is_lambertian() {
+            return DecodedLobe::Phong { mirror: Vec3::ZERO, exponent: 0.0 };
+        }
+        self.shape.decode()
     }
 
     /// The factor of a photon's power in the lobe's sum, for the code of the direction that it came from.
     #[inline(always)]
-    pub fn lobe_factor(&self, lobe: &DecodedLobe, direction: [u8; 2]) -> Vec3 {
-        let cosine = lobe.mirror.dot(unit(decode_direction(direction).into()));
-        Vec3::splat(phong::power(cosine, decode_exponent(self.exponent)))
+    pub fn lobe_factor(lobe: &DecodedLobe, direction: [u8; 2]) -> Vec3 {
+        let incident = unit(decode_direction(direction).into());
+        Vec3::splat(match lobe {
+            DecodedLobe::Phong { mirror, exponent } => phong::power(mirror.dot(incident), *exponent),
+            DecodedLobe::Ggx(kernel) => kernel.factor(incident),
+        })
     }
 
     /// The reflected power of photons, in the units of `weight`, from the sum of their powers and the lobe's sum.
@@ -98,12 +107,84 @@ impl PartialReflection {
 
 /// The lobe of a [`PartialReflection`], decoded.
 #[derive(Clone, Copy, Debug)]
-pub struct DecodedLobe {
-    /// Unit mirror direction; zero without a lobe.
-    mirror: Vec3,
+pub enum DecodedLobe {
+    /// A Phong lobe: its unit mirror direction, zero without a lobe, and its exponent.
+    Phong {
+        /// The mirror direction.
+        mirror: Vec3,
+        /// The exponent.
+        exponent: f32,
+    },
+    /// A GGX lobe.
+    Ggx(Kernel),
 }
 
-#[inline(always)]
-fn decode_exponent(bytes: [u8; 2]) -> f32 {
-    from_upper_half(u16::from_be_bytes(bytes))
+/// The parameters of a lobe but its colour, of a model that the first bit of the third byte tells.
+///
+/// - Phong, bit 0: two bytes of the mirror direction, a bfloat16 of the exponent, which is not negative.
+/// - GGX, bit 1: 12 bits of the outgoing direction, 12 of the normal, 7 of the roughness. Narrow lobes are not gathered
+///   ([`super::Reflection::has_narrow_lobe`]): a lobe here is ten times as wide as the steps of the directions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Shape([u8; 4]);
+
+/// The bit of a GGX lobe in the third byte.
+const GGX: u8 = 0x80;
+/// Steps of the roughness.
+const ROUGHNESS_STEPS: f32 = 127.0;
+
+impl Shape {
+    #[inline(always)]
+    fn phong(reflector: &Reflector, lobe: &PhongLobe) -> Self {
+        let [u, v] = encode_direction(mirror(reflector.outgoing, reflector.normal).to_array());
+        let [upper, lower] = upper_half(max(lobe.exponent, 0.0)).to_be_bytes();
+        Self([u, v, upper, lower])
+    }
+
+    fn ggx(reflector: &Reflector, lobe: &GgxLobe) -> Self {
+        let [a, b] = encode_direction(reflector.outgoing.to_array()).map(coarse);
+        let [c, d] = encode_direction(reflector.normal.to_array()).map(coarse);
+        // The third byte has the roughness; two bits of each of the others' have the fourth direction coordinate.
+        let roughness = (lobe.roughness() * ROUGHNESS_STEPS + 0.5) as u8;
+        Self([a | d >> 4 << 6, b | (d >> 2 & 3) << 6, GGX | roughness, c | (d & 3) << 6])
+    }
+
+    #[inline(always)]
+    fn exponent(self) -> f32 {
+        let [_, _, upper, lower] = self.0;
+        from_upper_half(u16::from_be_bytes([upper, lower]))
+    }
+
+    fn kernel(self) -> Kernel {
+        let [first, second, third, fourth] = self.0;
+        let low = |byte: u8| byte & 0x3f;
+        let last = first >> 6 << 4 | second >> 6 << 2 | fourth >> 6;
+        let direction = |u, v| unit(decode_direction([fine(u), fine(v)]).into());
+        let roughness = f32::from(third & !GGX) / ROUGHNESS_STEPS;
+        Kernel::new(direction(low(fourth), last), direction(low(first), low(second)), roughness)
+    }
+
+    #[inline(always)]
+    fn decode(self) -> DecodedLobe {
+        let [u, v, third, _] = self.0;
+        if third & GGX == 0 {
+            let mirror = unit(decode_direction([u, v]).into());
+            return DecodedLobe::Phong { mirror, exponent: self.exponent() };
+        }
+        DecodedLobe::Ggx(self.kernel())
+    }
+}
+
+/// Steps of a direction's coordinate in its own byte, and in six bits.
+const STEPS: [u32; 2] = [254, 62];
+
+/// A coordinate of a direction's code in six bits.
+fn coarse(byte: u8) -> u8 {
+    let [fine, coarse] = STEPS;
+    ((u32::from(byte).min(fine) * coarse + fine / 2) / fine) as u8
+}
+
+/// The coordinate in a byte of one in six bits.
+fn fine(bits: u8) -> u8 {
+    let [fine, coarse] = STEPS;
+    ((u32::from(bits).min(coarse) * fine + coarse / 2) / coarse) as u8
 }

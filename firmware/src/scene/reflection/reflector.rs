@@ -10,6 +10,9 @@ use core::f32::consts::{FRAC_1_PI, PI};
 use glam::Vec3;
 
 use super::Reflection;
+use super::ggx::Geometry;
+use super::lobe::Lobe;
+use super::phong::PhongLobe;
 use crate::vector::{from_frame, max, max_component, mirror};
 
 /// A direction that is reflected to, and its weight.
@@ -39,7 +42,11 @@ impl Reflector {
         if self.reflection.is_lambertian() {
             return self.lambertian();
         }
-        self.lambertian() + self.reflection.lobe.evaluate(self.lobe_power(incident))
+        self.lambertian()
+            + match &self.reflection.lobe {
+                Lobe::Phong(lobe) => lobe.evaluate(self.phong_power(lobe, incident)),
+                Lobe::Ggx(lobe) => lobe.evaluate(&self.geometry(incident)),
+            }
     }
 
     /// The Lambertian part of `f`, 1/sr.
@@ -57,13 +64,13 @@ impl Reflector {
     /// The albedo, 0 to 1.
     #[inline(always)]
     pub fn albedo(&self) -> Vec3 {
-        self.reflection.diffuse + self.reflection.lobe.albedo
+        self.reflection.diffuse + self.reflection.lobe.albedo()
     }
 
     /// The greatest channels of the Lambertian albedo and of the lobe's.
     #[inline(always)]
     pub fn albedos(&self) -> [f32; 2] {
-        [max_component(self.reflection.diffuse), max_component(self.reflection.lobe.albedo)]
+        [max_component(self.reflection.diffuse), max_component(self.reflection.lobe.albedo())]
     }
 
     /// The Lambertian part's share of [`Self::albedos`], 1 without a lobe.
@@ -80,72 +87,106 @@ impl Reflector {
         if lobe > 0.0 { lobe / (diffuse + lobe) } else { 0.0 }
     }
 
-    /// The lobe's sharpness: the exponent `n` of the lobe `cos^n alpha` that is as wide.
+    /// The lobe's sharpness: the exponent `n` of the lobe `cos^n alpha` that is as wide; `1 / (2 a^2)` of a GGX lobe (Walter et
+    /// al. 2007).
     #[inline(always)]
     pub fn lobe_sharpness(&self) -> f32 {
-        self.reflection.lobe.exponent
+        match &self.reflection.lobe {
+            Lobe::Phong(lobe) => lobe.exponent,
+            Lobe::Ggx(lobe) => 0.5 / (lobe.alpha() * lobe.alpha()),
+        }
     }
 
     /// The direction of the lobe's own sampling at a point of the unit square.
     #[inline(always)]
     pub fn sample_lobe(&self, point: [f32; 2]) -> Vec3 {
-        self.reflection.lobe.direction(mirror(self.outgoing, self.normal), point)
+        match &self.reflection.lobe {
+            Lobe::Phong(lobe) => lobe.direction(mirror(self.outgoing, self.normal), point),
+            Lobe::Ggx(lobe) => lobe.direction(self.normal, self.outgoing, point),
+        }
     }
 
-    /// The lobe's `f / p` over its albedo, without unit, at a direction of [`Self::sample_lobe`].
+    /// The lobe's `f cos(theta) / p`, without unit, at a direction of [`Self::sample_lobe`]; zero below the surface.
+    pub fn lobe_weight(&self, direction: Vec3) -> Vec3 {
+        let cosine = max(self.normal.dot(direction), 0.0);
+        self.reflection.lobe.albedo() * (self.lobe_gain(direction) * cosine)
+    }
+
+    /// The lobe's `f / p` over its albedo, without unit, at a direction of [`Self::sample_lobe`] above the surface.
     #[inline(always)]
-    pub fn lobe_gain(&self, _direction: Vec3) -> f32 {
-        self.reflection.lobe.gain()
+    pub fn lobe_gain(&self, direction: Vec3) -> f32 {
+        match &self.reflection.lobe {
+            Lobe::Phong(lobe) => lobe.gain(),
+            Lobe::Ggx(lobe) => lobe.gain(&self.geometry(direction)),
+        }
     }
 
     /// The probability density of [`Self::sample_lobe`], 1/sr; 0 without a lobe.
     #[inline(always)]
     pub fn lobe_density(&self, direction: Vec3) -> f32 {
-        self.reflection.lobe.density(self.lobe_power_or_zero(direction))
+        match &self.reflection.lobe {
+            Lobe::Phong(lobe) => lobe.density(self.phong_power_or_zero(lobe, direction)),
+            Lobe::Ggx(lobe) => lobe.density(&self.geometry(direction)),
+        }
     }
 
     /// `f` and [`Self::lobe_density`], both 1/sr, of a sampled direction: cheaper together.
     #[inline(always)]
     pub fn sampled(&self, direction: Vec3) -> (Vec3, f32) {
-        let Reflection { lobe, .. } = &self.reflection;
-        let power = self.lobe_power_or_zero(direction);
-        (self.lambertian() + lobe.sampled_value(power), lobe.density(power))
+        match &self.reflection.lobe {
+            Lobe::Phong(lobe) => {
+                let power = self.phong_power_or_zero(lobe, direction);
+                (self.lambertian() + lobe.sampled_value(power), lobe.density(power))
+            }
+            Lobe::Ggx(lobe) => {
+                let geometry = self.geometry(direction);
+                (self.lambertian() + lobe.evaluate(&geometry), lobe.density(&geometry))
+            }
+        }
     }
 
     /// The direction at a point of the unit square; `None` below the surface, where the weight is zero.
     pub fn sample(&self, [u, v]: [f32; 2]) -> Option<ReflectedDirection> {
-        let Self { normal, outgoing, reflection } = *self;
+        let Self { normal, reflection, .. } = *self;
         let diffuse_share = self.diffuse_share();
         if diffuse_share >= 1.0 {
             let direction = cosine_direction(normal, [u, v]);
             return Some(ReflectedDirection { direction, weight: reflection.diffuse });
         }
-        let lobe = reflection.lobe;
-        let mirror = mirror(outgoing, normal);
         let direction = if v < diffuse_share {
             cosine_direction(normal, [u, v / diffuse_share])
         } else {
-            lobe.direction(mirror, [u, (v - diffuse_share) / (1.0 - diffuse_share)])
+            self.sample_lobe([u, (v - diffuse_share) / (1.0 - diffuse_share)])
         };
         let cosine = normal.dot(direction);
         if cosine <= 0.0 {
             return None;
         }
-        let power = lobe.power(mirror, direction);
-        let density =
-            diffuse_share * cosine * FRAC_1_PI + (1.0 - diffuse_share) * lobe.sampled_density(power);
-        let weight = (self.lambertian() + lobe.sampled_value(power)) * (cosine / density);
+        let (value, lobe_density) = match &reflection.lobe {
+            Lobe::Phong(lobe) => {
+                let power = self.phong_power(lobe, direction);
+                (self.lambertian() + lobe.sampled_value(power), lobe.sampled_density(power))
+            }
+            Lobe::Ggx(_) => self.sampled(direction),
+        };
+        let density = diffuse_share * cosine * FRAC_1_PI + (1.0 - diffuse_share) * lobe_density;
+        let weight = value * (cosine / density);
         (density > 0.0).then_some(ReflectedDirection { direction, weight })
     }
 
     #[inline(always)]
-    fn lobe_power(&self, direction: Vec3) -> f32 {
-        self.reflection.lobe.power(mirror(self.outgoing, self.normal), direction)
+    fn geometry(&self, incident: Vec3) -> Geometry {
+        Geometry::new(self.normal, self.outgoing, incident)
     }
 
     #[inline(always)]
-    fn lobe_power_or_zero(&self, direction: Vec3) -> f32 {
-        if self.reflection.is_lambertian() { 0.0 } else { self.lobe_power(direction) }
+    fn phong_power(&self, lobe: &PhongLobe, direction: Vec3) -> f32 {
+        lobe.power(mirror(self.outgoing, self.normal), direction)
+    }
+
+    #[inline(always)]
+    fn phong_power_or_zero(&self, lobe: &PhongLobe, direction: Vec3) -> f32 {
+        if lobe.reflects() { self.phong_power(lobe, direction) } else { 0.0 }
     }
 }
 
