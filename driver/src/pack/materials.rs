@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::{SceneImage, keeps_photons};
 use photoncard_shared::layout::{
-    self, DOUBLE_SIDED, HAS_ATTRIBUTES, NO_TEXTURE, Record, Reflectance, THIN_WALLED,
+    self, DOUBLE_SIDED, HAS_ATTRIBUTES, NARROW_LOBE, NO_TEXTURE, Record, Reflectance, THIN_WALLED,
 };
 
 use crate::light::Lights;
@@ -19,11 +19,10 @@ pub(super) fn records(scene: &Scene, lights: &Lights) -> impl ExactSizeIterator<
         let has_any = triangle.attributes != NO_ATTRIBUTES || lights.of_triangle(index).is_some();
         has_attributes[triangle.material as usize] |= has_any;
     }
-    scene
-        .materials
-        .iter()
-        .zip(has_attributes)
-        .map(|(material, has_attributes)| record(material, has_attributes))
+    scene.materials.iter().zip(has_attributes).map(|(material, has_attributes)| {
+        let attributes = if has_attributes { HAS_ATTRIBUTES } else { 0 };
+        record(material, attributes | lobe_flag(scene, material))
+    })
 }
 
 /// Returns whether any triangle's material stores photons, as the chip decides from the image.
@@ -34,25 +33,27 @@ pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Line
     }
     let mut used = scene.materials.iter().zip(is_used).filter(|(_, is_used)| *is_used);
     used.any(|(material, _)| {
-        let material = layout::Material::read(&record(material, true));
+        let material = layout::Material::read(&record(material, HAS_ATTRIBUTES | lobe_flag(scene, material)));
         // The image was just packed. If it were malformed, tracing photons would report it.
         keeps_photons(&image, &mut memory, &material).unwrap_or(true)
     })
 }
 
-/// Record of a material; `has_attributes` is true if any of its triangles may have attributes. `u16` indexes all textures
-/// of the scene.
-fn record(material: &Material, has_attributes: bool) -> [u8; RECORD_BYTES] {
+/// [`NARROW_LOBE`] if rays follow the material's lobe.
+fn lobe_flag(scene: &Scene, material: &Material) -> u32 {
+    if scene.has_narrow_lobe(material) { NARROW_LOBE } else { 0 }
+}
+
+/// Record of a material; `flags` are those that follow from the scene: [`HAS_ATTRIBUTES`] if any of its triangles may have
+/// attributes, and [`NARROW_LOBE`]. `u16` indexes all textures of the scene.
+fn record(material: &Material, mut flags: u32) -> [u8; RECORD_BYTES] {
     let transmission = transmission_of(material);
-    let mut flags = if material.double_sided { DOUBLE_SIDED } else { 0 };
+    flags |= if material.double_sided { DOUBLE_SIDED } else { 0 };
     if transmission.is_some_and(|transmission| !transmission.is_volume) {
         flags |= THIN_WALLED;
     }
     let texture =
         |index: Option<u32>| index.and_then(|index| u16::try_from(index).ok()).unwrap_or(NO_TEXTURE);
-    if has_attributes {
-        flags |= HAS_ATTRIBUTES;
-    }
     layout::Material {
         reflectance: reflectance(material),
         emission: material.emission.to_array(),
@@ -127,7 +128,7 @@ mod tests {
     use super::*;
 
     fn read(material: &Material) -> layout::Material {
-        layout::Material::read(&record(material, false))
+        layout::Material::read(&record(material, 0))
     }
 
     #[test]

@@ -194,7 +194,7 @@ impl Tracer<'_> {
             let arrival = path.arrive(&mut surface, [random.choice(), u, v]);
             let arrived = std::mem::replace(&mut path.throughput, Vec3::ONE) * power;
             match arrival {
-                Arrival::Lost => break,
+                Arrival::Lost | Arrival::Absorbed => break,
                 Arrival::GoesOn => {
                     let left = arrived * shading_share(&surface, path.ray.direction);
                     match survive(power, left, random.survival()) {

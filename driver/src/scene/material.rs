@@ -173,11 +173,15 @@ impl Material {
                 let reflects = dielectric.max_element() > 0.0
                     || grazing > 0.0
                     || metallic * base_colour.max_element() > 0.0;
-                let roughness = roughness * texel;
-                roughness * roughness < NARROW_ALPHA && reflects
-                    || transmits && self.may_be_dielectric(metallic)
+                is_narrow(roughness * texel) && reflects || transmits && self.may_be_dielectric(metallic)
             }
         }
+    }
+
+    /// Returns whether the material has a lobe that is narrow somewhere. `texel` is the minimum roughness of its texture, 1 without
+    /// one.
+    pub(super) fn has_narrow_lobe(&self, texel: f32) -> bool {
+        matches!(self.reflection, Reflection::MetallicRoughness { roughness, .. } if is_narrow(roughness * texel))
     }
 
     /// Returns whether the material may have dielectric parts: `metallic` is below 1, or a texture varies it.
@@ -207,6 +211,11 @@ impl Material {
         }
         Ok(())
     }
+}
+
+/// Returns whether a GGX lobe of a roughness is narrow.
+fn is_narrow(roughness: f32) -> bool {
+    roughness * roughness < NARROW_ALPHA
 }
 
 impl Reflection {

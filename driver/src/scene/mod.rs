@@ -100,6 +100,11 @@ impl Scene {
         self.materials.iter().map(|material| material.is_specular(self.minimum_roughness(material))).collect()
     }
 
+    /// Returns whether a material has a lobe that is narrow somewhere, and that rays follow.
+    pub(crate) fn has_narrow_lobe(&self, material: &Material) -> bool {
+        material.has_narrow_lobe(self.minimum_roughness(material))
+    }
+
     /// Minimum of a material's roughness texture, 0 to 1; 1 without one.
     fn minimum_roughness(&self, material: &Material) -> f32 {
         let texture = material.metallic_roughness_texture.and_then(|index| self.textures.get(index as usize));

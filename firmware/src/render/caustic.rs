@@ -25,7 +25,10 @@ pub fn reflected<M: MemoryPort>(
     let Some(CausticGather { neighbors, max_distance }) = frame.caustics else { return Ok(Vec3::ZERO) };
     let photons = context.scene.header.section(SectionKind::CausticLeaves).records;
     // A narrow lobe's gather rays follow light to its source.
-    let reflection = point.surface.reflection.without_narrow_lobe();
+    let reflection = match frame.gather_rays {
+        0 => point.surface.reflection,
+        _ => point.surface.reflection.without_narrow_lobe(),
+    };
     if photons == 0 || reflection.is_black() {
         return Ok(Vec3::ZERO);
     }

@@ -20,7 +20,7 @@ use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 use photoncard_shared::message::Fault;
 
-use super::{Context, GatherPoint, PixelSample, Purpose};
+use super::{Context, GatherPoint, PixelSample, Purpose, SHORTER};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::light::{
@@ -28,9 +28,6 @@ use crate::scene::light::{
 };
 use crate::scene::{Ray, Surface, is_occluded};
 use crate::vector::max_component;
-
-/// Length of a shadow ray over the distance of its light: it ends before the emitter's surface, whatever the rounding.
-const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
 
 /// Reflected direct light at a point by shadow rays, weighted, W/(sr m^2).
 ///

@@ -56,7 +56,10 @@ pub fn cast<M: MemoryPort>(
         match path.follow(context, &mut met, &mut hit, &random)? {
             PathEnd::Surface => {}
             PathEnd::Escaped => return escaped(context, point, &path, &sampled, weight),
-            PathEnd::Lost => return Ok(None),
+            PathEnd::Lost => {
+                let direct = collected(context, point, &path, &sampled, weight);
+                return Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }));
+            }
         }
     }
     met.normal = met.geometric_normal;
@@ -65,7 +68,8 @@ pub fn cast<M: MemoryPort>(
     } else {
         beyond_specular(context, point, &sampled, weight) * met.emission
     };
-    let direct = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit);
+    let direct = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit)
+        + collected(context, point, &path, &sampled, weight);
     let weight = weight * path.throughput;
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
@@ -90,8 +94,10 @@ fn escaped<M: MemoryPort>(
     sampled: &GatherDirection,
     weight: Vec3,
 ) -> Result<Option<GatherRayEnd>, Fault> {
+    let collected = collected(context, point, path, sampled, weight);
     if context.scene.header.lights.texture.is_none() {
-        return Ok(None);
+        let end = GatherRayEnd { cell: sampled.cell, direct: collected, request: None };
+        return Ok((collected != Vec3::ZERO).then_some(end));
     }
     let emitted = if path.bounces == 0 {
         weight * direct::escaped(context, point, path.ray.direction, sampled.density)?
@@ -99,8 +105,24 @@ fn escaped<M: MemoryPort>(
         let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
         beyond_specular(context, point, sampled, weight) * radiance
     };
-    let direct = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit);
+    let direct = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit) + collected;
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
+}
+
+/// Light of punctual lights that the path has collected at narrow lobes, weighted, in the image's radiance units.
+fn collected<M>(
+    context: &Context<M>,
+    point: &GatherPoint,
+    path: &SpecularPath,
+    sampled: &GatherDirection,
+    weight: Vec3,
+) -> Vec3 {
+    if path.collected == Vec3::ZERO {
+        return Vec3::ZERO;
+    }
+    beyond_specular(context, point, sampled, weight)
+        * path.collected
+        * (1.0 / context.scene.header.radiance_unit)
 }
 
 /// Weight of emission at the end of a gather ray that passed specular surfaces or narrow lobes: `weight` without a caustic map, and

@@ -16,6 +16,9 @@ use photoncard_shared::message::FrameParameters;
 use crate::gather::GatherRequest;
 use crate::scene::SceneImage;
 
+/// Length of a shadow ray over the distance of its light: it ends before the emitter's surface, whatever the rounding.
+const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
+
 /// Arguments of every pass: scene, memory, frame parameters and counters.
 pub struct Context<'a, M> {
     /// Sections of the card image.

@@ -11,9 +11,10 @@ use glam::Vec3;
 use photoncard_shared::budget::SPECULAR_BOUNCES;
 use photoncard_shared::message::Fault;
 
-use super::Context;
+use super::{Context, SHORTER};
 use crate::memory::MemoryPort;
-use crate::scene::{Hit, Ray, Reflection, Reflector, Surface, closest_hit, read_surface};
+use crate::scene::light::{LightSample, Receiver, sample_light};
+use crate::scene::{Hit, Ray, Reflection, Reflector, Surface, closest_hit, is_occluded, read_surface};
 use crate::vector::{max, max_component};
 
 /// Minimum ratio of the probabilities to end at a surface and to go on, if its reflection is not black.
@@ -26,6 +27,8 @@ pub struct SpecularPath {
     pub ray: Ray,
     /// Throughput between the path's origin and the present ray, without unit.
     pub throughput: Vec3,
+    /// Light of punctual lights that the narrow lobes passed reflect towards the origin, W/(sr m^2): no ray meets such a light.
+    pub collected: Vec3,
     /// Number of specular surfaces passed.
     pub bounces: u32,
     /// Distance of the first specular surface from the origin, metres.
@@ -66,6 +69,8 @@ pub enum Arrival {
     GoesOn,
     /// The path is black: after too many specular surfaces, or at one that absorbs everything.
     Lost,
+    /// The path is black: the sampled direction of a narrow lobe lies below the surface.
+    Absorbed,
 }
 
 /// The end of a path.
@@ -86,6 +91,7 @@ impl SpecularPath {
         Self {
             ray,
             throughput: Vec3::ONE,
+            collected: Vec3::ZERO,
             bounces: 0,
             first_distance: 0.0,
             carried,
@@ -142,6 +148,9 @@ impl SpecularPath {
         let [_, glossy] = lobe.albedos();
         let goes = reflected + transmitted + glossy;
         let stays = max_component(surface.reflector().albedo());
+        if goes <= 0.0 {
+            return if stays > 0.0 { Arrival::Ends } else { Arrival::Lost };
+        }
         // A minimum probability bounds the weight of ending here: no fireflies. At an emitter it is one half.
         let stays = if stays > 0.0 { max(stays, goes * MIN_STAY) } else { 0.0 };
         let stays = if max_component(surface.emission) > 0.0 { max(stays, goes) } else { stays };
@@ -159,7 +168,7 @@ impl SpecularPath {
         if glossy > 0.0 && (past_specular >= 0.0 || reflected + transmitted <= 0.0) {
             let direction = lobe.sample_lobe([u, v]);
             if !surface.is_above(direction) {
-                return Arrival::Lost;
+                return Arrival::Absorbed;
             }
             self.throughput *= lobe.lobe_weight(direction) * (all / glossy);
             self.ray = Ray::new(surface.offset_origin(), direction);
@@ -189,6 +198,10 @@ impl SpecularPath {
         random: &dyn Fn(u32) -> f32,
     ) -> Result<PathEnd, Fault> {
         loop {
+            if self.passes_lobe(surface) {
+                let throughput = self.throughput;
+                self.collected += throughput * punctual_light(context, surface, self.bounces, random)?;
+            }
             let [first, second] = [1, 2].map(|k| k * (SPECULAR_BOUNCES + 1) + self.bounces);
             let direction =
                 if self.passes_lobe(surface) { [random(first), random(second)] } else { [0.0; 2] };
@@ -198,6 +211,7 @@ impl SpecularPath {
                     context.counters.lost_paths += 1;
                     return Ok(PathEnd::Lost);
                 }
+                Arrival::Absorbed => return Ok(PathEnd::Lost),
                 Arrival::GoesOn => context.counters.specular_rays += 1,
             }
             let next = closest_hit(context.scene, context.memory, &self.ray)?;
@@ -206,4 +220,31 @@ impl SpecularPath {
             *surface = read_surface(context.scene, context.memory, &self.ray, hit)?;
         }
     }
+}
+
+/// Light of one sampled light, if it has no extent, that the narrow lobe of a surface reflects, W/(sr m^2). Lights with extent are met
+/// by the path itself.
+#[inline(never)]
+fn punctual_light<M: MemoryPort>(
+    context: &mut Context<M>,
+    surface: &Surface,
+    bounce: u32,
+    random: &dyn Fn(u32) -> f32,
+) -> Result<Vec3, Fault> {
+    let [u, v] = [3, 4].map(|k| random(k * (SPECULAR_BOUNCES + 1) + bounce));
+    let receiver = Receiver::new(surface);
+    let Some(light) = sample_light(context.scene, context.memory, &receiver, [u, v], u.to_bits())? else {
+        return Ok(Vec3::ZERO);
+    };
+    let LightSample { direction, distance, irradiance, density } = light;
+    if density.is_some() || !surface.is_above(direction) || max_component(irradiance) <= 0.0 {
+        return Ok(Vec3::ZERO);
+    }
+    context.counters.shadow_rays += 1;
+    let ray = Ray { origin: receiver.origin, direction, max_distance: distance * SHORTER };
+    if is_occluded(context.scene, context.memory, &ray)? {
+        return Ok(Vec3::ZERO);
+    }
+    let lobe = Reflector { reflection: surface.reflection.narrow_lobe(), ..surface.reflector() };
+    Ok(lobe.evaluate(direction) * irradiance * surface.normal.dot(direction))
 }

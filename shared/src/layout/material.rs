@@ -10,6 +10,9 @@ pub const THIN_WALLED: u32 = 2;
 /// Flag of [`Material::flags`]: some triangles of the material have [`super::Attributes`].
 pub const HAS_ATTRIBUTES: u32 = 4;
 
+/// Flag of [`Material::flags`]: the GGX lobe is narrow somewhere, and is followed by rays instead of being estimated from photons.
+pub const NARROW_LOBE: u32 = 8;
+
 const KIND_SHIFT: u32 = 4;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
@@ -27,7 +30,7 @@ pub struct Material {
     pub reflectance: Reflectance,
     /// Emitted radiance, W/(sr m^2), to be multiplied by the emissive texture.
     pub emission: [f32; 3],
-    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`] and [`HAS_ATTRIBUTES`].
+    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`] and [`NARROW_LOBE`].
     pub flags: u32,
     /// glTF's `alphaCutoff`: triangles with cut-outs are absent where the product of base texture and vertex alpha is
     /// below it.
@@ -117,7 +120,7 @@ impl Material {
                 _ => Reflectance::Phong { diffuse: first, specular: second, exponent: a },
             },
             emission: read_vector(bytes, 32),
-            flags: kind & (DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES),
+            flags: kind & (DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE),
             cutoff: read_f32(bytes, 48),
             textures: [textures[0] as u16, (textures[0] >> 16) as u16, textures[1] as u16],
         }
@@ -181,7 +184,7 @@ mod tests {
                 roughness: 0.4,
             },
         ] {
-            for flags in 0..=DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES {
+            for flags in 0..=DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE {
                 let material = Material {
                     reflectance,
                     emission: [18.0, 14.0, 6.5],

@@ -34,6 +34,8 @@ pub(super) struct GgxLobe {
     pub(super) albedo: Vec3,
     /// Coefficients of `F0` and `F90` in the albedo.
     shares: [f32; 2],
+    /// `true` if rays follow the lobe, and no photon is gathered for it.
+    pub(super) is_followed: bool,
 }
 
 /// The normal and the two directions of `f`, reduced to what the lobe depends on.
@@ -68,7 +70,7 @@ impl GgxLobe {
         let shares = albedo_shares(roughness, cosine);
         let [of_f0, of_f90] = shares;
         let albedo = (f0 * of_f0 + f90 * of_f90).min(Vec3::ONE);
-        Self { f0, f90, alpha: max(roughness * roughness, MIN_ALPHA), albedo, shares }
+        Self { f0, f90, alpha: max(roughness * roughness, MIN_ALPHA), albedo, shares, is_followed: false }
     }
 
     /// The greatest channel of the albedo that the lobe would have with another reflectance, 0 to 1.
@@ -105,6 +107,13 @@ impl GgxLobe {
     pub(super) fn density(&self, geometry: &Geometry) -> f32 {
         let Geometry { outgoing, .. } = *geometry;
         distribution(self.alpha, geometry) / (2.0 * (outgoing + length(self.alpha, outgoing)))
+    }
+
+    /// `f cos / p = F G2 / G1`, without unit, of a direction above the surface.
+    pub(super) fn weight(&self, geometry: &Geometry) -> Vec3 {
+        let Geometry { incident, outgoing, .. } = *geometry;
+        let visible = 2.0 * (outgoing + length(self.alpha, outgoing)) * visibility(self.alpha, geometry);
+        self.fresnel(geometry) * (visible * incident)
     }
 
     /// `f / p` over the albedo, without unit.
@@ -146,7 +155,7 @@ impl GgxLobe {
         mirror(outgoing, half)
     }
 
-    /// Brightness of the reflectance at normal incidence and of the albedo, for tests of blackness.
+    /// `true` if `F0` or `F90` is above 0 in some channel.
     #[inline(always)]
     pub(super) fn reflects(&self) -> bool {
         max_component(self.f0) > 0.0 || max_component(self.f90) > 0.0
@@ -204,12 +213,15 @@ fn distribution(alpha: f32, geometry: &Geometry) -> f32 {
     squared / (PI * denominator * denominator)
 }
 
+/// Minimum of the denominator of `V`: `D V` stays finite.
+const MIN_VISIBILITY_SUM: f32 = 1e-12;
+
 /// `V`.
 #[inline(always)]
 fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
     let Geometry { incident, outgoing, .. } = *geometry;
     let sum = incident * length(alpha, outgoing) + outgoing * length(alpha, incident);
-    0.5 / max(sum, f32::MIN_POSITIVE)
+    0.5 / max(sum, MIN_VISIBILITY_SUM)
 }
 
 /// `L`.

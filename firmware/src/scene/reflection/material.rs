@@ -1,7 +1,7 @@
 //! Materials as reflections: the factors of a record times those of textures and corners, seen from one direction.
 
 use glam::Vec3;
-use photoncard_shared::layout::{Material, NO_TEXTURE, Reflectance, THIN_WALLED};
+use photoncard_shared::layout::{Material, NARROW_LOBE, NO_TEXTURE, Reflectance, THIN_WALLED};
 use photoncard_shared::message::Fault;
 
 use super::Reflection;
@@ -50,6 +50,7 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
     let View { outgoing, normals, is_front } = *view;
     let [normal, _] = normals;
     let cosine = normal.dot(outgoing);
+    let has_narrow_lobe = material.flags & NARROW_LOBE != 0;
     let mut scattering =
         Scattering { reflection: Reflection::BLACK, specular: Specular::NONE, absorption: Vec3::ZERO };
     match material.reflectance {
@@ -64,6 +65,7 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
                 grazing,
                 metallic: metallic * texel.metallic,
                 roughness: roughness * texel.roughness,
+                has_narrow_lobe,
             };
             if roughness > 0.0 {
                 scattering.reflection = surface.reflection(cosine);
@@ -78,8 +80,14 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
             let (diffuse, specular) = glass.at(outgoing, normals, !is_front);
             // Metal is opaque.
             let [metallic, roughness] = [metallic * texel.metallic, roughness * texel.roughness];
-            let metal =
-                MetallicRoughness { base, dielectric: Vec3::ZERO, grazing: 0.0, metallic: 1.0, roughness };
+            let metal = MetallicRoughness {
+                base,
+                dielectric: Vec3::ZERO,
+                grazing: 0.0,
+                metallic: 1.0,
+                roughness,
+                has_narrow_lobe,
+            };
             scattering.reflection = metal.lobe_beside(diffuse * (1.0 - metallic), metallic, cosine);
             scattering.specular = specular.dimmed(1.0 - metallic);
             if !(is_front || is_thin) {
@@ -100,27 +108,20 @@ pub fn keeps_photons(
     material: &Material,
 ) -> Result<bool, Fault> {
     let [_, texture, _] = material.textures;
-    let any = |roughness: [f32; 2], metallic: [f32; 2]| {
-        let of = |roughness| metallic.into_iter().any(|metallic| keeps(material, roughness, metallic));
-        roughness.into_iter().any(of)
-    };
-    if texture == NO_TEXTURE {
-        return Ok(keeps(material, 1.0, 1.0));
-    }
-    // The texture is read where it decides.
-    if !any([0.0, 1.0], [0.0, 1.0]) {
-        return Ok(false);
+    // A texture of metalness is read where it decides.
+    if texture == NO_TEXTURE || keeps(material, 0.0) == keeps(material, 1.0) {
+        return Ok(keeps(material, 1.0));
     }
     let texture = read_texture(scene, memory, u32::from(texture))?;
-    let [_, roughness, metallic, _] = channel_ranges(scene, memory, &texture)?;
-    Ok(any(roughness, metallic))
+    let [_, _, metallic, _] = channel_ranges(scene, memory, &texture)?;
+    Ok(metallic.into_iter().any(|metallic| keeps(material, metallic)))
 }
 
-/// `true` if photons are stored at a texel of a roughness and a metalness, white besides: its reflection without a narrow lobe
-/// is not black. The light comes along the normal, where smooth coats reflect the least and leave the most. Of ranges of
-/// roughness and metalness, one end keeps photons if any value does.
-fn keeps(material: &Material, roughness: f32, metallic: f32) -> bool {
-    let texel = Texel { roughness, metallic, ..Texel::WHITE };
+/// `true` if photons are stored at a texel of a metalness, white besides: its reflection without a narrow lobe is not black. The
+/// light comes along the normal, where smooth coats reflect the least and leave the most. Of a range of metalness, one end keeps
+/// photons if any value does.
+fn keeps(material: &Material, metallic: f32) -> bool {
+    let texel = Texel { metallic, ..Texel::WHITE };
     let view = View { outgoing: Vec3::Y, normals: [Vec3::Y; 2], is_front: true };
     !scattering(material, &texel, &view).reflection.without_narrow_lobe().is_black()
 }
@@ -193,9 +194,7 @@ mod tests {
                 let some = sights.iter().any(|(texel, view)| {
                     !scattering(&material, texel, view).reflection.without_narrow_lobe().is_black()
                 });
-                let ends = metallic.into_iter().any(|metallic| {
-                    [0.0, 1.0].into_iter().any(|roughness| keeps(&material, roughness, metallic))
-                });
+                let ends = metallic.into_iter().any(|metallic| keeps(&material, metallic));
                 assert_eq!(ends, some, "{material:?} of a metalness in {metallic:?}");
             }
         }

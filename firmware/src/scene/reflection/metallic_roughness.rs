@@ -25,13 +25,15 @@ pub(super) struct MetallicRoughness {
     pub(super) grazing: f32,
     pub(super) metallic: f32,
     pub(super) roughness: f32,
+    /// The material's [`NARROW_LOBE`](photoncard_shared::layout::NARROW_LOBE).
+    pub(super) has_narrow_lobe: bool,
 }
 
 impl MetallicRoughness {
     /// The reflection without its perfectly specular part, seen at a cosine to the normal.
     pub(super) fn reflection(&self, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
-        let lobe = GgxLobe::new(f0, f90, self.roughness, cosine);
+        let lobe = self.lobe(f0, f90, cosine);
         let coat = lobe.albedo_of(self.dielectric, self.grazing);
         let diffuse = self.base * ((1.0 - self.metallic) * (1.0 - coat));
         Reflection { diffuse, lobe: Lobe::Ggx(lobe) }
@@ -40,8 +42,14 @@ impl MetallicRoughness {
     /// A share of the lobe, beside a Lambertian part of another albedo.
     pub(super) fn lobe_beside(&self, diffuse: Vec3, share: f32, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
-        let lobe = GgxLobe::new(f0 * share, f90 * share, self.roughness, cosine);
+        let lobe = self.lobe(f0 * share, f90 * share, cosine);
         Reflection { diffuse, lobe: Lobe::Ggx(lobe) }
+    }
+
+    fn lobe(&self, f0: Vec3, f90: Vec3, cosine: f32) -> GgxLobe {
+        let mut lobe = GgxLobe::new(f0, f90, self.roughness, cosine);
+        lobe.is_followed = self.has_narrow_lobe;
+        lobe
     }
 
     /// The Lambertian and the perfectly specular part at roughness 0, seen at a cosine to the normal.
@@ -82,6 +90,7 @@ mod tests {
                 grazing: if dielectric > 0.0 { 1.0 } else { 0.0 },
                 metallic,
                 roughness,
+                has_narrow_lobe: false,
             }
         })
     }
@@ -107,6 +116,7 @@ mod tests {
             grazing: 1.0,
             metallic: 1.0,
             roughness: 0.0,
+            has_narrow_lobe: false,
         };
         let (rest, specular) = gold.smooth(1.0);
         assert!(rest.is_black());
@@ -122,6 +132,7 @@ mod tests {
             grazing: 0.0,
             metallic: 0.0,
             roughness: 0.0,
+            has_narrow_lobe: false,
         };
         assert_eq!(dull.smooth(0.0).1.reflected, Vec3::ZERO);
         assert!(dull.reflection(0.1).is_lambertian());

@@ -9,7 +9,7 @@
 //! | the record of a waiting gather, and its sums over photons | [`PartialReflection`] |
 //!
 //! A reflection is a Lambertian part and one lobe. Callers name neither the lobe's model nor its parameters: a model is a file
-//! here, as `phong` is, and a case in [`Reflection`], [`Reflector`] and [`PartialReflection`].
+//! here, as `phong` and `ggx` are, and a case in `lobe`, [`Reflector`] and [`PartialReflection`].
 
 mod ggx;
 mod ggx_albedo;
@@ -31,7 +31,9 @@ use crate::vector::max_component;
 use lobe::Lobe;
 use phong::PhongLobe;
 
-/// `a = roughness^2` below which a GGX lobe is narrow: half of its light is within 28 degrees, an eighth of the hemisphere.
+/// `a = roughness^2` below which a GGX lobe is narrow: half of its light is within 28 degrees, an eighth of the hemisphere. A material
+/// with a narrow lobe at some texel has [`NARROW_LOBE`](photoncard_shared::layout::NARROW_LOBE), for all texels: photons are stored
+/// for the lobe everywhere on a surface or nowhere.
 pub const NARROW_ALPHA: f32 = 0.25;
 
 /// The parameters of a reflection function `f`: a Lambertian part and a lobe.
@@ -81,7 +83,7 @@ impl Reflection {
     pub fn has_narrow_lobe(&self) -> bool {
         match &self.lobe {
             Lobe::Phong(_) => false,
-            Lobe::Ggx(lobe) => lobe.alpha() < NARROW_ALPHA && lobe.reflects(),
+            Lobe::Ggx(lobe) => lobe.is_followed && lobe.reflects(),
         }
     }
 

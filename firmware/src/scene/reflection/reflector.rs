@@ -108,8 +108,10 @@ impl Reflector {
 
     /// The lobe's `f cos(theta) / p`, without unit, at a direction of [`Self::sample_lobe`]; zero below the surface.
     pub fn lobe_weight(&self, direction: Vec3) -> Vec3 {
-        let cosine = max(self.normal.dot(direction), 0.0);
-        self.reflection.lobe.albedo() * (self.lobe_gain(direction) * cosine)
+        match &self.reflection.lobe {
+            Lobe::Phong(lobe) => lobe.albedo * (lobe.gain() * max(self.normal.dot(direction), 0.0)),
+            Lobe::Ggx(lobe) => lobe.weight(&self.geometry(direction)),
+        }
     }
 
     /// The lobe's `f / p` over its albedo, without unit, at a direction of [`Self::sample_lobe`] above the surface.
