@@ -109,6 +109,7 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     image.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
     image.append(SectionKind::Attributes, corners.records.iter().map(layout::Attributes::to_bytes))?;
     image.append(SectionKind::Materials, materials::records(scene, lights))?;
+    image.append(SectionKind::Layers, materials::layers(scene).into_iter())?;
     image.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
     image.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;
     let index_in_image = |triangle: usize| indices.get(triangle).copied().unwrap_or(0);

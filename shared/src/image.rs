@@ -9,12 +9,14 @@
 //! textures and vertex attributes are empty in an image without them.
 
 use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
-use crate::layout::{Attributes, DistantLight, Emitter, Material, Photon, PhotonGrid, Record, Texture};
+use crate::layout::{
+    Attributes, DistantLight, Emitter, Layers, Material, Photon, PhotonGrid, Record, Texture,
+};
 
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// Version of the formats in this module and in [`crate::layout`].
-pub const LAYOUT_VERSION: u16 = 9;
+pub const LAYOUT_VERSION: u16 = 10;
 /// Lines of the header.
 pub const HEADER_LINES: usize = 2;
 /// Entries of [`SectionKind::LeafAttributes`] in one line.
@@ -36,39 +38,41 @@ pub enum SectionKind {
     Attributes = 3,
     /// [`Material`]s.
     Materials = 4,
+    /// [`Layers`] of materials that have any.
+    Layers = 5,
     /// [`Texture`]s.
-    Textures = 5,
+    Textures = 6,
     /// Lines of texels, see [`Texture`].
-    Texels = 6,
+    Texels = 7,
     /// [`Emitter`]s.
-    Emitters = 7,
+    Emitters = 8,
     /// [`crate::layout::LightNode`]s above the emitters, the root first.
-    LightNodes = 8,
+    LightNodes = 9,
     /// [`DistantLight`]s.
-    DistantLights = 9,
+    DistantLights = 10,
     /// Distribution of the environment's cells: `u32` thresholds of the cumulative distribution function, in units of
     /// 2^-32. First the marginal one of the rows, then for each row the conditional one of its cells; each ends with
     /// 2^32 - 1.
-    EnvironmentCells = 10,
+    EnvironmentCells = 11,
     /// [`Photon`]s, a left-balanced kd-tree: the children of `i` are `2 i + 1` and `2 i + 2`.
-    Photons = 11,
+    Photons = 12,
     /// [`crate::layout::PhotonNode`]s, the root first.
-    PhotonNodes = 12,
+    PhotonNodes = 13,
     /// [`crate::layout::PhotonLeaf`]s.
-    PhotonLeaves = 13,
+    PhotonLeaves = 14,
     /// [`crate::layout::PhotonNode`]s of the caustic map, the root first.
-    CausticNodes = 14,
+    CausticNodes = 15,
     /// [`crate::layout::PhotonLeaf`]s of the caustic map: photons whose bounces, one at least, were all perfectly
     /// specular.
-    CausticLeaves = 15,
+    CausticLeaves = 16,
     /// [`crate::layout::PhotonNode`]s above irradiance points, the root first.
-    IrradianceNodes = 16,
+    IrradianceNodes = 17,
     /// [`crate::layout::PhotonLeaf`]s of [`crate::layout::IrradiancePoint`]s instead of photons' contents.
-    IrradianceLeaves = 17,
+    IrradianceLeaves = 18,
 }
 
 /// Number of sections.
-pub const SECTIONS: usize = 18;
+pub const SECTIONS: usize = 19;
 
 impl SectionKind {
     /// All sections, in order.
@@ -78,6 +82,7 @@ impl SectionKind {
         Self::LeafAttributes,
         Self::Attributes,
         Self::Materials,
+        Self::Layers,
         Self::Textures,
         Self::Texels,
         Self::Emitters,
@@ -99,6 +104,7 @@ impl SectionKind {
             Self::LeafAttributes => LEAF_ATTRIBUTES_PER_LINE,
             Self::Attributes => Attributes::PER_LINE as u32,
             Self::Materials => Material::PER_LINE as u32,
+            Self::Layers => Layers::PER_LINE as u32,
             Self::Textures => Texture::PER_LINE as u32,
             Self::Emitters => Emitter::PER_LINE as u32,
             Self::DistantLights => DistantLight::PER_LINE as u32,
@@ -124,7 +130,7 @@ impl SectionKind {
             Self::Nodes => Structure::Nodes,
             Self::Triangles => Structure::Triangles,
             Self::LeafAttributes | Self::Attributes => Structure::Attributes,
-            Self::Materials => Structure::Materials,
+            Self::Materials | Self::Layers => Structure::Materials,
             Self::Textures | Self::Texels => Structure::Textures,
             Self::Emitters | Self::LightNodes | Self::DistantLights | Self::EnvironmentCells => {
                 Structure::Emitters

@@ -11,6 +11,7 @@
 //! | [`Attributes`] | 64 | 2 |
 //! | [`LeafAttributes`] | 4 | 32 |
 //! | [`Material`] | 64 | 2 |
+//! | [`Layers`] | 128 | 1 |
 //! | [`Texture`] | 40 | 3 |
 //! | texel | 4 | 32 |
 //! | [`Emitter`] | 64 | 2 |
@@ -30,6 +31,7 @@ mod direction;
 mod distant_light;
 mod emitter;
 mod irradiance_point;
+mod layers;
 mod light_node;
 mod material;
 mod photon;
@@ -46,6 +48,7 @@ pub use direction::{decode_direction, decode_normal, encode_direction, encode_no
 pub use distant_light::DistantLight;
 pub use emitter::{Emitter, EmitterKind};
 pub use irradiance_point::IrradiancePoint;
+pub use layers::{LayerTextures, Layers};
 pub use light_node::{LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode};
 pub use material::{
     DOUBLE_SIDED, HAS_ATTRIBUTES, MAX_PHONG_EXPONENT, Material, NARROW_LOBE, NO_TEXTURE, Reflectance,

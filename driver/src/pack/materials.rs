@@ -4,13 +4,19 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::{SceneImage, keeps_photons};
 use photoncard_shared::layout::{
-    self, DOUBLE_SIDED, HAS_ATTRIBUTES, NARROW_LOBE, NO_TEXTURE, Record, Reflectance, THIN_WALLED,
+    self, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTextures, NARROW_LOBE, NO_TEXTURE, Record, Reflectance,
+    THIN_WALLED,
 };
 
 use crate::light::Lights;
-use crate::scene::{Material, NO_ATTRIBUTES, Reflection, Scene, Transmission};
+use crate::scene::{Layers, Material, NO_ATTRIBUTES, NormalMap, Reflection, Scene, Transmission};
 
 const RECORD_BYTES: usize = layout::Material::BYTES;
+
+/// The records of the layers of a scene's materials.
+pub(super) fn layers(scene: &Scene) -> Vec<[u8; layout::Layers::BYTES]> {
+    scene.materials.iter().filter_map(|material| material.layers.as_deref()).map(layers_record).collect()
+}
 
 /// The records of a scene's materials.
 pub(super) fn records(scene: &Scene, lights: &Lights) -> impl ExactSizeIterator<Item = [u8; RECORD_BYTES]> {
@@ -19,9 +25,11 @@ pub(super) fn records(scene: &Scene, lights: &Lights) -> impl ExactSizeIterator<
         let has_any = triangle.attributes != NO_ATTRIBUTES || lights.of_triangle(index).is_some();
         has_attributes[triangle.material as usize] |= has_any;
     }
-    scene.materials.iter().zip(has_attributes).map(|(material, has_attributes)| {
+    let mut layers = 0..;
+    scene.materials.iter().zip(has_attributes).map(move |(material, has_attributes)| {
         let attributes = if has_attributes { HAS_ATTRIBUTES } else { 0 };
-        record(material, attributes | lobe_flag(scene, material))
+        let layers = material.layers.as_ref().and_then(|_| layers.next());
+        record(material, attributes | lobe_flag(scene, material), layers)
     })
 }
 
@@ -33,7 +41,8 @@ pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Line
     }
     let mut used = scene.materials.iter().zip(is_used).filter(|(_, is_used)| *is_used);
     used.any(|(material, _)| {
-        let material = layout::Material::read(&record(material, HAS_ATTRIBUTES | lobe_flag(scene, material)));
+        let material =
+            layout::Material::read(&record(material, HAS_ATTRIBUTES | lobe_flag(scene, material), None));
         // The image was just packed. If it were malformed, tracing photons would report it.
         keeps_photons(&image, &mut memory, &material).unwrap_or(true)
     })
@@ -45,15 +54,13 @@ fn lobe_flag(scene: &Scene, material: &Material) -> u32 {
 }
 
 /// Record of a material; `flags` are those that follow from the scene: [`HAS_ATTRIBUTES`] if any of its triangles may have
-/// attributes, and [`NARROW_LOBE`]. `u16` indexes all textures of the scene.
-fn record(material: &Material, mut flags: u32) -> [u8; RECORD_BYTES] {
+/// attributes, and [`NARROW_LOBE`]; `layers` is the index of its layers. `u16` indexes all textures of the scene.
+fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> [u8; RECORD_BYTES] {
     let transmission = transmission_of(material);
     flags |= if material.double_sided { DOUBLE_SIDED } else { 0 };
     if transmission.is_some_and(|transmission| !transmission.is_volume) {
         flags |= THIN_WALLED;
     }
-    let texture =
-        |index: Option<u32>| index.and_then(|index| u16::try_from(index).ok()).unwrap_or(NO_TEXTURE);
     layout::Material {
         reflectance: reflectance(material),
         emission: material.emission.to_array(),
@@ -64,6 +71,46 @@ fn record(material: &Material, mut flags: u32) -> [u8; RECORD_BYTES] {
             texture(material.metallic_roughness_texture),
             texture(material.emissive_texture),
         ],
+        layers,
+    }
+    .to_bytes()
+}
+
+fn texture(index: Option<u32>) -> u16 {
+    index.and_then(|index| u16::try_from(index).ok()).unwrap_or(NO_TEXTURE)
+}
+
+fn layers_record(layers: &Layers) -> [u8; layout::Layers::BYTES] {
+    let map =
+        |map: Option<NormalMap>| (texture(map.map(|map| map.texture)), map.map_or(1.0, |map| map.scale));
+    let (normal, normal_scale) = map(layers.normal);
+    let coat = layers.coat.as_ref();
+    let (coat_normal, coat_normal_scale) = map(coat.and_then(|coat| coat.normal));
+    let sheen = layers.sheen.as_ref();
+    let diffuse = layers.diffuse_transmission.as_ref();
+    layout::Layers {
+        specular: layers.specular.to_array(),
+        normal_scale,
+        coat: coat.map_or(0.0, |coat| coat.factor),
+        coat_roughness: coat.map_or(0.0, |coat| coat.roughness),
+        coat_normal_scale,
+        sheen: sheen.map_or([0.0; 3], |sheen| sheen.colour.to_array()),
+        sheen_roughness: sheen.map_or(0.0, |sheen| sheen.roughness),
+        diffuse_transmission: diffuse.map_or(0.0, |part| part.factor),
+        diffuse_transmission_colour: diffuse.map_or([1.0; 3], |part| part.colour.to_array()),
+        textures: LayerTextures {
+            normal,
+            specular: texture(layers.specular_texture),
+            specular_colour: texture(layers.specular_colour_texture),
+            coat: texture(coat.and_then(|coat| coat.factor_texture)),
+            coat_roughness: texture(coat.and_then(|coat| coat.roughness_texture)),
+            coat_normal,
+            sheen: texture(sheen.and_then(|sheen| sheen.colour_texture)),
+            sheen_roughness: texture(sheen.and_then(|sheen| sheen.roughness_texture)),
+            transmission: texture(layers.transmission_texture),
+            diffuse_transmission: texture(diffuse.and_then(|part| part.factor_texture)),
+            diffuse_transmission_colour: texture(diffuse.and_then(|part| part.colour_texture)),
+        },
     }
     .to_bytes()
 }
@@ -128,7 +175,7 @@ mod tests {
     use super::*;
 
     fn read(material: &Material) -> layout::Material {
-        layout::Material::read(&record(material, 0))
+        layout::Material::read(&record(material, 0, None))
     }
 
     #[test]

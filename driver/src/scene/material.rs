@@ -4,6 +4,7 @@ use glam::Vec3;
 use photoncard_firmware::scene::NARROW_ALPHA;
 use photoncard_shared::layout::MAX_PHONG_EXPONENT;
 
+use super::layers::Layers;
 use super::limits::EMISSION;
 
 /// Tolerance of the sum of the two albedos above 1: they are often written in three digits.
@@ -34,6 +35,8 @@ pub struct Material {
     /// Emissive texture (sRGB), an index into [`Scene::textures`](super::Scene::textures), which multiplies the
     /// emission.
     pub emissive_texture: Option<u32>,
+    /// Layers beyond the base; `None` for most materials.
+    pub layers: Option<Box<Layers>>,
 }
 
 /// Reflection and transmission model of a surface.
@@ -111,17 +114,21 @@ pub(super) enum Property {
     Transmission,
     Ior,
     Absorption,
+    NormalScale,
+    Coat,
+    Sheen,
+    DiffuseTransmission,
 }
 
-fn every(vector: Vec3, holds: impl Fn(f32) -> bool) -> bool {
+pub(super) fn every(vector: Vec3, holds: impl Fn(f32) -> bool) -> bool {
     vector.to_array().into_iter().all(holds)
 }
 
-fn is_share(value: f32) -> bool {
+pub(super) fn is_share(value: f32) -> bool {
     (0.0..=1.0).contains(&value)
 }
 
-fn fault(property: Property, reason: String, remedy: &'static str) -> Result<(), OutOfRange> {
+pub(super) fn fault(property: Property, reason: String, remedy: &'static str) -> Result<(), OutOfRange> {
     Err(OutOfRange { property, reason, remedy })
 }
 
@@ -138,6 +145,7 @@ impl Material {
             base_texture: None,
             metallic_roughness_texture: None,
             emissive_texture: None,
+            layers: None,
         }
     }
 
@@ -191,12 +199,14 @@ impl Material {
 
     /// Textures in use, as indices into [`Scene::textures`](super::Scene::textures).
     pub fn textures(&self) -> impl Iterator<Item = u32> {
-        [self.base_texture, self.metallic_roughness_texture, self.emissive_texture].into_iter().flatten()
+        let own = [self.base_texture, self.metallic_roughness_texture, self.emissive_texture];
+        own.into_iter().flatten().chain(self.layers.iter().flat_map(|layers| layers.textures()))
     }
 
     /// Checks that every value is finite and within its range, and that no more light is reflected than arrives.
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
         self.reflection.check()?;
+        self.layers.as_ref().map_or(Ok(()), |layers| layers.check())?;
         let emission = self.emission;
         if !every(emission, |value| value == 0.0 || EMISSION.contains(&value)) {
             let remedy = "emission is a radiance of 0, or of 1e-20 to 1e20, in each channel";

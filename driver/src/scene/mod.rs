@@ -6,6 +6,7 @@ mod camera;
 mod checksum;
 mod environment;
 pub mod gltf;
+mod layers;
 mod light;
 mod limits;
 mod map_size;
@@ -20,6 +21,7 @@ use glam::Vec3;
 
 pub use self::camera::Camera;
 pub use self::environment::Environment;
+pub use self::layers::{Coat, DiffuseTransmission, Layers, NormalMap, Sheen};
 pub use self::light::{PunctualKind, PunctualLight};
 pub use self::limits::BRIGHTEST;
 pub use self::map_size::MAX_ENVIRONMENT_TEXELS;

@@ -176,10 +176,10 @@ pub(super) fn surface_of(
     finished(scene, memory, bare, (index, weights, is_front), &material)
 }
 
-/// `true` for a material without textures and vertex attributes.
+/// `true` for a material without textures, vertex attributes and layers.
 #[inline(always)]
 fn is_plain(material: &Material) -> bool {
-    material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0
+    material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0 && material.layers.is_none()
 }
 
 /// The surface with vertex attributes, textures and material applied.

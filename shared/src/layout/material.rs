@@ -14,6 +14,9 @@ pub const HAS_ATTRIBUTES: u32 = 4;
 pub const NARROW_LOBE: u32 = 8;
 
 const KIND_SHIFT: u32 = 4;
+const KIND_BITS: u32 = 2;
+/// Shift of the index of [`super::Layers`], plus 1.
+const LAYERS_SHIFT: u32 = 8;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
 
@@ -38,6 +41,8 @@ pub struct Material {
     /// Indices of the textures of base colour (or diffuse albedo), metallic-roughness (roughness in green, metalness in
     /// blue) and emission; [`NO_TEXTURE`] if absent.
     pub textures: [u16; 3],
+    /// Index of the material's [`super::Layers`], below 2^24 - 1; `None` without.
+    pub layers: Option<u32>,
 }
 
 /// Model of reflection and transmission, with its parameters.
@@ -100,7 +105,7 @@ impl Material {
         let textures = [read_u32(bytes, 52), read_u32(bytes, 56)];
         let share = |shift: u32| (textures[1] >> shift & 0xff) as f32 / 255.0;
         Self {
-            reflectance: match kind >> KIND_SHIFT {
+            reflectance: match kind >> KIND_SHIFT & ((1 << KIND_BITS) - 1) {
                 METALLIC_ROUGHNESS => Reflectance::MetallicRoughness {
                     base: first,
                     dielectric: second,
@@ -123,6 +128,7 @@ impl Material {
             flags: kind & (DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE),
             cutoff: read_f32(bytes, 48),
             textures: [textures[0] as u16, (textures[0] >> 16) as u16, textures[1] as u16],
+            layers: (kind >> LAYERS_SHIFT).checked_sub(1),
         }
     }
 
@@ -144,7 +150,8 @@ impl Material {
         write_f32(&mut bytes, 24, a);
         write_f32(&mut bytes, 28, b);
         write_vector(&mut bytes, 32, self.emission);
-        write_u32(&mut bytes, 44, self.flags | kind << KIND_SHIFT);
+        let layers = self.layers.map_or(0, |index| index + 1);
+        write_u32(&mut bytes, 44, self.flags | kind << KIND_SHIFT | layers << LAYERS_SHIFT);
         write_f32(&mut bytes, 48, self.cutoff);
         let [base, metallic_roughness, emissive] = self.textures.map(u32::from);
         write_u32(&mut bytes, 52, base | metallic_roughness << 16);
@@ -191,6 +198,7 @@ mod tests {
                     flags,
                     cutoff: 0.5,
                     textures: [3, NO_TEXTURE, 70],
+                    layers: flags.checked_sub(7),
                 };
                 assert_eq!(Material::read(&material.to_bytes()), material);
             }

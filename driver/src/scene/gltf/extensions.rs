@@ -1,11 +1,14 @@
 //! glTF extensions that the loader supports.
 
 /// Names of the supported extensions.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 10] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 13] = [
     INSTANCING,
     "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     // Rendered with lighting nevertheless, which a notice reports.

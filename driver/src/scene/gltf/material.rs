@@ -8,6 +8,7 @@ use gltf::json::material::AlphaMode;
 use gltf::json::validation::Checked;
 
 use super::document::Document;
+use super::layers::{self, has_other_layer};
 use super::texture::Textures;
 use crate::error::SceneError;
 use crate::scene::material::{OutOfRange, Property};
@@ -70,6 +71,9 @@ fn load_one(
         ..Material::new(name, reflection)
     };
     add_textures(&mut material, index, source, textures)?;
+    let is_gltf = matches!(material.reflection, Reflection::MetallicRoughness { .. });
+    let base = (unlimited_f0(source), is_gltf);
+    material.layers = layers::load(document, index, source, textures, base)?;
     check_extensions(extensions).and_then(|()| material.check()).map_err(|fault| {
         let item = match fault.property {
             Property::Diffuse | Property::Alpha => "pbrMetallicRoughness.baseColorFactor",
@@ -83,6 +87,10 @@ fn load_one(
             Property::Specular => "extras.photoncard.phong.specular",
             Property::Exponent => "extras.photoncard.phong.exponent",
             Property::Emission => "emissiveFactor",
+            Property::NormalScale => "normalTexture.scale",
+            Property::Coat => "extensions.KHR_materials_clearcoat",
+            Property::Sheen => "extensions.KHR_materials_sheen",
+            Property::DiffuseTransmission => "extensions.KHR_materials_diffuse_transmission",
         };
         SceneError::Material {
             location: document.location(format!("materials[{index}].{item}")),
@@ -150,22 +158,29 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
     let pbr = &source.pbr_metallic_roughness;
     let extensions = source.extensions.as_ref();
     let ior = extensions.and_then(|extensions| extensions.ior.as_ref()).map_or(IOR, |ior| ior.ior.0);
-    // An index of 0 stands for infinity; its reflectance is then 1 (`KHR_materials_ior`).
-    let amplitude = (f64::from(ior) - 1.0) / (f64::from(ior) + 1.0);
-    let normal_reflectance = (amplitude * amplitude) as f32;
     let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
-    let (factor, colour) = specular.map_or((1.0, Vec3::ONE), |specular| {
-        (specular.specular_factor.0, Vec3::from(specular.specular_color_factor.0))
-    });
+    let factor = specular.map_or(1.0, |specular| specular.specular_factor.0);
     Reflection::MetallicRoughness {
         base_colour,
         metallic: pbr.metallic_factor.0,
         roughness: pbr.roughness_factor.0,
-        dielectric: (normal_reflectance * colour).min(Vec3::ONE) * factor,
+        dielectric: unlimited_f0(source).min(Vec3::ONE) * factor,
         grazing: factor,
         // A reflectance of 1 leaves no light to transmit.
         transmission: if ior == 0.0 { None } else { transmission(extensions, ior) },
     }
+}
+
+/// F0 of the dielectric, before its limit of 1 and without `specularFactor`: that of the index of refraction times
+/// `specularColorFactor`.
+fn unlimited_f0(source: &json::Material) -> Vec3 {
+    let extensions = source.extensions.as_ref();
+    let ior = extensions.and_then(|extensions| extensions.ior.as_ref()).map_or(IOR, |ior| ior.ior.0);
+    // An index of 0 stands for infinity; its reflectance is then 1 (`KHR_materials_ior`).
+    let amplitude = (f64::from(ior) - 1.0) / (f64::from(ior) + 1.0);
+    let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
+    let colour = specular.map_or(Vec3::ONE, |specular| specular.specular_color_factor.0.into());
+    colour * (amplitude * amplitude) as f32
 }
 
 /// Emitted radiance: `emissiveFactor` times `emissiveStrength`, W/(sr m^2).
@@ -186,6 +201,7 @@ fn is_lambertian(material: &json::Material) -> bool {
     specular.is_some_and(|specular| specular.specular_factor.0 == 0.0)
         && material.pbr_metallic_roughness.metallic_factor.0 == 0.0
         && !is_transmissive(material)
+        && !has_other_layer(material)
 }
 
 /// Returns whether the material transmits light.

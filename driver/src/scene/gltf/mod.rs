@@ -12,6 +12,7 @@ mod extensions;
 mod files;
 mod image;
 mod instances;
+mod layers;
 mod light;
 mod limits;
 mod material;

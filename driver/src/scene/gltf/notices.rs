@@ -106,14 +106,10 @@ impl Notices {
 
 /// Notices on unused features of materials.
 fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String])) {
-    let normal = materials(root, |material| material.normal_texture.is_some());
-    note("normal textures are ignored, the surface is rendered without its bumps", "material", &normal);
     let occluded = materials(root, |material| material.occlusion_texture.is_some());
     note("occlusion textures are ignored, occlusion is computed", "material", &occluded);
     let dark = materials(root, has_dark_texture);
     note("emissive textures are ignored where the emissive factor or strength is 0", "material", &dark);
-    let extended = materials(root, has_extension_texture);
-    note("textures of extensions are ignored, the factors alone count", "material", &extended);
     let blended = materials(root, |material| material.alpha_mode == Checked::Valid(AlphaMode::Blend));
     note("alpha is ignored, the surface is rendered opaque", "material", &blended);
     let frosted = materials(root, |material| {
@@ -124,17 +120,6 @@ fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String]
         material.extensions.as_ref().is_some_and(|extensions| extensions.unlit.is_some())
     });
     note("unlit materials are rendered as lit ones", "material", &unlit);
-}
-
-/// Returns whether an extension whose factors are used has a texture.
-fn has_extension_texture(material: &json::Material) -> bool {
-    let Some(extensions) = &material.extensions else { return false };
-    let specular = extensions.specular.as_ref();
-    let transmission = extensions.transmission.as_ref();
-    let volume = extensions.volume.as_ref();
-    specular.is_some_and(|s| s.specular_texture.is_some() || s.specular_color_texture.is_some())
-        || transmission.is_some_and(|transmission| transmission.transmission_texture.is_some())
-        || volume.is_some_and(|volume| volume.thickness_texture.is_some())
 }
 
 /// Unsupported extensions in use, with the materials, meshes and nodes that use them.

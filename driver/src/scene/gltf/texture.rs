@@ -47,7 +47,11 @@ impl<'a> Textures<'a> {
     ) -> Result<u32, SceneError> {
         let document = self.document;
         let index = info.index.value();
-        let texture = &document.root.textures[index];
+        // The glTF library has not checked textures of extensions that it does not know.
+        let Some(texture) = document.root.textures.get(index) else {
+            let reason = format!("there is no texture {index}: the file has {}", document.root.textures.len());
+            return Err(document.invalid(format!("{item}.index"), reason, "state the index of a texture"));
+        };
         if document.root.images.get(texture.source.value()).is_none() {
             let reason = "the texture has no image in PNG or JPEG";
             let remedy = "export the scene with PNG or JPEG textures, without extensions for other formats";

@@ -168,6 +168,7 @@ mod tests {
             flags: 0,
             cutoff: 0.0,
             textures: [NO_TEXTURE; 3],
+            layers: None,
         })
     }
 

@@ -1,0 +1,142 @@
+//! Layers of a material beyond its base: normal map, textures of the reflectance, clearcoat, sheen, textures of transmission.
+
+use glam::Vec3;
+
+use super::material::{OutOfRange, Property, every, fault, is_share};
+
+/// Layers of a material. Every texture is an index into [`Scene::textures`](super::Scene::textures), and multiplies the value
+/// that it varies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layers {
+    /// Normal map of the base.
+    pub normal: Option<NormalMap>,
+    /// F0 of the dielectric before its limit of 1, without the factor: F0 of the index of refraction times the colour of
+    /// `KHR_materials_specular`.
+    pub specular: Vec3,
+    /// Texture of the factor of `KHR_materials_specular`, in alpha.
+    pub specular_texture: Option<u32>,
+    /// Texture of the colour of `KHR_materials_specular` (sRGB).
+    pub specular_colour_texture: Option<u32>,
+    /// Coat over everything else.
+    pub coat: Option<Coat>,
+    /// Sheen below the coat.
+    pub sheen: Option<Sheen>,
+    /// Texture of the transmitted share, in red.
+    pub transmission_texture: Option<u32>,
+    /// Diffuse transmission.
+    pub diffuse_transmission: Option<DiffuseTransmission>,
+}
+
+/// A tangent-space normal texture (linear).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NormalMap {
+    /// The texture.
+    pub texture: u32,
+    /// Scale of x and y.
+    pub scale: f32,
+}
+
+/// A layer of clear dielectric of the index 1.5 (`KHR_materials_clearcoat`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coat {
+    /// Share of the surface that has the coat, 0 to 1.
+    pub factor: f32,
+    /// Perceptual roughness, 0 to 1.
+    pub roughness: f32,
+    /// Texture of the factor, in red.
+    pub factor_texture: Option<u32>,
+    /// Texture of the roughness, in green.
+    pub roughness_texture: Option<u32>,
+    /// Normal map; the coat has the corners' normals without one.
+    pub normal: Option<NormalMap>,
+}
+
+/// A layer of fibres (`KHR_materials_sheen`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sheen {
+    /// Colour, 0 to 1.
+    pub colour: Vec3,
+    /// Perceptual roughness, 0 to 1.
+    pub roughness: f32,
+    /// Texture of the colour (sRGB).
+    pub colour_texture: Option<u32>,
+    /// Texture of the roughness, in alpha.
+    pub roughness_texture: Option<u32>,
+}
+
+/// Diffuse transmission (`KHR_materials_diffuse_transmission`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DiffuseTransmission {
+    /// Share of the diffuse light that leaves at the other side, 0 to 1.
+    pub factor: f32,
+    /// Colour of that light, 0 to 1.
+    pub colour: Vec3,
+    /// Texture of the share, in alpha.
+    pub factor_texture: Option<u32>,
+    /// Texture of the colour (sRGB).
+    pub colour_texture: Option<u32>,
+}
+
+impl Layers {
+    /// No layer: for a dielectric of an F0.
+    pub const fn none(specular: Vec3) -> Self {
+        Self {
+            normal: None,
+            specular,
+            specular_texture: None,
+            specular_colour_texture: None,
+            coat: None,
+            sheen: None,
+            transmission_texture: None,
+            diffuse_transmission: None,
+        }
+    }
+
+    /// Textures in use.
+    pub(super) fn textures(&self) -> impl Iterator<Item = u32> {
+        let Self { normal, specular_texture, specular_colour_texture, transmission_texture, .. } = *self;
+        let map = |map: Option<NormalMap>| map.map(|map| map.texture);
+        let coat = self.coat.map(|coat| [coat.factor_texture, coat.roughness_texture, map(coat.normal)]);
+        let sheen = self.sheen.map(|sheen| [sheen.colour_texture, sheen.roughness_texture]);
+        let diffuse = self.diffuse_transmission.map(|part| [part.factor_texture, part.colour_texture]);
+        [map(normal), specular_texture, specular_colour_texture, transmission_texture]
+            .into_iter()
+            .chain(coat.into_iter().flatten())
+            .chain(sheen.into_iter().flatten())
+            .chain(diffuse.into_iter().flatten())
+            .flatten()
+    }
+
+    /// Checks that every value is finite and within its range.
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        let coat_normal = self.coat.and_then(|coat| coat.normal);
+        for (map, property) in [(self.normal, Property::NormalScale), (coat_normal, Property::Coat)] {
+            if let Some(scale) = map.map(|map| map.scale).filter(|scale| !scale.is_finite()) {
+                return fault(
+                    property,
+                    format!("the scale of the normals is {scale}"),
+                    "state a finite number",
+                );
+            }
+        }
+        if let Some(Coat { factor, roughness, .. }) = self.coat
+            && !(is_share(factor) && is_share(roughness))
+        {
+            let reason = format!("the coat's factor is {factor}, its roughness {roughness}");
+            return fault(Property::Coat, reason, "both are 0 to 1");
+        }
+        if let Some(Sheen { colour, roughness, .. }) = self.sheen
+            && !(every(colour, is_share) && is_share(roughness))
+        {
+            let reason = format!("the sheen's colour is {colour}, its roughness {roughness}");
+            return fault(Property::Sheen, reason, "both are 0 to 1");
+        }
+        if let Some(DiffuseTransmission { factor, colour, .. }) = self.diffuse_transmission
+            && !(is_share(factor) && every(colour, is_share))
+        {
+            let reason = format!("the factor of diffuse transmission is {factor}, its colour {colour}");
+            return fault(Property::DiffuseTransmission, reason, "both are 0 to 1");
+        }
+        Ok(())
+    }
+}

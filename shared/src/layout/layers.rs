@@ -1,0 +1,201 @@
+//! Layers of materials beyond the base: textures of the dielectric's reflectance, normal map, clearcoat, sheen and transmission.
+
+use super::{NO_TEXTURE, Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
+
+/// Layers of a material, which few materials have. Every texture multiplies the factor of its name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Layers {
+    /// F0 of the dielectric before its limit of 1 and without `specularFactor`: F0 of the index of refraction times
+    /// `specularColorFactor`.
+    pub specular: [f32; 3],
+    /// Scale of x and y of the normal texture.
+    pub normal_scale: f32,
+    /// Factor of the coat, 0 to 1 (`KHR_materials_clearcoat`).
+    pub coat: f32,
+    /// Roughness of the coat, 0 to 1.
+    pub coat_roughness: f32,
+    /// Scale of x and y of the coat's normal texture.
+    pub coat_normal_scale: f32,
+    /// Colour of the sheen, 0 to 1 (`KHR_materials_sheen`).
+    pub sheen: [f32; 3],
+    /// Roughness of the sheen, 0 to 1.
+    pub sheen_roughness: f32,
+    /// Share of the diffuse light that leaves at the other side, 0 to 1 (`KHR_materials_diffuse_transmission`).
+    pub diffuse_transmission: f32,
+    /// Colour of the diffuse light that leaves at the other side, 0 to 1.
+    pub diffuse_transmission_colour: [f32; 3],
+    /// Textures.
+    pub textures: LayerTextures,
+}
+
+/// Textures of [`Layers`]: indices, [`NO_TEXTURE`] if absent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LayerTextures {
+    /// Tangent-space normal: red, green and blue of `2 c - 1`, linear.
+    pub normal: u16,
+    /// `specularFactor`: alpha.
+    pub specular: u16,
+    /// `specularColorFactor`: red, green and blue, sRGB.
+    pub specular_colour: u16,
+    /// Factor of the coat: red.
+    pub coat: u16,
+    /// Roughness of the coat: green.
+    pub coat_roughness: u16,
+    /// Tangent-space normal of the coat.
+    pub coat_normal: u16,
+    /// Colour of the sheen: red, green and blue, sRGB.
+    pub sheen: u16,
+    /// Roughness of the sheen: alpha.
+    pub sheen_roughness: u16,
+    /// `transmissionFactor`: red.
+    pub transmission: u16,
+    /// Share of diffuse transmission: alpha.
+    pub diffuse_transmission: u16,
+    /// Colour of diffuse transmission: red, green and blue, sRGB.
+    pub diffuse_transmission_colour: u16,
+}
+
+impl LayerTextures {
+    /// No texture.
+    pub const NONE: Self = Self::of([NO_TEXTURE; 11]);
+
+    const fn of(indices: [u16; 11]) -> Self {
+        let [
+            normal,
+            specular,
+            specular_colour,
+            coat,
+            coat_roughness,
+            coat_normal,
+            sheen,
+            sheen_roughness,
+            transmission,
+            diffuse_transmission,
+            diffuse_transmission_colour,
+        ] = indices;
+        Self {
+            normal,
+            specular,
+            specular_colour,
+            coat,
+            coat_roughness,
+            coat_normal,
+            sheen,
+            sheen_roughness,
+            transmission,
+            diffuse_transmission,
+            diffuse_transmission_colour,
+        }
+    }
+
+    const fn indices(self) -> [u16; 11] {
+        let Self {
+            normal,
+            specular,
+            specular_colour,
+            coat,
+            coat_roughness,
+            coat_normal,
+            sheen,
+            sheen_roughness,
+            transmission,
+            diffuse_transmission,
+            diffuse_transmission_colour,
+        } = self;
+        [
+            normal,
+            specular,
+            specular_colour,
+            coat,
+            coat_roughness,
+            coat_normal,
+            sheen,
+            sheen_roughness,
+            transmission,
+            diffuse_transmission,
+            diffuse_transmission_colour,
+        ]
+    }
+}
+
+impl Record for Layers {
+    const BYTES: usize = 128;
+}
+
+const TEXTURES: usize = 64;
+
+impl Layers {
+    /// No layer beyond the base.
+    pub const NONE: Self = Self {
+        specular: [0.0; 3],
+        normal_scale: 1.0,
+        coat: 0.0,
+        coat_roughness: 0.0,
+        coat_normal_scale: 1.0,
+        sheen: [0.0; 3],
+        sheen_roughness: 0.0,
+        diffuse_transmission: 0.0,
+        diffuse_transmission_colour: [1.0; 3],
+        textures: LayerTextures::NONE,
+    };
+
+    /// Reads a record.
+    pub fn read(bytes: &[u8; Self::BYTES]) -> Self {
+        let texture =
+            |index: usize| (read_u32(bytes, TEXTURES + (index & !1) * 2) >> (16 * (index & 1))) as u16;
+        Self {
+            specular: read_vector(bytes, 0),
+            normal_scale: read_f32(bytes, 12),
+            coat: read_f32(bytes, 16),
+            coat_roughness: read_f32(bytes, 20),
+            coat_normal_scale: read_f32(bytes, 24),
+            sheen: read_vector(bytes, 28),
+            sheen_roughness: read_f32(bytes, 40),
+            diffuse_transmission: read_f32(bytes, 44),
+            diffuse_transmission_colour: read_vector(bytes, 48),
+            textures: LayerTextures::of(core::array::from_fn(texture)),
+        }
+    }
+
+    /// The record's bytes.
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        write_vector(&mut bytes, 0, self.specular);
+        write_f32(&mut bytes, 12, self.normal_scale);
+        write_f32(&mut bytes, 16, self.coat);
+        write_f32(&mut bytes, 20, self.coat_roughness);
+        write_f32(&mut bytes, 24, self.coat_normal_scale);
+        write_vector(&mut bytes, 28, self.sheen);
+        write_f32(&mut bytes, 40, self.sheen_roughness);
+        write_f32(&mut bytes, 44, self.diffuse_transmission);
+        write_vector(&mut bytes, 48, self.diffuse_transmission_colour);
+        for (index, pair) in self.textures.indices().chunks(2).enumerate() {
+            let [low, high] = [0, 1].map(|slot| pair.get(slot).copied().unwrap_or(NO_TEXTURE));
+            write_u32(&mut bytes, TEXTURES + 4 * index, u32::from(low) | u32::from(high) << 16);
+        }
+        bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layers_survive_their_bytes() {
+        let layers = Layers {
+            specular: [1.5, 2.0, 0.1],
+            normal_scale: -0.5,
+            coat: 0.25,
+            coat_roughness: 0.125,
+            coat_normal_scale: 2.0,
+            sheen: [0.1, 0.2, 0.3],
+            sheen_roughness: 0.75,
+            diffuse_transmission: 0.5,
+            diffuse_transmission_colour: [0.7, 0.8, 0.9],
+            textures: LayerTextures::of(core::array::from_fn(|index| 1000 + index as u16)),
+        };
+        assert_eq!(Layers::read(&layers.to_bytes()), layers);
+        assert_eq!(Layers::read(&Layers::NONE.to_bytes()), Layers::NONE);
+    }
+}
