@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::material::{OutOfRange, Property, every, fault, is_share};
+use super::out_of_range::{OutOfRange, Property, every, fault, is_share};
 
 /// Layers of a material. Every texture is an index into [`Scene::textures`](super::Scene::textures), and multiplies the value
 /// that it varies.

@@ -11,6 +11,7 @@ mod light;
 mod limits;
 mod map_size;
 mod material;
+mod out_of_range;
 mod radiance;
 mod raster;
 mod settings;

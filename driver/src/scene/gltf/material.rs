@@ -11,7 +11,7 @@ use super::document::Document;
 use super::layers::{self, has_other_layer};
 use super::texture::Textures;
 use crate::error::SceneError;
-use crate::scene::material::{OutOfRange, Property};
+use crate::scene::out_of_range::{OutOfRange, Property};
 use crate::scene::{Encoding, Material, Reflection, Transmission};
 
 /// Contents of `extras` for this renderer; other keys belong to other programs.

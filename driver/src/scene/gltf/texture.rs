@@ -49,7 +49,8 @@ impl<'a> Textures<'a> {
         let index = info.index.value();
         // The glTF library has not checked textures of extensions that it does not know.
         let Some(texture) = document.root.textures.get(index) else {
-            let reason = format!("there is no texture {index}: the file has {}", document.root.textures.len());
+            let reason =
+                format!("there is no texture {index}: the file has {}", document.root.textures.len());
             return Err(document.invalid(format!("{item}.index"), reason, "state the index of a texture"));
         };
         if document.root.images.get(texture.source.value()).is_none() {
