@@ -94,7 +94,7 @@ impl Prepared {
                 let direction = (camera.forward + camera.right * x + camera.up * y).normalize();
                 let eye = Ray::new(camera.origin, direction);
                 let hit = closest_hit(&scene, &mut memory, &eye).expect("sound")?;
-                let surface = read_surface(&scene, &mut memory, &eye, &hit).expect("sound");
+                let surface = read_surface(&scene, &mut memory, &eye, &hit, &|_| 0.0).expect("sound");
                 let sampled = surface.reflector().sample([random(i, 3), random(i, 4)])?;
                 Some(Ray::new(surface.offset_origin(), sampled.direction))
             })

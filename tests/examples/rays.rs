@@ -37,7 +37,7 @@ fn bounces(scene: &Scene, packed: &PackedScene, count: u32) -> Vec<Ray> {
             camera.forward + camera.right * (random(i, 1) - 0.5) + camera.up * (random(i, 2) - 0.5);
         let eye = Ray::new(camera.origin, direction.normalize());
         let hit = closest_hit(&image, &mut memory, &eye).expect("sound")?;
-        let surface = read_surface(&image, &mut memory, &eye, &hit).expect("sound");
+        let surface = read_surface(&image, &mut memory, &eye, &hit, &|_| 0.0).expect("sound");
         let sampled = surface.reflector().sample([random(i, 3), random(i, 4)])?;
         Some(Ray::new(surface.offset_origin(), sampled.direction))
     };

@@ -1,212 +1,238 @@
-//! Layers: they add up to the picture, do not change it, and hold the quantities of their names.
+//! Layers of materials of known radiance: coat, sheen, diffuse transmission, rough glass, textures of the reflectance.
 
-use photoncard_driver::film::{Film, FilmPixel, PixelLayers, PixelValue};
-use photoncard_driver::layer::Layers;
-use photoncard_driver::photon_map::PhotonLayout;
-use photoncard_driver::render::{
-    CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderError, RenderSettings, Rendering,
-    Unobserved, render,
+use glam::Vec3;
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
+use photoncard_driver::scene::{
+    Camera, Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, Reflection, Scene,
+    Sheen, Texture, Transmission,
 };
-use photoncard_driver::scene::{Reflection, Scene, gltf};
-use photoncard_driver::scheduler::GatherOrder;
-use photoncard_tests::render_or_panic;
-
-fn load(name: &str) -> Scene {
-    let path = format!("{}/../scenes/{name}", env!("CARGO_MANIFEST_DIR"));
-    gltf::load(path.as_ref()).expect("a shipped scene loads")
-}
-
-fn card(text: &str) -> CardAddress {
-    text.parse().unwrap()
-}
+use photoncard_tests::shapes::{add_ball, add_textured_quad};
+use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
 
 fn settings() -> RenderSettings {
     RenderSettings {
-        picture: Picture { width: 37, height: 29, layers: Layers::all(), ..Picture::default() },
-        photons: PhotonMaps { count: 20_000, neighbors: 50, ..PhotonMaps::default() },
-        integrator: Integrator { gather_rays: 12, samples: 2, ..Integrator::default() },
-        cards: CardSet { addresses: vec![card("emulated:1")], ..CardSet::default() },
+        picture: Picture { width: 16, height: 16, ..Picture::default() },
+        photons: PhotonMaps { count: 100_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 32, samples: 64, ..Integrator::default() },
         ..RenderSettings::default()
     }
 }
 
-/// Bits of the pixels without layers.
-fn picture_bits(film: &Film) -> Vec<u8> {
-    film.pixels().iter().flat_map(PixelValue::to_bytes).collect()
+/// A dielectric of a base colour and an F0, as glTF's, with layers.
+fn dielectric(base: f32, f0: f32, layers: Layers) -> Material {
+    let reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::splat(base),
+        metallic: 0.0,
+        roughness: 0.9,
+        dielectric: Vec3::splat(f0),
+        grazing: if f0 > 0.0 { 1.0 } else { 0.0 },
+        transmission: None,
+    };
+    Material { double_sided: true, layers: Some(Box::new(layers)), ..Material::new("surface", reflection) }
 }
 
-/// Bits of the layers.
-fn layer_bits(film: &Film) -> Vec<u8> {
-    film.all().flat_map(|pixel| pixel.layers.to_bytes()).collect()
+fn none() -> Layers {
+    Layers::none(Vec3::ZERO)
 }
 
-/// Checks that a pixel's components add up to its radiance, except for rounding.
-fn adds_up(FilmPixel { pixel, layers }: FilmPixel) -> bool {
-    let PixelLayers { direct, indirect, caustic, .. } = layers;
-    (0..3).all(|axis| {
-        let sum = f64::from(direct[axis]) + f64::from(indirect[axis]) + f64::from(caustic[axis]);
-        (sum - f64::from(pixel.radiance[axis])).abs() <= 2.0 * f64::from(f32::EPSILON) * sum
-    })
+fn coat(factor: f32, roughness: f32) -> Layers {
+    let coat = Coat { factor, roughness, factor_texture: None, roughness_texture: None, normal: None };
+    Layers { coat: Some(coat), ..none() }
 }
 
-/// Other settings with equal pixels, with layers.
-fn variants() -> Vec<RenderSettings> {
-    let orders = [
-        GatherOrder::Naive,
-        GatherOrder::Tiled,
-        GatherOrder::DirectionBins,
-        GatherOrder::Hash,
-        GatherOrder::Sort,
-        GatherOrder::Hilbert,
-    ];
-    let of_order = |order| settings().with(|s| s.schedule.order = order);
-    let others = [
-        settings().with(|s| {
-            s.schedule.tile = 32;
-            s.schedule.queue = Some(5000);
-        }),
-        settings().with(|s| {
-            s.schedule.tile = 8;
-            s.cards.addresses = vec![card("emulated-micro:2")];
-        }),
-        of_order(GatherOrder::Hilbert).with(|s| {
-            s.schedule.tile = 5;
-            s.cards.addresses = vec![card("emulated:2")];
-        }),
-        settings().with(|s| {
-            s.photons.layout = PhotonLayout::Jensen;
-            s.schedule.queue = Some(37);
-        }),
-    ];
-    orders.into_iter().map(of_order).chain(others).collect()
+fn sheen(colour: f32, roughness: f32) -> Layers {
+    let colour = Vec3::splat(colour);
+    Layers {
+        sheen: Some(Sheen { colour, roughness, colour_texture: None, roughness_texture: None }),
+        ..none()
+    }
 }
+
+fn leaf(factor: f32, colour: f32) -> Layers {
+    let colour = Vec3::splat(colour);
+    let part = DiffuseTransmission { factor, colour, factor_texture: None, colour_texture: None };
+    Layers { diffuse_transmission: Some(part), ..none() }
+}
+
+/// Radiance of a horizontal plate under a white sky, seen from afar at a cosine to its normal.
+fn plate(material: Material, cosine: f32) -> f64 {
+    shown(&plate_of(material, cosine))
+}
+
+fn shown(scene: &Scene) -> f64 {
+    mean(&radiances(&render_or_panic(scene, &settings()).film))
+}
+
+fn plate_of(material: Material, cosine: f32) -> Scene {
+    let corner = |x: f32, z: f32| Vec3::new(40.0 * x, 0.0, 40.0 * z);
+    let mut scene = scene(Vec::new(), vec![material], from_afar(cosine));
+    let corners = [corner(-1., 1.), corner(1., 1.), corner(1., -1.), corner(-1., -1.)];
+    add_textured_quad(&mut scene, corners, [[0., 0.], [1., 0.], [1., 1.], [0., 1.]], 0);
+    scene.environment = Some(Environment::constant(Vec3::ONE));
+    scene
+}
+
+fn from_afar(cosine: f32) -> Camera {
+    let direction = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.01).normalize();
+    Camera { vertical_fov: 2.0_f32.to_radians(), ..camera(direction * 20.0, -direction) }
+}
+
+/// Directional albedos of a GGX lobe with F0 0.04 and F90 1 by quadrature: roughness, cosine, albedo.
+const COATS: [(f32, f32, f64); 4] =
+    [(0.1, 0.15, 0.4608), (0.1, 0.98, 0.04), (0.5, 0.15, 0.1477), (0.7, 0.15, 0.0825)];
 
 #[test]
-fn layers_add_up_to_the_picture_and_change_no_bit_of_it() {
-    let scene = load("cornell-glossy.gltf");
-    for irradiance_error in [None, Some(0.025)] {
-        let with =
-            |settings: RenderSettings| settings.with(|s| s.integrator.irradiance_error = irradiance_error);
-        let plain = with(settings().with(|s| s.picture.layers = Layers::default()));
-        let plain = render_or_panic(&scene, &plain).film;
-        assert!(!plain.has_layers());
-        let mut expected = None;
-        for variant in variants() {
-            let variant = with(variant);
-            let film = render_or_panic(&scene, &variant).film;
-            assert!(picture_bits(&film) == picture_bits(&plain), "{variant:?} changes the picture");
-            let expected = expected.get_or_insert_with(|| layer_bits(&film));
-            assert!(layer_bits(&film) == *expected, "{variant:?} changes the layers");
-            assert!(film.all().all(adds_up), "{variant:?}");
-            for light in [|layers: PixelLayers| layers.direct, |layers: PixelLayers| layers.indirect] {
-                assert!(film.all().any(|pixel| light(pixel.layers)[1] > 0.0));
-            }
+fn a_coat_reflects_its_albedo_and_leaves_the_rest_to_the_base() {
+    for (roughness, cosine, albedo) in COATS {
+        for (factor, base) in [(1.0_f32, 0.0_f32), (0.5, 0.0), (1.0, 0.5)] {
+            let of_coat = albedo * f64::from(factor);
+            let expected = of_coat + (1.0 - of_coat) * f64::from(base);
+            let found = plate(dielectric(base, 0.0, coat(factor, roughness)), cosine);
+            let error = found - expected;
+            assert!(
+                error.abs() < 0.01 * expected + 3e-4,
+                "{roughness} at {cosine} on {base}: {found}, not {expected}"
+            );
         }
     }
 }
 
 #[test]
-fn what_no_photon_brings_is_direct() {
-    let scene = load("cornell.gltf");
-    let film = render_or_panic(&scene, &settings().with(|s| s.integrator.gather_rays = 0)).film;
-    for FilmPixel { pixel, layers } in film.all() {
-        assert_eq!(layers, PixelLayers { direct: pixel.radiance, ..PixelLayers::default() });
+fn a_smooth_coat_reflects_as_schlick_says() {
+    for cosine in [0.15_f32, 0.98] {
+        let schlick = f64::from(0.04 + 0.96 * (1.0 - cosine).powi(5));
+        let found = plate(dielectric(0.5, 0.0, coat(1.0, 0.0)), cosine);
+        let expected = schlick + (1.0 - schlick) * 0.5;
+        assert!((found / expected - 1.0).abs() < 0.01, "{cosine}: {found}, not {expected}");
     }
-    // Without shadow rays direct light comes from gather rays alone, whose weight is then 1.
-    let without = render_or_panic(&scene, &settings().with(|s| s.integrator.shadow_rays = 0)).film;
-    let with = render_or_panic(&scene, &settings()).film;
-    for (without, with) in without.all().zip(with.all()) {
-        assert_eq!(without.layers.indirect, with.layers.indirect);
-    }
-    assert!(without.all().zip(with.all()).any(|(without, with)| without.layers.direct != with.layers.direct));
 }
 
-fn gathers(rendering: &Rendering) -> Vec<f32> {
-    rendering.film.all().map(|pixel| pixel.layers.gathers).collect()
-}
+/// Directional albedos of a white sheen by quadrature: roughness, cosine, albedo.
+const SHEENS: [(f32, f32, f64); 4] =
+    [(0.5, 0.15, 0.4847), (0.5, 0.98, 0.031), (1.0, 0.15, 0.6442), (1.0, 0.98, 0.1697)];
 
 #[test]
-fn every_sample_gathers_that_is_not_interpolated() {
-    let scene = load("cornell.gltf");
-    let plain = render_or_panic(&scene, &settings());
-    for (pixel, gathers) in plain.film.pixels().iter().zip(gathers(&plain)) {
-        // Samples that look past the box have neither.
-        assert_eq!(gathers == 0.0, pixel.albedo == [0.0; 3]);
-        assert!([0.0, 1.0, 2.0].contains(&gathers));
-    }
-    assert!(gathers(&plain).iter().filter(|&&gathers| gathers == 2.0).count() > 37 * 29 / 2);
-
-    let cached = render_or_panic(&scene, &settings().with(|s| s.integrator.irradiance_error = Some(0.025)));
-    assert!(gathers(&cached).iter().zip(gathers(&plain)).all(|(with, without)| *with <= without));
-    let [with, without] =
-        [&cached, &plain].map(|rendering| f64::from(gathers(rendering).iter().sum::<f32>()));
-    assert!(with < without);
-    // All surfaces of the box are Lambertian.
-    let share = cached.statistics.interpolated_share;
-    assert!((with - (1.0 - share) * without).abs() < 1e-3, "{with} of {without}, share {share}");
-}
-
-#[test]
-fn albedo_and_normals_are_fit_for_a_denoiser() {
-    let mut scene = load("cornell-glossy.gltf");
-    for material in &mut scene.materials {
-        if let Reflection::Phong { specular, .. } = &mut material.reflection {
-            *specular = glam::Vec3::splat(0.9);
+fn a_sheen_reflects_its_albedo_and_leaves_the_rest_to_the_base() {
+    for (roughness, cosine, albedo) in SHEENS {
+        for (colour, base) in [(1.0_f32, 0.0_f32), (0.5, 0.4)] {
+            let of_sheen = albedo * f64::from(colour);
+            let expected = of_sheen + (1.0 - of_sheen) * f64::from(base);
+            let found = plate(dielectric(base, 0.0, sheen(colour, roughness)), cosine);
+            let error = found - expected;
+            assert!(error.abs() < 0.01 * expected + 2e-3, "{roughness} at {cosine}: {found}, not {expected}");
         }
     }
-    let film = render_or_panic(&scene, &settings()).film;
-    for pixel in film.pixels() {
-        assert!(pixel.albedo.iter().all(|albedo| (0.0..=1.0).contains(albedo)), "{:?}", pixel.albedo);
-        assert!(glam::Vec3::from(pixel.normal).length() < 1.0 + 1e-5, "{:?}", pixel.normal);
-    }
-    assert!(film.pixels().iter().any(|pixel| pixel.albedo.contains(&1.0)));
 }
 
 #[test]
-fn tiles_with_layers_that_no_chip_holds_are_refused_with_a_remedy() {
-    let scene = load("cornell.gltf");
-    for (tile, cards, most) in [(33, "emulated:1", 32), (64, "emulated:1", 32), (9, "emulated-micro:1", 8)] {
-        for order in [GatherOrder::Sort, GatherOrder::Naive, GatherOrder::Hilbert] {
-            let cards = vec![card(cards)];
-            if order == GatherOrder::Hilbert && most == 8 {
-                continue;
-            }
-            let settings = settings().with(|s| {
-                s.schedule.tile = tile;
-                s.schedule.order = order;
-                s.cards.addresses = cards;
-            });
-            let error = render(&scene, &settings, &Unobserved).err().expect("is refused");
-            let said = error.to_string();
-            assert!(error.is_input() && said.contains(&format!("1 to {most}")), "{said}");
-            assert!(said.contains("--tile") && said.contains("--aov"), "{said}");
-            let RenderError::Setting { remedy, .. } = error else { panic!("{said}") };
-            assert!(remedy.contains(&format!("choose {most} or less")), "{remedy}");
-        }
-    }
-    // Layers that the host always has take no room.
-    for aov in ["albedo,N,Z", "none"] {
-        let layers = aov.parse().unwrap();
-        render_or_panic(
-            &scene,
-            &settings().with(|s| {
-                s.picture.layers = layers;
-                s.schedule.tile = 64;
-            }),
-        );
-    }
+fn a_leaf_shows_what_both_of_its_sides_receive() {
+    let found = plate(dielectric(0.6, 0.0, leaf(0.25, 0.8)), 0.9);
+    let expected = 0.75 * 0.6 + 0.25 * 0.8;
+    assert!((found / expected - 1.0).abs() < 0.01, "{found}, not {expected}");
 }
 
+/// A plate of a black dielectric of roughness 0.1 seen from above shows its F0. The code 188 is 0.5029 of white, 128 is half an alpha.
 #[test]
-fn the_default_tile_has_room_on_every_card() {
-    for (aov, cards, side) in [
-        ("all", "emulated:2", 16),
-        ("all", "emulated-micro:2", 8),
-        ("gathers", "tcp:localhost:7000", 8),
-        ("Z", "tcp:localhost:7000", 16),
-        ("none", "emulated-micro:1", 16),
+fn textures_of_the_reflectance_multiply_it_before_its_limit() {
+    for (specular, texel, expected) in [
+        (0.996_f32, [188, 188, 188, 255], 0.996 * 0.5029),
+        (0.04, [255, 255, 255, 128], 0.04 * 128.0 / 255.0),
+        (3.0, [188, 188, 188, 128], 128.0 / 255.0),
     ] {
-        let cards = [card("emulated:1"), card(cards)];
-        assert_eq!(RenderSettings::default_tile(&aov.parse().unwrap(), &cards), side, "{aov} {cards:?}");
+        let f0 = Vec3::splat(specular.min(1.0));
+        let layers = Layers {
+            specular_texture: Some(0),
+            specular_colour_texture: Some(0),
+            ..Layers::none(Vec3::splat(specular))
+        };
+        let reflection = Reflection::MetallicRoughness {
+            base_colour: Vec3::ZERO,
+            metallic: 0.0,
+            roughness: 0.1,
+            dielectric: f0,
+            grazing: 1.0,
+            transmission: None,
+        };
+        let material = Material { layers: Some(Box::new(layers)), ..Material::new("surface", reflection) };
+        let mut scene = plate_of(material, 0.98);
+        scene.textures.push(Texture::new(0));
+        scene.images.push(Image {
+            name: "reflectance".to_owned(),
+            width: 1,
+            height: 1,
+            encoding: Encoding::Srgb,
+            texels: vec![texel],
+        });
+        let found = shown(&scene);
+        assert!((found / expected - 1.0).abs() < 0.01, "{specular}: {found}, not {expected}");
     }
+}
+
+const EMISSION: f32 = 1.0;
+const ALBEDO: f32 = 0.5;
+
+/// Radiances of a closed room of uniform radiance 1 with an object in it.
+fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Vec<[f32; 3]> {
+    let wall = Material { emission: Vec3::splat(EMISSION * (1.0 - ALBEDO)), ..lambertian("wall", ALBEDO) };
+    let view = camera(Vec3::new(0.1, 0.05, 0.9), Vec3::new(-0.1, -0.05, -1.0));
+    let mut scene = scene(room([0; 6]), vec![wall, thing], view);
+    add(&mut scene);
+    let settings = settings().with(|s| {
+        s.picture.width = 48;
+        s.picture.height = 48;
+        s.integrator.samples = 16;
+        s.integrator.gather_rays = 16;
+        s.photons.count = 200_000;
+    });
+    radiances(&render_or_panic(&scene, &settings).film)
+}
+
+/// Checks the mean over the picture and over each of its blocks of 8x8.
+fn does_not_show(all: &[[f32; 3]], tolerance: f64) {
+    let error = mean(all) - 1.0;
+    assert!(error.abs() < 0.4 * tolerance, "the mean is off by {error}");
+    for block in 0..36 {
+        let corner = block / 6 * 8 * 48 + block % 6 * 8;
+        let pixels: Vec<[f32; 3]> = (0..64).map(|i| all[corner + i / 8 * 48 + i % 8]).collect();
+        let error = mean(&pixels) - 1.0;
+        assert!(error.abs() < tolerance, "block {block} is off by {error}");
+    }
+}
+
+fn sheet(scene: &mut Scene) {
+    let corner = |x: f32, y: f32| Vec3::new(0.5 * x, 0.5 * y, 0.1 * x);
+    scene.triangles.extend(quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 1));
+}
+
+fn glass(roughness: f32, is_volume: bool) -> Material {
+    let transmission = Transmission { factor: 1.0, ior: 1.5, is_volume, absorption: Vec3::ZERO };
+    let reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::ONE,
+        metallic: 0.0,
+        roughness,
+        dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
+        transmission: Some(transmission),
+    };
+    Material::new("glass", reflection)
+}
+
+#[test]
+fn a_white_leaf_does_not_show_in_a_furnace() {
+    for factor in [0.5, 0.9] {
+        does_not_show(&furnace_with(dielectric(1.0, 0.0, leaf(factor, 1.0)), sheet), 0.03);
+    }
+}
+
+#[test]
+fn rough_glass_does_not_show_in_a_furnace() {
+    let ball = |scene: &mut Scene| add_ball(scene, Vec3::new(-0.2, -0.1, 0.0), 0.4, 24, 1);
+    does_not_show(&furnace_with(glass(0.2, false), sheet), 0.03);
+    does_not_show(&furnace_with(glass(0.1, true), ball), 0.04);
+}
+
+#[test]
+fn a_coat_on_white_does_not_show_in_a_furnace() {
+    does_not_show(&furnace_with(dielectric(1.0, 0.0, coat(1.0, 0.2)), sheet), 0.03);
+    does_not_show(&furnace_with(dielectric(1.0, 0.0, sheen(0.8, 0.8)), sheet), 0.04);
 }

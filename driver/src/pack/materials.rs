@@ -76,6 +76,9 @@ fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> [u8; RECO
     .to_bytes()
 }
 
+/// Maximum share of diffuse transmission. Photons are stored where the base reflects diffusely, at both sides.
+const MAX_DIFFUSE_TRANSMISSION: f32 = 63.0 / 64.0;
+
 fn texture(index: Option<u32>) -> u16 {
     index.and_then(|index| u16::try_from(index).ok()).unwrap_or(NO_TEXTURE)
 }
@@ -96,7 +99,7 @@ fn layers_record(layers: &Layers) -> [u8; layout::Layers::BYTES] {
         coat_normal_scale,
         sheen: sheen.map_or([0.0; 3], |sheen| sheen.colour.to_array()),
         sheen_roughness: sheen.map_or(0.0, |sheen| sheen.roughness),
-        diffuse_transmission: diffuse.map_or(0.0, |part| part.factor),
+        diffuse_transmission: diffuse.map_or(0.0, |part| part.factor.min(MAX_DIFFUSE_TRANSMISSION)),
         diffuse_transmission_colour: diffuse.map_or([1.0; 3], |part| part.colour.to_array()),
         textures: LayerTextures {
             normal,

@@ -84,6 +84,11 @@ impl BounceRandom {
         unit_interval(self.bits(5))
     }
 
+    /// Number in [0, 1) for a choice of a surface's layer.
+    pub(super) fn layer(self, choice: u32) -> f32 {
+        unit_interval(self.bits(6 + choice))
+    }
+
     /// Random bits for the rounding of the power.
     pub(super) fn dither(self) -> u32 {
         self.bits(4)

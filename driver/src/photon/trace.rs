@@ -189,7 +189,7 @@ impl Tracer<'_> {
         for bounce in 0..MAX_BOUNCES {
             let random = random.bounce(bounce);
             let Some(hit) = closest_hit(scene, memory, &path.ray)? else { break };
-            let mut surface = read_surface(scene, memory, &path.ray, &hit)?;
+            let mut surface = read_surface(scene, memory, &path.ray, &hit, &|choice| random.layer(choice))?;
             let [u, v] = random.point();
             let arrival = path.arrive(&mut surface, [random.choice(), u, v]);
             let arrived = std::mem::replace(&mut path.throughput, Vec3::ONE) * power;
@@ -208,7 +208,11 @@ impl Tracer<'_> {
                     if surface.reflection.is_black() || self.purpose == Purpose::Caustics && !is_caustic {
                         break;
                     }
-                    photons.push(self.stored(&surface, arrived, is_direct, random.dither()));
+                    // Photons arrive at the base, or at a layer above it that rays follow.
+                    if !surface.is_behind {
+                        let power = arrived / surface.probability;
+                        photons.push(self.stored(&surface, power, is_direct, random.dither()));
+                    }
                     if self.purpose == Purpose::Caustics {
                         break;
                     }

@@ -65,13 +65,13 @@ impl<K: ChipKind> Chip<K> {
         context: &mut Context<M>,
         index: usize,
         at: PixelSample,
-        View { surface, seen, .. }: &View,
+        View { surface, is_first, .. }: &View,
     ) -> Purpose {
         let frame = context.frame;
         let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
         let sample = SeenSample { pixel: [at.x, at.y], film: eye::film_position(context, at), surface };
         // Records lie where eye rays meet surfaces, not behind mirrors and glass.
-        let allowed = allowed_error(frame).filter(|_| is_lambertian && seen.is_some());
+        let allowed = allowed_error(frame).filter(|_| is_lambertian && *is_first);
         let interpolated = allowed.and_then(|allowed| self.cache.interpolate(&sample, allowed));
         context.counters.lambertian_samples += u64::from(is_lambertian);
         context.counters.interpolated_samples += u64::from(interpolated.is_some());

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_shared::message::Fault;
 
-use super::specular_path::{Carried, Passes, PathEnd, SpecularPath};
+use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choice};
 use super::{Context, PixelSample};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
@@ -25,8 +25,10 @@ pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
 pub struct View {
     /// The surface, its reflection and emission times the throughput of the eye path.
     pub surface: Surface,
-    /// Hit of the eye ray itself; `None` behind perfectly specular surfaces.
+    /// Hit of the eye ray itself; `None` behind perfectly specular surfaces, and for a surface of several layers.
     pub seen: Option<Seen>,
+    /// `true` if the eye ray itself meets the surface.
+    pub is_first: bool,
     /// Depth of the eye ray's hit along the view's axis, metres.
     pub depth: f32,
 }
@@ -62,18 +64,24 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     let PixelSample { x, y, sample } = pixel;
     let samples = context.frame.samples;
     let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Specular);
-    // The first choice is stratified over all samples of a pixel.
-    let random = |bounce| match bounce {
-        0 => pattern.point(pattern.index_in_all(0, sample, samples), samples)[0],
-        _ => pattern.choice(sample, bounce),
+    // The first choices are stratified over all samples of a pixel.
+    let first = || pattern.point(pattern.index_in_all(0, sample, samples), samples);
+    let first_layer = surface_choice(0, 0);
+    let random = |choice| match choice {
+        0 => first()[0],
+        _ if choice == first_layer => first()[1],
+        _ => pattern.choice(sample, choice),
     };
     let mut path = SpecularPath::new(ray, Carried::Radiance, Passes::Specular);
     let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
         return background(context, &path);
     };
-    let mut surface = read_surface(context.scene, context.memory, &ray, &hit)?;
-    let is_direct = surface.specular.is_none();
-    if !is_direct {
+    let of_surface = |choice| random(surface_choice(0, choice));
+    let mut surface = read_surface(context.scene, context.memory, &ray, &hit, &of_surface)?;
+    let is_first = surface.specular.is_none();
+    // A layer is chosen again by the eye path alone.
+    let is_stored = is_first && surface.probability >= 1.0;
+    if !is_first {
         match path.follow(context, &mut surface, &mut hit, &random)? {
             PathEnd::Surface => {}
             PathEnd::Escaped => return background(context, &path),
@@ -82,9 +90,10 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     }
     let along_axis = ray.direction.dot(context.frame.camera.forward.into());
     Ok(Sight::Surface(View {
-        depth: if is_direct { depth(context, &surface) } else { path.first_distance * along_axis },
+        depth: if is_first { depth(context, &surface) } else { path.first_distance * along_axis },
         surface: surface.dimmed(path.throughput),
-        seen: is_direct.then(|| Seen::new(&hit)),
+        seen: is_stored.then(|| Seen::new(&hit)),
+        is_first,
     }))
 }
 

@@ -5,7 +5,7 @@
 use glam::Vec3;
 use photoncard_shared::message::{Fault, Radiance};
 
-use super::specular_path::{Carried, Passes, PathEnd, SpecularPath};
+use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choice};
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, HilbertCode};
 use crate::importance::GatherDirection;
@@ -50,9 +50,10 @@ pub fn cast<M: MemoryPort>(
     let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
         return escaped(context, point, &path, &sampled, weight);
     };
-    let mut met = read_surface(context.scene, context.memory, &ray, &hit)?;
+    let random = |choice| point.pattern.choice(index, choice);
+    let of_surface = |choice| random(surface_choice(0, choice));
+    let mut met = read_surface(context.scene, context.memory, &ray, &hit, &of_surface)?;
     if path.may_pass(&met) {
-        let random = |bounce| point.pattern.choice(index, bounce);
         match path.follow(context, &mut met, &mut hit, &random)? {
             PathEnd::Surface => {}
             PathEnd::Escaped => return escaped(context, point, &path, &sampled, weight),

@@ -217,9 +217,15 @@ impl SpecularPath {
             let next = closest_hit(context.scene, context.memory, &self.ray)?;
             let Some(next) = next else { return Ok(PathEnd::Escaped) };
             *hit = next;
-            *surface = read_surface(context.scene, context.memory, &self.ray, hit)?;
+            let random = |choice| random(surface_choice(self.bounces, choice));
+            *surface = read_surface(context.scene, context.memory, &self.ray, hit, &random)?;
         }
     }
+}
+
+/// Number of the random number with which a path chooses the layer of a surface.
+pub fn surface_choice(bounces: u32, choice: u32) -> u32 {
+    (5 + choice) * (SPECULAR_BOUNCES + 1) + bounces
 }
 
 /// Light of one sampled light, if it has no extent, that the narrow lobe of a surface reflects, W/(sr m^2). Lights with extent are met

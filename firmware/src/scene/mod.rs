@@ -3,6 +3,7 @@
 mod bvh;
 mod corners;
 mod cut_out;
+mod layers;
 pub mod light;
 mod reflection;
 mod seen;
@@ -18,7 +19,7 @@ pub use reflection::{
 };
 pub use seen::Seen;
 pub use specular::Specular;
-pub use surface::{Surface, read_surface};
+pub use surface::{SURFACE_CHOICES, Surface, read_surface};
 pub use texture::{decode_texel, read_texture, sample_texture};
 pub use triangle::{Hit, Intersection, RayFrame};
 

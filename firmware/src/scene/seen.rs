@@ -34,7 +34,7 @@ impl Seen {
         Self { triangle: hit.index, weights: [v, w] }
     }
 
-    /// Reads the surface on the side of the ray's origin. Its `distance` is 0.
+    /// Reads the surface on the side of the ray's origin, of several layers the base. Its `distance` is 0.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -47,6 +47,6 @@ impl Seen {
     ) -> Result<Surface, Fault> {
         let triangle = read_triangle(scene, memory, self.triangle)?;
         let [v, w] = self.weights;
-        surface_of(scene, memory, ray, (self.triangle, &triangle), [1.0 - v - w, v, w], 0.0)
+        surface_of(scene, memory, ray, (self.triangle, &triangle), [1.0 - v - w, v, w], &|_| 0.0)
     }
 }

@@ -8,11 +8,15 @@ use photoncard_shared::layout::{
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
-use super::reflection::{Scattering, Texel, View, scattering};
+use super::layers::{has_layers, layer_texel, read_layers};
+use super::reflection::{Layer, Scattering, Taken, Texel, View, scattering, take};
 use super::specular::Specular;
 use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origin};
 use crate::memory::MemoryPort;
 use crate::vector::{max_component, unit};
+
+/// Random numbers of [`read_surface`].
+pub const SURFACE_CHOICES: u32 = 3;
 
 const MATERIALS_PER_LINE: u32 = Material::PER_LINE as u32;
 
@@ -39,6 +43,10 @@ pub struct Surface {
     pub emitter: Option<u32>,
     /// `true` if the other side reflects and emits too (glTF's `doubleSided`).
     pub double_sided: bool,
+    /// Probability with which the surface's layer was taken, 1 for a surface of one layer: reflection and emission are over it.
+    pub probability: f32,
+    /// `true` for the other side of a surface, seen through it. Photons are stored on the side where they arrive.
+    pub is_behind: bool,
     /// Distance along the ray, metres.
     pub distance: f32,
     /// Greatest absolute coordinate that `position` was computed from, metres: it bounds the rounding error.
@@ -59,6 +67,8 @@ impl Surface {
             emission: Vec3::ZERO,
             emitter: None,
             double_sided: false,
+            probability: 1.0,
+            is_behind: false,
             distance: 0.0,
             magnitude,
         }
@@ -85,6 +95,17 @@ impl Surface {
         self
     }
 
+    /// The other side as it is seen through the surface: the side of the ray is mirrored.
+    fn from_behind(self) -> Self {
+        let front = -self.normal;
+        Self {
+            geometric_normal: -self.geometric_normal,
+            outgoing: self.outgoing - front * (2.0 * front.dot(self.outgoing)),
+            is_behind: true,
+            ..self
+        }
+    }
+
     /// A point just off the surface, from which a ray does not meet it again.
     #[inline(always)]
     pub fn offset_origin(&self) -> Vec3 {
@@ -109,7 +130,8 @@ impl Surface {
     }
 }
 
-/// Reads the surface where a ray meets a triangle.
+/// Reads the surface where a ray meets a triangle. `random` gives [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of its
+/// layers; the base is the layer of 0.
 ///
 /// # Errors
 /// If the triangle's material is not in the image.
@@ -119,9 +141,11 @@ pub fn read_surface(
     memory: &mut impl MemoryPort,
     ray: &Ray,
     hit: &Hit,
+    random: &dyn Fn(u32) -> f32,
 ) -> Result<Surface, Fault> {
     let Hit { intersection, triangle, index } = hit;
-    surface_of(scene, memory, ray, (*index, triangle), intersection.barycentric, intersection.distance)
+    let surface = surface_of(scene, memory, ray, (*index, triangle), intersection.barycentric, random)?;
+    Ok(Surface { distance: intersection.distance, ..surface })
 }
 
 /// Reads material `index`.
@@ -136,7 +160,7 @@ pub(super) fn read_material(
     Ok(Material::read(bytes))
 }
 
-/// Surface of a triangle at barycentric `weights`.
+/// Surface of a triangle at barycentric `weights`, at a distance of 0: [`read_surface`].
 #[inline(always)]
 pub(super) fn surface_of(
     scene: &SceneImage,
@@ -144,7 +168,7 @@ pub(super) fn surface_of(
     ray: &Ray,
     (index, triangle): (u32, &Triangle),
     weights: [f32; 3],
-    distance: f32,
+    random: &dyn Fn(u32) -> f32,
 ) -> Result<Surface, Fault> {
     let material = read_material(scene, memory, triangle.material)?;
     let [a, b, c] = triangle.vertices.map(Vec3::from_array);
@@ -159,7 +183,6 @@ pub(super) fn surface_of(
         outgoing: -ray.direction,
         reflection: Reflection::BLACK,
         double_sided,
-        distance,
         ..Surface::white(Vec3::ZERO, normal, magnitude(&[a, b, c, ray.origin]))
     };
     if let Reflectance::Phong { diffuse, specular, exponent } = material.reflectance
@@ -173,7 +196,7 @@ pub(super) fn surface_of(
             ..bare
         });
     }
-    finished(scene, memory, bare, (index, weights, is_front), &material)
+    finished(scene, memory, bare, (index, weights, is_front), &material, random)
 }
 
 /// `true` for a material without textures, vertex attributes and layers.
@@ -190,6 +213,7 @@ fn finished(
     bare: Surface,
     (index, weights, is_front): (u32, [f32; 3], bool),
     material: &Material,
+    random: &dyn Fn(u32) -> f32,
 ) -> Result<Surface, Fault> {
     let is_glass = matches!(material.reflectance, Reflectance::Glass { .. });
     if !(is_front || bare.double_sided || is_glass) {
@@ -215,8 +239,32 @@ fn finished(
     }
     let Surface { normal, geometric_normal, outgoing, .. } = surface;
     let view = View { outgoing, normals: [normal, geometric_normal], is_front };
+    if has_layers(material) {
+        return layered(scene, memory, surface, (corners.as_ref(), material), (&texel, &view), random);
+    }
     let Scattering { reflection, specular, absorption } = scattering(material, &texel, &view);
     Ok(Surface { reflection, specular, absorption, ..surface })
+}
+
+/// The surface of one of a material's layers. Its base emits.
+#[inline(never)]
+fn layered(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    surface: Surface,
+    (corners, material): (Option<&Corners>, &Material),
+    (texel, view): (&Texel, &View),
+    random: &dyn Fn(u32) -> f32,
+) -> Result<Surface, Fault> {
+    let layers = read_layers(scene, memory, material)?;
+    let layer_texel = layer_texel(scene, memory, corners, &layers)?;
+    let taken = take((material, &layers), (texel, &layer_texel), view, surface.normal, random);
+    let Taken { layer, scattering: Scattering { reflection, specular, absorption }, .. } = taken;
+    let Taken { normal, probability, .. } = taken;
+    let surface = Surface { reflection, specular, absorption, normal, probability, ..surface };
+    let emission = if layer == Layer::Base { surface.emission / probability } else { Vec3::ZERO };
+    let surface = Surface { emission, ..surface };
+    Ok(if layer == Layer::Behind { surface.from_behind() } else { surface })
 }
 
 fn rgb([red, green, blue, _]: [f32; 4]) -> Vec3 {

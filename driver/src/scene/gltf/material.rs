@@ -205,7 +205,7 @@ fn is_lambertian(material: &json::Material) -> bool {
 }
 
 /// Returns whether the material transmits light.
-pub(super) fn is_transmissive(material: &json::Material) -> bool {
+fn is_transmissive(material: &json::Material) -> bool {
     let transmission = material.extensions.as_ref().and_then(|extensions| extensions.transmission.as_ref());
     transmission.is_some_and(|transmission| transmission.transmission_factor.0 > 0.0)
 }

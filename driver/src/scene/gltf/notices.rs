@@ -10,7 +10,7 @@ use gltf::json::validation::Checked;
 use super::document::Document;
 use super::extensions::SUPPORTED_EXTENSIONS;
 use super::light;
-use super::material::{has_dark_texture, is_transmissive};
+use super::material::has_dark_texture;
 use super::names::mesh_name;
 use super::not_finite::NotFinite;
 use super::primitive::Topology;
@@ -112,10 +112,6 @@ fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String]
     note("emissive textures are ignored where the emissive factor or strength is 0", "material", &dark);
     let blended = materials(root, |material| material.alpha_mode == Checked::Valid(AlphaMode::Blend));
     note("alpha is ignored, the surface is rendered opaque", "material", &blended);
-    let frosted = materials(root, |material| {
-        is_transmissive(material) && material.pbr_metallic_roughness.roughness_factor.0 > 0.0
-    });
-    note("rough transmission is rendered as smooth glass", "material", &frosted);
     let unlit = materials(root, |material| {
         material.extensions.as_ref().is_some_and(|extensions| extensions.unlit.is_some())
     });

@@ -140,19 +140,8 @@ impl GgxLobe {
     }
 
     /// A direction of density `p` at a point of the unit square; it may lie below the surface.
-    pub(super) fn direction(&self, normal: Vec3, outgoing: Vec3, [u, v]: [f32; 2]) -> Vec3 {
-        let height = normal.dot(outgoing);
-        // The ellipsoid of normals, scaled to a sphere.
-        let flat = outgoing - normal * height;
-        let stretched = unit(flat * self.alpha + normal * height);
-        let top = normal.dot(stretched);
-        let z = (1.0 - v) * (1.0 + top) - top;
-        let sine = libm::sqrtf(max(1.0 - z * z, 0.0));
-        let angle = 2.0 * PI * u;
-        let cap = from_frame(normal, sine * libm::cosf(angle), sine * libm::sinf(angle), z) + stretched;
-        let cap_height = normal.dot(cap);
-        let half = unit((cap - normal * cap_height) * self.alpha + normal * max(cap_height, 0.0));
-        mirror(outgoing, half)
+    pub(super) fn direction(&self, normal: Vec3, outgoing: Vec3, point: [f32; 2]) -> Vec3 {
+        mirror(outgoing, visible_normal(normal, outgoing, self.alpha, point))
     }
 
     /// `true` if `F0` or `F90` is above 0 in some channel.
@@ -160,6 +149,32 @@ impl GgxLobe {
     pub(super) fn reflects(&self) -> bool {
         max_component(self.f0) > 0.0 || max_component(self.f90) > 0.0
     }
+}
+
+/// A microfacet's normal, by the density of visible normals, at a point of the unit square.
+fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) -> Vec3 {
+    let height = normal.dot(outgoing);
+    // The ellipsoid of normals, scaled to a sphere.
+    let flat = outgoing - normal * height;
+    let stretched = unit(flat * alpha + normal * height);
+    let top = normal.dot(stretched);
+    let z = (1.0 - v) * (1.0 + top) - top;
+    let sine = libm::sqrtf(max(1.0 - z * z, 0.0));
+    let angle = 2.0 * PI * u;
+    let cap = from_frame(normal, sine * libm::cosf(angle), sine * libm::sinf(angle), z) + stretched;
+    let cap_height = normal.dot(cap);
+    unit((cap - normal * cap_height) * alpha + normal * max(cap_height, 0.0))
+}
+
+/// The normal of a visible microfacet of a roughness, at a point of the unit square.
+pub(super) fn microfacet(normal: Vec3, outgoing: Vec3, roughness: f32, point: [f32; 2]) -> Vec3 {
+    visible_normal(normal, outgoing, max(roughness * roughness, MIN_ALPHA), point)
+}
+
+/// Smith's masking `G1` at a cosine to the normal, 0 to 1.
+pub(super) fn masking(roughness: f32, cosine: f32) -> f32 {
+    let (alpha, cosine) = (max(roughness * roughness, MIN_ALPHA), max(cosine, 0.0));
+    2.0 * cosine / max(cosine + length(alpha, cosine), f32::MIN_POSITIVE)
 }
 
 /// A lobe with `F = 1` seen from one direction, as a factor of photons' power: `D V` over its bound

@@ -5,20 +5,24 @@
 //! cosines above 0.2, to 0.02 below.
 
 /// Entries along each axis: roughness 0 to 1, square root of the cosine 0 to 1.
-const SIDE: usize = 16;
+pub(super) const SIDE: usize = 16;
 
 /// `[A, B]` at a roughness and a cosine between normal and outgoing direction, both 0 to 1.
 #[inline(never)]
 pub(super) fn albedo_shares(roughness: f32, cosine: f32) -> [f32; 2] {
+    [&F0_SHARES, &F90_SHARES].map(|table| interpolated(table, roughness, cosine))
+}
+
+/// Value of a table of (roughness, square root of the cosine), in steps of 1/255.
+#[inline(always)]
+pub(super) fn interpolated(table: &[[u8; SIDE]; SIDE], roughness: f32, cosine: f32) -> f32 {
     let (row, down) = cell(roughness);
     let (column, across) = cell(libm::sqrtf(if cosine > 0.0 { cosine } else { 0.0 }));
-    [&F0_SHARES, &F90_SHARES].map(|table| {
-        let entry = |row: usize, column: usize| {
-            table.get(row).and_then(|row| row.get(column)).map_or(0.0, |&share| f32::from(share))
-        };
-        let between = |row: usize| entry(row, column) * (1.0 - across) + entry(row, column + 1) * across;
-        (between(row) * (1.0 - down) + between(row + 1) * down) * (1.0 / 255.0)
-    })
+    let entry = |row: usize, column: usize| {
+        table.get(row).and_then(|row| row.get(column)).map_or(0.0, |&share| f32::from(share))
+    };
+    let between = |row: usize| entry(row, column) * (1.0 - across) + entry(row, column + 1) * across;
+    (between(row) * (1.0 - down) + between(row + 1) * down) * (1.0 / 255.0)
 }
 
 /// Index of the entry before a coordinate, and the rest, 0 to 1. NaN counts as 0.

@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::ggx::GgxLobe;
 use super::phong::PhongLobe;
+use super::sheen::SheenLobe;
 
 /// A lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,6 +14,8 @@ pub(super) enum Lobe {
     Phong(PhongLobe),
     /// glTF's metallic-roughness model.
     Ggx(GgxLobe),
+    /// `KHR_materials_sheen`. Rays follow it always.
+    Sheen(SheenLobe),
 }
 
 impl Lobe {
@@ -25,6 +28,7 @@ impl Lobe {
         match self {
             Self::Phong(lobe) => lobe.reflects(),
             Self::Ggx(lobe) => lobe.reflects(),
+            Self::Sheen(lobe) => lobe.reflects(),
         }
     }
 
@@ -34,6 +38,7 @@ impl Lobe {
         match self {
             Self::Phong(lobe) => lobe.albedo,
             Self::Ggx(lobe) => lobe.albedo,
+            Self::Sheen(lobe) => lobe.albedo(),
         }
     }
 
@@ -43,6 +48,7 @@ impl Lobe {
         match self {
             Self::Phong(lobe) => Self::Phong(PhongLobe { albedo: lobe.albedo * colour, ..lobe }),
             Self::Ggx(lobe) => Self::Ggx(lobe.dimmed(colour)),
+            Self::Sheen(lobe) => Self::Sheen(lobe.dimmed(colour)),
         }
     }
 }

@@ -13,14 +13,18 @@
 
 mod ggx;
 mod ggx_albedo;
+mod keeps_photons;
+mod layered;
 mod lobe;
 mod material;
 mod metallic_roughness;
 mod phong;
 mod record;
 mod reflector;
+mod sheen;
 
-pub use material::keeps_photons;
+pub use keeps_photons::keeps_photons;
+pub(super) use layered::{Layer, LayerTexel, Taken, take};
 pub(super) use material::{Scattering, Texel, View, scattering};
 pub use record::{DecodedLobe, PartialReflection};
 pub use reflector::{ReflectedDirection, Reflector};
@@ -84,6 +88,7 @@ impl Reflection {
         match &self.lobe {
             Lobe::Phong(_) => false,
             Lobe::Ggx(lobe) => lobe.is_followed && lobe.reflects(),
+            Lobe::Sheen(lobe) => lobe.reflects(),
         }
     }
 

@@ -39,6 +39,8 @@ impl PartialReflection {
                 let shape = Shape::ggx(reflector, lobe);
                 (shape, lobe.colour(), shape.kernel().bound())
             }
+            // Followed by rays: no photon is gathered for it.
+            Lobe::Sheen(_) => (Shape([0; 4]), Vec3::ZERO, 0.0),
         };
         Self {
             diffuse: Rgbe::encode((reflector.lambertian() * weight).to_array(), dither),

@@ -13,6 +13,7 @@ use super::Reflection;
 use super::ggx::Geometry;
 use super::lobe::Lobe;
 use super::phong::PhongLobe;
+use super::sheen::SheenLobe;
 use crate::vector::{from_frame, max, max_component, mirror};
 
 /// A direction that is reflected to, and its weight.
@@ -46,6 +47,7 @@ impl Reflector {
             + match &self.reflection.lobe {
                 Lobe::Phong(lobe) => lobe.evaluate(self.phong_power(lobe, incident)),
                 Lobe::Ggx(lobe) => lobe.evaluate(&self.geometry(incident)),
+                Lobe::Sheen(lobe) => lobe.evaluate(self.normal, self.outgoing, incident),
             }
     }
 
@@ -94,6 +96,7 @@ impl Reflector {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.exponent,
             Lobe::Ggx(lobe) => 0.5 / (lobe.alpha() * lobe.alpha()),
+            Lobe::Sheen(_) => 0.0,
         }
     }
 
@@ -103,6 +106,7 @@ impl Reflector {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.direction(mirror(self.outgoing, self.normal), point),
             Lobe::Ggx(lobe) => lobe.direction(self.normal, self.outgoing, point),
+            Lobe::Sheen(_) => SheenLobe::direction(self.normal, point),
         }
     }
 
@@ -111,6 +115,10 @@ impl Reflector {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.albedo * (lobe.gain() * max(self.normal.dot(direction), 0.0)),
             Lobe::Ggx(lobe) => lobe.weight(&self.geometry(direction)),
+            Lobe::Sheen(lobe) => {
+                let cosine = max(self.normal.dot(direction), 0.0);
+                lobe.evaluate(self.normal, self.outgoing, direction) * (cosine / lobe.density())
+            }
         }
     }
 
@@ -120,6 +128,7 @@ impl Reflector {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.gain(),
             Lobe::Ggx(lobe) => lobe.gain(&self.geometry(direction)),
+            Lobe::Sheen(lobe) => lobe.gain(self.normal, self.outgoing, direction),
         }
     }
 
@@ -129,6 +138,7 @@ impl Reflector {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.density(self.phong_power_or_zero(lobe, direction)),
             Lobe::Ggx(lobe) => lobe.density(&self.geometry(direction)),
+            Lobe::Sheen(lobe) => lobe.density(),
         }
     }
 
@@ -144,6 +154,7 @@ impl Reflector {
                 let geometry = self.geometry(direction);
                 (self.lambertian() + lobe.evaluate(&geometry), lobe.density(&geometry))
             }
+            Lobe::Sheen(lobe) => (self.evaluate(direction), lobe.density()),
         }
     }
 
@@ -169,7 +180,7 @@ impl Reflector {
                 let power = self.phong_power(lobe, direction);
                 (self.lambertian() + lobe.sampled_value(power), lobe.sampled_density(power))
             }
-            Lobe::Ggx(_) => self.sampled(direction),
+            Lobe::Ggx(_) | Lobe::Sheen(_) => self.sampled(direction),
         };
         let density = diffuse_share * cosine * FRAC_1_PI + (1.0 - diffuse_share) * lobe_density;
         let weight = value * (cosine / density);

@@ -1,0 +1,63 @@
+//! Layers of materials, read from card memory with their textures.
+
+use glam::Vec3;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{Layers, Material, Record, Reflectance};
+use photoncard_shared::message::Fault;
+
+use super::SceneImage;
+use super::corners::Corners;
+use super::reflection::LayerTexel;
+use crate::memory::MemoryPort;
+
+const LAYERS_PER_LINE: u32 = Layers::PER_LINE as u32;
+
+/// `true` for a material whose surfaces have several layers, or one that takes random numbers: rough glass.
+#[inline(always)]
+pub(super) fn has_layers(material: &Material) -> bool {
+    material.layers.is_some()
+        || matches!(material.reflectance, Reflectance::Glass { roughness, .. } if roughness > 0.0)
+}
+
+/// Layers of a material.
+pub(super) fn read_layers(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    material: &Material,
+) -> Result<Layers, Fault> {
+    let Some(index) = material.layers else { return Ok(Layers::NONE) };
+    let bytes = scene.record::<{ Layers::BYTES }, LAYERS_PER_LINE>(memory, SectionKind::Layers, index)?;
+    Ok(Layers::read(bytes))
+}
+
+/// Values of the layers' textures at a point.
+pub(super) fn layer_texel(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    corners: Option<&Corners>,
+    layers: &Layers,
+) -> Result<LayerTexel, Fault> {
+    let mut read = |index: u16| match corners {
+        Some(corners) => corners.texture(scene, memory, index),
+        None => Ok([1.0; 4]),
+    };
+    let textures = &layers.textures;
+    let [.., specular] = read(textures.specular)?;
+    let [coat, ..] = read(textures.coat)?;
+    let [_, coat_roughness, ..] = read(textures.coat_roughness)?;
+    let [.., sheen_roughness] = read(textures.sheen_roughness)?;
+    let [transmission, ..] = read(textures.transmission)?;
+    let [.., diffuse_transmission] = read(textures.diffuse_transmission)?;
+    let mut colour = |index: u16| read(index).map(|[red, green, blue, _]| Vec3::new(red, green, blue));
+    Ok(LayerTexel {
+        specular,
+        specular_colour: colour(textures.specular_colour)?,
+        coat,
+        coat_roughness,
+        sheen: colour(textures.sheen)?,
+        sheen_roughness,
+        transmission,
+        diffuse_transmission,
+        diffuse_transmission_colour: colour(textures.diffuse_transmission_colour)?,
+    })
+}

@@ -1,0 +1,307 @@
+//! Surfaces of several layers: coat, sheen, base, and the reflection of the other side that diffuse or rough transmission shows.
+//!
+//! A path takes one layer at random, in proportion to its share of the light, and the reflection of that layer over the probability:
+//! the samples of a pixel cover all of them. So a surface has one lobe whatever its layers, in registers and in the record of a
+//! waiting gather. Light that reaches a layer is dimmed by the directional albedo of those above it. Coat, sheen and transmission are
+//! followed by rays, and only the base is lit by photons: `NARROW_LOBE` or not.
+
+use glam::Vec3;
+use photoncard_shared::layout::{Layers, Material, NARROW_LOBE, Reflectance, THIN_WALLED};
+
+use super::Reflection;
+use super::ggx::{GgxLobe, masking, microfacet};
+use super::lobe::Lobe;
+use super::material::{Scattering, Texel, View, scattering};
+use super::metallic_roughness::MetallicRoughness;
+use super::sheen::SheenLobe;
+use crate::scene::specular::{Glass, Specular};
+use crate::vector::{max, max_component};
+
+/// Minimum probability of a layer that reflects light: it bounds the weight of a sample.
+const MIN_PROBABILITY: f32 = 1.0 / 8.0;
+
+/// F0 of a coat: of the index of refraction 1.5.
+const COAT_F0: f32 = 0.04;
+
+/// Factors of [`Layers`] at a point, from textures.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::scene) struct LayerTexel {
+    pub(in crate::scene) specular: f32,
+    pub(in crate::scene) specular_colour: Vec3,
+    pub(in crate::scene) coat: f32,
+    pub(in crate::scene) coat_roughness: f32,
+    pub(in crate::scene) sheen: Vec3,
+    pub(in crate::scene) sheen_roughness: f32,
+    pub(in crate::scene) transmission: f32,
+    pub(in crate::scene) diffuse_transmission: f32,
+    pub(in crate::scene) diffuse_transmission_colour: Vec3,
+}
+
+impl LayerTexel {
+    const WHITE: Self = Self {
+        specular: 1.0,
+        specular_colour: Vec3::ONE,
+        coat: 1.0,
+        coat_roughness: 1.0,
+        sheen: Vec3::ONE,
+        sheen_roughness: 1.0,
+        transmission: 1.0,
+        diffuse_transmission: 1.0,
+        diffuse_transmission_colour: Vec3::ONE,
+    };
+}
+
+/// A layer, with what is left of its light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::scene) enum Layer {
+    Base,
+    Coat,
+    Sheen,
+    /// The reflection of the other side, seen through the surface.
+    Behind,
+}
+
+/// The layer that a path takes.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::scene) struct Taken {
+    pub(in crate::scene) layer: Layer,
+    /// Its scattering over `probability`.
+    pub(in crate::scene) scattering: Scattering,
+    /// Shading normal.
+    pub(in crate::scene) normal: Vec3,
+    pub(in crate::scene) probability: f32,
+}
+
+/// All layers at a point.
+struct Stack {
+    base: Scattering,
+    base_normal: Vec3,
+    behind: Reflection,
+    sheen: SheenLobe,
+    coat: Scattering,
+}
+
+/// Takes a layer of a material at a point. `coat_normal` is the coat's shading normal. Of `random`, numbers in [0, 1), 0 chooses the
+/// layer, 1 and 2 the microfacet of rough glass. The first layer of the lowest number is the base.
+#[inline(never)]
+pub(in crate::scene) fn take(
+    (material, layers): (&Material, &Layers),
+    (texel, layer_texel): (&Texel, &LayerTexel),
+    view: &View,
+    coat_normal: Vec3,
+    random: &dyn Fn(u32) -> f32,
+) -> Taken {
+    let material = varied(material, layers, layer_texel);
+    let [normal, _] = view.normals;
+    let cosine = normal.dot(view.outgoing);
+    let coat = coat(layers, layer_texel, coat_normal.dot(view.outgoing));
+    let sheen = SheenLobe::new(
+        Vec3::from(layers.sheen) * layer_texel.sheen,
+        layers.sheen_roughness * layer_texel.sheen_roughness,
+        cosine,
+    );
+    let (base, base_normal, behind) = base(&material, (layers, layer_texel), texel, view, random);
+    let below_coat = Vec3::splat(max(1.0 - albedo(&coat), 0.0));
+    let below_sheen = below_coat * max(1.0 - max_component(sheen.albedo()), 0.0);
+    let stack = Stack {
+        base: dimmed(base, below_sheen),
+        base_normal,
+        behind: behind.dimmed(below_sheen),
+        sheen: sheen.dimmed(below_coat),
+        coat,
+    };
+    stack.take(view, coat_normal, random(0))
+}
+
+impl Stack {
+    fn take(&self, view: &View, coat_normal: Vec3, random: f32) -> Taken {
+        let [normal, _] = view.normals;
+        let shares = [
+            (Layer::Base, albedo(&self.base)),
+            (Layer::Coat, albedo(&self.coat)),
+            (Layer::Sheen, max_component(self.sheen.albedo())),
+            (Layer::Behind, max_component(self.behind.diffuse) + max_component(self.behind.lobe.albedo())),
+        ];
+        let sum: f32 = shares.iter().map(|(_, share)| share).sum();
+        let bounded = |share: f32| if share > 0.0 { max(share, sum * MIN_PROBABILITY) } else { 0.0 };
+        let all: f32 = shares.iter().map(|&(_, share)| bounded(share)).sum();
+        let mut rest = random * all;
+        let mut taken = (Layer::Base, 1.0);
+        for (layer, share) in shares {
+            let share = bounded(share);
+            if share <= 0.0 {
+                continue;
+            }
+            taken = (layer, share / all);
+            rest -= share;
+            if rest < 0.0 {
+                break;
+            }
+        }
+        let (layer, probability) = taken;
+        let (scattering, normal) = match layer {
+            Layer::Base => (self.base, self.base_normal),
+            Layer::Coat => (self.coat, coat_normal),
+            Layer::Sheen => (Scattering::of_lobe(Lobe::Sheen(self.sheen)), normal),
+            Layer::Behind => (Scattering { reflection: self.behind, ..Scattering::BLACK }, -normal),
+        };
+        // Whichever layer the light goes to, it has come through the glass.
+        let scattering = Scattering { absorption: self.base.absorption, ..scattering };
+        let scattering = dimmed(scattering, Vec3::splat(1.0 / probability));
+        Taken { layer, scattering, normal, probability }
+    }
+}
+
+/// The material with the textures of its reflectance and transmission applied.
+fn varied(material: &Material, layers: &Layers, texel: &LayerTexel) -> Material {
+    let mut material = *material;
+    match &mut material.reflectance {
+        Reflectance::MetallicRoughness { dielectric, grazing, .. } => {
+            let [r, g, b] = layers.specular;
+            let f0 = (Vec3::new(r, g, b) * texel.specular_colour).min(Vec3::ONE);
+            *grazing *= texel.specular;
+            *dielectric = (f0 * *grazing).to_array();
+        }
+        Reflectance::Glass { transmission, specular, .. } => {
+            *transmission *= texel.transmission;
+            *specular *= texel.specular;
+        }
+        Reflectance::Phong { .. } => {}
+    }
+    material
+}
+
+/// The coat's lobe, or mirror at roughness 0, seen at a cosine.
+fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> Scattering {
+    let factor = layers.coat * texel.coat;
+    if factor <= 0.0 {
+        return Scattering::BLACK;
+    }
+    let roughness = layers.coat_roughness * texel.coat_roughness;
+    let surface = MetallicRoughness {
+        base: Vec3::ZERO,
+        dielectric: Vec3::splat(COAT_F0 * factor),
+        grazing: factor,
+        metallic: 0.0,
+        roughness,
+        has_narrow_lobe: true,
+    };
+    if layers.coat_roughness > 0.0 {
+        Scattering { reflection: surface.reflection(cosine), ..Scattering::BLACK }
+    } else {
+        let (_, specular) = surface.smooth(cosine);
+        Scattering { specular, ..Scattering::BLACK }
+    }
+}
+
+/// The base's reflection, without its narrow lobe: photons light it.
+pub(super) fn lit_by_photons(material: &Material, texel: &Texel, view: &View) -> Reflection {
+    let none = LayerTexel::WHITE;
+    let (base, ..) = base(material, (&Layers::NONE, &none), texel, view, &|_| 0.0);
+    base.reflection.without_narrow_lobe()
+}
+
+/// The base with its shading normal, and the reflection of the other side that it shows.
+fn base(
+    material: &Material,
+    layers: (&Layers, &LayerTexel),
+    texel: &Texel,
+    view: &View,
+    random: &dyn Fn(u32) -> f32,
+) -> (Scattering, Vec3, Reflection) {
+    let [normal, _] = view.normals;
+    if let Reflectance::Glass { roughness, .. } = material.reflectance
+        && roughness > 0.0
+    {
+        return rough_glass(material, texel, view, [random(1), random(2)]);
+    }
+    let mut base = scattering(material, texel, view);
+    let (layers, layer_texel) = layers;
+    let share = layers.diffuse_transmission * layer_texel.diffuse_transmission;
+    if share <= 0.0 {
+        return (base, normal, Reflection::BLACK);
+    }
+    let colour = Vec3::from(layers.diffuse_transmission_colour) * layer_texel.diffuse_transmission_colour;
+    let white = match material.reflectance {
+        Reflectance::MetallicRoughness { dielectric, grazing, metallic, roughness, .. } => {
+            let reflectance =
+                Reflectance::MetallicRoughness { base: [1.0; 3], dielectric, grazing, metallic, roughness };
+            scattering(&Material { reflectance, ..*material }, &Texel { colour: Vec3::ONE, ..*texel }, view)
+        }
+        _ => base,
+    };
+    base.reflection.diffuse *= 1.0 - share;
+    (base, normal, Reflection::lambertian(white.reflection.diffuse * colour * share))
+}
+
+/// Rough glass. A thin wall shows the reflection of its other side, by the lobe of the microfacets. The surface of a volume is a
+/// perfectly specular one at a microfacet of visible normals (Walter et al. 2007), but for the reflection outside, which is a lobe.
+fn rough_glass(
+    material: &Material,
+    texel: &Texel,
+    view: &View,
+    point: [f32; 2],
+) -> (Scattering, Vec3, Reflection) {
+    let View { outgoing, normals, is_front } = *view;
+    let [normal, geometric_normal] = normals;
+    let black = (Scattering::BLACK, normal, Reflection::BLACK);
+    let Reflectance::Glass { base, absorption, transmission, ior, specular, metallic, roughness } =
+        material.reflectance
+    else {
+        return black;
+    };
+    let cosine = normal.dot(outgoing);
+    let [metallic, roughness] = [metallic * texel.metallic, roughness * texel.roughness];
+    let (colour, is_thin) = (Vec3::from(base) * texel.colour, material.flags & THIN_WALLED != 0);
+    let amplitude = (ior - 1.0) / (ior + 1.0);
+    let surface = MetallicRoughness {
+        base: colour,
+        dielectric: Vec3::splat(amplitude * amplitude * specular),
+        grazing: specular,
+        metallic,
+        roughness,
+        has_narrow_lobe: material.flags & NARROW_LOBE != 0,
+    };
+    let mut outside = surface.reflection(cosine);
+    let through = outside.diffuse * transmission;
+    outside.diffuse *= 1.0 - transmission;
+    let reflected = Scattering { reflection: outside, ..Scattering::BLACK };
+    if is_thin {
+        let mut lobe = GgxLobe::new(through, through, roughness, cosine);
+        lobe.is_followed = true;
+        return (reflected, normal, Reflection { diffuse: Vec3::ZERO, lobe: Lobe::Ggx(lobe) });
+    }
+    let microfacet = microfacet(normal, outgoing, roughness, point);
+    let tint = Vec3::from_array(colour.to_array().map(libm::sqrtf));
+    let absorption = Vec3::from(absorption);
+    let glass = Glass { base: tint, absorption, transmission, ior, specular, is_thin };
+    let (_, refracted) = glass.at(outgoing, [microfacet, geometric_normal], !is_front);
+    // Of sampled visible normals, G2 / G1 = G1 of the direction of incidence remains.
+    let mirrored = Specular::reflected_direction(outgoing, microfacet, geometric_normal);
+    let [beside, behind] = [normal.dot(mirrored), -normal.dot(refracted.behind)]
+        .map(|cosine| masking(roughness, cosine) * (1.0 - metallic));
+    let transmitted = refracted.transmitted * behind;
+    if is_front {
+        let specular = Specular { reflected: Vec3::ZERO, transmitted, ..refracted };
+        return (Scattering { specular, ..reflected }, normal, Reflection::BLACK);
+    }
+    let specular = Specular { reflected: refracted.reflected * beside, transmitted, ..refracted };
+    (Scattering { specular, absorption, ..Scattering::BLACK }, microfacet, Reflection::BLACK)
+}
+
+/// The greatest albedo of all ways on from a point.
+fn albedo(Scattering { reflection, specular, .. }: &Scattering) -> f32 {
+    let Reflection { diffuse, lobe } = reflection;
+    [*diffuse, lobe.albedo(), specular.reflected, specular.transmitted].into_iter().map(max_component).sum()
+}
+
+/// Scattering times a colour.
+fn dimmed(scattering: Scattering, colour: Vec3) -> Scattering {
+    let Scattering { reflection, specular, .. } = scattering;
+    let specular = Specular {
+        reflected: specular.reflected * colour,
+        transmitted: specular.transmitted * colour,
+        ..specular
+    };
+    Scattering { reflection: reflection.dimmed(colour), specular, ..scattering }
+}
