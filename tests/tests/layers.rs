@@ -86,7 +86,8 @@ fn a_coat_reflects_its_albedo_and_leaves_the_rest_to_the_base() {
     for (roughness, cosine, albedo) in COATS {
         for (factor, base) in [(1.0_f32, 0.0_f32), (0.5, 0.0), (1.0, 0.5)] {
             let of_coat = albedo * f64::from(factor);
-            let expected = of_coat + (1.0 - of_coat) * f64::from(base);
+            let fresnel = f64::from(factor * (0.04 + 0.96 * (1.0 - cosine).powi(5)));
+            let expected = of_coat + (1.0 - fresnel.max(of_coat)) * f64::from(base);
             let found = plate(dielectric(base, 0.0, coat(factor, roughness)), cosine);
             let error = found - expected;
             assert!(

@@ -94,14 +94,14 @@ pub(in crate::scene) fn take(
     let material = varied(material, layers, layer_texel);
     let [normal, _] = view.normals;
     let cosine = normal.dot(view.outgoing);
-    let coat = coat(layers, layer_texel, coat_normal.dot(view.outgoing));
+    let (coat, coat_fresnel) = coat(layers, layer_texel, coat_normal.dot(view.outgoing));
     let sheen = SheenLobe::new(
         Vec3::from(layers.sheen) * layer_texel.sheen,
         layers.sheen_roughness * layer_texel.sheen_roughness,
         cosine,
     );
     let (base, base_normal, behind) = base(&material, (layers, layer_texel), texel, view, random);
-    let below_coat = Vec3::splat(max(1.0 - albedo(&coat), 0.0));
+    let below_coat = Vec3::splat(max(1.0 - max(albedo(&coat), coat_fresnel), 0.0));
     let below_sheen = below_coat * max(1.0 - max_component(sheen.albedo()), 0.0);
     let stack = Stack {
         base: dimmed(base, below_sheen),
@@ -171,11 +171,11 @@ fn varied(material: &Material, layers: &Layers, texel: &LayerTexel) -> Material 
     material
 }
 
-/// The coat's lobe, or mirror at roughness 0, seen at a cosine.
-fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> Scattering {
+/// The coat's lobe, or mirror at roughness 0, seen at a cosine, and its `F(n.o)`, by which glTF dims all below it.
+fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
     let factor = layers.coat * texel.coat;
     if factor <= 0.0 {
-        return Scattering::BLACK;
+        return (Scattering::BLACK, 0.0);
     }
     let roughness = layers.coat_roughness * texel.coat_roughness;
     let surface = MetallicRoughness {
@@ -186,11 +186,12 @@ fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> Scattering {
         roughness,
         has_narrow_lobe: true,
     };
+    let (_, specular) = surface.smooth(cosine);
+    let fresnel = max_component(specular.reflected);
     if layers.coat_roughness > 0.0 {
-        Scattering { reflection: surface.reflection(cosine), ..Scattering::BLACK }
+        (Scattering { reflection: surface.reflection(cosine), ..Scattering::BLACK }, fresnel)
     } else {
-        let (_, specular) = surface.smooth(cosine);
-        Scattering { specular, ..Scattering::BLACK }
+        (Scattering { specular, ..Scattering::BLACK }, fresnel)
     }
 }
 

@@ -13,7 +13,7 @@ use super::Reflection;
 use super::ggx::GgxLobe;
 use super::lobe::Lobe;
 use crate::scene::specular::Specular;
-use crate::vector::max_component;
+use crate::vector::{max, max_component, min};
 
 /// A metallic-roughness surface at one point, textures applied.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,7 @@ impl MetallicRoughness {
     pub(super) fn reflection(&self, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
         let lobe = self.lobe(f0, f90, cosine);
-        let coat = lobe.albedo_of(self.dielectric, self.grazing);
+        let coat = max(lobe.albedo_of(self.dielectric, self.grazing), self.mean_fresnel(cosine));
         let diffuse = self.base * ((1.0 - self.metallic) * (1.0 - coat));
         Reflection { diffuse, lobe: Lobe::Ggx(lobe) }
     }
@@ -59,8 +59,16 @@ impl MetallicRoughness {
         let share = squared * squared * rest;
         let [f0, f90] = self.mixed();
         let coat = max_component(towards(self.dielectric, Vec3::splat(self.grazing), share));
+        let coat = max(coat, self.mean_fresnel(cosine));
         let diffuse = self.base * ((1.0 - self.metallic) * (1.0 - coat));
         (Reflection::lambertian(diffuse), Specular::mirror(towards(f0, f90, share)))
+    }
+
+    /// The dielectric's `F(h.o)` at a cosine between normal and `o`, the mean over the directions of even light: its base is
+    /// dimmed by `1 - F` (glTF 2.0, appendix B.2.4), and by the lobe's albedo where that is more.
+    fn mean_fresnel(&self, cosine: f32) -> f32 {
+        let f0 = max_component(self.dielectric);
+        f0 + (self.grazing - f0) * mean_schlick(cosine)
     }
 
     /// F0 and F90 of metal and dielectric by their shares.
@@ -68,6 +76,12 @@ impl MetallicRoughness {
         let mix = |dielectric: Vec3, metal: Vec3| towards(dielectric, metal, self.metallic);
         [mix(self.dielectric, self.base), mix(Vec3::splat(self.grazing), Vec3::ONE)]
     }
+}
+
+/// Mean of `(1 - h.o)^5` over directions `i` of even light, `h` the half vector of `i` and `o`, at the cosine of `o`: a fit to 0.0001.
+fn mean_schlick(cosine: f32) -> f32 {
+    let rest = 1.0 - min(max(cosine, 0.0), 1.0);
+    rest * (0.0045 + rest * (rest * 0.0257 - 0.0021))
 }
 
 /// Linear interpolation, `from` at a share of 0.
@@ -105,6 +119,23 @@ mod tests {
                 let (reflection, specular) = surface.smooth(cosine);
                 assert!((reflection.diffuse + specular.reflected).max_element() <= 1.000_001, "{surface:?}");
             }
+        }
+    }
+
+    #[test]
+    fn the_base_is_dimmed_by_the_mean_of_the_fresnel_reflectance() {
+        for cosine in [0.05_f32, 0.4, 0.8, 1.0] {
+            let outgoing = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
+            let mut sum = 0.0_f64;
+            for (a, b) in (0..300_u16).flat_map(|a| (0..300_u16).map(move |b| (a, b))) {
+                let [height, angle] = [a, b].map(|i| (f32::from(i) + 0.5) / 300.0);
+                let (sine, angle) = ((1.0 - height).sqrt(), angle * core::f32::consts::TAU);
+                let incident = Vec3::new(sine * angle.cos(), height.sqrt(), sine * angle.sin());
+                let along = (incident + outgoing).normalize().dot(outgoing);
+                sum += f64::from((1.0 - along).powi(5));
+            }
+            let mean = (sum / 90_000.0) as f32;
+            assert!((mean - mean_schlick(cosine)).abs() < 2e-4, "{cosine}: {mean}");
         }
     }
 
