@@ -98,9 +98,9 @@ impl PackedScene {
 
 /// Writes the sections of a scene.
 fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
-    let cut_out: Vec<bool> = scene.materials.iter().map(|material| material.alpha_cutoff.is_some()).collect();
-    let hierarchy = bvh::build(&scene.triangles, &cut_out)?;
-    let corners = PackedCorners::new(scene, lights, &hierarchy.leaf_triangles);
+    let uncovered = scene.uncovered_materials();
+    let hierarchy = bvh::build(&scene.triangles, &uncovered)?;
+    let corners = PackedCorners::new(scene, lights, (&hierarchy.leaf_triangles, &uncovered));
     let textures = textures::records(scene, lights.environment())?;
     let indices = indices_in_image(scene, &hierarchy.leaf_triangles);
     let mut image = ImageWriter::new(header(scene, lights));
@@ -108,7 +108,7 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     image.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
     image.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
     image.append(SectionKind::Attributes, corners.records.iter().map(layout::Attributes::to_bytes))?;
-    image.append(SectionKind::Materials, materials::records(scene, lights))?;
+    image.append(SectionKind::Materials, materials::records(scene, lights, &uncovered))?;
     image.append(SectionKind::Layers, materials::layers(scene).into_iter())?;
     image.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
     image.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;

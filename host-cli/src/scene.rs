@@ -85,6 +85,9 @@ fn material(material: &Material, scene: &Scene) -> String {
     if let Some(cutoff) = material.alpha_cutoff {
         parts.push(format!("not there where alpha {} is below {cutoff}", material.alpha));
     }
+    if material.blends {
+        parts.push(format!("covered by alpha {}", material.alpha));
+    }
     let textures = [
         ("base", material.base_texture),
         ("metallic-roughness", material.metallic_roughness_texture),

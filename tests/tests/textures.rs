@@ -150,8 +150,8 @@ fn roughness_and_metalness_follow_their_texture() {
     // Integrals of the GGX lobe at a cosine of 0.95, by quadrature.
     let metal = Vec3::new(0.792, 0.396, 0.198);
     assert!((albedo(10) - metal).abs().max_element() < 0.005, "{}", albedo(10));
-    let coat = 0.013;
-    let dull = Vec3::new(0.8, 0.4, 0.2) * (1.0 - coat) + coat;
+    let (coat, fresnel) = (0.013, 0.04);
+    let dull = Vec3::new(0.8, 0.4, 0.2) * (1.0 - fresnel) + coat;
     assert!((albedo(37) - dull).abs().max_element() < 0.005, "{}", albedo(37));
 }
 
@@ -217,6 +217,67 @@ fn where_alpha_cuts_out_there_is_nothing() {
     };
     assert!((open / bare - 1.0).abs() < 0.01, "{open} {bare}");
     assert!(half > 0.15 * open && half < 0.5 * open, "{half} of {open}");
+}
+
+/// A sheet of partial coverage before a lamp: eye rays, shadow rays, gather rays and photons pass it in the share that is not there.
+#[test]
+fn where_alpha_is_a_half_half_of_the_light_passes() {
+    let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
+    let sheet = |alpha| Material { blends: true, alpha, double_sided: true, ..lambertian("sheet", 0.0) };
+    let light = |alpha: f32| {
+        let view = camera(Vec3::new(0.0, 0.5, 0.9), Vec3::new(0.0, -0.5, -0.9));
+        let materials = vec![lamp.clone(), lambertian("floor", 0.8), sheet(alpha)];
+        let mut scene = scene(room([1, 1, 1, 0, 1, 1]), materials, view);
+        let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, z]| Vec3::new(x, 0.7, z));
+        add_textured_quad(&mut scene, corners, [[0., 0.], [8., 0.], [8., 8.], [0., 8.]], 2);
+        mean(&radiances(&render_or_panic(&scene, &settings()).film))
+    };
+    let open = light(0.0);
+    // The sheet absorbs light of either side: below it every path to the lamp passes it once at least.
+    for alpha in [0.25_f32, 0.75] {
+        let found = light(alpha) / open;
+        let most = f64::from(1.0 - alpha);
+        assert!(found < most && found > 0.7 * most, "{alpha}: {found}");
+    }
+}
+
+/// Radiance of a black sheet of partial coverage before a lamp, and of the lamp through it.
+#[test]
+fn a_sheet_shows_itself_by_its_alpha_and_what_is_behind_by_the_rest() {
+    let sheet = Material {
+        blends: true,
+        alpha: 0.3,
+        base_texture: Some(0),
+        emission: Vec3::splat(4.0),
+        double_sided: true,
+        ..lambertian("sheet", 0.0)
+    };
+    let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
+    let view = camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z);
+    let mut scene = scene(room([0; 6]), vec![lamp, sheet], view);
+    let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(x, y, 0.0));
+    add_textured_quad(&mut scene, corners, [[0., 0.], [8., 0.], [8., 8.], [0., 8.]], 1);
+    let scene = with_texture(scene, image(1, Encoding::Srgb, vec![[255, 255, 255, 128]]), Texture::new(0));
+    let found =
+        mean(&radiances(&render_or_panic(&scene, &settings().with(|s| s.integrator.samples = 64)).film));
+    let alpha = 0.3 * 128.0 / 255.0;
+    let expected = alpha * 4.0 + (1.0 - alpha);
+    assert!((found / expected - 1.0).abs() < 0.01, "{found}, not {expected}");
+}
+
+/// A sheet that returns as much light as it takes does not show in a furnace: photons are stored on it as often as gathers ask.
+#[test]
+fn a_sheet_of_partial_coverage_does_not_show_in_a_furnace() {
+    let wall = Material { emission: Vec3::splat(0.5), ..lambertian("wall", 0.5) };
+    let sheet = Material { blends: true, alpha: 0.4, double_sided: true, ..lambertian("sheet", 1.0) };
+    let view = camera(Vec3::new(0.1, 0.05, 0.9), Vec3::new(-0.1, -0.05, -1.0));
+    let mut scene = scene(room([0; 6]), vec![wall, sheet], view);
+    let corners =
+        [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(0.6 * x, 0.6 * y, 0.1 * x));
+    scene.triangles.extend(quad(corners, 1));
+    let found = radiances(&render_or_panic(&scene, &settings().with(|s| s.photons.count = 200_000)).film);
+    let error = mean(&found) - 1.0;
+    assert!(error.abs() < 0.012, "{error}");
 }
 
 /// Interpolated normals equal the ball's, however few its faces are.

@@ -174,7 +174,9 @@ impl SceneEmitter {
                 double_sided: material.double_sided,
                 triangle: 0,
                 material: triangle.material,
-                varies: material.emissive_texture.is_some() || material.alpha_cutoff.is_some(),
+                varies: material.emissive_texture.is_some()
+                    || material.alpha_cutoff.is_some()
+                    || material.blends,
             },
             emission: material.emission.to_array(),
             trail: 0,

@@ -15,11 +15,15 @@ pub(super) struct PackedCorners {
 }
 
 impl PackedCorners {
-    /// Attributes of a scene whose triangles are in `leaves`.
-    pub(super) fn new(scene: &Scene, lights: &Lights, leaves: &[LeafTriangles]) -> Self {
+    /// Attributes of a scene whose triangles are in `leaves`. `uncovered` are [`Scene::uncovered_materials`].
+    pub(super) fn new(
+        scene: &Scene,
+        lights: &Lights,
+        (leaves, uncovered): (&[LeafTriangles], &[bool]),
+    ) -> Self {
         let mut packed = Self { leaves: Vec::with_capacity(leaves.len()), records: Vec::new() };
         for leaf in leaves {
-            let entry = packed.append(scene, lights, leaf);
+            let entry = packed.append(scene, lights, (leaf, uncovered));
             packed.leaves.push(entry);
         }
         if packed.records.is_empty() {
@@ -29,11 +33,16 @@ impl PackedCorners {
     }
 
     /// Appends the records of a leaf. Returns its entry.
-    fn append(&mut self, scene: &Scene, lights: &Lights, leaf: &LeafTriangles) -> u32 {
+    fn append(
+        &mut self,
+        scene: &Scene,
+        lights: &Lights,
+        (leaf, uncovered): (&LeafTriangles, &[bool]),
+    ) -> u32 {
         let triangles = || leaf.iter().map(|&index| &scene.triangles[index as usize]);
         let materials = || triangles().map(|triangle| &scene.materials[triangle.material as usize]);
         let has_corners = triangles().any(|triangle| triangle.attributes != NO_ATTRIBUTES);
-        let has_cut_outs = materials().any(|material| material.alpha_cutoff.is_some());
+        let has_cut_outs = triangles().any(|triangle| uncovered[triangle.material as usize]);
         let has_emitters = leaf.iter().any(|&index| lights.of_triangle(index).is_some());
         if !has_corners && !has_cut_outs && !has_emitters {
             return layout::NO_ATTRIBUTES;

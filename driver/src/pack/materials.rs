@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::{SceneImage, keeps_photons};
 use photoncard_shared::layout::{
-    self, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTextures, NARROW_LOBE, NO_TEXTURE, Record, Reflectance,
+    self, BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTextures, NARROW_LOBE, NO_TEXTURE, Record, Reflectance,
     THIN_WALLED,
 };
 
@@ -18,16 +18,22 @@ pub(super) fn layers(scene: &Scene) -> Vec<[u8; layout::Layers::BYTES]> {
     scene.materials.iter().filter_map(|material| material.layers.as_deref()).map(layers_record).collect()
 }
 
-/// The records of a scene's materials.
-pub(super) fn records(scene: &Scene, lights: &Lights) -> impl ExactSizeIterator<Item = [u8; RECORD_BYTES]> {
+/// The records of a scene's materials; `uncovered` are [`Scene::uncovered_materials`].
+pub(super) fn records(
+    scene: &Scene,
+    lights: &Lights,
+    uncovered: &[bool],
+) -> impl ExactSizeIterator<Item = [u8; RECORD_BYTES]> {
     let mut has_attributes = vec![false; scene.materials.len()];
     for (index, triangle) in (0..).zip(&scene.triangles) {
         let has_any = triangle.attributes != NO_ATTRIBUTES || lights.of_triangle(index).is_some();
         has_attributes[triangle.material as usize] |= has_any;
     }
     let mut layers = 0..;
-    scene.materials.iter().zip(has_attributes).map(move |(material, has_attributes)| {
-        let attributes = if has_attributes { HAS_ATTRIBUTES } else { 0 };
+    let materials = scene.materials.iter().zip(has_attributes).zip(uncovered);
+    materials.map(move |((material, has_attributes), &is_uncovered)| {
+        let mut attributes = if has_attributes || is_uncovered { HAS_ATTRIBUTES } else { 0 };
+        attributes |= if material.blends && is_uncovered { BLENDS } else { 0 };
         let layers = material.layers.as_ref().and_then(|_| layers.next());
         record(material, attributes | lobe_flag(scene, material), layers)
     })
@@ -118,8 +124,12 @@ fn layers_record(layers: &Layers) -> [u8; layout::Layers::BYTES] {
     .to_bytes()
 }
 
-/// Alpha cutoff for the product of texture and vertex alpha: the material's cutoff over its alpha factor.
+/// Alpha cutoff for the product of texture and vertex alpha: the material's cutoff over its alpha factor. Of partial coverage, that
+/// factor.
 fn cutoff(material: &Material) -> f32 {
+    if material.blends {
+        return material.alpha;
+    }
     match material.alpha_cutoff {
         Some(cutoff) if cutoff > 0.0 => cutoff / material.alpha,
         _ => 0.0,

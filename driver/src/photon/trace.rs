@@ -208,9 +208,9 @@ impl Tracer<'_> {
                     if surface.reflection.is_black() || self.purpose == Purpose::Caustics && !is_caustic {
                         break;
                     }
-                    // Photons arrive at the base, or at a layer above it that rays follow.
+                    // Of photons that reach the surface some meet its base: gathers are there as often.
                     if !surface.is_behind {
-                        let power = arrived / surface.probability;
+                        let power = arrived / (surface.probability * surface.coverage);
                         photons.push(self.stored(&surface, power, is_direct, random.dither()));
                     }
                     if self.purpose == Purpose::Caustics {

@@ -25,6 +25,9 @@ pub struct Material {
     /// Alpha below which the surface is cut out (`alphaMode` `MASK`), of `alpha` times the alphas of the base texture
     /// and of the corners' colours.
     pub alpha_cutoff: Option<f32>,
+    /// True for partial coverage (`alphaMode` `BLEND`): the share of the surface that is there is `alpha` times the alphas of the base
+    /// texture and of the corners' colours.
+    pub blends: bool,
     /// Alpha of the base colour factor, 0 to 1.
     pub alpha: f32,
     /// Base colour texture, an index into [`Scene::textures`](super::Scene::textures): its colour (sRGB) multiplies the
@@ -97,6 +100,7 @@ impl Material {
             emission: Vec3::ZERO,
             double_sided: false,
             alpha_cutoff: None,
+            blends: false,
             alpha: 1.0,
             base_texture: None,
             metallic_roughness_texture: None,

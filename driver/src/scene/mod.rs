@@ -108,6 +108,31 @@ impl Scene {
         material.has_narrow_lobe(self.minimum_roughness(material))
     }
 
+    /// For each material, whether parts of its surfaces may not be there: it has cut-outs, or an alpha below 1 that counts.
+    pub(crate) fn uncovered_materials(&self) -> Vec<bool> {
+        let mut uncovered: Vec<bool> =
+            self.materials.iter().map(|material| self.is_uncovered(material)).collect();
+        for triangle in &self.triangles {
+            let attributes = self.attributes.get(triangle.attributes as usize);
+            let has_alpha =
+                attributes.is_some_and(|list| list.colours.iter().any(|&[.., alpha]| alpha < 1.0));
+            let blends =
+                self.materials.get(triangle.material as usize).is_some_and(|material| material.blends);
+            if let Some(entry) = uncovered.get_mut(triangle.material as usize).filter(|_| blends && has_alpha)
+            {
+                *entry = true;
+            }
+        }
+        uncovered
+    }
+
+    fn is_uncovered(&self, material: &Material) -> bool {
+        let texture = material.base_texture.and_then(|index| self.textures.get(index as usize));
+        let image = texture.and_then(|texture| self.images.get(texture.image as usize));
+        let has_alpha = || image.is_some_and(|image| image.texels.iter().any(|&[.., alpha]| alpha < u8::MAX));
+        material.alpha_cutoff.is_some() || material.blends && (material.alpha < 1.0 || has_alpha())
+    }
+
     /// Minimum of a material's roughness texture, 0 to 1; 1 without one.
     fn minimum_roughness(&self, material: &Material) -> f32 {
         let texture = material.metallic_roughness_texture.and_then(|index| self.textures.get(index as usize));

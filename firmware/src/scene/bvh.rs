@@ -9,7 +9,7 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, Triangle, WideNode};
 use photoncard_shared::message::Fault;
 
-use super::cut_out::is_there;
+use super::coverage::is_met;
 use super::slabs::Slabs;
 use super::{Hit, Intersection, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
@@ -94,7 +94,7 @@ impl<M: MemoryPort> Kernel for AnyHit<'_, M> {
     }
 }
 
-/// Hits of triangles with cut-outs in one leaf, before their alpha is read.
+/// Hits of triangles with cut-outs or partial coverage in one leaf, before their alpha is read.
 type CutOuts = heapless::Vec<Hit, LEAF_TRIANGLES>;
 
 /// Calls `visit` with each intersection, the triangle's index, and a function that reads the triangle. The maximum distance is the one
@@ -143,7 +143,8 @@ fn descend(
                 }
                 for Hit { intersection, triangle, index } in &with_cut_outs {
                     let is_near = intersection.distance <= until;
-                    if !is_near || !is_there(scene, memory, triangle, *index, intersection.barycentric)? {
+                    let weights = intersection.barycentric;
+                    if !is_near || !is_met(scene, memory, ray, (*index, triangle), weights)? {
                         continue;
                     }
                     match visit(*intersection, *index, &|| *triangle) {

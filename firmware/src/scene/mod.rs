@@ -2,7 +2,7 @@
 
 mod bvh;
 mod corners;
-mod cut_out;
+mod coverage;
 mod layers;
 pub mod light;
 mod reflection;

@@ -3,11 +3,12 @@
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Record, Reflectance, Triangle,
+    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Record, Reflectance, Triangle,
 };
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
+use super::coverage::covered;
 use super::layers::{has_layers, layer_texel, read_layers};
 use super::reflection::{Layer, Scattering, Taken, Texel, View, scattering, take};
 use super::specular::Specular;
@@ -45,6 +46,8 @@ pub struct Surface {
     pub double_sided: bool,
     /// Probability with which the surface's layer was taken, 1 for a surface of one layer: reflection and emission are over it.
     pub probability: f32,
+    /// Share of the surface that is there, 1 without partial coverage: rays meet it with this probability.
+    pub coverage: f32,
     /// `true` for the other side of a surface, seen through it. Photons are stored on the side where they arrive.
     pub is_behind: bool,
     /// Distance along the ray, metres.
@@ -68,6 +71,7 @@ impl Surface {
             emitter: None,
             double_sided: false,
             probability: 1.0,
+            coverage: 1.0,
             is_behind: false,
             distance: 0.0,
             magnitude,
@@ -227,7 +231,11 @@ fn finished(
     let mut texel = Texel::WHITE;
     if let Some(corners) = &corners {
         let [base, metallic_roughness, emissive] = material.textures;
-        texel.colour = rgb(corners.texture(scene, memory, base)?) * rgb(corners.colour());
+        let [texture, colour] = [corners.texture(scene, memory, base)?, corners.colour()];
+        texel.colour = rgb(texture) * rgb(colour);
+        if material.flags & BLENDS != 0 {
+            surface.coverage = covered(material, texture[3] * colour[3]);
+        }
         [_, texel.roughness, texel.metallic, _] = corners.texture(scene, memory, metallic_roughness)?;
         if max_component(surface.emission) > 0.0 {
             surface.emission *= rgb(corners.texture(scene, memory, emissive)?);

@@ -13,6 +13,12 @@ pub const HAS_ATTRIBUTES: u32 = 4;
 /// Flag of [`Material::flags`]: the GGX lobe is narrow somewhere, and is followed by rays instead of being estimated from photons.
 pub const NARROW_LOBE: u32 = 8;
 
+/// Flag of [`Material::flags`]: [`Material::cutoff`] is a factor of alpha, the share of the surface that is there (glTF's `alphaMode`
+/// `BLEND`).
+pub const BLENDS: u32 = 64;
+
+const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | BLENDS;
+
 const KIND_SHIFT: u32 = 4;
 const KIND_BITS: u32 = 2;
 /// Shift of the index of [`super::Layers`], plus 1.
@@ -33,10 +39,10 @@ pub struct Material {
     pub reflectance: Reflectance,
     /// Emitted radiance, W/(sr m^2), to be multiplied by the emissive texture.
     pub emission: [f32; 3],
-    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`] and [`NARROW_LOBE`].
+    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`], [`NARROW_LOBE`] and [`BLENDS`].
     pub flags: u32,
     /// glTF's `alphaCutoff`: triangles with cut-outs are absent where the product of base texture and vertex alpha is
-    /// below it.
+    /// below it. With [`BLENDS`] the product of the three is their coverage.
     pub cutoff: f32,
     /// Indices of the textures of base colour (or diffuse albedo), metallic-roughness (roughness in green, metalness in
     /// blue) and emission; [`NO_TEXTURE`] if absent.
@@ -125,7 +131,7 @@ impl Material {
                 _ => Reflectance::Phong { diffuse: first, specular: second, exponent: a },
             },
             emission: read_vector(bytes, 32),
-            flags: kind & (DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE),
+            flags: kind & FLAGS,
             cutoff: read_f32(bytes, 48),
             textures: [textures[0] as u16, (textures[0] >> 16) as u16, textures[1] as u16],
             layers: (kind >> LAYERS_SHIFT).checked_sub(1),
@@ -191,14 +197,14 @@ mod tests {
                 roughness: 0.4,
             },
         ] {
-            for flags in 0..=DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE {
+            for flags in [0, FLAGS].into_iter().chain((0..7).map(|bit| FLAGS & 1 << bit)) {
                 let material = Material {
                     reflectance,
                     emission: [18.0, 14.0, 6.5],
                     flags,
                     cutoff: 0.5,
                     textures: [3, NO_TEXTURE, 70],
-                    layers: flags.checked_sub(7),
+                    layers: flags.checked_sub(FLAGS),
                 };
                 assert_eq!(Material::read(&material.to_bytes()), material);
             }

@@ -67,6 +67,7 @@ fn load_one(
         double_sided: source.double_sided,
         alpha_cutoff: (source.alpha_mode == Checked::Valid(AlphaMode::Mask))
             .then(|| source.alpha_cutoff.unwrap_or_default().0),
+        blends: source.alpha_mode == Checked::Valid(AlphaMode::Blend),
         alpha,
         ..Material::new(name, reflection)
     };

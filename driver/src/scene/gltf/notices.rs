@@ -4,8 +4,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use gltf::json;
-use gltf::json::material::AlphaMode;
-use gltf::json::validation::Checked;
 
 use super::document::Document;
 use super::extensions::SUPPORTED_EXTENSIONS;
@@ -110,8 +108,6 @@ fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String]
     note("occlusion textures are ignored, occlusion is computed", "material", &occluded);
     let dark = materials(root, has_dark_texture);
     note("emissive textures are ignored where the emissive factor or strength is 0", "material", &dark);
-    let blended = materials(root, |material| material.alpha_mode == Checked::Valid(AlphaMode::Blend));
-    note("alpha is ignored, the surface is rendered opaque", "material", &blended);
     let unlit = materials(root, |material| {
         material.extensions.as_ref().is_some_and(|extensions| extensions.unlit.is_some())
     });

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{Emitter, EmitterKind, NO_TEXTURE, Record, Triangle};
+use photoncard_shared::layout::{BLENDS, Emitter, EmitterKind, NO_TEXTURE, Record, Triangle};
 use photoncard_shared::message::Fault;
 
 use super::choice::Fraction;
@@ -10,7 +10,7 @@ use super::sample::{LightSample, Receiver};
 use super::tree::{select_emitter, selection_probability};
 use crate::memory::MemoryPort;
 use crate::scene::corners::Corners;
-use crate::scene::cut_out::is_there;
+use crate::scene::coverage::coverage;
 use crate::scene::surface::read_material;
 use crate::scene::{SceneImage, magnitude, offset_origin};
 use crate::vector::{max, min, unit};
@@ -79,9 +79,9 @@ fn emission_at(
     weights: [f32; 3],
 ) -> Result<Vec3, Fault> {
     let material = read_material(scene, memory, triangle.material)?;
-    let emission = Vec3::from_array(emitter.emission);
-    if material.cutoff > 0.0 && !is_there(scene, memory, triangle, index, weights)? {
-        return Ok(Vec3::ZERO);
+    let mut emission = Vec3::from_array(emitter.emission);
+    if material.cutoff > 0.0 || material.flags & BLENDS != 0 {
+        emission *= coverage(scene, memory, (index, triangle), weights)?;
     }
     let [.., texture] = material.textures;
     if texture == NO_TEXTURE {

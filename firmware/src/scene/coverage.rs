@@ -1,0 +1,66 @@
+//! Coverage: cut-outs (glTF's `alphaMode` `MASK`), points of a triangle whose alpha is below the material's cutoff, and partial
+//! coverage (`BLEND`), of which a ray sees the surface with the probability alpha.
+
+use photoncard_shared::layout::{BLENDS, Material, Triangle};
+use photoncard_shared::message::Fault;
+
+use super::corners::Corners;
+use super::surface::read_material;
+use super::{Ray, SceneImage};
+use crate::memory::MemoryPort;
+use crate::sampler::{hash, unit_interval};
+
+/// `true` if a ray meets a triangle at a point, with barycentric `weights`, that its cut-outs or its coverage leave. The choice depends
+/// on the ray and the triangle alone: shadow rays, gather rays and photons agree on the mean.
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(never)]
+pub(super) fn is_met(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    ray: &Ray,
+    (index, triangle): (u32, &Triangle),
+    weights: [f32; 3],
+) -> Result<bool, Fault> {
+    let coverage = coverage(scene, memory, (index, triangle), weights)?;
+    Ok(coverage >= 1.0 || chance(ray, index) < coverage)
+}
+
+/// Covered share at a point of a triangle, with barycentric `weights`: 0 or 1 with cut-outs, alpha with partial coverage.
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(never)]
+pub(super) fn coverage(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    (index, triangle): (u32, &Triangle),
+    weights: [f32; 3],
+) -> Result<f32, Fault> {
+    let material = read_material(scene, memory, triangle.material)?;
+    let Some(corners) = Corners::read(scene, memory, index, weights)? else { return Ok(1.0) };
+    let [base, ..] = material.textures;
+    let [.., texture] = corners.texture(scene, memory, base)?;
+    let [.., colour] = corners.colour();
+    Ok(covered(&material, texture * colour))
+}
+
+/// Covered share where texture and vertex colour have an alpha.
+pub(super) fn covered(material: &Material, alpha: f32) -> f32 {
+    if material.flags & BLENDS != 0 {
+        alpha * material.cutoff
+    } else if alpha >= material.cutoff {
+        1.0
+    } else {
+        0.0
+    }
+}
+
+/// Random number in [0, 1) of a ray and a triangle.
+fn chance(ray: &Ray, triangle: u32) -> f32 {
+    let [a, b, c] = ray.origin.to_array().map(f32::to_bits);
+    let [d, e, f] = ray.direction.to_array().map(f32::to_bits);
+    let key = [a, b, c, d, e, f].into_iter().fold(triangle, |key, bits| hash(key.wrapping_add(bits)));
+    unit_interval(key)
+}
