@@ -85,7 +85,7 @@ impl PackedScene {
         &self.sources
     }
 
-    /// The sources of caustic photons, aimed at perfectly specular surfaces; `None` if there are none.
+    /// The sources of caustic photons, aimed at specular surfaces; `None` if there are none.
     pub(crate) fn aimed_sources(&self) -> Option<&Sources> {
         self.aimed_sources.as_ref()
     }

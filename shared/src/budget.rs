@@ -56,7 +56,7 @@ impl Budget {
 /// Maximum of [`Budget::gather_rays`] over all chips.
 pub const MAX_GATHER_RAYS: u32 = 1 << 14;
 
-/// Maximum number of perfectly specular bounces of a path; a path that would take more is black. In a clear glass ball
+/// Maximum number of specular bounces of a path; a path that would take more is black. In a clear glass ball
 /// less than 1e-20 of the light is left by then.
 pub const SPECULAR_BOUNCES: u32 = 16;
 

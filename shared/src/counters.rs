@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
     /// Eye rays: 2 a sample, for its light and for its other channels; another for each later piece of work on a sample
-    /// that sees its surface by way of perfectly specular ones; and 1 for each lookup of a point of the irradiance
+    /// that sees its surface by way of specular ones; and 1 for each lookup of a point of the irradiance
     /// cache's lattice.
     pub eye_rays: u64,
     /// Shadow rays.
@@ -15,9 +15,9 @@ pub struct Counters {
     pub gather_rays: u64,
     /// Rays that survey the surroundings of irradiance records.
     pub survey_rays: u64,
-    /// Rays from perfectly specular surfaces, which continue eye and gather rays.
+    /// Rays from specular surfaces, which continue eye and gather rays.
     pub specular_rays: u64,
-    /// Paths that ended black: after [`crate::budget::SPECULAR_BOUNCES`] perfectly specular surfaces, or at one that
+    /// Paths that ended black: after [`crate::budget::SPECULAR_BOUNCES`] specular surfaces, or at one that
     /// absorbs all.
     pub lost_paths: u64,
     /// Searches for the k nearest photons in the caustic map.

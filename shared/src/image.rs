@@ -62,7 +62,7 @@ pub enum SectionKind {
     PhotonLeaves = 14,
     /// [`crate::layout::PhotonNode`]s of the caustic map, the root first.
     CausticNodes = 15,
-    /// [`crate::layout::PhotonLeaf`]s of the caustic map: photons whose bounces, one at least, were all perfectly
+    /// [`crate::layout::PhotonLeaf`]s of the caustic map: photons whose bounces, one at least, were all
     /// specular.
     CausticLeaves = 16,
     /// [`crate::layout::PhotonNode`]s above irradiance points, the root first.

@@ -98,7 +98,7 @@ pub struct FrameParameters {
     pub queue: u32,
     /// Source of the radiance at the end of a gather ray.
     pub radiance: Radiance,
-    /// Gathers in the caustic map; with `None`, emission that gather rays meet through perfectly specular surfaces counts.
+    /// Gathers in the caustic map; with `None`, emission that gather rays meet through specular surfaces counts.
     pub caustics: Option<CausticGather>,
     /// `true` for pixels with [`PixelLayers`]. Their [`Pixel`]s do not change; tiles have fewer pixels
     /// ([`Budget::pixels_of_tile`]).

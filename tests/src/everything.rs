@@ -2,11 +2,11 @@
 
 use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{
-    Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture,
-    Transmission, Triangle, Wrap,
+    Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, PunctualKind, PunctualLight,
+    Reflection, Scene, Sheen, Texture, Transmission, Triangle, Wrap,
 };
 
-use crate::shapes::{add_ball, add_textured_quad};
+use crate::shapes::{add_ball, add_textured_quad, cuboid};
 use crate::{camera, lambertian, quad, room, scene};
 
 const WALL: u32 = 0;
@@ -17,9 +17,14 @@ const MIRROR: u32 = 4;
 const GLASS: u32 = 5;
 const LATTICE: u32 = 6;
 const SCREEN: u32 = 7;
+const VEIL: u32 = 8;
+const VARNISHED: u32 = 9;
+const PANE: u32 = 10;
+const ICE: u32 = 11;
 
 /// A room with a lamp, a point light, a spot and a directional light, a sky through its open front, walls with textures
-/// of both sets of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, and an emissive screen.
+/// of both sets of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, an emissive
+/// screen, a veil of partial coverage with sheen and diffuse transmission, a varnished board, a rough pane and a rough block of glass.
 pub fn everything() -> Scene {
     let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
     let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);
@@ -50,6 +55,10 @@ pub fn everything() -> Scene {
     let coordinates = [[0., 3.], [3., 3.], [3., 0.], [0., 0.]];
     add_textured_quad(&mut scene, upright(Vec3::new(0.3, 0.2, -0.5), 0.4), coordinates, LATTICE);
     add_textured_quad(&mut scene, upright(Vec3::new(-0.5, 0.3, -0.7), 0.25), coordinates, SCREEN);
+    add_textured_quad(&mut scene, upright(Vec3::new(-0.1, -0.1, 0.1), 0.15), coordinates, VEIL);
+    add_textured_quad(&mut scene, upright(Vec3::new(0.7, -0.1, -0.2), 0.2), coordinates, VARNISHED);
+    add_textured_quad(&mut scene, upright(Vec3::new(-0.2, -0.6, 0.3), 0.15), coordinates, PANE);
+    scene.triangles.extend(cuboid(Vec3::new(0.0, -0.8, 0.0), Vec3::splat(0.1), ICE));
     scene
 }
 
@@ -64,6 +73,8 @@ fn materials() -> Vec<Material> {
     };
     let absorption = Vec3::new(0.1, 0.5, 1.0);
     let clear = Transmission { factor: 0.95, ior: 1.5, is_volume: true, absorption };
+    let thin = Transmission { is_volume: false, ..clear };
+    let none = Layers::none(Vec3::splat(0.04));
     vec![
         lambertian("wall", 0.6),
         Material { emission: Vec3::splat(12.0), ..lambertian("lamp", 0.0) },
@@ -82,7 +93,44 @@ fn materials() -> Vec<Material> {
             ..lambertian("lattice", 0.8)
         },
         Material { emission: Vec3::splat(2.0), emissive_texture: Some(0), ..lambertian("screen", 0.1) },
+        Material {
+            blends: true,
+            alpha: 0.9,
+            base_texture: Some(3),
+            double_sided: true,
+            layers: Some(Box::new(veil(none.clone()))),
+            ..Material::new("veil", glossy(0.0, 0.8, None))
+        },
+        Material {
+            metallic_roughness_texture: Some(2),
+            layers: Some(Box::new(varnish(none.clone()))),
+            ..Material::new("varnished", glossy(0.3, 0.9, None))
+        },
+        Material {
+            layers: Some(Box::new(Layers { transmission_texture: Some(2), ..none })),
+            ..Material::new("pane", glossy(0.0, 0.4, Some(thin)))
+        },
+        Material::new("ice", glossy(0.1, 0.3, Some(clear))),
     ]
+}
+
+fn veil(none: Layers) -> Layers {
+    let colour = Vec3::new(0.3, 0.5, 0.4);
+    let sheen = Sheen { colour, roughness: 0.6, colour_texture: Some(0), roughness_texture: Some(3) };
+    let leaf = DiffuseTransmission {
+        factor: 0.7,
+        colour: Vec3::new(0.5, 0.9, 0.3),
+        factor_texture: Some(3),
+        colour_texture: Some(0),
+    };
+    Layers { sheen: Some(sheen), diffuse_transmission: Some(leaf), ..none }
+}
+
+fn varnish(none: Layers) -> Layers {
+    let (factor_texture, roughness_texture) = (Some(2), Some(2));
+    let coat = Coat { factor: 0.9, roughness: 0.4, factor_texture, roughness_texture, normal: None };
+    let specular = Vec3::new(0.9, 0.2, 0.1);
+    Layers { coat: Some(coat), specular, specular_texture: Some(3), specular_colour_texture: Some(0), ..none }
 }
 
 fn add_textures(scene: &mut Scene) {

@@ -72,7 +72,7 @@ impl Sources {
         Self::towards(scene, lights, Targets::default())
     }
 
-    /// The sources of a scene, for photons that are aimed at perfectly specular surfaces; `None` if there are none.
+    /// The sources of a scene, for photons that are aimed at specular surfaces; `None` if there are none.
     pub(crate) fn aimed(scene: &Scene, lights: &Lights) -> Option<Self> {
         let targets = Targets::new(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))

@@ -1,4 +1,4 @@
-//! Targets of caustic photons: spheres around all surfaces that reflect or transmit perfectly specularly.
+//! Targets of caustic photons: spheres around all surfaces that reflect or transmit specularly.
 //!
 //! A sphere is chosen in proportion to the solid angle that it subtends, and a direction uniformly within this angle. Where
 //! spheres overlap, a direction may be chosen through any of them: its density is the number of spheres in this direction

@@ -79,7 +79,7 @@ impl BounceRandom {
         unit_interval(self.bits(3))
     }
 
-    /// Number in [0, 1) that selects reflection or transmission at a perfectly specular surface.
+    /// Number in [0, 1) that selects reflection or transmission at a specular surface.
     pub(super) fn choice(self) -> f32 {
         unit_interval(self.bits(5))
     }

@@ -1,4 +1,4 @@
-//! Photon paths: Russian roulette on the albedo; a photon is stored at every surface that is not perfectly specular.
+//! Photon paths: Russian roulette on the albedo; a photon is stored at every surface that is not specular.
 
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
@@ -146,9 +146,9 @@ impl Traced {
 /// Map that photons are traced for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
-    /// The photon map: a photon at every surface that is not perfectly specular.
+    /// The photon map: a photon at every surface that is not specular.
     Indirect,
-    /// The caustic map: a photon at the first such surface, of paths that have met perfectly specular surfaces before.
+    /// The caustic map: a photon at the first such surface, of paths that have met specular surfaces before.
     Caustics,
 }
 

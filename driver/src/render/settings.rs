@@ -40,7 +40,7 @@ pub struct RenderSettings {
 /// Default number of direction bins: three per entry of the table that samples directions.
 const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 
-/// Default number of caustic photons for a scene with a perfectly specular surface.
+/// Default number of caustic photons for a scene with a specular surface.
 pub const DEFAULT_CAUSTIC_PHOTONS: usize = 200_000;
 
 impl RenderSettings {

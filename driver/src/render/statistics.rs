@@ -39,7 +39,7 @@ pub struct Statistics {
     pub time_s: Times,
     /// Number of rays cast on the chips.
     pub rays: Rays,
-    /// Number of paths that exceeded the limit of perfectly specular bounces, or met a surface that absorbs all light; they
+    /// Number of paths that exceeded the limit of specular bounces, or met a surface that absorbs all light; they
     /// contribute nothing.
     pub lost_paths: u64,
     /// Number of searches of the caustic map.
@@ -155,7 +155,7 @@ pub struct Rays {
     pub gather: u64,
     /// Rays that survey the surroundings of irradiance records.
     pub survey: u64,
-    /// Rays from perfectly specular surfaces, continuing any of these but shadow rays.
+    /// Rays from specular surfaces, continuing any of these but shadow rays.
     pub specular: u64,
 }
 

@@ -2,11 +2,12 @@
 
 use glam::Vec3;
 
-use super::{Material, Reflection, Scene};
+use super::{Material, Reflection, Scene, Transmission};
 use crate::error::SceneError;
 
 const FORM: &str = "write MATERIAL.PROPERTY=VALUE, for example floor.exponent=32 or lamp.emission=18,14,7; the \
-                    properties are diffuse, specular, exponent, metallic, roughness and emission";
+                    properties are diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha and \
+                    emission";
 
 /// Maximum number of names that an error proposes.
 const PROPOSED: usize = 5;
@@ -19,16 +20,24 @@ enum Property {
     Exponent,
     Metallic,
     Roughness,
+    Transmission,
+    Ior,
+    Thickness,
+    Alpha,
     Emission,
 }
 
 impl Property {
-    const ALL: [(&str, Self); 6] = [
+    const ALL: [(&str, Self); 10] = [
         ("diffuse", Self::Diffuse),
         ("specular", Self::Specular),
         ("exponent", Self::Exponent),
         ("metallic", Self::Metallic),
         ("roughness", Self::Roughness),
+        ("transmission", Self::Transmission),
+        ("ior", Self::Ior),
+        ("thickness", Self::Thickness),
+        ("alpha", Self::Alpha),
         ("emission", Self::Emission),
     ];
 
@@ -38,6 +47,10 @@ impl Property {
             Self::Exponent => Some("the exponent"),
             Self::Metallic => Some("the metalness"),
             Self::Roughness => Some("the roughness"),
+            Self::Transmission => Some("the transmission"),
+            Self::Ior => Some("the index of refraction"),
+            Self::Thickness => Some("the thickness"),
+            Self::Alpha => Some("alpha"),
             Self::Diffuse | Self::Specular | Self::Emission => None,
         }
     }
@@ -46,9 +59,10 @@ impl Property {
 impl Scene {
     /// Applies `MATERIAL.PROPERTY=VALUE` to every material of the name.
     ///
-    /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material) or
-    /// `emission` of any material, `specular` or `exponent` of one that states a Phong lobe or is Lambertian, or
-    /// `metallic` or `roughness` of a metallic-roughness one. Colours are `r,g,b` or one number for all three, the
+    /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material), `alpha` (the coverage of
+    /// a material without cut-outs) or `emission` of any material, `specular` or `exponent` of one that states a Phong lobe or is
+    /// Lambertian, or `metallic`, `roughness`, `ior` (index of refraction, in place of the colour of the reflectance too),
+    /// `transmission` or `thickness` (above 0: the surface bounds a solid) of a metallic-roughness one. Colours are `r,g,b` or one number for all three, the
     /// others one number. Textures keep multiplying the values; the emissive texture of a material that did
     /// not emit was not loaded, as a notice says. The material's name may itself contain dots.
     /// [`Scene::check_light`] checks that the scene still has a light once all assignments are applied.
@@ -110,8 +124,40 @@ impl Material {
             [value, ..] => Vec3::splat(value),
             [] => return Ok(()),
         };
+        if property == Property::Ior
+            && let Some(layers) = &mut self.layers
+        {
+            layers.specular = Vec3::splat(f0(value.x));
+        }
         match (property, &mut self.reflection) {
             (Property::Emission, _) => self.emission = value,
+            (Property::Alpha, _) => {
+                self.alpha = value.x;
+                self.blends |= self.alpha_cutoff.is_none();
+            }
+            (Property::Ior, Reflection::MetallicRoughness { dielectric, grazing, transmission, .. }) => {
+                *dielectric = Vec3::splat(f0(value.x) * *grazing);
+                if let Some(transmission) = transmission {
+                    transmission.ior = value.x;
+                }
+            }
+            (
+                Property::Transmission,
+                Reflection::MetallicRoughness { dielectric, grazing, transmission, .. },
+            ) => {
+                let ior = index_of_refraction(*dielectric, *grazing);
+                let wall = Transmission { factor: 1.0, ior, is_volume: false, absorption: Vec3::ZERO };
+                transmission.get_or_insert(wall).factor = value.x;
+            }
+            (Property::Thickness, Reflection::MetallicRoughness { transmission: Some(transmission), .. }) => {
+                transmission.is_volume = value.x > 0.0;
+            }
+            (Property::Thickness, Reflection::MetallicRoughness { transmission: None, .. }) => {
+                return Err((
+                    "the material transmits no light",
+                    "set its transmission first, such as glass.transmission=1",
+                ));
+            }
             (Property::Diffuse, Reflection::Phong { diffuse: target, .. })
             | (Property::Diffuse, Reflection::MetallicRoughness { base_colour: target, .. })
             | (Property::Specular, Reflection::Phong { specular: target, .. }) => *target = value,
@@ -126,15 +172,37 @@ impl Material {
                     "set metallic or roughness instead, or state a lobe in the material's extras in the file",
                 ));
             }
-            (Property::Metallic | Property::Roughness, Reflection::Phong { .. }) => {
+            (
+                Property::Metallic
+                | Property::Roughness
+                | Property::Transmission
+                | Property::Ior
+                | Property::Thickness,
+                Reflection::Phong { .. },
+            ) => {
                 return Err((
-                    "the material is a Lambertian or Phong one, which has neither metalness nor roughness",
+                    "the material is a Lambertian or Phong one, which has neither metalness nor roughness nor transmission",
                     "set specular or exponent instead, or take the Phong lobe or the specular factor of 0 out of the file",
                 ));
             }
         }
         Ok(())
     }
+}
+
+/// F0 of an index of refraction: `((n - 1) / (n + 1))^2`.
+fn f0(ior: f32) -> f32 {
+    let amplitude = (ior - 1.0) / (ior + 1.0);
+    amplitude * amplitude
+}
+
+/// Index of refraction of a dielectric's F0 and F90; 1.5 for one without reflectance.
+fn index_of_refraction(f0: Vec3, f90: f32) -> f32 {
+    if f90 <= 0.0 {
+        return 1.5;
+    }
+    let amplitude = (f0.max_element() / f90).clamp(0.0, 0.99).sqrt();
+    (1.0 + amplitude) / (1.0 - amplitude)
 }
 
 /// Parses one number, or three with commas between them.
@@ -193,6 +261,38 @@ mod tests {
     fn exponent(material: &Material) -> f32 {
         let Reflection::Phong { exponent, .. } = material.reflection else { panic!("{material:?}") };
         exponent
+    }
+
+    #[test]
+    fn glass_is_made_of_any_dielectric() {
+        let mut scene = scene();
+        for assignment in [
+            "metal.metallic=0",
+            "metal.transmission=0.9",
+            "metal.thickness=0.01",
+            "metal.ior=1.33",
+            "floor.alpha=0.5",
+        ] {
+            scene.apply(assignment).unwrap();
+        }
+        let Reflection::MetallicRoughness { dielectric, transmission, .. } = scene.materials[4].reflection
+        else {
+            panic!("{:?}", scene.materials[4]);
+        };
+        assert!((dielectric.x - 0.020_06).abs() < 1e-4, "{dielectric}");
+        let glass = Transmission { factor: 0.9, ior: 1.33, is_volume: true, absorption: Vec3::ZERO };
+        assert_eq!(transmission, Some(glass));
+        assert!(scene.materials[0].blends && scene.materials[0].alpha == 0.5);
+        assert!(scene.apply("floor.ior=1.5").is_err());
+        assert!(scene.apply("metal.ior=0.5").is_err());
+        assert!(scene.apply("metal.transmission=2").is_err());
+    }
+
+    #[test]
+    fn an_index_of_refraction_comes_back_from_its_reflectance() {
+        for ior in [1.0_f32, 1.33, 1.5, 2.4] {
+            assert!((index_of_refraction(Vec3::splat(f0(ior)), 1.0) - ior).abs() < 1e-4);
+        }
     }
 
     #[test]

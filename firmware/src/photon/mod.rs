@@ -25,9 +25,9 @@ use crate::simd::{self, Isa, Kernel};
 /// One of the two photon maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhotonMap {
-    /// The photon map: every arrival of light at a surface that is not perfectly specular.
+    /// The photon map: every arrival of light at a surface that is not specular.
     Indirect,
-    /// The caustic map: photons whose bounces, one at least, were all perfectly specular (`L S+ D`).
+    /// The caustic map: photons whose bounces, one at least, were all specular (`L S+ D`).
     Caustics,
 }
 

@@ -5,7 +5,7 @@ use photoncard_shared::layout::{BLENDS, Material, Triangle};
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
-use super::surface::read_material;
+use super::materials::read_material;
 use super::{Ray, SceneImage};
 use crate::memory::MemoryPort;
 use crate::sampler::{hash, unit_interval};

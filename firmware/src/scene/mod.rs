@@ -3,8 +3,8 @@
 mod bvh;
 mod corners;
 mod coverage;
-mod layers;
 pub mod light;
+mod materials;
 mod reflection;
 mod seen;
 mod slabs;

@@ -1,15 +1,14 @@
 //! Surfaces: a triangle's material at the point where a ray meets it, textures applied, seen from the ray's side.
 
 use glam::Vec3;
-use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Record, Reflectance, Triangle,
+    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Reflectance, Triangle,
 };
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
 use super::coverage::covered;
-use super::layers::{has_layers, layer_texel, read_layers};
+use super::materials::{has_layers, layer_texel, read_layers, read_material};
 use super::reflection::{Layer, Scattering, Taken, Texel, View, scattering, take};
 use super::specular::Specular;
 use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origin};
@@ -18,8 +17,6 @@ use crate::vector::{max_component, unit};
 
 /// Random numbers of [`read_surface`].
 pub const SURFACE_CHOICES: u32 = 3;
-
-const MATERIALS_PER_LINE: u32 = Material::PER_LINE as u32;
 
 /// Surface at the hit of a ray, on the side of the ray's origin.
 #[derive(Clone, Copy, Debug)]
@@ -100,7 +97,7 @@ impl Surface {
     }
 
     /// The other side as it is seen through the surface: the side of the ray is mirrored.
-    fn from_behind(self) -> Self {
+    fn turned(self) -> Self {
         let front = -self.normal;
         Self {
             geometric_normal: -self.geometric_normal,
@@ -150,18 +147,6 @@ pub fn read_surface(
     let Hit { intersection, triangle, index } = hit;
     let surface = surface_of(scene, memory, ray, (*index, triangle), intersection.barycentric, random)?;
     Ok(Surface { distance: intersection.distance, ..surface })
-}
-
-/// Reads material `index`.
-#[inline(always)]
-pub(super) fn read_material(
-    scene: &SceneImage,
-    memory: &mut impl MemoryPort,
-    index: u32,
-) -> Result<Material, Fault> {
-    let kind = SectionKind::Materials;
-    let bytes = scene.record::<{ Material::BYTES }, MATERIALS_PER_LINE>(memory, kind, index)?;
-    Ok(Material::read(bytes))
 }
 
 /// Surface of a triangle at barycentric `weights`, at a distance of 0: [`read_surface`].
@@ -272,7 +257,7 @@ fn layered(
     let surface = Surface { reflection, specular, absorption, normal, probability, ..surface };
     let emission = if layer == Layer::Base { surface.emission / probability } else { Vec3::ZERO };
     let surface = Surface { emission, ..surface };
-    Ok(if layer == Layer::Behind { surface.from_behind() } else { surface })
+    Ok(if layer == Layer::Behind { surface.turned() } else { surface })
 }
 
 fn rgb([red, green, blue, _]: [f32; 4]) -> Vec3 {

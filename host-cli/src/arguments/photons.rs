@@ -18,8 +18,8 @@ pub(crate) struct PhotonOptions {
     /// Photons that a gather searches for
     #[arg(long, default_value_t = PhotonMaps::default().neighbors, allow_negative_numbers = true)]
     pub(super) neighbors: u32,
-    /// Photons of the caustic map: light from specular paths, by mirrors and glass alone [default: 200000 if anything in
-    /// the scene is perfectly specular]. With 0 gather rays carry this light, with more noise, and that of punctual lights
+    /// Photons of the caustic map: light focused by mirrors, glass and glossy surfaces [default: 200000 if the scene has
+    /// any]. With 0 gather rays carry this light, with more noise, and that of punctual lights
     /// is lost
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) caustic_photons: Option<usize>,

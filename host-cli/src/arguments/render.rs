@@ -21,7 +21,7 @@ pub(crate) struct RenderOptions {
     /// The picture to write, an EXR file: linear RGB radiance and the layers of --aov
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: PathBuf,
-    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness or emission; may be repeated
+    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha or emission; may be repeated
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
     /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and

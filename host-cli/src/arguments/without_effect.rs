@@ -12,7 +12,8 @@ impl RenderOptions {
         let order = self.schedule.order;
         let name = order.name();
         let is_cached = self.integrator.irradiance_cache;
-        let without_specular = "without a caustic map: nothing in the scene is perfectly specular".to_owned();
+        let without_specular =
+            "without a caustic map: nothing in the scene is a mirror, glass or glossy".to_owned();
         let without_map = if self.photons.caustic_photons == Some(0) {
             "with --caustic-photons 0".to_owned()
         } else {

@@ -47,7 +47,7 @@ pub struct PhotonMaps {
     /// Maximum distance of a gather, metres; `None` to derive it from the density of the photons.
     pub max_distance: Option<f32>,
     /// Number of photons in the caustic map; `None` for [`DEFAULT_CAUSTIC_PHOTONS`](super::DEFAULT_CAUSTIC_PHOTONS) if the
-    /// scene has a perfectly specular surface, and no map otherwise.
+    /// scene has a specular surface, and no map otherwise.
     pub caustic_photons: Option<usize>,
     /// Number of photons that a gather of caustics searches for.
     pub caustic_neighbors: u32,

@@ -26,6 +26,7 @@ mod pose;
 mod primitive;
 mod room;
 mod skin;
+mod solid_glass;
 mod texture;
 mod transform;
 mod uri;
@@ -94,6 +95,7 @@ pub fn load_for(path: &Path, dram_bytes: u32) -> Result<Scene, SceneError> {
         scene.cameras.push(camera::frame(&scene));
         notices.framed = true;
     }
+    notices.solid_glass = solid_glass::make_solid(&document, &mut scene);
     scene.notices = notices.finish(&document);
     Ok(scene)
 }

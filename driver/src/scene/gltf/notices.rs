@@ -21,6 +21,8 @@ const LISTED: usize = 8;
 pub(super) struct Notices {
     /// Names of orthographic cameras.
     pub(super) orthographic: Vec<String>,
+    /// Names of materials of closed meshes that became solid glass.
+    pub(super) solid_glass: Vec<String>,
     /// True if the scene has no camera and received a default one.
     pub(super) framed: bool,
     /// Meshes with normals or colours that are not finite.
@@ -90,6 +92,8 @@ impl Notices {
         let limited = names("light", lights, |light| light.name.as_ref(), |light| light.range.is_some());
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
         note("orthographic cameras are ignored", "camera", &self.orthographic);
+        let solid = "closed meshes of glass without a thickness are solid, as in Blender (a thin wall by --set MATERIAL.thickness=0)";
+        note(solid, "material", &self.solid_glass);
         for (extension, places) in other_extensions(root) {
             let places = if places.is_empty() { String::new() } else { format!(": {}", places.join(", ")) };
             sentences.push(format!("the extension {extension} is ignored{places}"));

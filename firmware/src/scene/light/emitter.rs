@@ -11,7 +11,7 @@ use super::tree::{select_emitter, selection_probability};
 use crate::memory::MemoryPort;
 use crate::scene::corners::Corners;
 use crate::scene::coverage::coverage;
-use crate::scene::surface::read_material;
+use crate::scene::materials::read_material;
 use crate::scene::{SceneImage, magnitude, offset_origin};
 use crate::vector::{max, min, unit};
 

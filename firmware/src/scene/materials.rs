@@ -1,4 +1,4 @@
-//! Layers of materials, read from card memory with their textures.
+//! Materials and their layers, read from card memory.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -10,7 +10,20 @@ use super::corners::Corners;
 use super::reflection::LayerTexel;
 use crate::memory::MemoryPort;
 
+const MATERIALS_PER_LINE: u32 = Material::PER_LINE as u32;
 const LAYERS_PER_LINE: u32 = Layers::PER_LINE as u32;
+
+/// Reads material `index`.
+#[inline(always)]
+pub(super) fn read_material(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    index: u32,
+) -> Result<Material, Fault> {
+    let kind = SectionKind::Materials;
+    let bytes = scene.record::<{ Material::BYTES }, MATERIALS_PER_LINE>(memory, kind, index)?;
+    Ok(Material::read(bytes))
+}
 
 /// `true` for a material whose surfaces have several layers, or one that takes random numbers: rough glass.
 #[inline(always)]
