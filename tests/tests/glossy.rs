@@ -2,7 +2,9 @@
 
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
-use photoncard_driver::scene::{Camera, Environment, Material, Reflection, Scene};
+use photoncard_driver::scene::{
+    Camera, Environment, Material, PunctualKind, PunctualLight, Reflection, Scene,
+};
 use photoncard_tests::{camera, mean, quad, radiances, render_or_panic, scene};
 
 fn settings() -> RenderSettings {
@@ -71,27 +73,47 @@ fn plates_in_a_white_furnace_show_their_albedo() {
     }
 }
 
+/// Two plates of metal at a right angle, seen from above.
+fn groove(roughness: f32) -> Scene {
+    let far = 40.0;
+    let side = |x: f32| {
+        let corner = |s: f32, z: f32| Vec3::new(x * s * far, s * far, z * far);
+        if x > 0.0 {
+            quad([corner(0., 1.), corner(1., 1.), corner(1., -1.), corner(0., -1.)], 0)
+        } else {
+            quad([corner(0., -1.), corner(1., -1.), corner(1., 1.), corner(0., 1.)], 0)
+        }
+    };
+    let triangles = [side(1.0), side(-1.0)].concat();
+    scene(triangles, vec![surface(0.9, 1.0, roughness)], far_camera(Vec3::new(0.01, 1.0, 0.02)))
+}
+
 /// Two plates at a right angle reflect most light twice: F0^2 at low roughness. The values are means of paths that are traced by the
 /// Monte Carlo method, with standard errors below 0.0002.
 #[test]
 fn a_groove_of_glossy_metal_is_not_black() {
     for (roughness, expected) in [(0.05, 0.8104), (0.1, 0.8102), (0.3, 0.7849)] {
-        let far = 40.0;
-        let side = |x: f32| {
-            let corner = |s: f32, z: f32| Vec3::new(x * s * far, s * far, z * far);
-            if x > 0.0 {
-                quad([corner(0., 1.), corner(1., 1.), corner(1., -1.), corner(0., -1.)], 0)
-            } else {
-                quad([corner(0., -1.), corner(1., -1.), corner(1., 1.), corner(0., 1.)], 0)
-            }
-        };
-        let triangles = [side(1.0), side(-1.0)].concat();
-        let groove =
-            scene(triangles, vec![surface(0.9, 1.0, roughness)], far_camera(Vec3::new(0.01, 1.0, 0.02)));
-        let pixels = radiances(&render_or_panic(&under_a_white_sky(groove), &settings()).film);
+        let pixels = radiances(&render_or_panic(&under_a_white_sky(groove(roughness)), &settings()).film);
         let found = mean(&pixels);
         assert!((found / expected - 1.0).abs() < 0.02, "{roughness}: {found} of {expected}");
         let greatest = pixels.iter().flatten().fold(0.0_f32, |greatest, &value| greatest.max(value));
         assert!(f64::from(greatest) < 3.0 * found, "{roughness}: {greatest}");
+    }
+}
+
+/// A light without extent is seen by way of two plates: no ray meets it. The values are means of traced paths, with standard errors
+/// below 0.2 %.
+#[test]
+fn a_groove_of_glossy_metal_reflects_a_distant_light() {
+    for (roughness, expected) in [(0.3, 1.5013), (0.45, 0.6827)] {
+        let direction = -Vec3::new(0.2, 1.0, 0.1).normalize();
+        let sun = PunctualLight {
+            name: "sun".to_owned(),
+            kind: PunctualKind::Directional { direction },
+            intensity: Vec3::ONE,
+        };
+        let lit = Scene { lights: vec![sun], ..groove(roughness) };
+        let found = mean(&radiances(&render_or_panic(&lit, &settings()).film));
+        assert!((found / expected - 1.0).abs() < 0.02, "{roughness}: {found} of {expected}");
     }
 }

@@ -22,6 +22,8 @@ mod phong;
 mod record;
 mod reflector;
 mod sheen;
+#[cfg(test)]
+mod tests;
 
 pub use keeps_photons::keeps_photons;
 pub(super) use layered::{Layer, LayerTexel, Taken, take};

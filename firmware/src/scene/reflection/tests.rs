@@ -1,0 +1,128 @@
+//! Properties that every lobe has: samples follow the density, weights are `f cos / p`, light may go either way.
+
+use core::f32::consts::TAU;
+use std::{vec, vec::Vec};
+
+use glam::Vec3;
+
+use super::ggx::GgxLobe;
+use super::lobe::Lobe;
+use super::phong::PhongLobe;
+use super::sheen::SheenLobe;
+use super::{Reflection, Reflector};
+use crate::sampler::{hash, unit_interval};
+
+fn at(cosine: f32, azimuth: f32) -> Vec3 {
+    let sine = (1.0 - cosine * cosine).sqrt();
+    Vec3::new(sine * azimuth.cos(), cosine, sine * azimuth.sin())
+}
+
+fn seen(lobe: Lobe, cosine: f32) -> Reflector {
+    let reflection = Reflection { diffuse: Vec3::ZERO, lobe };
+    Reflector { normal: Vec3::Y, outgoing: at(cosine, 0.3), reflection }
+}
+
+fn ggx(roughness: f32, cosine: f32) -> Lobe {
+    Lobe::Ggx(GgxLobe::new(Vec3::new(1.0, 0.5, 0.0), Vec3::ONE, roughness, cosine))
+}
+
+/// Lobes of every model, seen from above and at a grazing angle.
+fn reflectors() -> Vec<Reflector> {
+    [0.95, 0.5, 0.15]
+        .into_iter()
+        .flat_map(|cosine| {
+            let phong = |exponent| Lobe::Phong(PhongLobe { albedo: Vec3::new(0.9, 0.5, 0.1), exponent });
+            let sheen = |roughness| Lobe::Sheen(SheenLobe::new(Vec3::new(0.9, 0.5, 0.1), roughness, cosine));
+            let lobes =
+                [phong(1.0), phong(40.0), ggx(0.25, cosine), ggx(0.6, cosine), ggx(1.0, cosine), sheen(0.5)];
+            lobes.map(|lobe| seen(lobe, cosine))
+        })
+        .collect()
+}
+
+const ROWS: usize = 12;
+const COLUMNS: usize = 24;
+const CELLS: usize = ROWS * COLUMNS;
+
+/// Cell of equal solid angle of the upper hemisphere; the last for directions below.
+fn cell(direction: Vec3) -> usize {
+    if direction.y < 0.0 {
+        return CELLS;
+    }
+    let row = ((direction.y * ROWS as f32) as usize).min(ROWS - 1);
+    let turn = direction.z.atan2(direction.x) / TAU + 0.5;
+    row * COLUMNS + ((turn * COLUMNS as f32) as usize).min(COLUMNS - 1)
+}
+
+/// Probabilities of the cells, by a quadrature of the density.
+fn probabilities(reflector: &Reflector) -> Vec<f64> {
+    const FINE: usize = 24;
+    let mut sums = vec![0.0_f64; CELLS + 1];
+    let [heights, turns] = [ROWS * FINE, COLUMNS * FINE];
+    let solid_angle = f64::from(TAU) / (heights * turns) as f64;
+    for (height, turn) in (0..heights).flat_map(|height| (0..turns).map(move |turn| (height, turn))) {
+        let cosine = (height as f32 + 0.5) / heights as f32;
+        let direction = at(cosine, (turn as f32 + 0.5) / turns as f32 * TAU);
+        sums[cell(direction)] += f64::from(reflector.lobe_density(direction)) * solid_angle;
+    }
+    sums[CELLS] = (1.0 - sums[..CELLS].iter().sum::<f64>()).max(0.0);
+    sums
+}
+
+/// Pearson's test: of `n` cells with 8 expected samples or more, the sum of `(found - expected)^2 / expected` has the mean `n` and the
+/// variance `2 n`. Density and samples are of single precision.
+#[test]
+fn samples_follow_their_density() {
+    const SAMPLES: u32 = 40_000;
+    for (index, reflector) in reflectors().iter().enumerate() {
+        let mut found = vec![0_u32; CELLS + 1];
+        for sample in 0..SAMPLES {
+            let point = [1, 2].map(|axis| unit_interval(hash(hash(sample * 2 + axis) ^ index as u32)));
+            found[cell(reflector.sample_lobe(point))] += 1;
+        }
+        let (mut sum, mut cells, mut rest) = (0.0, 0.0_f64, [0.0, 0.0]);
+        for (&found, probability) in found.iter().zip(probabilities(reflector)) {
+            let expected = probability * f64::from(SAMPLES);
+            if expected >= 8.0 {
+                sum += (f64::from(found) - expected).powi(2) / expected;
+                cells += 1.0;
+            } else {
+                rest = [rest[0] + f64::from(found), rest[1] + expected];
+            }
+        }
+        assert!(sum < cells + 5.0 * (2.0 * cells).sqrt(), "lobe {index}: {sum} of {cells} cells");
+        assert!((rest[0] - rest[1]).abs() < 6.0 * rest[1].sqrt() + 8.0, "lobe {index}: {rest:?}");
+    }
+}
+
+#[test]
+fn weights_are_the_value_times_the_cosine_over_the_density() {
+    for (index, reflector) in reflectors().iter().enumerate() {
+        for sample in 0..200_u32 {
+            let point = [1, 2].map(|axis| unit_interval(hash(sample * 2 + axis)));
+            let direction = reflector.sample_lobe(point);
+            if direction.y < 0.02 {
+                continue;
+            }
+            let density = reflector.lobe_density(direction);
+            let expected = reflector.evaluate(direction) * (direction.y / density);
+            let weight = reflector.lobe_weight(direction);
+            let error = (weight - expected).abs().max_element();
+            assert!(error < 1e-3 * expected.max_element() + 1e-6, "lobe {index}: {weight} {expected}");
+        }
+    }
+}
+
+#[test]
+fn light_may_go_either_way() {
+    for roughness in [0.1, 0.4, 0.9] {
+        for (o, i) in [(0.9, 0.2), (0.5, 0.5), (0.05, 0.7)] {
+            let [outgoing, incident] = [at(o, 0.3), at(i, 3.0)];
+            let [there, back] = [(outgoing, incident), (incident, outgoing)].map(|(from, to)| {
+                let reflector = Reflector { outgoing: from, ..seen(ggx(roughness, from.y), from.y) };
+                reflector.evaluate(to)
+            });
+            assert!((there - back).abs().max_element() <= 1e-4 * there.max_element(), "{there} {back}");
+        }
+    }
+}
