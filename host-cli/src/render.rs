@@ -107,6 +107,9 @@ fn read_scene(options: &RenderOptions, settings: &RenderSettings) -> Result<Scen
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
     }
+    if options.energy_compensation {
+        scene.compensate_energy();
+    }
     if let Some(environment) = &options.environment {
         scene.environment = Some(environment.load()?);
     }
@@ -172,6 +175,7 @@ fn provenance(
     let mut add = |name: &str, value| provenance.insert(name.to_owned(), value);
     add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
     add("set", json!(options.assignments));
+    add("energy-compensation", json!(options.energy_compensation));
     add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));
     // The automatic distance, if none is given.
     add("max-distance", json!(rendering.statistics.max_distance));

@@ -15,6 +15,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--camera", "camera"], "camera", json!("camera")),
         (&["--aov", "direct"], "aov", json!("direct,indirect,caustic,gathers")),
         (&["--set", "white.diffuse=0.5,0.5,0.5"], "set", json!(["white.diffuse=0.5,0.5,0.5"])),
+        (&["--energy-compensation"], "energy-compensation", json!(true)),
         (&["--environment", "1,2,3"], "environment", json!("1,2,3")),
         (&["--seed", "5"], "seed", json!(5)),
         (&["--photons", "300"], "photons", json!(300)),

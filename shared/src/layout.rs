@@ -51,8 +51,8 @@ pub use irradiance_point::IrradiancePoint;
 pub use layers::{LayerTextures, Layers};
 pub use light_node::{LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode};
 pub use material::{
-    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, MAX_PHONG_EXPONENT, Material, NARROW_LOBE, NO_TEXTURE, Reflectance,
-    THIN_WALLED,
+    BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, MAX_PHONG_EXPONENT, Material, NARROW_LOBE, NO_TEXTURE,
+    Reflectance, THIN_WALLED,
 };
 pub use photon::{DISC_CODES, FULL_DISC, PHOTON_CONTENT_BYTES, Photon, Rgbe, disc_fraction, encode_disc};
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};

@@ -4,8 +4,8 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::{SceneImage, keeps_photons};
 use photoncard_shared::layout::{
-    self, BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTextures, NARROW_LOBE, NO_TEXTURE, Record, Reflectance,
-    THIN_WALLED,
+    self, BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTextures, NARROW_LOBE, NO_TEXTURE, Record,
+    Reflectance, THIN_WALLED,
 };
 
 use crate::light::Lights;
@@ -64,6 +64,7 @@ fn lobe_flag(scene: &Scene, material: &Material) -> u32 {
 fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> [u8; RECORD_BYTES] {
     let transmission = transmission_of(material);
     flags |= if material.double_sided { DOUBLE_SIDED } else { 0 };
+    flags |= if material.energy_compensation { COMPENSATED } else { 0 };
     if transmission.is_some_and(|transmission| !transmission.is_volume) {
         flags |= THIN_WALLED;
     }

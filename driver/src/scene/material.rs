@@ -39,6 +39,8 @@ pub struct Material {
     /// Emissive texture (sRGB), an index into [`Scene::textures`](super::Scene::textures), which multiplies the
     /// emission.
     pub emissive_texture: Option<u32>,
+    /// True to add the light that a rough microsurface reflects several times, which glTF's model leaves out.
+    pub energy_compensation: bool,
     /// Layers beyond the base; `None` for most materials.
     pub layers: Option<Box<Layers>>,
 }
@@ -105,6 +107,7 @@ impl Material {
             base_texture: None,
             metallic_roughness_texture: None,
             emissive_texture: None,
+            energy_compensation: false,
             layers: None,
         }
     }

@@ -141,6 +141,11 @@ impl Scene {
         f32::from(minimum.unwrap_or(u8::MAX)) / 255.0
     }
 
+    /// Adds the light that rough microsurfaces reflect several times to the reflection of all metallic-roughness materials.
+    pub fn compensate_energy(&mut self) {
+        self.materials.iter_mut().for_each(|material| material.energy_compensation = true);
+    }
+
     /// Checks that the scene has a light, once settings were applied and an environment was added.
     ///
     /// # Errors

@@ -24,6 +24,10 @@ pub(crate) struct RenderOptions {
     /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha or emission; may be repeated
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
+    /// Add the light that rough metals and coats reflect several times between their microfacets, as Blender does by default; glTF's
+    /// model leaves it out, and a metal of roughness 1 is less than half as bright
+    #[arg(long)]
+    pub(crate) energy_compensation: bool,
     /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and
     /// top is y; or a constant radiance
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]

@@ -17,7 +17,10 @@ pub const NARROW_LOBE: u32 = 8;
 /// `BLEND`).
 pub const BLENDS: u32 = 64;
 
-const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | BLENDS;
+/// Flag of [`Material::flags`]: the GGX lobe is brightened by the light that a rough microsurface reflects several times.
+pub const COMPENSATED: u32 = 128;
+
+const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | BLENDS | COMPENSATED;
 
 const KIND_SHIFT: u32 = 4;
 const KIND_BITS: u32 = 2;
@@ -39,7 +42,7 @@ pub struct Material {
     pub reflectance: Reflectance,
     /// Emitted radiance, W/(sr m^2), to be multiplied by the emissive texture.
     pub emission: [f32; 3],
-    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`], [`NARROW_LOBE`] and [`BLENDS`].
+    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`], [`NARROW_LOBE`], [`BLENDS`] and [`COMPENSATED`].
     pub flags: u32,
     /// glTF's `alphaCutoff`: triangles with cut-outs are absent where the product of base texture and vertex alpha is
     /// below it. With [`BLENDS`] the product of the three is their coverage.
@@ -197,7 +200,7 @@ mod tests {
                 roughness: 0.4,
             },
         ] {
-            for flags in [0, FLAGS].into_iter().chain((0..7).map(|bit| FLAGS & 1 << bit)) {
+            for flags in [0, FLAGS].into_iter().chain((0..8).map(|bit| FLAGS & 1 << bit)) {
                 let material = Material {
                     reflectance,
                     emission: [18.0, 14.0, 6.5],

@@ -21,6 +21,9 @@ use crate::vector::{from_frame, max, max_component, min, mirror, unit};
 /// Minimum of `a`: a lobe of 0.06 degrees, in which `f32` resolves the half vector.
 const MIN_ALPHA: f32 = 1e-3;
 
+/// Minimum of the albedo over which energy is compensated.
+const MIN_ALBEDO: f32 = 0.1;
+
 /// A lobe seen from one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GgxLobe {
@@ -71,6 +74,14 @@ impl GgxLobe {
         let [of_f0, of_f90] = shares;
         let albedo = (f0 * of_f0 + f90 * of_f90).min(Vec3::ONE);
         Self { f0, f90, alpha: max(roughness * roughness, MIN_ALPHA), albedo, shares, is_followed: false }
+    }
+
+    /// The lobe with the light that its microsurface reflects several times: `f (1 + F0 (1 - E) / E)`, `E` the albedo of a lobe with
+    /// `F = 1` (Turquin 2019, *Practical multiple scattering compensation for microfacet models*).
+    pub(super) fn compensated(self) -> Self {
+        let [of_f0, of_f90] = self.shares;
+        let of_white = min(max(of_f0 + of_f90, MIN_ALBEDO), 1.0);
+        self.dimmed(Vec3::ONE + self.f0 * ((1.0 - of_white) / of_white))
     }
 
     /// The greatest channel of the albedo that the lobe would have with another reflectance, 0 to 1.

@@ -6,7 +6,7 @@
 //! followed by rays, and only the base is lit by photons: `NARROW_LOBE` or not.
 
 use glam::Vec3;
-use photoncard_shared::layout::{Layers, Material, NARROW_LOBE, Reflectance, THIN_WALLED};
+use photoncard_shared::layout::{COMPENSATED, Layers, Material, NARROW_LOBE, Reflectance, THIN_WALLED};
 
 use super::Reflection;
 use super::ggx::{GgxLobe, masking, microfacet};
@@ -185,6 +185,7 @@ fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
         metallic: 0.0,
         roughness,
         has_narrow_lobe: true,
+        is_compensated: false,
     };
     let (_, specular) = surface.smooth(cosine);
     let fresnel = max_component(specular.reflected);
@@ -262,6 +263,7 @@ fn rough_glass(
         metallic,
         roughness,
         has_narrow_lobe: material.flags & NARROW_LOBE != 0,
+        is_compensated: material.flags & COMPENSATED != 0,
     };
     let mut outside = surface.reflection(cosine);
     let through = outside.diffuse * transmission;

@@ -1,7 +1,7 @@
 //! Materials as reflections: the factors of a record times those of textures and corners, seen from one direction.
 
 use glam::Vec3;
-use photoncard_shared::layout::{Material, NARROW_LOBE, Reflectance, THIN_WALLED};
+use photoncard_shared::layout::{COMPENSATED, Material, NARROW_LOBE, Reflectance, THIN_WALLED};
 
 use super::Reflection;
 use super::lobe::Lobe;
@@ -59,6 +59,7 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
     let [normal, _] = normals;
     let cosine = normal.dot(outgoing);
     let has_narrow_lobe = material.flags & NARROW_LOBE != 0;
+    let is_compensated = material.flags & COMPENSATED != 0;
     let mut scattering = Scattering::BLACK;
     match material.reflectance {
         Reflectance::Phong { diffuse, specular, exponent } => {
@@ -73,6 +74,7 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
                 metallic: metallic * texel.metallic,
                 roughness: roughness * texel.roughness,
                 has_narrow_lobe,
+                is_compensated,
             };
             if roughness > 0.0 {
                 scattering.reflection = surface.reflection(cosine);
@@ -96,6 +98,7 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
                 metallic: 1.0,
                 roughness,
                 has_narrow_lobe,
+                is_compensated,
             };
             scattering.reflection = metal.lobe_beside(diffuse * (1.0 - metallic), metallic, cosine);
             scattering.specular = specular.dimmed(1.0 - metallic);

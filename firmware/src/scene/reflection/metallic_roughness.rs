@@ -27,6 +27,8 @@ pub(super) struct MetallicRoughness {
     pub(super) roughness: f32,
     /// The material's [`NARROW_LOBE`](photoncard_shared::layout::NARROW_LOBE).
     pub(super) has_narrow_lobe: bool,
+    /// The material's [`COMPENSATED`](photoncard_shared::layout::COMPENSATED).
+    pub(super) is_compensated: bool,
 }
 
 impl MetallicRoughness {
@@ -49,7 +51,7 @@ impl MetallicRoughness {
     fn lobe(&self, f0: Vec3, f90: Vec3, cosine: f32) -> GgxLobe {
         let mut lobe = GgxLobe::new(f0, f90, self.roughness, cosine);
         lobe.is_followed = self.has_narrow_lobe;
-        lobe
+        if self.is_compensated { lobe.compensated() } else { lobe }
     }
 
     /// The Lambertian and the perfectly specular part at roughness 0, seen at a cosine to the normal.
@@ -105,6 +107,7 @@ mod tests {
                 metallic,
                 roughness,
                 has_narrow_lobe: false,
+                is_compensated: false,
             }
         })
     }
@@ -140,6 +143,23 @@ mod tests {
     }
 
     #[test]
+    fn a_rough_white_metal_that_is_compensated_loses_no_light() {
+        for (roughness, cosine) in [(0.3, 0.2), (0.6, 0.9), (1.0, 0.3), (1.0, 1.0)] {
+            let white = MetallicRoughness {
+                base: Vec3::ONE,
+                dielectric: Vec3::ZERO,
+                grazing: 0.0,
+                metallic: 1.0,
+                roughness,
+                has_narrow_lobe: false,
+                is_compensated: true,
+            };
+            let albedo = white.reflection(cosine).lobe.albedo().x;
+            assert!((albedo - 1.0).abs() < 1e-3, "{roughness} {cosine}: {albedo}");
+        }
+    }
+
+    #[test]
     fn smooth_metals_are_mirrors() {
         let gold = MetallicRoughness {
             base: Vec3::splat(0.8),
@@ -148,6 +168,7 @@ mod tests {
             metallic: 1.0,
             roughness: 0.0,
             has_narrow_lobe: false,
+            is_compensated: false,
         };
         let (rest, specular) = gold.smooth(1.0);
         assert!(rest.is_black());
@@ -164,6 +185,7 @@ mod tests {
             metallic: 0.0,
             roughness: 0.0,
             has_narrow_lobe: false,
+            is_compensated: false,
         };
         assert_eq!(dull.smooth(0.0).1.reflected, Vec3::ZERO);
         assert!(dull.reflection(0.1).is_lambertian());
