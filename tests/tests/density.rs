@@ -5,7 +5,7 @@ use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::{Material, Scene, Triangle};
-use photoncard_firmware::photon::{CandidateBuffer, Estimate, NearestPhotons, PhotonMap, gather};
+use photoncard_firmware::photon::{CandidateBuffer, Estimate, LitBy, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::scene::{PartialReflection, Reflection, Surface};
 use photoncard_firmware::simd::Level;
 use photoncard_tests::{camera, lambertian, quad, room, scene};
@@ -51,7 +51,9 @@ impl Map {
             Vec3::splat(scene.header.photon_power_unit),
             1 << 31,
         );
-        let estimate = || Estimate { nearest: &nearest, position, reflection: &reflection };
+        let lobe = reflection.decode_lobe();
+        let lit_by = LitBy::All;
+        let estimate = || Estimate { nearest: &nearest, position, reflection: &reflection, lobe, lit_by };
         let mut radiances = Level::ALL.iter().filter_map(|level| level.run(estimate()));
         let radiance = radiances.next().expect("what every processor has");
         assert!(radiances.all(|other| other == radiance), "{position}");

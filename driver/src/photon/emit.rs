@@ -25,6 +25,8 @@ pub(super) struct Emission {
     pub(super) ray: Ray,
     /// Power per channel, watts, as if it were the only path.
     pub(super) power: Vec3,
+    /// True for light of a surface or of the environment, which rays may meet.
+    pub(super) has_extent: bool,
 }
 
 /// 2^64 over the powers 1 to 4 of the root of `x^5 = x + 1`.
@@ -114,12 +116,17 @@ pub(super) fn emit(
     let [first, b, c, d] = random.emission();
     let [b, c, d] = [b, c, d].map(unit_of_bits);
     let Some(chosen) = sources.choose(first) else { return Ok(None) };
+    let mut has_extent = true;
     let emission = match chosen.source {
         Source::Emitter(index) => {
             let emitter = read_emitter(scene, memory, index)?;
+            has_extent = matches!(emitter.kind, EmitterKind::Triangle { .. });
             from_emitter(scene, memory, &emitter, &sources.targets, [chosen.rest, b, c, d])?
         }
-        Source::Distant { direction, irradiance } => from_afar(sources, direction, irradiance, [c, d]),
+        Source::Distant { direction, irradiance } => {
+            has_extent = false;
+            from_afar(sources, direction, irradiance, [c, d])
+        }
         Source::Cell { across: [left, width], cosines: [upper, lower], solid_angle } => {
             let cosine = (upper + (lower - upper) * b).clamp(-1.0, 1.0);
             let towards = environment_direction(left + width * chosen.rest, cosine);
@@ -127,8 +134,11 @@ pub(super) fn emit(
             from_afar(sources, -towards, irradiance, [c, d])
         }
     };
-    let emission =
-        emission.map(|emission| Emission { power: emission.power / chosen.probability, ..emission });
+    let emission = emission.map(|emission| Emission {
+        power: emission.power / chosen.probability,
+        has_extent,
+        ..emission
+    });
     // Bounces are fewer than `u32::MAX`: this random number is used once.
     Ok(emission.and_then(|emission| roulette(emission, sources.power, random.bounce(u32::MAX).survival())))
 }
@@ -163,7 +173,11 @@ fn from_emitter(
             } else {
                 aimed(&point, double_sided, targets, [c, d])
             };
-            emission.map(|Emission { ray, power }| Emission { ray, power: power * area })
+            emission.map(|Emission { ray, power, .. }| Emission {
+                ray,
+                power: power * area,
+                has_extent: true,
+            })
         }
         EmitterKind::Point { position } => {
             let position = Vec3::from(position);
@@ -171,6 +185,7 @@ fn from_emitter(
             aim.map(|Aim { towards, measure }| Emission {
                 ray: Ray::new(position, towards),
                 power: intensity * measure,
+                has_extent: true,
             })
         }
         EmitterKind::Spot { position, direction, scale, offset } => {
@@ -180,6 +195,7 @@ fn from_emitter(
             aim.map(|Aim { towards, measure }| Emission {
                 ray: Ray::new(position, towards),
                 power: intensity * (measure * falloff(axis.dot(towards), scale, offset)),
+                has_extent: true,
             })
         }
     })
@@ -206,6 +222,7 @@ fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Opti
     white.reflector().sample([c, d]).map(|sampled| Emission {
         ray: Ray::new(white.offset_origin(), sampled.direction),
         power: point.emission * (PI * sides),
+        has_extent: true,
     })
 }
 
@@ -218,6 +235,7 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
     (cosine > 0.0 || double_sided).then(|| Emission {
         ray: Ray::new(origin, towards),
         power: point.emission * (cosine.abs() * measure),
+        has_extent: true,
     })
 }
 
@@ -231,7 +249,7 @@ fn from_afar(sources: &Sources, direction: Vec3, irradiance: Vec3, square: [f32;
     // The origin lies before the whole scene.
     let corners = sources.bounds.map(|corner| corner * direction);
     let origin = towards + direction * corners[0].min(corners[1]).element_sum();
-    Some(Emission { ray: Ray::new(origin, direction), power: irradiance * measure })
+    Some(Emission { ray: Ray::new(origin, direction), power: irradiance * measure, has_extent: true })
 }
 
 /// Emission from infinitely far through the faces of the scene's bounding box, each in proportion to its projected area.
@@ -254,5 +272,5 @@ fn through_box([lower, upper]: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c,
     place[(axis + 1) % 3] = across;
     place[(axis + 2) % 3] = d;
     let origin = lower + size * Vec3::from(place);
-    Emission { ray: Ray::new(origin, direction), power: irradiance * area }
+    Emission { ray: Ray::new(origin, direction), power: irradiance * area, has_extent: true }
 }

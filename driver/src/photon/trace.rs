@@ -22,6 +22,8 @@ pub struct PhotonPass {
     pub photons: Photons,
     /// Number of paths traced.
     pub paths: u64,
+    /// Number of paths that met a surface that reflects or transmits light.
+    met: u64,
 }
 
 /// Number of paths after which at least one photon per thousand further paths must be stored.
@@ -34,7 +36,8 @@ const PATHS_PER_TASK: u64 = 2048;
 /// Maximum number of bounces of a path; only surfaces without loss let a path reach it.
 const MAX_BOUNCES: u32 = 512;
 
-/// Traces paths until `count` photons are stored; none if no surface stores photons. `progress` is called with the number
+/// Traces paths until `count` photons are stored; none if no surface stores photons, and fewer if most light ends on surfaces that
+/// store none. `progress` is called with the number
 /// of photons, and returns whether to go on.
 ///
 /// # Errors
@@ -53,10 +56,14 @@ pub fn trace(
     if stored >= count || !packed.keeps_photons() {
         return Ok(traced);
     }
-    if is_fruitless(stored, traced.paths) {
+    if !is_fruitless(stored, traced.paths) {
+        return Err(PhotonError::Stopped);
+    }
+    // The fewer photons are all that there is to gather, unless light passes the surfaces by.
+    if is_fruitless(traced.met as usize, traced.paths) {
         return Err(PhotonError::Lost { stored, paths: traced.paths });
     }
-    Err(PhotonError::Stopped)
+    Ok(traced)
 }
 
 /// Traces paths until `count` caustic photons are stored, or until the yield is so low that the missing ones are invisible.
@@ -87,7 +94,7 @@ fn trace_while(
 ) -> Result<PhotonPass, PhotonError> {
     if !packed.keeps_photons() {
         let photons = Photons { list: Vec::new(), grid: packed.photon_grid(), power_unit: 1.0 };
-        return Ok(PhotonPass { photons, paths: 0 });
+        return Ok(PhotonPass { photons, paths: 0, met: 0 });
     }
     // Photons rarely gain power after emission: factor 2 at a Phong lobe, 16 at glass whose reflection is almost the
     // mirror's alone.
@@ -98,6 +105,7 @@ fn trace_while(
     let tracer = Tracer { scene, sources, grid, path_unit, seed, purpose };
     let mut list: Vec<StoredPhoton> = Vec::with_capacity(count);
     let mut paths = 0_u64;
+    let mut met = 0_u64;
     while list.len() < count && go_on(list.len(), paths) {
         let tasks = next_tasks(count - list.len(), list.len(), paths);
         let round: Result<Vec<Traced>, Fault> = (0..tasks)
@@ -108,6 +116,7 @@ fn trace_while(
             })
             .collect();
         for traced in round.map_err(PhotonError::Unsound)? {
+            met += traced.met;
             let missing = count - list.len();
             if missing > 0 {
                 paths += traced.paths_until(missing);
@@ -116,7 +125,7 @@ fn trace_while(
         }
     }
     let power_unit = (path_unit / paths.max(1) as f32).max(f32::MIN_POSITIVE);
-    Ok(PhotonPass { photons: Photons { list, grid: tracer.grid, power_unit }, paths })
+    Ok(PhotonPass { photons: Photons { list, grid: tracer.grid, power_unit }, paths, met })
 }
 
 /// Number of tasks of the next round, from the photons per path so far; at most 64, so that progress shows. It does not
@@ -133,6 +142,8 @@ struct Traced {
     photons: Vec<StoredPhoton>,
     /// Number of photons at the end of each path.
     ends: Vec<u32>,
+    /// Number of paths that met a surface that reflects or transmits light.
+    met: u64,
 }
 
 impl Traced {
@@ -166,23 +177,26 @@ struct Tracer<'s> {
 impl Tracer<'_> {
     /// Traces the paths of a task.
     fn trace(&self, memory: &mut impl MemoryPort, first: u64) -> Result<Traced, Fault> {
-        let mut traced = Traced { photons: Vec::new(), ends: Vec::with_capacity(PATHS_PER_TASK as usize) };
+        let mut traced =
+            Traced { photons: Vec::new(), ends: Vec::with_capacity(PATHS_PER_TASK as usize), met: 0 };
         for path in first..first + PATHS_PER_TASK {
-            self.follow(memory, path, &mut traced.photons)?;
+            traced.met += u64::from(self.follow(memory, path, &mut traced.photons)?);
             traced.ends.push(traced.photons.len() as u32);
         }
         Ok(traced)
     }
 
+    /// Traces a path. Returns whether it met a surface that reflects or transmits light.
     fn follow(
         &self,
         memory: &mut impl MemoryPort,
         path: u64,
         photons: &mut Vec<StoredPhoton>,
-    ) -> Result<(), Fault> {
+    ) -> Result<bool, Fault> {
         let scene = &self.scene;
         let random = PathRandom::new(self.seed, path);
-        let Some(emission) = emit(scene, memory, self.sources, random)? else { return Ok(()) };
+        let Some(emission) = emit(scene, memory, self.sources, random)? else { return Ok(false) };
+        let mut met = false;
         let mut power = emission.power;
         let mut path = SpecularPath::new(emission.ray, Carried::Power, Passes::NarrowLobes);
         let mut is_direct = true;
@@ -196,6 +210,7 @@ impl Tracer<'_> {
             match arrival {
                 Arrival::Lost | Arrival::Absorbed => break,
                 Arrival::GoesOn => {
+                    met = true;
                     let left = arrived * shading_share(&surface, path.ray.direction);
                     match survive(power, left, random.survival()) {
                         Some(left) => power = left,
@@ -208,10 +223,15 @@ impl Tracer<'_> {
                     if surface.reflection.is_black() || self.purpose == Purpose::Caustics && !is_caustic {
                         break;
                     }
+                    met = true;
                     // Of photons that reach the surface some meet its base: gathers are there as often.
                     if !surface.is_behind {
                         let power = arrived / (surface.probability * surface.coverage);
-                        photons.push(self.stored(&surface, power, is_direct, random.dither()));
+                        let flag = match self.purpose {
+                            Purpose::Indirect => is_direct,
+                            Purpose::Caustics => emission.has_extent,
+                        };
+                        photons.push(self.stored(&surface, power, flag, random.dither()));
                     }
                     if self.purpose == Purpose::Caustics {
                         break;
@@ -227,7 +247,7 @@ impl Tracer<'_> {
                 }
             }
         }
-        Ok(())
+        Ok(met)
     }
 
     /// Record of a photon that arrives at a surface.

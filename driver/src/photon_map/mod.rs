@@ -67,7 +67,7 @@ pub fn map_photons(
 ) -> Result<MappedImage, PhotonError> {
     let mut times = PhotonTimes::default();
     let start = Instant::now();
-    let PhotonPass { photons, paths } = trace(&packed, settings.seed, settings.photons, progress)?;
+    let PhotonPass { photons, paths, .. } = trace(&packed, settings.seed, settings.photons, progress)?;
     let caustic = caustics(&packed, settings, progress)?;
     times.tracing = start.elapsed();
     let start = Instant::now();

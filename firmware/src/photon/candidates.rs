@@ -82,7 +82,7 @@ impl Candidate {
         Photon::disc_of_flags(self.flags())
     }
 
-    /// Returns whether the photon came straight from a light.
+    /// Returns whether the photon came straight from a light; in the caustic map, whether it came from a light with extent.
     #[inline(always)]
     pub fn is_direct(&self) -> bool {
         Photon::direct_of_flags(self.flags())

@@ -16,7 +16,7 @@ use photoncard_shared::message::Fault;
 pub use candidates::{Candidate, CandidateBuffer, CandidateStorage, Candidates};
 pub use irradiance::{FoundIrradiance, PointSearch, nearest_irradiance};
 pub use nearest::NearestPhotons;
-pub use radiance::{Estimate, MIN_NORMAL_COSINE, SameSurface, reflected_radiance};
+pub use radiance::{Estimate, LitBy, MIN_NORMAL_COSINE, SameSurface, reflected_caustics, reflected_radiance};
 
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;

@@ -33,7 +33,28 @@ const MIN_RADIUS_SHARE: f32 = 1e-6;
 /// Radiance of a gather at a position, in the units of the reflection: the photons' power, reflected, over the area of their disc.
 #[inline(always)]
 pub fn reflected_radiance(nearest: &NearestPhotons, position: Vec3, reflection: &PartialReflection) -> Vec3 {
-    simd::run(Estimate { nearest, position, reflection })
+    let lobe = reflection.decode_lobe();
+    simd::run(Estimate { nearest, position, reflection, lobe, lit_by: LitBy::All })
+}
+
+/// [`reflected_radiance`] of caustics, by a lobe that was not decoded from the record.
+#[inline(always)]
+pub fn reflected_caustics(
+    nearest: &NearestPhotons,
+    position: Vec3,
+    (reflection, lobe): (&PartialReflection, DecodedLobe),
+    lit_by: LitBy,
+) -> Vec3 {
+    simd::run(Estimate { nearest, position, reflection, lobe, lit_by })
+}
+
+/// Photons that light a lobe; the Lambertian part is lit by all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LitBy {
+    /// All photons.
+    All,
+    /// Photons of the caustic map from lights without extent.
+    Punctual,
 }
 
 /// The [`Kernel`] of [`reflected_radiance`].
@@ -44,6 +65,10 @@ pub struct Estimate<'a, 'n> {
     pub position: Vec3,
     /// Reflection at the position.
     pub reflection: &'a PartialReflection,
+    /// Its lobe.
+    pub lobe: DecodedLobe,
+    /// Photons that light the lobe.
+    pub lit_by: LitBy,
 }
 
 impl Kernel for Estimate<'_, '_> {
@@ -51,14 +76,16 @@ impl Kernel for Estimate<'_, '_> {
 
     #[inline(always)]
     fn run(self, _: impl Isa) -> Vec3 {
-        let Self { nearest, position, reflection } = self;
+        let Self { nearest, position, reflection, lobe, lit_by } = self;
         let (radius_squared, farthest) = if nearest.is_full() {
             let farthest = extreme(nearest, u32::max, |candidate, other| candidate.order() > other.order());
             (farthest.map_or(0.0, |farthest| farthest.distance_squared()), farthest)
         } else {
             (nearest.max_distance_squared(), None)
         };
-        let Some((closest, sums)) = sum(nearest, farthest, reflection) else { return Vec3::ZERO };
+        let Some((closest, sums)) = sum(nearest, farthest, Sums::new(reflection, lobe, lit_by)) else {
+            return Vec3::ZERO;
+        };
         let fraction = disc_fraction(closest.disc());
         let least = MIN_RADIUS_SHARE * magnitude(&[position]);
         let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
@@ -92,10 +119,10 @@ fn extreme(
 fn sum<'a>(
     nearest: &NearestPhotons,
     farthest: Option<Candidate>,
-    reflection: &'a PartialReflection,
+    mut sums: Sums<'a>,
 ) -> Option<(Candidate, Sums<'a>)> {
     let (_, contents) = nearest.columns();
-    let mut sums = Sums::new(reflection);
+    let reflection = sums.reflection;
     if reflection.is_lambertian() && are_all_of(reflection.normal(), contents) {
         // With a single photon, `farthest` is the closest too.
         if farthest.is_some() && contents.len() < 2 {
@@ -140,21 +167,22 @@ const NORMAL_SHIFT: u32 = 50;
 struct Sums<'a> {
     reflection: &'a PartialReflection,
     decoded: DecodedLobe,
+    lit_by: LitBy,
     power: ColourSum,
     lobe: ColourSum,
 }
 
 impl<'a> Sums<'a> {
     #[inline(always)]
-    fn new(reflection: &'a PartialReflection) -> Self {
-        let decoded = reflection.decode_lobe();
-        Self { reflection, decoded, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
+    fn new(reflection: &'a PartialReflection, decoded: DecodedLobe, lit_by: LitBy) -> Self {
+        Self { reflection, decoded, lit_by, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
     }
 
     #[inline(always)]
     fn add(&mut self, photon: &Candidate) {
         self.power.add_rgbe(photon.power());
-        if !self.reflection.is_lambertian() {
+        let is_lit = self.lit_by == LitBy::All || !photon.is_direct();
+        if is_lit && !self.reflection.is_lambertian() {
             let factor = PartialReflection::lobe_factor(&self.decoded, photon.direction());
             self.lobe.add(Vec3::from_array(photon.power().decode()) * factor);
         }

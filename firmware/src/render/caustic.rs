@@ -9,8 +9,8 @@ use photoncard_shared::message::{CausticGather, Fault};
 use super::search::search;
 use super::{Context, GatherPoint};
 use crate::memory::{MemoryPort, Stage};
-use crate::photon::{Candidates, NearestPhotons, PhotonMap, reflected_radiance};
-use crate::scene::{PartialReflection, Reflector};
+use crate::photon::{Candidates, LitBy, NearestPhotons, PhotonMap, reflected_caustics};
+use crate::scene::{PartialReflection, Reflection, Reflector};
 
 /// Radiance of reflected caustics at a point, in the image's radiance units.
 ///
@@ -24,11 +24,7 @@ pub fn reflected<M: MemoryPort>(
     let frame = context.frame;
     let Some(CausticGather { neighbors, max_distance }) = frame.caustics else { return Ok(Vec3::ZERO) };
     let photons = context.scene.header.section(SectionKind::CausticLeaves).records;
-    // A narrow lobe's gather rays follow light to its source.
-    let reflection = match frame.gather_rays {
-        0 => point.surface.reflection,
-        _ => point.surface.reflection.without_narrow_lobe(),
-    };
+    let (reflection, lit_by) = lit(&point.surface.reflection, frame.gather_rays);
     if photons == 0 || reflection.is_black() {
         return Ok(Vec3::ZERO);
     }
@@ -41,11 +37,21 @@ pub fn reflected<M: MemoryPort>(
     let unit = header.caustic_power_unit / header.radiance_unit;
     // Reflection is by the shading normal; photons carry the geometric one.
     let surface = &point.surface;
-    let reflection = PartialReflection::encode(
-        &Reflector { reflection, ..surface.reflector() },
-        Vec3::splat(unit),
-        point.pattern.dither(0),
-    )
-    .among(encode_normal(surface.geometric_normal.to_array()));
-    Ok(reflected_radiance(&nearest, position, &reflection))
+    let reflector = Reflector { reflection, ..surface.reflector() };
+    let (record, lobe) =
+        PartialReflection::encode_present(&reflector, Vec3::splat(unit), point.pattern.dither(0));
+    let record = record.among(encode_normal(surface.geometric_normal.to_array()));
+    Ok(reflected_caustics(&nearest, position, (&record, lobe), lit_by))
+}
+
+/// The reflection that the map lights, and the photons that light its lobe. Gather rays of a narrow lobe meet lights with extent, but
+/// rarely the highlights of other lights.
+fn lit(reflection: &Reflection, gather_rays: u32) -> (Reflection, LitBy) {
+    if gather_rays == 0 || !reflection.has_narrow_lobe() {
+        (*reflection, LitBy::All)
+    } else if reflection.gathers_caustics() {
+        (*reflection, LitBy::Punctual)
+    } else {
+        (reflection.without_narrow_lobe(), LitBy::All)
+    }
 }

@@ -110,7 +110,8 @@ fn escaped<M: MemoryPort>(
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
 }
 
-/// Light of punctual lights that the path has collected at narrow lobes, weighted, in the image's radiance units.
+/// Light of punctual lights that the path has collected at narrow lobes, weighted, in the image's radiance units; zero where the caustic
+/// map brings it.
 fn collected<M>(
     context: &Context<M>,
     point: &GatherPoint,
@@ -118,7 +119,8 @@ fn collected<M>(
     sampled: &GatherDirection,
     weight: Vec3,
 ) -> Vec3 {
-    if path.collected == Vec3::ZERO {
+    let is_by_map = context.frame.caustics.is_some() && point.surface.reflection.gathers_caustics();
+    if path.collected == Vec3::ZERO || is_by_map {
         return Vec3::ZERO;
     }
     beyond_specular(context, point, sampled, weight)

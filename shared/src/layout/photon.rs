@@ -20,7 +20,8 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// [`disc_fraction`].
 ///
 /// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it, but importance
-/// sampling, which asks for the directions of indirect light, leaves it out.
+/// sampling, which asks for the directions of indirect light, leaves it out. In the caustic map the flag marks light of a surface or of
+/// the environment, which gather rays of a narrow lobe meet as well.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
     /// Position, metres.

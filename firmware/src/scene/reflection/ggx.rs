@@ -21,6 +21,9 @@ use crate::vector::{from_frame, max, max_component, min, mirror, unit};
 /// Minimum of `a`: a lobe of 0.06 degrees, in which `f32` resolves the half vector.
 const MIN_ALPHA: f32 = 1e-3;
 
+/// Minimum `a` of [`GgxLobe::gathers_caustics`]: half of the light within 3.4 degrees.
+const MIN_CAUSTIC_ALPHA: f32 = 0.03;
+
 /// Minimum of the albedo over which energy is compensated.
 const MIN_ALBEDO: f32 = 0.1;
 
@@ -94,6 +97,12 @@ impl GgxLobe {
     #[inline(always)]
     pub(super) fn dimmed(self, colour: Vec3) -> Self {
         Self { f0: self.f0 * colour, f90: self.f90 * colour, albedo: self.albedo * colour, ..self }
+    }
+
+    /// `true` for a lobe that photons of lights without extent resolve, in the caustic map: it is wider than the code of their
+    /// directions, and than a disc of photons is seen from the things that reflect them.
+    pub(super) fn gathers_caustics(&self) -> bool {
+        self.alpha >= MIN_CAUSTIC_ALPHA
     }
 
     /// `a`.

@@ -101,6 +101,16 @@ impl Reflection {
         if self.has_narrow_lobe() { Self::lambertian(self.diffuse) } else { self }
     }
 
+    /// `true` with a narrow lobe that the caustic map lights, with photons of lights without extent: a gather ray of the lobe rarely meets
+    /// their highlights.
+    #[inline(always)]
+    pub fn gathers_caustics(&self) -> bool {
+        match &self.lobe {
+            Lobe::Ggx(lobe) => self.has_narrow_lobe() && lobe.gathers_caustics(),
+            Lobe::Phong(_) | Lobe::Sheen(_) => false,
+        }
+    }
+
     /// The narrow lobe alone; black without one.
     #[must_use]
     pub fn narrow_lobe(self) -> Self {

@@ -50,6 +50,16 @@ impl PartialReflection {
         }
     }
 
+    /// The record of a reflection that does not wait, and its lobe: of GGX, with directions as they are.
+    pub fn encode_present(reflector: &Reflector, weight: Vec3, dither: u32) -> (Self, DecodedLobe) {
+        let record = Self::encode(reflector, weight, dither);
+        let Lobe::Ggx(lobe) = &reflector.reflection.lobe else { return (record, record.decode_lobe()) };
+        let kernel = Kernel::new(reflector.normal, reflector.outgoing, lobe.roughness());
+        let colour = lobe.colour() * weight * kernel.bound();
+        let lobe = Rgbe::encode(colour.to_array(), dither);
+        (Self { lobe, ..record }, DecodedLobe::Ggx(kernel))
+    }
+
     /// The record for photons of another surface normal, of this code.
     #[must_use]
     pub fn among(self, normal: u8) -> Self {
