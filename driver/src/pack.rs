@@ -37,6 +37,7 @@ pub struct PackedScene {
     sources: Sources,
     aimed_sources: Option<Sources>,
     keeps_photons: bool,
+    has_lobes_under_punctual_lights: bool,
 }
 
 impl PackedScene {
@@ -55,6 +56,8 @@ impl PackedScene {
             sources: Sources::new(scene, &lights),
             aimed_sources: Sources::aimed(scene, &lights),
             keeps_photons,
+            has_lobes_under_punctual_lights: !scene.lights.is_empty()
+                && scene.materials.iter().any(|material| scene.has_narrow_lobe(material)),
         })
     }
 
@@ -93,6 +96,11 @@ impl PackedScene {
     /// Returns whether any surface stores photons.
     pub(crate) fn keeps_photons(&self) -> bool {
         self.keeps_photons
+    }
+
+    /// Returns whether there are narrow lobes and lights without extent: the caustic map brings the one's light to the other.
+    pub(crate) fn has_lobes_under_punctual_lights(&self) -> bool {
+        self.has_lobes_under_punctual_lights
     }
 }
 

@@ -7,7 +7,7 @@ use photoncard_firmware::scene::keeps_photons;
 use photoncard_shared::address::Line;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    BvhLeaf, DOUBLE_SIDED, LEAF_TRIANGLES, Material, Record, Reflectance, encode_normal,
+    BLENDS, BvhLeaf, DOUBLE_SIDED, LEAF_TRIANGLES, Material, Record, Reflectance, encode_normal,
 };
 use photoncard_shared::message::{Fault, FaultCode};
 use rayon::prelude::*;
@@ -40,7 +40,8 @@ pub(super) struct SideTable {
 #[derive(Clone, Copy)]
 struct Finish {
     reflects: bool,
-    is_glass: bool,
+    /// Light may pass: glass, partial coverage, or layers, among which diffuse transmission is.
+    transmits: bool,
     emits: bool,
     is_double_sided: bool,
 }
@@ -63,7 +64,9 @@ impl SideTable {
                 let material = Material::read(bytes);
                 Ok(Finish {
                     reflects: keeps_photons(&scene, &mut memory, &material)?,
-                    is_glass: matches!(material.reflectance, Reflectance::Glass { .. }),
+                    transmits: matches!(material.reflectance, Reflectance::Glass { .. })
+                        || material.flags & BLENDS != 0
+                        || material.layers.is_some(),
                     emits: material.emission.into_iter().any(|radiance| radiance > 0.0),
                     is_double_sided: material.flags & DOUBLE_SIDED != 0,
                 })
@@ -96,7 +99,7 @@ impl SideTable {
     }
 
     /// Marks double-sided triangles that form closed surfaces as solid: no light enters, unless they emit it themselves or
-    /// are glass. A surface is closed if each of its edges is shared by exactly two triangles, in opposite directions.
+    /// transmit it. A surface is closed if each of its edges is shared by exactly two triangles, in opposite directions.
     fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
@@ -110,7 +113,7 @@ impl SideTable {
                     let triangle = leaf_triangles.triangle(slot);
                     sheets.push((index, triangle.vertices.map(bits)));
                     let finish = finishes.get(triangle.material as usize);
-                    is_open.push(finish.is_none_or(|finish| finish.emits || finish.is_glass));
+                    is_open.push(finish.is_none_or(|finish| finish.emits || finish.transmits));
                 }
             }
         }
@@ -142,10 +145,10 @@ impl Sides {
         let [a, b, c] = vertices.map(Vec3::from);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let code = |normal: Vec3, reflects: bool| reflects.then(|| encode_normal(normal.to_array()));
-        let Finish { reflects, is_glass, is_double_sided, .. } = finish;
+        let Finish { reflects, transmits, is_double_sided, .. } = finish;
         Self {
             normals: [code(normal, reflects), code(-normal, reflects && is_double_sided)],
-            is_solid: !is_double_sided && !is_glass,
+            is_solid: !is_double_sided && !transmits,
         }
     }
 }

@@ -92,7 +92,11 @@ fn trace_while(
     count: usize,
     go_on: &dyn Fn(usize, u64) -> bool,
 ) -> Result<PhotonPass, PhotonError> {
-    if !packed.keeps_photons() {
+    let keeps_photons = match purpose {
+        Purpose::Indirect => packed.keeps_photons(),
+        Purpose::Caustics => packed.keeps_photons() || packed.has_lobes_under_punctual_lights(),
+    };
+    if !keeps_photons {
         let photons = Photons { list: Vec::new(), grid: packed.photon_grid(), power_unit: 1.0 };
         return Ok(PhotonPass { photons, paths: 0, met: 0 });
     }
@@ -198,7 +202,11 @@ impl Tracer<'_> {
         let Some(emission) = emit(scene, memory, self.sources, random)? else { return Ok(false) };
         let mut met = false;
         let mut power = emission.power;
-        let mut path = SpecularPath::new(emission.ray, Carried::Power, Passes::NarrowLobes);
+        let passes = match self.purpose {
+            Purpose::Indirect => Passes::NarrowLobes,
+            Purpose::Caustics => Passes::CausticPhotons,
+        };
+        let mut path = SpecularPath::new(emission.ray, Carried::Power, passes);
         let mut is_direct = true;
         for bounce in 0..MAX_BOUNCES {
             let random = random.bounce(bounce);
@@ -220,7 +228,12 @@ impl Tracer<'_> {
                 Arrival::Ends => {
                     let surface = surface.flat();
                     let is_caustic = is_direct && path.bounces > 0;
-                    if surface.reflection.is_black() || self.purpose == Purpose::Caustics && !is_caustic {
+                    // Rays of a narrow lobe meet lights with extent.
+                    let lit = match emission.has_extent {
+                        true => surface.reflection.without_narrow_lobe(),
+                        false => surface.reflection,
+                    };
+                    if lit.is_black() || self.purpose == Purpose::Caustics && !is_caustic {
                         break;
                     }
                     met = true;
@@ -243,7 +256,7 @@ impl Tracer<'_> {
                     }
                     is_direct = false;
                     let ray = Ray::new(surface.offset_origin(), sampled.direction);
-                    path = SpecularPath::new(ray, Carried::Power, Passes::NarrowLobes);
+                    path = SpecularPath::new(ray, Carried::Power, passes);
                 }
             }
         }

@@ -58,6 +58,9 @@ pub enum Passes {
     Specular,
     /// Narrow lobes besides: for gather rays and photons ([`crate::scene::Reflection::has_narrow_lobe`]).
     NarrowLobes,
+    /// Narrow lobes besides, and an end at those that the caustic map lights ([`crate::scene::Reflection::gathers_caustics`]): for its
+    /// photons.
+    CausticPhotons,
 }
 
 /// The continuation of a path at a surface.
@@ -108,7 +111,7 @@ impl SpecularPath {
 
     #[inline(always)]
     fn passes_lobe(&self, surface: &Surface) -> bool {
-        self.passes == Passes::NarrowLobes && surface.reflection.has_narrow_lobe()
+        self.passes != Passes::Specular && surface.reflection.has_narrow_lobe()
     }
 
     /// Arrives at a surface. Of `random`, in [0, 1), the first chooses the continuation, the others a direction. Where the path
@@ -140,7 +143,9 @@ impl SpecularPath {
             },
             ..surface.reflector()
         };
-        if !lobe.reflection.is_black() {
+        let ends_at_lobe = self.passes == Passes::CausticPhotons && self.bounces > 0;
+        let keeps_lobe = ends_at_lobe && surface.reflection.gathers_caustics();
+        if !lobe.reflection.is_black() && !keeps_lobe {
             surface.reflection = surface.reflection.without_narrow_lobe();
         }
         let specular = &surface.specular;
