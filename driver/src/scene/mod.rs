@@ -10,6 +10,7 @@ mod light;
 mod limits;
 mod map_size;
 mod material;
+mod meshopt;
 mod radiance;
 mod raster;
 mod settings;

@@ -21,7 +21,7 @@ pub struct Inputs {
     seeds: Vec<Seed>,
 }
 
-const SCENES: [&str; 9] = [
+const SCENES: [&str; 11] = [
     "scenes/cornell.gltf",
     "scenes/cornell-glossy.gltf",
     "scenes/cornell-uplight.gltf",
@@ -31,6 +31,8 @@ const SCENES: [&str; 9] = [
     "scenes/roughness.glb",
     "scenes/cornell-spheres.glb",
     "scenes/atrium.glb",
+    "driver/tests/compressed/meshopt-0.glb",
+    "driver/tests/compressed/meshopt-1.glb",
 ];
 
 const IMAGES: [&str; 11] = [

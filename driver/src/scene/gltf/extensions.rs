@@ -1,8 +1,10 @@
 //! glTF extensions that the loader supports.
 
 /// Names of the supported extensions.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 10] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 12] = [
     INSTANCING,
+    MESHOPT[0],
+    MESHOPT[1],
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -20,3 +22,6 @@ pub(super) const QUANTIZATION: &str = "KHR_mesh_quantization";
 
 /// Instances of a node's mesh.
 pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+
+/// Compressed buffer views: one format under two names.
+pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];

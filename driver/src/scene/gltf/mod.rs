@@ -7,6 +7,7 @@
 mod accessor;
 mod buffers;
 mod camera;
+mod compression;
 mod document;
 mod extensions;
 mod files;
@@ -35,6 +36,7 @@ use std::path::Path;
 use photoncard_firmware::kind::REFERENCE;
 
 use self::accessor::Source;
+use self::buffers::Buffers;
 use self::document::Document;
 pub use self::limits::MAX_TRIANGLES;
 use self::notices::Notices;
@@ -73,7 +75,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 /// has no triangle with an area. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
 pub fn load_for(path: &Path, dram_bytes: u32) -> Result<Scene, SceneError> {
     let document = Document::read(path)?;
-    let buffers = buffers::load(&document)?;
+    let buffers = Buffers::load(&document)?;
     let source = Source::new(&document, &buffers);
     let mut room = Room::new(path, dram_bytes.into());
     room.materials(document.root.materials.len())?;

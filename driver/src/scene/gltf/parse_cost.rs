@@ -4,7 +4,7 @@
 //! as the largest value of its kind, in the types of the `gltf` crate and in the loader's, times two, as lists grow by
 //! doubling.
 
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::fmt;
 
 use glam::DMat4;
@@ -47,7 +47,7 @@ fn element(list: &str) -> u64 {
         "accessors" => size_of::<json::Accessor>(),
         "animations" => size_of::<json::Animation>(),
         "buffers" => size_of::<json::Buffer>(),
-        "bufferViews" => size_of::<json::buffer::View>(),
+        "bufferViews" => size_of::<json::buffer::View>() + size_of::<OnceCell<Vec<u8>>>(),
         "cameras" => size_of::<json::Camera>() + size_of::<Camera>(),
         "images" => size_of::<json::Image>(),
         "materials" => size_of::<json::Material>() + size_of::<Material>(),
