@@ -189,43 +189,89 @@ fn images_without_a_use_are_not_read() {
     assert_eq!(scene.load().unwrap().materials[0].textures().count(), 1);
 }
 
+/// Checks that a scene is loaded without its texture, and that one notice names the image and the reason.
+fn check_left_out(scene: &Scene, parts: &[&str]) {
+    assert_eq!((scene.images.len(), scene.textures.len()), (0, 0), "{parts:?}");
+    assert_eq!((scene.materials[0].base_texture, scene.triangles.len()), (None, 1), "{parts:?}");
+    let [notice] = &scene.notices[..] else { panic!("{parts:?}: {:?}", scene.notices) };
+    for part in ["left out"].iter().chain(parts) {
+        assert!(notice.contains(part), "{part:?} is not in {notice:?}");
+    }
+}
+
 #[test]
-fn images_that_cannot_be_had_are_refused() {
+fn textures_without_a_readable_image_are_left_out() {
     let uri = |uri: &str| textured(&json!({"uri": uri}));
-    let jpeg_as_png = format!("data:image/png;base64,{}", base64(COLOUR));
+    let without_source = |texture: Value| {
+        let mut scene = embedded(TEXEL, "image/png");
+        scene.json["textures"] = json!([texture]);
+        scene
+    };
     let cases: [(Extended, &[&str]); 19] = [
-        (uri("absent.png"), &["images[0].uri", "absent.png"]),
-        (uri("sub"), &["images[0].uri", "regular file"]),
-        (uri("/etc/hostname"), &["images[0].uri", "relative"]),
-        (uri("../secret.png"), &["images[0].uri", "leaves"]),
-        (uri("sub/%2e%2e/%2E%2e/secret.png"), &["images[0].uri", "leaves"]),
-        (uri("..%2fsecret.png"), &["images[0].uri", "leaves"]),
-        (uri("file:///etc/hostname"), &["images[0].uri", "scheme"]),
-        (uri("https://example.org/a.png"), &["images[0].uri", "scheme"]),
-        (uri("data:image/png;base64,*"), &["images[0].uri", "base64"]),
-        (uri(&jpeg_as_png), &["images[0].uri", "image/png", "image/jpeg"]),
-        (uri("data:image/png;base64,"), &["images[0]", "empty"]),
-        (textured(&json!({})), &["images[0]", "neither uri nor bufferView"]),
-        (textured(&json!({"uri": "a.png", "bufferView": 0})), &["images[0]", "both"]),
-        (embedded(COLOUR, "image/png"), &["images[0].mimeType", "image/png"]),
-        (embedded(b"RIFF....WEBPVP8 ", "image/webp"), &["images[0]", "WebP"]),
-        (embedded(&TEXEL[..TEXEL.len() - 20], "image/png"), &["images[0]", "decoded"]),
-        (embedded(&COLOUR[..COLOUR.len() - 100], "image/jpeg"), &["images[0]", "decoded"]),
-        (embedded(&COLOUR[..100], "image/jpeg"), &["images[0]"]),
-        (embedded(CMYK, "image/jpeg"), &["images[0]", "CMYK"]),
+        (uri("absent.png"), &["'absent.png'", "cannot read"]),
+        (uri("sub"), &["'sub'", "regular file"]),
+        (uri("/etc/hostname"), &["relative"]),
+        (uri("../secret.png"), &["leaves"]),
+        (uri("sub/%2e%2e/%2E%2e/secret.png"), &["leaves"]),
+        (uri("..%2fsecret.png"), &["leaves"]),
+        (uri("file:///etc/hostname"), &["scheme"]),
+        (uri("https://example.org/a.png"), &["scheme"]),
+        (uri("data:image/png;base64,*"), &["'image 0'", "base64"]),
+        (uri("data:image/png;base64,"), &["'image 0'", "empty"]),
+        (textured(&json!({"name": "paint"})), &["'paint'", "neither uri nor bufferView"]),
+        (textured(&json!({"uri": "a.png", "bufferView": 0})), &["'a.png'", "both"]),
+        (embedded(b"GIF89a", "image/gif"), &["'image 0'", "GIF"]),
+        (embedded(&TEXEL[..TEXEL.len() - 20], "image/png"), &["decoded"]),
+        (embedded(&COLOUR[..COLOUR.len() - 100], "image/jpeg"), &["decoded"]),
+        (embedded(&COLOUR[..100], "image/jpeg"), &["frame header"]),
+        (embedded(CMYK, "image/jpeg"), &["CMYK"]),
+        (without_source(json!({"extensions": {"VENDOR_texture": {"source": 0}}})), &["no image in a format"]),
+        (without_source(json!({})), &["no image in a format"]),
     ];
     for (scene, parts) in cases {
-        match load_beside(&scene, &[]) {
-            Ok(_) => panic!("{parts:?} was loaded"),
-            Err(error) => check(&error, parts),
-        }
+        check_left_out(&load_beside(&scene, &[]).unwrap(), parts);
     }
     #[cfg(unix)]
-    check(&load_beside(&uri("link.png"), &[]).unwrap_err(), &["images[0].uri", "link"]);
+    check_left_out(&load_beside(&uri("link.png"), &[]).unwrap(), &["'link.png'", "link"]);
+    // A buffer that is too short is a fault of the whole file.
     let mut beyond = embedded(TEXEL, "image/png");
     beyond.json["bufferViews"][2]["byteLength"] = json!(1000);
     beyond.json["images"][0]["bufferView"] = json!(2);
     check(&beyond.load().unwrap_err(), &["images[0].bufferView", "beyond"]);
+}
+
+/// Other textures keep their images, and a notice has an image once, and not more than eight of them.
+#[test]
+fn textures_beside_one_that_is_left_out_stay() {
+    let mut scene = embedded(TEXEL, "image/png");
+    let first = push(&mut scene.json, "images", json!({"uri": "absent 0.png"}));
+    for number in 1..20 {
+        push(&mut scene.json, "images", json!({"uri": format!("absent {number}.png")}));
+    }
+    for image in first..first + 20 {
+        let texture = push(&mut scene.json, "textures", json!({"source": image}));
+        let other = json!({"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": texture},
+            "pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": texture}}});
+        push(&mut scene.json, "materials", other);
+    }
+    pbr(&mut scene.json)["baseColorTexture"] = json!({"index": 1});
+    scene.json["materials"][0]["emissiveTexture"] = json!({"index": 0});
+    let scene = scene.load().unwrap();
+    assert_eq!((scene.materials[0].base_texture, scene.materials[0].emissive_texture), (None, Some(0)));
+    assert_eq!((scene.textures.len(), scene.textures[0].image), (1, 0));
+    assert_eq!(scene.images[0].texels, [[255, 128, 0, 51]]);
+    let [notice] = &scene.notices[..] else { panic!("{:?}", scene.notices) };
+    assert_eq!(notice.matches("absent 0.png'").count(), 1, "{notice}");
+    assert!(notice.ends_with("and 12 more"), "{notice}");
+}
+
+/// The format of an image follows from its bytes.
+#[test]
+fn wrong_media_types_do_no_harm() {
+    let right = embedded(COLOUR, "image/jpeg").load().unwrap().checksum();
+    assert_eq!(embedded(COLOUR, "image/png").load().unwrap().checksum(), right);
+    let uri = format!("data:image/png;base64,{}", base64(COLOUR));
+    assert_eq!(textured(&json!({"uri": uri})).load().unwrap().images[0].width, 24);
 }
 
 /// A header alone, with a correct checksum, and a size that is too large or impossible for the file's length.
@@ -259,12 +305,14 @@ fn sizes_are_refused_by_the_header() {
     for (size, part) in [
         ([1, 100_000], "1 x 100000 texels, more than 16384"),
         ([16_385, 1], "16385 x 1"),
-        ([16_384, 16_384], "do not fit into 70 bytes"),
         ([u32::MAX >> 1, u32::MAX >> 1], "more than 16384"),
     ] {
         let error = embedded(&header(size[0], size[1]), "image/png").load().unwrap_err();
         check(&error, &["images[0]", part]);
     }
+    // A size that the file cannot hold is damage.
+    let empty = embedded(&header(16_384, 16_384), "image/png").load().unwrap();
+    check_left_out(&empty, &["16384 x 16384 texels do not fit into 70 bytes"]);
     let mut wide = COLOUR.to_vec();
     let frame = wide.windows(2).position(|bytes| bytes == [0xff, 0xc0]).unwrap();
     wide[frame + 5..frame + 9].copy_from_slice(&[0xff; 4]);
@@ -272,12 +320,9 @@ fn sizes_are_refused_by_the_header() {
 }
 
 #[test]
-fn textures_without_an_image_or_coordinates_are_refused() {
+fn textures_without_coordinates_or_of_wrong_indices_are_refused() {
     type Change = fn(&mut Value);
-    let cases: [(&[&str], Change); 6] = [
-        (&["textures[0].source"], |json| {
-            json["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
-        }),
+    let cases: [(&[&str], Change); 5] = [
         (&["textures[0].source"], |json| json["textures"][0]["source"] = json!(3)),
         (&["materials[0].pbrMetallicRoughness.baseColorTexture.index"], |json| {
             pbr(json)["baseColorTexture"]["index"] = json!(3);

@@ -7,12 +7,13 @@ use rayon::prelude::*;
 use super::accessor::Source;
 use super::files::Bytes;
 use super::room::Room;
-use super::uri::{INSIDE_FOLDER, decode_data, is_data, locate};
+use super::uri::{decode_data, is_data, locate};
 use crate::error::SceneError;
 use crate::scene::raster::{Fault, Kind};
 use crate::scene::{Encoding, Image, MAX_TEXELS};
 
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
+const CONVERT: &str = "convert the image to PNG or JPEG";
 
 /// An image whose header is read.
 struct Found<'a> {
@@ -21,19 +22,37 @@ struct Found<'a> {
     bytes: Bytes<'a>,
 }
 
-/// Maximum size of all image files together, bytes: in both formats a texel takes at most eight.
+/// Maximum size of all image files together, bytes: in every format a texel takes at most eight.
 const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
 
-/// Decodes images by index and encoding. All indices exist.
+/// Image that a texture refers to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Origin {
+    /// Image of the index.
+    Image(usize),
+    /// None in a format that is read, for the texture of the index.
+    Absent(usize),
+}
+
+/// Decodes images; those that cannot be read are descriptions of the fault. All indices exist.
+///
+/// # Errors
+/// If the images exceed a limit, or the memory of process or card.
 pub(super) fn load(
     source: &Source<'_>,
-    wanted: &[(usize, Encoding)],
+    wanted: &[(Origin, Encoding)],
     room: &mut Room,
-) -> Result<Vec<Image>, SceneError> {
+) -> Result<Vec<Result<Image, String>>, SceneError> {
     let (mut texels, mut bytes) = (0, 0);
     let mut found = Vec::with_capacity(wanted.len());
-    for &(index, _) in wanted {
-        let image = find(source, index)?;
+    for &(origin, _) in wanted {
+        let image = match find(source, origin) {
+            Ok(image) => image,
+            Err(failure) => {
+                found.push(Err(failure.description(source, origin)?));
+                continue;
+            }
+        };
         texels += u64::from(image.size[0]) * u64::from(image.size[1]);
         bytes += image.bytes.len() as u64;
         let (count, limit, unit) = if texels > MAX_TEXELS {
@@ -43,86 +62,98 @@ pub(super) fn load(
         };
         if count > limit {
             let reason = format!("the images up to this one have {count} {unit}, more than {limit}");
-            return Err(fault(source, index, "", reason, "scale the images down, or use fewer"));
+            return Err(error(source, origin, reason, "scale the images down, or use fewer"));
         }
         room.texels(image.size)?;
-        found.push(image);
+        found.push(Ok(image));
     }
-    let decoded: Vec<_> = found
-        .into_par_iter()
-        .map(|image| (image.size, image.kind.decode(&image.bytes, image.size)))
-        .collect();
+    let decode = |image: Found<'_>| (image.size, image.kind.decode(&image.bytes, image.size));
+    let decoded: Vec<_> = found.into_par_iter().map(|image| image.map(decode)).collect();
     // The first error in the order of the file is returned, whichever thread failed first.
-    let images = decoded.into_iter().zip(wanted).map(|(([width, height], texels), &(index, encoding))| {
-        let texels = texels.map_err(|Fault { reason, remedy }| fault(source, index, "", reason, remedy))?;
-        Ok(Image { name: name(source, index), width, height, texels, encoding })
+    let images = decoded.into_iter().zip(wanted).map(|(decoded, &(origin, encoding))| match decoded {
+        Ok(([width, height], Ok(texels))) => {
+            Ok(Ok(Image { name: name(source, origin), width, height, texels, encoding }))
+        }
+        Ok((_, Err(fault))) => Failure::Image(fault).description(source, origin).map(Err),
+        Err(description) => Ok(Err(description)),
     });
     images.collect()
 }
 
-fn fault(
-    source: &Source<'_>,
-    index: usize,
-    field: &str,
-    reason: impl Into<String>,
-    remedy: &'static str,
-) -> SceneError {
-    let location = source.document.location(format!("images[{index}]{field}"));
-    SceneError::Image { location, reason: reason.into(), remedy }
+/// Failure to read an image.
+enum Failure {
+    /// Fault of the image.
+    Image(Fault),
+    /// Fault of the buffers, which other parts of the scene need.
+    Scene(SceneError),
+}
+
+impl From<Fault> for Failure {
+    fn from(fault: Fault) -> Self {
+        Self::Image(fault)
+    }
+}
+
+impl Failure {
+    /// Description of an image that cannot be read; an error for one beyond a limit.
+    fn description(self, source: &Source<'_>, origin: Origin) -> Result<String, SceneError> {
+        match self {
+            Self::Image(Fault { reason, remedy, is_limit: true }) => {
+                Err(error(source, origin, reason, remedy))
+            }
+            Self::Image(Fault { reason, .. }) => Ok(format!("'{}' ({reason})", name(source, origin))),
+            Self::Scene(error) => Err(error),
+        }
+    }
+}
+
+fn error(source: &Source<'_>, origin: Origin, reason: String, remedy: &'static str) -> SceneError {
+    let item = match origin {
+        Origin::Image(index) => format!("images[{index}]"),
+        Origin::Absent(texture) => format!("textures[{texture}]"),
+    };
+    SceneError::Image { location: source.document.location(item), reason, remedy }
 }
 
 /// Name of the image, or of its file, or `image N`.
-fn name(source: &Source<'_>, index: usize) -> String {
+fn name(source: &Source<'_>, origin: Origin) -> String {
+    let Origin::Image(index) = origin else { return "none".to_owned() };
     let image = &source.document.root.images[index];
     let file = image.uri.as_ref().filter(|uri| !is_data(uri));
     image.name.as_ref().or(file).cloned().unwrap_or_else(|| format!("image {index}"))
 }
 
-fn find<'a>(source: &Source<'a>, index: usize) -> Result<Found<'a>, SceneError> {
-    let (stated, bytes) = bytes(source, index)?;
-    let fault = |Fault { reason, remedy }| fault(source, index, "", reason, remedy);
-    let kind = Kind::of(&bytes).map_err(fault)?;
-    if let Some((field, stated)) = stated.filter(|(_, stated)| *stated != kind.media_type()) {
-        let reason = format!("the image is stated to be {stated}, and is {}", kind.media_type());
-        let remedy = "state the image's own type, or export the scene again";
-        return Err(self::fault(source, index, field, reason, remedy));
-    }
-    let size = kind.size(&bytes).map_err(fault)?;
+fn find<'a>(source: &Source<'a>, origin: Origin) -> Result<Found<'a>, Failure> {
+    let Origin::Image(index) = origin else {
+        return Err(Fault::unreadable("the texture has no image in a format that is read", CONVERT).into());
+    };
+    let bytes = bytes(source, index)?;
+    // The format follows from the bytes: exporters state wrong media types.
+    let kind = Kind::of(&bytes)?;
+    let size = kind.size(&bytes)?;
     Ok(Found { kind, size, bytes })
 }
 
-/// JSON path and value of a stated media type.
-type Stated<'a> = Option<(&'static str, &'a str)>;
-
-/// Stated media type of an image, and its bytes.
-fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<(Stated<'a>, Bytes<'a>), SceneError> {
+/// Bytes of an image.
+fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<Bytes<'a>, Failure> {
     let document = source.document;
     let image = &document.root.images[index];
-    let stated = image.mime_type.as_ref().map(|kind| (".mimeType", kind.0.as_str()));
-    let fault = |field, reason, remedy| fault(source, index, field, reason, remedy);
+    let unreadable = |reason: String| Failure::Image(Fault::unreadable(reason, EXPORT_AGAIN));
     match (&image.uri, image.buffer_view) {
         (Some(uri), None) if is_data(uri) => {
-            let (kind, bytes) = decode_data(uri).map_err(|reason| fault(".uri", reason, EXPORT_AGAIN))?;
-            let in_uri = Some((".uri", kind)).filter(|_| kind.starts_with("image/"));
-            Ok((stated.or(in_uri), Bytes::Shared(Arc::new(bytes))))
+            let (_, bytes) = decode_data(uri).map_err(unreadable)?;
+            Ok(Bytes::Shared(Arc::new(bytes)))
         }
         (Some(uri), None) => {
-            let file = locate(&document.path, uri).map_err(|reason| fault(".uri", reason, INSIDE_FOLDER))?;
-            let bytes = document.files.read(&file).map_err(|error| {
-                let reason = format!("cannot read {}: {error}", file.display());
-                fault(
-                    ".uri",
-                    reason,
-                    "put the image where the scene looks for it, or export the scene as .glb",
-                )
-            })?;
-            Ok((stated, bytes))
+            let file = locate(&document.path, uri).map_err(unreadable)?;
+            let read = document.files.read(&file);
+            read.map_err(|error| unreadable(format!("cannot read {}: {error}", file.display())))
         }
         (None, Some(view)) => {
-            let bytes = source.bytes(view.value(), &format!("images[{index}].bufferView"))?;
-            Ok((stated, Bytes::Part(bytes)))
+            let bytes = source.bytes(view.value(), &format!("images[{index}].bufferView"));
+            bytes.map(Bytes::Part).map_err(Failure::Scene)
         }
-        (None, None) => Err(fault("", "it has neither uri nor bufferView".to_owned(), EXPORT_AGAIN)),
-        (Some(_), Some(_)) => Err(fault("", "it has both uri and bufferView".to_owned(), EXPORT_AGAIN)),
+        (None, None) => Err(unreadable("it has neither uri nor bufferView".to_owned())),
+        (Some(_), Some(_)) => Err(unreadable("it has both uri and bufferView".to_owned())),
     }
 }

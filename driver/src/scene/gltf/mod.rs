@@ -82,8 +82,8 @@ pub fn load_for(path: &Path, dram_bytes: u32) -> Result<Scene, SceneError> {
     let mut notices = Notices::default();
     let mut textures = Textures::new(&document);
     let materials = material::load(&document, &mut textures)?;
-    let (textures, images) = textures.finish(&source, &mut room)?;
-    let mut scene = Scene { materials, textures, images, ..Scene::default() };
+    let mut scene = Scene { materials, ..Scene::default() };
+    textures.finish(&source, &mut room, &mut scene, &mut notices)?;
     nodes::place(&source, &mut scene, &mut room, &mut notices)?;
     let file = || path.to_owned();
     match (scene.triangles.is_empty(), scene.skipped_triangles) {

@@ -23,6 +23,8 @@ const LISTED: usize = 8;
 pub(super) struct Notices {
     /// Names of orthographic cameras.
     pub(super) orthographic: Vec<String>,
+    /// Images that cannot be read, each with its reason.
+    pub(super) unreadable: Vec<String>,
     /// True if the scene has no camera and received a default one.
     pub(super) framed: bool,
     /// Meshes with normals or colours that are not finite.
@@ -31,14 +33,17 @@ pub(super) struct Notices {
 
 /// Formats `kind 'a', 'b' and 3 more`.
 fn list(kind: &str, names: &[String]) -> String {
+    let quoted: Vec<_> = names.iter().map(|name| format!("'{name}'")).collect();
+    format!("{kind} {}", several(&quoted))
+}
+
+/// Formats `a, b and 3 more`; equal ones count once.
+fn several(items: &[String]) -> String {
     let mut seen = BTreeSet::new();
-    let unique: Vec<_> = names.iter().filter(|name| seen.insert(*name)).collect();
-    let listed: Vec<_> = unique.iter().take(LISTED).map(|name| format!("'{name}'")).collect();
-    let more = match unique.len().saturating_sub(LISTED) {
-        0 => String::new(),
-        rest => format!(" and {rest} more"),
-    };
-    format!("{kind} {}{more}", listed.join(", "))
+    let unique: Vec<_> = items.iter().filter(|item| seen.insert(*item)).map(String::as_str).collect();
+    let (listed, rest) = unique.split_at(unique.len().min(LISTED));
+    let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
+    format!("{}{more}", listed.join(", "))
 }
 
 /// Names of the items for which `holds` is true.
@@ -65,6 +70,12 @@ impl Notices {
     pub(super) fn finish(self, document: &Document) -> Vec<String> {
         let root = &document.root;
         let mut sentences = Vec::new();
+        if !self.unreadable.is_empty() {
+            let images = several(&self.unreadable);
+            sentences.push(format!(
+                "textures are left out whose image cannot be read, the factors alone count: image {images}"
+            ));
+        }
         let mut note = |sentence: &str, kind: &str, names: &[String]| {
             if !names.is_empty() {
                 sentences.push(format!("{sentence}: {}", list(kind, names)));

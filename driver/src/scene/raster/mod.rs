@@ -52,15 +52,7 @@ impl Kind {
             Some((_, name)) => format!("the image is neither PNG nor JPEG, but seems to be {name}"),
             None => "the image is neither PNG nor JPEG".to_owned(),
         };
-        Err(Fault { reason, remedy: REMEDY })
-    }
-
-    /// Media type as in glTF.
-    pub(super) fn media_type(self) -> &'static str {
-        match self {
-            Self::Png => "image/png",
-            Self::Jpeg => "image/jpeg",
-        }
+        Err(Fault::unreadable(reason, REMEDY))
     }
 
     /// Width and height from the header, checked against the limits and the file's length.
@@ -98,7 +90,11 @@ pub(super) fn check_size([width, height]: [u32; 2]) -> Result<(), Fault> {
     }
     if width > MAX_SIDE || height > MAX_SIDE || u64::from(width) * u64::from(height) > MAX_TEXELS {
         let reason = format!("the image has {width} x {height} texels, more than {MAX_SIDE} x {MAX_SIDE}");
-        return Err(Fault { reason, remedy: "scale the image down to 16384 texels a side or less" });
+        return Err(Fault {
+            reason,
+            remedy: "scale the image down to 16384 texels a side or less",
+            is_limit: true,
+        });
     }
     Ok(())
 }
