@@ -17,6 +17,10 @@ const TEXEL: &[u8] = include_bytes!("images/texel.png");
 const COLOUR: &[u8] = include_bytes!("images/colour.jpg");
 const PROGRESSIVE: &[u8] = include_bytes!("images/progressive.jpg");
 const GREY: &[u8] = include_bytes!("images/grey.jpg");
+const LOSSY_WEBP: &[u8] = include_bytes!("images/lossy.webp");
+const LOSSLESS_WEBP: &[u8] = include_bytes!("images/lossless.webp");
+/// With alpha of 255 - 5 y.
+const ALPHA_WEBP: &[u8] = include_bytes!("images/alpha.webp");
 const CMYK: &[u8] = include_bytes!("images/cmyk.jpg");
 
 /// The triangle with coordinates, whose base colour is texture 0 of image 0.
@@ -112,6 +116,45 @@ fn jpegs_are_decoded() {
             .iter()
             .all(|[red, green, blue, alpha]| { red == green && green == blue && *alpha == 255 })
     );
+}
+
+/// WebP as an image of its own, and as the image of a texture's extension, which may be required.
+#[test]
+fn webps_are_decoded() {
+    for (bytes, tolerance, rows) in [(LOSSY_WEBP, 8, 0), (LOSSLESS_WEBP, 0, 0), (ALPHA_WEBP, 8, 5)] {
+        let mut scene = embedded(bytes, "image/webp");
+        let image = scene.load().unwrap().images.remove(0);
+        assert_eq!((image.width, image.height), (24, 16));
+        for (index, texel) in image.texels.iter().enumerate() {
+            let (x, y) = (index as i32 % 24, index as i32 / 24);
+            let expected = [10 * x, 16 * y, 200 - 8 * x, 255 - rows * y];
+            let errors = texel.iter().zip(expected).map(|(&found, e)| (i32::from(found) - e).abs());
+            assert!(errors.max() <= Some(4 * tolerance), "{texel:?} is not {expected:?}");
+        }
+        scene.json["extensionsRequired"] = json!(["EXT_texture_webp"]);
+        scene.json["textures"] = json!([{"extensions": {"EXT_texture_webp": {"source": 0}}}]);
+        assert_eq!(scene.load().unwrap().images, [image]);
+    }
+    // A texture's own image comes first.
+    let mut scene = embedded(TEXEL, "image/png");
+    let view = scene.view(LOSSY_WEBP);
+    push(&mut scene.json, "images", json!({"bufferView": view}));
+    scene.json["textures"][0]["extensions"] = json!({"EXT_texture_webp": {"source": 1}});
+    assert_eq!(scene.load().unwrap().images[0].width, 1);
+}
+
+#[test]
+fn webps_that_contradict_themselves_or_move_are_left_out() {
+    let changed = |bytes: &[u8], at: usize, value: u8| {
+        let mut bytes = bytes.to_vec();
+        bytes[at] = value;
+        embedded(&bytes, "image/webp").load().unwrap()
+    };
+    // The canvas of the extended header, and its mark of an animation.
+    check_left_out(&changed(ALPHA_WEBP, 24, 24), &["contradict"]);
+    check_left_out(&changed(ALPHA_WEBP, 20, 0x12), &["cannot be decoded"]);
+    check_left_out(&embedded(&LOSSY_WEBP[..100], "image/webp").load().unwrap(), &["cannot be decoded"]);
+    check_left_out(&embedded(&LOSSLESS_WEBP[..30], "image/webp").load().unwrap(), &["cannot be decoded"]);
 }
 
 #[test]

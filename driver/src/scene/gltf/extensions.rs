@@ -1,8 +1,9 @@
 //! glTF extensions that the loader supports.
 
 /// Names of the supported extensions.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 12] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 13] = [
     INSTANCING,
+    WEBP,
     MESHOPT[0],
     MESHOPT[1],
     "KHR_lights_punctual",
@@ -25,3 +26,6 @@ pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
 /// Compressed buffer views: one format under two names.
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+
+/// Image of a texture, in WebP.
+pub(super) const WEBP: &str = "EXT_texture_webp";

@@ -13,7 +13,7 @@ use crate::scene::raster::{Fault, Kind};
 use crate::scene::{Encoding, Image, MAX_TEXELS};
 
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
-const CONVERT: &str = "convert the image to PNG or JPEG";
+const CONVERT: &str = "convert the image to PNG, JPEG or WebP";
 
 /// An image whose header is read.
 struct Found<'a> {
