@@ -1,7 +1,7 @@
 //! glTF extensions that the loader supports.
 
 /// Names of the supported extensions.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 13] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 14] = [
     INSTANCING,
     WEBP,
     MESHOPT[0],
@@ -9,6 +9,7 @@ pub(super) const SUPPORTED_EXTENSIONS: [&str; 13] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     // Rendered with lighting nevertheless, which a notice reports.

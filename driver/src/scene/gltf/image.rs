@@ -6,7 +6,9 @@ use rayon::prelude::*;
 
 use super::accessor::Source;
 use super::files::Bytes;
+use super::origin::Origin;
 use super::room::Room;
+use super::specular_glossiness::{Conversion, Grid};
 use super::uri::{decode_data, is_data, locate};
 use crate::error::SceneError;
 use crate::scene::raster::{Fault, Kind};
@@ -15,69 +17,29 @@ use crate::scene::{Encoding, Image, MAX_TEXELS};
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
 const CONVERT: &str = "convert the image to PNG, JPEG or WebP";
 
-/// An image whose header is read.
-struct Found<'a> {
+/// Maximum size of all image files together, bytes: in every format a texel takes at most eight.
+const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
+
+/// An image file whose header is read.
+struct File<'a> {
+    origin: Origin,
     kind: Kind,
     size: [u32; 2],
     bytes: Bytes<'a>,
 }
 
-/// Maximum size of all image files together, bytes: in every format a texel takes at most eight.
-const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
-
-/// Image that a texture refers to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Origin {
-    /// Image of the index.
-    Image(usize),
-    /// None in a format that is read, for the texture of the index.
-    Absent(usize),
+/// An image before it is decoded.
+enum Found<'a> {
+    File(File<'a>),
+    /// Image that is made from two others, as far as these can be read.
+    Converted(&'a Conversion, [Option<File<'a>>; 2]),
 }
 
-/// Decodes images; those that cannot be read are descriptions of the fault. All indices exist.
-///
-/// # Errors
-/// If the images exceed a limit, or the memory of process or card.
-pub(super) fn load(
-    source: &Source<'_>,
-    wanted: &[(Origin, Encoding)],
-    room: &mut Room,
-) -> Result<Vec<Result<Image, String>>, SceneError> {
-    let (mut texels, mut bytes) = (0, 0);
-    let mut found = Vec::with_capacity(wanted.len());
-    for &(origin, _) in wanted {
-        let image = match find(source, origin) {
-            Ok(image) => image,
-            Err(failure) => {
-                found.push(Err(failure.description(source, origin)?));
-                continue;
-            }
-        };
-        texels += u64::from(image.size[0]) * u64::from(image.size[1]);
-        bytes += image.bytes.len() as u64;
-        let (count, limit, unit) = if texels > MAX_TEXELS {
-            (texels, MAX_TEXELS, "texels")
-        } else {
-            (bytes, MAX_FILE_BYTES, "bytes")
-        };
-        if count > limit {
-            let reason = format!("the images up to this one have {count} {unit}, more than {limit}");
-            return Err(error(source, origin, reason, "scale the images down, or use fewer"));
-        }
-        room.texels(image.size)?;
-        found.push(Ok(image));
-    }
-    let decode = |image: Found<'_>| (image.size, image.kind.decode(&image.bytes, image.size));
-    let decoded: Vec<_> = found.into_par_iter().map(|image| image.map(decode)).collect();
-    // The first error in the order of the file is returned, whichever thread failed first.
-    let images = decoded.into_iter().zip(wanted).map(|(decoded, &(origin, encoding))| match decoded {
-        Ok(([width, height], Ok(texels))) => {
-            Ok(Ok(Image { name: name(source, origin), width, height, texels, encoding }))
-        }
-        Ok((_, Err(fault))) => Failure::Image(fault).description(source, origin).map(Err),
-        Err(description) => Ok(Err(description)),
-    });
-    images.collect()
+/// Texels of an image, `None` if it cannot be read, and the faults of all files that it takes.
+struct Decoded {
+    size: [u32; 2],
+    texels: Option<Vec<[u8; 4]>>,
+    faults: Vec<(Origin, Fault)>,
 }
 
 /// Failure to read an image.
@@ -94,16 +56,89 @@ impl From<Fault> for Failure {
     }
 }
 
-impl Failure {
-    /// Description of an image that cannot be read; an error for one beyond a limit.
-    fn description(self, source: &Source<'_>, origin: Origin) -> Result<String, SceneError> {
-        match self {
-            Self::Image(Fault { reason, remedy, is_limit: true }) => {
-                Err(error(source, origin, reason, remedy))
+/// Decodes images. Those that cannot be read are `None`, and described in `unreadable`. All indices exist.
+///
+/// # Errors
+/// If the images exceed a limit, or the memory of process or card.
+pub(super) fn load(
+    source: &Source<'_>,
+    wanted: &[(Origin, Encoding)],
+    room: &mut Room,
+    unreadable: &mut Vec<String>,
+) -> Result<Vec<Option<Image>>, SceneError> {
+    let (mut texels, mut bytes) = (0, 0);
+    let mut found = Vec::with_capacity(wanted.len());
+    for &(origin, _) in wanted {
+        let image = find(source, origin, unreadable)?;
+        if let Some(image) = &image {
+            let size = image.size();
+            texels += u64::from(size[0]) * u64::from(size[1]);
+            bytes += image.bytes();
+            let (count, limit, unit) = if texels > MAX_TEXELS {
+                (texels, MAX_TEXELS, "texels")
+            } else {
+                (bytes, MAX_FILE_BYTES, "bytes")
+            };
+            if count > limit {
+                let reason = format!("the images up to this one have {count} {unit}, more than {limit}");
+                return Err(error(source, origin, reason, "scale the images down, or use fewer"));
             }
-            Self::Image(Fault { reason, .. }) => Ok(format!("'{}' ({reason})", name(source, origin))),
-            Self::Scene(error) => Err(error),
+            room.texels(size)?;
         }
+        found.push(image);
+    }
+    let decoded: Vec<_> = found.into_par_iter().map(|image| image.map(|image| image.decode())).collect();
+    // The first error in the order of the file is returned, whichever thread failed first.
+    let images = decoded.into_iter().zip(wanted).map(|(decoded, &(origin, encoding))| {
+        let Some(Decoded { size: [width, height], texels, faults }) = decoded else { return Ok(None) };
+        for (origin, fault) in faults {
+            unreadable.push(description(source, origin, fault)?);
+        }
+        Ok(texels.map(|texels| Image { name: name(source, origin), width, height, texels, encoding }))
+    });
+    images.collect()
+}
+
+impl Found<'_> {
+    fn size(&self) -> [u32; 2] {
+        match self {
+            Self::File(file) => file.size,
+            Self::Converted(_, files) => {
+                Conversion::size(files.each_ref().map(|file| Some(file.as_ref()?.size)))
+            }
+        }
+    }
+
+    /// Size of the files, bytes.
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::File(file) => file.bytes.len() as u64,
+            Self::Converted(_, files) => files.iter().flatten().map(|file| file.bytes.len() as u64).sum(),
+        }
+    }
+
+    fn decode(&self) -> Decoded {
+        let size = self.size();
+        let mut faults = Vec::new();
+        let mut decode = |file: &File<'_>| {
+            let texels = file.kind.decode(&file.bytes, file.size);
+            texels.map_err(|fault| faults.push((file.origin, fault))).ok()
+        };
+        let texels = match self {
+            Self::File(file) => decode(file),
+            Self::Converted(conversion, files) => {
+                let decoded = files.each_ref().map(|file| {
+                    let file = file.as_ref()?;
+                    Some((file.size, decode(file)?))
+                });
+                let grids = decoded.each_ref().map(|grid| {
+                    let (size, texels) = grid.as_ref()?;
+                    Some(Grid { size: *size, texels })
+                });
+                Some(conversion.texels(size, grids))
+            }
+        };
+        Decoded { size, texels, faults }
     }
 }
 
@@ -115,6 +150,15 @@ fn error(source: &Source<'_>, origin: Origin, reason: String, remedy: &'static s
     SceneError::Image { location: source.document.location(item), reason, remedy }
 }
 
+/// Description of an image that cannot be read; an error for one beyond a limit.
+fn description(source: &Source<'_>, origin: Origin, fault: Fault) -> Result<String, SceneError> {
+    let Fault { reason, remedy, is_limit } = fault;
+    if is_limit {
+        return Err(error(source, origin, reason, remedy));
+    }
+    Ok(format!("'{}' ({reason})", name(source, origin)))
+}
+
 /// Name of the image, or of its file, or `image N`.
 fn name(source: &Source<'_>, origin: Origin) -> String {
     let Origin::Image(index) = origin else { return "none".to_owned() };
@@ -123,7 +167,29 @@ fn name(source: &Source<'_>, origin: Origin) -> String {
     image.name.as_ref().or(file).cloned().unwrap_or_else(|| format!("image {index}"))
 }
 
-fn find<'a>(source: &Source<'a>, origin: Origin) -> Result<Found<'a>, Failure> {
+fn find<'a>(
+    source: &Source<'a>,
+    origin: Origin,
+    unreadable: &mut Vec<String>,
+) -> Result<Option<Found<'a>>, SceneError> {
+    let mut file = |origin| match find_file(source, origin) {
+        Ok(file) => Ok(Some(file)),
+        Err(Failure::Scene(error)) => Err(error),
+        Err(Failure::Image(fault)) => {
+            unreadable.push(description(source, origin, fault)?);
+            Ok(None)
+        }
+    };
+    let conversion = match origin {
+        Origin::Image(index) => source.document.conversions.images.get(&index),
+        Origin::Absent(_) => None,
+    };
+    let Some(conversion) = conversion else { return Ok(file(origin)?.map(Found::File)) };
+    let [diffuse, specular] = conversion.sources.map(|origin| origin.map_or(Ok(None), &mut file));
+    Ok(Some(Found::Converted(conversion, [diffuse?, specular?])))
+}
+
+fn find_file<'a>(source: &Source<'a>, origin: Origin) -> Result<File<'a>, Failure> {
     let Origin::Image(index) = origin else {
         return Err(Fault::unreadable("the texture has no image in a format that is read", CONVERT).into());
     };
@@ -131,9 +197,8 @@ fn find<'a>(source: &Source<'a>, origin: Origin) -> Result<Found<'a>, Failure> {
     // The format follows from the bytes: exporters state wrong media types.
     let kind = Kind::of(&bytes)?;
     let size = kind.size(&bytes)?;
-    Ok(Found { kind, size, bytes })
+    Ok(File { origin, kind, size, bytes })
 }
-
 /// Bytes of an image.
 fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<Bytes<'a>, Failure> {
     let document = source.document;

@@ -82,6 +82,13 @@ impl Notices {
             }
         };
         note_materials(root, &mut note);
+        let mismatched = &document.conversions.mismatched;
+        let name = |&index: &usize| {
+            root.materials[index].name.clone().unwrap_or_else(|| format!("material {index}"))
+        };
+        let mismatched: Vec<_> = mismatched.iter().map(name).collect();
+        let sentence = "specular-glossiness textures that are mapped in another way than the diffuse ones are ignored, their factors alone count";
+        note(sentence, "material", &mismatched);
         let other_modes = meshes(root, |primitive| Topology::of(primitive).is_none());
         note("points and lines are ignored, only triangles are rendered", "mesh", &other_modes);
         let morphed =

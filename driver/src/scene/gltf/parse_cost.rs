@@ -11,6 +11,7 @@ use glam::DMat4;
 use gltf::json;
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
+use super::specular_glossiness::Conversion;
 use crate::scene::{Camera, Material};
 
 /// Maximum number of bytes of memory per byte of JSON.
@@ -50,7 +51,12 @@ fn element(list: &str) -> u64 {
         "bufferViews" => size_of::<json::buffer::View>() + size_of::<OnceCell<Vec<u8>>>(),
         "cameras" => size_of::<json::Camera>() + size_of::<Camera>(),
         "images" => size_of::<json::Image>(),
-        "materials" => size_of::<json::Material>() + size_of::<Material>(),
+        // A converted material has two images and textures of its own.
+        "materials" => {
+            let converted =
+                size_of::<json::Image>() + size_of::<json::Texture>() + size_of::<(usize, Conversion)>();
+            size_of::<json::Material>() + size_of::<Material>() + 2 * converted
+        }
         "meshes" => size_of::<json::Mesh>(),
         "nodes" => size_of::<json::Node>() + placed,
         "samplers" => size_of::<json::texture::Sampler>(),

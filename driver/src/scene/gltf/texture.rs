@@ -9,9 +9,9 @@ use gltf::json::validation::Checked;
 
 use super::accessor::Source;
 use super::document::Document;
-use super::extensions::WEBP;
-use super::image::{self, Origin};
+use super::image;
 use super::notices::Notices;
+use super::origin::Origin;
 use super::room::Room;
 use crate::error::SceneError;
 use crate::scene::{Encoding, Material, Scene, Texture, Wrap};
@@ -50,7 +50,7 @@ impl<'a> Textures<'a> {
         let document = self.document;
         let index = info.index.value();
         let texture = &document.root.textures[index];
-        let origin = origin(document, index);
+        let origin = Origin::of(&document.root, index);
         let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
         let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
         if set > 1 {
@@ -97,10 +97,7 @@ impl<'a> Textures<'a> {
         scene: &mut Scene,
         notices: &mut Notices,
     ) -> Result<(), SceneError> {
-        let mut images = Vec::new();
-        for image in image::load(source, &self.images, room)? {
-            images.push(image.map_err(|description| notices.unreadable.push(description)).ok());
-        }
+        let images = image::load(source, &self.images, room, &mut notices.unreadable)?;
         let is_read: Vec<_> = images.iter().map(Option::is_some).collect();
         scene.images = images.into_iter().flatten().collect();
         let images = renumbered(&is_read);
@@ -112,19 +109,6 @@ impl<'a> Textures<'a> {
         scene.materials.iter_mut().for_each(|material| renumber(material, &textures));
         Ok(())
     }
-}
-
-/// Image of a texture: its own one, of which those of extensions are copies, or that of an extension.
-fn origin(document: &Document, index: usize) -> Origin {
-    let texture = &document.root.textures[index];
-    let extensions = texture.extensions.as_ref();
-    let of_extension = |name: &str| extensions?.others.get(name)?.get("source")?.as_u64();
-    let own = Some(texture.source.value() as u64);
-    let mut sources = [own].into_iter().chain([of_extension(WEBP)]).flatten();
-    let images = document.root.images.len() as u64;
-    sources
-        .find(|source| *source < images)
-        .map_or(Origin::Absent(index), |source| Origin::Image(source as usize))
 }
 
 /// For each element of a list, its index once those that are not kept have been removed.
