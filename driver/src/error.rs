@@ -305,6 +305,16 @@ pub enum SceneError {
         cameras: String,
     },
 
+    /// Error of a variant name that the scene's file lacks.
+    #[error("the scene has no variant '{name}'")]
+    #[diagnostic(code(scene::variant), help("choose one of: {variants}"))]
+    UnknownVariant {
+        /// Requested name.
+        name: String,
+        /// Names of the file's variants.
+        variants: String,
+    },
+
     /// Error of a material name that the scene lacks.
     #[error("`{assignment}`: the scene has no material '{material}'")]
     #[diagnostic(code(setting::material), help("choose one of: {nearest}"))]

@@ -344,7 +344,7 @@ fn sizes_are_refused_by_the_header() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.glb");
     fs::write(&path, glb(two.json, &two.bytes)).unwrap();
-    check(&gltf::load_for(&path, u32::MAX).unwrap_err(), &["images[1]", "268435457 texels"]);
+    check(&gltf::load_for(&path, u32::MAX, None).unwrap_err(), &["images[1]", "268435457 texels"]);
     for (size, part) in [
         ([1, 100_000], "1 x 100000 texels, more than 16384"),
         ([16_385, 1], "16385 x 1"),

@@ -103,7 +103,8 @@ fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
 fn read_scene(options: &RenderOptions, settings: &RenderSettings) -> Result<Scene, Failure> {
     // The image must fit every card.
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
-    let mut scene = load_for(&options.scene, dram_bytes).map_err(Failure::input)?;
+    let scene = load_for(&options.scene, dram_bytes, options.variant.as_deref());
+    let mut scene = scene.map_err(Failure::input)?;
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
     }
@@ -171,6 +172,7 @@ fn provenance(
     let mut provenance = settings.identity(scene);
     let mut add = |name: &str, value| provenance.insert(name.to_owned(), value);
     add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
+    add("variant", json!(options.variant));
     add("set", json!(options.assignments));
     add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));
     // The automatic distance, if none is given.

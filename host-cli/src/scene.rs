@@ -25,6 +25,7 @@ pub(crate) fn info(path: &Path) -> Result<(), Failure> {
     lines.extend(scene.cameras.iter().map(camera));
     lines.extend(scene.lights.iter().map(light));
     lines.extend(scene.materials.iter().map(|item| material(item, &scene)));
+    lines.extend(scene.variants.iter().map(|name| format!("variant    {name}")));
     lines.extend(scene.notices.iter().map(|notice| format!("ignored    {notice}")));
     print(&lines)
 }

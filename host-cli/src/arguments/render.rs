@@ -24,6 +24,9 @@ pub(crate) struct RenderOptions {
     /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness or emission; may be repeated
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
+    /// Variant of the scene's materials, by its name [default: the materials that its meshes state]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) variant: Option<String>,
     /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and
     /// top is y; or a constant radiance
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]

@@ -1,7 +1,7 @@
 //! glTF extensions that the loader supports.
 
 /// Names of the supported extensions.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 14] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 15] = [
     INSTANCING,
     WEBP,
     MESHOPT[0],
@@ -14,6 +14,7 @@ pub(super) const SUPPORTED_EXTENSIONS: [&str; 14] = [
     "KHR_materials_transmission",
     // Rendered with lighting nevertheless, which a notice reports.
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     QUANTIZATION,
     "KHR_texture_transform",

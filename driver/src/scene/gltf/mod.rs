@@ -31,6 +31,7 @@ mod specular_glossiness;
 mod texture;
 mod transform;
 mod uri;
+mod variants;
 mod vertex;
 
 use std::path::Path;
@@ -65,18 +66,20 @@ use crate::scene::Scene;
 /// # Errors
 /// As [`load_for`].
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    load_for(path, REFERENCE.dram_bytes)
+    load_for(path, REFERENCE.dram_bytes, None)
 }
 
-/// Loads the default scene of a glTF file, or its first, for cards with `dram_bytes` of memory.
+/// Loads the default scene of a glTF file, or its first, for cards with `dram_bytes` of memory, in the variant of its materials of a name
+/// (`KHR_materials_variants`), or with the materials that its meshes state.
 ///
 /// [`Scene::notices`] names the features of the file that are not rendered.
 ///
 /// # Errors
 /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory, or
-/// has no triangle with an area. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
-pub fn load_for(path: &Path, dram_bytes: u32) -> Result<Scene, SceneError> {
-    let document = Document::read(path)?;
+/// has no triangle with an area; or if there is no such variant. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
+pub fn load_for(path: &Path, dram_bytes: u32, variant: Option<&str>) -> Result<Scene, SceneError> {
+    let mut document = Document::read(path)?;
+    variant.map_or(Ok(()), |name| variants::select(&mut document, name))?;
     let buffers = Buffers::load(&document)?;
     let source = Source::new(&document, &buffers);
     let mut room = Room::new(path, dram_bytes.into());
@@ -84,7 +87,7 @@ pub fn load_for(path: &Path, dram_bytes: u32) -> Result<Scene, SceneError> {
     let mut notices = Notices::default();
     let mut textures = Textures::new(&document);
     let materials = material::load(&document, &mut textures)?;
-    let mut scene = Scene { materials, ..Scene::default() };
+    let mut scene = Scene { materials, variants: variants::names(&document), ..Scene::default() };
     textures.finish(&source, &mut room, &mut scene, &mut notices)?;
     nodes::place(&source, &mut scene, &mut room, &mut notices)?;
     let file = || path.to_owned();
