@@ -31,3 +31,12 @@ pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_c
 
 /// Image of a texture, in WebP.
 pub(super) const WEBP: &str = "EXT_texture_webp";
+
+/// Command of glTF-Transform that removes an extension without loss of its contents, as a clause of the remedy; empty for others.
+pub(super) fn removal(name: &str) -> &'static str {
+    match name {
+        "KHR_draco_mesh_compression" => ", for example by `npx @gltf-transform/cli copy IN.glb OUT.glb`",
+        "KHR_texture_basisu" => ", for example by `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`",
+        _ => "",
+    }
+}
