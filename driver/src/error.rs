@@ -97,13 +97,15 @@ pub enum SceneError {
     #[error("{location} requires the extension {name}, which is not supported")]
     #[diagnostic(
         code(scene::required_extension),
-        help("export the scene without {name}; supported are {supported}")
+        help("export or convert the scene without {name}{removal}; supported are {supported}")
     )]
     RequiredExtension {
         /// Location in `extensionsRequired`.
         location: Location,
         /// Name of the extension.
         name: String,
+        /// Command that removes the extension, as a clause; empty if there is none.
+        removal: &'static str,
         /// Names of the supported extensions.
         supported: String,
     },
@@ -303,6 +305,16 @@ pub enum SceneError {
         name: String,
         /// Names of the scene's cameras.
         cameras: String,
+    },
+
+    /// Error of a variant name that the scene's file lacks.
+    #[error("the scene has no variant '{name}'")]
+    #[diagnostic(code(scene::variant), help("choose one of: {variants}"))]
+    UnknownVariant {
+        /// Requested name.
+        name: String,
+        /// Names of the file's variants.
+        variants: String,
     },
 
     /// Error of a material name that the scene lacks.

@@ -298,3 +298,16 @@ fn cameras_that_see_nothing() {
         (&["nodes[1]", "inverted"], |json| json["nodes"][1]["scale"] = json!([1, 0, 1])),
     ]);
 }
+
+#[test]
+fn the_remedy_for_compression_is_a_command() {
+    for (name, command) in [
+        ("KHR_draco_mesh_compression", "cli copy"),
+        ("KHR_texture_basisu", "cli ktxdecompress"),
+        ("VENDOR_other", "without VENDOR_other; supported are"),
+    ] {
+        let error = load_changed(|json| json["extensionsRequired"] = json!([name])).unwrap_err();
+        let help = error.help().unwrap().to_string();
+        assert!(help.contains(command) && help.contains("EXT_meshopt_compression"), "{help}");
+    }
+}

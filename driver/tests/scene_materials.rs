@@ -4,8 +4,9 @@ mod scene_support;
 
 use glam::Vec3;
 use miette::Diagnostic;
-use photoncard_driver::scene::{Material, Reflection, Transmission};
-use scene_support::load_changed;
+use photoncard_driver::error::SceneError;
+use photoncard_driver::scene::{Material, Reflection, Scene, Transmission, gltf};
+use scene_support::{load_changed, push, triangle_bytes, triangle_json};
 use serde_json::{Value, json};
 
 /// The only material after a change, without the extension and the factor that make it Lambertian.
@@ -215,4 +216,54 @@ fn what_is_out_of_range_is_refused() {
         assert!(text.contains("materials[0]") && text.contains(part), "{part}: {text}");
         assert!(error.help().is_some());
     }
+}
+
+/// Two materials, and two variants: one maps the primitive to the other material, one leaves it as it is.
+fn with_variants() -> Value {
+    let mut json = triangle_json();
+    push(&mut json, "materials", json!({"name": "other", "emissiveFactor": [1, 1, 1]}));
+    json["extensionsRequired"] = json!(["KHR_materials_variants"]);
+    json["extensions"] =
+        json!({"KHR_materials_variants": {"variants": [{"name": "day"}, {"name": "night"}]}});
+    json["meshes"][0]["primitives"][0]["extensions"] =
+        json!({"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [1]}]}});
+    json
+}
+
+fn load_variant(json: &Value, variant: Option<&str>) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("data.bin"), triangle_bytes()).unwrap();
+    let path = folder.path().join("scene.gltf");
+    std::fs::write(&path, json.to_string()).unwrap();
+    gltf::load_for(&path, u32::MAX, variant)
+}
+
+#[test]
+fn a_variant_chooses_materials() {
+    let json = with_variants();
+    let used = |variant| {
+        let scene = load_variant(&json, variant).unwrap();
+        assert_eq!((scene.variants.join(" "), scene.notices.len()), ("day night".to_owned(), 0));
+        (scene.materials[scene.triangles[0].material as usize].name.clone(), scene.checksum())
+    };
+    let [stated, day, night] = [None, Some("day"), Some("night")].map(used);
+    assert_eq!((stated.0.as_str(), night.0.as_str()), ("lamp", "other"));
+    assert_eq!(stated, day);
+    assert_ne!(stated.1, night.1);
+}
+
+#[test]
+fn variants_that_do_not_exist_are_refused() {
+    let message = |json: &Value, name: &str| {
+        let error = load_variant(json, Some(name)).unwrap_err();
+        format!("{error}; {}", error.help().unwrap())
+    };
+    let unknown = message(&with_variants(), "dusk");
+    assert!(unknown.contains("no variant 'dusk'") && unknown.contains("'day', 'night'"), "{unknown}");
+    assert!(message(&triangle_json(), "dusk").contains("leave the option out"));
+    let mut beyond = with_variants();
+    beyond["meshes"][0]["primitives"][0]["extensions"]["KHR_materials_variants"]["mappings"][0]["material"] =
+        json!(7);
+    assert!(message(&beyond, "night").contains("material 7 does not exist"), "{}", message(&beyond, "night"));
+    assert!(load_variant(&beyond, Some("day")).is_ok());
 }

@@ -247,6 +247,59 @@ fn quantised_vertices_are_read_where_the_extension_allows_them() {
     assert_eq!(scene.load().unwrap().triangles[0].vertices, [Vec3::ZERO, Vec3::X * 3.0, Vec3::Y * 3.0]);
 }
 
+/// Normalised and whole integers of all types of the extension, in all attributes that it widens.
+#[test]
+fn quantised_attributes_mean_what_their_type_says() {
+    // The greatest value of each type, as bytes, and what it stands for once normalised.
+    let types: [(u32, &[u8], f32); 4] = [
+        (5120, &[127], 127.0),
+        (5121, &[255], 255.0),
+        (5122, &[255, 127], 32_767.0),
+        (5123, &[255, 255], 65_535.0),
+    ];
+    for (component, greatest, whole) in types {
+        for is_normalized in [false, true] {
+            let zero = vec![0; greatest.len()];
+            let rows = |width: usize, filled: [&[usize]; 3]| -> Vec<u8> {
+                let row = |places: &[usize]| -> Vec<u8> {
+                    let value = |at: usize| if places.contains(&at) { greatest } else { &zero };
+                    let mut row: Vec<u8> = (0..width).flat_map(value).copied().collect();
+                    row.resize(8, 0);
+                    row
+                };
+                filled.into_iter().flat_map(row).collect()
+            };
+            let mut scene = Extended::new();
+            scene.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+            let mut add = |name: &str, kind: &str, bytes: Vec<u8>| {
+                let accessor = scene.accessor(kind, component, 3, &bytes);
+                scene.json["accessors"][accessor]["normalized"] = json!(is_normalized || name == "NORMAL");
+                let view = scene.json["accessors"][accessor]["bufferView"].as_u64().unwrap() as usize;
+                scene.json["bufferViews"][view]["byteStride"] = json!(8);
+                scene.primitive()["attributes"][name] = json!(accessor);
+            };
+            add("POSITION", "VEC3", rows(3, [&[], &[0], &[1]]));
+            add("NORMAL", "VEC3", rows(3, [&[0, 2], &[2], &[2]]));
+            add("TEXCOORD_0", "VEC2", rows(2, [&[], &[0], &[1]]));
+            let texel = scene.view(include_bytes!("images/texel.png"));
+            scene.json["images"] = json!([{"bufferView": texel, "mimeType": "image/png"}]);
+            scene.json["textures"] = json!([{"source": 0}]);
+            scene.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+            let scene = scene.load().unwrap();
+            let one = if is_normalized { 1.0 } else { whole };
+            assert_eq!(
+                scene.triangles[0].vertices,
+                [Vec3::ZERO, Vec3::X * one, Vec3::Y * one],
+                "{component}"
+            );
+            let found = attributes(&scene);
+            assert_eq!(found.coordinates[0], [Vec2::ZERO, Vec2::X * one, Vec2::Y * one], "{component}");
+            let slanted = Vec3::new(1.0, 0.0, 1.0).normalize();
+            assert!(found.normals.unwrap()[0].distance(slanted) < 1e-6, "{component}: {found:?}");
+        }
+    }
+}
+
 #[test]
 fn attributes_that_do_not_fit_are_refused() {
     type Change = fn(&mut Extended);

@@ -20,13 +20,13 @@ use crate::progress::Progress;
 
 /// Renders a scene, and writes the picture and all other requested outputs.
 pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
-    let settings = options.settings();
+    let mut settings = options.settings();
     for path in outputs(options) {
         output::check_writable(path).map_err(|error| Failure::input_error(&error))?;
     }
     check_distinct(options)?;
     let start = Instant::now();
-    let scene = read_scene(options, &settings)?;
+    let scene = read_scene(options, &mut settings)?;
     let scene_seconds = start.elapsed().as_secs_f64();
     let progress = Progress::start(options.quiet).map_err(|error| Failure::work_error(&error))?;
     let result = on_threads(options.threads, || render(&scene, &settings, &progress))?;
@@ -100,10 +100,11 @@ fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
     Ok(())
 }
 
-fn read_scene(options: &RenderOptions, settings: &RenderSettings) -> Result<Scene, Failure> {
+fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
     // The image must fit every card.
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
-    let mut scene = load_for(&options.scene, dram_bytes).map_err(Failure::input)?;
+    let scene = load_for(&options.scene, dram_bytes, options.variant.as_deref());
+    let mut scene = scene.map_err(Failure::input)?;
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
     }
@@ -114,8 +115,10 @@ fn read_scene(options: &RenderOptions, settings: &RenderSettings) -> Result<Scen
         scene.environment = Some(environment.load()?);
     }
     scene.check_light().map_err(Failure::input)?;
+    let camera = scene.camera(settings.picture.camera.as_deref()).map_err(Failure::input)?;
+    let misfit = options.picture.fit(camera, &mut settings.picture);
     if !options.quiet {
-        for notice in options.without_effect(&scene) {
+        for notice in options.without_effect(&scene).into_iter().chain(misfit) {
             say(format_args!("photoncard: {notice}"));
         }
         for notice in &scene.notices {
@@ -174,6 +177,7 @@ fn provenance(
     let mut provenance = settings.identity(scene);
     let mut add = |name: &str, value| provenance.insert(name.to_owned(), value);
     add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
+    add("variant", json!(options.variant));
     add("set", json!(options.assignments));
     add("energy-compensation", json!(options.energy_compensation));
     add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));

@@ -25,6 +25,7 @@ pub(crate) fn info(path: &Path) -> Result<(), Failure> {
     lines.extend(scene.cameras.iter().map(camera));
     lines.extend(scene.lights.iter().map(light));
     lines.extend(scene.materials.iter().map(|item| material(item, &scene)));
+    lines.extend(scene.variants.iter().map(|name| format!("variant    {name}")));
     lines.extend(scene.notices.iter().map(|notice| format!("ignored    {notice}")));
     print(&lines)
 }
@@ -54,7 +55,9 @@ fn image(image: &Image) -> String {
 
 fn camera(camera: &Camera) -> String {
     let degrees = camera.vertical_fov.to_degrees();
-    format!("camera     {} at {}, vertical field of view {degrees:.1} degrees", camera.name, camera.origin)
+    let Camera { name, origin, .. } = camera;
+    let aspect = camera.aspect.map_or(String::new(), |aspect| format!(", aspect ratio {aspect}"));
+    format!("camera     {name} at {origin}, vertical field of view {degrees:.1} degrees{aspect}")
 }
 
 fn light(light: &PunctualLight) -> String {

@@ -152,6 +152,7 @@ fn names_that_do_not_exist() {
     room.write_scene("scene.gltf", &scene());
     for (option, value, words) in [
         ("--camera", "absent", ["no camera 'absent'", "'eye'"]),
+        ("--variant", "night", ["no variant 'night'", "leave the option out"]),
         ("--set", "floor", ["`floor`", "MATERIAL.PROPERTY=VALUE"]),
         ("--set", "flor.diffuse=0", ["'flor'", "'floor'"]),
         ("--set", "floor.gloss=1", ["'gloss'", "the properties are"]),

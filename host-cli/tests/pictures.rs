@@ -4,7 +4,7 @@ mod support;
 
 use photoncard_driver::exr::{RgbImage, read_rgb};
 use serde_json::{Value, json};
-use support::{Room, scene, scene_bytes, scene_of, shipped};
+use support::{Room, scene, scene_bytes, scene_of, shipped, small_render};
 
 fn picture(room: &Room, name: &str) -> RgbImage {
     read_rgb(&room.path(name)).unwrap()
@@ -200,4 +200,26 @@ fn what_is_ignored_is_said_once() {
         assert_eq!(outcome.stderr.matches(sentence).count(), 1, "{sentence}: {}", outcome.stderr);
         assert_eq!(information.matches(sentence).count(), 1, "{sentence}: {information}");
     }
+}
+
+#[test]
+fn the_camera_gives_the_picture_its_aspect_ratio() {
+    let room = Room::new();
+    let mut scene = scene();
+    scene["cameras"][0]["perspective"]["aspectRatio"] = json!(64.0);
+    room.write_scene("scene.gltf", &scene);
+    let without_size: Vec<_> = small_render("scene.gltf", &["-o", "a.exr"]);
+    let place = without_size.iter().position(|argument| *argument == "--size").expect("a small size");
+    let arguments = [&without_size[..place], &without_size[place + 2..]].concat();
+    let outcome = room.run(&arguments);
+    assert_eq!((outcome.status, outcome.stderr.contains("aspect")), (Some(0), false), "{}", outcome.stderr);
+    let found = picture(&room, "a.exr");
+    assert_eq!((found.width, found.height), (512, 8));
+
+    // Another size is rendered as it is given, with the same field of view from top to bottom.
+    let said = room.rendered("scene.gltf", &["-o", "a.exr", "--size", "128x8"]).stderr;
+    assert!(said.contains("'eye' has an aspect ratio of 64") && said.contains("--size 128x2 "), "{said}");
+    let narrow = picture(&room, "a.exr");
+    assert_eq!((narrow.width, narrow.height), (128, 8));
+    assert!(!room.rendered("scene.gltf", &["-o", "a.exr", "--size", "128x2"]).stderr.contains("aspect"));
 }

@@ -58,6 +58,9 @@ const OTHERS: [&[&str]; 18] = [
 /// Options on the storage of samples, which the file states itself, and on messages.
 const OF_THE_FILE: [&str; 4] = ["--output", "--sample-type", "--quiet", "--help"];
 
+/// Option that pixels depend on, and that no shipped scene takes.
+const OF_SCENES_WITH_VARIANTS: &str = "--variant";
+
 /// Provenance in an EXR file: the text of the attribute `photoncard`.
 fn provenance(file: &[u8]) -> Value {
     let head = b"photoncard\0string\0";
@@ -78,7 +81,7 @@ fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
     let room = Room::new();
     let plain = rendered(&room, &[]);
     assert_eq!(plain["scene"], "cornell-spheres.glb");
-    let mut keys = BTreeSet::from(["program", "layout", "scene", "scene-checksum"]);
+    let mut keys = BTreeSet::from(["program", "layout", "scene", "scene-checksum", "variant"]);
     for (options, key, value) in options_of_pixels() {
         let found = rendered(&room, options);
         assert_eq!(found[key], value, "{options:?}");
@@ -106,6 +109,31 @@ fn scenes_of_one_name_that_differ_have_another_provenance() {
     assert_ne!(dark, light);
 }
 
+#[test]
+fn a_variant_is_in_the_provenance_and_changes_the_scene() {
+    let room = Room::new();
+    let mut scene = scene();
+    scene["extensions"] =
+        json!({"KHR_materials_variants": {"variants": [{"name": "day"}, {"name": "night"}]}});
+    scene["materials"].as_array_mut().expect("a list").push(json!({"name": "dark"}));
+    scene["meshes"][0]["primitives"][0]["extensions"] =
+        json!({"KHR_materials_variants": {"mappings": [{"material": 2, "variants": [1]}]}});
+    room.write_scene("scene.gltf", &scene);
+    let of = |options: &[&str]| {
+        room.rendered("scene.gltf", &[&["-o", "a.exr", "--max-distance", "0.5"], options].concat());
+        provenance(&room.read("a.exr"))
+    };
+    let [stated, day, night] = [of(&[]), of(&["--variant", "day"]), of(&["--variant", "night"])];
+    assert_eq!(
+        [&stated, &day, &night].map(|of| of["variant"].clone()),
+        [Value::Null, json!("day"), json!("night")]
+    );
+    assert_eq!(stated["scene-checksum"], day["scene-checksum"]);
+    assert_ne!(stated["scene-checksum"], night["scene-checksum"]);
+    let info = room.run(&["scene", "info", "scene.gltf"]).stdout;
+    assert!(info.contains("variant    day\nvariant    night\n"), "{info}");
+}
+
 /// A new option must be in one of the lists above.
 #[test]
 fn every_option_is_known_to_change_pixels_or_not_to() {
@@ -116,6 +144,6 @@ fn every_option_is_known_to_change_pixels_or_not_to() {
     let offered: BTreeSet<_> = options.collect();
     let of_pixels = options_of_pixels();
     let known = of_pixels.iter().map(|(options, ..)| options[0]).chain(OTHERS.map(|options| options[0]));
-    let known: BTreeSet<_> = known.chain(OF_THE_FILE).collect();
+    let known: BTreeSet<_> = known.chain(OF_THE_FILE).chain([OF_SCENES_WITH_VARIANTS]).collect();
     assert_eq!(offered, known);
 }

@@ -17,6 +17,7 @@ const INPUTS: [(&str, u64); NAMES.len()] = [
     ("session", 20_000),
     ("image", 6000),
     ("gltf", 8000),
+    ("meshopt", 8000),
     ("textures", 6000),
     ("environments", 20_000),
     ("exr", 8000),

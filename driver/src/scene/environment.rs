@@ -58,13 +58,13 @@ impl Environment {
         } else if bytes.starts_with(radiance::MAGIC) {
             walled(|| radiance::read(&bytes)).map(|(size, texels)| Self::of(size, texels))
         } else {
-            Err(Fault {
-                reason: "it is neither a Radiance picture nor an OpenEXR picture".to_owned(),
-                remedy: "convert the environment to .hdr or .exr",
-            })
+            Err(Fault::unreadable(
+                "it is neither a Radiance picture nor an OpenEXR picture",
+                "convert the environment to .hdr or .exr",
+            ))
         };
         let fault =
-            |Fault { reason, remedy }| SceneError::Environment { file: path.to_owned(), reason, remedy };
+            |Fault { reason, remedy, .. }| SceneError::Environment { file: path.to_owned(), reason, remedy };
         read.and_then(Self::checked).map_err(fault)
     }
 
@@ -77,10 +77,10 @@ impl Environment {
         let Some(index) = self.texels.iter().position(is_bad) else { return Ok(self) };
         let (x, y) = (index % self.width as usize, index / self.width as usize);
         let reason = format!("texel ({x}, {y}) is {:?}, which is no radiance", self.texels[index]);
-        Err(Fault {
+        Err(Fault::unreadable(
             reason,
-            remedy: "limit every channel to the range of 0 to 1e20, and store the map again",
-        })
+            "limit every channel to the range of 0 to 1e20, and store the map again",
+        ))
     }
 
     /// Returns whether any texel emits light.
@@ -91,17 +91,17 @@ impl Environment {
 
 fn read_exr(path: &Path, bytes: &[u8]) -> Result<Environment, Fault> {
     let image = exr::decode_rgb(path, bytes, MAX_ENVIRONMENT_TEXELS).map_err(|error| match error {
-        ExrError::NoColour { channels, .. } => Fault {
-            reason: format!("it has no channels R, G and B, only {channels}"),
-            remedy: "write the picture as plain RGB",
-        },
-        ExrError::Compression { compression, .. } => Fault {
-            reason: format!("it has {compression}, which is not read"),
-            remedy: "store the picture with ZIP compression",
-        },
+        ExrError::NoColour { channels, .. } => Fault::unreadable(
+            format!("it has no channels R, G and B, only {channels}"),
+            "write the picture as plain RGB",
+        ),
+        ExrError::Compression { compression, .. } => Fault::unreadable(
+            format!("it has {compression}, which is not read"),
+            "store the picture with ZIP compression",
+        ),
         ExrError::TooLarge { width, height, .. } => too_large([width, height]),
         ExrError::Memory { bytes, .. } => Fault::memory(OutOfMemory { bytes }),
-        other => Fault { reason: other.to_string(), remedy: "export or copy the picture again" },
+        other => Fault::unreadable(other.to_string(), "export or copy the picture again"),
     })?;
     let size = [image.width, image.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
     check_map_size(size)?;

@@ -107,6 +107,38 @@ impl Layers {
             .flatten()
     }
 
+    /// Replaces every texture by `renumbered` of it, or takes it off. No field is left out here: a new one may be a texture.
+    pub(super) fn renumber(&mut self, renumbered: impl Fn(u32) -> Option<u32>) {
+        let Self {
+            normal,
+            specular: _,
+            specular_texture,
+            specular_colour_texture,
+            coat,
+            sheen,
+            transmission_texture,
+            diffuse_transmission,
+        } = self;
+        let replace = |texture: &mut Option<u32>| *texture = texture.and_then(&renumbered);
+        let replace_map = |map: &mut Option<NormalMap>| {
+            *map = map.and_then(|map| Some(NormalMap { texture: renumbered(map.texture)?, ..map }));
+        };
+        replace_map(normal);
+        [specular_texture, specular_colour_texture, transmission_texture].into_iter().for_each(replace);
+        if let Some(Coat { factor: _, roughness: _, factor_texture, roughness_texture, normal }) = coat {
+            [factor_texture, roughness_texture].into_iter().for_each(replace);
+            replace_map(normal);
+        }
+        if let Some(Sheen { colour: _, roughness: _, colour_texture, roughness_texture }) = sheen {
+            [colour_texture, roughness_texture].into_iter().for_each(replace);
+        }
+        if let Some(DiffuseTransmission { factor: _, colour: _, factor_texture, colour_texture }) =
+            diffuse_transmission
+        {
+            [factor_texture, colour_texture].into_iter().for_each(replace);
+        }
+    }
+
     /// Checks that every value is finite and within its range.
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
         let coat_normal = self.coat.and_then(|coat| coat.normal);

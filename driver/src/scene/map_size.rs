@@ -20,5 +20,5 @@ pub(super) fn too_large([width, height]: [impl Display; 2]) -> Fault {
     let reason = format!(
         "the map has {width} x {height} texels, more than {MAX_SIDE} a side or {MAX_ENVIRONMENT_TEXELS} in all"
     );
-    Fault { reason, remedy: "scale the map down to 8192 x 4096 texels or less" }
+    Fault { reason, remedy: "scale the map down to 8192 x 4096 texels or less", is_limit: true }
 }

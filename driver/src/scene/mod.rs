@@ -11,6 +11,7 @@ mod light;
 mod limits;
 mod map_size;
 mod material;
+mod meshopt;
 mod out_of_range;
 mod radiance;
 mod raster;
@@ -50,6 +51,8 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// Cameras in file order. Never empty: a file without cameras gets one that frames the scene.
     pub cameras: Vec<Camera>,
+    /// Names of the file's variants of materials.
+    pub variants: Vec<String>,
     /// Sentences on contents of the file that the renderer does not use, each once.
     pub notices: Vec<String>,
     /// Number of triangles of zero area that were left out.

@@ -21,7 +21,7 @@ const EXPORT_AGAIN: &str =
     "export the picture again, or copy it again: it is damaged or was cut off on the way";
 
 fn damaged(reason: impl Into<String>) -> Fault {
-    Fault { reason: reason.into(), remedy: EXPORT_AGAIN }
+    Fault::unreadable(reason.into(), EXPORT_AGAIN)
 }
 
 fn ends_early() -> Fault {
@@ -85,7 +85,7 @@ fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
             ("FORMAT", "32-bit_rle_rgbe") => {}
             ("FORMAT", other) => {
                 let reason = format!("its texels are {other:.40}, and only 32-bit_rle_rgbe is read");
-                return Err(Fault { reason, remedy: "store the picture as RGB, not XYZ" });
+                return Err(Fault::unreadable(reason, "store the picture as RGB, not XYZ"));
             }
             // Several exposures multiply.
             ("EXPOSURE", value) => {
@@ -99,9 +99,11 @@ fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
         return Err(damaged(format!("its exposures multiply to {exposure}")));
     }
     let resolution = next_line(&mut rest)?;
-    let (size, flipped) = parse_resolution(&resolution).ok_or_else(|| Fault {
-        reason: format!("its rows are stated as {resolution:.40}"),
-        remedy: "store the picture in rows, from the top: -Y HEIGHT +X WIDTH",
+    let (size, flipped) = parse_resolution(&resolution).ok_or_else(|| {
+        Fault::unreadable(
+            format!("its rows are stated as {resolution:.40}"),
+            "store the picture in rows, from the top: -Y HEIGHT +X WIDTH",
+        )
     })?;
     Ok((Header { size, flipped, exposure }, rest))
 }
@@ -144,7 +146,7 @@ fn read_row<'a>(rest: &'a [u8], row: &mut [[u8; 4]]) -> Result<&'a [u8], Fault> 
     row.copy_from_slice(texels.as_chunks().0);
     if row.iter().any(|texel| texel.starts_with(&[1, 1, 1])) {
         let reason = "its rows are run-length encoded in the way of before 1991".to_owned();
-        return Err(Fault { reason, remedy: "store the picture again with a newer program" });
+        return Err(Fault::unreadable(reason, "store the picture again with a newer program"));
     }
     Ok(rest)
 }

@@ -4,12 +4,16 @@ use clap::Args;
 use photoncard_driver::film::Window;
 use photoncard_driver::layer::Layers;
 use photoncard_driver::render::Picture;
+use photoncard_driver::scene::Camera;
+
+/// Longer side of a picture without a given size, pixels.
+const SIDE: u32 = 512;
 
 #[derive(Args)]
 pub(crate) struct PictureOptions {
-    /// Width and height of the picture, pixels
-    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = size, allow_hyphen_values = true)]
-    size: (u32, u32),
+    /// Width and height of the picture, pixels [default: 512 on the longer side, in the aspect ratio of the camera; 512x512 if it states none]
+    #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true)]
+    size: Option<(u32, u32)>,
     /// Render only the columns X0 up to X1 and the rows Y0 up to Y1
     #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, allow_hyphen_values = true)]
     crop: Option<Window>,
@@ -25,8 +29,29 @@ pub(crate) struct PictureOptions {
 impl PictureOptions {
     /// Settings of these options.
     pub(super) fn settings(&self) -> Picture {
-        let Self { size: (width, height), crop, camera, aov } = self;
-        Picture { width: *width, height: *height, crop: *crop, camera: camera.clone(), layers: aov.clone() }
+        let Self { size, crop, camera, aov } = self;
+        let (width, height) = size.unwrap_or((SIDE, SIDE));
+        Picture { width, height, crop: *crop, camera: camera.clone(), layers: aov.clone() }
+    }
+
+    /// Gives the picture the camera's aspect ratio, if no size is given. Returns a notice if the one that is given is of another.
+    pub(crate) fn fit(&self, camera: &Camera, picture: &mut Picture) -> Option<String> {
+        match (self.size, camera.size(SIDE)) {
+            (None, Some((width, height))) => {
+                (picture.width, picture.height) = (width, height);
+                None
+            }
+            (Some((width, height)), Some(_)) if camera.is_cropped(width, height) => {
+                let (width, height) = camera.size(width.max(height))?;
+                let Camera { name, aspect, .. } = camera;
+                Some(format!(
+                    "the camera '{name}' has an aspect ratio of {}, and the picture another; the vertical field of view is kept: \
+                     --size {width}x{height} shows what the file means",
+                    aspect.unwrap_or(1.0)
+                ))
+            }
+            _ => None,
+        }
     }
 }
 

@@ -28,6 +28,9 @@ pub(crate) struct RenderOptions {
     /// model leaves it out, and a metal of roughness 1 is less than half as bright
     #[arg(long)]
     pub(crate) energy_compensation: bool,
+    /// Variant of the scene's materials, by its name [default: the materials that its meshes state]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) variant: Option<String>,
     /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and
     /// top is y; or a constant radiance
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]

@@ -25,7 +25,7 @@ pub(super) struct Scenes {
 }
 
 /// Scene with every feature that the loader reads: a hierarchy, sparse positions, normals, coordinates, colours, a skin,
-/// instances, a strip, textures, a lobe, glass, lights, an orthographic camera.
+/// instances, a strip, textures, a lobe, glass, a converted material, variants, lights, an orthographic camera.
 const RICH: &[u8] = include_bytes!("../../fuzz/rich.gltf");
 const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/furnace.gltf"),

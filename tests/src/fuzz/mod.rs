@@ -6,6 +6,7 @@
 pub(crate) mod environment;
 pub(crate) mod gltf;
 mod image;
+mod meshopt;
 mod messages;
 pub(crate) mod mutation;
 pub(crate) mod picture;
@@ -24,8 +25,8 @@ pub use self::run::{Failure, Report, Settings, fuzz};
 pub use self::target::Target;
 
 /// Names of all targets.
-pub const NAMES: [&str; 8] =
-    ["frames", "messages", "session", "image", "gltf", "textures", "environments", "exr"];
+pub const NAMES: [&str; 9] =
+    ["frames", "messages", "session", "image", "gltf", "meshopt", "textures", "environments", "exr"];
 
 /// Target with the name `name`.
 pub fn target(name: &str) -> Option<Arc<dyn Target>> {
@@ -35,6 +36,7 @@ pub fn target(name: &str) -> Option<Arc<dyn Target>> {
         "session" => Some(Arc::new(session::Sessions::new())),
         "image" => Some(Arc::new(image::Image::new())),
         "gltf" => Some(Arc::new(gltf::Scenes::new())),
+        "meshopt" => Some(Arc::new(meshopt::Streams::new())),
         "textures" => Some(Arc::new(texture::Textures::new())),
         "environments" => Some(Arc::new(environment::Environments::new())),
         "exr" => Some(Arc::new(picture::Pictures::new())),

@@ -1,4 +1,4 @@
-//! Fuzzing of textures: PNG and JPEG files in a valid scene.
+//! Fuzzing of textures: PNG, JPEG and WebP files in a valid scene.
 
 use std::fs;
 use std::path::PathBuf;
@@ -18,7 +18,7 @@ pub(super) struct Textures {
 }
 
 /// Images of all colour types of PNG: no edit of a byte adds a palette.
-const SEEDS: [&[u8]; 7] = [
+const SEEDS: [&[u8]; 10] = [
     include_bytes!("../../../driver/tests/images/texel.png"),
     include_bytes!("../../../driver/tests/images/palette.png"),
     include_bytes!("../../../driver/tests/images/deep.png"),
@@ -26,7 +26,13 @@ const SEEDS: [&[u8]; 7] = [
     include_bytes!("../../../driver/tests/images/colour.jpg"),
     include_bytes!("../../../driver/tests/images/progressive.jpg"),
     include_bytes!("../../../driver/tests/images/grey.jpg"),
+    include_bytes!("../../../driver/tests/images/lossy.webp"),
+    include_bytes!("../../../driver/tests/images/lossless.webp"),
+    include_bytes!("../../../driver/tests/images/alpha.webp"),
 ];
+
+/// Memory of the card, bytes. It bounds the texels of WebP, which may take no bytes of the file at all.
+const DRAM_BYTES: u32 = 2 << 20;
 
 /// Scene whose second buffer view, of `image_bytes` bytes, is the base colour of its only triangle.
 fn scene(image_bytes: usize) -> String {
@@ -90,12 +96,21 @@ impl Target for Textures {
 
     fn read(&self, input: &[u8]) -> bool {
         fs::write(self.path(), textured(input)).expect("there is room for a scene");
-        match gltf::load(&self.path()) {
-            Ok(scene) => {
-                let [image] = &scene.images[..] else { panic!("one image is in use") };
-                assert_eq!(image.texels.len(), image.width as usize * image.height as usize);
-                true
-            }
+        match gltf::load_for(&self.path(), DRAM_BYTES, None) {
+            Ok(scene) => match &scene.images[..] {
+                [image] => {
+                    assert_eq!(image.texels.len(), image.width as usize * image.height as usize);
+                    true
+                }
+                _ => {
+                    assert!(
+                        scene.notices.iter().any(|notice| notice.contains("left out")),
+                        "{:?}",
+                        scene.notices
+                    );
+                    false
+                }
+            },
             Err(error) => {
                 let _ = error.to_string();
                 false

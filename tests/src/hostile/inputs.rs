@@ -21,7 +21,7 @@ pub struct Inputs {
     seeds: Vec<Seed>,
 }
 
-const SCENES: [&str; 9] = [
+const SCENES: [&str; 11] = [
     "scenes/cornell.gltf",
     "scenes/cornell-glossy.gltf",
     "scenes/cornell-uplight.gltf",
@@ -31,9 +31,11 @@ const SCENES: [&str; 9] = [
     "scenes/roughness.glb",
     "scenes/cornell-spheres.glb",
     "scenes/atrium.glb",
+    "driver/tests/compressed/meshopt-0.glb",
+    "driver/tests/compressed/meshopt-1.glb",
 ];
 
-const IMAGES: [&str; 11] = [
+const IMAGES: [&str; 14] = [
     "driver/tests/images/texel.png",
     "driver/tests/images/palette.png",
     "driver/tests/images/deep.png",
@@ -43,6 +45,9 @@ const IMAGES: [&str; 11] = [
     "driver/tests/images/progressive.jpg",
     "driver/tests/images/grey.jpg",
     "driver/tests/images/cmyk.jpg",
+    "driver/tests/images/lossy.webp",
+    "driver/tests/images/lossless.webp",
+    "driver/tests/images/alpha.webp",
     "scenes/sky.exr",
     "tests/references/cornell-spheres-caustics.exr",
 ];
@@ -96,7 +101,7 @@ impl Inputs {
             }
             (0..=4, "gltf") => mutation::edit_json(bytes, random),
             (0..=4, "glb") => edit_glb(bytes, random),
-            (0..=3, "exr" | "hdr" | "jpg") => edit_header(bytes, random),
+            (0..=3, "exr" | "hdr" | "jpg" | "webp") => edit_header(bytes, random),
             (5, _) => self.splice(bytes, extension, random),
             (6, _) if random.once_in(4) => bytes.truncate(random.below(bytes.len())),
             _ => edit_window(bytes, random),
@@ -117,7 +122,7 @@ impl Inputs {
 /// File to read for an input, with its extension: for a texture the scene around it.
 pub(super) fn as_file(extension: &str, bytes: Vec<u8>) -> (&str, Vec<u8>) {
     match extension {
-        "png" | "jpg" => ("glb", texture::textured(&bytes)),
+        "png" | "jpg" | "webp" => ("glb", texture::textured(&bytes)),
         _ => (extension, bytes),
     }
 }

@@ -9,8 +9,8 @@ use gltf::json;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::validation::Checked;
 
+use super::buffers::Buffers;
 use super::document::Document;
-use super::files::Bytes;
 use crate::error::SceneError;
 
 const REMEDY: &str = "export the scene again; the accessor, its buffer view and its buffer do not fit";
@@ -18,7 +18,7 @@ const REMEDY: &str = "export the scene again; the accessor, its buffer view and 
 /// Buffers of a document with their bytes.
 pub(super) struct Source<'a> {
     pub(super) document: &'a Document,
-    buffers: &'a [Bytes<'a>],
+    buffers: &'a Buffers<'a>,
     /// Cache of accessors whose sparse indices were found to be increasing: many primitives may share one.
     increasing: RefCell<BTreeSet<usize>>,
 }
@@ -205,7 +205,7 @@ impl<'a> Elements<'a> {
 }
 
 impl<'a> Source<'a> {
-    pub(super) fn new(document: &'a Document, buffers: &'a [Bytes<'a>]) -> Self {
+    pub(super) fn new(document: &'a Document, buffers: &'a Buffers<'a>) -> Self {
         Self { document, buffers, increasing: RefCell::default() }
     }
 
@@ -258,12 +258,7 @@ impl<'a> Source<'a> {
         let view = self.document.root.buffer_views.get(index).ok_or_else(|| {
             self.document.invalid("bufferViews", format!("buffer view {index} does not exist"), REMEDY)
         })?;
-        let offset = view.byte_offset.map_or(0, |offset| offset.0);
-        let bytes = self.buffers.get(view.buffer.value()).and_then(|buffer| {
-            let start = usize::try_from(offset).ok()?;
-            let end = usize::try_from(offset.checked_add(view.byte_length.0)?).ok()?;
-            buffer.get(start..end)
-        });
+        let bytes = self.buffers.view(self.document, index, view)?;
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))
     }
 

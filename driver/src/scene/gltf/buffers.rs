@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use gltf::json;
+
+use super::compression::{Compressed, DecodedViews, is_placeholder};
 use super::document::Document;
 use super::files::Bytes;
 use super::uri::{INSIDE_FOLDER, decode_data, is_data, locate};
@@ -9,9 +12,43 @@ use crate::error::SceneError;
 
 const EXPORT_AGAIN: &str = "export the scene again; the buffer and its description do not fit";
 
-/// Bytes of every buffer, each at least as long as `byteLength`.
-pub(super) fn load(document: &Document) -> Result<Vec<Bytes<'_>>, SceneError> {
-    (0..document.root.buffers.len()).map(|index| load_one(document, index)).collect()
+/// Bytes of every buffer, and of the compressed buffer views that were read.
+pub(super) struct Buffers<'a> {
+    /// At least as long as `byteLength`, or empty for the placeholders of compressed views.
+    bytes: Vec<Bytes<'a>>,
+    decoded: DecodedViews,
+}
+
+impl<'a> Buffers<'a> {
+    /// Reads the buffers of a document.
+    pub(super) fn load(document: &'a Document) -> Result<Self, SceneError> {
+        let Document { root, .. } = document;
+        let bytes =
+            (0..root.buffers.len()).map(|index| load_one(document, index)).collect::<Result<_, _>>()?;
+        Ok(Self { bytes, decoded: DecodedViews::new(root.buffer_views.len()) })
+    }
+
+    /// Bytes of the buffer view `index`; `None` if they exceed its buffer.
+    pub(super) fn view(
+        &self,
+        document: &Document,
+        index: usize,
+        view: &json::buffer::View,
+    ) -> Result<Option<&[u8]>, SceneError> {
+        if let Some(compressed) = Compressed::of(document, index, view)? {
+            let stream = self.part(compressed.buffer(), compressed.place());
+            return self.decoded.get(document, &compressed, stream).map(Some);
+        }
+        let offset = view.byte_offset.map_or(0, |offset| offset.0);
+        Ok(self.part(view.buffer.value(), (offset, view.byte_length.0)))
+    }
+
+    /// Bytes of a buffer from an offset on; `None` if they exceed it.
+    fn part(&self, buffer: usize, (offset, length): (u64, u64)) -> Option<&[u8]> {
+        let start = usize::try_from(offset).ok()?;
+        let end = usize::try_from(offset.checked_add(length)?).ok()?;
+        self.bytes.get(buffer)?.get(start..end)
+    }
 }
 
 fn load_one(document: &Document, index: usize) -> Result<Bytes<'_>, SceneError> {
@@ -21,6 +58,9 @@ fn load_one(document: &Document, index: usize) -> Result<Bytes<'_>, SceneError> 
         reason,
         remedy,
     };
+    if is_placeholder(document, index, buffer) {
+        return Ok(Bytes::Part(&[]));
+    }
     let bytes = match (&buffer.uri, document.blob()) {
         (Some(uri), _) if is_data(uri) => {
             let (_, bytes) = decode_data(uri).map_err(|reason| fault(".uri", reason, EXPORT_AGAIN))?;

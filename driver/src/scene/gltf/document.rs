@@ -9,9 +9,10 @@ use gltf::json::mesh::Semantic;
 use gltf::json::validation::{Checked, Error as Fault, Validate};
 use miette::{NamedSource, SourceSpan};
 
-use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
+use super::extensions::{self, QUANTIZATION, SUPPORTED_EXTENSIONS};
 use super::files::{Files, read_file};
 use super::parse_cost;
+use super::specular_glossiness::{self, Conversions};
 use crate::error::{Location, SceneError};
 use crate::printable::printable;
 use crate::{allocation, foreign};
@@ -29,6 +30,8 @@ pub(super) struct Document {
     /// Bytes of the file; a range of them is the BIN chunk of a GLB.
     bytes: Vec<u8>,
     blob: Option<Range<usize>>,
+    /// Materials and images that were converted from another model.
+    pub(super) conversions: Conversions,
     /// Files in its folder that were read.
     pub(super) files: Files,
 }
@@ -40,8 +43,10 @@ impl Document {
         let (text, blob) =
             if bytes.starts_with(GLB_MAGIC) { split_glb(path, &bytes)? } else { (0..bytes.len(), None) };
         let root = parse(path, &bytes[text])?;
-        let document = Self { path: path.to_owned(), root, bytes, blob, files: Files::default() };
+        let (conversions, files) = (Conversions::default(), Files::default());
+        let mut document = Self { path: path.to_owned(), root, bytes, blob, conversions, files };
         document.check()?;
+        document.conversions = specular_glossiness::convert(&mut document.root);
         Ok(document)
     }
 
@@ -76,7 +81,13 @@ impl Document {
             if !SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
                 let location = self.location(format!("extensionsRequired[{i}]"));
                 let supported = SUPPORTED_EXTENSIONS.join(", ");
-                return Err(SceneError::RequiredExtension { location, name: name.clone(), supported });
+                let removal = extensions::removal(name);
+                return Err(SceneError::RequiredExtension {
+                    location,
+                    name: name.clone(),
+                    removal,
+                    supported,
+                });
             }
         }
         self.check_positions()?;

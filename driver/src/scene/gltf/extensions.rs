@@ -1,18 +1,23 @@
 //! glTF extensions that the loader supports.
 
 /// Names of the supported extensions.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 13] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 18] = [
     INSTANCING,
+    WEBP,
+    MESHOPT[0],
+    MESHOPT[1],
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     // Rendered with lighting nevertheless, which a notice reports.
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     QUANTIZATION,
     "KHR_texture_transform",
@@ -23,3 +28,18 @@ pub(super) const QUANTIZATION: &str = "KHR_mesh_quantization";
 
 /// Instances of a node's mesh.
 pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+
+/// Compressed buffer views: one format under two names.
+pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+
+/// Image of a texture, in WebP.
+pub(super) const WEBP: &str = "EXT_texture_webp";
+
+/// Command of glTF-Transform that removes an extension without loss of its contents, as a clause of the remedy; empty for others.
+pub(super) fn removal(name: &str) -> &'static str {
+    match name {
+        "KHR_draco_mesh_compression" => ", for example by `npx @gltf-transform/cli copy IN.glb OUT.glb`",
+        "KHR_texture_basisu" => ", for example by `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`",
+        _ => "",
+    }
+}

@@ -7,6 +7,7 @@
 mod accessor;
 mod buffers;
 mod camera;
+mod compression;
 mod document;
 mod extensions;
 mod files;
@@ -21,15 +22,18 @@ mod names;
 mod nodes;
 mod not_finite;
 mod notices;
+mod origin;
 mod parse_cost;
 mod pose;
 mod primitive;
 mod room;
 mod skin;
 mod solid_glass;
+mod specular_glossiness;
 mod texture;
 mod transform;
 mod uri;
+mod variants;
 mod vertex;
 
 use std::path::Path;
@@ -37,6 +41,7 @@ use std::path::Path;
 use photoncard_firmware::kind::REFERENCE;
 
 use self::accessor::Source;
+use self::buffers::Buffers;
 use self::document::Document;
 pub use self::limits::MAX_TRIANGLES;
 use self::notices::Notices;
@@ -63,27 +68,29 @@ use crate::scene::Scene;
 /// # Errors
 /// As [`load_for`].
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    load_for(path, REFERENCE.dram_bytes)
+    load_for(path, REFERENCE.dram_bytes, None)
 }
 
-/// Loads the default scene of a glTF file, or its first, for cards with `dram_bytes` of memory.
+/// Loads the default scene of a glTF file, or its first, for cards with `dram_bytes` of memory, in the variant of its materials of a name
+/// (`KHR_materials_variants`), or with the materials that its meshes state.
 ///
 /// [`Scene::notices`] names the features of the file that are not rendered.
 ///
 /// # Errors
 /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory, or
-/// has no triangle with an area. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
-pub fn load_for(path: &Path, dram_bytes: u32) -> Result<Scene, SceneError> {
-    let document = Document::read(path)?;
-    let buffers = buffers::load(&document)?;
+/// has no triangle with an area; or if there is no such variant. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
+pub fn load_for(path: &Path, dram_bytes: u32, variant: Option<&str>) -> Result<Scene, SceneError> {
+    let mut document = Document::read(path)?;
+    variant.map_or(Ok(()), |name| variants::select(&mut document, name))?;
+    let buffers = Buffers::load(&document)?;
     let source = Source::new(&document, &buffers);
     let mut room = Room::new(path, dram_bytes.into());
     room.materials(document.root.materials.len())?;
     let mut notices = Notices::default();
     let mut textures = Textures::new(&document);
     let materials = material::load(&document, &mut textures)?;
-    let (textures, images) = textures.finish(&source, &mut room)?;
-    let mut scene = Scene { materials, textures, images, ..Scene::default() };
+    let mut scene = Scene { materials, variants: variants::names(&document), ..Scene::default() };
+    textures.finish(&source, &mut room, &mut scene, &mut notices)?;
     nodes::place(&source, &mut scene, &mut room, &mut notices)?;
     let file = || path.to_owned();
     match (scene.triangles.is_empty(), scene.skipped_triangles) {

@@ -23,6 +23,8 @@ pub(super) struct Notices {
     pub(super) orthographic: Vec<String>,
     /// Names of materials of closed meshes that became solid glass.
     pub(super) solid_glass: Vec<String>,
+    /// Images that cannot be read, each with its reason.
+    pub(super) unreadable: Vec<String>,
     /// True if the scene has no camera and received a default one.
     pub(super) framed: bool,
     /// Meshes with normals or colours that are not finite.
@@ -31,14 +33,17 @@ pub(super) struct Notices {
 
 /// Formats `kind 'a', 'b' and 3 more`.
 fn list(kind: &str, names: &[String]) -> String {
+    let quoted: Vec<_> = names.iter().map(|name| format!("'{name}'")).collect();
+    format!("{kind} {}", several(&quoted))
+}
+
+/// Formats `a, b and 3 more`; equal ones count once.
+fn several(items: &[String]) -> String {
     let mut seen = BTreeSet::new();
-    let unique: Vec<_> = names.iter().filter(|name| seen.insert(*name)).collect();
-    let listed: Vec<_> = unique.iter().take(LISTED).map(|name| format!("'{name}'")).collect();
-    let more = match unique.len().saturating_sub(LISTED) {
-        0 => String::new(),
-        rest => format!(" and {rest} more"),
-    };
-    format!("{kind} {}{more}", listed.join(", "))
+    let unique: Vec<_> = items.iter().filter(|item| seen.insert(*item)).map(String::as_str).collect();
+    let (listed, rest) = unique.split_at(unique.len().min(LISTED));
+    let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
+    format!("{}{more}", listed.join(", "))
 }
 
 /// Names of the items for which `holds` is true.
@@ -65,12 +70,25 @@ impl Notices {
     pub(super) fn finish(self, document: &Document) -> Vec<String> {
         let root = &document.root;
         let mut sentences = Vec::new();
+        if !self.unreadable.is_empty() {
+            let images = several(&self.unreadable);
+            sentences.push(format!(
+                "textures are left out whose image cannot be read, the factors alone count: image {images}"
+            ));
+        }
         let mut note = |sentence: &str, kind: &str, names: &[String]| {
             if !names.is_empty() {
                 sentences.push(format!("{sentence}: {}", list(kind, names)));
             }
         };
         note_materials(root, &mut note);
+        let mismatched = &document.conversions.mismatched;
+        let name = |&index: &usize| {
+            root.materials[index].name.clone().unwrap_or_else(|| format!("material {index}"))
+        };
+        let mismatched: Vec<_> = mismatched.iter().map(name).collect();
+        let sentence = "specular-glossiness textures that are mapped in another way than the diffuse ones are ignored, their factors alone count";
+        note(sentence, "material", &mismatched);
         let other_modes = meshes(root, |primitive| Topology::of(primitive).is_none());
         note("points and lines are ignored, only triangles are rendered", "mesh", &other_modes);
         let morphed =

@@ -4,13 +4,14 @@
 //! as the largest value of its kind, in the types of the `gltf` crate and in the loader's, times two, as lists grow by
 //! doubling.
 
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::fmt;
 
 use glam::DMat4;
 use gltf::json;
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
+use super::specular_glossiness::Conversion;
 use crate::scene::{Camera, Material};
 
 /// Maximum number of bytes of memory per byte of JSON.
@@ -47,10 +48,15 @@ fn element(list: &str) -> u64 {
         "accessors" => size_of::<json::Accessor>(),
         "animations" => size_of::<json::Animation>(),
         "buffers" => size_of::<json::Buffer>(),
-        "bufferViews" => size_of::<json::buffer::View>(),
+        "bufferViews" => size_of::<json::buffer::View>() + size_of::<OnceCell<Vec<u8>>>(),
         "cameras" => size_of::<json::Camera>() + size_of::<Camera>(),
         "images" => size_of::<json::Image>(),
-        "materials" => size_of::<json::Material>() + size_of::<Material>(),
+        // A converted material has two images and textures of its own.
+        "materials" => {
+            let converted =
+                size_of::<json::Image>() + size_of::<json::Texture>() + size_of::<(usize, Conversion)>();
+            size_of::<json::Material>() + size_of::<Material>() + 2 * converted
+        }
         "meshes" => size_of::<json::Mesh>(),
         "nodes" => size_of::<json::Node>() + placed,
         "samplers" => size_of::<json::texture::Sampler>(),

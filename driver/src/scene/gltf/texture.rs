@@ -10,9 +10,11 @@ use gltf::json::validation::Checked;
 use super::accessor::Source;
 use super::document::Document;
 use super::image;
+use super::notices::Notices;
+use super::origin::Origin;
 use super::room::Room;
 use crate::error::SceneError;
-use crate::scene::{Encoding, Image, Texture, Wrap};
+use crate::scene::{Encoding, Material, Scene, Texture, Wrap};
 
 /// Maximum absolute value in a texture transform: beyond it single precision cannot resolve texels.
 const MAX_TRANSFORM: f32 = 1e6;
@@ -23,8 +25,8 @@ pub(super) struct Textures<'a> {
     textures: Vec<Texture>,
     /// Index of each texture, by the bits of its fields.
     known: BTreeMap<[u32; 11], u32>,
-    images: Vec<(usize, Encoding)>,
-    image_indices: BTreeMap<(usize, Encoding), u32>,
+    images: Vec<(Origin, Encoding)>,
+    image_indices: BTreeMap<(Origin, Encoding), u32>,
 }
 
 impl<'a> Textures<'a> {
@@ -53,11 +55,7 @@ impl<'a> Textures<'a> {
                 format!("there is no texture {index}: the file has {}", document.root.textures.len());
             return Err(document.invalid(format!("{item}.index"), reason, "state the index of a texture"));
         };
-        if document.root.images.get(texture.source.value()).is_none() {
-            let reason = "the texture has no image in PNG or JPEG";
-            let remedy = "export the scene with PNG or JPEG textures, without extensions for other formats";
-            return Err(document.invalid(format!("textures[{index}].source"), reason, remedy));
-        }
+        let origin = Origin::of(&document.root, index);
         let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
         let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
         if set > 1 {
@@ -71,15 +69,15 @@ impl<'a> Textures<'a> {
             let place = format!("{item}.extensions.KHR_texture_transform");
             found.ok_or_else(|| document.invalid(place, "the transform is out of range", remedy))
         })?;
-        let image = self.image(texture.source.value(), encoding);
+        let image = self.image(origin, encoding);
         let (wrap, nearest) = sampler(document, texture);
         Ok(self.insert(Texture { image, set, wrap, nearest, matrix, offset }))
     }
 
-    fn image(&mut self, index: usize, encoding: Encoding) -> u32 {
+    fn image(&mut self, origin: Origin, encoding: Encoding) -> u32 {
         let Self { images, image_indices, .. } = self;
-        *image_indices.entry((index, encoding)).or_insert_with(|| {
-            images.push((index, encoding));
+        *image_indices.entry((origin, encoding)).or_insert_with(|| {
+            images.push((origin, encoding));
             images.len() as u32 - 1
         })
     }
@@ -96,13 +94,55 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// All textures, with the images that they refer to.
+    /// Loads the images, and leaves textures out whose image cannot be read; the notices name those.
     pub(super) fn finish(
         self,
         source: &Source<'_>,
         room: &mut Room,
-    ) -> Result<(Vec<Texture>, Vec<Image>), SceneError> {
-        Ok((self.textures, image::load(source, &self.images, room)?))
+        scene: &mut Scene,
+        notices: &mut Notices,
+    ) -> Result<(), SceneError> {
+        let images = image::load(source, &self.images, room, &mut notices.unreadable)?;
+        let is_read: Vec<_> = images.iter().map(Option::is_some).collect();
+        scene.images = images.into_iter().flatten().collect();
+        let images = renumbered(&is_read);
+        let kept = self.textures.iter().map(|texture| images[texture.image as usize].is_some());
+        let textures = renumbered(&kept.collect::<Vec<_>>());
+        scene.textures = (self.textures.into_iter())
+            .filter_map(|texture| Some(Texture { image: images[texture.image as usize]?, ..texture }))
+            .collect();
+        scene.materials.iter_mut().for_each(|material| renumber(material, &textures));
+        Ok(())
+    }
+}
+
+/// For each element of a list, its index once those that are not kept have been removed.
+fn renumbered(is_kept: &[bool]) -> Vec<Option<u32>> {
+    let mut next = 0..;
+    is_kept.iter().map(|kept| kept.then(|| next.next()).flatten()).collect()
+}
+
+/// Renumbers the textures of a material, or takes them off it. No field is left out here: a new one may be a texture.
+fn renumber(material: &mut Material, indices: &[Option<u32>]) {
+    let Material {
+        name: _,
+        reflection: _,
+        emission: _,
+        double_sided: _,
+        alpha_cutoff: _,
+        blends: _,
+        alpha: _,
+        energy_compensation: _,
+        base_texture,
+        metallic_roughness_texture,
+        emissive_texture,
+        layers,
+    } = material;
+    for texture in [base_texture, metallic_roughness_texture, emissive_texture] {
+        *texture = texture.and_then(|index| indices[index as usize]);
+    }
+    if let Some(layers) = layers {
+        layers.renumber(|index| indices[index as usize]);
     }
 }
 

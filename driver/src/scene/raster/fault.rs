@@ -9,6 +9,8 @@ pub(in crate::scene) struct Fault {
     pub(in crate::scene) reason: String,
     /// Remedy.
     pub(in crate::scene) remedy: &'static str,
+    /// True for an image that is beyond a limit, or takes memory that the process cannot have; false for one that cannot be read.
+    pub(in crate::scene) is_limit: bool,
 }
 
 const COPY_AGAIN: &str = "export the image again, or copy it again: it is damaged or was cut off on the way";
@@ -16,10 +18,19 @@ const COPY_AGAIN: &str = "export the image again, or copy it again: it is damage
 impl Fault {
     /// Error of an image whose memory the process cannot have.
     pub(in crate::scene) fn memory(error: OutOfMemory) -> Self {
-        Self { reason: format!("decoding it takes much memory: {error}"), remedy: allocation::REMEDY }
+        Self {
+            reason: format!("decoding it takes much memory: {error}"),
+            remedy: allocation::REMEDY,
+            is_limit: true,
+        }
+    }
+
+    /// Error of an image that cannot be read, in whatever process.
+    pub(in crate::scene) fn unreadable(reason: impl Into<String>, remedy: &'static str) -> Self {
+        Self { reason: reason.into(), remedy, is_limit: false }
     }
 
     pub(super) fn damaged(reason: impl std::fmt::Display) -> Self {
-        Self { reason: format!("the image cannot be decoded: {reason}"), remedy: COPY_AGAIN }
+        Self::unreadable(format!("the image cannot be decoded: {reason}"), COPY_AGAIN)
     }
 }

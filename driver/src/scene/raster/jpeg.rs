@@ -66,12 +66,12 @@ pub(super) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<[u8;
         Some(ColorSpace::Luma) => ColorSpace::Luma,
         Some(ColorSpace::YCbCr | ColorSpace::RGB) => ColorSpace::RGB,
         Some(ColorSpace::CMYK | ColorSpace::YCCK) => {
-            let reason = "the JPEG is of CMYK, colours of ink, which stand for no light".to_owned();
-            return Err(Fault { reason, remedy: "convert the image to RGB" });
+            let reason = "the JPEG is of CMYK, colours of ink, which stand for no light";
+            return Err(Fault::unreadable(reason, "convert the image to RGB"));
         }
         _ => {
-            let reason = "the JPEG has neither one channel nor three".to_owned();
-            return Err(Fault { reason, remedy: "convert the image to RGB" });
+            let reason = "the JPEG has neither one channel nor three";
+            return Err(Fault::unreadable(reason, "convert the image to RGB"));
         }
     };
     decoder.set_options(decoder.options().jpeg_set_out_colorspace(colours));

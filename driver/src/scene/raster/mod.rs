@@ -1,11 +1,12 @@
-//! Decoding of PNG and JPEG files to 8-bit RGBA texels.
+//! Decoding of PNG, JPEG and WebP files to 8-bit RGBA texels.
 //!
 //! Sizes are checked in the header, before anything is allocated for them: against limits, and against the maximum that a
-//! file of its length can hold at the best compression. A file's colour space is ignored, as glTF requires.
+//! file of its length can hold at the best compression, where its format has one. A file's colour space is ignored, as glTF requires.
 
 mod fault;
 mod jpeg;
 mod png;
+mod webp;
 
 pub(super) use self::fault::Fault;
 use super::texture::{MAX_SIDE, MAX_TEXELS};
@@ -26,41 +27,31 @@ pub(super) fn walled<T>(decoder: impl FnOnce() -> Result<T, Fault>) -> Result<T,
 pub(super) enum Kind {
     Png,
     Jpeg,
+    WebP,
 }
 
 impl Kind {
     /// Format by the first bytes of a file.
     pub(super) fn of(bytes: &[u8]) -> Result<Self, Fault> {
-        const REMEDY: &str = "convert the image to PNG or JPEG";
-        const OTHERS: [(&[u8], &str); 6] = [
-            (b"RIFF", "WebP"),
-            (b"\xabKTX", "KTX"),
-            (b"GIF8", "GIF"),
-            (b"DDS ", "DDS"),
-            (b"BM", "BMP"),
-            (b"II*\0", "TIFF"),
-        ];
+        const REMEDY: &str = "convert the image to PNG, JPEG or WebP";
+        const OTHERS: [(&[u8], &str); 5] =
+            [(b"\xabKTX", "KTX"), (b"GIF8", "GIF"), (b"DDS ", "DDS"), (b"BM", "BMP"), (b"II*\0", "TIFF")];
         if bytes.starts_with(png::MAGIC) {
             return Ok(Self::Png);
         }
         if bytes.starts_with(jpeg::MAGIC) {
             return Ok(Self::Jpeg);
         }
+        if webp::is_webp(bytes) {
+            return Ok(Self::WebP);
+        }
         let other = OTHERS.into_iter().find(|(magic, _)| bytes.starts_with(magic));
         let reason = match other {
             _ if bytes.is_empty() => "the image is empty".to_owned(),
-            Some((_, name)) => format!("the image is neither PNG nor JPEG, but seems to be {name}"),
-            None => "the image is neither PNG nor JPEG".to_owned(),
+            Some((_, name)) => format!("the image is neither PNG, JPEG nor WebP, but seems to be {name}"),
+            None => "the image is neither PNG, JPEG nor WebP".to_owned(),
         };
-        Err(Fault { reason, remedy: REMEDY })
-    }
-
-    /// Media type as in glTF.
-    pub(super) fn media_type(self) -> &'static str {
-        match self {
-            Self::Png => "image/png",
-            Self::Jpeg => "image/jpeg",
-        }
+        Err(Fault::unreadable(reason, REMEDY))
     }
 
     /// Width and height from the header, checked against the limits and the file's length.
@@ -68,6 +59,7 @@ impl Kind {
         let (size, most_texels) = walled(|| match self {
             Self::Png => png::size(bytes),
             Self::Jpeg => jpeg::size(bytes),
+            Self::WebP => webp::size(bytes),
         })?;
         check_size(size)?;
         let [width, height] = size;
@@ -85,6 +77,7 @@ impl Kind {
         let texels = walled(|| match self {
             Self::Png => png::decode(bytes, size),
             Self::Jpeg => jpeg::decode(bytes, size),
+            Self::WebP => webp::decode(bytes, size),
         })?;
         let [width, height] = size.map(|side| side as usize);
         if texels.len() == width * height { Ok(texels) } else { Err(Fault::damaged("rows are missing")) }
@@ -98,7 +91,11 @@ pub(super) fn check_size([width, height]: [u32; 2]) -> Result<(), Fault> {
     }
     if width > MAX_SIDE || height > MAX_SIDE || u64::from(width) * u64::from(height) > MAX_TEXELS {
         let reason = format!("the image has {width} x {height} texels, more than {MAX_SIDE} x {MAX_SIDE}");
-        return Err(Fault { reason, remedy: "scale the image down to 16384 texels a side or less" });
+        return Err(Fault {
+            reason,
+            remedy: "scale the image down to 16384 texels a side or less",
+            is_limit: true,
+        });
     }
     Ok(())
 }
@@ -111,7 +108,8 @@ mod tests {
     fn kinds_are_told_by_the_first_bytes() {
         assert_eq!(Kind::of(b"\x89PNG\r\n\x1a\n..."), Ok(Kind::Png));
         assert_eq!(Kind::of(b"\xff\xd8\xff\xe0"), Ok(Kind::Jpeg));
-        for (bytes, name) in [(&b""[..], "empty"), (b"RIFF....WEBP", "WebP"), (b"text", "neither")] {
+        assert_eq!(Kind::of(b"RIFF....WEBP"), Ok(Kind::WebP));
+        for (bytes, name) in [(&b""[..], "empty"), (b"RIFF....WAVE", "neither"), (b"GIF89a", "GIF")] {
             let fault = Kind::of(bytes).unwrap_err();
             assert!(fault.reason.contains(name), "{fault:?}");
         }

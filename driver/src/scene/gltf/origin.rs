@@ -1,0 +1,28 @@
+//! Images of textures.
+
+use gltf::json;
+
+use super::extensions::WEBP;
+
+/// Image that a texture refers to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Origin {
+    /// Image of the index.
+    Image(usize),
+    /// None in a format that is read, for the texture of the index.
+    Absent(usize),
+}
+
+impl Origin {
+    /// Image of a texture: its own one, of which those of extensions are copies, or that of an extension.
+    pub(super) fn of(root: &json::Root, texture: usize) -> Self {
+        let stated = &root.textures[texture];
+        let extensions = stated.extensions.as_ref();
+        let of_extension = |name: &str| extensions?.others.get(name)?.get("source")?.as_u64();
+        let own = Some(stated.source.value() as u64);
+        let mut sources = [own].into_iter().chain([of_extension(WEBP)]).flatten();
+        let images = root.images.len() as u64;
+        let image = sources.find(|source| *source < images);
+        image.map_or(Self::Absent(texture), |image| Self::Image(image as usize))
+    }
+}

@@ -1,0 +1,102 @@
+//! Conversion of specular-glossiness to metallic-roughness: that of the extension's own examples.
+
+use glam::Vec3;
+
+/// F0 of a dielectric.
+const DIELECTRIC: f32 = 0.04;
+
+const EPSILON: f32 = 1e-6;
+
+/// Weights of red, green and blue in the perceived brightness, a quadratic mean.
+const WEIGHTS: Vec3 = Vec3::new(0.299, 0.587, 0.114);
+
+/// Linear values of the specular-glossiness model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Appearance {
+    pub(super) diffuse: Vec3,
+    pub(super) specular: Vec3,
+    pub(super) glossiness: f32,
+}
+
+/// Linear values of the metallic-roughness model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Converted {
+    pub(super) base: Vec3,
+    pub(super) metallic: f32,
+    pub(super) roughness: f32,
+}
+
+fn brightness(colour: Vec3) -> f32 {
+    libm::sqrtf(WEIGHTS.dot(colour * colour))
+}
+
+/// Metalness at which a base colour has this diffuse and specular brightness.
+fn solve_metallic(diffuse: f32, specular: f32, one_minus_strength: f32) -> f32 {
+    // At F0 itself, the most common value, rounding would decide whether dark texels are metal.
+    if specular <= DIELECTRIC + EPSILON {
+        return 0.0;
+    }
+    let b = diffuse * one_minus_strength / (1.0 - DIELECTRIC) + specular - 2.0 * DIELECTRIC;
+    let c = DIELECTRIC - specular;
+    let discriminant = (b * b - 4.0 * DIELECTRIC * c).max(0.0);
+    ((libm::sqrtf(discriminant) - b) / (2.0 * DIELECTRIC)).clamp(0.0, 1.0)
+}
+
+impl Appearance {
+    pub(super) fn converted(&self) -> Converted {
+        let Self { diffuse, specular, glossiness } = *self;
+        let one_minus_strength = 1.0 - specular.max_element();
+        let metallic = solve_metallic(brightness(diffuse), brightness(specular), one_minus_strength);
+        let of_diffuse = diffuse * (one_minus_strength / (1.0 - DIELECTRIC) / (1.0 - metallic).max(EPSILON));
+        let of_specular = (specular - Vec3::splat(DIELECTRIC * (1.0 - metallic))) / metallic.max(EPSILON);
+        let base = of_diffuse + (of_specular - of_diffuse) * (metallic * metallic);
+        Converted { base: base.clamp(Vec3::ZERO, Vec3::ONE), metallic, roughness: 1.0 - glossiness }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Specular-glossiness of a metallic-roughness material, by the same examples.
+    fn backwards(base: Vec3, metallic: f32, roughness: f32) -> Appearance {
+        let specular = Vec3::splat(DIELECTRIC).lerp(base, metallic);
+        let strength = 1.0 - specular.max_element();
+        let diffuse = base * ((1.0 - DIELECTRIC) * (1.0 - metallic) / strength.max(EPSILON));
+        Appearance { diffuse, specular, glossiness: 1.0 - roughness }
+    }
+
+    /// Metals and dielectrics come back as they were. Between them the formula itself is approximate.
+    #[test]
+    fn what_was_converted_there_is_converted_back() {
+        for base in [Vec3::new(0.9, 0.6, 0.2), Vec3::splat(0.5), Vec3::new(0.1, 0.3, 0.8)] {
+            for metallic in [0.0, 1.0] {
+                let back = backwards(base, metallic, 0.3).converted();
+                assert!(back.base.distance(base) < 1e-3, "{base}, {metallic}: {back:?}");
+                assert!((back.metallic - metallic).abs() < 1e-3, "{base}, {metallic}: {back:?}");
+                assert!((back.roughness - 0.3).abs() < 1e-6);
+            }
+        }
+        let grey = backwards(Vec3::splat(0.5), 0.5, 0.3).converted();
+        assert!(
+            (grey.metallic - 0.5).abs() < 0.02 && grey.base.distance(Vec3::splat(0.5)) < 0.02,
+            "{grey:?}"
+        );
+    }
+
+    /// White reflection at all angles: the formula's extreme.
+    #[test]
+    fn extremes_stay_in_range() {
+        for diffuse in [0.0, 1.0] {
+            for specular in [0.0, DIELECTRIC, 1.0] {
+                let white = Vec3::ONE;
+                let appearance =
+                    Appearance { diffuse: white * diffuse, specular: white * specular, glossiness: 1.0 };
+                let Converted { base, metallic, roughness } = appearance.converted();
+                let in_range = |value: f32| (0.0..=1.0).contains(&value);
+                assert!(base.to_array().into_iter().all(in_range), "{appearance:?}: {base}");
+                assert!(in_range(metallic) && roughness == 0.0, "{appearance:?}: {metallic}");
+            }
+        }
+    }
+}
