@@ -3,9 +3,12 @@
 mod bvh;
 mod corners;
 mod cut_out;
+mod layers;
 pub mod light;
+mod normal_map;
 mod reflection;
 mod seen;
+mod shading_normal;
 mod slabs;
 mod specular;
 mod surface;

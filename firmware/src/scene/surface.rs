@@ -8,7 +8,9 @@ use photoncard_shared::layout::{
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
+use super::normal_map::base_normal;
 use super::reflection::{Scattering, Texel, View, scattering};
+use super::shading_normal::{bent_by_share, turned};
 use super::specular::Specular;
 use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origin};
 use crate::memory::MemoryPort;
@@ -209,28 +211,19 @@ fn finished(
             surface.emission *= rgb(corners.texture(scene, memory, emissive)?);
             surface.emitter = corners.emitter();
         }
-        if let Some(normal) = corners.normal() {
-            surface.normal = shading_normal(if is_front { normal } else { -normal }, &bare);
+        let front = if is_front { bare.geometric_normal } else { -bare.geometric_normal };
+        if let Some(normal) = base_normal(scene, memory, material, corners, front)? {
+            let normal = if is_front { normal } else { -normal };
+            surface.normal = turned(normal, bare.outgoing, bare.geometric_normal);
         }
     }
     let Surface { normal, geometric_normal, outgoing, .. } = surface;
     let view = View { outgoing, normals: [normal, geometric_normal], is_front };
     let Scattering { reflection, specular, absorption } = scattering(material, &texel, &view);
-    Ok(Surface { reflection, specular, absorption, ..surface })
+    let normal = bent_by_share(normal, reflection.glossy_share(), outgoing, geometric_normal);
+    Ok(Surface { normal, reflection, specular, absorption, ..surface })
 }
 
 fn rgb([red, green, blue, _]: [f32; 4]) -> Vec3 {
     Vec3::new(red, green, blue)
-}
-
-/// Least cosine between a shading normal and the direction to the viewer.
-const MIN_COSINE: f32 = 0.01;
-
-/// A shading normal, turned towards the viewer where it points away, as it may at a silhouette.
-fn shading_normal(normal: Vec3, bare: &Surface) -> Vec3 {
-    let cosine = normal.dot(bare.outgoing);
-    let turned = if cosine < MIN_COSINE { normal + bare.outgoing * (MIN_COSINE - cosine) } else { normal };
-    let turned = unit(turned);
-    // Without a direction, or on the wrong side still: flat.
-    if turned.dot(bare.geometric_normal) > 0.0 { turned } else { bare.geometric_normal }
 }
