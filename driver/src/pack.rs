@@ -115,7 +115,7 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     image.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
     image.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
     image.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
-    image.append(SectionKind::Attributes, corners.records.iter().map(layout::Attributes::to_bytes))?;
+    image.append(SectionKind::Attributes, corners.records.into_iter())?;
     image.append(SectionKind::Materials, materials::records(scene, lights, &uncovered))?;
     image.append(SectionKind::Layers, materials::layers(scene).into_iter())?;
     image.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;

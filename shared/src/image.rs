@@ -34,7 +34,7 @@ pub enum SectionKind {
     Triangles = 1,
     /// [`crate::layout::LeafAttributes`], one `u32` for each leaf of triangles. Empty if no triangle has attributes.
     LeafAttributes = 2,
-    /// [`Attributes`] of triangles.
+    /// [`Attributes`] of triangles, those of a leaf after its [`crate::layout::Tangents`] if it has any.
     Attributes = 3,
     /// [`Material`]s.
     Materials = 4,

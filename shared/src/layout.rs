@@ -9,6 +9,7 @@
 //! | [`BvhNode`] | 128 | 1 |
 //! | [`BvhLeaf`], up to eight triangles | 128 | 1 |
 //! | [`Attributes`] | 64 | 2 |
+//! | [`Tangents`] of four triangles | 64 | 2 |
 //! | [`LeafAttributes`] | 4 | 32 |
 //! | [`Material`] | 64 | 2 |
 //! | [`Layers`] | 128 | 1 |
@@ -38,6 +39,7 @@ mod photon;
 mod photon_grid;
 mod photon_leaf;
 mod photon_node;
+mod tangents;
 mod texture;
 mod wide_node;
 
@@ -58,6 +60,7 @@ pub use photon::{DISC_CODES, FULL_DISC, PHOTON_CONTENT_BYTES, Photon, Rgbe, disc
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};
 pub use photon_leaf::{LEAF_LANES, LEAF_PHOTONS, LeafCoordinates, PhotonLeaf, leaf_capacity};
 pub use photon_node::{GridBox, NodeCoordinates, PhotonNode};
+pub use tangents::Tangents;
 pub use texture::{TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat, Texture, Wrap};
 pub use wide_node::{Child, Links, NODE_CHILDREN, WideNode};
 

@@ -2,11 +2,11 @@
 
 use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{
-    Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, PunctualKind, PunctualLight,
-    Reflection, Scene, Sheen, Texture, Transmission, Triangle, Wrap,
+    Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, NormalMap, PunctualKind,
+    PunctualLight, Reflection, Scene, Sheen, Texture, Transmission, Triangle, VertexAttributes, Wrap,
 };
 
-use crate::shapes::{add_ball, add_textured_quad, cuboid};
+use crate::shapes::{add_ball, add_tangents, add_textured_quad, cuboid};
 use crate::{camera, lambertian, quad, room, scene};
 
 const WALL: u32 = 0;
@@ -21,10 +21,13 @@ const VEIL: u32 = 8;
 const VARNISHED: u32 = 9;
 const PANE: u32 = 10;
 const ICE: u32 = 11;
+const BUMPS: u32 = 12;
+const DENTS: u32 = 13;
 
 /// A room with a lamp, a point light, a spot and a directional light, a sky through its open front, walls with textures
 /// of both sets of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, an emissive
-/// screen, a veil of partial coverage with sheen and diffuse transmission, a varnished board, a rough pane and a rough block of glass.
+/// screen, a veil of partial coverage with sheen and diffuse transmission, a varnished board, a rough pane and a rough block of glass,
+/// and normal maps on a glossy and on a Lambertian sheet.
 pub fn everything() -> Scene {
     let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
     let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);
@@ -39,10 +42,11 @@ pub fn everything() -> Scene {
             scene.triangles[index].attributes = scene.attributes.len() as u32;
             let coordinates = vertices.map(|vertex| Vec2::new(vertex.x + vertex.z, vertex.y - vertex.z));
             let colours = [[1.0, 0.9, 0.8, 1.0], [0.7, 1.0, 0.6, 1.0], [0.9, 0.5, 1.0, 1.0]];
-            scene.attributes.push(photoncard_driver::scene::VertexAttributes {
+            scene.attributes.push(VertexAttributes {
                 normals: None,
                 coordinates: [coordinates, coordinates.map(|coordinate| coordinate * 3.0)],
                 colours,
+                ..VertexAttributes::NONE
             });
         }
     }
@@ -59,6 +63,11 @@ pub fn everything() -> Scene {
     add_textured_quad(&mut scene, upright(Vec3::new(0.7, -0.1, -0.2), 0.2), coordinates, VARNISHED);
     add_textured_quad(&mut scene, upright(Vec3::new(-0.2, -0.6, 0.3), 0.15), coordinates, PANE);
     scene.triangles.extend(cuboid(Vec3::new(0.0, -0.8, 0.0), Vec3::splat(0.1), ICE));
+    for (material, x) in [(BUMPS, -0.7), (DENTS, 0.8)] {
+        add_textured_quad(&mut scene, upright(Vec3::new(x, -0.1, -0.4), 0.2), coordinates, material);
+        let along = Vec3::new(1.0, 0.0, 0.3).normalize();
+        add_tangents(&mut scene, material, along.extend(x.signum()));
+    }
     scene
 }
 
@@ -111,7 +120,16 @@ fn materials() -> Vec<Material> {
             ..Material::new("pane", glossy(0.0, 0.4, Some(thin)))
         },
         Material::new("ice", glossy(0.1, 0.3, Some(clear))),
+        Material { layers: bumpy(0.7), ..Material::new("bumps", glossy(0.9, 0.3, None)) },
+        Material { layers: bumpy(-0.4), double_sided: true, ..lambertian("dents", 0.7) },
     ]
+}
+
+fn bumpy(scale: f32) -> Option<Box<Layers>> {
+    Some(Box::new(Layers {
+        normal: Some(NormalMap { texture: 4, scale }),
+        ..Layers::none(Vec3::splat(0.04))
+    }))
 }
 
 fn veil(none: Layers) -> Layers {
@@ -142,12 +160,15 @@ fn add_textures(scene: &mut Scene) {
         texels: (0..width * height).map(|i| [0, 1, 2, 3].map(|k| texel(i % width, i / width, k))).collect(),
         encoding,
     };
-    scene.images = vec![image(13, 9, Encoding::Srgb), image(16, 4, Encoding::Linear)];
+    let mut normals = image(7, 6, Encoding::Linear);
+    normals.texels.iter_mut().for_each(|[_, _, blue, _]| *blue |= 192);
+    scene.images = vec![image(13, 9, Encoding::Srgb), image(16, 4, Encoding::Linear), normals];
     scene.textures = vec![
         Texture::new(0),
         Texture { set: 1, wrap: [Wrap::Mirror, Wrap::Clamp], ..Texture::new(0) },
         Texture { nearest: true, matrix: [[0.8, 0.6], [-0.6, 0.8]], offset: [0.3, 0.1], ..Texture::new(1) },
         Texture { wrap: [Wrap::Repeat, Wrap::Mirror], ..Texture::new(0) },
+        Texture { wrap: [Wrap::Mirror; 2], ..Texture::new(2) },
     ];
 }
 

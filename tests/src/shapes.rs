@@ -1,6 +1,6 @@
 //! Shapes for scenes of tests.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use photoncard_driver::scene::{Scene, Triangle, VertexAttributes};
 
 use crate::{quad, room};
@@ -57,5 +57,13 @@ pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f
         scene
             .attributes
             .push(VertexAttributes { coordinates: [coordinates, [Vec2::ZERO; 3]], ..VertexAttributes::NONE });
+    }
+}
+
+/// Gives the textured triangles of a material tangents: a direction, with the sign of the bitangent in w.
+pub fn add_tangents(scene: &mut Scene, material: u32, tangent: Vec4) {
+    for triangle in scene.triangles.iter().filter(|triangle| triangle.material == material) {
+        scene.attributes[triangle.attributes as usize].tangents = scene.tangents.len() as u32;
+        scene.tangents.push([tangent; 3]);
     }
 }

@@ -1,17 +1,17 @@
 //! Vertex attributes of triangles as records of the card image.
 
-use photoncard_shared::layout::{self, LeafAttributes};
+use photoncard_shared::layout::{self, LeafAttributes, Record, Tangents};
 
 use crate::bvh::LeafTriangles;
 use crate::light::Lights;
-use crate::scene::{NO_ATTRIBUTES, Scene, VertexAttributes};
+use crate::scene::{NO_ATTRIBUTES, Scene, Triangle, VertexAttributes};
 
 /// Vertex attributes of the triangles of all leaves. Leaves without attributes have no records.
 pub(super) struct PackedCorners {
     /// Entry of each leaf; empty if no leaf has attributes.
     pub(super) leaves: Vec<u32>,
     /// Records of the leaves with attributes.
-    pub(super) records: Vec<layout::Attributes>,
+    pub(super) records: Vec<[u8; layout::Attributes::BYTES]>,
 }
 
 impl PackedCorners {
@@ -49,6 +49,10 @@ impl PackedCorners {
         }
         let is_of_second_set = |texture: u32| scene.textures[texture as usize].set == 1;
         let two_sets = materials().any(|material| material.textures().any(is_of_second_set));
+        if materials().any(|material| material.tangent_texture().is_some()) {
+            let tangents: Vec<Tangents> = triangles().map(|triangle| tangents(scene, triangle)).collect();
+            self.records.extend(Tangents::to_records(&tangents));
+        }
         // A record takes half a line, and lines are fewer than 2^32: the upper bit is free.
         let first = self.records.len() as u32;
         for &index in leaf {
@@ -56,10 +60,21 @@ impl PackedCorners {
             let emitter = lights.of_triangle(index);
             let attributes =
                 scene.attributes.get(triangle.attributes as usize).unwrap_or(&VertexAttributes::NONE);
-            self.records.extend((0..1 + usize::from(two_sets)).map(|set| record(attributes, set, emitter)));
+            let sets = 0..1 + usize::from(two_sets);
+            self.records.extend(sets.map(|set| record(attributes, set, emitter).to_bytes()));
         }
         LeafAttributes { first, two_sets }.to_entry()
     }
+}
+
+/// Tangents of a triangle; none if it has no normal map.
+fn tangents(scene: &Scene, triangle: &Triangle) -> Tangents {
+    let attributes = scene.attributes.get(triangle.attributes as usize);
+    let tangents = attributes.and_then(|attributes| scene.tangents.get(attributes.tangents as usize));
+    tangents.map_or(Tangents::NONE, |corners| Tangents {
+        directions: corners.map(|tangent| tangent.truncate().to_array()),
+        signs: corners.map(|tangent| tangent.w),
+    })
 }
 
 /// Record of vertex attributes with one set of texture coordinates; `emitter` is the triangle's emitter, if any.

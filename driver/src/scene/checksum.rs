@@ -20,7 +20,9 @@ impl Scene {
             attributes.normals.iter().flatten().for_each(|normal| add(&mut sum, &normal.to_array()));
             attributes.coordinates.iter().flatten().for_each(|place| add(&mut sum, &place.to_array()));
             add(&mut sum, attributes.colours.as_flattened());
+            sum.update(&attributes.tangents.to_le_bytes());
         }
+        self.tangents.iter().flatten().for_each(|tangent| add(&mut sum, &tangent.to_array()));
         for image in &self.images {
             sum.update(image.texels.as_flattened());
         }

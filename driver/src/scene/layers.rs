@@ -92,6 +92,12 @@ impl Layers {
         }
     }
 
+    /// The normal texture whose coordinates define tangents: the base's, or the coat's if the base has none.
+    pub(super) fn tangent_texture(&self) -> Option<u32> {
+        let coat_normal = self.coat.and_then(|coat| coat.normal);
+        self.normal.or(coat_normal).map(|map| map.texture)
+    }
+
     /// Textures in use.
     pub(super) fn textures(&self) -> impl Iterator<Item = u32> {
         let Self { normal, specular_texture, specular_colour_texture, transmission_texture, .. } = *self;

@@ -170,6 +170,12 @@ impl Material {
         own.into_iter().flatten().chain(self.layers.iter().flat_map(|layers| layers.textures()))
     }
 
+    /// The normal texture whose coordinates define tangents, an index into [`Scene::textures`](super::Scene::textures); `None`
+    /// without a normal map.
+    pub(crate) fn tangent_texture(&self) -> Option<u32> {
+        self.layers.as_ref().and_then(|layers| layers.tangent_texture())
+    }
+
     /// Checks that every value is finite and within its range, and that no more light is reflected than arrives.
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
         self.reflection.check()?;

@@ -29,7 +29,7 @@ pub use self::limits::BRIGHTEST;
 pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
 pub use self::material::{Material, Reflection, Transmission};
 pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
-pub use self::triangle::{NO_ATTRIBUTES, Triangle, VertexAttributes};
+pub use self::triangle::{CornerTangents, NO_ATTRIBUTES, NO_TANGENTS, Triangle, VertexAttributes};
 use crate::error::SceneError;
 
 /// A scene in world space, every instance resolved. [`gltf::load`] reads one from a file.
@@ -39,6 +39,8 @@ pub struct Scene {
     pub triangles: Vec<Triangle>,
     /// Attributes of the triangles that have any: normals, texture coordinates and colours of the corners.
     pub attributes: Vec<VertexAttributes>,
+    /// Tangents of the triangles whose material has a normal map.
+    pub tangents: Vec<CornerTangents>,
     /// Materials; the index in [`Triangle::material`] refers to this list.
     pub materials: Vec<Material>,
     /// Textures, mappings of images to surfaces; the indices in [`Material`] refer to this list.

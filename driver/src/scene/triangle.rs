@@ -1,9 +1,12 @@
 //! Triangles, and the attributes of their corners.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 
 /// [`Triangle::attributes`] of a triangle whose corners have nothing but their positions.
 pub const NO_ATTRIBUTES: u32 = u32::MAX;
+
+/// [`VertexAttributes::tangents`] of a triangle without tangents.
+pub const NO_TANGENTS: u32 = u32::MAX;
 
 /// A triangle in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,9 +49,25 @@ pub struct VertexAttributes {
     /// Linear RGBA of the corners, white without `COLOR_0`. It multiplies the base colour (or the diffuse albedo) and
     /// alpha.
     pub colours: [[f32; 4]; 3],
+    /// Index into [`Scene::tangents`](super::Scene::tangents), or [`NO_TANGENTS`].
+    pub tangents: u32,
 }
+
+/// Tangents of a triangle's corners: x, y and z of the unit vector in world space along which u increases, perpendicular to the
+/// corner's normal, or zero at a corner without one; w is 1 or -1, and the bitangent `w (normal x tangent)`.
+pub type CornerTangents = [Vec4; 3];
 
 impl VertexAttributes {
     /// Attributes of a triangle that states none: flat, at the origin of every texture, white.
-    pub const NONE: Self = Self { normals: None, coordinates: [[Vec2::ZERO; 3]; 2], colours: [[1.0; 4]; 3] };
+    pub const NONE: Self = Self {
+        normals: None,
+        coordinates: [[Vec2::ZERO; 3]; 2],
+        colours: [[1.0; 4]; 3],
+        tangents: NO_TANGENTS,
+    };
+
+    /// Unit normals of the corners, of a flat triangle its own.
+    pub fn normals_of(&self, triangle: &Triangle) -> [Vec3; 3] {
+        self.normals.unwrap_or_else(|| [triangle.scaled_normal().normalize_or_zero(); 3])
+    }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use photoncard_shared::image::{LEAF_ATTRIBUTES_PER_LINE, SectionKind};
-use photoncard_shared::layout::{Attributes, LEAF_TRIANGLES, LeafAttributes, NO_TEXTURE, Record};
+use photoncard_shared::layout::{Attributes, LEAF_TRIANGLES, LeafAttributes, NO_TEXTURE, Record, Tangents};
 use photoncard_shared::message::Fault;
 
 use super::SceneImage;
@@ -40,9 +40,30 @@ impl Corners {
 
     /// Interpolated unit shading normal on the front; `None` for a flat triangle.
     pub(super) fn normal(&self) -> Option<Vec3> {
-        let normals = self.attributes.normals?;
-        let weighted = normals.into_iter().zip(self.weights);
-        Some(unit(weighted.map(|(normal, weight)| unit(normal.into()) * weight).sum()))
+        self.attributes.normals.map(|normals| unit(self.interpolated(normals)))
+    }
+
+    /// Tangent, bitangent and normal on the front, interpolated and not normalised, as bakers of normal maps take them.
+    /// `front_normal` is that of a flat triangle. The material must have a normal map.
+    pub(super) fn frame(
+        &self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        front_normal: Vec3,
+    ) -> Result<[Vec3; 3], Fault> {
+        let bytes = record(scene, memory, Tangents::locate(self.leaf, self.slot))?;
+        let Tangents { directions, signs } = Tangents::read(bytes, self.slot);
+        let tangent = self.interpolated(directions);
+        let sign: f32 = signs.into_iter().zip(self.weights).map(|(sign, weight)| sign * weight).sum();
+        let normal = self.attributes.normals.map_or(front_normal, |normals| self.interpolated(normals));
+        Ok([tangent, normal.cross(tangent) * sign, normal])
+    }
+
+    /// Mean of the corners' unit vectors, by their weights.
+    #[inline(always)]
+    fn interpolated(&self, directions: [[f32; 3]; 3]) -> Vec3 {
+        let weighted = directions.into_iter().zip(self.weights);
+        weighted.map(|(direction, weight)| unit(direction.into()) * weight).sum()
     }
 
     /// Interpolated vertex colour, linear red, green, blue and alpha.

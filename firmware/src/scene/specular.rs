@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::shading_normal::bent;
 use crate::vector::{max, mirror, unit};
 
 /// Perfectly specular reflection and transmission at a point.
@@ -45,9 +46,10 @@ impl Specular {
         self.reflected == Vec3::ZERO && self.transmitted == Vec3::ZERO
     }
 
-    /// Mirror direction of `outgoing` about the shading normal, or about the geometric normal if the former is below the surface.
+    /// Mirror direction of `outgoing` about the shading normal, bent where that direction would be below the surface.
     pub(crate) fn reflected_direction(outgoing: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
-        let direction = mirror(outgoing, normal);
+        let direction = mirror(outgoing, bent(normal, outgoing, geometric_normal));
+        // Rounding, at grazing views.
         if direction.dot(geometric_normal) > 0.0 { direction } else { mirror(outgoing, geometric_normal) }
     }
 }

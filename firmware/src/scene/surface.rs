@@ -9,7 +9,9 @@ use photoncard_shared::message::Fault;
 use super::corners::Corners;
 use super::coverage::covered;
 use super::materials::{has_layers, layer_texel, read_layers, read_material};
+use super::normal_map::{base_normal, mapped_normal};
 use super::reflection::{Layer, Scattering, Taken, Texel, View, scattering, take};
+use super::shading_normal::{bent_by_share, turned};
 use super::specular::Specular;
 use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origin};
 use crate::memory::MemoryPort;
@@ -226,8 +228,10 @@ fn finished(
             surface.emission *= rgb(corners.texture(scene, memory, emissive)?);
             surface.emitter = corners.emitter();
         }
-        if let Some(normal) = corners.normal() {
-            surface.normal = shading_normal(if is_front { normal } else { -normal }, &bare);
+        let front = if is_front { bare.geometric_normal } else { -bare.geometric_normal };
+        if let Some(normal) = base_normal(scene, memory, material, corners, front)? {
+            let normal = if is_front { normal } else { -normal };
+            surface.normal = turned(normal, bare.outgoing, bare.geometric_normal);
         }
     }
     let Surface { normal, geometric_normal, outgoing, .. } = surface;
@@ -236,7 +240,8 @@ fn finished(
         return layered(scene, memory, surface, (corners.as_ref(), material), (&texel, &view), random);
     }
     let Scattering { reflection, specular, absorption } = scattering(material, &texel, &view);
-    Ok(Surface { reflection, specular, absorption, ..surface })
+    let normal = bent_by_share(normal, reflection.glossy_share(), outgoing, geometric_normal);
+    Ok(Surface { normal, reflection, specular, absorption, ..surface })
 }
 
 /// The surface of one of a material's layers. Its base emits.
@@ -251,9 +256,21 @@ fn layered(
 ) -> Result<Surface, Fault> {
     let layers = read_layers(scene, memory, material)?;
     let layer_texel = layer_texel(scene, memory, corners, &layers)?;
-    let taken = take((material, &layers), (texel, &layer_texel), view, surface.normal, random);
+    let coat_normal = match corners {
+        Some(corners) => {
+            let map = (layers.textures.coat_normal, layers.coat_normal_scale);
+            let sign = if view.is_front { 1.0 } else { -1.0 };
+            let normal = mapped_normal(scene, memory, map, corners, surface.geometric_normal * sign)?;
+            normal.map(|normal| turned(normal * sign, surface.outgoing, surface.geometric_normal))
+        }
+        None => None,
+    };
+    let coat_normal = coat_normal.unwrap_or(surface.geometric_normal);
+    let taken = take((material, &layers), (texel, &layer_texel), view, coat_normal, random);
     let Taken { layer, scattering: Scattering { reflection, specular, absorption }, .. } = taken;
     let Taken { normal, probability, .. } = taken;
+    let share = if layer == Layer::Behind { 0.0 } else { reflection.glossy_share() };
+    let normal = bent_by_share(normal, share, surface.outgoing, surface.geometric_normal);
     let surface = Surface { reflection, specular, absorption, normal, probability, ..surface };
     let emission = if layer == Layer::Base { surface.emission / probability } else { Vec3::ZERO };
     let surface = Surface { emission, ..surface };
@@ -262,16 +279,4 @@ fn layered(
 
 fn rgb([red, green, blue, _]: [f32; 4]) -> Vec3 {
     Vec3::new(red, green, blue)
-}
-
-/// Least cosine between a shading normal and the direction to the viewer.
-const MIN_COSINE: f32 = 0.01;
-
-/// A shading normal, turned towards the viewer where it points away, as it may at a silhouette.
-fn shading_normal(normal: Vec3, bare: &Surface) -> Vec3 {
-    let cosine = normal.dot(bare.outgoing);
-    let turned = if cosine < MIN_COSINE { normal + bare.outgoing * (MIN_COSINE - cosine) } else { normal };
-    let turned = unit(turned);
-    // Without a direction, or on the wrong side still: flat.
-    if turned.dot(bare.geometric_normal) > 0.0 { turned } else { bare.geometric_normal }
 }

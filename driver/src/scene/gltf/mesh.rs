@@ -3,8 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use glam::Vec3;
-
 use super::accessor::Source;
 use super::limits::MAX_TRIANGLES;
 use super::material;
@@ -126,7 +124,10 @@ impl<'a> MeshPlacer<'a> {
             for texture in scene.materials[material].textures() {
                 used_sets[scene.textures[texture as usize].set as usize] = true;
             }
-            prepared.push(Primitive::new(self.source, mesh, index, topology, material as u32, used_sets)?);
+            let tangent_texture = scene.materials[material].tangent_texture();
+            let tangent_set = tangent_texture.map(|texture| scene.textures[texture as usize].set as usize);
+            let sets = (used_sets, tangent_set);
+            prepared.push(Primitive::new(self.source, mesh, index, topology, material as u32, sets)?);
         }
         Ok(prepared)
     }
@@ -141,34 +142,30 @@ impl<'a> MeshPlacer<'a> {
         let reader = VertexReader { source: self.source, mesh, primitive, not_finite: NotFinite::default() };
         let source = self.source;
         let no_memory = |error| SceneError::memory(&source.document.path, "placing its triangles", error);
+        let tangents = reader.tangents()?;
         for triangle in 0..primitive.triangles {
-            let mut corners = reader.indices(triangle)?;
-            let [a, b, c] = corners;
-            let mut transforms =
-                [reader.transform(pose, a)?, reader.transform(pose, b)?, reader.transform(pose, c)?];
-            // A mirroring transform swaps front and back; reversing the order of vertices restores them.
-            if transforms[0].is_mirror {
-                corners.swap(1, 2);
-                transforms.swap(1, 2);
-            }
-            let mut vertices = [Vec3::ZERO; 3];
-            for ((vertex, corner), transform) in vertices.iter_mut().zip(corners).zip(&transforms) {
-                *vertex = reader.place(corner, transform)?;
-            }
-            let mut placed = Triangle::new(vertices, primitive.material);
-            if placed.area() > 0.0 {
-                if let Some(attributes) = reader.attributes(corners, &transforms, &placed)? {
-                    placed.attributes = scene.attributes.len() as u32;
-                    allocation::push(&mut scene.attributes, attributes).map_err(no_memory)?;
-                }
-                allocation::push(&mut scene.triangles, placed).map_err(no_memory)?;
-            } else {
+            let corners = reader.corners(triangle, pose)?;
+            let mut placed = Triangle::new(reader.places(&corners)?, primitive.material);
+            if placed.area() <= 0.0 {
                 scene.skipped_triangles += 1;
+                continue;
             }
+            if let Some(mut attributes) = reader.attributes(&corners, &placed)? {
+                if let Some(tangents) = tangents {
+                    let normals = attributes.normals_of(&placed);
+                    let found = reader.placed_tangents(tangents, triangle, &corners, normals);
+                    attributes.tangents = scene.tangents.len() as u32;
+                    allocation::push(&mut scene.tangents, found).map_err(no_memory)?;
+                }
+                placed.attributes = scene.attributes.len() as u32;
+                allocation::push(&mut scene.attributes, attributes).map_err(no_memory)?;
+            }
+            allocation::push(&mut scene.triangles, placed).map_err(no_memory)?;
         }
-        let NotFinite { normals, colours } = &reader.not_finite;
+        let NotFinite { normals, colours, tangents } = &reader.not_finite;
         self.not_finite.normals.extend(normals.get().then_some(mesh));
         self.not_finite.colours.extend(colours.get().then_some(mesh));
+        self.not_finite.tangents.extend(tangents.get().then_some(mesh));
         Ok(())
     }
 }

@@ -96,13 +96,18 @@ impl Notices {
         let meshes_of = |indices: &BTreeSet<usize>| -> Vec<String> {
             indices.iter().map(|&index| mesh_name(root, index)).collect()
         };
-        let NotFinite { normals, colours } = &self.not_finite;
+        let NotFinite { normals, colours, tangents } = &self.not_finite;
         note(
             "normals that are not finite are ignored, the triangles' own count",
             "mesh",
             &meshes_of(normals),
         );
         note("vertex colours that are not finite are 0, or 1 if infinite", "mesh", &meshes_of(colours));
+        note(
+            "tangents that are zero or not finite are ignored, the mesh's are computed",
+            "mesh",
+            &meshes_of(tangents),
+        );
         note("morph targets are ignored, the base shape is rendered", "mesh", &morphed);
         let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
         note("animations are ignored, the scene is rendered as it stands", "animation", &moving);

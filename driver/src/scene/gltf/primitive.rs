@@ -1,7 +1,9 @@
 //! Primitives of a mesh: topology, and accessors of vertex attributes.
 
+use std::cell::OnceCell;
 use std::collections::HashSet;
 
+use glam::Vec4;
 use gltf::json;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::{Mode, Semantic};
@@ -51,6 +53,11 @@ const fn coordinates(is_quantized: bool) -> Format {
     Format { types: &[Type::Vec2], components, integers }
 }
 
+const fn tangents(is_quantized: bool) -> Format {
+    let components = if is_quantized { QUANTIZED } else { FLOATS };
+    Format { types: &[Type::Vec4], components, integers: Integers::Normalized }
+}
+
 /// Topology of triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Topology {
@@ -90,6 +97,14 @@ impl Topology {
     }
 }
 
+/// Tangents of a primitive, in the mesh's space.
+pub(super) enum Tangents {
+    /// Those of its `TANGENT`.
+    Stated,
+    /// Computed ones, triangle by triangle.
+    Computed(Vec<[Vec4; 3]>),
+}
+
 /// Primitive of triangles whose accessors are within bounds.
 pub(super) struct Primitive<'a> {
     pub(super) index: usize,
@@ -99,6 +114,12 @@ pub(super) struct Primitive<'a> {
     pub(super) positions: Elements<'a>,
     pub(super) indices: Option<Elements<'a>>,
     pub(super) normals: Option<Elements<'a>>,
+    /// Stated tangents, if the material has a normal map.
+    pub(super) tangents: Option<Elements<'a>>,
+    /// Set of texture coordinates along which tangents point, if the material has a normal map.
+    pub(super) tangent_set: Option<usize>,
+    /// Tangents once the first instance is placed.
+    pub(super) known_tangents: OnceCell<Tangents>,
     /// Sets of texture coordinates that the material uses.
     pub(super) coordinates: [Option<Elements<'a>>; 2],
     pub(super) colours: Option<Elements<'a>>,
@@ -145,14 +166,14 @@ impl<'a> AttributeReader<'_, 'a> {
 }
 
 impl<'a> Primitive<'a> {
-    /// Primitive `index` of a mesh, with the sets of texture coordinates that are used.
+    /// Primitive `index` of a mesh, with the sets of texture coordinates that its material uses, and the one of its tangents.
     pub(super) fn new(
         source: &Source<'a>,
         mesh: usize,
         index: usize,
         topology: Topology,
         material: u32,
-        used_sets: [bool; 2],
+        (used_sets, tangent_set): ([bool; 2], Option<usize>),
     ) -> Result<Self, SceneError> {
         let document = source.document;
         let primitive = &document.root.meshes[mesh].primitives[index];
@@ -183,11 +204,20 @@ impl<'a> Primitive<'a> {
             let reason = format!("{count} vertices do not make whole triangles");
             document.invalid(&item, reason, "export the mesh again, triangulated")
         })?;
+        let normals = of_count(Semantic::Normals, &normals(is_quantized))?;
+        // Without normals tangents are ignored (glTF 2.0, 3.7.2.1).
+        let tangents = match tangent_set {
+            Some(_) if normals.is_some() => of_count(Semantic::Tangents, &tangents(is_quantized))?,
+            _ => None,
+        };
         Ok(Self {
             index,
             triangles,
             topology,
-            normals: of_count(Semantic::Normals, &normals(is_quantized))?,
+            normals,
+            tangents,
+            tangent_set,
+            known_tangents: OnceCell::new(),
             coordinates: sets,
             colours: of_count(Semantic::Colors(0), &COLOURS)?,
             influences: influences(&attributes, positions.count)?,
@@ -213,7 +243,9 @@ impl<'a> Primitive<'a> {
     pub(super) fn bytes_of_a_card(&self) -> Result<u64, OutOfMemory> {
         let sets = 1 + u64::from(self.coordinates[1].is_some());
         // Normals may equal the triangles' own, and colours may be white: these need no records.
-        let attributes = if self.is_mapped() { room::attributes(self.triangles, sets) } else { 0 };
+        let has_tangents = self.tangent_set.is_some();
+        let attributes =
+            if self.is_mapped() { room::attributes(self.triangles, sets, has_tangents) } else { 0 };
         Ok(Room::geometry(self.triangles, self.corners_in_different_places()?) + attributes)
     }
 

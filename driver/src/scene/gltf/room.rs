@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::layout::{
     Attributes, LEAF_TRIANGLES, LEAF_VERTICES, Material, NODE_CHILDREN, Record, TILE_HEIGHT, TILE_WIDTH,
+    Tangents,
 };
 
 use crate::error::SceneError;
@@ -39,7 +40,7 @@ impl Room {
     pub(super) fn fits_any(&self, triangles: u64) -> bool {
         let corners = triangles.saturating_mul(3);
         self.available - self.taken
-            >= Self::geometry(triangles, corners).saturating_add(attributes(triangles, 2))
+            >= Self::geometry(triangles, corners).saturating_add(attributes(triangles, 2, true))
     }
 
     /// Counts all triangles of a scene; `bytes` is the size of their leaves, nodes and attributes.
@@ -66,8 +67,10 @@ impl Room {
 }
 
 /// Size of the attributes of triangles with `sets` sets of texture coordinates, bytes.
-pub(super) fn attributes(triangles: u64, sets: u64) -> u64 {
-    triangles.saturating_mul(sets.max(1) * Attributes::BYTES as u64)
+pub(super) fn attributes(triangles: u64, sets: u64, have_tangents: bool) -> u64 {
+    let tangents =
+        if have_tangents { (Tangents::RECORDS * Attributes::BYTES / LEAF_TRIANGLES) as u64 } else { 0 };
+    triangles.saturating_mul(sets.max(1) * Attributes::BYTES as u64 + tangents)
 }
 
 #[cfg(test)]

@@ -26,6 +26,11 @@ impl Transform {
         self.matrix.transform_point3(local.as_dvec3()).as_vec3()
     }
 
+    /// Tangent in world space, of any length.
+    pub(super) fn tangent(&self, local: Vec3) -> DVec3 {
+        self.matrix.transform_vector3(local.as_dvec3())
+    }
+
     /// Unit normal in world space; `None` if it is degenerate.
     pub(super) fn normal(&self, local: Vec3) -> Option<Vec3> {
         (self.normals * local.as_dvec3()).try_normalize().map(DVec3::as_vec3)

@@ -23,6 +23,14 @@ const MAX_TEXTURE_COORDINATE: f32 = 1e6;
 /// Maximum distance of a vertex normal from the triangle's, both unit vectors, at which they count as equal: 0.1 degrees.
 const FLAT_DISTANCE: f64 = 0.001_745;
 
+/// Corners of a triangle as it is placed.
+pub(super) struct Corners<'p> {
+    pub(super) vertices: [u64; 3],
+    /// Places in the file's triangle.
+    pub(super) order: [usize; 3],
+    pub(super) transforms: [Cow<'p, Transform>; 3],
+}
+
 /// Reader of the vertices of one primitive.
 pub(super) struct VertexReader<'r, 'a> {
     pub(super) source: &'r Source<'a>,
@@ -68,17 +76,36 @@ impl VertexReader<'_, '_> {
         }
     }
 
+    /// Corners of a triangle in a pose.
+    pub(super) fn corners<'p>(&self, triangle: u64, pose: &'p Pose<'_>) -> Result<Corners<'p>, SceneError> {
+        let [a, b, c] = self.indices(triangle)?;
+        let transforms = [self.transform(pose, a)?, self.transform(pose, b)?, self.transform(pose, c)?];
+        let mut corners = Corners { vertices: [a, b, c], order: [0, 1, 2], transforms };
+        // A mirroring transform swaps front and back; reversing the order of vertices restores them.
+        if corners.transforms[0].is_mirror {
+            corners.vertices.swap(1, 2);
+            corners.order.swap(1, 2);
+            corners.transforms.swap(1, 2);
+        }
+        Ok(corners)
+    }
+
+    /// World positions of a triangle's corners.
+    pub(super) fn places(&self, corners: &Corners<'_>) -> Result<[Vec3; 3], SceneError> {
+        let mut places = [Vec3::ZERO; 3];
+        for ((place, vertex), transform) in places.iter_mut().zip(corners.vertices).zip(&corners.transforms) {
+            *place = self.place(vertex, transform)?;
+        }
+        Ok(places)
+    }
+
     /// World transform of a vertex.
-    pub(super) fn transform<'p>(
-        &self,
-        pose: &'p Pose<'_>,
-        vertex: u64,
-    ) -> Result<Cow<'p, Transform>, SceneError> {
+    fn transform<'p>(&self, pose: &'p Pose<'_>, vertex: u64) -> Result<Cow<'p, Transform>, SceneError> {
         pose.of(self.primitive, vertex).map_err(|reason| self.fault("JOINTS_0", vertex, reason))
     }
 
     /// World position of a vertex.
-    pub(super) fn place(&self, vertex: u64, transform: &Transform) -> Result<Vec3, SceneError> {
+    fn place(&self, vertex: u64, transform: &Transform) -> Result<Vec3, SceneError> {
         let local = Vec3::from(self.primitive.positions.vec3(vertex));
         let placed = transform.place(local);
         let is_usable = |value: f32| value.abs() <= MAX_COORDINATE;
@@ -96,8 +123,7 @@ impl VertexReader<'_, '_> {
     /// Attributes of a triangle's corners beyond positions; `None` if they are the default ones.
     pub(super) fn attributes(
         &self,
-        corners: [u64; 3],
-        transforms: &[Cow<'_, Transform>; 3],
+        corners: &Corners<'_>,
         triangle: &Triangle,
     ) -> Result<Option<VertexAttributes>, SceneError> {
         if !self.primitive.may_have_attributes() {
@@ -106,19 +132,20 @@ impl VertexReader<'_, '_> {
         let is_mapped = self.primitive.is_mapped();
         let mut coordinates = VertexAttributes::NONE.coordinates;
         for (set, coordinates) in coordinates.iter_mut().enumerate() {
-            for (coordinate, corner) in coordinates.iter_mut().zip(corners) {
-                *coordinate = self.coordinate(set, corner)?;
+            for (coordinate, vertex) in coordinates.iter_mut().zip(corners.vertices) {
+                *coordinate = self.coordinate(set, vertex)?;
             }
         }
         let attributes = VertexAttributes {
-            normals: self.normals(corners, transforms, triangle),
+            normals: self.normals(corners, triangle),
             coordinates,
-            colours: corners.map(|corner| self.colour(corner)),
+            colours: corners.vertices.map(|vertex| self.colour(vertex)),
+            ..VertexAttributes::NONE
         };
         Ok(Some(attributes).filter(|attributes| is_mapped || *attributes != VertexAttributes::NONE))
     }
 
-    fn coordinate(&self, set: usize, vertex: u64) -> Result<Vec2, SceneError> {
+    pub(super) fn coordinate(&self, set: usize, vertex: u64) -> Result<Vec2, SceneError> {
         let Some(elements) = &self.primitive.coordinates[set] else { return Ok(Vec2::ZERO) };
         let coordinate = Vec2::from(elements.floats(vertex, [0.0; 2]));
         if coordinate.abs().to_array().into_iter().all(|value| value <= MAX_TEXTURE_COORDINATE) {
@@ -142,19 +169,15 @@ impl VertexReader<'_, '_> {
 
     /// Vertex normals of the corners; `None` if they equal the triangle's normal. The triangle's normal replaces a vertex
     /// normal that is degenerate or on the back.
-    fn normals(
-        &self,
-        corners: [u64; 3],
-        transforms: &[Cow<'_, Transform>; 3],
-        triangle: &Triangle,
-    ) -> Option<[Vec3; 3]> {
+    fn normals(&self, corners: &Corners<'_>, triangle: &Triangle) -> Option<[Vec3; 3]> {
         let elements = self.primitive.normals.as_ref()?;
         let [a, b, c] = triangle.vertices.map(Vec3::as_dvec3);
         let own = (b - a).cross(c - a).try_normalize()?;
         let mut normals = [own.as_vec3(); 3];
         let mut is_smooth = false;
-        for ((normal, corner), transform) in normals.iter_mut().zip(corners).zip(transforms) {
-            let local = Vec3::from(elements.vec3(corner));
+        for ((normal, vertex), transform) in normals.iter_mut().zip(corners.vertices).zip(&corners.transforms)
+        {
+            let local = Vec3::from(elements.vec3(vertex));
             if !local.is_finite() {
                 self.not_finite.normals.set(true);
             }

@@ -94,6 +94,18 @@ impl Reflection {
         }
     }
 
+    /// The share of a GGX lobe in the albedo, 0 without one.
+    #[inline(always)]
+    pub(super) fn glossy_share(&self) -> f32 {
+        match &self.lobe {
+            Lobe::Ggx(lobe) if lobe.reflects() => {
+                let albedo = max_component(self.lobe.albedo());
+                albedo / (albedo + max_component(self.diffuse))
+            }
+            _ => 0.0,
+        }
+    }
+
     /// The reflection that photons estimate: without a narrow lobe.
     #[inline(always)]
     #[must_use]

@@ -1,0 +1,46 @@
+//! Normal maps: normals stated by a texture in the tangent space of a triangle's corners (`MikkTSpace`).
+
+use glam::Vec3;
+use photoncard_shared::layout::{Material, NO_TEXTURE};
+use photoncard_shared::message::Fault;
+
+use super::SceneImage;
+use super::corners::Corners;
+use super::materials::read_layers;
+use crate::memory::MemoryPort;
+use crate::vector::unit;
+
+/// Unit normal of a material's base on the front: by its normal map, or interpolated; `None` for the triangle's own.
+/// `front_normal` is the triangle's.
+#[inline(always)]
+pub(super) fn base_normal(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    material: &Material,
+    corners: &Corners,
+    front_normal: Vec3,
+) -> Result<Option<Vec3>, Fault> {
+    if material.layers.is_none() {
+        return Ok(corners.normal());
+    }
+    let layers = read_layers(scene, memory, material)?;
+    let map = (layers.textures.normal, layers.normal_scale);
+    mapped_normal(scene, memory, map, corners, front_normal)
+}
+
+/// Unit normal on the front by a normal texture and the scale of its x and y; interpolated for [`NO_TEXTURE`].
+#[inline(never)]
+pub(super) fn mapped_normal(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    (texture, scale): (u16, f32),
+    corners: &Corners,
+    front_normal: Vec3,
+) -> Result<Option<Vec3>, Fault> {
+    if texture == NO_TEXTURE {
+        return Ok(corners.normal());
+    }
+    let [x, y, z, _] = corners.texture(scene, memory, texture)?.map(|channel| 2.0 * channel - 1.0);
+    let [tangent, bitangent, normal] = corners.frame(scene, memory, front_normal)?;
+    Ok(Some(unit(tangent * (x * scale) + bitangent * (y * scale) + normal * z)))
+}

@@ -1,0 +1,121 @@
+//! Tangents of triangles' corners, the x axes of normal maps.
+
+use super::attributes::{decode_octahedral, encode_octahedral};
+use super::{Attributes, LEAF_TRIANGLES, LeafAttributes, Record, read_u32, write_u32};
+
+/// Code of a corner without a tangent.
+const NO_TANGENT: u32 = u32::MAX;
+const SIGNS: usize = 12;
+
+/// The tangents of one triangle, 16 bytes.
+///
+/// | bytes | contents |
+/// |---|---|
+/// | 0..12 | tangents, 32 bits each: octahedral, 16 bits an axis; all ones for none |
+/// | 12..16 | bits 0 to 2: the corner's sign is -1 |
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tangents {
+    /// Directions, of length 0.57 to 1; zero at a corner without a tangent, where a normal map has no effect.
+    pub directions: [[f32; 3]; 3],
+    /// 1 or -1: the bitangent is the sign times `normal x tangent` (glTF's `TANGENT.w`).
+    pub signs: [f32; 3],
+}
+
+impl Tangents {
+    /// Bytes of one triangle.
+    const BYTES: usize = 16;
+
+    /// Triangles in a record of the size of [`Attributes`].
+    const PER_RECORD: usize = Attributes::BYTES / Self::BYTES;
+
+    /// Records before the first [`Attributes`] of a leaf with tangents.
+    pub const RECORDS: usize = LEAF_TRIANGLES / Self::PER_RECORD;
+
+    /// Corners without tangents.
+    pub const NONE: Self = Self { directions: [[0.0; 3]; 3], signs: [1.0; 3] };
+
+    /// Index of the record with the tangents of a slot of a leaf. Only leaves with a material that needs them have such records.
+    #[inline(always)]
+    pub fn locate(leaf: LeafAttributes, slot: u32) -> u32 {
+        leaf.first.wrapping_sub(Self::RECORDS as u32).wrapping_add(Self::record(slot))
+    }
+
+    /// Reads the tangents of a slot of a leaf from the record at [`Self::locate`].
+    #[inline(always)]
+    pub fn read(bytes: &[u8; Attributes::BYTES], slot: u32) -> Self {
+        let at = Self::offset(slot);
+        let signs = read_u32(bytes, at + SIGNS);
+        Self {
+            directions: [0, 1, 2].map(|corner| match read_u32(bytes, at + 4 * corner) {
+                NO_TANGENT => [0.0; 3],
+                code => decode_octahedral(code),
+            }),
+            signs: [0, 1, 2].map(|corner| if signs >> corner & 1 == 0 { 1.0 } else { -1.0 }),
+        }
+    }
+
+    /// The records of a leaf's tangents, slot by slot.
+    pub fn to_records(leaf: &[Self]) -> [[u8; Attributes::BYTES]; Self::RECORDS] {
+        let mut records = [[0; Attributes::BYTES]; Self::RECORDS];
+        for (slot, tangents) in (0..).zip(leaf) {
+            if let Some(record) = records.get_mut(Self::record(slot) as usize) {
+                tangents.write(record, Self::offset(slot));
+            }
+        }
+        records
+    }
+
+    fn write(&self, bytes: &mut [u8; Attributes::BYTES], at: usize) {
+        let mut signs = 0;
+        for (corner, (direction, sign)) in self.directions.into_iter().zip(self.signs).enumerate() {
+            let code = if direction == [0.0; 3] { NO_TANGENT } else { encode_octahedral(direction) };
+            write_u32(bytes, at + 4 * corner, code);
+            signs |= u32::from(sign < 0.0) << corner;
+        }
+        write_u32(bytes, at + SIGNS, signs);
+    }
+
+    /// Record of a slot, 0 to [`Self::RECORDS`] - 1.
+    #[inline(always)]
+    fn record(slot: u32) -> u32 {
+        slot / Self::PER_RECORD as u32
+    }
+
+    #[inline(always)]
+    fn offset(slot: u32) -> usize {
+        slot as usize % Self::PER_RECORD * Self::BYTES
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tangents_survive_their_records() {
+        let axis = |axis: usize, sign: f32| core::array::from_fn(|k| if k == axis { sign } else { 0.0 });
+        let leaf: [Tangents; LEAF_TRIANGLES] = core::array::from_fn(|slot| Tangents {
+            directions: [axis(slot % 3, 1.0), axis((slot + 1) % 3, -1.0), [0.0; 3]],
+            signs: [0, 1, 2].map(|corner| if slot >> corner & 1 == 0 { 1.0 } else { -1.0 }),
+        });
+        let records = Tangents::to_records(&leaf);
+        for (slot, tangents) in (0..).zip(leaf) {
+            assert_eq!(Tangents::read(&records[Tangents::record(slot) as usize], slot), tangents, "{slot}");
+        }
+    }
+
+    #[test]
+    fn tangents_lie_before_the_attributes() {
+        for two_sets in [false, true] {
+            let leaf = LeafAttributes { first: 40, two_sets };
+            assert_eq!([0, 3, 4, 7].map(|slot| Tangents::locate(leaf, slot)), [38, 38, 39, 39]);
+        }
+    }
+
+    #[test]
+    fn a_leaf_of_few_triangles_has_as_many_records() {
+        let one = Tangents { directions: [[0.0, 1.0, 0.0]; 3], signs: [-1.0; 3] };
+        let records = Tangents::to_records(&[one]);
+        assert_eq!((records.len(), Tangents::read(&records[0], 0)), (Tangents::RECORDS, one));
+    }
+}

@@ -1,0 +1,424 @@
+//! Normal maps of known appearance: tilted plates under lights and skies, and their adjoint for photons.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3, Vec4};
+use photoncard_driver::film::Film;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::photon::trace;
+use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
+use photoncard_driver::scene::{
+    Camera, Encoding, Environment, Image, Layers, Material, NormalMap, PunctualKind, PunctualLight,
+    Reflection, Scene, Texture,
+};
+use photoncard_firmware::memory::MemoryPort;
+use photoncard_firmware::render::Context;
+use photoncard_firmware::render::specular_path::{Carried, Passes, PathEnd, SpecularPath};
+use photoncard_firmware::sampler::hash;
+use photoncard_firmware::scene::{Ray, closest_hit, read_surface};
+use photoncard_shared::counters::Counters;
+use photoncard_shared::layout::{Photon, decode_direction};
+use photoncard_tests::shapes::{add_ball, add_tangents, add_textured_quad};
+use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, scene};
+use rayon::prelude::*;
+
+const ALBEDO: f32 = 0.8;
+
+fn settings(gather_rays: u32, samples: u32) -> RenderSettings {
+    RenderSettings {
+        picture: Picture { width: 16, height: 16, ..Picture::default() },
+        photons: PhotonMaps { count: 2000, neighbors: 20, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays, shadow_rays: 1, samples, ..Integrator::default() },
+        cards: CardSet {
+            addresses: vec!["emulated:1".parse::<CardAddress>().unwrap()],
+            ..CardSet::default()
+        },
+        ..RenderSettings::default()
+    }
+}
+
+fn film(scene: &Scene, settings: &RenderSettings) -> Film {
+    render_or_panic(scene, settings).film
+}
+
+/// A normal texture of nearest texels, side by side.
+fn normal_texture(scene: &mut Scene, normals: &[DVec3]) {
+    let texel = |normal: &DVec3| {
+        let [red, green, blue] = ((*normal * 0.5 + 0.5) * 255.0).round().to_array().map(|value| value as u8);
+        [red, green, blue, 255]
+    };
+    scene.images = vec![Image {
+        name: "normals".into(),
+        width: normals.len() as u32,
+        height: 1,
+        texels: normals.iter().map(texel).collect(),
+        encoding: Encoding::Linear,
+    }];
+    scene.textures = vec![Texture { nearest: normals.len() > 1, ..Texture::new(0) }];
+}
+
+/// A unit vector of a normal texture after its rounding to 8 bits.
+fn rounded(normal: DVec3, scale: f64) -> DVec3 {
+    let texel = ((normal * 0.5 + 0.5) * 255.0).round() / 255.0 * 2.0 - 1.0;
+    (texel * DVec3::new(scale, scale, 1.0)).normalize()
+}
+
+fn tilted(degrees: f64, azimuth: f64) -> DVec3 {
+    let ((sine, cosine), (y, x)) = (degrees.to_radians().sin_cos(), azimuth.to_radians().sin_cos());
+    DVec3::new(sine * x, sine * y, cosine)
+}
+
+fn mapped(material: Material, scale: f32) -> Material {
+    let normal = Some(NormalMap { texture: 0, scale });
+    Material { layers: Some(Box::new(Layers { normal, ..Layers::none(Vec3::splat(0.04)) })), ..material }
+}
+
+fn metal(roughness: f32) -> Material {
+    let reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::splat(ALBEDO),
+        metallic: 1.0,
+        roughness,
+        dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
+        transmission: None,
+    };
+    Material::new("metal", reflection)
+}
+
+/// A square of side 2 in the plane z = 0 that faces +z, with u to the right and v downwards, from 0 to 1.
+fn plate(material: Material, normals: &[DVec3], tangent: Vec4, view: Camera) -> Scene {
+    let mut scene = scene(Vec::new(), vec![material], view);
+    let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(x, y, 0.0));
+    add_textured_quad(&mut scene, corners, [[0., 1.], [1., 1.], [1., 0.], [0., 0.]], 0);
+    add_tangents(&mut scene, 0, tangent);
+    normal_texture(&mut scene, normals);
+    scene
+}
+
+/// Camera far along a direction that sees a square of 1.8 m at the origin.
+fn far_camera(direction: Vec3) -> Camera {
+    let origin = direction.normalize() * 50.0;
+    // Straight up, the camera's upper edge is along y.
+    let aside = if direction.x == 0.0 && direction.y == 0.0 { Vec3::new(0.0, 1e-4, 0.0) } else { Vec3::ZERO };
+    Camera { vertical_fov: 2.0 * (0.9_f32 / 50.0).atan(), ..camera(origin, aside - origin) }
+}
+
+fn directional(direction: DVec3, irradiance: f32) -> PunctualLight {
+    PunctualLight {
+        name: "light".into(),
+        kind: PunctualKind::Directional { direction: -direction.as_vec3() },
+        intensity: Vec3::splat(irradiance),
+    }
+}
+
+#[test]
+fn a_tilted_plate_is_lit_by_the_cosine_to_its_mapped_normal() {
+    let light = DVec3::new(0.3, 0.5, 0.8).normalize();
+    for (normal, scale) in [
+        (tilted(0.0, 0.0), 1.0),
+        (tilted(20.0, 0.0), 1.0),
+        (tilted(35.0, 120.0), 1.0),
+        (tilted(35.0, 250.0), -0.5),
+        (tilted(60.0, 80.0), 2.0),
+    ] {
+        let texel = rounded(normal, f64::from(scale));
+        for (tangent, sign) in [(DVec3::X, 1.0), (DVec3::NEG_X, -1.0), (DVec3::Y, 1.0), (DVec3::NEG_Y, -1.0)]
+        {
+            let bitangent = DVec3::Z.cross(tangent) * sign;
+            let world = tangent * texel.x + bitangent * texel.y + DVec3::Z * texel.z;
+            let material = Material { double_sided: true, ..mapped(lambertian("plate", ALBEDO), scale) };
+            // From either side: the back has the opposite normal.
+            for side in [1.0, -1.0] {
+                let view = far_camera(Vec3::Z * side as f32);
+                let tangent = tangent.extend(sign).as_vec4();
+                let mut scene = plate(material.clone(), &[normal], tangent, view);
+                scene.lights = vec![directional(light * side, 3.0)];
+                let film = film(&scene, &settings(0, 1));
+                let facing = world * side;
+                let expected = f64::from(ALBEDO) / PI * 3.0 * facing.dot(light * side).max(0.0);
+                let found = mean(&radiances(&film));
+                let lit = f64::from(ALBEDO) / PI * 3.0;
+                let error = (found - expected).abs();
+                assert!(error < 0.005 * lit, "{normal} {tangent} {side}: {found} {expected}");
+                for pixel in film.pixels() {
+                    let error = Vec3::from(pixel.normal).as_dvec3().distance(facing);
+                    assert!(error < 2e-3, "{normal} {tangent} {side}: {:?}", pixel.normal);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scale_of_zero_and_a_tangent_of_zero_are_no_map() {
+    let light = directional(DVec3::new(0.3, 0.5, 0.8).normalize(), 3.0);
+    let seen = |scale: f32, tangent: Vec4| {
+        let material = mapped(lambertian("plate", ALBEDO), scale);
+        let mut scene = plate(material, &[tilted(40.0, 30.0)], tangent, far_camera(Vec3::Z));
+        scene.lights = vec![light.clone()];
+        mean(&radiances(&film(&scene, &settings(0, 1))))
+    };
+    let plain = f64::from(ALBEDO) / PI * 3.0 * 0.8 / 0.98_f64.sqrt();
+    for found in [seen(0.0, Vec4::new(1.0, 0.0, 0.0, 1.0)), seen(1.0, Vec4::new(0.0, 0.0, 0.0, 1.0))] {
+        assert!((found / plain - 1.0).abs() < 1e-5, "{found} {plain}");
+    }
+    let tilted = seen(1.0, Vec4::new(1.0, 0.0, 0.0, 1.0));
+    assert!((tilted / plain - 1.0).abs() > 0.1, "{tilted} {plain}");
+}
+
+/// Normals in all directions: light from behind the plate reaches none.
+#[test]
+fn a_bumpy_plate_leaks_no_light_from_behind() {
+    let normals: Vec<_> = (0..16).map(|k| tilted(70.0, 22.5 * f64::from(k))).collect();
+    for material in [lambertian("plate", ALBEDO), metal(0.2), metal(0.6), metal(0.0)] {
+        let material = Material { double_sided: true, ..mapped(material, 1.0) };
+        let view = far_camera(Vec3::new(0.5, 0.2, 1.0));
+        let mut scene = plate(material, &normals, Vec4::new(1.0, 0.0, 0.0, 1.0), view);
+        scene.lights = [DVec3::new(0.9, 0.1, -0.2), DVec3::new(-0.2, 0.9, -0.4)]
+            .map(|behind| directional(behind.normalize(), 3.0))
+            .to_vec();
+        let dark = film(&scene, &settings(16, 1));
+        assert!(dark.pixels().iter().all(|pixel| pixel.radiance == [0.0; 3]));
+    }
+}
+
+/// GGX's `f cos` of a metal: height-correlated Smith masking, Schlick's Fresnel reflectance.
+fn metal_times_cosine(normal: DVec3, outgoing: DVec3, incident: DVec3, roughness: f64) -> f64 {
+    let squared = roughness.powi(4);
+    let half = (outgoing + incident).normalize();
+    let [o, i, h] = [outgoing, incident, half].map(|direction| normal.dot(direction));
+    if o <= 0.0 || i <= 0.0 {
+        return 0.0;
+    }
+    let distribution = squared / (PI * (h * h * (squared - 1.0) + 1.0).powi(2));
+    let length = |cosine: f64| (squared + (1.0 - squared) * cosine * cosine).sqrt();
+    let visibility = 0.5 / (i * length(o) + o * length(i));
+    let base = f64::from(ALBEDO);
+    let fresnel = base + (1.0 - base) * (1.0 - half.dot(outgoing)).powi(5);
+    distribution * visibility * fresnel * i
+}
+
+/// The normal nearest to `normal`, in its plane with z, whose mirror direction is not below the plate: by bisection.
+fn bent(normal: DVec3, outgoing: DVec3) -> DVec3 {
+    let least = (0.9 * outgoing.z).min(0.01);
+    let is_above = |n: DVec3| (n * (2.0 * n.dot(outgoing)) - outgoing).z >= least;
+    if is_above(normal) {
+        return normal;
+    }
+    let (mut bad, mut good) = (normal, DVec3::Z);
+    for _ in 0..60 {
+        let middle = (bad + good).normalize();
+        if is_above(middle) { good = middle } else { bad = middle }
+    }
+    good
+}
+
+/// The integral of a function over the directions above the plate, by midpoints in cosine and azimuth.
+fn over_the_sky(value: impl Fn(DVec3) -> f64) -> f64 {
+    const SIDE: u32 = 250;
+    let mut sum = 0.0;
+    for row in 0..SIDE {
+        let z = (f64::from(row) + 0.5) / f64::from(SIDE);
+        let sine = (1.0 - z * z).sqrt();
+        for column in 0..2 * SIDE {
+            let (y, x) = (PI * (f64::from(column) + 0.5) / f64::from(SIDE)).sin_cos();
+            sum += value(DVec3::new(sine * x, sine * y, z));
+        }
+    }
+    sum * 2.0 * PI / f64::from(2 * SIDE * SIDE)
+}
+
+/// Bumps of up to 40 degrees, seen at an angle.
+fn bumps() -> Vec<DVec3> {
+    (0..16).map(|k| tilted(f64::from(k % 4 + 1) * 10.0, 97.0 * f64::from(k))).collect()
+}
+
+/// Albedo of a bumpy plate, mean over its texels: [`bent`] or not, or of the same texels above their own horizons alone.
+fn albedos(outgoing: DVec3, roughness: Option<f64>) -> [f64; 3] {
+    let count = bumps().len() as f64;
+    let mut sums = [0.0; 3];
+    for normal in bumps() {
+        let normal = rounded(normal, 1.0);
+        let albedo = |normal: DVec3, over: DVec3| {
+            // The plate's horizon, or the texel's own.
+            let frame = glam::DQuat::from_rotation_arc(DVec3::Z, over);
+            over_the_sky(|direction| {
+                let direction = frame * direction;
+                match roughness {
+                    Some(roughness) => metal_times_cosine(normal, outgoing, direction, roughness),
+                    None => f64::from(ALBEDO) / PI * normal.dot(direction).max(0.0),
+                }
+            }) / count
+        };
+        let used = if roughness.is_some() { bent(normal, outgoing) } else { normal };
+        sums[0] += albedo(used, DVec3::Z);
+        sums[1] += albedo(normal, DVec3::Z);
+        sums[2] += albedo(normal, normal);
+    }
+    sums
+}
+
+#[test]
+fn bumpy_plates_in_a_white_furnace_lose_little() {
+    for (degrees, roughness, largest_loss) in [
+        (0.0, None, 0.07),
+        (60.0, None, 0.07),
+        (0.0, Some(0.3), 0.05),
+        (45.0, Some(0.3), 0.2),
+        (70.0, Some(0.3), 0.3),
+        (70.0, Some(0.6), 0.3),
+    ] {
+        let direction = tilted(degrees, 20.0);
+        let [expected, unbent, whole] = albedos(direction, roughness);
+        let material = match roughness {
+            Some(roughness) => metal(roughness as f32),
+            None => lambertian("plate", ALBEDO),
+        };
+        let view = far_camera(direction.as_vec3());
+        let mut scene = plate(mapped(material, 1.0), &bumps(), Vec4::new(1.0, 0.0, 0.0, 1.0), view);
+        // The picture is within the plate: repeated, as far as the camera sees.
+        for triangle in &mut scene.triangles {
+            triangle.vertices.iter_mut().for_each(|vertex| *vertex *= 16.0);
+        }
+        for attributes in &mut scene.attributes {
+            attributes.coordinates[0].iter_mut().for_each(|place| *place *= 16.0);
+        }
+        scene.environment = Some(Environment::constant(Vec3::ONE));
+        let found = mean(&radiances(&film(&scene, &settings(64, 32))));
+        println!(
+            "{degrees} {roughness:?}: {found:.4}, expected {expected:.4}, unbent {unbent:.4}, whole {whole:.4}"
+        );
+        assert!((found / expected - 1.0).abs() < 0.01, "{degrees} {roughness:?}: {found} {expected}");
+        assert!(found >= unbent * 0.995, "{degrees} {roughness:?}: {found} {unbent}");
+        assert!(found > whole * (1.0 - largest_loss), "{degrees} {roughness:?}: {found} {whole}");
+    }
+}
+
+/// A coarse ball, whose smooth normals deviate from its facets, with bumps: its silhouette included, it reflects a white sky.
+#[test]
+fn glossy_bumpy_balls_have_neither_black_nor_bright_fringes() {
+    for roughness in [0.0, 0.1, 0.3] {
+        for scale in [0.0, 0.5] {
+            let view = camera(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z);
+            let mut scene = scene(Vec::new(), vec![mapped(metal(roughness), scale)], view);
+            scene.cameras[0].vertical_fov = 2.0 * 0.24_f32.atan();
+            add_ball(&mut scene, Vec3::ZERO, 1.2, 8, 0);
+            add_tangents(&mut scene, 0, Vec4::new(0.0, 1.0, 0.0, 1.0));
+            for (index, attributes) in scene.attributes.iter_mut().enumerate() {
+                attributes.coordinates[0].iter_mut().for_each(|place| place.x = index as f32 / 16.0 + 0.01);
+            }
+            normal_texture(&mut scene, &bumps());
+            scene.environment = Some(Environment::constant(Vec3::ONE));
+            let settings = settings(16, 16).with(|s| {
+                s.picture.width = 32;
+                s.picture.height = 32;
+            });
+            let film = film(&scene, &settings);
+            let ball: Vec<f32> = film.pixels().iter().map(|pixel| pixel.radiance[0]).collect();
+            let least = ball.iter().copied().fold(f32::INFINITY, f32::min);
+            let most = ball.iter().copied().fold(0.0, f32::max);
+            let mean = ball.iter().sum::<f32>() / ball.len() as f32;
+            println!("{roughness} {scale}: {least} {mean} {most}");
+            // Half of a lobe whose mirror direction is at the horizon is below it.
+            let bound = if scale > 0.0 { 0.4 } else { 0.65 };
+            assert!(
+                least > bound && mean < 0.95 && most < 1.01,
+                "{roughness} {scale}: {least} {mean} {most}"
+            );
+        }
+    }
+}
+
+/// Pseudorandom number in [0, 1).
+fn random(index: u32, dimension: u32) -> f32 {
+    (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
+}
+
+/// Point of a sequence that is even in four dimensions: multiples of the powers of the root of `g^5 = g + 1` (Roberts 2018).
+fn place(index: u32) -> [f32; 4] {
+    const G: f64 = 1.167_303_978_261_418_7;
+    [1, 2, 3, 4].map(|power| (0.5 + f64::from(index) / G.powi(power)).fract() as f32)
+}
+
+/// A floor, and beside it a glossy wall with bumps that a lamp shines at.
+fn wall_and_floor(normals: &[DVec3], roughness: f32) -> Scene {
+    let lamp = Material { emission: Vec3::splat(10.0), ..lambertian("lamp", 0.0) };
+    // Black would store no photons.
+    let materials = vec![mapped(metal(roughness), 1.0), lambertian("floor", 0.001), lamp];
+    let mut scene = scene(Vec::new(), materials, camera(Vec3::new(0.0, 1.0, 3.0), Vec3::NEG_Z));
+    let wall = [[0., 1.], [0., -1.], [1.5, -1.], [1.5, 1.]].map(|[y, z]| Vec3::new(-1.0, y, z));
+    add_textured_quad(&mut scene, wall, [[0., 9.], [8., 9.], [8., 0.], [0., 0.]], 0);
+    // The wall's u runs along -z.
+    add_tangents(&mut scene, 0, Vec4::new(0.0, 0.0, -1.0, 1.0));
+    let floor = [[-1., 1.], [1., 1.], [1., -1.], [-1., -1.]].map(|[x, z]| Vec3::new(x, 0.0, z));
+    scene.triangles.extend(quad(floor, 1));
+    let lamp = [[2.5, 2.], [0.2, 2.], [0.2, -2.], [2.5, -2.]].map(|[y, z]| Vec3::new(1.0, y, z));
+    scene.triangles.extend(quad([lamp[0], lamp[3], lamp[2], lamp[1]], 2));
+    assert!(scene.triangles[scene.triangles.len() - 1].scaled_normal().x < 0.0, "the lamp faces the wall");
+    assert!(scene.triangles[0].scaled_normal().x > 0.0, "the wall faces the lamp");
+    normal_texture(&mut scene, normals);
+    scene
+}
+
+/// Power that photons bring to the floor by way of the wall, W.
+fn brought(packed: &PackedScene) -> f64 {
+    let pass = trace(packed, 1, 600_000, &|_| true).unwrap();
+    let unit = f64::from(pass.photons.power_unit());
+    // The lamp is towards +x of every point of the floor, the wall towards -x.
+    let is_by_the_wall = |photon: &Photon| decode_direction(photon.direction)[0] < 0.0;
+    let on_the_floor = pass.photons.iter().filter(|photon| photon.position[1].abs() < 1e-3);
+    on_the_floor.filter(is_by_the_wall).map(|photon| f64::from(photon.power.decode()[0]) * unit).sum()
+}
+
+/// Power that paths from the floor find by way of the wall, W.
+fn found(packed: &PackedScene, view: &Camera) -> f64 {
+    const PATHS: u32 = 700_000;
+    const OF_A_TASK: u32 = 10_000;
+    let frame = RenderSettings::default().frame(view, 1.0, None);
+    let of_task = |task: u32| {
+        let (image, mut memory) = packed.view();
+        let mut counters = Counters::ZERO;
+        let counters = &mut counters;
+        let mut context =
+            Context { scene: &image, memory: &mut memory, frame: &frame, counters, outlet: None };
+        (task * OF_A_TASK..(task + 1) * OF_A_TASK).map(|index| path_to_the_lamp(&mut context, index)).sum()
+    };
+    let sums: Vec<f64> = (0..PATHS / OF_A_TASK).into_par_iter().map(of_task).collect();
+    // The floor has 4 m^2, and half of the cosine's integral is on the wall's side.
+    sums.iter().sum::<f64>() / f64::from(PATHS) * 4.0 * PI / 2.0
+}
+
+/// Radiance that path `index` finds from the floor to the wall's side.
+fn path_to_the_lamp<M: MemoryPort>(context: &mut Context<M>, index: u32) -> f64 {
+    let [x, z, u, v] = place(index);
+    let origin = Vec3::new(2.0 * x - 1.0, 1e-5, 2.0 * z - 1.0);
+    let (sine, cosine) = (std::f32::consts::PI * u).sin_cos();
+    let radius = v.sqrt();
+    let direction = Vec3::new(-radius * sine, (1.0 - v).sqrt(), radius * cosine);
+    let mut path = SpecularPath::new(Ray::new(origin, direction), Carried::Radiance, Passes::NarrowLobes);
+    let Some(mut hit) = closest_hit(context.scene, context.memory, &path.ray).unwrap() else { return 0.0 };
+    let mut surface = read_surface(context.scene, context.memory, &path.ray, &hit, &|_| 0.0).unwrap();
+    assert!(path.may_pass(&surface), "nothing but the wall is there");
+    let choose = |choice: u32| random(index, choice);
+    match path.follow(context, &mut surface, &mut hit, &choose).unwrap() {
+        PathEnd::Surface => f64::from((path.throughput * surface.emission).x),
+        PathEnd::Escaped | PathEnd::Lost => 0.0,
+    }
+}
+
+#[test]
+fn photons_bring_by_a_bumpy_wall_what_paths_find_there() {
+    let gentle: Vec<_> = (0..16).map(|k| tilted(f64::from(k % 4) * 6.0, 97.0 * f64::from(k))).collect();
+    for (name, normals, roughness, tolerance) in [
+        ("tilted", vec![tilted(15.0, 180.0)], 0.3, 0.01),
+        ("gentle", gentle, 0.3, 0.01),
+        ("bumpy", bumps(), 0.3, 0.02),
+        ("bumpy mirror", bumps(), 0.0, 0.02),
+    ] {
+        let scene = wall_and_floor(&normals, roughness);
+        let packed = PackedScene::new(&scene).unwrap();
+        let (brought, found) = (brought(&packed), found(&packed, &scene.cameras[0]));
+        println!("{name}: {brought:.4} W by photons, {found:.4} W by paths: {:.4}", brought / found);
+        assert!((brought / found - 1.0).abs() < tolerance, "{name}: {brought} {found}");
+    }
+}
