@@ -92,7 +92,7 @@ pub fn load_for(path: &Path, dram_bytes: u32, variant: Option<&str>) -> Result<S
     let mut textures = Textures::new(&document);
     let materials = material::load(&document, &mut textures)?;
     let mut scene = Scene { materials, variants: variants::names(&document), ..Scene::default() };
-    textures.finish(&source, &mut room, &mut scene, &mut notices)?;
+    textures.finish(&source, &mut room, &mut scene, &mut notices.unreadable)?;
     nodes::place(&source, &mut scene, &mut room, &mut notices)?;
     let file = || path.to_owned();
     match (scene.triangles.is_empty(), scene.skipped_triangles) {

@@ -10,7 +10,6 @@ use gltf::json::validation::Checked;
 use super::accessor::Source;
 use super::document::Document;
 use super::image;
-use super::notices::Notices;
 use super::origin::Origin;
 use super::room::Room;
 use crate::error::SceneError;
@@ -94,15 +93,15 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// Loads the images, and leaves textures out whose image cannot be read; the notices name those.
+    /// Loads the images, and leaves textures out whose image cannot be read and is described in `unreadable`.
     pub(super) fn finish(
         self,
         source: &Source<'_>,
         room: &mut Room,
         scene: &mut Scene,
-        notices: &mut Notices,
+        unreadable: &mut Vec<String>,
     ) -> Result<(), SceneError> {
-        let images = image::load(source, &self.images, room, &mut notices.unreadable)?;
+        let images = image::load(source, &self.images, room, unreadable)?;
         let is_read: Vec<_> = images.iter().map(Option::is_some).collect();
         scene.images = images.into_iter().flatten().collect();
         let images = renumbered(&is_read);

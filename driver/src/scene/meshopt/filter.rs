@@ -1,6 +1,23 @@
 //! Filters of decoded attributes. Values that the extension leaves undefined become any number, never a panic.
 
-use super::Filter;
+use serde::Deserialize;
+
+/// Transform of decoded attributes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub(in crate::scene) enum Filter {
+    /// Attributes as they are.
+    #[default]
+    None,
+    /// Unit vectors as points of an octahedron.
+    Octahedral,
+    /// Unit quaternions without their largest component.
+    Quaternion,
+    /// Floats as mantissas with exponents.
+    Exponential,
+    /// Colours as luma and two differences, with alpha.
+    Color,
+}
 
 /// Applies a filter to elements of `stride` bytes, in place.
 pub(super) fn apply(filter: Filter, stride: usize, decoded: &mut [u8]) {

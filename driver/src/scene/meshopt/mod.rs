@@ -9,6 +9,7 @@ mod indices;
 
 use serde::Deserialize;
 
+pub(super) use self::filter::Filter;
 use crate::allocation::{self, OutOfMemory};
 
 /// Maximum number of decoded bytes per byte of a stream: a byte of control bits stands for four lanes of 256 elements.
@@ -27,23 +28,6 @@ pub(super) enum Mode {
     Triangles,
     /// Other indices, as differences.
     Indices,
-}
-
-/// Transform of decoded attributes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "UPPERCASE")]
-pub(super) enum Filter {
-    /// Attributes as they are.
-    #[default]
-    None,
-    /// Unit vectors as points of an octahedron.
-    Octahedral,
-    /// Unit quaternions without their largest component.
-    Quaternion,
-    /// Floats as mantissas with exponents.
-    Exponential,
-    /// Colours as luma and two differences, with alpha.
-    Color,
 }
 
 /// Layout of decoded bytes, and the form of their stream.
