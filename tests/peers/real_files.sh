@@ -7,8 +7,8 @@
 # or render, or if one that cannot be rendered is not refused with the reason. OPTIONS in the environment are given
 # to each render, in place of those of a small picture: OPTIONS="--size 512x512 --spp 16".
 #
-# It needs curl, tar, Python 3 and 230 MB of packages, which are kept below cargo's target folder and are of the versions
-# and checksums below; previews are there as well. The packages have licences of their own.
+# It needs curl, tar, Python 3 and 240 MB of packages (packages.sh), which are kept below cargo's target folder; previews are there as
+# well.
 set -euo pipefail
 [ $# -ge 1 ] && [ -x "$1" ] || {
     echo "usage: $0 PHOTONCARD [NAME ...]: PHOTONCARD is the binary to render with, target/release/photoncard" >&2
@@ -16,91 +16,11 @@ set -euo pipefail
 }
 photoncard=$(realpath "$1")
 shift
-for tool in curl tar python3 sha256sum base64; do
-    command -v "$tool" >/dev/null || {
-        echo "$0: $tool is missing; install it with the system's package manager" >&2
-        exit 1
-    }
-done
 cd "$(dirname "$0")/../.."
-folder=$(realpath -m "${CARGO_TARGET_DIR:-target}")/peers/real-files
+source tests/peers/packages.sh
+folder=$package_folder
 read -r -a options <<<"${OPTIONS:---size 64x64 --spp 1 --gather-rays 4 --photons 10000}"
-mkdir -p "$folder/packages" "$folder/pictures"
-
-crates=https://static.crates.io/crates
-npm=https://registry.npmjs.org
-pypi=https://files.pythonhosted.org/packages
-
-# Package, address, SHA-256.
-packages() {
-    cat <<END
-easy-gltf $crates/easy-gltf/easy-gltf-1.1.4.crate b6cc16292992ce0d4874c93dbe7ef3b0a47a72234e797c1eeb10d73a1b9d7b73
-bevy_mod_raycast $crates/bevy_mod_raycast/bevy_mod_raycast-0.18.0.crate d9e4ff45885c4716771a9f55977d8ce69596502a5241da55bf608d7cd71a9cb3
-bevy_mod_outline $crates/bevy_mod_outline/bevy_mod_outline-0.13.0.crate 97f2e45781f64d23a3fecfd86d13efbb5256832b8091fe3b48cecd5875c538b9
-bevy_fps_controller $crates/bevy_fps_controller/bevy_fps_controller-20.0.0.crate 3920a91ddd7c8d9481158be05687adbdd8e266deeab20416d6d5f2481e9f151f
-webxr-assets $npm/@webxr-input-profiles/assets/-/assets-1.0.20.tgz 30df2a2268220fc0d0e034bed1550aabdd7a2500573c5216f64fc70d59c3d91e
-pmndrs-assets $npm/@pmndrs/assets/-/assets-1.7.0.tgz 152bd218a3390703f184f0c6ce16e73c8f0a87f32d38530d418a09d33d8208dc
-gradio $pypi/17/03/c1fdcfe84d1dce2a75921654e7b2075b251f7d48904d2b6006a2556a16b5/gradio-6.31.0-py3-none-any.whl 7b50b9b6a2d23cd02851ad4c8b1c8312c88d8b911d1f29c93f9761c98348a64a
-genesis-world $pypi/eb/85/45b33ceb7cdab11b53d3e706e8db21b9394b756214885d087a053d0286d9/genesis_world-1.4.5-py3-none-any.whl 7ce8fcc8b0af9a87907e550b5f373b27af3f6ca622e843ce12dc51e8a93a03fd
-END
-}
-
-# Name, package, path inside it, and its light: "own", or "white" of an environment; or "refused", and what the error says.
-files() {
-    local profiles=package/dist/profiles
-    cat <<END
-duck gradio gradio/media_assets/models3d/Duck.glb white
-fox gradio gradio/media_assets/models3d/Fox.gltf white
-fox-glb bevy_mod_outline bevy_mod_outline-0.13.0/assets/Fox.glb white
-morph-stress bevy_mod_outline bevy_mod_outline-0.13.0/assets/MorphStressTest.gltf white
-hollow bevy_mod_outline bevy_mod_outline-0.13.0/assets/hollow.glb white
-monkey bevy_mod_raycast bevy_mod_raycast-0.18.0/assets/models/monkey/Monkey.gltf white
-playground bevy_fps_controller bevy_fps_controller-20.0.0/assets/playground.glb white
-cube easy-gltf easy-gltf-1.1.4/tests/cube.glb own
-cube-classic easy-gltf easy-gltf-1.1.4/tests/cube_classic.gltf own
-cube-colour easy-gltf easy-gltf-1.1.4/tests/cube_color.glb white
-head easy-gltf easy-gltf-1.1.4/tests/head.glb own
-complete easy-gltf easy-gltf-1.1.4/tests/complete.glb own
-box-sparse easy-gltf easy-gltf-1.1.4/tests/box_sparse.glb refused only 0 photons were stored
-chopping-board genesis-world genesis/assets/meshes/chopping-board/source/chopping_board.glb white
-trash-bag genesis-world genesis/assets/meshes/trashbag_rope.glb white
-camera genesis-world genesis/assets/meshes/camera/camera.glb white
-ball genesis-world genesis/assets/tower/ball.glb white
-ring genesis-world genesis/assets/tower/ring_01.glb white
-valve-index webxr-assets $profiles/valve-index/left.glb white
-galaxy-xr webxr-assets $profiles/samsung-galaxyxr/left.glb white
-magicleap webxr-assets $profiles/magicleap-two/none.glb white
-vive-cosmos webxr-assets $profiles/htc-vive-cosmos/left.glb white
-trigger webxr-assets $profiles/generic-trigger-squeeze/none.glb white
-pico webxr-assets $profiles/pico-4u/left.glb white
-hand webxr-assets $profiles/generic-hand/left.glb white
-suzi-draco pmndrs-assets package/models/suzi.glb refused requires the extension KHR_draco_mesh_compression
-END
-}
-
-fetch() {
-    local name=$1 address=$2 checksum=$3
-    local archive=$folder/packages/$name-${checksum:0:8}
-    if [ ! -e "$archive" ]; then
-        curl --fail --silent --show-error --location --output "$archive.partial" "$address"
-        echo "$checksum  $archive.partial" | sha256sum --check --quiet
-        mv "$archive.partial" "$archive"
-    fi
-    [ -d "$folder/$name" ] && return
-    mkdir -p "$folder/$name.partial"
-    case $address in
-        *.whl) python3 -m zipfile -e "$archive" "$folder/$name.partial" ;;
-        *) tar -xzf "$archive" -C "$folder/$name.partial" ;;
-    esac
-    # This package keeps each model as a JavaScript module around a data URI.
-    if [ "$name" = pmndrs-assets ]; then
-        local module
-        for module in "$folder/$name.partial"/package/models/*.glb.js; do
-            sed 's/.*base64,\([A-Za-z0-9+\/=]*\).*/\1/' "$module" | base64 --decode >"${module%.js}"
-        done
-    fi
-    mv "$folder/$name.partial" "$folder/$name"
-}
+mkdir -p "$folder/pictures"
 
 render() {
     local name=$1 file=$2 light=$3 refusal=$4 log=$folder/pictures/$1.log status=0
@@ -131,9 +51,8 @@ done
 failed=0
 while read -r name package path light refusal; do
     wanted "$name" "$@" || continue
-    read -r _ address checksum < <(packages | grep "^$package ")
-    fetch "$package" "$address" "$checksum"
-    if render "$name" "$folder/$package/$path" "$light" "$refusal"; then
+    file=$(package_file "$package" "$path")
+    if render "$name" "$file" "$light" "$refusal"; then
         echo "ok      $name"
     else
         echo "FAILED  $name: $path"
