@@ -107,12 +107,12 @@ fn materials() -> Vec<Material> {
             alpha: 0.9,
             base_texture: Some(3),
             double_sided: true,
-            layers: Some(Box::new(veil(none.clone()))),
+            layers: Some(Box::new(veil(&none))),
             ..Material::new("veil", glossy(0.0, 0.8, None))
         },
         Material {
             metallic_roughness_texture: Some(2),
-            layers: Some(Box::new(varnish(none.clone()))),
+            layers: Some(Box::new(varnish(&none))),
             ..Material::new("varnished", glossy(0.3, 0.9, None))
         },
         Material {
@@ -132,7 +132,7 @@ fn bumpy(scale: f32) -> Option<Box<Layers>> {
     }))
 }
 
-fn veil(none: Layers) -> Layers {
+fn veil(none: &Layers) -> Layers {
     let colour = Vec3::new(0.3, 0.5, 0.4);
     let sheen = Sheen { colour, roughness: 0.6, colour_texture: Some(0), roughness_texture: Some(3) };
     let leaf = DiffuseTransmission {
@@ -141,14 +141,20 @@ fn veil(none: Layers) -> Layers {
         factor_texture: Some(3),
         colour_texture: Some(0),
     };
-    Layers { sheen: Some(sheen), diffuse_transmission: Some(leaf), ..none }
+    Layers { sheen: Some(sheen), diffuse_transmission: Some(leaf), ..none.clone() }
 }
 
-fn varnish(none: Layers) -> Layers {
+fn varnish(none: &Layers) -> Layers {
     let (factor_texture, roughness_texture) = (Some(2), Some(2));
     let coat = Coat { factor: 0.9, roughness: 0.4, factor_texture, roughness_texture, normal: None };
     let specular = Vec3::new(0.9, 0.2, 0.1);
-    Layers { coat: Some(coat), specular, specular_texture: Some(3), specular_colour_texture: Some(0), ..none }
+    Layers {
+        coat: Some(coat),
+        specular,
+        specular_texture: Some(3),
+        specular_colour_texture: Some(0),
+        ..none.clone()
+    }
 }
 
 fn add_textures(scene: &mut Scene) {

@@ -265,6 +265,22 @@ fn a_sheet_shows_itself_by_its_alpha_and_what_is_behind_by_the_rest() {
     assert!((found / expected - 1.0).abs() < 0.01, "{found}, not {expected}");
 }
 
+/// glTF culls backs: of a one-sided sheet of partial coverage rays and photons pass it.
+#[test]
+fn the_back_of_a_one_sided_sheet_of_partial_coverage_is_not_there() {
+    let sheet = Material { blends: true, alpha: 0.9, ..lambertian("sheet", 0.0) };
+    let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
+    for (sign, expected) in [(1.0, 0.1), (-1.0, 1.0)] {
+        let view = camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z);
+        let mut scene = scene(room([0; 6]), vec![lamp.clone(), sheet.clone()], view);
+        let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(x * sign, y, 0.0));
+        scene.triangles.extend(quad(corners, 1));
+        let settings = settings().with(|s| s.integrator.samples = 64);
+        let found = mean(&radiances(&render_or_panic(&scene, &settings).film));
+        assert!((found - expected).abs() < 0.01, "{found}, not {expected}");
+    }
+}
+
 /// A sheet that returns as much light as it takes does not show in a furnace: photons are stored on it as often as gathers ask.
 #[test]
 fn a_sheet_of_partial_coverage_does_not_show_in_a_furnace() {

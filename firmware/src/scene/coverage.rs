@@ -1,7 +1,8 @@
 //! Coverage: cut-outs (glTF's `alphaMode` `MASK`), points of a triangle whose alpha is below the material's cutoff, and partial
 //! coverage (`BLEND`), of which a ray sees the surface with the probability alpha.
 
-use photoncard_shared::layout::{BLENDS, Material, Triangle};
+use glam::Vec3;
+use photoncard_shared::layout::{BLENDS, DOUBLE_SIDED, Material, Triangle};
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
@@ -11,7 +12,8 @@ use crate::memory::MemoryPort;
 use crate::sampler::{hash, unit_interval};
 
 /// `true` if a ray meets a triangle at a point, with barycentric `weights`, that its cut-outs or its coverage leave. The choice depends
-/// on the ray and the triangle alone: shadow rays, gather rays and photons agree on the mean.
+/// on the ray and the triangle alone: shadow rays, gather rays and photons agree on the mean. The back of a one-sided surface of
+/// partial coverage is not there.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -23,11 +25,20 @@ pub(super) fn is_met(
     (index, triangle): (u32, &Triangle),
     weights: [f32; 3],
 ) -> Result<bool, Fault> {
-    let coverage = coverage(scene, memory, (index, triangle), weights)?;
+    let material = read_material(scene, memory, triangle.material)?;
+    if material.flags & (BLENDS | DOUBLE_SIDED) == BLENDS && is_back(ray, triangle) {
+        return Ok(false);
+    }
+    let coverage = coverage(scene, memory, &material, index, weights)?;
     Ok(coverage >= 1.0 || chance(ray, index) < coverage)
 }
 
-/// Covered share at a point of a triangle, with barycentric `weights`: 0 or 1 with cut-outs, alpha with partial coverage.
+fn is_back(ray: &Ray, triangle: &Triangle) -> bool {
+    let [a, b, c] = triangle.vertices.map(Vec3::from_array);
+    (b - a).cross(c - a).dot(ray.direction) > 0.0
+}
+
+/// Covered share at a point of triangle `index`, of a material, with barycentric `weights`: 0 or 1 with cut-outs, alpha with partial coverage.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -35,15 +46,15 @@ pub(super) fn is_met(
 pub(super) fn coverage(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    (index, triangle): (u32, &Triangle),
+    material: &Material,
+    index: u32,
     weights: [f32; 3],
 ) -> Result<f32, Fault> {
-    let material = read_material(scene, memory, triangle.material)?;
     let Some(corners) = Corners::read(scene, memory, index, weights)? else { return Ok(1.0) };
     let [base, ..] = material.textures;
     let [.., texture] = corners.texture(scene, memory, base)?;
     let [.., colour] = corners.colour();
-    Ok(covered(&material, texture * colour))
+    Ok(covered(material, texture * colour))
 }
 
 /// Covered share where texture and vertex colour have an alpha.

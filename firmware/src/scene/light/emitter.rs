@@ -81,7 +81,7 @@ fn emission_at(
     let material = read_material(scene, memory, triangle.material)?;
     let mut emission = Vec3::from_array(emitter.emission);
     if material.cutoff > 0.0 || material.flags & BLENDS != 0 {
-        emission *= coverage(scene, memory, (index, triangle), weights)?;
+        emission *= coverage(scene, memory, &material, index, weights)?;
     }
     let [.., texture] = material.textures;
     if texture == NO_TEXTURE {
