@@ -17,7 +17,7 @@ import png
 ROUGHNESSES = (0.1, 0.3, 0.6, 1.0)
 PLACES = ((-1.1, 1.1), (1.1, 1.1), (-1.1, -1.1), (1.1, -1.1))
 GOLD, GREY, BLACK = (1.0, 0.77, 0.34, 1.0), (0.5, 0.5, 0.5, 1.0), (0.0, 0.0, 0.0, 1.0)
-WHITE, GREEN = (1.0, 1.0, 1.0, 1.0), (0.6, 0.9, 0.6, 1.0)
+WHITE, GREEN, HALF_RED = (1.0, 1.0, 1.0, 1.0), (0.6, 0.9, 0.6, 1.0), (0.8, 0.2, 0.1, 0.5)
 
 
 def dielectric(base=GREY, **extensions):
@@ -45,8 +45,9 @@ PROBES = {
     "bumps-lambert": dielectric(specular={"specularFactor": 0.0}) | {"normal": 1.0},
     "bumps-metal": metal() | {"normal": 1.0},
     "bumps-weak": dielectric() | {"normal": 0.3},
-    "blend": dielectric((0.8, 0.2, 0.1, 0.5)) | {"alphaMode": "BLEND"},
-    "blend-lambert": dielectric((0.8, 0.2, 0.1, 0.5), specular={"specularFactor": 0.0}) | {"alphaMode": "BLEND"},
+    # Backs of one-sided surfaces are not seen in glTF, and are in Blender.
+    "blend": dielectric(HALF_RED) | {"alphaMode": "BLEND", "doubleSided": True},
+    "blend-lambert": dielectric(HALF_RED, specular={"specularFactor": 0.0}) | {"alphaMode": "BLEND", "doubleSided": True},
     "specular-tint": dielectric(BLACK, specular={"specularColorFactor": [1.0, 0.3, 0.1]}),
     "specular-high": dielectric(BLACK, ior={"ior": 1000.0}, specular={"specularColorFactor": [0.6, 0.3, 0.1]}),
     "specular-half": dielectric(specular={"specularFactor": 0.5}),

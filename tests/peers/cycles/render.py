@@ -2,8 +2,8 @@
 
     render.py SCENE.glb --samples N --seeds 1 2 --outputs A.exr B.exr --mask MASK.npy
 
-Light is neither clamped nor filtered, paths may have any length that matters, and a pixel is the mean over its square. Prints a line of JSON:
-CPU seconds of each picture, and materials that Cycles shades in its own way.
+Light is neither clamped nor denoised, paths have up to 64 bounces, and a pixel is the mean over its square. Prints a line of JSON:
+CPU seconds of each picture, and materials that keep a model of Blender's own.
 """
 
 import argparse

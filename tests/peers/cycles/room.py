@@ -48,7 +48,7 @@ def main():
     render.settle(scene, arguments.size, 1)
     export(scene_file)
     render.shade(scene, "principled")
-    reference = converged(scene, scene_file, arguments)
+    reference = converged(scene, arguments)
     heads = "| picture | CPU s | mean | median block | 95th percentile | fireflies | of a million |\n|---|---|---|---|---|---|---|"
     print(heads, file=arguments.table, flush=True)
     shown, seconds = [], []
@@ -195,14 +195,14 @@ def export(path):
     bpy.ops.export_scene.gltf(filepath=str(path), export_cameras=True, export_lights=True)
 
 
-def converged(scene, scene_file, arguments):
+def converged(scene, arguments):
     """A picture of Cycles with many samples, kept for the next time.
 
     It is denoised, as caustics of small lights leave fireflies at any number of samples.
     """
     key = hashlib.sha256(f"{arguments.size} {arguments.samples}".encode())
-    for part in (scene_file, HERE / "render.py"):
-        key.update(part.read_bytes())
+    for part in ("room.py", "render.py"):
+        key.update((HERE / part).read_bytes())
     stem = arguments.folder / f"room-converged-{key.hexdigest()[:12]}"
     output, note = stem.with_suffix(".exr"), stem.with_suffix(".json")
     if not note.exists():
