@@ -50,7 +50,7 @@ pub use direction::{decode_direction, decode_normal, encode_direction, encode_no
 pub use distant_light::DistantLight;
 pub use emitter::{Emitter, EmitterKind};
 pub use irradiance_point::IrradiancePoint;
-pub use layers::{LayerTextures, Layers};
+pub use layers::{LayerTexture, Layers};
 pub use light_node::{LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode};
 pub use material::{
     BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, MAX_PHONG_EXPONENT, Material, NARROW_LOBE, NO_TEXTURE,

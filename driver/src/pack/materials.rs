@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::{SceneImage, keeps_photons};
 use photoncard_shared::layout::{
-    self, BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTextures, NARROW_LOBE, NO_TEXTURE, Record,
+    self, BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTexture, NARROW_LOBE, NO_TEXTURE, Record,
     Reflectance, THIN_WALLED,
 };
 
@@ -108,19 +108,19 @@ fn layers_record(layers: &Layers) -> [u8; layout::Layers::BYTES] {
         sheen_roughness: sheen.map_or(0.0, |sheen| sheen.roughness),
         diffuse_transmission: diffuse.map_or(0.0, |part| part.factor.min(MAX_DIFFUSE_TRANSMISSION)),
         diffuse_transmission_colour: diffuse.map_or([1.0; 3], |part| part.colour.to_array()),
-        textures: LayerTextures {
-            normal,
-            specular: texture(layers.specular_texture),
-            specular_colour: texture(layers.specular_colour_texture),
-            coat: texture(coat.and_then(|coat| coat.factor_texture)),
-            coat_roughness: texture(coat.and_then(|coat| coat.roughness_texture)),
-            coat_normal,
-            sheen: texture(sheen.and_then(|sheen| sheen.colour_texture)),
-            sheen_roughness: texture(sheen.and_then(|sheen| sheen.roughness_texture)),
-            transmission: texture(layers.transmission_texture),
-            diffuse_transmission: texture(diffuse.and_then(|part| part.factor_texture)),
-            diffuse_transmission_colour: texture(diffuse.and_then(|part| part.colour_texture)),
-        },
+        textures: LayerTexture::ALL.map(|which| match which {
+            LayerTexture::Normal => normal,
+            LayerTexture::Specular => texture(layers.specular_texture),
+            LayerTexture::SpecularColour => texture(layers.specular_colour_texture),
+            LayerTexture::Coat => texture(coat.and_then(|coat| coat.factor_texture)),
+            LayerTexture::CoatRoughness => texture(coat.and_then(|coat| coat.roughness_texture)),
+            LayerTexture::CoatNormal => coat_normal,
+            LayerTexture::Sheen => texture(sheen.and_then(|sheen| sheen.colour_texture)),
+            LayerTexture::SheenRoughness => texture(sheen.and_then(|sheen| sheen.roughness_texture)),
+            LayerTexture::Transmission => texture(layers.transmission_texture),
+            LayerTexture::DiffuseTransmission => texture(diffuse.and_then(|part| part.factor_texture)),
+            LayerTexture::DiffuseTransmissionColour => texture(diffuse.and_then(|part| part.colour_texture)),
+        }),
     }
     .to_bytes()
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{Layers, Material, Record, Reflectance};
+use photoncard_shared::layout::{LayerTexture, Layers, Material, Record, Reflectance};
 use photoncard_shared::message::Fault;
 
 use super::SceneImage;
@@ -50,27 +50,27 @@ pub(super) fn layer_texel(
     corners: Option<&Corners>,
     layers: &Layers,
 ) -> Result<LayerTexel, Fault> {
-    let mut read = |index: u16| match corners {
-        Some(corners) => corners.texture(scene, memory, index),
+    let mut read = |texture: LayerTexture| match corners {
+        Some(corners) => corners.texture(scene, memory, layers.texture(texture)),
         None => Ok([1.0; 4]),
     };
-    let textures = &layers.textures;
-    let [.., specular] = read(textures.specular)?;
-    let [coat, ..] = read(textures.coat)?;
-    let [_, coat_roughness, ..] = read(textures.coat_roughness)?;
-    let [.., sheen_roughness] = read(textures.sheen_roughness)?;
-    let [transmission, ..] = read(textures.transmission)?;
-    let [.., diffuse_transmission] = read(textures.diffuse_transmission)?;
-    let mut colour = |index: u16| read(index).map(|[red, green, blue, _]| Vec3::new(red, green, blue));
+    let [.., specular] = read(LayerTexture::Specular)?;
+    let [coat, ..] = read(LayerTexture::Coat)?;
+    let [_, coat_roughness, ..] = read(LayerTexture::CoatRoughness)?;
+    let [.., sheen_roughness] = read(LayerTexture::SheenRoughness)?;
+    let [transmission, ..] = read(LayerTexture::Transmission)?;
+    let [.., diffuse_transmission] = read(LayerTexture::DiffuseTransmission)?;
+    let mut colour =
+        |texture: LayerTexture| read(texture).map(|[red, green, blue, _]| Vec3::new(red, green, blue));
     Ok(LayerTexel {
         specular,
-        specular_colour: colour(textures.specular_colour)?,
+        specular_colour: colour(LayerTexture::SpecularColour)?,
         coat,
         coat_roughness,
-        sheen: colour(textures.sheen)?,
+        sheen: colour(LayerTexture::Sheen)?,
         sheen_roughness,
         transmission,
         diffuse_transmission,
-        diffuse_transmission_colour: colour(textures.diffuse_transmission_colour)?,
+        diffuse_transmission_colour: colour(LayerTexture::DiffuseTransmissionColour)?,
     })
 }

@@ -1,7 +1,7 @@
 //! Normal maps: normals stated by a texture in the tangent space of a triangle's corners (`MikkTSpace`).
 
 use glam::Vec3;
-use photoncard_shared::layout::{Material, NO_TEXTURE};
+use photoncard_shared::layout::{LayerTexture, Material, NO_TEXTURE};
 use photoncard_shared::message::Fault;
 
 use super::SceneImage;
@@ -24,7 +24,7 @@ pub(super) fn base_normal(
         return Ok(corners.normal());
     }
     let layers = read_layers(scene, memory, material)?;
-    let map = (layers.textures.normal, layers.normal_scale);
+    let map = (layers.texture(LayerTexture::Normal), layers.normal_scale);
     mapped_normal(scene, memory, map, corners, front_normal)
 }
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use photoncard_shared::layout::{
-    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, Material, NO_TEXTURE, Reflectance, Triangle,
+    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTexture, Material, NO_TEXTURE, Reflectance, Triangle,
 };
 use photoncard_shared::message::Fault;
 
@@ -258,7 +258,7 @@ fn layered(
     let layer_texel = layer_texel(scene, memory, corners, &layers)?;
     let coat_normal = match corners {
         Some(corners) => {
-            let map = (layers.textures.coat_normal, layers.coat_normal_scale);
+            let map = (layers.texture(LayerTexture::CoatNormal), layers.coat_normal_scale);
             let sign = if view.is_front { 1.0 } else { -1.0 };
             let normal = mapped_normal(scene, memory, map, corners, surface.geometric_normal * sign)?;
             normal.map(|normal| turned(normal * sign, surface.outgoing, surface.geometric_normal))

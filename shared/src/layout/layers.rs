@@ -24,99 +24,56 @@ pub struct Layers {
     pub diffuse_transmission: f32,
     /// Colour of the diffuse light that leaves at the other side, 0 to 1.
     pub diffuse_transmission_colour: [f32; 3],
-    /// Textures.
-    pub textures: LayerTextures,
+    /// Indices of the textures, in the order of [`LayerTexture::ALL`]; [`NO_TEXTURE`] if absent.
+    pub textures: [u16; TEXTURE_COUNT],
 }
 
-/// Textures of [`Layers`]: indices, [`NO_TEXTURE`] if absent.
+/// A texture of [`Layers`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LayerTextures {
+#[repr(u8)]
+pub enum LayerTexture {
     /// Tangent-space normal: red, green and blue of `2 c - 1`, linear.
-    pub normal: u16,
+    Normal,
     /// `specularFactor`: alpha.
-    pub specular: u16,
+    Specular,
     /// `specularColorFactor`: red, green and blue, sRGB.
-    pub specular_colour: u16,
+    SpecularColour,
     /// Factor of the coat: red.
-    pub coat: u16,
+    Coat,
     /// Roughness of the coat: green.
-    pub coat_roughness: u16,
+    CoatRoughness,
     /// Tangent-space normal of the coat.
-    pub coat_normal: u16,
+    CoatNormal,
     /// Colour of the sheen: red, green and blue, sRGB.
-    pub sheen: u16,
+    Sheen,
     /// Roughness of the sheen: alpha.
-    pub sheen_roughness: u16,
+    SheenRoughness,
     /// `transmissionFactor`: red.
-    pub transmission: u16,
+    Transmission,
     /// Share of diffuse transmission: alpha.
-    pub diffuse_transmission: u16,
+    DiffuseTransmission,
     /// Colour of diffuse transmission: red, green and blue, sRGB.
-    pub diffuse_transmission_colour: u16,
+    DiffuseTransmissionColour,
 }
 
-impl LayerTextures {
-    /// No texture.
-    pub const NONE: Self = Self::of([NO_TEXTURE; 11]);
-
-    const fn of(indices: [u16; 11]) -> Self {
-        let [
-            normal,
-            specular,
-            specular_colour,
-            coat,
-            coat_roughness,
-            coat_normal,
-            sheen,
-            sheen_roughness,
-            transmission,
-            diffuse_transmission,
-            diffuse_transmission_colour,
-        ] = indices;
-        Self {
-            normal,
-            specular,
-            specular_colour,
-            coat,
-            coat_roughness,
-            coat_normal,
-            sheen,
-            sheen_roughness,
-            transmission,
-            diffuse_transmission,
-            diffuse_transmission_colour,
-        }
-    }
-
-    const fn indices(self) -> [u16; 11] {
-        let Self {
-            normal,
-            specular,
-            specular_colour,
-            coat,
-            coat_roughness,
-            coat_normal,
-            sheen,
-            sheen_roughness,
-            transmission,
-            diffuse_transmission,
-            diffuse_transmission_colour,
-        } = self;
-        [
-            normal,
-            specular,
-            specular_colour,
-            coat,
-            coat_roughness,
-            coat_normal,
-            sheen,
-            sheen_roughness,
-            transmission,
-            diffuse_transmission,
-            diffuse_transmission_colour,
-        ]
-    }
+impl LayerTexture {
+    /// All textures, in the order of their indices in a record.
+    pub const ALL: [Self; 11] = [
+        Self::Normal,
+        Self::Specular,
+        Self::SpecularColour,
+        Self::Coat,
+        Self::CoatRoughness,
+        Self::CoatNormal,
+        Self::Sheen,
+        Self::SheenRoughness,
+        Self::Transmission,
+        Self::DiffuseTransmission,
+        Self::DiffuseTransmissionColour,
+    ];
 }
+
+const TEXTURE_COUNT: usize = LayerTexture::ALL.len();
 
 impl Record for Layers {
     const BYTES: usize = 128;
@@ -136,8 +93,13 @@ impl Layers {
         sheen_roughness: 0.0,
         diffuse_transmission: 0.0,
         diffuse_transmission_colour: [1.0; 3],
-        textures: LayerTextures::NONE,
+        textures: [NO_TEXTURE; TEXTURE_COUNT],
     };
+
+    /// Index of a texture; [`NO_TEXTURE`] if absent.
+    pub fn texture(&self, texture: LayerTexture) -> u16 {
+        self.textures.get(texture as usize).copied().unwrap_or(NO_TEXTURE)
+    }
 
     /// Reads a record.
     pub fn read(bytes: &[u8; Self::BYTES]) -> Self {
@@ -153,7 +115,7 @@ impl Layers {
             sheen_roughness: read_f32(bytes, 40),
             diffuse_transmission: read_f32(bytes, 44),
             diffuse_transmission_colour: read_vector(bytes, 48),
-            textures: LayerTextures::of(core::array::from_fn(texture)),
+            textures: core::array::from_fn(texture),
         }
     }
 
@@ -169,7 +131,7 @@ impl Layers {
         write_f32(&mut bytes, 40, self.sheen_roughness);
         write_f32(&mut bytes, 44, self.diffuse_transmission);
         write_vector(&mut bytes, 48, self.diffuse_transmission_colour);
-        for (index, pair) in self.textures.indices().chunks(2).enumerate() {
+        for (index, pair) in self.textures.chunks(2).enumerate() {
             let [low, high] = [0, 1].map(|slot| pair.get(slot).copied().unwrap_or(NO_TEXTURE));
             write_u32(&mut bytes, TEXTURES + 4 * index, u32::from(low) | u32::from(high) << 16);
         }
@@ -193,7 +155,7 @@ mod tests {
             sheen_roughness: 0.75,
             diffuse_transmission: 0.5,
             diffuse_transmission_colour: [0.7, 0.8, 0.9],
-            textures: LayerTextures::of(core::array::from_fn(|index| 1000 + index as u16)),
+            textures: core::array::from_fn(|index| 1000 + index as u16),
         };
         assert_eq!(Layers::read(&layers.to_bytes()), layers);
         assert_eq!(Layers::read(&Layers::NONE.to_bytes()), Layers::NONE);

@@ -99,9 +99,9 @@ impl Topology {
 
 /// Tangents of a primitive, in the mesh's space.
 pub(super) enum Tangents {
-    /// Those of its `TANGENT`.
+    /// Stated by the `TANGENT` attribute.
     Stated,
-    /// Computed ones, triangle by triangle.
+    /// Computed by MikkTSpace, triangle by triangle.
     Computed(Vec<[Vec4; 3]>),
 }
 
