@@ -4,7 +4,7 @@ use std::path::Path;
 
 use photoncard_driver::scene::gltf::load;
 use photoncard_driver::scene::{
-    Camera, Encoding, Image, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture, Wrap,
+    Camera, Encoding, Image, Layers, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture, Wrap,
 };
 
 use crate::console::print;
@@ -91,17 +91,52 @@ fn material(material: &Material, scene: &Scene) -> String {
     if material.blends {
         parts.push(format!("covered by alpha {}", material.alpha));
     }
+    parts.extend(material.layers.iter().flat_map(|layers| of_layers(layers)));
     let textures = [
         ("base", material.base_texture),
         ("metallic-roughness", material.metallic_roughness_texture),
         ("emissive", material.emissive_texture),
     ];
-    for (use_, index) in textures {
+    let of_layers = material.layers.iter().flat_map(|layers| layer_textures(layers));
+    for (use_, index) in textures.into_iter().chain(of_layers) {
         if let Some(texture) = index.and_then(|index| scene.textures.get(index as usize)) {
             parts.push(format!("{use_} texture {}", describe(texture, scene)));
         }
     }
     format!("material   {}: {}", material.name, parts.join(", "))
+}
+
+fn of_layers(layers: &Layers) -> Vec<String> {
+    let Layers { normal, coat, sheen, diffuse_transmission, .. } = layers;
+    let scale = normal.filter(|map| map.scale != 1.0).map(|map| format!("normals scaled by {}", map.scale));
+    let coat = coat.map(|coat| format!("coat {} of roughness {}", coat.factor, coat.roughness));
+    let sheen = sheen.map(|sheen| format!("sheen {} of roughness {}", sheen.colour, sheen.roughness));
+    let behind = diffuse_transmission
+        .map(|part| format!("diffuse transmission {} of colour {}", part.factor, part.colour));
+    [scale, coat, sheen, behind].into_iter().flatten().collect()
+}
+
+fn layer_textures(layers: &Layers) -> Vec<(&'static str, Option<u32>)> {
+    let mut textures = vec![
+        ("normal", layers.normal.map(|map| map.texture)),
+        ("specular", layers.specular_texture),
+        ("specular colour", layers.specular_colour_texture),
+        ("transmission", layers.transmission_texture),
+    ];
+    if let Some(coat) = layers.coat {
+        textures.push(("coat", coat.factor_texture));
+        textures.push(("coat roughness", coat.roughness_texture));
+        textures.push(("coat normal", coat.normal.map(|map| map.texture)));
+    }
+    if let Some(sheen) = layers.sheen {
+        textures.push(("sheen", sheen.colour_texture));
+        textures.push(("sheen roughness", sheen.roughness_texture));
+    }
+    if let Some(part) = layers.diffuse_transmission {
+        textures.push(("diffuse transmission", part.factor_texture));
+        textures.push(("diffuse transmission colour", part.colour_texture));
+    }
+    textures
 }
 
 fn describe(texture: &Texture, scene: &Scene) -> String {
