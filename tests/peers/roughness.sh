@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Metals and dielectrics from smooth to rough beside glTF's own model: how far a Lambertian surface with a Phong lobe is from it.
+# Metals and dielectrics from smooth to rough, rendered by GGX, beside Mitsuba's path tracer.
 #
 #   tests/peers/roughness.sh [OPTION ...]
 #
