@@ -3,8 +3,8 @@
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, Reflection, Scene,
-    Sheen, Texture, Transmission,
+    Camera, Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, PunctualKind,
+    PunctualLight, Reflection, Scene, Sheen, Texture, Transmission,
 };
 use photoncard_tests::shapes::{add_ball, add_textured_quad};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
@@ -216,6 +216,32 @@ fn glass(roughness: f32, is_volume: bool) -> Material {
         transmission: Some(transmission),
     };
     Material::new("glass", reflection)
+}
+
+/// Sun through a pane is a caustic on the floor below it. A coat takes its share of the light, and photons are stored once.
+#[test]
+fn a_caustic_below_a_coat_is_dimmed_by_the_coat() {
+    let look = |floor: Material| {
+        let square = |half: f32, y: f32, material: u32| {
+            let corner = |x: f32, z: f32| Vec3::new(x * half, y, -z * half);
+            quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], material)
+        };
+        let mut view = camera(Vec3::new(0.0, 0.3, 0.9), Vec3::new(0.0, -0.3, -0.9));
+        view.vertical_fov = 0.3;
+        let triangles = [square(1.0, 0.0, 0), square(1.2, 0.5, 1)].concat();
+        let sun = PunctualLight {
+            name: "sun".to_owned(),
+            kind: PunctualKind::Directional { direction: Vec3::NEG_Y },
+            intensity: Vec3::ONE,
+        };
+        let lit = Scene { lights: vec![sun], ..scene(triangles, vec![floor, glass(0.0, false)], view) };
+        shown(&lit)
+    };
+    let bare = look(dielectric(0.5, 0.0, none()));
+    for roughness in [0.1_f32, 0.3, 0.6] {
+        let share = look(dielectric(0.5, 0.0, coat(1.0, roughness))) / bare;
+        assert!((0.7..1.0).contains(&share), "{roughness}: {share}");
+    }
 }
 
 #[test]

@@ -3,11 +3,12 @@
 use std::collections::HashMap;
 
 use glam::Vec3;
-use photoncard_firmware::scene::keeps_photons;
+use photoncard_firmware::memory::MemoryPort;
+use photoncard_firmware::scene::{SceneImage, keeps_photons};
 use photoncard_shared::address::Line;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    BLENDS, BvhLeaf, DOUBLE_SIDED, LEAF_TRIANGLES, Material, Record, Reflectance, encode_normal,
+    BLENDS, BvhLeaf, DOUBLE_SIDED, LEAF_TRIANGLES, Layers, Material, Record, Reflectance, encode_normal,
 };
 use photoncard_shared::message::{Fault, FaultCode};
 use rayon::prelude::*;
@@ -40,7 +41,7 @@ pub(super) struct SideTable {
 #[derive(Clone, Copy)]
 struct Finish {
     reflects: bool,
-    /// Light may pass: glass, partial coverage, or layers, among which diffuse transmission is.
+    /// Light may pass: glass, partial coverage, diffuse transmission.
     transmits: bool,
     emits: bool,
     is_double_sided: bool,
@@ -66,7 +67,7 @@ impl SideTable {
                     reflects: keeps_photons(&scene, &mut memory, &material)?,
                     transmits: matches!(material.reflectance, Reflectance::Glass { .. })
                         || material.flags & BLENDS != 0
-                        || material.layers.is_some(),
+                        || transmits_diffusely(&scene, &mut memory, &material)?,
                     emits: material.emission.into_iter().any(|radiance| radiance > 0.0),
                     is_double_sided: material.flags & DOUBLE_SIDED != 0,
                 })
@@ -138,6 +139,17 @@ impl SideTable {
             self.sides[*index].is_solid = !is_mesh_open[meshes.root(sheet)];
         }
     }
+}
+
+fn transmits_diffusely(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    material: &Material,
+) -> Result<bool, Fault> {
+    let Some(index) = material.layers else { return Ok(false) };
+    let kind = SectionKind::Layers;
+    let bytes = scene.record::<{ Layers::BYTES }, { Layers::PER_LINE as u32 }>(memory, kind, index)?;
+    Ok(Layers::read(bytes).diffuse_transmission > 0.0)
 }
 
 impl Sides {

@@ -228,23 +228,18 @@ impl Tracer<'_> {
                 Arrival::Ends => {
                     let surface = surface.flat();
                     let is_caustic = is_direct && path.bounces > 0;
-                    // Rays of a narrow lobe meet lights with extent.
-                    let lit = match emission.has_extent {
-                        true => surface.reflection.without_narrow_lobe(),
-                        false => surface.reflection,
-                    };
-                    if lit.is_black() || self.purpose == Purpose::Caustics && !is_caustic {
+                    let is_of_map = self.purpose == Purpose::Indirect || is_caustic;
+                    if !is_of_map || !is_lit(&surface, emission.has_extent) {
                         break;
                     }
                     met = true;
-                    // Of photons that reach the surface some meet its base: gathers are there as often.
+                    let flag = match self.purpose {
+                        Purpose::Indirect => is_direct,
+                        Purpose::Caustics => emission.has_extent,
+                    };
+                    // Light that comes through a surface is stored at the side where it arrives.
                     if !surface.is_behind {
-                        let power = arrived / (surface.probability * surface.coverage);
-                        let flag = match self.purpose {
-                            Purpose::Indirect => is_direct,
-                            Purpose::Caustics => emission.has_extent,
-                        };
-                        photons.push(self.stored(&surface, power, flag, random.dither()));
+                        photons.push(self.stored(&surface, arrived, flag, random.dither()));
                     }
                     if self.purpose == Purpose::Caustics {
                         break;
@@ -263,8 +258,10 @@ impl Tracer<'_> {
         Ok(met)
     }
 
-    /// Record of a photon that arrives at a surface.
-    fn stored(&self, surface: &Surface, power: Vec3, direct: bool, dither: u32) -> StoredPhoton {
+    /// Record of a photon that arrives at a surface. Of photons that reach the surface some meet its base, and gathers are there as
+    /// rarely: the record has the power of all.
+    fn stored(&self, surface: &Surface, arrived: Vec3, direct: bool, dither: u32) -> StoredPhoton {
+        let power = arrived / (surface.probability * surface.coverage);
         let photon = Photon {
             position: surface.position.to_array(),
             power: Rgbe::encode((power / self.path_unit).to_array(), dither),
@@ -276,6 +273,12 @@ impl Tracer<'_> {
         };
         StoredPhoton::new(&self.grid, &photon)
     }
+}
+
+/// Returns whether photons of a light light a surface: rays of a narrow lobe meet lights with extent.
+fn is_lit(surface: &Surface, has_extent: bool) -> bool {
+    let reflection = surface.reflection;
+    !if has_extent { reflection.without_narrow_lobe() } else { reflection }.is_black()
 }
 
 /// Maximum of [`shading_share`].

@@ -128,10 +128,9 @@ impl Material {
     }
 
     /// Returns whether the material focuses light: it reflects or transmits perfectly specularly (mirrors, smooth coats, glass), or
-    /// by a narrow lobe. `texel` is the minimum roughness of its texture, 1 without one.
+    /// by a lobe that rays follow: a narrow one, a coat, a sheen. `texel` is the minimum roughness of its texture, 1 without one.
     pub(super) fn is_specular(&self, texel: f32) -> bool {
-        let coat = self.layers.as_ref().and_then(|layers| layers.coat);
-        if coat.is_some_and(|coat| is_narrow(coat.roughness)) {
+        if self.layers.as_ref().is_some_and(|layers| layers.coat.is_some() || layers.sheen.is_some()) {
             return true;
         }
         match self.reflection {

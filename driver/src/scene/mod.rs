@@ -103,7 +103,7 @@ impl Scene {
         self.triangles.iter().any(|triangle| is_specular.get(triangle.material as usize) == Some(&true))
     }
 
-    /// For each material, whether it focuses light: it reflects or transmits perfectly specularly, or by a narrow lobe.
+    /// For each material, whether it focuses light: it reflects or transmits perfectly specularly, or by a lobe that rays follow.
     pub fn specular_materials(&self) -> Vec<bool> {
         self.materials.iter().map(|material| material.is_specular(self.minimum_roughness(material))).collect()
     }

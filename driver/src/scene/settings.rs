@@ -124,6 +124,18 @@ impl Material {
             [value, ..] => Vec3::splat(value),
             [] => return Ok(()),
         };
+        if property == Property::Thickness && !(0.0..f32::INFINITY).contains(&value.x) {
+            return Err((
+                "the thickness is not a length",
+                "state 0 for a thin wall, or any length for a solid",
+            ));
+        }
+        if property == Property::Ior && !(1.0..f32::INFINITY).contains(&value.x) {
+            return Err((
+                "the index of refraction is below 1",
+                "indices of refraction are 1 or more; glass has 1.5",
+            ));
+        }
         if property == Property::Ior
             && let Some(layers) = &mut self.layers
         {
@@ -284,7 +296,9 @@ mod tests {
         assert_eq!(transmission, Some(glass));
         assert!(scene.materials[0].blends && scene.materials[0].alpha == 0.5);
         assert!(scene.apply("floor.ior=1.5").is_err());
-        assert!(scene.apply("metal.ior=0.5").is_err());
+        for impossible in ["metal.ior=0.5", "metal.ior=nan", "metal.thickness=-3", "metal.thickness=nan"] {
+            assert!(scene.apply(impossible).is_err(), "{impossible}");
+        }
         assert!(scene.apply("metal.transmission=2").is_err());
     }
 

@@ -2,7 +2,7 @@
 //! coverage (`BLEND`), of which a ray sees the surface with the probability alpha.
 
 use glam::Vec3;
-use photoncard_shared::layout::{BLENDS, DOUBLE_SIDED, Material, Triangle};
+use photoncard_shared::layout::{BLENDS, DOUBLE_SIDED, Material, Reflectance, Triangle};
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
@@ -26,7 +26,9 @@ pub(super) fn is_met(
     weights: [f32; 3],
 ) -> Result<bool, Fault> {
     let material = read_material(scene, memory, triangle.material)?;
-    if material.flags & (BLENDS | DOUBLE_SIDED) == BLENDS && is_back(ray, triangle) {
+    // Glass has two sides always: a ray inside meets its back.
+    let is_glass = matches!(material.reflectance, Reflectance::Glass { .. });
+    if material.flags & (BLENDS | DOUBLE_SIDED) == BLENDS && !is_glass && is_back(ray, triangle) {
         return Ok(false);
     }
     let coverage = coverage(scene, memory, &material, index, weights)?;

@@ -12,6 +12,8 @@ pub struct Specular {
     pub reflected: Vec3,
     /// Transmittance, 0 to 1.
     pub transmitted: Vec3,
+    /// Direction of reflected light, a unit vector; zero for the mirror direction about the shading normal.
+    pub beside: Vec3,
     /// Direction of transmitted light: a unit vector behind the surface.
     pub behind: Vec3,
     /// Absorption coefficient behind the surface, 1/m.
@@ -25,6 +27,7 @@ impl Specular {
     pub const NONE: Self = Self {
         reflected: Vec3::ZERO,
         transmitted: Vec3::ZERO,
+        beside: Vec3::ZERO,
         behind: Vec3::ZERO,
         absorption: Vec3::ZERO,
         radiance_scale: 1.0,
@@ -69,14 +72,14 @@ pub(super) struct Glass {
 }
 
 impl Glass {
-    /// Albedo of the Lambertian part, and specular part. Normals are on the side of `outgoing`, the inside of the solid if
+    /// Share of light that is scattered instead of transmitted, and specular part. Normals are on the side of `outgoing`, the inside of the solid if
     /// `is_inside`.
     pub(super) fn at(
         &self,
         outgoing: Vec3,
         [normal, geometric_normal]: [Vec3; 2],
         is_inside: bool,
-    ) -> (Vec3, Specular) {
+    ) -> (f32, Specular) {
         let cosine = max(normal.dot(outgoing), 0.0);
         let index = if is_inside && !self.is_thin { 1.0 / self.ior } else { self.ior };
         let (reflectance, cosine_behind) = fresnel(cosine, index);
@@ -87,10 +90,11 @@ impl Glass {
         let refracted = unit(normal * (cosine / index - cosine_behind) - outgoing * (1.0 / index));
         let behind =
             if self.is_thin || refracted.dot(geometric_normal) >= 0.0 { -outgoing } else { refracted };
-        let through = self.base * (1.0 - reflectance);
+        let through = 1.0 - reflectance;
         let specular = Specular {
             reflected: Vec3::splat(reflectance),
-            transmitted: through * self.transmission,
+            transmitted: self.base * (through * self.transmission),
+            beside: Vec3::ZERO,
             behind,
             absorption: if is_inside || self.is_thin { Vec3::ZERO } else { self.absorption },
             radiance_scale: if self.is_thin { 1.0 } else { 1.0 / (index * index) },
@@ -131,7 +135,7 @@ mod tests {
         let angle = degrees.to_radians();
         let outgoing = Vec3::new(angle.sin(), angle.cos(), 0.0);
         let (diffuse, specular) = glass.at(outgoing, [Vec3::Y; 2], is_inside);
-        assert_eq!(diffuse, Vec3::ZERO);
+        assert_eq!(diffuse, 0.0);
         specular
     }
 

@@ -129,6 +129,9 @@ impl Surface {
 
     /// The mirror direction of the ray, a unit vector away from the surface.
     pub fn mirrored(&self) -> Vec3 {
+        if self.specular.beside != Vec3::ZERO {
+            return self.specular.beside;
+        }
         Specular::reflected_direction(self.outgoing, self.normal, self.geometric_normal)
     }
 }
@@ -244,7 +247,7 @@ fn finished(
     Ok(Surface { normal, reflection, specular, absorption, ..surface })
 }
 
-/// The surface of one of a material's layers. Its base emits.
+/// The surface of one of a material's layers. All layers of the side emit.
 #[inline(never)]
 fn layered(
     scene: &SceneImage,
@@ -268,11 +271,11 @@ fn layered(
     let coat_normal = coat_normal.unwrap_or(surface.geometric_normal);
     let taken = take((material, &layers), (texel, &layer_texel), view, coat_normal, random);
     let Taken { layer, scattering: Scattering { reflection, specular, absorption }, .. } = taken;
-    let Taken { normal, probability, .. } = taken;
+    let Taken { normal, probability, of_front, .. } = taken;
     let share = if layer == Layer::Behind { 0.0 } else { reflection.glossy_share() };
     let normal = bent_by_share(normal, share, surface.outgoing, surface.geometric_normal);
     let surface = Surface { reflection, specular, absorption, normal, probability, ..surface };
-    let emission = if layer == Layer::Base { surface.emission / probability } else { Vec3::ZERO };
+    let emission = if layer == Layer::Behind { Vec3::ZERO } else { surface.emission / of_front };
     let surface = Surface { emission, ..surface };
     Ok(if layer == Layer::Behind { surface.turned() } else { surface })
 }

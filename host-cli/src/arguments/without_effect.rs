@@ -2,7 +2,7 @@
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::render::Radiance;
-use photoncard_driver::scene::Scene;
+use photoncard_driver::scene::{Material, Reflection, Scene};
 
 use super::render::RenderOptions;
 
@@ -20,7 +20,14 @@ impl RenderOptions {
             without_specular.clone()
         };
         let has_map = scene.is_specular() && self.photons.caustic_photons != Some(0);
+        let has_lobe =
+            |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });
         let cases = [
+            (
+                self.energy_compensation && !scene.materials.iter().any(has_lobe),
+                "--energy-compensation",
+                "without a metallic-roughness material".to_owned(),
+            ),
             (
                 self.integrator.ic_error.is_some() && !is_cached,
                 "--ic-error",

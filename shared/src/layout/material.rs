@@ -79,7 +79,7 @@ pub enum Reflectance {
         /// Roughness, 0 (perfectly specular) to 1.
         roughness: f32,
     },
-    /// A smooth transparent dielectric (glTF `KHR_materials_transmission`).
+    /// A transparent dielectric (glTF `KHR_materials_transmission`).
     Glass {
         /// Transmission colour, to be multiplied by the base texture.
         base: [f32; 3],
@@ -95,7 +95,7 @@ pub enum Reflectance {
         specular: f32,
         /// Metalness, 0 to 1; metal transmits nothing.
         metallic: f32,
-        /// Roughness of the metal, 0 to 1 in steps of 1/255.
+        /// Roughness, 0 (perfectly specular) to 1 in steps of 1/255.
         roughness: f32,
     },
 }

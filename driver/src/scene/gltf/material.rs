@@ -75,6 +75,10 @@ fn load_one(
     let is_gltf = matches!(material.reflection, Reflection::MetallicRoughness { .. });
     let base = (unlimited_f0(source), is_gltf);
     material.layers = layers::load(document, index, source, textures, base)?;
+    // Light that comes through a leaf has reached its back.
+    let transmits_diffusely =
+        material.layers.as_ref().is_some_and(|layers| layers.diffuse_transmission.is_some());
+    material.double_sided |= transmits_diffusely;
     check_extensions(extensions).and_then(|()| material.check()).map_err(|fault| {
         let item = match fault.property {
             Property::Diffuse | Property::Alpha => "pbrMetallicRoughness.baseColorFactor",

@@ -104,7 +104,7 @@ pub fn load_for(path: &Path, dram_bytes: u32, variant: Option<&str>) -> Result<S
         scene.cameras.push(camera::frame(&scene));
         notices.framed = true;
     }
-    notices.solid_glass = solid_glass::make_solid(&document, &mut scene);
+    notices.solid_glass = solid_glass::make_solid(&document, &mut scene)?;
     scene.notices = notices.finish(&document);
     Ok(scene)
 }

@@ -101,7 +101,7 @@ impl Topology {
 pub(super) enum Tangents {
     /// Stated by the `TANGENT` attribute.
     Stated,
-    /// Computed by MikkTSpace, triangle by triangle.
+    /// Computed by `MikkTSpace`, triangle by triangle.
     Computed(Vec<[Vec4; 3]>),
 }
 

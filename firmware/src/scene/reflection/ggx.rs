@@ -42,6 +42,8 @@ pub(super) struct GgxLobe {
     shares: [f32; 2],
     /// `true` if rays follow the lobe, and no photon is gathered for it.
     pub(super) is_followed: bool,
+    /// `true` for the lobe of a layer beyond the base: photons are stored for the base.
+    pub(super) is_layer: bool,
 }
 
 /// The normal and the two directions of `f`, reduced to what the lobe depends on.
@@ -76,7 +78,20 @@ impl GgxLobe {
         let shares = albedo_shares(roughness, cosine);
         let [of_f0, of_f90] = shares;
         let albedo = (f0 * of_f0 + f90 * of_f90).min(Vec3::ONE);
-        Self { f0, f90, alpha: max(roughness * roughness, MIN_ALPHA), albedo, shares, is_followed: false }
+        Self {
+            f0,
+            f90,
+            alpha: max(roughness * roughness, MIN_ALPHA),
+            albedo,
+            shares,
+            is_followed: false,
+            is_layer: false,
+        }
+    }
+
+    /// The lobe as that of a layer beyond the base, which rays follow.
+    pub(super) fn as_layer(self) -> Self {
+        Self { is_followed: true, is_layer: true, ..self }
     }
 
     /// The lobe with the light that its microsurface reflects several times: `f (1 + F0 (1 - E) / E)`, `E` the albedo of a lobe with
@@ -102,7 +117,7 @@ impl GgxLobe {
     /// `true` for a lobe that photons of lights without extent resolve, in the caustic map: it is wider than the code of their
     /// directions, and than a disc of photons is seen from the things that reflect them.
     pub(super) fn gathers_caustics(&self) -> bool {
-        self.alpha >= MIN_CAUSTIC_ALPHA
+        self.alpha >= MIN_CAUSTIC_ALPHA && !self.is_layer
     }
 
     /// `a`.

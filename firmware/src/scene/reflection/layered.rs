@@ -3,7 +3,7 @@
 //! A path takes one layer at random, in proportion to its share of the light, and the reflection of that layer over the probability:
 //! the samples of a pixel cover all of them. So a surface has one lobe whatever its layers, in registers and in the record of a
 //! waiting gather. Light that reaches a layer is dimmed by the directional albedo of those above it. Coat, sheen and transmission are
-//! followed by rays, and only the base is lit by photons: `NARROW_LOBE` or not.
+//! followed by rays, and photons light the base alone.
 
 use glam::Vec3;
 use photoncard_shared::layout::{COMPENSATED, Layers, Material, NARROW_LOBE, Reflectance, THIN_WALLED};
@@ -70,6 +70,8 @@ pub(in crate::scene) struct Taken {
     /// Shading normal.
     pub(in crate::scene) normal: Vec3,
     pub(in crate::scene) probability: f32,
+    /// Probability of all layers of this side.
+    pub(in crate::scene) of_front: f32,
 }
 
 /// All layers at a point.
@@ -125,6 +127,8 @@ impl Stack {
         let sum: f32 = shares.iter().map(|(_, share)| share).sum();
         let bounded = |share: f32| if share > 0.0 { max(share, sum * MIN_PROBABILITY) } else { 0.0 };
         let all: f32 = shares.iter().map(|&(_, share)| bounded(share)).sum();
+        let [.., (_, behind)] = shares;
+        let of_front = if all > 0.0 { 1.0 - bounded(behind) / all } else { 1.0 };
         let mut rest = random * all;
         let mut taken = (Layer::Base, 1.0);
         for (layer, share) in shares {
@@ -148,7 +152,7 @@ impl Stack {
         // Whichever layer the light goes to, it has come through the glass.
         let scattering = Scattering { absorption: self.base.absorption, ..scattering };
         let scattering = dimmed(scattering, Vec3::splat(1.0 / probability));
-        Taken { layer, scattering, normal, probability }
+        Taken { layer, scattering, normal, probability, of_front }
     }
 }
 
@@ -184,13 +188,17 @@ fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
         grazing: factor,
         metallic: 0.0,
         roughness,
-        has_narrow_lobe: true,
+        has_narrow_lobe: false,
         is_compensated: false,
     };
     let (_, specular) = surface.smooth(cosine);
     let fresnel = max_component(specular.reflected);
     if layers.coat_roughness > 0.0 {
-        (Scattering { reflection: surface.reflection(cosine), ..Scattering::BLACK }, fresnel)
+        let mut reflection = surface.reflection(cosine);
+        if let Lobe::Ggx(lobe) = reflection.lobe {
+            reflection.lobe = Lobe::Ggx(lobe.as_layer());
+        }
+        (Scattering { reflection, ..Scattering::BLACK }, fresnel)
     } else {
         (Scattering { specular, ..Scattering::BLACK }, fresnel)
     }
@@ -270,9 +278,8 @@ fn rough_glass(
     outside.diffuse *= 1.0 - transmission;
     let reflected = Scattering { reflection: outside, ..Scattering::BLACK };
     if is_thin {
-        let mut lobe = GgxLobe::new(through, through, roughness, cosine);
-        lobe.is_followed = true;
-        return (reflected, normal, Reflection { diffuse: Vec3::ZERO, lobe: Lobe::Ggx(lobe) });
+        let lobe = Lobe::Ggx(GgxLobe::new(through, through, roughness, cosine).as_layer());
+        return (reflected, normal, Reflection { diffuse: Vec3::ZERO, lobe });
     }
     let microfacet = microfacet(normal, outgoing, roughness, point);
     let tint = Vec3::from_array(colour.to_array().map(libm::sqrtf));
@@ -288,8 +295,11 @@ fn rough_glass(
         let specular = Specular { reflected: Vec3::ZERO, transmitted, ..refracted };
         return (Scattering { specular, ..reflected }, normal, Reflection::BLACK);
     }
-    let specular = Specular { reflected: refracted.reflected * beside, transmitted, ..refracted };
-    (Scattering { specular, absorption, ..Scattering::BLACK }, microfacet, Reflection::BLACK)
+    let reflected = refracted.reflected * beside;
+    let specular = Specular { reflected, transmitted, beside: mirrored, ..refracted };
+    let diffuse = outside.diffuse;
+    let reflection = Reflection::lambertian(diffuse);
+    (Scattering { reflection, specular, absorption }, normal, Reflection::BLACK)
 }
 
 /// The greatest albedo of all ways on from a point.

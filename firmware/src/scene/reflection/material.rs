@@ -88,7 +88,7 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
             // Light passes a volume's surface twice, and is tinted once.
             let tint = if is_thin { base } else { Vec3::from_array(base.to_array().map(libm::sqrtf)) };
             let glass = Glass { base: tint, absorption, transmission, ior, specular, is_thin };
-            let (diffuse, specular) = glass.at(outgoing, normals, !is_front);
+            let (scattered, specular) = glass.at(outgoing, normals, !is_front);
             // Metal is opaque.
             let [metallic, roughness] = [metallic * texel.metallic, roughness * texel.roughness];
             let metal = MetallicRoughness {
@@ -100,7 +100,8 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
                 has_narrow_lobe,
                 is_compensated,
             };
-            scattering.reflection = metal.lobe_beside(diffuse * (1.0 - metallic), metallic, cosine);
+            scattering.reflection =
+                metal.lobe_beside(base * (scattered * (1.0 - metallic)), metallic, cosine);
             scattering.specular = specular.dimmed(1.0 - metallic);
             if !(is_front || is_thin) {
                 scattering.absorption = absorption;

@@ -2,9 +2,8 @@
 //!
 //! - The lobe is [`GgxLobe`]: `F0` is the dielectric's with the share `1 - metallic`, the base colour with the share `metallic`;
 //!   `F90` is the factor of `KHR_materials_specular` with the share `1 - metallic`, 1 with the share `metallic`.
-//! - The Lambertian albedo is `base (1 - metallic) (1 - E)`, `E` the greatest channel of the dielectric lobe's albedo for the
-//!   outgoing direction: what the coat reflects does not reach the base. (Appendix B weights by `1 - F` of the half vector, which loses
-//!   the light that rough coats mask.)
+//! - The Lambertian albedo is `base (1 - metallic) (1 - max(F, E))`: `F` the mean of the dielectric's `F(h.o)` over even light, by
+//!   which appendix B weights the base, and `E` the greatest channel of the lobe's albedo towards `o`, greater at grazing views.
 //! - Of roughness 0 the coat is perfectly specular, with Schlick's reflectance at the angle.
 
 use glam::Vec3;

@@ -5,7 +5,7 @@
 //! - `G = 1 / (1 + l(n.o) + l(n.i))`, `l` the fit of that paper.
 //!
 //! Directions are sampled evenly over the hemisphere: the lobe is wide, and strongest at grazing angles. `E`, the directional albedo
-//! of a white lobe, is in a table; a narrow lobe's exceeds 1 at grazing angles, and counts as 1.
+//! of a white lobe, is in a table. A roughness below 0.25 counts as 0.25: `E` would exceed 1 at grazing angles.
 
 use core::f32::consts::PI;
 
@@ -14,8 +14,8 @@ use glam::Vec3;
 use super::ggx_albedo::{SIDE, interpolated};
 use crate::vector::{from_frame, max, max_component, unit};
 
-/// Minimum of `a`.
-const MIN_ALPHA: f32 = 1e-3;
+/// Minimum roughness: a narrower lobe would reflect more light at grazing angles than arrives.
+const MIN_ROUGHNESS: f32 = 0.25;
 /// Density of the directions, 1/sr.
 const DENSITY: f32 = 0.5 / PI;
 
@@ -31,8 +31,9 @@ pub(super) struct SheenLobe {
 impl SheenLobe {
     /// The lobe of a roughness, 0 to 1, seen at a cosine to the normal.
     pub(super) fn new(colour: Vec3, roughness: f32, cosine: f32) -> Self {
+        let roughness = max(roughness, MIN_ROUGHNESS);
         let of_white = interpolated(&ALBEDOS, roughness, cosine);
-        Self { colour, alpha: max(roughness * roughness, MIN_ALPHA), of_white }
+        Self { colour, alpha: roughness * roughness, of_white }
     }
 
     /// `true` if some light is reflected.
