@@ -4,7 +4,7 @@ mod scene_support;
 
 use glam::Vec3;
 use photoncard_driver::scene::{Coat, DiffuseTransmission, Layers, Material, Reflection, Sheen};
-use scene_support::{load_changed, push};
+use scene_support::{Extended, load_changed, push};
 use serde_json::{Value, json};
 
 /// A PNG of one texel.
@@ -12,14 +12,15 @@ const TEXEL: &str = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAA
 
 /// The only material after a change of it; the file has one texture.
 fn material(change: impl FnOnce(&mut Value)) -> Result<Material, String> {
-    let scene = load_changed(|json| {
-        json["images"] = json!([{"uri": TEXEL}]);
-        json["textures"] = json!([{"source": 0}]);
-        let material = &mut json["materials"][0];
-        material["extensions"].as_object_mut().unwrap().remove("KHR_materials_specular");
-        change(material);
-    });
-    scene.map(|scene| scene.materials[0].clone()).map_err(|error| error.to_string())
+    let mut scene = Extended::new();
+    let coordinates = scene.floats("VEC2", &[[0.0; 2], [1.0, 0.0], [0.0, 1.0]]);
+    scene.primitive()["attributes"]["TEXCOORD_0"] = json!(coordinates);
+    scene.json["images"] = json!([{"uri": TEXEL}]);
+    scene.json["textures"] = json!([{"source": 0}]);
+    let material = &mut scene.json["materials"][0];
+    material["extensions"].as_object_mut().unwrap().remove("KHR_materials_specular");
+    change(material);
+    scene.load().map(|scene| scene.materials[0].clone()).map_err(|error| error.to_string())
 }
 
 fn layers(change: impl FnOnce(&mut Value)) -> Layers {
@@ -81,7 +82,7 @@ fn what_is_out_of_range_is_refused_with_its_place() {
             "KHR_materials_clearcoat.clearcoatTexture",
         ),
         ("KHR_materials_sheen", json!({"sheenColorFactor": [2.0, 0.0, 0.0]}), "KHR_materials_sheen"),
-        ("KHR_materials_sheen", json!([]), "KHR_materials_sheen"),
+        ("KHR_materials_sheen", json!("silk"), "KHR_materials_sheen"),
         (
             "KHR_materials_diffuse_transmission",
             json!({"diffuseTransmissionFactor": -1.0}),
