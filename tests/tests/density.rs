@@ -4,10 +4,11 @@ use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::Radiance;
-use photoncard_driver::scene::{Material, Scene, Triangle};
+use photoncard_driver::scene::{Encoding, Image, Material, Scene, Texture, Triangle};
 use photoncard_firmware::photon::{CandidateBuffer, Estimate, LitBy, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::scene::{PartialReflection, Reflection, Surface};
 use photoncard_firmware::simd::Level;
+use photoncard_tests::shapes::add_textured_quad;
 use photoncard_tests::{camera, lambertian, quad, room, scene};
 
 const NEIGHBORS: u32 = 100;
@@ -146,6 +147,30 @@ fn the_radiance_of_shelves_above_one_another_is_that_of_the_wall() {
         assert!((within - 1.0).abs() < 0.05, "on the shelves it is {within}");
         assert!((edge - 1.0).abs() < 0.06, "at their edge it is {edge}");
     }
+}
+
+/// A lattice of a texture, with holes narrower than a gather's radius.
+#[test]
+fn the_radiance_of_a_lattice_is_that_of_the_wall() {
+    let lattice =
+        Material { alpha_cutoff: Some(0.5), base_texture: Some(0), double_sided: true, ..glowing() };
+    let mut furnace = cluttered_furnace(Vec::new(), lattice);
+    let texels = [255, 0, 0, 255].map(|alpha| [255, 255, 255, alpha]).to_vec();
+    furnace.images.push(Image {
+        name: "lattice".into(),
+        width: 2,
+        height: 2,
+        texels,
+        encoding: Encoding::Srgb,
+    });
+    furnace.textures.push(Texture { nearest: true, ..Texture::new(0) });
+    let corners = [[-1., 1.], [1., 1.], [1., -1.], [-1., -1.]].map(|[x, z]| Vec3::new(0.4 * x, 0.0, 0.4 * z));
+    add_textured_quad(&mut furnace, corners, [[0., 0.], [40., 0.], [40., 40.], [0., 40.]], 1);
+    let map = Map::new(&furnace, 300_000);
+    let lines = [-0.2, -0.1, 0.0, 0.1, 0.2]
+        .map(|z| map.mean_along(Vec3::new(-0.2, 0.0, z), Vec3::new(0.2, 0.0, z), Vec3::Y));
+    let mean = lines.iter().sum::<f64>() / 5.0;
+    assert!((mean - 1.0).abs() < 0.04, "{mean}");
 }
 
 /// Bars narrower than a gather's radius, close above a floor, with gaps of their width: a search on the floor finds their

@@ -128,7 +128,7 @@ impl Crossing {
         Self { key, height, triangle, slope }
     }
 
-    fn chord(&self) -> usize {
+    pub(super) fn chord(&self) -> usize {
         (self.key >> 33) as usize
     }
 

@@ -13,7 +13,7 @@
 use glam::Vec3;
 use photoncard_firmware::photon::MIN_NORMAL_COSINE;
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, magnitude, offset_origin};
+use photoncard_firmware::scene::{Ray, is_there, magnitude, offset_origin};
 use photoncard_firmware::simd::run;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{FULL_DISC, LEAF_PHOTONS, Photon, PhotonLeaf, decode_normal, encode_disc};
@@ -232,6 +232,9 @@ impl<'a> Meter<'a> {
         } else {
             self.cross_by_rays(frame, &chords, ball)?;
         }
+        if self.sides.has_cut_outs {
+            self.leave_out_cut_outs(frame, &chords, ball)?;
+        }
         let sides = self.sides;
         self.crossings.open_surfaces(&chords, |triangle| sides.of(triangle), &mut self.surfaces);
         let lift = self.lift(radius) / ball.radius;
@@ -246,6 +249,26 @@ impl<'a> Meter<'a> {
             fractions[photon.photon] = run(within);
         }
         Ok(())
+    }
+
+    /// Removes crossings of triangles where these are cut out.
+    fn leave_out_cut_outs(&mut self, frame: &ChordFrame, chords: &Chords, ball: Ball) -> Result<(), Fault> {
+        let Self { sides, searcher: Searcher { scene, memory, .. }, crossings, .. } = self;
+        let [tangent, bitangent, normal] = frame.axes;
+        let mut fault = None;
+        crossings.list.retain(|crossing| {
+            if !sides.of(crossing.triangle).has_cut_outs {
+                return true;
+            }
+            let [x, y] = chords.point(crossing.chord());
+            let along = tangent * x + bitangent * y + normal * crossing.height;
+            let found = is_there(scene, memory, crossing.triangle, ball.centre + along * ball.radius);
+            found.unwrap_or_else(|error| {
+                fault = Some(error);
+                true
+            })
+        });
+        fault.map_or(Ok(()), Err)
     }
 
     /// Frame along the normal of a photon. The reference point is above the photon with no surface in between: at

@@ -22,6 +22,8 @@ pub(super) struct Sides {
     normals: [Option<u8>; 2],
     /// True if the back faces the inside of a solid. The back of a double-sided sheet is as open as its front.
     pub(super) is_solid: bool,
+    /// True if parts of the triangle are not there, by its texture.
+    pub(super) has_cut_outs: bool,
 }
 
 impl Sides {
@@ -35,6 +37,8 @@ impl Sides {
 /// Sides of all triangles of an image.
 pub(super) struct SideTable {
     sides: Vec<Sides>,
+    /// True if any triangle has cut-outs.
+    pub(super) has_cut_outs: bool,
 }
 
 /// Properties of a material that decide on its triangles' sides.
@@ -45,6 +49,8 @@ struct Finish {
     transmits: bool,
     emits: bool,
     is_double_sided: bool,
+    /// Partial coverage is no cut-out: photons stored there count for it.
+    blends: bool,
 }
 
 impl SideTable {
@@ -70,6 +76,7 @@ impl SideTable {
                         || transmits_diffusely(&scene, &mut memory, &material)?,
                     emits: material.emission.into_iter().any(|radiance| radiance > 0.0),
                     is_double_sided: material.flags & DOUBLE_SIDED != 0,
+                    blends: material.flags & BLENDS != 0,
                 })
             })
             .collect();
@@ -82,11 +89,15 @@ impl SideTable {
                 let triangle = leaf.triangle(slot);
                 let missing = Fault { code: FaultCode::Record, detail: triangle.material };
                 let finish = finishes.get(triangle.material as usize).ok_or(missing)?;
-                *sides = Sides::of(triangle.vertices, *finish);
+                *sides = Sides {
+                    has_cut_outs: triangle.cut_out && !finish.blends,
+                    ..Sides::of(triangle.vertices, *finish)
+                };
             }
             Ok(())
         })?;
-        let mut table = Self { sides };
+        let has_cut_outs = sides.iter().any(|sides| sides.has_cut_outs);
+        let mut table = Self { sides, has_cut_outs };
         if finishes.iter().any(|finish| finish.is_double_sided) {
             table.find_closed_sheets(leaves, &finishes);
         }
@@ -161,6 +172,7 @@ impl Sides {
         Self {
             normals: [code(normal, reflects), code(-normal, reflects && is_double_sided)],
             is_solid: !is_double_sided && !transmits,
+            has_cut_outs: false,
         }
     }
 }

@@ -86,7 +86,8 @@ impl Surroundings {
             let is_along = normal.dot(*plane.get_or_insert(normal)) >= MIN_PLAIN_COSINE;
             let is_at = normal.dot(a).abs() <= lift;
             let is_side = sides.of(index).normal(true) == Some(wall.normal);
-            is_along && is_at && is_side && triangles.push(*corners).is_ok()
+            let is_whole = !sides.of(index).has_cut_outs;
+            is_along && is_at && is_side && is_whole && triangles.push(*corners).is_ok()
         });
         self.stack = stack;
         let Some(normal) = plane.filter(|_| is_plane == Ok(true)) else { return is_plane.map(|_| false) };

@@ -3,6 +3,7 @@
 mod bvh;
 mod corners;
 mod coverage;
+mod cut_out;
 pub mod light;
 mod materials;
 mod normal_map;
@@ -16,6 +17,7 @@ mod texture;
 mod triangle;
 
 pub use bvh::{AnyHit, ClosestHit, closest_hit, is_occluded};
+pub use cut_out::is_there;
 pub use reflection::{
     DecodedLobe, NARROW_ALPHA, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,
 };

@@ -1,0 +1,29 @@
+//! Cut-outs at a place.
+
+use glam::Vec3;
+use photoncard_shared::message::Fault;
+
+use super::SceneImage;
+use super::bvh::read_triangle;
+use super::coverage::coverage;
+use super::materials::read_material;
+use crate::memory::MemoryPort;
+
+/// `true` if no cut-out is at a point of triangle `index`, metres; points off its plane are projected.
+///
+/// # Errors
+/// If the image is not sound.
+pub fn is_there(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    index: u32,
+    place: Vec3,
+) -> Result<bool, Fault> {
+    let triangle = read_triangle(scene, memory, index)?;
+    let material = read_material(scene, memory, triangle.material)?;
+    let [a, b, c] = triangle.vertices.map(Vec3::from_array);
+    let normal = (b - a).cross(c - a);
+    let weight = |from: Vec3, to: Vec3| (to - from).cross(place - from).dot(normal) / normal.length_squared();
+    let weights = [weight(b, c), weight(c, a), weight(a, b)];
+    Ok(coverage(scene, memory, &material, index, weights)? > 0.0)
+}
