@@ -55,7 +55,7 @@ vive-cosmos webxr-assets $profiles/htc-vive-cosmos/left.glb white
 trigger webxr-assets $profiles/generic-trigger-squeeze/none.glb white
 pico webxr-assets $profiles/pico-4u/left.glb white
 hand webxr-assets $profiles/generic-hand/left.glb white
-suzi-draco pmndrs-assets package/models/suzi.glb refused requires the extension KHR_draco_mesh_compression
+suzi-draco pmndrs-assets package/models/suzi.glb white
 END
 }
 

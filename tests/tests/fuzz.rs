@@ -18,6 +18,7 @@ const INPUTS: [(&str, u64); NAMES.len()] = [
     ("image", 6000),
     ("gltf", 8000),
     ("meshopt", 8000),
+    ("draco", 8000),
     ("textures", 6000),
     ("environments", 20_000),
     ("exr", 8000),

@@ -3,10 +3,10 @@
 //! No input may panic, take longer than some seconds, or allocate more than a bound. A coverage-guided fuzzer would do
 //! more, but needs another compiler; here a failing input is replayed by its number.
 
+mod compressed;
 pub(crate) mod environment;
 pub(crate) mod gltf;
 mod image;
-mod meshopt;
 mod messages;
 pub(crate) mod mutation;
 pub(crate) mod picture;
@@ -25,8 +25,8 @@ pub use self::run::{Failure, Report, Settings, fuzz};
 pub use self::target::Target;
 
 /// Names of all targets.
-pub const NAMES: [&str; 9] =
-    ["frames", "messages", "session", "image", "gltf", "meshopt", "textures", "environments", "exr"];
+pub const NAMES: [&str; 10] =
+    ["frames", "messages", "session", "image", "gltf", "meshopt", "draco", "textures", "environments", "exr"];
 
 /// Target with the name `name`.
 pub fn target(name: &str) -> Option<Arc<dyn Target>> {
@@ -36,7 +36,8 @@ pub fn target(name: &str) -> Option<Arc<dyn Target>> {
         "session" => Some(Arc::new(session::Sessions::new())),
         "image" => Some(Arc::new(image::Image::new())),
         "gltf" => Some(Arc::new(gltf::Scenes::new())),
-        "meshopt" => Some(Arc::new(meshopt::Streams::new())),
+        "meshopt" => Some(Arc::new(compressed::Streams::meshopt())),
+        "draco" => Some(Arc::new(compressed::Streams::draco())),
         "textures" => Some(Arc::new(texture::Textures::new())),
         "environments" => Some(Arc::new(environment::Environments::new())),
         "exr" => Some(Arc::new(picture::Pictures::new())),

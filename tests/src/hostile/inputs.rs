@@ -21,7 +21,7 @@ pub struct Inputs {
     seeds: Vec<Seed>,
 }
 
-const SCENES: [&str; 11] = [
+const SCENES: [&str; 13] = [
     "scenes/cornell.gltf",
     "scenes/cornell-glossy.gltf",
     "scenes/cornell-uplight.gltf",
@@ -33,6 +33,8 @@ const SCENES: [&str; 11] = [
     "scenes/atrium.glb",
     "driver/tests/compressed/meshopt-0.glb",
     "driver/tests/compressed/meshopt-1.glb",
+    "driver/tests/compressed/draco-edgebreaker.glb",
+    "driver/tests/compressed/draco-sequential.glb",
 ];
 
 const IMAGES: [&str; 14] = [

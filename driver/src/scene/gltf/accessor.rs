@@ -2,7 +2,8 @@
 //!
 //! Nothing is allocated for an accessor's count: it need not be backed by bytes (glTF fills with zeros).
 
-use std::cell::RefCell;
+use std::borrow::Cow;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 
 use gltf::json;
@@ -21,6 +22,16 @@ pub(super) struct Source<'a> {
     buffers: &'a Buffers<'a>,
     /// Cache of accessors whose sparse indices were found to be increasing: many primitives may share one.
     increasing: RefCell<BTreeSet<usize>>,
+    /// Sums over all primitives that were decompressed.
+    pub(super) decompressed: Decompressed,
+}
+
+/// Sums over decompressed primitives.
+#[derive(Default)]
+pub(super) struct Decompressed {
+    pub(super) triangles: Cell<u64>,
+    /// Size of their attributes and indices, bytes.
+    pub(super) bytes: Cell<u64>,
 }
 
 /// Valid formats of an accessor, depending on its use.
@@ -41,6 +52,14 @@ pub(super) enum Integers {
     AsStated,
 }
 
+/// Statements of an accessor on its elements.
+#[derive(Clone, Copy)]
+pub(super) struct Header {
+    pub(super) count: u64,
+    pub(super) kind: Type,
+    pub(super) component: ComponentType,
+}
+
 /// Elements of one accessor.
 pub(super) struct Elements<'a> {
     pub(super) count: u64,
@@ -53,13 +72,13 @@ pub(super) struct Elements<'a> {
 
 /// Elements of equal size at a constant stride.
 struct Strided<'a> {
-    bytes: &'a [u8],
+    bytes: Cow<'a, [u8]>,
     stride: usize,
     size: usize,
 }
 
-impl<'a> Strided<'a> {
-    fn get(&self, index: usize) -> Option<&'a [u8]> {
+impl Strided<'_> {
+    fn get(&self, index: usize) -> Option<&[u8]> {
         let start = index.checked_mul(self.stride)?;
         self.bytes.get(start..start.checked_add(self.size)?)
     }
@@ -72,12 +91,12 @@ struct Sparse<'a> {
     values: Strided<'a>,
 }
 
-impl<'a> Sparse<'a> {
+impl Sparse<'_> {
     fn index(&self, position: usize) -> Option<u64> {
         self.indices.get(position).map(unsigned)
     }
 
-    fn get(&self, index: u64) -> Option<&'a [u8]> {
+    fn get(&self, index: u64) -> Option<&[u8]> {
         let (mut low, mut high) = (0, self.count);
         while low < high {
             let middle = low + (high - low) / 2;
@@ -109,21 +128,16 @@ fn unsigned(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |value, &byte| value << 8 | u64::from(byte))
 }
 
-impl<'a> Elements<'a> {
-    /// Elements of the accessor `index`, which `item` refers to and which must have a valid format.
-    pub(super) fn new(
-        source: &Source<'a>,
+impl Header {
+    /// Header of the accessor `index`, which `item` refers to and which must have a valid format.
+    fn of(
+        document: &Document,
         index: usize,
+        accessor: &json::Accessor,
         item: &str,
         format: &Format,
     ) -> Result<Self, SceneError> {
-        let document = source.document;
         let here = format!("accessors[{index}]");
-        let accessor = document
-            .root
-            .accessors
-            .get(index)
-            .ok_or_else(|| document.invalid(item, format!("accessor {index} does not exist"), REMEDY))?;
         let component = match accessor.component_type {
             Checked::Valid(component) if format.components.contains(&component.0) => component.0,
             _ => {
@@ -143,14 +157,47 @@ impl<'a> Elements<'a> {
                 return Err(document.invalid(item, reason, REMEDY));
             }
         };
-        let components = kind.multiplicity();
-        let size = component.size() * components;
-        let count = accessor.count.0;
-        let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
-        let base = accessor
-            .buffer_view
-            .map(|view| source.strided(view.value(), offset, count, size, &here))
-            .transpose()?;
+        Ok(Self { count: accessor.count.0, kind, component })
+    }
+
+    /// Size of an element, bytes.
+    pub(super) fn size(self) -> usize {
+        self.component.size() * self.kind.multiplicity()
+    }
+}
+
+impl<'a> Elements<'a> {
+    /// Elements of the accessor `index`, which `item` refers to and which must have a valid format.
+    pub(super) fn new(
+        source: &Source<'a>,
+        index: usize,
+        item: &str,
+        format: &Format,
+    ) -> Result<Self, SceneError> {
+        Self::decompressed(source, index, item, format, |_| Ok(None))
+    }
+
+    /// Elements as [`new`](Self::new), over the bytes that `decompress` has for the accessor instead of those of its buffer view.
+    pub(super) fn decompressed(
+        source: &Source<'a>,
+        index: usize,
+        item: &str,
+        format: &Format,
+        decompress: impl FnOnce(Header) -> Result<Option<Vec<u8>>, SceneError>,
+    ) -> Result<Self, SceneError> {
+        let accessor = source.accessor(index, item)?;
+        let here = format!("accessors[{index}]");
+        let header = Header::of(source.document, index, accessor, item, format)?;
+        let Header { count, kind, component } = header;
+        let size = header.size();
+        let base = match decompress(header)? {
+            Some(bytes) => Some(Strided { bytes: bytes.into(), stride: size, size }),
+            None => {
+                let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
+                let view = accessor.buffer_view.map(|view| view.value());
+                view.map(|view| source.strided(view, offset, count, size, &here)).transpose()?
+            }
+        };
         let sparse =
             accessor.sparse.as_ref().map(|sparse| source.sparse(index, sparse, count, size)).transpose()?;
         let is_normalized = match format.integers {
@@ -158,11 +205,25 @@ impl<'a> Elements<'a> {
             Integers::Normalized => true,
             Integers::AsStated => accessor.normalized,
         };
-        Ok(Self { count, component, components, is_normalized, base, sparse })
+        Ok(Self { count, component, components: kind.multiplicity(), is_normalized, base, sparse })
+    }
+
+    /// Indices that were decompressed, without an accessor of them.
+    pub(super) fn indices(indices: impl Iterator<Item = u32>) -> Self {
+        let bytes: Vec<u8> = indices.flat_map(u32::to_le_bytes).collect();
+        let size = size_of::<u32>();
+        Self {
+            count: (bytes.len() / size) as u64,
+            component: ComponentType::U32,
+            components: 1,
+            is_normalized: false,
+            base: Some(Strided { bytes: bytes.into(), stride: size, size }),
+            sparse: None,
+        }
     }
 
     /// Bytes of an element; `None` if glTF defines it as zero.
-    fn bytes(&self, index: u64) -> Option<&'a [u8]> {
+    fn bytes(&self, index: u64) -> Option<&[u8]> {
         let replaced = self.sparse.as_ref().and_then(|sparse| sparse.get(index));
         replaced.or_else(|| self.base.as_ref()?.get(usize::try_from(index).ok()?))
     }
@@ -206,12 +267,18 @@ impl<'a> Elements<'a> {
 
 impl<'a> Source<'a> {
     pub(super) fn new(document: &'a Document, buffers: &'a Buffers<'a>) -> Self {
-        Self { document, buffers, increasing: RefCell::default() }
+        Self { document, buffers, increasing: RefCell::default(), decompressed: Decompressed::default() }
+    }
+
+    /// The accessor `index`, which `item` refers to.
+    fn accessor(&self, index: usize, item: &str) -> Result<&'a json::Accessor, SceneError> {
+        let found = self.document.root.accessors.get(index);
+        found.ok_or_else(|| self.document.invalid(item, format!("accessor {index} does not exist"), REMEDY))
     }
 
     /// Bytes of the buffer view `view`, which `item` refers to.
     pub(super) fn bytes(&self, view: usize, item: &str) -> Result<&'a [u8], SceneError> {
-        let (bytes, _) = self.view(view)?;
+        let (bytes, _) = self.view(view, item)?;
         bytes.ok_or_else(|| {
             let reason = format!("bufferViews[{view}] reaches beyond its buffer");
             self.document.invalid(item, reason, REMEDY)
@@ -228,7 +295,7 @@ impl<'a> Source<'a> {
         item: &str,
     ) -> Result<Strided<'a>, SceneError> {
         let fault = |reason: String| self.document.invalid(item, reason, REMEDY);
-        let (Some(bytes), stride) = self.view(view)? else {
+        let (Some(bytes), stride) = self.view(view, item)? else {
             return Err(fault(format!("bufferViews[{view}] reaches beyond its buffer")));
         };
         let stride = stride.unwrap_or(size);
@@ -242,7 +309,7 @@ impl<'a> Source<'a> {
         let bytes = usize::try_from(offset).ok().and_then(|offset| bytes.get(offset..));
         match (bytes, needed) {
             (Some(bytes), Some(needed)) if needed <= bytes.len() as u64 => {
-                Ok(Strided { bytes, stride, size })
+                Ok(Strided { bytes: bytes.into(), stride, size })
             }
             _ => {
                 let reason = format!(
@@ -254,9 +321,9 @@ impl<'a> Source<'a> {
     }
 
     /// Bytes of a buffer view, `None` if they exceed the buffer, and its stride.
-    fn view(&self, index: usize) -> Result<(Option<&'a [u8]>, Option<usize>), SceneError> {
+    fn view(&self, index: usize, item: &str) -> Result<(Option<&'a [u8]>, Option<usize>), SceneError> {
         let view = self.document.root.buffer_views.get(index).ok_or_else(|| {
-            self.document.invalid("bufferViews", format!("buffer view {index} does not exist"), REMEDY)
+            self.document.invalid(item, format!("buffer view {index} does not exist"), REMEDY)
         })?;
         let bytes = self.buffers.view(self.document, index, view)?;
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))

@@ -10,8 +10,8 @@ use super::extensions::MESHOPT;
 use crate::error::SceneError;
 use crate::scene::meshopt::{self, Fault, Filter, Layout, Mode};
 
-/// Maximum size of all decoded buffer views together, bytes: more than any scene's vertices take.
-const MAX_DECODED: u64 = 1 << 32;
+/// Maximum size of all decoded buffer views together, and of all decoded primitives, bytes: more than any scene's vertices take.
+pub(super) const MAX_DECODED: u64 = 1 << 32;
 
 const REMEDY: &str = "compress the file again, or export it without the extension";
 

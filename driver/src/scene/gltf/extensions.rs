@@ -1,11 +1,12 @@
 //! glTF extensions that the loader supports.
 
 /// Names of the supported extensions.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 18] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 19] = [
     INSTANCING,
     WEBP,
     MESHOPT[0],
     MESHOPT[1],
+    DRACO,
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
@@ -32,13 +33,15 @@ pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 /// Compressed buffer views: one format under two names.
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
+/// Compressed primitives.
+pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
+
 /// Image of a texture, in WebP.
 pub(super) const WEBP: &str = "EXT_texture_webp";
 
 /// Command of glTF-Transform that removes an extension without loss of its contents, as a clause of the remedy; empty for others.
 pub(super) fn removal(name: &str) -> &'static str {
     match name {
-        "KHR_draco_mesh_compression" => ", for example by `npx @gltf-transform/cli copy IN.glb OUT.glb`",
         "KHR_texture_basisu" => ", for example by `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`",
         _ => "",
     }

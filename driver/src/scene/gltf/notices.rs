@@ -11,7 +11,7 @@ use super::light;
 use super::material::has_dark_texture;
 use super::names::mesh_name;
 use super::not_finite::NotFinite;
-use super::primitive::Topology;
+use super::topology::Topology;
 
 /// Maximum number of names in a notice; further ones are counted.
 const LISTED: usize = 8;

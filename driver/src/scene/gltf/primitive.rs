@@ -6,11 +6,13 @@ use std::collections::HashSet;
 use glam::Vec4;
 use gltf::json;
 use gltf::json::accessor::{ComponentType, Type};
-use gltf::json::mesh::{Mode, Semantic};
+use gltf::json::mesh::Semantic;
 use gltf::json::validation::Checked;
 
 use super::accessor::{Elements, Format, Integers, Source};
+use super::draco::Decoded;
 use super::room::{self, Room};
+use super::topology::Topology;
 use crate::allocation::OutOfMemory;
 use crate::error::SceneError;
 
@@ -58,45 +60,6 @@ const fn tangents(is_quantized: bool) -> Format {
     Format { types: &[Type::Vec4], components, integers: Integers::Normalized }
 }
 
-/// Topology of triangles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Topology {
-    List,
-    Strip,
-    Fan,
-}
-
-impl Topology {
-    /// Topology of a primitive, if it consists of triangles.
-    pub(super) fn of(primitive: &json::mesh::Primitive) -> Option<Self> {
-        match primitive.mode {
-            Checked::Valid(Mode::Triangles) => Some(Self::List),
-            Checked::Valid(Mode::TriangleStrip) => Some(Self::Strip),
-            Checked::Valid(Mode::TriangleFan) => Some(Self::Fan),
-            _ => None,
-        }
-    }
-
-    /// Number of triangles of `vertices` vertices; `None` if some are left over.
-    fn triangles(self, vertices: u64) -> Option<u64> {
-        match self {
-            Self::List => vertices.is_multiple_of(3).then_some(vertices / 3),
-            Self::Strip | Self::Fan if vertices == 0 => Some(0),
-            Self::Strip | Self::Fan => vertices.checked_sub(2).filter(|triangles| *triangles > 0),
-        }
-    }
-
-    /// Vertices of a triangle, counter-clockwise (glTF 2.0, 3.7.2.1).
-    fn vertices(self, triangle: u64) -> [u64; 3] {
-        let odd = triangle % 2;
-        match self {
-            Self::List => [3 * triangle, 3 * triangle + 1, 3 * triangle + 2],
-            Self::Strip => [triangle, triangle + 1 + odd, triangle + 2 - odd],
-            Self::Fan => [triangle + 1, triangle + 2, 0],
-        }
-    }
-}
-
 /// Tangents of a primitive, in the mesh's space.
 pub(super) enum Tangents {
     /// Stated by the `TANGENT` attribute.
@@ -134,15 +97,31 @@ struct AttributeReader<'s, 'a> {
     source: &'s Source<'a>,
     item: String,
     primitive: &'s json::mesh::Primitive,
+    /// Its compressed attributes.
+    decoded: Option<Decoded<'s>>,
 }
 
 impl<'a> AttributeReader<'_, 'a> {
     fn get(&self, semantic: Semantic, format: &Format) -> Result<Option<Elements<'a>>, SceneError> {
-        let item = format!("{}.attributes.{}", self.item, semantic.to_string());
+        let name = semantic.to_string();
+        let item = format!("{}.attributes.{name}", self.item);
         let Some(accessor) = self.primitive.attributes.get(&Checked::Valid(semantic)) else {
             return Ok(None);
         };
-        Elements::new(self.source, accessor.value(), &item, format).map(Some)
+        let decompress = |header| match &self.decoded {
+            Some(decoded) => decoded.attribute(&name, header),
+            None => Ok(None),
+        };
+        Elements::decompressed(self.source, accessor.value(), &item, format, decompress).map(Some)
+    }
+
+    fn indices(&self) -> Result<Option<Elements<'a>>, SceneError> {
+        if let Some(decoded) = &self.decoded {
+            return Ok(Some(decoded.indices()));
+        }
+        let item = format!("{}.indices", self.item);
+        let accessor = self.primitive.indices;
+        accessor.map(|accessor| Elements::new(self.source, accessor.value(), &item, &INDICES)).transpose()
     }
 
     /// Rejects an attribute whose count differs from the positions'.
@@ -178,7 +157,10 @@ impl<'a> Primitive<'a> {
         let document = source.document;
         let primitive = &document.root.meshes[mesh].primitives[index];
         let item = format!("meshes[{mesh}].primitives[{index}]");
-        let attributes = AttributeReader { source, item: item.clone(), primitive };
+        let decoded = Decoded::of(source, mesh, index, topology)?;
+        // Whatever a compressed primitive was made of, its stream holds a list.
+        let topology = if decoded.is_some() { Topology::List } else { topology };
+        let attributes = AttributeReader { source, item: item.clone(), primitive, decoded };
         let is_quantized = document.is_quantized();
         let positions = attributes.get(Semantic::Positions, &positions(is_quantized))?.ok_or_else(|| {
             let reason = "the primitive has no POSITION";
@@ -195,10 +177,7 @@ impl<'a> Primitive<'a> {
                 return Err(document.invalid(format!("{item}.attributes"), reason, remedy));
             }
         }
-        let indices = primitive
-            .indices
-            .map(|accessor| Elements::new(source, accessor.value(), &format!("{item}.indices"), &INDICES));
-        let indices = indices.transpose()?;
+        let indices = attributes.indices()?;
         let count = indices.as_ref().map_or(positions.count, |indices| indices.count);
         let triangles = topology.triangles(count).ok_or_else(|| {
             let reason = format!("{count} vertices do not make whole triangles");
@@ -278,26 +257,5 @@ fn influences<'a>(
         let weights = attributes.of_count(count, Semantic::Weights(set), &WEIGHTS)?;
         let (Some(joints), Some(weights)) = (joints, weights) else { return Ok(pairs) };
         pairs.push((joints, weights));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The triangles of a quadrilateral have equal orientation in a strip and in a fan.
-    #[test]
-    fn strips_and_fans_keep_their_side() {
-        assert_eq!([0, 1].map(|triangle| Topology::List.vertices(triangle)), [[0, 1, 2], [3, 4, 5]]);
-        assert_eq!([0, 1].map(|triangle| Topology::Strip.vertices(triangle)), [[0, 1, 2], [1, 3, 2]]);
-        assert_eq!([0, 1].map(|triangle| Topology::Fan.vertices(triangle)), [[1, 2, 0], [2, 3, 0]]);
-    }
-
-    #[test]
-    fn vertices_make_whole_triangles() {
-        let counts = |topology: Topology| [0, 1, 2, 3, 4].map(|count| topology.triangles(count));
-        assert_eq!(counts(Topology::List), [Some(0), None, None, Some(1), None]);
-        assert_eq!(counts(Topology::Strip), [Some(0), None, None, Some(1), Some(2)]);
-        assert_eq!(counts(Topology::Fan), counts(Topology::Strip));
     }
 }

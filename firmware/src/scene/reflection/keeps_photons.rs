@@ -10,7 +10,7 @@ use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::scene::texture::{channel_ranges, read_texture};
 
-/// `true` for a material on whose surfaces photons are stored: at some texel its [`Reflection`] is not black.
+/// `true` for a material on whose surfaces photons are stored: at some texel its base reflects without a narrow lobe.
 ///
 /// # Errors
 /// If the image is not sound.

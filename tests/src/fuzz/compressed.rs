@@ -1,4 +1,4 @@
-//! Fuzzing of compressed buffer views: damaged streams in valid scenes.
+//! Fuzzing of compressed buffer views and primitives: damaged streams in valid scenes.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,14 +11,23 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound};
 
-/// Scenes with streams of every mode and filter, in both versions.
-pub(crate) const SEEDS: [&[u8]; 2] = [
+/// Scenes with buffer views of every mode and filter, in both versions of meshopt.
+const MESHOPT: [&[u8]; 2] = [
     include_bytes!("../../../driver/tests/compressed/meshopt-0.glb"),
     include_bytes!("../../../driver/tests/compressed/meshopt-1.glb"),
 ];
 
-/// Target of compressed buffer views. An input is a scene.
+/// Scenes with a primitive of every attribute, by both encoders of Draco.
+const DRACO: [&[u8]; 2] = [
+    include_bytes!("../../../driver/tests/compressed/draco-edgebreaker.glb"),
+    include_bytes!("../../../driver/tests/compressed/draco-sequential.glb"),
+];
+
+/// Target of compressed contents. An input is a scene.
 pub(super) struct Streams {
+    name: &'static str,
+    /// Maximum number of bytes that a byte of a stream stands for.
+    expansion: usize,
     /// JSON and streams of each scene.
     scenes: Vec<(Vec<u8>, Vec<u8>)>,
     streams: Vec<Vec<u8>>,
@@ -26,10 +35,20 @@ pub(super) struct Streams {
 }
 
 impl Streams {
-    pub(super) fn new() -> Self {
-        let scenes: Vec<_> = SEEDS.into_iter().filter_map(split_glb).collect();
+    pub(super) fn meshopt() -> Self {
+        Self::new("meshopt", MESHOPT, 1024)
+    }
+
+    pub(super) fn draco() -> Self {
+        // Its scenes have accessors of a few elements, which bound what a stream stands for.
+        Self::new("draco", DRACO, 0)
+    }
+
+    fn new(name: &'static str, seeds: [&[u8]; 2], expansion: usize) -> Self {
+        let scenes: Vec<_> = seeds.into_iter().filter_map(split_glb).collect();
         let streams = scenes.iter().map(|(_, streams)| streams.clone()).collect();
-        Self { scenes, streams, folder: tempfile::tempdir().expect("there is room for a folder") }
+        let folder = tempfile::tempdir().expect("there is room for a folder");
+        Self { name, expansion, scenes, streams, folder }
     }
 
     fn path(&self) -> PathBuf {
@@ -39,12 +58,11 @@ impl Streams {
 
 impl Target for Streams {
     fn name(&self) -> &'static str {
-        "meshopt"
+        self.name
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // A byte of a stream stands for at most 1024.
-        bound(input, 1024)
+        bound(input, self.expansion)
     }
 
     fn input(&self, random: &mut Random) -> Vec<u8> {

@@ -1,0 +1,65 @@
+//! Topologies of triangles: lists, strips and fans.
+
+use gltf::json;
+use gltf::json::mesh::Mode;
+use gltf::json::validation::Checked;
+
+/// Topology of triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Topology {
+    List,
+    Strip,
+    Fan,
+}
+
+impl Topology {
+    /// Topology of a primitive, if it consists of triangles.
+    pub(super) fn of(primitive: &json::mesh::Primitive) -> Option<Self> {
+        match primitive.mode {
+            Checked::Valid(Mode::Triangles) => Some(Self::List),
+            Checked::Valid(Mode::TriangleStrip) => Some(Self::Strip),
+            Checked::Valid(Mode::TriangleFan) => Some(Self::Fan),
+            _ => None,
+        }
+    }
+
+    /// Number of triangles of `vertices` vertices; `None` if some are left over.
+    pub(super) fn triangles(self, vertices: u64) -> Option<u64> {
+        match self {
+            Self::List => vertices.is_multiple_of(3).then_some(vertices / 3),
+            Self::Strip | Self::Fan if vertices == 0 => Some(0),
+            Self::Strip | Self::Fan => vertices.checked_sub(2).filter(|triangles| *triangles > 0),
+        }
+    }
+
+    /// Vertices of a triangle, counter-clockwise (glTF 2.0, 3.7.2.1).
+    pub(super) fn vertices(self, triangle: u64) -> [u64; 3] {
+        let odd = triangle % 2;
+        match self {
+            Self::List => [3 * triangle, 3 * triangle + 1, 3 * triangle + 2],
+            Self::Strip => [triangle, triangle + 1 + odd, triangle + 2 - odd],
+            Self::Fan => [triangle + 1, triangle + 2, 0],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The triangles of a quadrilateral have equal orientation in a strip and in a fan.
+    #[test]
+    fn strips_and_fans_keep_their_side() {
+        assert_eq!([0, 1].map(|triangle| Topology::List.vertices(triangle)), [[0, 1, 2], [3, 4, 5]]);
+        assert_eq!([0, 1].map(|triangle| Topology::Strip.vertices(triangle)), [[0, 1, 2], [1, 3, 2]]);
+        assert_eq!([0, 1].map(|triangle| Topology::Fan.vertices(triangle)), [[1, 2, 0], [2, 3, 0]]);
+    }
+
+    #[test]
+    fn vertices_make_whole_triangles() {
+        let counts = |topology: Topology| [0, 1, 2, 3, 4].map(|count| topology.triangles(count));
+        assert_eq!(counts(Topology::List), [Some(0), None, None, Some(1), None]);
+        assert_eq!(counts(Topology::Strip), [Some(0), None, None, Some(1), Some(2)]);
+        assert_eq!(counts(Topology::Fan), counts(Topology::Strip));
+    }
+}
