@@ -13,21 +13,21 @@
 
 mod ggx;
 mod ggx_albedo;
-mod keeps_photons;
 mod layered;
 mod lobe;
 mod material;
 mod metallic_roughness;
 mod phong;
+mod photon_keeping;
 mod record;
 mod reflector;
 mod sheen;
 #[cfg(test)]
 mod tests;
 
-pub use keeps_photons::keeps_photons;
 pub(super) use layered::{Layer, LayerTexel, Taken, take};
 pub(super) use material::{Scattering, Texel, View, scattering};
+pub use photon_keeping::keeps_photons;
 pub use record::{DecodedLobe, PartialReflection};
 pub use reflector::{ReflectedDirection, Reflector};
 
