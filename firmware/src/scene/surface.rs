@@ -99,7 +99,7 @@ impl Surface {
     }
 
     /// The other side as it is seen through the surface: the side of the ray is mirrored.
-    fn turned(self) -> Self {
+    fn seen_through(self) -> Self {
         let front = -self.normal;
         Self {
             geometric_normal: -self.geometric_normal,
@@ -277,7 +277,7 @@ fn layered(
     let surface = Surface { reflection, specular, absorption, normal, probability, ..surface };
     let emission = if layer == Layer::Behind { Vec3::ZERO } else { surface.emission / of_front };
     let surface = Surface { emission, ..surface };
-    Ok(if layer == Layer::Behind { surface.turned() } else { surface })
+    Ok(if layer == Layer::Behind { surface.seen_through() } else { surface })
 }
 
 fn rgb([red, green, blue, _]: [f32; 4]) -> Vec3 {

@@ -19,7 +19,7 @@ use super::ggx_albedo::albedo_shares;
 use crate::vector::{from_frame, max, max_component, min, mirror, unit};
 
 /// Minimum of `a`: a lobe of 0.06 degrees, in which `f32` resolves the half vector.
-const MIN_ALPHA: f32 = 1e-3;
+pub(super) const MIN_ALPHA: f32 = 1e-3;
 
 /// Minimum `a` of [`GgxLobe::gathers_caustics`]: half of the light within 3.4 degrees.
 const MIN_CAUSTIC_ALPHA: f32 = 0.03;
@@ -49,8 +49,8 @@ pub(super) struct GgxLobe {
 /// The normal and the two directions of `f`, reduced to what the lobe depends on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Geometry {
-    incident: f32,
-    outgoing: f32,
+    pub(super) incident: f32,
+    pub(super) outgoing: f32,
     /// `1 - (n.h)^2`.
     sine_squared: f32,
     /// `h.o`.
@@ -160,7 +160,7 @@ impl GgxLobe {
         max_component(self.fresnel(geometry)) * visible / albedo
     }
 
-    /// The colour of [`Kernel`]s: the albedo over that of a lobe with `F = 1`. The mean of `F` over all directions, so that the
+    /// The colour of [`Kernel`](super::ggx_kernel::Kernel)s: the albedo over that of a lobe with `F = 1`. The mean of `F` over all directions, so that the
     /// reflection of even light is exact.
     pub(super) fn colour(&self) -> Vec3 {
         let [of_f0, of_f90] = self.shares;
@@ -212,51 +212,9 @@ pub(super) fn masking(roughness: f32, cosine: f32) -> f32 {
     2.0 * cosine / max(cosine + length(alpha, cosine), f32::MIN_POSITIVE)
 }
 
-/// A lobe with `F = 1` seen from one direction, as a factor of photons' power: `D V` over its bound
-/// `1 / (2 pi a^3 n.o)`, so that sums of factors stay within those of powers.
-#[derive(Clone, Copy, Debug)]
-pub struct Kernel {
-    normal: Vec3,
-    outgoing: Vec3,
-    alpha: f32,
-}
-
-/// Minimum cosine of a kernel's outgoing direction.
-const MIN_KERNEL_COSINE: f32 = 0.02;
-
-impl Kernel {
-    /// Of unit vectors.
-    pub(super) fn new(normal: Vec3, outgoing: Vec3, roughness: f32) -> Self {
-        Self { normal, outgoing, alpha: max(roughness * roughness, MIN_ALPHA) }
-    }
-
-    #[inline(always)]
-    fn cosine(&self) -> f32 {
-        max(self.normal.dot(self.outgoing), MIN_KERNEL_COSINE)
-    }
-
-    /// The bound of `D V`, 1/sr.
-    pub(super) fn bound(&self) -> f32 {
-        1.0 / (2.0 * PI * self.alpha * self.alpha * self.alpha * self.cosine())
-    }
-
-    /// `D V` over the bound, 0 to 1, for a unit vector to the light; 0 below the surface.
-    #[inline(always)]
-    pub(super) fn factor(&self, incident: Vec3) -> f32 {
-        let mut geometry = Geometry::new(self.normal, self.outgoing, incident);
-        if geometry.incident <= 0.0 {
-            return 0.0;
-        }
-        geometry.outgoing = self.cosine();
-        let peak = 1.0 / (PI * self.alpha * self.alpha);
-        let distribution = distribution(self.alpha, &geometry) / peak;
-        distribution * (2.0 * self.alpha * geometry.outgoing * visibility(self.alpha, &geometry))
-    }
-}
-
 /// `D`, 1/sr.
 #[inline(always)]
-fn distribution(alpha: f32, geometry: &Geometry) -> f32 {
+pub(super) fn distribution(alpha: f32, geometry: &Geometry) -> f32 {
     let squared = alpha * alpha;
     let sine_squared = min(geometry.sine_squared, 1.0);
     let denominator = sine_squared + squared * (1.0 - sine_squared);
@@ -268,7 +226,7 @@ const MIN_VISIBILITY_SUM: f32 = 1e-12;
 
 /// `V`.
 #[inline(always)]
-fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
+pub(super) fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
     let Geometry { incident, outgoing, .. } = *geometry;
     let sum = incident * length(alpha, outgoing) + outgoing * length(alpha, incident);
     0.5 / max(sum, MIN_VISIBILITY_SUM)
@@ -429,26 +387,6 @@ mod tests {
             // Five standard deviations above the mean of the distribution.
             let bound = f64::from(bins) + 5.0 * f64::from(2 * bins).sqrt();
             assert!(chi_squared < bound, "{roughness} {cosine}: {chi_squared} of {bins}");
-        }
-    }
-
-    #[test]
-    fn a_kernel_is_the_lobe_over_its_bound() {
-        for (roughness, cosine) in [(0.5, 0.9), (0.7, 0.3), (1.0, 0.05)] {
-            let outgoing = at(cosine, 0.0);
-            let lobe = lobe(1.0, 1.0, roughness, cosine);
-            let kernel = Kernel::new(Vec3::Y, outgoing, roughness);
-            for index in 0..200_u8 {
-                let incident = at(f32::from(index % 20 + 1) / 20.0, f32::from(index / 20));
-                let factor = kernel.factor(incident);
-                assert!((0.0..=1.001).contains(&factor), "{factor}");
-                let value = lobe.evaluate(&Geometry::new(Vec3::Y, outgoing, incident)).x;
-                assert!(
-                    (factor * kernel.bound() / value - 1.0).abs() < 1e-3,
-                    "{roughness} {cosine} {incident}"
-                );
-            }
-            assert_eq!(kernel.factor(-Vec3::Y), 0.0);
         }
     }
 }

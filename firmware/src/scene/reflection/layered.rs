@@ -77,7 +77,6 @@ pub(in crate::scene) struct Taken {
 /// All layers at a point.
 struct Stack {
     base: Scattering,
-    base_normal: Vec3,
     behind: Reflection,
     sheen: SheenLobe,
     coat: Scattering,
@@ -102,12 +101,11 @@ pub(in crate::scene) fn take(
         layers.sheen_roughness * layer_texel.sheen_roughness,
         cosine,
     );
-    let (base, base_normal, behind) = base(&material, (layers, layer_texel), texel, view, random);
+    let (base, behind) = base(&material, (layers, layer_texel), texel, view, random);
     let below_coat = Vec3::splat(max(1.0 - max(albedo(&coat), coat_fresnel), 0.0));
     let below_sheen = below_coat * max(1.0 - max_component(sheen.albedo()), 0.0);
     let stack = Stack {
         base: dimmed(base, below_sheen),
-        base_normal,
         behind: behind.dimmed(below_sheen),
         sheen: sheen.dimmed(below_coat),
         coat,
@@ -144,7 +142,7 @@ impl Stack {
         }
         let (layer, probability) = taken;
         let (scattering, normal) = match layer {
-            Layer::Base => (self.base, self.base_normal),
+            Layer::Base => (self.base, normal),
             Layer::Coat => (self.coat, coat_normal),
             Layer::Sheen => (Scattering::of_lobe(Lobe::Sheen(self.sheen)), normal),
             Layer::Behind => (Scattering { reflection: self.behind, ..Scattering::BLACK }, -normal),
@@ -207,19 +205,18 @@ fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
 /// The base's reflection, without its narrow lobe: photons light it.
 pub(super) fn lit_by_photons(material: &Material, texel: &Texel, view: &View) -> Reflection {
     let none = LayerTexel::WHITE;
-    let (base, ..) = base(material, (&Layers::NONE, &none), texel, view, &|_| 0.0);
+    let (base, _) = base(material, (&Layers::NONE, &none), texel, view, &|_| 0.0);
     base.reflection.without_narrow_lobe()
 }
 
-/// The base with its shading normal, and the reflection of the other side that it shows.
+/// The base, and the reflection of the other side that it shows.
 fn base(
     material: &Material,
     layers: (&Layers, &LayerTexel),
     texel: &Texel,
     view: &View,
     random: &dyn Fn(u32) -> f32,
-) -> (Scattering, Vec3, Reflection) {
-    let [normal, _] = view.normals;
+) -> (Scattering, Reflection) {
     if let Reflectance::Glass { roughness, .. } = material.reflectance
         && roughness > 0.0
     {
@@ -229,7 +226,7 @@ fn base(
     let (layers, layer_texel) = layers;
     let share = layers.diffuse_transmission * layer_texel.diffuse_transmission;
     if share <= 0.0 {
-        return (base, normal, Reflection::BLACK);
+        return (base, Reflection::BLACK);
     }
     let colour = Vec3::from(layers.diffuse_transmission_colour) * layer_texel.diffuse_transmission_colour;
     let white = match material.reflectance {
@@ -241,20 +238,15 @@ fn base(
         _ => base,
     };
     base.reflection.diffuse *= 1.0 - share;
-    (base, normal, Reflection::lambertian(white.reflection.diffuse * colour * share))
+    (base, Reflection::lambertian(white.reflection.diffuse * colour * share))
 }
 
 /// Rough glass. A thin wall shows the reflection of its other side, by the lobe of the microfacets. The surface of a volume is a
 /// perfectly specular one at a microfacet of visible normals (Walter et al. 2007), but for the reflection outside, which is a lobe.
-fn rough_glass(
-    material: &Material,
-    texel: &Texel,
-    view: &View,
-    point: [f32; 2],
-) -> (Scattering, Vec3, Reflection) {
+fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2]) -> (Scattering, Reflection) {
     let View { outgoing, normals, is_front } = *view;
     let [normal, geometric_normal] = normals;
-    let black = (Scattering::BLACK, normal, Reflection::BLACK);
+    let black = (Scattering::BLACK, Reflection::BLACK);
     let Reflectance::Glass { base, absorption, transmission, ior, specular, metallic, roughness } =
         material.reflectance
     else {
@@ -279,7 +271,7 @@ fn rough_glass(
     let reflected = Scattering { reflection: outside, ..Scattering::BLACK };
     if is_thin {
         let lobe = Lobe::Ggx(GgxLobe::new(through, through, roughness, cosine).as_layer());
-        return (reflected, normal, Reflection { diffuse: Vec3::ZERO, lobe });
+        return (reflected, Reflection { diffuse: Vec3::ZERO, lobe });
     }
     let microfacet = microfacet(normal, outgoing, roughness, point);
     let tint = Vec3::from_array(colour.to_array().map(libm::sqrtf));
@@ -293,13 +285,13 @@ fn rough_glass(
     let transmitted = refracted.transmitted * behind;
     if is_front {
         let specular = Specular { reflected: Vec3::ZERO, transmitted, ..refracted };
-        return (Scattering { specular, ..reflected }, normal, Reflection::BLACK);
+        return (Scattering { specular, ..reflected }, Reflection::BLACK);
     }
     let reflected = refracted.reflected * beside;
     let specular = Specular { reflected, transmitted, beside: mirrored, ..refracted };
     let diffuse = outside.diffuse;
     let reflection = Reflection::lambertian(diffuse);
-    (Scattering { reflection, specular, absorption }, normal, Reflection::BLACK)
+    (Scattering { reflection, specular, absorption }, Reflection::BLACK)
 }
 
 /// The greatest albedo of all ways on from a point.

@@ -13,6 +13,7 @@
 
 mod ggx;
 mod ggx_albedo;
+mod ggx_kernel;
 mod layered;
 mod lobe;
 mod material;

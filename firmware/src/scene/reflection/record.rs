@@ -4,7 +4,8 @@ use glam::Vec3;
 use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode_normal};
 
 use super::Reflector;
-use super::ggx::{GgxLobe, Kernel};
+use super::ggx::GgxLobe;
+use super::ggx_kernel::Kernel;
 use super::lobe::Lobe;
 use super::phong::{self, PhongLobe};
 use crate::fixed_point::ColourSum;

@@ -1,0 +1,82 @@
+//! GGX lobe of a waiting gather, as a factor of photons' power.
+
+use core::f32::consts::PI;
+
+use glam::Vec3;
+
+use super::ggx::{Geometry, MIN_ALPHA, distribution, visibility};
+use crate::vector::max;
+
+/// A lobe with `F = 1` seen from one direction, as a factor of photons' power: `D V` over its bound
+/// `1 / (2 pi a^3 n.o)`, so that sums of factors stay within those of powers.
+#[derive(Clone, Copy, Debug)]
+pub struct Kernel {
+    normal: Vec3,
+    outgoing: Vec3,
+    alpha: f32,
+}
+
+/// Minimum cosine of a kernel's outgoing direction.
+const MIN_KERNEL_COSINE: f32 = 0.02;
+
+impl Kernel {
+    /// Of unit vectors.
+    pub(super) fn new(normal: Vec3, outgoing: Vec3, roughness: f32) -> Self {
+        Self { normal, outgoing, alpha: max(roughness * roughness, MIN_ALPHA) }
+    }
+
+    #[inline(always)]
+    fn cosine(&self) -> f32 {
+        max(self.normal.dot(self.outgoing), MIN_KERNEL_COSINE)
+    }
+
+    /// The bound of `D V`, 1/sr.
+    pub(super) fn bound(&self) -> f32 {
+        1.0 / (2.0 * PI * self.alpha * self.alpha * self.alpha * self.cosine())
+    }
+
+    /// `D V` over the bound, 0 to 1, for a unit vector to the light; 0 below the surface.
+    #[inline(always)]
+    pub(super) fn factor(&self, incident: Vec3) -> f32 {
+        let mut geometry = Geometry::new(self.normal, self.outgoing, incident);
+        if geometry.incident <= 0.0 {
+            return 0.0;
+        }
+        geometry.outgoing = self.cosine();
+        let peak = 1.0 / (PI * self.alpha * self.alpha);
+        let distribution = distribution(self.alpha, &geometry) / peak;
+        distribution * (2.0 * self.alpha * geometry.outgoing * visibility(self.alpha, &geometry))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ggx::GgxLobe;
+    use super::*;
+
+    /// A unit vector at a cosine to the y axis.
+    fn at(cosine: f32, azimuth: f32) -> Vec3 {
+        let sine = (1.0 - cosine * cosine).sqrt();
+        Vec3::new(sine * azimuth.cos(), cosine, sine * azimuth.sin())
+    }
+
+    #[test]
+    fn a_kernel_is_the_lobe_over_its_bound() {
+        for (roughness, cosine) in [(0.5, 0.9), (0.7, 0.3), (1.0, 0.05)] {
+            let outgoing = at(cosine, 0.0);
+            let lobe = GgxLobe::new(Vec3::ONE, Vec3::ONE, roughness, cosine);
+            let kernel = Kernel::new(Vec3::Y, outgoing, roughness);
+            for index in 0..200_u8 {
+                let incident = at(f32::from(index % 20 + 1) / 20.0, f32::from(index / 20));
+                let factor = kernel.factor(incident);
+                assert!((0.0..=1.001).contains(&factor), "{factor}");
+                let value = lobe.evaluate(&Geometry::new(Vec3::Y, outgoing, incident)).x;
+                assert!(
+                    (factor * kernel.bound() / value - 1.0).abs() < 1e-3,
+                    "{roughness} {cosine} {incident}"
+                );
+            }
+            assert_eq!(kernel.factor(-Vec3::Y), 0.0);
+        }
+    }
+}
