@@ -7,9 +7,7 @@
 mod scene_support;
 
 use miette::Diagnostic;
-use photoncard_driver::error::SceneError;
-use photoncard_driver::scene::Scene;
-use scene_support::{glb, load_bytes};
+use scene_support::{load_parts, parts};
 use serde_json::{Value, json};
 
 const FILES: [(&[u8], &str); 2] = [
@@ -19,17 +17,6 @@ const FILES: [(&[u8], &str); 2] = [
 
 /// Maximum difference of filtered values, which the extension defines to one unit of 8 bits.
 const UNIT: f32 = 1.01 / 127.0;
-
-/// JSON and binary chunk of a file.
-fn parts(file: &[u8]) -> (Value, Vec<u8>) {
-    let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
-    let json = serde_json::from_slice(&file[20..20 + length]).unwrap();
-    (json, file[20 + length + 8..].to_vec())
-}
-
-fn load((json, bytes): &(Value, Vec<u8>)) -> Result<Scene, SceneError> {
-    load_bytes("scene.glb", &glb(json.clone(), bytes))
-}
 
 /// Extension of a buffer view.
 fn extension<'v>(json: &'v mut Value, view: usize, name: &str) -> &'v mut Value {
@@ -43,7 +30,7 @@ fn near<const N: usize>(found: [f32; N], expected: [f32; N]) -> bool {
 #[test]
 fn compressed_views_hold_what_their_fallback_holds() {
     for (file, name) in FILES {
-        let compressed = load(&parts(file)).unwrap();
+        let compressed = load_parts(&parts(file)).unwrap();
         assert!(
             compressed.notices.iter().all(|notice| notice.contains("camera")),
             "{:?}",
@@ -55,7 +42,7 @@ fn compressed_views_hold_what_their_fallback_holds() {
                 view.as_object_mut().unwrap().remove("extensions").is_some_and(|of| of.get(name).is_some())
             );
         }
-        let fallback = load(&(json, bytes)).unwrap();
+        let fallback = load_parts(&(json, bytes)).unwrap();
         // A grid of 24 x 16 vertices, and five strips of 40 vertices.
         assert_eq!(compressed.triangles.len(), 2 * 23 * 15 + 5 * 38);
         let pairs = compressed.triangles.iter().zip(&fallback.triangles);
@@ -86,14 +73,14 @@ fn compressed_views_hold_what_their_fallback_holds() {
 #[test]
 fn placeholders_need_no_bytes() {
     for (file, name) in FILES {
-        let expected = load(&parts(file)).unwrap().checksum();
+        let expected = load_parts(&parts(file)).unwrap().checksum();
         let (mut json, bytes) = parts(file);
         json["extensionsRequired"] = json!([name, "KHR_mesh_quantization"]);
         json["buffers"][1].as_object_mut().unwrap().remove("uri");
-        assert_eq!(load(&(json.clone(), bytes.clone())).unwrap().checksum(), expected);
+        assert_eq!(load_parts(&(json.clone(), bytes.clone())).unwrap().checksum(), expected);
         json["buffers"][1]["uri"] = json!("absent.bin");
         json["buffers"][1]["extensions"] = json!({name: {"fallback": true}});
-        assert_eq!(load(&(json, bytes)).unwrap().checksum(), expected);
+        assert_eq!(load_parts(&(json, bytes)).unwrap().checksum(), expected);
     }
 }
 
@@ -105,7 +92,7 @@ fn views_without_a_use_are_not_decoded() {
     let mut view = json["bufferViews"][0].clone();
     view["extensions"][name]["mode"] = json!("TOMORROW");
     json["bufferViews"].as_array_mut().unwrap().push(view);
-    assert!(load(&(json, bytes)).is_ok());
+    assert!(load_parts(&(json, bytes)).is_ok());
 }
 
 #[test]
@@ -137,7 +124,7 @@ fn impossible_streams_are_refused() {
             // Another stride or mode is refused by the extension, before the buffer view's own.
             json["bufferViews"][0].as_object_mut().unwrap().remove("byteStride");
             change(&mut json, name);
-            let Err(error) = load(&(json, bytes)) else { panic!("{part} was loaded") };
+            let Err(error) = load_parts(&(json, bytes)) else { panic!("{part} was loaded") };
             let text = error.to_string();
             assert!(text.contains(part), "{part}: {text}");
             assert!(text.contains(name), "{text}");

@@ -10,8 +10,7 @@ use std::time::{Duration, Instant};
 
 use miette::Diagnostic;
 use photoncard_driver::error::SceneError;
-use photoncard_driver::scene::Scene;
-use scene_support::{glb, load_bytes};
+use scene_support::{load_parts, parts};
 use serde_json::{Value, json};
 
 const NAME: &str = "KHR_draco_mesh_compression";
@@ -33,17 +32,6 @@ const VERTICES: u64 = 24;
 
 /// Maximum time for a scene of some hundred bytes.
 const PATIENCE: Duration = Duration::from_secs(10);
-
-/// JSON and binary chunk of a file.
-fn parts(file: &[u8]) -> (Value, Vec<u8>) {
-    let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
-    let json = serde_json::from_slice(&file[20..20 + length]).unwrap();
-    (json, file[20 + length + 8..].to_vec())
-}
-
-fn load((json, bytes): &(Value, Vec<u8>)) -> Result<Scene, SceneError> {
-    load_bytes("scene.glb", &glb(json.clone(), bytes))
-}
 
 fn primitive(json: &mut Value) -> &mut Value {
     &mut json["meshes"][0]["primitives"][0]
@@ -69,13 +57,13 @@ fn stream(json: &Value) -> std::ops::Range<usize> {
 #[test]
 fn compressed_primitives_hold_what_the_reference_decoder_finds() {
     for [file, reference] in FILES {
-        let compressed = load(&parts(file)).unwrap();
+        let compressed = load_parts(&parts(file)).unwrap();
         assert!(
             compressed.notices.iter().all(|notice| notice.contains("camera")),
             "{:?}",
             compressed.notices
         );
-        let reference = load(&parts(reference)).unwrap();
+        let reference = load_parts(&parts(reference)).unwrap();
         assert_eq!((reference.triangles.len(), reference.tangents.len()), (TRIANGLES, TRIANGLES));
         assert_eq!(compressed.triangles, reference.triangles);
         assert_eq!(compressed.attributes, reference.attributes);
@@ -88,7 +76,7 @@ fn vertices_are_those_of_the_wave_within_the_quantisation() {
     for [file, _] in FILES {
         let (mut json, bytes) = parts(file);
         json["nodes"][0].as_object_mut().unwrap().remove("skin");
-        let scene = load(&(json, bytes)).unwrap();
+        let scene = load_parts(&(json, bytes)).unwrap();
         // 14 bits for 4 m; the colours are not quantised.
         let tolerance = 4.0 / 16_384.0;
         let mut squares = BTreeSet::new();
@@ -112,13 +100,13 @@ fn vertices_are_those_of_the_wave_within_the_quantisation() {
 #[test]
 fn strips_are_compressed_as_their_triangles() {
     for [file, _] in FILES {
-        let expected = load(&parts(file)).unwrap().checksum();
+        let expected = load_parts(&parts(file)).unwrap().checksum();
         // Two triangles of zero area were left out.
         for corners in [TRIANGLES + 2, TRIANGLES + 4] {
             let (mut json, bytes) = parts(file);
             primitive(&mut json)["mode"] = json!(5);
             json["accessors"][0]["count"] = json!(corners);
-            assert_eq!(load(&(json, bytes)).unwrap().checksum(), expected);
+            assert_eq!(load_parts(&(json, bytes)).unwrap().checksum(), expected);
         }
     }
 }
@@ -128,7 +116,7 @@ fn strips_are_compressed_as_their_triangles() {
 #[test]
 fn attributes_beside_the_stream_are_read() {
     for [file, reference] in FILES {
-        let expected = load(&parts(reference)).unwrap().checksum();
+        let expected = load_parts(&parts(reference)).unwrap().checksum();
         let (mut json, mut bytes) = parts(reference);
         let (compressed, streams) = parts(file);
         let mut view = compressed["bufferViews"][0].clone();
@@ -145,7 +133,7 @@ fn attributes_beside_the_stream_are_read() {
         let positions = accessor(&mut json, "POSITION")["bufferView"].as_u64().unwrap() as usize;
         let start = json["bufferViews"][positions]["byteOffset"].as_u64().unwrap() as usize;
         bytes[start..start + 12].fill(0x55);
-        assert_eq!(load(&(json, bytes)).unwrap().checksum(), expected);
+        assert_eq!(load_parts(&(json, bytes)).unwrap().checksum(), expected);
     }
 }
 
@@ -193,7 +181,7 @@ fn impossible_streams_are_refused() {
         for (part, change) in &cases {
             let (mut json, bytes) = parts(file);
             change(&mut json);
-            let Err(error) = load(&(json, bytes)) else { panic!("{part} was loaded") };
+            let Err(error) = load_parts(&(json, bytes)) else { panic!("{part} was loaded") };
             let text = error.to_string();
             assert!(text.contains(part), "{part}: {text}");
             assert!(text.contains(&format!("meshes[0].primitives[0].extensions.{NAME}")), "{text}");
@@ -206,7 +194,7 @@ fn impossible_streams_are_refused() {
 fn more_triangles_than_any_scene_has_are_refused_before_they_are_decoded() {
     let (mut json, bytes) = parts(FILES[0][0]);
     json["accessors"][0]["count"] = json!(3_u64 << 40);
-    let error = load(&(json, bytes)).unwrap_err();
+    let error = load_parts(&(json, bytes)).unwrap_err();
     assert!(matches!(error, SceneError::TooManyTriangles { .. }), "{error}");
 }
 
@@ -216,14 +204,14 @@ fn the_memory_of_all_primitives_is_bounded_together() {
     let (mut json, bytes) = parts(FILES[0][0]);
     let mut one = primitive(&mut json).clone();
     json["meshes"][0]["primitives"] = json!(vec![one.clone(); 3]);
-    assert_eq!(load(&(json.clone(), bytes.clone())).unwrap().triangles.len(), 3 * TRIANGLES);
+    assert_eq!(load_parts(&(json.clone(), bytes.clone())).unwrap().triangles.len(), 3 * TRIANGLES);
     // Each takes 0.9 GB, with an attribute that no material uses.
     let count = 12_000_000;
     let accessor = json!({"componentType": 5121, "type": "VEC4", "count": count});
     one["attributes"]["_UNUSED"] = json!(scene_support::push(&mut json, "accessors", accessor));
     one["extensions"][NAME]["attributes"]["_UNUSED"] = json!(77);
     json["meshes"][0]["primitives"] = json!(vec![one; 5]);
-    let error = load(&(json, bytes)).unwrap_err().to_string();
+    let error = load_parts(&(json, bytes)).unwrap_err().to_string();
     assert!(
         error.contains("primitives[4]") && error.contains("up to this one, of 12000000 vertices"),
         "{error}"
@@ -235,7 +223,7 @@ fn the_memory_of_all_primitives_is_bounded_together() {
 fn damaged_streams_are_loaded_or_refused_and_soon() {
     let load = |json: &Value, bytes: Vec<u8>| {
         let start = Instant::now();
-        let loaded = load(&(json.clone(), bytes));
+        let loaded = load_parts(&(json.clone(), bytes));
         assert!(start.elapsed() < PATIENCE);
         loaded.inspect_err(|error| assert!(error.to_string().contains("meshes[0].primitives[0]"), "{error}"))
     };

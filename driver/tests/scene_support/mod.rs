@@ -71,6 +71,20 @@ pub(crate) fn glb(mut json: Value, bin: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// JSON and binary chunk of a GLB.
+#[allow(dead_code, reason = "not every test file takes one apart")]
+pub(crate) fn parts(file: &[u8]) -> (Value, Vec<u8>) {
+    let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
+    let json = serde_json::from_slice(&file[20..20 + length]).unwrap();
+    (json, file[20 + length + 8..].to_vec())
+}
+
+/// Loads a GLB of [`parts`].
+#[allow(dead_code, reason = "not every test file takes one apart")]
+pub(crate) fn load_parts((json, bytes): &(Value, Vec<u8>)) -> Result<Scene, SceneError> {
+    load_bytes("scene.glb", &glb(json.clone(), bytes))
+}
+
 /// The triangle, to which views and accessors are added.
 #[allow(dead_code, reason = "not every test file adds accessors")]
 pub(crate) struct Extended {
