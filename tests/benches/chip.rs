@@ -18,7 +18,7 @@ use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::render::Context;
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, closest_hit, is_occluded, read_surface};
+use photoncard_firmware::scene::{Ray, Surface, closest_hit, is_occluded, read_surface};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::Photon;
@@ -94,7 +94,8 @@ impl Prepared {
                 let direction = (camera.forward + camera.right * x + camera.up * y).normalize();
                 let eye = Ray::new(camera.origin, direction);
                 let hit = closest_hit(&scene, &mut memory, &eye).expect("sound")?;
-                let surface = read_surface(&scene, &mut memory, &eye, &hit, &|_| 0.0).expect("sound");
+                let mut surface = Surface::NOWHERE;
+                read_surface(&scene, &mut memory, &eye, &hit, &|_| 0.0, &mut surface).expect("sound");
                 let sampled = surface.reflector().sample([random(i, 3), random(i, 4)])?;
                 Some(Ray::new(surface.offset_origin(), sampled.direction))
             })

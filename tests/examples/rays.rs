@@ -13,7 +13,7 @@ use photoncard_driver::pack::PackedScene;
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_firmware::memory::{Counted, Lines, MemoryPort};
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, SceneImage, closest_hit, is_occluded, read_surface};
+use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit, is_occluded, read_surface};
 use photoncard_shared::address::Structure;
 use photoncard_shared::image::SectionKind;
 use rustix::time::{ClockId, clock_gettime};
@@ -37,7 +37,8 @@ fn bounces(scene: &Scene, packed: &PackedScene, count: u32) -> Vec<Ray> {
             camera.forward + camera.right * (random(i, 1) - 0.5) + camera.up * (random(i, 2) - 0.5);
         let eye = Ray::new(camera.origin, direction.normalize());
         let hit = closest_hit(&image, &mut memory, &eye).expect("sound")?;
-        let surface = read_surface(&image, &mut memory, &eye, &hit, &|_| 0.0).expect("sound");
+        let mut surface = Surface::NOWHERE;
+        read_surface(&image, &mut memory, &eye, &hit, &|_| 0.0, &mut surface).expect("sound");
         let sampled = surface.reflector().sample([random(i, 3), random(i, 4)])?;
         Some(Ray::new(surface.offset_origin(), sampled.direction))
     };

@@ -15,7 +15,7 @@ use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::render::Context;
 use photoncard_firmware::render::specular_path::{Carried, Passes, PathEnd, SpecularPath};
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, closest_hit, read_surface};
+use photoncard_firmware::scene::{Ray, Surface, closest_hit, read_surface};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::layout::{Photon, decode_direction};
 use photoncard_tests::shapes::{add_ball, add_tangents, add_textured_quad};
@@ -397,7 +397,8 @@ fn path_to_the_lamp<M: MemoryPort>(context: &mut Context<M>, index: u32) -> f64 
     let direction = Vec3::new(-radius * sine, (1.0 - v).sqrt(), radius * cosine);
     let mut path = SpecularPath::new(Ray::new(origin, direction), Carried::Radiance, Passes::NarrowLobes);
     let Some(mut hit) = closest_hit(context.scene, context.memory, &path.ray).unwrap() else { return 0.0 };
-    let mut surface = read_surface(context.scene, context.memory, &path.ray, &hit, &|_| 0.0).unwrap();
+    let mut surface = Surface::NOWHERE;
+    read_surface(context.scene, context.memory, &path.ray, &hit, &|_| 0.0, &mut surface).unwrap();
     assert!(path.may_pass(&surface), "nothing but the wall is there");
     let choose = |choice: u32| random(index, choice);
     match path.follow(context, &mut surface, &mut hit, &choose).unwrap() {

@@ -211,7 +211,8 @@ impl Tracer<'_> {
         for bounce in 0..MAX_BOUNCES {
             let random = random.bounce(bounce);
             let Some(hit) = closest_hit(scene, memory, &path.ray)? else { break };
-            let mut surface = read_surface(scene, memory, &path.ray, &hit, &|choice| random.layer(choice))?;
+            let mut surface = Surface::NOWHERE;
+            read_surface(scene, memory, &path.ray, &hit, &|choice| random.layer(choice), &mut surface)?;
             let [u, v] = random.point();
             let arrival = path.arrive(&mut surface, [random.choice(), u, v]);
             let arrived = std::mem::replace(&mut path.throughput, Vec3::ONE) * power;

@@ -87,9 +87,9 @@ impl<K: ChipKind> Chip<K> {
     pub(super) fn light_directly<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let (index, at) = self.present();
         context.memory.enter(Stage::Shadow);
-        if let Some(stored) = self.points.view().get(index)
-            && let Some(point) = stored.restore(context, at)?
-        {
+        let stored = self.points.view().get(index).copied().unwrap_or(StoredPoint::NOTHING);
+        let mut point = stored.point(context.frame, at);
+        if stored.read_surface(context, at, &mut point.surface)? {
             let reflected = direct::reflected(context, at, &point)?;
             let light = reflected * sample_share(context);
             add_light(self.sums.view_mut(), context.frame, index as u16, Component::Direct, light);
@@ -124,7 +124,8 @@ impl<K: ChipKind> Chip<K> {
         let stored = points.view().get(index).copied().unwrap_or(StoredPoint::NOTHING);
         let of_bin = stored.rays_of_bin(frame, at, position.bin);
         if !of_bin.is_empty()
-            && let Some(point) = stored.restore(context, at)?
+            && let mut point = stored.point(frame, at)
+            && stored.read_surface(context, at, &mut point.surface)?
         {
             let share = 1.0 / frame.samples as f32;
             let (rays, is_last) = position.next_rays(of_bin);

@@ -9,7 +9,7 @@ use crate::importance::DirectionTable;
 use crate::memory::MemoryPort;
 use crate::render::{Context, GatherPoint, PixelSample, Purpose, eye};
 use crate::sampler::{Dimension, Pattern};
-use crate::scene::Seen;
+use crate::scene::{Seen, Surface};
 
 /// State of a gather point from one direction bin to the next, 48 bytes: the rest is read again.
 #[derive(Clone, Copy, Debug)]
@@ -63,31 +63,38 @@ impl StoredPoint {
         }
     }
 
-    /// The gather point of a sample of a pixel.
+    /// The gather point of a sample of a pixel, but for its surface.
     #[inline(always)]
-    pub(super) fn restore<M: MemoryPort>(
-        &self,
-        context: &mut Context<M>,
-        at: PixelSample,
-    ) -> Result<Option<GatherPoint>, Fault> {
-        if self.rays == StoredRays::NOWHERE {
-            return Ok(None);
-        }
-        let surface = if self.seen.is_elsewhere() {
-            // The way there is followed again.
-            let Some(view) = eye::view(context, at)?.surface() else { return Ok(None) };
-            view.surface
-        } else {
-            let film = eye::film_position(context, at);
-            eye::surface(context, film, &self.seen)?
-        };
-        Ok(Some(GatherPoint {
-            surface,
-            pattern: pattern(context.frame, at),
+    pub(super) fn point(&self, frame: &FrameParameters, at: PixelSample) -> GatherPoint {
+        GatherPoint {
+            surface: Surface::NOWHERE,
+            pattern: pattern(frame, at),
             rays: self.rays.number(),
             directions: self.directions,
             purpose: self.rays.purpose(),
-        }))
+        }
+    }
+
+    /// Reads the surface of a sample of a pixel into `surface`. `false` if there is none.
+    #[inline(always)]
+    pub(super) fn read_surface<M: MemoryPort>(
+        &self,
+        context: &mut Context<M>,
+        at: PixelSample,
+        surface: &mut Surface,
+    ) -> Result<bool, Fault> {
+        if self.rays == StoredRays::NOWHERE {
+            return Ok(false);
+        }
+        if self.seen.is_elsewhere() {
+            // The way there is followed again.
+            let Some(view) = eye::view(context, at)?.surface() else { return Ok(false) };
+            *surface = view.surface;
+        } else {
+            let film = eye::film_position(context, at);
+            eye::surface(context, film, &self.seen, surface)?;
+        }
+        Ok(true)
     }
 }
 

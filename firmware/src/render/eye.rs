@@ -77,7 +77,8 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
         return background(context, &path);
     };
     let of_surface = |choice| random(surface_choice(0, choice));
-    let mut surface = read_surface(context.scene, context.memory, &ray, &hit, &of_surface)?;
+    let mut surface = Surface::NOWHERE;
+    read_surface(context.scene, context.memory, &ray, &hit, &of_surface, &mut surface)?;
     let is_first = surface.specular.is_none();
     // A layer is chosen again by the eye path alone.
     let is_stored = is_first && surface.probability >= 1.0;
@@ -114,7 +115,7 @@ pub fn look<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<O
     Ok(hit.map(|hit| Seen::new(&hit)))
 }
 
-/// Surface at a stored hit of the eye ray at a position of the picture.
+/// Reads the surface at a stored hit of the eye ray at a position of the picture into `surface`.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -123,8 +124,9 @@ pub fn surface<M: MemoryPort>(
     context: &mut Context<M>,
     film: [f32; 2],
     seen: &Seen,
-) -> Result<Surface, Fault> {
-    seen.surface(context.scene, context.memory, &eye_ray(context, film))
+    surface: &mut Surface,
+) -> Result<(), Fault> {
+    seen.surface(context.scene, context.memory, &eye_ray(context, film), surface)
 }
 
 /// Surface at the hit of the eye ray at a position of the picture.
@@ -132,10 +134,10 @@ pub fn surface<M: MemoryPort>(
 /// # Errors
 /// If the image is not sound.
 pub fn see<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Surface>, Fault> {
-    match look(context, film)? {
-        Some(seen) => surface(context, film, &seen).map(Some),
-        None => Ok(None),
-    }
+    let Some(seen) = look(context, film)? else { return Ok(None) };
+    let mut found = Surface::NOWHERE;
+    surface(context, film, &seen, &mut found)?;
+    Ok(Some(found))
 }
 
 fn eye_ray<M>(context: &Context<M>, [x, y]: [f32; 2]) -> Ray {

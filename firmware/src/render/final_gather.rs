@@ -12,7 +12,7 @@ use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
 use crate::scene::light::environment_radiance;
-use crate::scene::{PartialReflection, Ray, Reflector, closest_hit, read_surface};
+use crate::scene::{PartialReflection, Ray, Reflector, Surface, closest_hit, read_surface};
 
 /// Contribution of one final gather ray.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +52,8 @@ pub fn cast<M: MemoryPort>(
     };
     let random = |choice| point.pattern.choice(index, choice);
     let of_surface = |choice| random(surface_choice(0, choice));
-    let mut met = read_surface(context.scene, context.memory, &ray, &hit, &of_surface)?;
+    let mut met = Surface::NOWHERE;
+    read_surface(context.scene, context.memory, &ray, &hit, &of_surface, &mut met)?;
     if path.may_pass(&met) {
         match path.follow(context, &mut met, &mut hit, &random)? {
             PathEnd::Surface => {}

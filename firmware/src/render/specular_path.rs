@@ -223,7 +223,7 @@ impl SpecularPath {
             let Some(next) = next else { return Ok(PathEnd::Escaped) };
             *hit = next;
             let random = |choice| random(surface_choice(self.bounces, choice));
-            *surface = read_surface(context.scene, context.memory, &self.ray, hit, &random)?;
+            read_surface(context.scene, context.memory, &self.ray, hit, &random, surface)?;
         }
     }
 }

@@ -34,7 +34,7 @@ impl Seen {
         Self { triangle: hit.index, weights: [v, w] }
     }
 
-    /// Reads the surface on the side of the ray's origin, of several layers the base. Its `distance` is 0.
+    /// Reads the surface on the side of the ray's origin into `surface`, of several layers the base. Its `distance` is 0.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -44,9 +44,10 @@ impl Seen {
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
         ray: &Ray,
-    ) -> Result<Surface, Fault> {
+        surface: &mut Surface,
+    ) -> Result<(), Fault> {
         let triangle = read_triangle(scene, memory, self.triangle)?;
         let [v, w] = self.weights;
-        surface_of(scene, memory, ray, (self.triangle, &triangle), [1.0 - v - w, v, w], &|_| 0.0)
+        surface_of(scene, memory, ray, (self.triangle, &triangle), [1.0 - v - w, v, w], &|_| 0.0, surface)
     }
 }

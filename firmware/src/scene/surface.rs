@@ -10,7 +10,7 @@ use super::corners::Corners;
 use super::coverage::covered;
 use super::materials::{has_layers, layer_texel, read_layers, read_material};
 use super::normal_map::{base_normal, mapped_normal};
-use super::reflection::{Layer, Scattering, Taken, Texel, View, scattering, take};
+use super::reflection::{Layer, Scattering, Texel, View, scattering, take};
 use super::shading_normal::{bent_by_share, turned};
 use super::specular::Specular;
 use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origin};
@@ -41,8 +41,6 @@ pub struct Surface {
     pub emission: Vec3,
     /// Index of the emitter that the surface belongs to, if it is one.
     pub emitter: Option<u32>,
-    /// `true` if the other side reflects and emits too (glTF's `doubleSided`).
-    pub double_sided: bool,
     /// Probability with which the surface's layer was taken, 1 for a surface of one layer: reflection and emission are over it.
     pub probability: f32,
     /// Share of the surface that is there, 1 without partial coverage: rays meet it with this probability.
@@ -56,8 +54,11 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// Arbitrary initial value.
+    pub const NOWHERE: Self = Self::white(Vec3::ZERO, Vec3::Z, 0.0);
+
     /// White Lambertian surface, seen along its normal.
-    pub fn white(position: Vec3, normal: Vec3, magnitude: f32) -> Self {
+    pub const fn white(position: Vec3, normal: Vec3, magnitude: f32) -> Self {
         Self {
             position,
             normal,
@@ -68,7 +69,6 @@ impl Surface {
             absorption: Vec3::ZERO,
             emission: Vec3::ZERO,
             emitter: None,
-            double_sided: false,
             probability: 1.0,
             coverage: 1.0,
             is_behind: false,
@@ -98,15 +98,12 @@ impl Surface {
         self
     }
 
-    /// The other side as it is seen through the surface: the side of the ray is mirrored.
-    fn seen_through(self) -> Self {
+    /// Turns to the other side as it is seen through the surface: the side of the ray is mirrored.
+    fn see_through(&mut self) {
         let front = -self.normal;
-        Self {
-            geometric_normal: -self.geometric_normal,
-            outgoing: self.outgoing - front * (2.0 * front.dot(self.outgoing)),
-            is_behind: true,
-            ..self
-        }
+        self.geometric_normal = -self.geometric_normal;
+        self.outgoing -= front * (2.0 * front.dot(self.outgoing));
+        self.is_behind = true;
     }
 
     /// A point just off the surface, from which a ray does not meet it again.
@@ -136,8 +133,9 @@ impl Surface {
     }
 }
 
-/// Reads the surface where a ray meets a triangle. `random` gives [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of its
-/// layers; the base is the layer of 0.
+/// Reads the surface where a ray meets a triangle into `surface`: in place, as a copy of its 200 bytes costs a chip as much as
+/// a step of the hierarchy. `random` gives [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of its layers; the base is the
+/// layer of 0.
 ///
 /// # Errors
 /// If the triangle's material is not in the image.
@@ -148,10 +146,12 @@ pub fn read_surface(
     ray: &Ray,
     hit: &Hit,
     random: &dyn Fn(u32) -> f32,
-) -> Result<Surface, Fault> {
+    surface: &mut Surface,
+) -> Result<(), Fault> {
     let Hit { intersection, triangle, index } = hit;
-    let surface = surface_of(scene, memory, ray, (*index, triangle), intersection.barycentric, random)?;
-    Ok(Surface { distance: intersection.distance, ..surface })
+    surface_of(scene, memory, ray, (*index, triangle), intersection.barycentric, random, surface)?;
+    surface.distance = intersection.distance;
+    Ok(())
 }
 
 /// Surface of a triangle at barycentric `weights`, at a distance of 0: [`read_surface`].
@@ -163,34 +163,32 @@ pub(super) fn surface_of(
     (index, triangle): (u32, &Triangle),
     weights: [f32; 3],
     random: &dyn Fn(u32) -> f32,
-) -> Result<Surface, Fault> {
+    surface: &mut Surface,
+) -> Result<(), Fault> {
     let material = read_material(scene, memory, triangle.material)?;
     let [a, b, c] = triangle.vertices.map(Vec3::from_array);
     let [u, v, w] = weights;
     let front_normal = unit((b - a).cross(c - a));
     let is_front = front_normal.dot(ray.direction) < 0.0;
     let normal = if is_front { front_normal } else { -front_normal };
-    let double_sided = material.flags & DOUBLE_SIDED != 0;
-    let bare = Surface {
-        // From the corners, not along the ray: the rounding error is relative to the corners.
-        position: a * u + b * v + c * w,
-        outgoing: -ray.direction,
-        reflection: Reflection::BLACK,
-        double_sided,
-        ..Surface::white(Vec3::ZERO, normal, magnitude(&[a, b, c, ray.origin]))
-    };
+    // From the corners, not along the ray: the rounding error is relative to the corners.
+    let position = a * u + b * v + c * w;
+    *surface = Surface::white(position, normal, magnitude(&[a, b, c, ray.origin]));
+    surface.outgoing = -ray.direction;
+    surface.reflection = Reflection::BLACK;
+    let is_visible = is_front || material.flags & DOUBLE_SIDED != 0;
     if let Reflectance::Phong { diffuse, specular, exponent } = material.reflectance
         && is_plain(&material)
     {
-        let reflection = Reflection::phong(diffuse.into(), specular.into(), exponent);
-        let is_visible = is_front || double_sided;
-        return Ok(Surface {
-            reflection: if is_visible { reflection } else { Reflection::BLACK },
-            emission: if is_visible { material.emission.into() } else { Vec3::ZERO },
-            ..bare
-        });
+        if is_visible {
+            surface.reflection = Reflection::phong(diffuse.into(), specular.into(), exponent);
+            surface.emission = material.emission.into();
+        }
+    } else if is_visible || matches!(material.reflectance, Reflectance::Glass { .. }) {
+        surface.emission = if is_visible { material.emission.into() } else { Vec3::ZERO };
+        finish(scene, memory, surface, (index, weights, is_front), &material, random)?;
     }
-    finished(scene, memory, bare, (index, weights, is_front), &material, random)
+    Ok(())
 }
 
 /// `true` for a material without textures, vertex attributes and layers.
@@ -199,23 +197,17 @@ fn is_plain(material: &Material) -> bool {
     material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0 && material.layers.is_none()
 }
 
-/// The surface with vertex attributes, textures and material applied.
+/// Applies vertex attributes, textures and material to a surface that emits as the material does.
 #[inline(never)]
-fn finished(
+fn finish(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    bare: Surface,
+    surface: &mut Surface,
     (index, weights, is_front): (u32, [f32; 3], bool),
     material: &Material,
     random: &dyn Fn(u32) -> f32,
-) -> Result<Surface, Fault> {
-    let is_glass = matches!(material.reflectance, Reflectance::Glass { .. });
-    if !(is_front || bare.double_sided || is_glass) {
-        return Ok(bare);
-    }
-    let emits = is_front || bare.double_sided;
-    let emission = if emits { material.emission.into() } else { Vec3::ZERO };
-    let mut surface = Surface { emission, ..bare };
+) -> Result<(), Fault> {
+    let Surface { outgoing, geometric_normal, .. } = *surface;
     let has_corners = material.flags & HAS_ATTRIBUTES != 0;
     let corners = if has_corners { Corners::read(scene, memory, index, weights)? } else { None };
     let mut texel = Texel::WHITE;
@@ -231,32 +223,32 @@ fn finished(
             surface.emission *= rgb(corners.texture(scene, memory, emissive)?);
             surface.emitter = corners.emitter();
         }
-        let front = if is_front { bare.geometric_normal } else { -bare.geometric_normal };
+        let front = if is_front { geometric_normal } else { -geometric_normal };
         if let Some(normal) = base_normal(scene, memory, material, corners, front)? {
             let normal = if is_front { normal } else { -normal };
-            surface.normal = turned(normal, bare.outgoing, bare.geometric_normal);
+            surface.normal = turned(normal, outgoing, geometric_normal);
         }
     }
-    let Surface { normal, geometric_normal, outgoing, .. } = surface;
-    let view = View { outgoing, normals: [normal, geometric_normal], is_front };
+    let view = View { outgoing, normals: [surface.normal, geometric_normal], is_front };
     if has_layers(material) {
-        return layered(scene, memory, surface, (corners.as_ref(), material), (&texel, &view), random);
+        return take_layer(scene, memory, surface, (corners.as_ref(), material), (&texel, &view), random);
     }
     let Scattering { reflection, specular, absorption } = scattering(material, &texel, &view);
-    let normal = bent_by_share(normal, reflection.glossy_share(), outgoing, geometric_normal);
-    Ok(Surface { normal, reflection, specular, absorption, ..surface })
+    surface.normal = bent_by_share(surface.normal, reflection.glossy_share(), outgoing, geometric_normal);
+    (surface.reflection, surface.specular, surface.absorption) = (reflection, specular, absorption);
+    Ok(())
 }
 
-/// The surface of one of a material's layers. All layers of the side emit.
+/// Applies one of a material's layers to a surface. All layers of the side emit.
 #[inline(never)]
-fn layered(
+fn take_layer(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    surface: Surface,
+    surface: &mut Surface,
     (corners, material): (Option<&Corners>, &Material),
     (texel, view): (&Texel, &View),
     random: &dyn Fn(u32) -> f32,
-) -> Result<Surface, Fault> {
+) -> Result<(), Fault> {
     let layers = read_layers(scene, memory, material)?;
     let layer_texel = layer_texel(scene, memory, corners, &layers)?;
     let coat_normal = match corners {
@@ -270,14 +262,18 @@ fn layered(
     };
     let coat_normal = coat_normal.unwrap_or(surface.geometric_normal);
     let taken = take((material, &layers), (texel, &layer_texel), view, coat_normal, random);
-    let Taken { layer, scattering: Scattering { reflection, specular, absorption }, .. } = taken;
-    let Taken { normal, probability, of_front, .. } = taken;
-    let share = if layer == Layer::Behind { 0.0 } else { reflection.glossy_share() };
-    let normal = bent_by_share(normal, share, surface.outgoing, surface.geometric_normal);
-    let surface = Surface { reflection, specular, absorption, normal, probability, ..surface };
-    let emission = if layer == Layer::Behind { Vec3::ZERO } else { surface.emission / of_front };
-    let surface = Surface { emission, ..surface };
-    Ok(if layer == Layer::Behind { surface.seen_through() } else { surface })
+    let Scattering { reflection, specular, absorption } = taken.scattering;
+    (surface.reflection, surface.specular, surface.absorption) = (reflection, specular, absorption);
+    surface.probability = taken.probability;
+    if taken.layer == Layer::Behind {
+        (surface.normal, surface.emission) = (taken.normal, Vec3::ZERO);
+        surface.see_through();
+    } else {
+        let share = surface.reflection.glossy_share();
+        surface.normal = bent_by_share(taken.normal, share, surface.outgoing, surface.geometric_normal);
+        surface.emission /= taken.of_front;
+    }
+    Ok(())
 }
 
 fn rgb([red, green, blue, _]: [f32; 4]) -> Vec3 {

@@ -40,10 +40,20 @@ pub(super) struct GgxLobe {
     pub(super) albedo: Vec3,
     /// Coefficients of `F0` and `F90` in the albedo.
     shares: [f32; 2],
-    /// `true` if rays follow the lobe, and no photon is gathered for it.
-    pub(super) is_followed: bool,
-    /// `true` for the lobe of a layer beyond the base: photons are stored for the base.
-    pub(super) is_layer: bool,
+    /// What estimates the lobe's light.
+    pub(super) estimate: Estimate,
+}
+
+/// The estimate of the light that a lobe reflects at the end of a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub(super) enum Estimate {
+    /// Photons are gathered for it.
+    Photons,
+    /// A ray follows it, and photons of lights without extent may be gathered.
+    Ray,
+    /// A ray alone: the lobe is that of a layer beyond the base, and photons are stored for the base.
+    RayAlone,
 }
 
 /// The normal and the two directions of `f`, reduced to what the lobe depends on.
@@ -84,14 +94,13 @@ impl GgxLobe {
             alpha: max(roughness * roughness, MIN_ALPHA),
             albedo,
             shares,
-            is_followed: false,
-            is_layer: false,
+            estimate: Estimate::Photons,
         }
     }
 
     /// The lobe as that of a layer beyond the base, which rays follow.
     pub(super) fn as_layer(self) -> Self {
-        Self { is_followed: true, is_layer: true, ..self }
+        Self { estimate: Estimate::RayAlone, ..self }
     }
 
     /// The lobe with the light that its microsurface reflects several times: `f (1 + F0 (1 - E) / E)`, `E` the albedo of a lobe with
@@ -117,7 +126,7 @@ impl GgxLobe {
     /// `true` for a lobe that photons of lights without extent resolve, in the caustic map: it is wider than the code of their
     /// directions, and than a disc of photons is seen from the things that reflect them.
     pub(super) fn gathers_caustics(&self) -> bool {
-        self.alpha >= MIN_CAUSTIC_ALPHA && !self.is_layer
+        self.alpha >= MIN_CAUSTIC_ALPHA && self.estimate != Estimate::RayAlone
     }
 
     /// `a`.

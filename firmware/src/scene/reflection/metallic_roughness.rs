@@ -9,7 +9,7 @@
 use glam::Vec3;
 
 use super::Reflection;
-use super::ggx::GgxLobe;
+use super::ggx::{Estimate, GgxLobe};
 use super::lobe::Lobe;
 use crate::scene::specular::Specular;
 use crate::vector::{max, max_component, min};
@@ -49,7 +49,9 @@ impl MetallicRoughness {
 
     fn lobe(&self, f0: Vec3, f90: Vec3, cosine: f32) -> GgxLobe {
         let mut lobe = GgxLobe::new(f0, f90, self.roughness, cosine);
-        lobe.is_followed = self.has_narrow_lobe;
+        if self.has_narrow_lobe {
+            lobe.estimate = Estimate::Ray;
+        }
         if self.is_compensated { lobe.compensated() } else { lobe }
     }
 

@@ -26,7 +26,7 @@ mod sheen;
 #[cfg(test)]
 mod tests;
 
-pub(super) use layered::{Layer, LayerTexel, Taken, take};
+pub(super) use layered::{Layer, LayerTexel, take};
 pub(super) use material::{Scattering, Texel, View, scattering};
 pub use photon_keeping::keeps_photons;
 pub use record::{DecodedLobe, PartialReflection};
@@ -35,6 +35,7 @@ pub use reflector::{ReflectedDirection, Reflector};
 use glam::Vec3;
 
 use crate::vector::max_component;
+use ggx::Estimate;
 use lobe::Lobe;
 use phong::PhongLobe;
 
@@ -90,7 +91,7 @@ impl Reflection {
     pub fn has_narrow_lobe(&self) -> bool {
         match &self.lobe {
             Lobe::Phong(_) => false,
-            Lobe::Ggx(lobe) => lobe.is_followed && lobe.reflects(),
+            Lobe::Ggx(lobe) => lobe.estimate != Estimate::Photons && lobe.reflects(),
             Lobe::Sheen(lobe) => lobe.reflects(),
         }
     }
