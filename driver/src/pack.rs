@@ -36,6 +36,7 @@ pub struct PackedScene {
     image: CardImage,
     sources: Sources,
     aimed_sources: Option<Sources>,
+    caustic_sources: Option<Sources>,
     keeps_photons: bool,
     has_lobes_under_punctual_lights: bool,
 }
@@ -55,6 +56,7 @@ impl PackedScene {
             image,
             sources: Sources::new(scene, &lights),
             aimed_sources: Sources::aimed(scene, &lights),
+            caustic_sources: Sources::of_caustics(scene, &lights),
             keeps_photons,
             has_lobes_under_punctual_lights: !scene.lights.is_empty()
                 && scene.materials.iter().any(|material| scene.has_narrow_lobe(material)),
@@ -88,9 +90,14 @@ impl PackedScene {
         &self.sources
     }
 
-    /// The sources of caustic photons, aimed at specular surfaces; `None` if there are none.
+    /// The sources of photons that are aimed at surfaces; `None` if there are none.
     pub(crate) fn aimed_sources(&self) -> Option<&Sources> {
         self.aimed_sources.as_ref()
+    }
+
+    /// The sources of caustic photons, aimed at specular surfaces; `None` if there are none.
+    pub(crate) fn caustic_sources(&self) -> Option<&Sources> {
+        self.caustic_sources.as_ref()
     }
 
     /// Returns whether any surface stores photons.

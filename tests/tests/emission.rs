@@ -157,3 +157,93 @@ fn a_panel_with_a_texture_emits_its_mean_and_all_lights_together_their_sum() {
     all.lights = vec![light(PunctualKind::Point { position: Vec3::new(0.0, 0.5, 0.0) }, COLOUR)];
     check(&all, times(COLOUR, panel + 4.0 * PI), "panel and point");
 }
+
+/// Distance of two small cubes from the middle between them, metres.
+const AFAR: f32 = 5.0;
+/// Half of a small cube's side, metres.
+const HALF: f32 = 0.05;
+
+/// Two small black cubes, far from each other.
+fn far_cubes() -> Scene {
+    let mut cubes = outside();
+    let of = |x: f32| {
+        let at = move |corner: Vec3| corner * HALF + Vec3::X * x;
+        outside()
+            .triangles
+            .into_iter()
+            .map(move |triangle| Triangle { vertices: triangle.vertices.map(at), ..triangle })
+    };
+    cubes.triangles = of(-AFAR).chain(of(AFAR)).collect();
+    cubes
+}
+
+/// Integral over the surfaces of both cubes of the irradiance by a light at a point: `toward(way)` is its radiant intensity along
+/// the vector to the surface, W/sr.
+fn received_from(from: Vec3, toward: impl Fn(Vec3) -> f32) -> f64 {
+    const STEPS: i32 = 8;
+    let middle = |i: i32| ((i as f32 + 0.5) / STEPS as f32 * 2.0 - 1.0) * HALF;
+    let mut sum = 0.0;
+    for (x, axis, side) in
+        [-AFAR, AFAR].into_iter().flat_map(|x| (0..6).map(move |face| (x, face % 3, face / 3)))
+    {
+        let normal = [Vec3::X, Vec3::Y, Vec3::Z][axis] * if side == 0 { 1.0 } else { -1.0 };
+        let (along, across) = normal.any_orthonormal_pair();
+        for (i, j) in (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (i, j))) {
+            let place = Vec3::X * x + normal * HALF + along * middle(i) + across * middle(j);
+            let way = place - from;
+            let cosine = -normal.dot(way.normalize());
+            sum += f64::from(toward(way).max(0.0) * cosine.max(0.0) / way.length_squared());
+        }
+    }
+    sum * f64::from((2.0 * HALF / STEPS as f32).powi(2))
+}
+
+#[test]
+fn photons_are_aimed_at_surfaces_far_from_the_lights() {
+    let position = Vec3::new(0.5, 3.0, 1.0);
+    let mut cubes = far_cubes();
+    cubes.lights = vec![light(PunctualKind::Point { position }, COLOUR)];
+    check(&cubes, times(COLOUR, received_from(position, |_| 1.0)), "point");
+    let direction = (Vec3::X * AFAR - position).normalize();
+    let kind = PunctualKind::Spot { position, direction, inner_cosine: 0.9, outer_cosine: 0.8 };
+    cubes.lights = vec![light(kind, COLOUR)];
+    let in_spot = |way: Vec3| if way.x > 0.0 { 1.0 } else { 0.0 };
+    check(&cubes, times(COLOUR, received_from(position, in_spot)), "spot");
+    let direction = Vec3::new(0.3, -1.0, 0.2).normalize();
+    cubes.lights = vec![light(PunctualKind::Directional { direction }, COLOUR)];
+    let shown = f64::from(direction.abs().element_sum() * 8.0 * HALF * HALF);
+    check(&cubes, times(COLOUR, shown), "directional");
+    cubes.lights.clear();
+    cubes.environment = Some(Environment::constant(COLOUR.into()));
+    check(&cubes, times(COLOUR, PI * f64::from(48.0 * HALF * HALF)), "environment");
+}
+
+#[test]
+fn photons_of_panels_are_aimed() {
+    let middle = Vec3::new(0.5, 3.0, 1.0);
+    for double_sided in [false, true] {
+        let mut cubes = far_cubes();
+        let mut lamp = lambertian("lamp", 0.0);
+        (lamp.emission, lamp.double_sided) = (COLOUR.into(), double_sided);
+        cubes.materials.push(lamp);
+        // It faces one of the cubes, its back the other.
+        let normal = Vec3::new(1.0, -0.4, 0.0).normalize();
+        let (along, across) = normal.any_orthonormal_pair();
+        let corner = |x: f32, y: f32| middle + along * (0.2 * x) + across * (0.2 * y);
+        cubes
+            .triangles
+            .extend(quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], 1));
+        let steps = 8;
+        let at = |i: i32| (i as f32 + 0.5) / steps as f32 * 2.0 - 1.0;
+        let points = (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j)));
+        let sum: f64 = points
+            .map(|(i, j)| {
+                received_from(corner(at(i), at(j)), |way| {
+                    let cosine = normal.dot(way.normalize());
+                    if double_sided { cosine.abs() } else { cosine }
+                })
+            })
+            .sum();
+        check(&cubes, times(COLOUR, sum * f64::from(0.4_f32 * 0.4) / f64::from(steps * steps)), "panel");
+    }
+}

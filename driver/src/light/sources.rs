@@ -44,7 +44,7 @@ pub(crate) struct Sources {
     pub(crate) bounds: [Vec3; 2],
     /// Targets that photons are aimed at; empty if they are not aimed.
     pub(crate) targets: Targets,
-    /// Power of all sources, watts, mean of the channels; 0 if photons are aimed.
+    /// Power of all sources, watts, mean of the channels; 0 if photons may be aimed.
     pub(crate) power: f64,
     /// Maximum over the sources of power in the strongest channel over probability, watts: the strongest photon, if it
     /// were the only one.
@@ -73,8 +73,15 @@ impl Sources {
     }
 
     /// The sources of a scene, for photons that are aimed at specular surfaces; `None` if there are none.
+    pub(crate) fn of_caustics(scene: &Scene, lights: &Lights) -> Option<Self> {
+        let targets = Targets::specular(scene);
+        (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
+    }
+
+    /// The sources of a scene, for photons in all directions, most of them aimed at surfaces that are no lamps: the lights may be
+    /// far from these. `None` if there are none.
     pub(crate) fn aimed(scene: &Scene, lights: &Lights) -> Option<Self> {
-        let targets = Targets::new(scene);
+        let targets = Targets::lit(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
     }
 

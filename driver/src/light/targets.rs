@@ -1,4 +1,4 @@
-//! Targets of caustic photons: spheres around all surfaces that reflect or transmit specularly.
+//! Targets of photons: spheres around some of a scene's surfaces.
 //!
 //! A sphere is chosen in proportion to the solid angle that it subtends, and a direction uniformly within this angle. Where
 //! spheres overlap, a direction may be chosen through any of them: its density is the number of spheres in this direction
@@ -8,7 +8,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use crate::scene::Scene;
+use crate::scene::{Material, Scene};
 
 /// A bounding sphere of some triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,10 +18,12 @@ pub(crate) struct Sphere {
     radius: f32,
 }
 
-/// Bounding spheres of all specular surfaces of a scene; empty if there are none.
+/// Bounding spheres of some of a scene's surfaces.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Targets {
     spheres: Vec<Sphere>,
+    /// Probability of aiming at a sphere; other photons are emitted in all directions. 0 without spheres.
+    pub(crate) share: f32,
 }
 
 /// A sampled direction or point, with the inverse of its density.
@@ -33,16 +35,30 @@ pub(crate) struct Aim {
     pub(crate) measure: f32,
 }
 
+/// Share of the aimed photons where photons may be needed elsewhere as well.
+const AIMED_SHARE: f32 = 0.9;
 /// Maximum number of spheres.
 const MAX_SPHERES: usize = 32;
 /// Margin of a sphere for rounding: relative to its radius; its square relative to the maximum coordinate.
 const MARGIN: f32 = 1e-3;
 
 impl Targets {
-    /// The targets of a scene.
-    pub(super) fn new(scene: &Scene) -> Self {
-        let is_specular = scene.specular_materials();
-        let triangles = scene.triangles.iter().filter(|triangle| is_specular[triangle.material as usize]);
+    /// All surfaces of a scene that reflect or transmit specularly: all caustic photons meet one.
+    pub(super) fn specular(scene: &Scene) -> Self {
+        Self { share: 1.0, ..Self::around(scene, &scene.specular_materials()) }
+    }
+
+    /// All surfaces of a scene but lamps, that is uniform emitters: what these reflect of other light hardly shows.
+    pub(super) fn lit(scene: &Scene) -> Self {
+        let is_lit =
+            |material: &Material| material.emission == Vec3::ZERO || material.emissive_texture.is_some();
+        let is_lit: Vec<_> = scene.materials.iter().map(is_lit).collect();
+        Self { share: AIMED_SHARE, ..Self::around(scene, &is_lit) }
+    }
+
+    /// Surfaces of the chosen materials.
+    fn around(scene: &Scene, is_chosen: &[bool]) -> Self {
+        let triangles = scene.triangles.iter().filter(|triangle| is_chosen[triangle.material as usize]);
         let all: Vec<[Vec3; 3]> = triangles.map(|triangle| triangle.vertices).collect();
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
         while parts.len() < MAX_SPHERES {
@@ -60,7 +76,7 @@ impl Targets {
                 None => parts[index].may_be_split = false,
             }
         }
-        Self { spheres: parts.into_iter().map(|part| part.sphere).collect() }
+        Self { spheres: parts.into_iter().map(|part| part.sphere).collect(), share: 0.0 }
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -70,6 +86,35 @@ impl Targets {
     /// Sum of the solid angles that the spheres subtend at a point, sr; overlaps count repeatedly.
     pub(super) fn solid_angle(&self, from: Vec3) -> f32 {
         self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()).sum()
+    }
+
+    /// Chooses by a number in [0, 1) whether to aim at a sphere. The remainder of the number is rescaled to [0, 1).
+    pub(crate) fn is_aimed(&self, number: f32) -> (bool, f32) {
+        if number < self.share {
+            (true, number / self.share)
+        } else {
+            (false, ((number - self.share) / (1.0 - self.share)).min(1.0 - f32::EPSILON / 2.0))
+        }
+    }
+
+    /// Density of the direction or the place of a photon that is aimed with the probability [`Self::share`]; `aimed` and `free` are the
+    /// densities with and without an aim.
+    pub(crate) fn mixed(&self, aimed: f32, free: f32) -> f32 {
+        self.share * aimed + (1.0 - self.share) * free
+    }
+
+    /// Density of a direction from a point by [`Self::direction`], 1/sr.
+    pub(crate) fn direction_density(&self, from: Vec3, towards: Vec3) -> f32 {
+        let all = self.solid_angle(from);
+        let covering = self.spheres.iter().filter(|sphere| sphere.cone(from).holds(towards)).count();
+        if all > 0.0 { covering as f32 / all } else { 0.0 }
+    }
+
+    /// Density of a line of a direction by [`Self::place`], 1/m^2: `place` is a point of it.
+    pub(crate) fn place_density(&self, direction: Vec3, place: Vec3) -> f32 {
+        let all = self.area();
+        let covering = self.spheres.iter().filter(|sphere| sphere.is_met(place, direction)).count();
+        if all > 0.0 { covering as f32 / all } else { 0.0 }
     }
 
     /// Sum of the projected areas of the spheres, `pi r^2`, m^2; overlaps count repeatedly.
@@ -97,11 +142,7 @@ impl Targets {
         let (sin, cos) = libm::sincosf(2.0 * PI * d);
         let place = centre + (tangent * cos + bitangent * sin) * (radius * c.sqrt());
         let others = self.spheres.iter().enumerate().filter(|(other, _)| *other != index);
-        let is_near = |sphere: &Sphere| {
-            (place - sphere.centre).reject_from_normalized(direction).length_squared()
-                < sphere.radius * sphere.radius
-        };
-        let covering = others.filter(|(_, sphere)| is_near(sphere)).count();
+        let covering = others.filter(|(_, sphere)| sphere.is_met(place, direction)).count();
         let towards = place.reject_from_normalized(direction);
         Some(Aim { towards, measure: all / (1 + covering) as f32 })
     }
@@ -148,7 +189,7 @@ impl SolidCone {
         (self.axis * (1.0 - fall) + (tangent * cos + bitangent * sin) * sine).normalize()
     }
 
-    fn holds(&self, direction: Vec3) -> bool {
+    pub(crate) fn holds(&self, direction: Vec3) -> bool {
         // `1 - cos` of the angle between the unit vectors, without cancellation.
         0.5 * (direction - self.axis).length_squared() < self.height
     }
@@ -166,6 +207,11 @@ impl Sphere {
             // Within the sphere; at its centre the quotient is infinite or NaN.
             SolidCone::ALL
         }
+    }
+
+    /// Returns whether the line of a direction through a point meets the sphere.
+    fn is_met(&self, place: Vec3, direction: Vec3) -> bool {
+        (place - self.centre).reject_from_normalized(direction).length_squared() < self.radius * self.radius
     }
 
     fn disc_area(&self) -> f32 {
@@ -219,7 +265,8 @@ mod tests {
     /// Three spheres, two of which overlap.
     fn targets() -> Targets {
         let sphere = |x: f32, y: f32, radius: f32| Sphere { centre: Vec3::new(x, y, 5.0), radius };
-        Targets { spheres: vec![sphere(0.0, 0.0, 1.0), sphere(0.8, 0.0, 0.7), sphere(-3.0, 2.0, 0.5)] }
+        let spheres = vec![sphere(0.0, 0.0, 1.0), sphere(0.8, 0.0, 0.7), sphere(-3.0, 2.0, 0.5)];
+        Targets { spheres, share: 1.0 }
     }
 
     /// Integral over the unit square of the measure that the spheres cover.
@@ -286,12 +333,12 @@ mod tests {
         };
         let triangles: Vec<_> = (0..100).map(|i| triangle(i as f32)).collect();
         let scene = Scene { triangles, materials: vec![mirror], ..Scene::default() };
-        let targets = Targets::new(&scene);
+        let targets = Targets::specular(&scene);
         assert_eq!(targets.spheres.len(), MAX_SPHERES);
         assert!(targets.spheres.iter().all(|sphere| sphere.radius < 4.0));
         for corner in scene.triangles.iter().flat_map(|triangle| triangle.vertices) {
             assert!(targets.spheres.iter().any(|sphere| sphere.centre.distance(corner) <= sphere.radius));
         }
-        assert!(Targets::new(&Scene::default()).is_empty());
+        assert!(Targets::specular(&Scene::default()).is_empty());
     }
 }

@@ -4,7 +4,7 @@
 //! path (the additive recurrence of Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*), shifted by
 //! the seed. Random numbers of bounces are hashes of (seed, path, bounce).
 
-use std::f32::consts::PI;
+use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
@@ -116,22 +116,24 @@ pub(super) fn emit(
     let [first, b, c, d] = random.emission();
     let [b, c, d] = [b, c, d].map(unit_of_bits);
     let Some(chosen) = sources.choose(first) else { return Ok(None) };
+    let (is_aimed, c) = sources.targets.is_aimed(c);
+    let way = Way { targets: &sources.targets, is_aimed };
     let mut has_extent = true;
     let emission = match chosen.source {
         Source::Emitter(index) => {
             let emitter = read_emitter(scene, memory, index)?;
             has_extent = matches!(emitter.kind, EmitterKind::Triangle { .. });
-            from_emitter(scene, memory, &emitter, &sources.targets, [chosen.rest, b, c, d])?
+            from_emitter(scene, memory, &emitter, way, [chosen.rest, b, c, d])?
         }
         Source::Distant { direction, irradiance } => {
             has_extent = false;
-            from_afar(sources, direction, irradiance, [c, d])
+            from_afar(sources.bounds, way, direction, irradiance, [c, d])
         }
         Source::Cell { across: [left, width], cosines: [upper, lower], solid_angle } => {
             let cosine = (upper + (lower - upper) * b).clamp(-1.0, 1.0);
             let towards = environment_direction(left + width * chosen.rest, cosine);
             let irradiance = environment_radiance(scene, memory, towards)? * solid_angle;
-            from_afar(sources, -towards, irradiance, [c, d])
+            from_afar(sources.bounds, way, -towards, irradiance, [c, d])
         }
     };
     let emission = emission.map(|emission| Emission {
@@ -139,6 +141,7 @@ pub(super) fn emit(
         has_extent,
         ..emission
     });
+    let emission = emission.filter(|emission| emission.power.max_element() > 0.0);
     // Bounces are fewer than `u32::MAX`: this random number is used once.
     Ok(emission.and_then(|emission| roulette(emission, sources.power, random.bounce(u32::MAX).survival())))
 }
@@ -154,12 +157,35 @@ fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emissi
     (roulette < probability).then(|| Emission { power: emission.power / probability, ..emission })
 }
 
-/// Emission of an emitter as the only source, towards the targets if there are any.
+/// The way in which a photon's direction is chosen.
+#[derive(Clone, Copy)]
+struct Way<'s> {
+    targets: &'s Targets,
+    is_aimed: bool,
+}
+
+impl Way<'_> {
+    /// The emission with its power over the density of both ways (the balance heuristic of Veach 1997, section 9.2.2), instead of
+    /// over that of its own one. `densities` are those of aimed and of other photons, for its ray.
+    fn balanced(&self, emission: Option<Emission>, densities: impl Fn(&Ray) -> [f32; 2]) -> Option<Emission> {
+        let emission = emission?;
+        if [0.0, 1.0].contains(&self.targets.share) {
+            return Some(emission);
+        }
+        let [aimed, free] = densities(&emission.ray);
+        let own = if self.is_aimed { aimed } else { free };
+        let mixed = self.targets.mixed(aimed, free);
+        // By rounding, at the border of a sphere.
+        (mixed > 0.0).then(|| Emission { power: emission.power * (own / mixed), ..emission })
+    }
+}
+
+/// Emission of an emitter as the only source.
 fn from_emitter(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     emitter: &Emitter,
-    targets: &Targets,
+    way: Way,
     [a, b, c, d]: [f32; 4],
 ) -> Result<Option<Emission>, Fault> {
     let intensity = Vec3::from(emitter.emission);
@@ -168,11 +194,16 @@ fn from_emitter(
             let Some(point) = emitter_point(scene, memory, emitter, [a, b])? else { return Ok(None) };
             let [p, q, r] = vertices.map(Vec3::from);
             let area = 0.5 * (q - p).cross(r - p).length();
-            let emission = if targets.is_empty() {
-                by_cosine(&point, double_sided, [c, d])
+            let emission = if way.is_aimed {
+                aimed(&point, double_sided, way.targets, [c, d])
             } else {
-                aimed(&point, double_sided, targets, [c, d])
+                by_cosine(&point, double_sided, [c, d])
             };
+            let emission = way.balanced(emission, |ray| {
+                let sides = if double_sided { 2.0 } else { 1.0 };
+                let free = point.normal.dot(ray.direction).abs() * (FRAC_1_PI / sides);
+                [way.targets.direction_density(point.position, ray.direction), free]
+            });
             emission.map(|Emission { ray, power, .. }| Emission {
                 ray,
                 power: power * area,
@@ -181,7 +212,7 @@ fn from_emitter(
         }
         EmitterKind::Point { position } => {
             let position = Vec3::from(position);
-            let aim = aim(targets, position, SolidCone::ALL, [c, d]);
+            let aim = aim(way, position, SolidCone::ALL, [c, d]);
             aim.map(|Aim { towards, measure }| Emission {
                 ray: Ray::new(position, towards),
                 power: intensity * measure,
@@ -191,7 +222,7 @@ fn from_emitter(
         EmitterKind::Spot { position, direction, scale, offset } => {
             let [position, axis] = [position, direction].map(Vec3::from);
             let height = (1.0 + offset / scale).clamp(0.0, 2.0);
-            let aim = aim(targets, position, SolidCone { axis, height }, [c, d]);
+            let aim = aim(way, position, SolidCone { axis, height }, [c, d]);
             aim.map(|Aim { towards, measure }| Emission {
                 ray: Ray::new(position, towards),
                 power: intensity * (measure * falloff(axis.dot(towards), scale, offset)),
@@ -201,12 +232,18 @@ fn from_emitter(
     })
 }
 
-/// Direction in the cone of emission, or towards the targets if there are any.
-fn aim(targets: &Targets, from: Vec3, cone: SolidCone, square: [f32; 2]) -> Option<Aim> {
-    if targets.is_empty() {
-        return Some(Aim { towards: cone.direction(square), measure: cone.solid_angle() });
+/// Direction in the cone of emission, or towards the targets.
+fn aim(way: Way, from: Vec3, cone: SolidCone, square: [f32; 2]) -> Option<Aim> {
+    let Way { targets, is_aimed } = way;
+    let free = Aim { towards: cone.direction(square), measure: cone.solid_angle() };
+    let aim = if is_aimed { targets.direction(from, square)? } else { free };
+    if targets.share == 0.0 || targets.share == 1.0 {
+        return Some(aim);
     }
-    targets.direction(from, square)
+    let Aim { towards, .. } = aim;
+    let free = if cone.holds(towards) { 1.0 / cone.solid_angle() } else { 0.0 };
+    let density = targets.mixed(targets.direction_density(from, towards), free);
+    (density > 0.0).then(|| Aim { towards, measure: 1.0 / density })
 }
 
 /// Emission of a point on a triangle, cosine-weighted, per square metre; from both sides if double-sided.
@@ -239,23 +276,49 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
     })
 }
 
-/// Emission from infinitely far along `direction`, towards the targets if there are any; `irradiance` is that of a surface
-/// facing the light.
-fn from_afar(sources: &Sources, direction: Vec3, irradiance: Vec3, square: [f32; 2]) -> Option<Emission> {
-    if sources.targets.is_empty() {
-        return Some(through_box(sources.bounds, direction, irradiance, square));
-    }
-    let Aim { towards, measure } = sources.targets.place(direction, square)?;
-    // The origin lies before the whole scene.
-    let corners = sources.bounds.map(|corner| corner * direction);
-    let origin = towards + direction * corners[0].min(corners[1]).element_sum();
-    Some(Emission { ray: Ray::new(origin, direction), power: irradiance * measure, has_extent: true })
+/// Emission from infinitely far along `direction`; `irradiance` is that of a surface facing the light.
+fn from_afar(
+    bounds: [Vec3; 2],
+    way: Way,
+    direction: Vec3,
+    irradiance: Vec3,
+    square: [f32; 2],
+) -> Option<Emission> {
+    let emission = if way.is_aimed {
+        let Aim { towards, measure } = way.targets.place(direction, square)?;
+        // The origin lies before the whole scene.
+        let corners = bounds.map(|corner| corner * direction);
+        let origin = towards + direction * corners[0].min(corners[1]).element_sum();
+        Emission { ray: Ray::new(origin, direction), power: irradiance * measure, has_extent: true }
+    } else {
+        through_box(bounds, direction, irradiance, square)
+    };
+    way.balanced(Some(emission), |ray| {
+        let free = if meets_box(bounds, ray) { 1.0 / shown(bounds, direction).element_sum() } else { 0.0 };
+        [way.targets.place_density(direction, ray.origin), free]
+    })
+}
+
+/// Projected areas of a box's faces along a direction, m^2.
+fn shown([lower, upper]: [Vec3; 2], direction: Vec3) -> Vec3 {
+    let size = upper - lower;
+    direction.abs() * Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y)
+}
+
+/// Returns whether the line of a ray meets a box.
+fn meets_box(bounds: [Vec3; 2], ray: &Ray) -> bool {
+    let [a, b] = bounds.map(|corner| (corner - ray.origin) / ray.direction);
+    // A component is NaN in the plane of a face.
+    let first = a.min(b).to_array().into_iter().fold(f32::NEG_INFINITY, f32::max);
+    let last = a.max(b).to_array().into_iter().fold(f32::INFINITY, f32::min);
+    first <= last
 }
 
 /// Emission from infinitely far through the faces of the scene's bounding box, each in proportion to its projected area.
-fn through_box([lower, upper]: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
+fn through_box(bounds: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
+    let [lower, upper] = bounds;
     let size = upper - lower;
-    let shown = direction.abs() * Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y);
+    let shown = shown(bounds, direction);
     let area = shown.element_sum();
     let mut number = c * area;
     let mut axis = 2;

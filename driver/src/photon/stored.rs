@@ -1,6 +1,6 @@
 //! Photons in host memory: sixteen bytes each, until they are written to the card image.
 
-use photoncard_shared::layout::{GRID_BITS, PHOTON_CONTENT_BYTES, Photon, PhotonGrid, Record};
+use photoncard_shared::layout::{GRID_BITS, PHOTON_CONTENT_BYTES, Photon, PhotonGrid, Record, Rgbe};
 
 /// A photon: its grid point, and its other values in encoded form.
 ///
@@ -46,6 +46,12 @@ impl StoredPhoton {
     /// Bytes after the position.
     pub(crate) fn content(self) -> [u8; PHOTON_CONTENT_BYTES] {
         self.content.to_le_bytes()
+    }
+
+    /// Sum of its power's channels, in units of the map.
+    pub(crate) fn power(self) -> f64 {
+        let [a, b, c, d, ..] = self.content();
+        Rgbe([a, b, c, d]).decode().into_iter().map(f64::from).sum()
     }
 
     /// The photon as a node of the kd-tree that splits along `axis`.

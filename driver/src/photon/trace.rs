@@ -33,6 +33,10 @@ const FRUITLESS_PATHS: u64 = 1_000_000;
 const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
 /// Number of paths of one task.
 const PATHS_PER_TASK: u64 = 2048;
+/// Number of tasks of a pilot.
+const PILOT_TASKS: u64 = 16;
+/// Photons of aimed paths over those of unaimed ones from which paths are aimed. The powers of unaimed photons are more alike.
+const MIN_GAIN_BY_AIM: f64 = 2.0;
 /// Maximum number of bounces of a path; only surfaces without loss let a path reach it.
 const MAX_BOUNCES: u32 = 512;
 
@@ -100,13 +104,12 @@ fn trace_while(
         let photons = Photons { list: Vec::new(), grid: packed.photon_grid(), power_unit: 1.0 };
         return Ok(PhotonPass { photons, paths: 0, met: 0 });
     }
-    // Photons rarely gain power after emission: factor 2 at a Phong lobe, 16 at glass whose reflection is almost the
-    // mirror's alone.
-    let aimed = packed.aimed_sources().filter(|_| purpose == Purpose::Caustics);
-    let sources = aimed.unwrap_or(packed.sources());
-    let path_unit = power_of_two_above(sources.strongest.into());
-    let (scene, grid) = (packed.view().0, packed.photon_grid());
-    let tracer = Tracer { scene, sources, grid, path_unit, seed, purpose };
+    let tracer = match purpose {
+        Purpose::Indirect => Tracer::of_more_photons(packed, seed).map_err(PhotonError::Unsound)?,
+        Purpose::Caustics => {
+            Tracer::new(packed, packed.caustic_sources().unwrap_or(packed.sources()), seed, purpose)
+        }
+    };
     let mut list: Vec<StoredPhoton> = Vec::with_capacity(count);
     let mut paths = 0_u64;
     let mut met = 0_u64;
@@ -128,7 +131,7 @@ fn trace_while(
             }
         }
     }
-    let power_unit = (path_unit / paths.max(1) as f32).max(f32::MIN_POSITIVE);
+    let power_unit = (tracer.path_unit / paths.max(1) as f32).max(f32::MIN_POSITIVE);
     Ok(PhotonPass { photons: Photons { list, grid: tracer.grid, power_unit }, paths, met })
 }
 
@@ -178,7 +181,36 @@ struct Tracer<'s> {
     purpose: Purpose,
 }
 
-impl Tracer<'_> {
+impl<'s> Tracer<'s> {
+    fn new(packed: &PackedScene, sources: &'s Sources, seed: u32, purpose: Purpose) -> Self {
+        // Photons rarely gain power after emission: factor 2 at a Phong lobe, 16 at glass whose reflection is almost the
+        // mirror's alone.
+        let path_unit = power_of_two_above(sources.strongest.into());
+        Self { scene: packed.view().0, sources, grid: packed.photon_grid(), path_unit, seed, purpose }
+    }
+
+    /// Tracer of the photon map whose paths store more photons: of unaimed paths, or of aimed ones, where far more of these meet a
+    /// surface.
+    fn of_more_photons(packed: &'s PackedScene, seed: u32) -> Result<Self, Fault> {
+        let unaimed = Self::new(packed, packed.sources(), seed, Purpose::Indirect);
+        let Some(sources) = packed.aimed_sources() else { return Ok(unaimed) };
+        let aimed = Self::new(packed, sources, seed, Purpose::Indirect);
+        let [of_unaimed, of_aimed] = [unaimed.pilot(packed)?, aimed.pilot(packed)?];
+        Ok(if of_aimed > MIN_GAIN_BY_AIM * of_unaimed { aimed } else { unaimed })
+    }
+
+    /// Effective number of the photons that the first paths store: `(sum w)^2 / sum w^2` of their powers w (Kish 1965).
+    fn pilot(&self, packed: &PackedScene) -> Result<f64, Fault> {
+        let tasks: Result<Vec<Traced>, Fault> = (0..PILOT_TASKS)
+            .into_par_iter()
+            .map(|task| self.trace(&mut packed.view().1, task * PATHS_PER_TASK))
+            .collect();
+        let powers = tasks?.into_iter().flat_map(|traced| traced.photons).map(StoredPhoton::power);
+        let [sum, squares] =
+            powers.fold([0.0; 2], |[sum, squares], power| [sum + power, squares + power * power]);
+        Ok(if squares > 0.0 { sum * sum / squares } else { 0.0 })
+    }
+
     /// Traces the paths of a task.
     fn trace(&self, memory: &mut impl MemoryPort, first: u64) -> Result<Traced, Fault> {
         let mut traced =
