@@ -11,14 +11,14 @@ use super::coverage::covered;
 use super::materials::{has_layers, layer_texel, read_layers, read_material};
 use super::normal_map::{base_normal, mapped_normal};
 use super::reflection::{Layer, Scattering, Taken, Texel, View, scattering, take};
-use super::shading_normal::{bent_by_share, turned};
+use super::shading_normal::{bent, bent_by_share, points_away, turned};
 use super::specular::Specular;
 use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origin};
 use crate::memory::MemoryPort;
-use crate::vector::{max_component, unit};
+use crate::vector::{max, max_component, min, unit};
 
 /// Random numbers of [`read_surface`].
-pub const SURFACE_CHOICES: u32 = 3;
+pub const SURFACE_CHOICES: u32 = 4;
 
 /// Surface at the hit of a ray, on the side of the ray's origin.
 #[derive(Clone, Copy, Debug)]
@@ -233,18 +233,50 @@ fn finished(
         }
         let front = if is_front { bare.geometric_normal } else { -bare.geometric_normal };
         if let Some(normal) = base_normal(scene, memory, material, corners, front)? {
-            let normal = if is_front { normal } else { -normal };
-            surface.normal = turned(normal, bare.outgoing, bare.geometric_normal);
+            surface.normal = if is_front { normal } else { -normal };
         }
     }
     let Surface { normal, geometric_normal, outgoing, .. } = surface;
-    let view = View { outgoing, normals: [normal, geometric_normal], is_front };
+    let view =
+        View { outgoing, normals: [turned(normal, outgoing, geometric_normal), geometric_normal], is_front };
     if has_layers(material) {
         return layered(scene, memory, surface, (corners.as_ref(), material), (&texel, &view), random);
     }
     let Scattering { reflection, specular, absorption } = scattering(material, &texel, &view);
-    let normal = bent_by_share(normal, reflection.glossy_share(), outgoing, geometric_normal);
-    Ok(Surface { normal, reflection, specular, absorption, ..surface })
+    let surface = Surface { reflection, specular, absorption, ..surface };
+    Ok(shaded_by_parts(surface, &view, random(0)))
+}
+
+/// Minimum probability of each of two parts with normals of their own.
+const MIN_PART: f32 = 1.0 / 8.0;
+
+/// A surface with the shading normals of its parts, instead of the one of its corners or texture: the Lambertian part has that one, a
+/// lobe or a mirror the bent one. Of a narrow lobe and a Lambertian part whose normals differ, one is taken by a random number in
+/// [0, 1), over its probability. A wide lobe, for which photons are stored, shares a normal with the Lambertian part.
+#[inline(never)]
+fn shaded_by_parts(surface: Surface, view: &View, random: f32) -> Surface {
+    let Surface { normal, geometric_normal, outgoing, reflection, .. } = surface;
+    if normal == geometric_normal || (reflection.is_lambertian() && surface.specular.is_none()) {
+        return surface;
+    }
+    let [turned, _] = view.normals;
+    let share = reflection.glossy_share();
+    if !(reflection.has_narrow_lobe() && share < 1.0) {
+        return Surface { normal: bent_by_share(turned, share, outgoing, geometric_normal), ..surface };
+    }
+    let bent = bent(turned, outgoing, geometric_normal);
+    // Not by the difference from `normal`, which rounding decides: a stored hit, read again, must give the same answer.
+    if bent == turned && !points_away(normal, outgoing) {
+        return surface;
+    }
+    let diffuse_share = min(max(1.0 - share, MIN_PART), 1.0 - MIN_PART);
+    let (part, normal, probability) = if random < diffuse_share {
+        (reflection.without_narrow_lobe(), normal, diffuse_share)
+    } else {
+        (reflection.narrow_lobe(), bent, 1.0 - diffuse_share)
+    };
+    let reflection = part.dimmed(Vec3::splat(1.0 / probability));
+    Surface { normal, reflection, probability: surface.probability * probability, ..surface }
 }
 
 /// The surface of one of a material's layers. All layers of the side emit.
@@ -264,20 +296,23 @@ fn layered(
             let map = (layers.texture(LayerTexture::CoatNormal), layers.coat_normal_scale);
             let sign = if view.is_front { 1.0 } else { -1.0 };
             let normal = mapped_normal(scene, memory, map, corners, surface.geometric_normal * sign)?;
-            normal.map(|normal| turned(normal * sign, surface.outgoing, surface.geometric_normal))
+            normal.map(|normal| normal * sign)
         }
         None => None,
     };
-    let coat_normal = coat_normal.unwrap_or(surface.geometric_normal);
+    let Surface { normal: own, geometric_normal, outgoing, .. } = surface;
+    let coat_normal = turned(coat_normal.unwrap_or(geometric_normal), outgoing, geometric_normal);
     let taken = take((material, &layers), (texel, &layer_texel), view, coat_normal, random);
     let Taken { layer, scattering: Scattering { reflection, specular, absorption }, .. } = taken;
     let Taken { normal, probability, of_front, .. } = taken;
-    let share = if layer == Layer::Behind { 0.0 } else { reflection.glossy_share() };
-    let normal = bent_by_share(normal, share, surface.outgoing, surface.geometric_normal);
     let surface = Surface { reflection, specular, absorption, normal, probability, ..surface };
-    let emission = if layer == Layer::Behind { Vec3::ZERO } else { surface.emission / of_front };
-    let surface = Surface { emission, ..surface };
-    Ok(if layer == Layer::Behind { surface.seen_through() } else { surface })
+    if layer == Layer::Behind {
+        return Ok(Surface { emission: Vec3::ZERO, ..surface }.seen_through());
+    }
+    let normals = [normal, geometric_normal];
+    let normal = if layer == Layer::Base { own } else { normal };
+    let surface = Surface { normal, emission: surface.emission / of_front, ..surface };
+    Ok(shaded_by_parts(surface, &View { normals, ..*view }, random(SURFACE_CHOICES - 1)))
 }
 
 fn rgb([red, green, blue, _]: [f32; 4]) -> Vec3 {
