@@ -258,6 +258,21 @@ fn albedos(outgoing: DVec3, roughness: Option<f64>) -> [f64; 3] {
     sums
 }
 
+/// Radiance of a plate with [`bumps`] under a white sky, seen from a direction.
+fn in_a_furnace(material: Material, direction: DVec3) -> f64 {
+    let view = far_camera(direction.as_vec3());
+    let mut scene = plate(mapped(material, 1.0), &bumps(), Vec4::new(1.0, 0.0, 0.0, 1.0), view);
+    // The picture is within the plate: repeated, as far as the camera sees.
+    for triangle in &mut scene.triangles {
+        triangle.vertices.iter_mut().for_each(|vertex| *vertex *= 16.0);
+    }
+    for attributes in &mut scene.attributes {
+        attributes.coordinates[0].iter_mut().for_each(|place| *place *= 16.0);
+    }
+    scene.environment = Some(Environment::constant(Vec3::ONE));
+    mean(&radiances(&film(&scene, &settings(64, 32))))
+}
+
 #[test]
 fn bumpy_plates_in_a_white_furnace_lose_little() {
     for (degrees, roughness, largest_loss) in [
@@ -274,17 +289,7 @@ fn bumpy_plates_in_a_white_furnace_lose_little() {
             Some(roughness) => metal(roughness as f32),
             None => lambertian("plate", ALBEDO),
         };
-        let view = far_camera(direction.as_vec3());
-        let mut scene = plate(mapped(material, 1.0), &bumps(), Vec4::new(1.0, 0.0, 0.0, 1.0), view);
-        // The picture is within the plate: repeated, as far as the camera sees.
-        for triangle in &mut scene.triangles {
-            triangle.vertices.iter_mut().for_each(|vertex| *vertex *= 16.0);
-        }
-        for attributes in &mut scene.attributes {
-            attributes.coordinates[0].iter_mut().for_each(|place| *place *= 16.0);
-        }
-        scene.environment = Some(Environment::constant(Vec3::ONE));
-        let found = mean(&radiances(&film(&scene, &settings(64, 32))));
+        let found = in_a_furnace(material, direction);
         println!(
             "{degrees} {roughness:?}: {found:.4}, expected {expected:.4}, unbent {unbent:.4}, whole {whole:.4}"
         );
@@ -292,6 +297,78 @@ fn bumpy_plates_in_a_white_furnace_lose_little() {
         assert!(found >= unbent * 0.995, "{degrees} {roughness:?}: {found} {unbent}");
         assert!(found > whole * (1.0 - largest_loss), "{degrees} {roughness:?}: {found} {whole}");
     }
+}
+
+/// Cosine-weighted mean over the hemisphere of Schlick's reflectance of a dielectric of F0 0.04.
+fn mean_fresnel(outgoing: DVec3) -> f64 {
+    over_the_sky(|direction| schlick(0.04, outgoing, direction) * direction.z / PI)
+}
+
+fn schlick(f0: f64, outgoing: DVec3, incident: DVec3) -> f64 {
+    f0 + (1.0 - f0) * (1.0 - (outgoing + incident).normalize().dot(outgoing)).powi(5)
+}
+
+/// Albedo of a bumpy plate of plastic, mean over its texels: the lobe by the normal that is [`bent`], above it the share of light that
+/// it leaves to the Lambertian base, by the texel's own normal.
+fn plastic_albedo(outgoing: DVec3, roughness: f64) -> f64 {
+    let base = f64::from(ALBEDO);
+    let lobe = |normal: DVec3, outgoing: DVec3| {
+        over_the_sky(|direction| {
+            let metal = schlick(base, outgoing, direction);
+            metal_times_cosine(normal, outgoing, direction, roughness) / metal
+                * schlick(0.04, outgoing, direction)
+        })
+    };
+    let of_texel = |normal: DVec3| {
+        let glossy = bent(normal, outgoing);
+        let cosine = glossy.dot(outgoing);
+        let along = DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+        let coat = lobe(DVec3::Z, along).max(mean_fresnel(along));
+        let lit = over_the_sky(|direction| normal.dot(direction).max(0.0) / PI);
+        lobe(glossy, outgoing) + base * (1.0 - coat) * lit
+    };
+    let count = bumps().len() as f64;
+    bumps().into_iter().map(|normal| of_texel(rounded(normal, 1.0)) / count).sum()
+}
+
+fn plastic(roughness: f32) -> Material {
+    let reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::splat(ALBEDO),
+        metallic: 0.0,
+        roughness,
+        dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
+        transmission: None,
+    };
+    Material::new("plastic", reflection)
+}
+
+/// Texels that are seen at a grazing angle reflect by the bent normal, and their base must have the light that is left there.
+#[test]
+fn bumpy_plates_of_plastic_lose_no_light_where_the_normal_of_the_lobe_is_bent() {
+    for (degrees, roughness) in [(0.0, 0.3), (60.0, 0.3), (75.0, 0.3), (75.0, 0.45)] {
+        let direction = tilted(degrees, 20.0);
+        let expected = plastic_albedo(direction, roughness);
+        let found = in_a_furnace(plastic(roughness as f32), direction);
+        println!("{degrees} {roughness}: {found:.4}, expected {expected:.4}");
+        assert!((found / expected - 1.0).abs() < 0.01, "{degrees} {roughness}: {found} {expected}");
+    }
+}
+
+/// Smooth normals that no lobe has to bend change nothing: the middle of a fine ball is as bright as a plate.
+#[test]
+fn a_smooth_ball_of_plastic_is_as_bright_as_a_plate() {
+    let sky = |mut scene: Scene| {
+        scene.environment = Some(Environment::constant(Vec3::ONE));
+        mean(&radiances(&film(&scene, &settings(32, 16))))
+    };
+    let view = far_camera(Vec3::Z);
+    let flat = sky(plate(plastic(0.3), &[DVec3::Z], Vec4::new(1.0, 0.0, 0.0, 1.0), view.clone()));
+    let mut ball = scene(Vec::new(), vec![plastic(0.3)], view);
+    add_ball(&mut ball, Vec3::ZERO, 10.0, 64, 0);
+    let round = sky(ball);
+    println!("{round} on the ball, {flat} on the plate");
+    assert!((round / flat - 1.0).abs() < 0.005, "{round} {flat}");
 }
 
 /// A coarse ball, whose smooth normals deviate from its facets, with bumps: its silhouette included, it reflects a white sky.

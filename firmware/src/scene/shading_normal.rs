@@ -8,6 +8,11 @@ use crate::vector::{max, min, mirror, unit};
 /// Least cosine between a shading normal and the direction to the viewer.
 const MIN_COSINE: f32 = 0.01;
 
+/// `true` for a shading normal that is [`turned`] towards the viewer.
+pub(super) fn points_away(normal: Vec3, outgoing: Vec3) -> bool {
+    normal.dot(outgoing) < MIN_COSINE
+}
+
 /// A shading normal, turned towards the viewer where it points away, as it may at a silhouette.
 pub(super) fn turned(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     let cosine = normal.dot(outgoing);

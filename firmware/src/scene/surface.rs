@@ -11,14 +11,14 @@ use super::coverage::covered;
 use super::materials::{has_layers, layer_texel, read_layers, read_material};
 use super::normal_map::{base_normal, mapped_normal};
 use super::reflection::{Layer, Scattering, Texel, View, scattering, take};
-use super::shading_normal::{bent_by_share, turned};
+use super::shading_normal::{bent, bent_by_share, points_away, turned};
 use super::specular::Specular;
 use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origin};
 use crate::memory::MemoryPort;
-use crate::vector::{max_component, unit};
+use crate::vector::{max, max_component, min, unit};
 
 /// Random numbers of [`read_surface`].
-pub const SURFACE_CHOICES: u32 = 3;
+pub const SURFACE_CHOICES: u32 = 4;
 
 /// Surface at the hit of a ray, on the side of the ray's origin.
 #[derive(Clone, Copy, Debug)]
@@ -225,18 +225,52 @@ fn finish(
         }
         let front = if is_front { geometric_normal } else { -geometric_normal };
         if let Some(normal) = base_normal(scene, memory, material, corners, front)? {
-            let normal = if is_front { normal } else { -normal };
-            surface.normal = turned(normal, outgoing, geometric_normal);
+            surface.normal = if is_front { normal } else { -normal };
         }
     }
-    let view = View { outgoing, normals: [surface.normal, geometric_normal], is_front };
+    let normals = [turned(surface.normal, outgoing, geometric_normal), geometric_normal];
+    let view = View { outgoing, normals, is_front };
     if has_layers(material) {
         return take_layer(scene, memory, surface, (corners.as_ref(), material), (&texel, &view), random);
     }
     let Scattering { reflection, specular, absorption } = scattering(material, &texel, &view);
-    surface.normal = bent_by_share(surface.normal, reflection.glossy_share(), outgoing, geometric_normal);
     (surface.reflection, surface.specular, surface.absorption) = (reflection, specular, absorption);
+    shade_by_parts(surface, &view, random(0));
     Ok(())
+}
+
+/// Minimum probability of each of two parts with normals of their own.
+const MIN_PART: f32 = 1.0 / 8.0;
+
+/// Gives a surface the shading normals of its parts, instead of the one of its corners or texture: the Lambertian part has that one, a
+/// lobe or a mirror the bent one. Of a narrow lobe and a Lambertian part whose normals differ, one is taken by a random number in
+/// [0, 1), over its probability. A wide lobe, for which photons are stored, shares a normal with the Lambertian part.
+#[inline(never)]
+fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
+    let Surface { normal, geometric_normal, outgoing, reflection, .. } = *surface;
+    if normal == geometric_normal || (reflection.is_lambertian() && surface.specular.is_none()) {
+        return;
+    }
+    let [turned, _] = view.normals;
+    let share = reflection.glossy_share();
+    if !(reflection.has_narrow_lobe() && share < 1.0) {
+        surface.normal = bent_by_share(turned, share, outgoing, geometric_normal);
+        return;
+    }
+    let bent = bent(turned, outgoing, geometric_normal);
+    // Not by the difference from `normal`, which rounding decides: a stored hit, read again, must give the same answer.
+    if bent == turned && !points_away(normal, outgoing) {
+        return;
+    }
+    let diffuse_share = min(max(1.0 - share, MIN_PART), 1.0 - MIN_PART);
+    let (part, normal, probability) = if random < diffuse_share {
+        (reflection.without_narrow_lobe(), normal, diffuse_share)
+    } else {
+        (reflection.narrow_lobe(), bent, 1.0 - diffuse_share)
+    };
+    surface.normal = normal;
+    surface.reflection = part.dimmed(Vec3::splat(1.0 / probability));
+    surface.probability *= probability;
 }
 
 /// Applies one of a material's layers to a surface. All layers of the side emit.
@@ -256,11 +290,12 @@ fn take_layer(
             let map = (layers.texture(LayerTexture::CoatNormal), layers.coat_normal_scale);
             let sign = if view.is_front { 1.0 } else { -1.0 };
             let normal = mapped_normal(scene, memory, map, corners, surface.geometric_normal * sign)?;
-            normal.map(|normal| turned(normal * sign, surface.outgoing, surface.geometric_normal))
+            normal.map(|normal| normal * sign)
         }
         None => None,
     };
-    let coat_normal = coat_normal.unwrap_or(surface.geometric_normal);
+    let Surface { geometric_normal, outgoing, .. } = *surface;
+    let coat_normal = turned(coat_normal.unwrap_or(geometric_normal), outgoing, geometric_normal);
     let taken = take((material, &layers), (texel, &layer_texel), view, coat_normal, random);
     let Scattering { reflection, specular, absorption } = taken.scattering;
     (surface.reflection, surface.specular, surface.absorption) = (reflection, specular, absorption);
@@ -268,11 +303,14 @@ fn take_layer(
     if taken.layer == Layer::Behind {
         (surface.normal, surface.emission) = (taken.normal, Vec3::ZERO);
         surface.see_through();
-    } else {
-        let share = surface.reflection.glossy_share();
-        surface.normal = bent_by_share(taken.normal, share, surface.outgoing, surface.geometric_normal);
-        surface.emission /= taken.of_front;
+        return Ok(());
     }
+    surface.emission /= taken.of_front;
+    if taken.layer != Layer::Base {
+        surface.normal = taken.normal;
+    }
+    let view = View { normals: [taken.normal, geometric_normal], ..*view };
+    shade_by_parts(surface, &view, random(SURFACE_CHOICES - 1));
     Ok(())
 }
 

@@ -54,6 +54,7 @@ def main():
     sky(scene, stage.SKY)
     lamp(bpy.data.materials[stage.LAMP])
     linear_textures()
+    scaled_normals()
     own = shade(scene, arguments.model)
     if arguments.mask:
         np.save(arguments.mask, seen(scene))
@@ -141,6 +142,24 @@ def decode(image):
     result.pixels.foreach_set(texels)
     result.update()
     return result
+
+
+def scaled_normals():
+    """Scales x and y of normal textures by glTF's scale: Blender's strength mixes the unit normals instead."""
+    for material in bpy.data.materials:
+        tree = material.node_tree
+        for node in [node for node in tree.nodes if node.type == "NORMAL_MAP"]:
+            strength, colour = node.inputs["Strength"], node.inputs["Color"]
+            scale, strength.default_value = strength.default_value, 1.0
+            if scale == 1.0 or not colour.is_linked:
+                continue
+            scaled = tree.nodes.new("ShaderNodeVectorMath")
+            scaled.operation = "MULTIPLY_ADD"
+            tree.links.new(colour.links[0].from_socket, scaled.inputs[0])
+            # The texture's 0.5 stands for 0.
+            scaled.inputs[1].default_value = (scale, scale, 1.0)
+            scaled.inputs[2].default_value = (0.5 - 0.5 * scale, 0.5 - 0.5 * scale, 0.0)
+            tree.links.new(scaled.outputs[0], colour)
 
 
 def shade(scene, model):

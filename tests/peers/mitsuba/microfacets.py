@@ -1,5 +1,5 @@
-"""glTF's metallic-roughness model, as its specification has it (glTF 2.0, appendix B.2 and B.3): GGX with Smith's separable
-masking and Schlick's Fresnel, over Lambertian reflection of what a dielectric lets through.
+"""glTF's metallic-roughness model (glTF 2.0, appendix B.2 and B.3): GGX with Smith's masking and Schlick's Fresnel, over Lambertian
+reflection of what a dielectric lets through. Masking is height-correlated, as in most renderers, where the appendix has the product.
 
 Mitsuba's `principled` has another diffuse part, which depends on the roughness.
 """
@@ -49,7 +49,10 @@ class MetallicRoughness(mi.BSDF):
         half = dr.normalize(si.wi + wo)
         grazing = dr.power(1.0 - dr.abs(dr.dot(si.wi, half)), 5.0)
         fresnel = self.normal_reflectance + (1.0 - self.normal_reflectance) * grazing
-        facets = self.facets.eval(half) * self.facets.G(si.wi, wo, half) / (4.0 * si.wi.z)
+        # Correlated by height (Heitz 2014): Mitsuba's own G is the product.
+        masking, shadowing = (dr.maximum(self.facets.smith_g1(way, half), 1e-6) for way in (si.wi, wo))
+        visible = 1.0 / (1.0 / masking + 1.0 / shadowing - 1.0)
+        facets = self.facets.eval(half) * visible / (4.0 * si.wi.z)
         # A metal has no diffuse part, so one Fresnel term serves both: that of the dielectric, where there is one.
         through = self.diffuse * (1.0 - fresnel) / dr.pi * wo.z
         return dr.select(active, fresnel * facets + through, 0.0)

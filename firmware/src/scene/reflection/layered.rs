@@ -93,9 +93,10 @@ pub(in crate::scene) fn take(
     random: &dyn Fn(u32) -> f32,
 ) -> Taken {
     let material = varied(material, layers, layer_texel);
-    let [normal, _] = view.normals;
+    let [normal, geometric_normal] = view.normals;
     let cosine = normal.dot(view.outgoing);
-    let (coat, coat_fresnel) = coat(layers, layer_texel, coat_normal.dot(view.outgoing));
+    let coat_view = View { normals: [coat_normal, geometric_normal], ..*view };
+    let (coat, coat_fresnel) = coat(layers, layer_texel, coat_view.glossy_cosine());
     let sheen = SheenLobe::new(
         Vec3::from(layers.sheen) * layer_texel.sheen,
         layers.sheen_roughness * layer_texel.sheen_roughness,
@@ -252,7 +253,7 @@ fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2])
     else {
         return black;
     };
-    let cosine = normal.dot(outgoing);
+    let cosine = view.glossy_cosine();
     let [metallic, roughness] = [metallic * texel.metallic, roughness * texel.roughness];
     let (colour, is_thin) = (Vec3::from(base) * texel.colour, material.flags & THIN_WALLED != 0);
     let amplitude = (ior - 1.0) / (ior + 1.0);

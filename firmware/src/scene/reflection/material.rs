@@ -6,6 +6,7 @@ use photoncard_shared::layout::{COMPENSATED, Material, NARROW_LOBE, Reflectance,
 use super::Reflection;
 use super::lobe::Lobe;
 use super::metallic_roughness::MetallicRoughness;
+use crate::scene::shading_normal::bent;
 use crate::scene::specular::{Glass, Specular};
 
 /// Factors of the material's values at a point, from textures and vertex colours.
@@ -29,6 +30,15 @@ pub(in crate::scene) struct View {
     /// Shading normal and geometric normal, unit vectors on the viewer's side.
     pub(in crate::scene) normals: [Vec3; 2],
     pub(in crate::scene) is_front: bool,
+}
+
+impl View {
+    /// Cosine of the view to the normal by which a lobe or a mirror reflects: to the shading normal, [`bent`].
+    #[inline(always)]
+    pub(super) fn glossy_cosine(&self) -> f32 {
+        let [normal, geometric_normal] = self.normals;
+        bent(normal, self.outgoing, geometric_normal).dot(self.outgoing)
+    }
 }
 
 /// Scattering at a point: reflection, perfectly specular part, absorption.
@@ -56,8 +66,7 @@ impl Scattering {
 #[inline(always)]
 pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &View) -> Scattering {
     let View { outgoing, normals, is_front } = *view;
-    let [normal, _] = normals;
-    let cosine = normal.dot(outgoing);
+    let cosine = view.glossy_cosine();
     let has_narrow_lobe = material.flags & NARROW_LOBE != 0;
     let is_compensated = material.flags & COMPENSATED != 0;
     let mut scattering = Scattering::BLACK;
