@@ -97,15 +97,13 @@ pub enum SceneError {
     #[error("{location} requires the extension {name}, which is not supported")]
     #[diagnostic(
         code(scene::required_extension),
-        help("export or convert the scene without {name}{removal}; supported are {supported}")
+        help("export or convert the scene without {name}; supported are {supported}")
     )]
     RequiredExtension {
         /// Location in `extensionsRequired`.
         location: Location,
         /// Name of the extension.
         name: String,
-        /// Command that removes the extension, as a clause; empty if there is none.
-        removal: &'static str,
         /// Names of the supported extensions.
         supported: String,
     },

@@ -8,7 +8,7 @@ use std::path::Path;
 use miette::Diagnostic;
 use photoncard_driver::error::SceneError;
 use photoncard_driver::scene::{Encoding, Scene, Wrap, gltf};
-use scene_support::{Extended, glb, push};
+use scene_support::{Extended, check_left_out, embedded, glb, pbr, push, textured};
 use serde_json::{Value, json};
 
 /// One texel: (255, 128, 0, 51).
@@ -22,29 +22,6 @@ const LOSSLESS_WEBP: &[u8] = include_bytes!("images/lossless.webp");
 /// With alpha of 255 - 5 y.
 const ALPHA_WEBP: &[u8] = include_bytes!("images/alpha.webp");
 const CMYK: &[u8] = include_bytes!("images/cmyk.jpg");
-
-/// The triangle with coordinates, whose base colour is texture 0 of image 0.
-fn textured(image: &Value) -> Extended {
-    let mut scene = Extended::new();
-    let coordinates = scene.floats("VEC2", &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
-    scene.primitive()["attributes"]["TEXCOORD_0"] = json!(coordinates);
-    scene.json["images"] = json!([image]);
-    scene.json["textures"] = json!([{"source": 0}]);
-    pbr(&mut scene.json)["baseColorTexture"] = json!({"index": 0});
-    scene
-}
-
-fn pbr(json: &mut Value) -> &mut Value {
-    &mut json["materials"][0]["pbrMetallicRoughness"]
-}
-
-/// [`textured`] with an image in a buffer view.
-fn embedded(bytes: &[u8], kind: &str) -> Extended {
-    let mut scene = textured(&json!(null));
-    let view = scene.view(bytes);
-    scene.json["images"] = json!([{"bufferView": view, "mimeType": kind}]);
-    scene
-}
 
 fn base64(bytes: &[u8]) -> String {
     use base64::Engine;
@@ -230,16 +207,6 @@ fn images_without_a_use_are_not_read() {
     scene.json["materials"][0]["emissiveTexture"] = json!({"index": 1});
     assert_eq!(scene.load().unwrap().images.len(), 1);
     assert_eq!(scene.load().unwrap().materials[0].textures().count(), 1);
-}
-
-/// Checks that a scene is loaded without its texture, and that one notice names the image and the reason.
-fn check_left_out(scene: &Scene, parts: &[&str]) {
-    assert_eq!((scene.images.len(), scene.textures.len()), (0, 0), "{parts:?}");
-    assert_eq!((scene.materials[0].base_texture, scene.triangles.len()), (None, 1), "{parts:?}");
-    let [notice] = &scene.notices[..] else { panic!("{parts:?}: {:?}", scene.notices) };
-    for part in ["left out"].iter().chain(parts) {
-        assert!(notice.contains(part), "{part:?} is not in {notice:?}");
-    }
 }
 
 #[test]

@@ -75,8 +75,8 @@ fn scenes_that_break_a_rule() {
     };
     refused_scene(&changed(&|s| s["accessors"][0]["count"] = json!(400)), &["accessors[0]"]);
     refused_scene(
-        &changed(&|s| s["extensionsRequired"] = json!(["KHR_texture_basisu"])),
-        &["extensionsRequired[0]", "KHR_texture_basisu", "convert the scene without"],
+        &changed(&|s| s["extensionsRequired"] = json!(["KHR_materials_anisotropy"])),
+        &["extensionsRequired[0]", "KHR_materials_anisotropy", "convert the scene without"],
     );
     let mut bytes = scene_bytes();
     bytes[12..16].copy_from_slice(&f32::NAN.to_le_bytes());

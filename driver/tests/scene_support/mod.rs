@@ -130,6 +130,43 @@ impl Extended {
     }
 }
 
+/// The triangle with coordinates, whose base colour is texture 0 of image 0.
+#[allow(dead_code, reason = "not every test file has textures")]
+pub(crate) fn textured(image: &Value) -> Extended {
+    let mut scene = Extended::new();
+    let coordinates = scene.floats("VEC2", &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+    scene.primitive()["attributes"]["TEXCOORD_0"] = json!(coordinates);
+    scene.json["images"] = json!([image]);
+    scene.json["textures"] = json!([{"source": 0}]);
+    pbr(&mut scene.json)["baseColorTexture"] = json!({"index": 0});
+    scene
+}
+
+#[allow(dead_code, reason = "not every test file has textures")]
+pub(crate) fn pbr(json: &mut Value) -> &mut Value {
+    &mut json["materials"][0]["pbrMetallicRoughness"]
+}
+
+/// [`textured`] with an image in a buffer view.
+#[allow(dead_code, reason = "not every test file has textures")]
+pub(crate) fn embedded(bytes: &[u8], kind: &str) -> Extended {
+    let mut scene = textured(&json!(null));
+    let view = scene.view(bytes);
+    scene.json["images"] = json!([{"bufferView": view, "mimeType": kind}]);
+    scene
+}
+
+/// Checks that a scene is loaded without its texture, and that one notice names the image and the reason.
+#[allow(dead_code, reason = "not every test file has textures")]
+pub(crate) fn check_left_out(scene: &Scene, parts: &[&str]) {
+    assert_eq!((scene.images.len(), scene.textures.len()), (0, 0), "{parts:?}");
+    assert_eq!((scene.materials[0].base_texture, scene.triangles.len()), (None, 1), "{parts:?}");
+    let [notice] = &scene.notices[..] else { panic!("{parts:?}: {:?}", scene.notices) };
+    for part in ["left out"].iter().chain(parts) {
+        assert!(notice.contains(part), "{part:?} is not in {notice:?}");
+    }
+}
+
 /// Appends to a list at the top of the JSON, and returns the index.
 #[allow(dead_code, reason = "not every test file appends")]
 pub(crate) fn push(json: &mut Value, list: &str, item: Value) -> usize {

@@ -1,4 +1,4 @@
-//! Fuzzing of textures: PNG, JPEG and WebP files in a valid scene.
+//! Fuzzing of textures: PNG, JPEG, WebP and KTX2 files in a valid scene.
 
 use std::fs;
 use std::path::PathBuf;
@@ -18,7 +18,7 @@ pub(super) struct Textures {
 }
 
 /// Images of all colour types of PNG: no edit of a byte adds a palette.
-const SEEDS: [&[u8]; 10] = [
+const SEEDS: [&[u8]; 14] = [
     include_bytes!("../../../driver/tests/images/texel.png"),
     include_bytes!("../../../driver/tests/images/palette.png"),
     include_bytes!("../../../driver/tests/images/deep.png"),
@@ -29,9 +29,13 @@ const SEEDS: [&[u8]; 10] = [
     include_bytes!("../../../driver/tests/images/lossy.webp"),
     include_bytes!("../../../driver/tests/images/lossless.webp"),
     include_bytes!("../../../driver/tests/images/alpha.webp"),
+    include_bytes!("../../../driver/tests/images/etc1s.ktx2"),
+    include_bytes!("../../../driver/tests/images/etc1s-alpha.ktx2"),
+    include_bytes!("../../../driver/tests/images/uastc.ktx2"),
+    include_bytes!("../../../driver/tests/images/uastc-zstd.ktx2"),
 ];
 
-/// Memory of the card, bytes. It bounds the texels of WebP, which may take no bytes of the file at all.
+/// Memory of the card, bytes. It bounds the texels of WebP and of ETC1S in KTX2, which may take no bytes of the file at all.
 const DRAM_BYTES: u32 = 2 << 20;
 
 /// Scene whose second buffer view, of `image_bytes` bytes, is the base colour of its only triangle.

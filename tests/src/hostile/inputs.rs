@@ -37,7 +37,7 @@ const SCENES: [&str; 13] = [
     "driver/tests/compressed/draco-sequential.glb",
 ];
 
-const IMAGES: [&str; 14] = [
+const IMAGES: [&str; 18] = [
     "driver/tests/images/texel.png",
     "driver/tests/images/palette.png",
     "driver/tests/images/deep.png",
@@ -50,6 +50,10 @@ const IMAGES: [&str; 14] = [
     "driver/tests/images/lossy.webp",
     "driver/tests/images/lossless.webp",
     "driver/tests/images/alpha.webp",
+    "driver/tests/images/etc1s.ktx2",
+    "driver/tests/images/etc1s-alpha.ktx2",
+    "driver/tests/images/uastc.ktx2",
+    "driver/tests/images/uastc-zstd.ktx2",
     "scenes/sky.exr",
     "tests/references/cornell-spheres-caustics.exr",
 ];
@@ -103,7 +107,7 @@ impl Inputs {
             }
             (0..=4, "gltf") => mutation::edit_json(bytes, random),
             (0..=4, "glb") => edit_glb(bytes, random),
-            (0..=3, "exr" | "hdr" | "jpg" | "webp") => edit_header(bytes, random),
+            (0..=3, "exr" | "hdr" | "jpg" | "webp" | "ktx2") => edit_header(bytes, random),
             (5, _) => self.splice(bytes, extension, random),
             (6, _) if random.once_in(4) => bytes.truncate(random.below(bytes.len())),
             _ => edit_window(bytes, random),
@@ -124,7 +128,7 @@ impl Inputs {
 /// File to read for an input, with its extension: for a texture the scene around it.
 pub(super) fn as_file(extension: &str, bytes: Vec<u8>) -> (&str, Vec<u8>) {
     match extension {
-        "png" | "jpg" | "webp" => ("glb", texture::textured(&bytes)),
+        "png" | "jpg" | "webp" | "ktx2" => ("glb", texture::textured(&bytes)),
         _ => (extension, bytes),
     }
 }

@@ -18,7 +18,7 @@ pub use self::supervisor::{Finding, Report, supervise};
 /// Kind of files to damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// PNG, JPEG and WebP as textures, Radiance and `OpenEXR` pictures as environments; the latter are compared as well.
+    /// PNG, JPEG, WebP and KTX2 as textures, Radiance and `OpenEXR` pictures as environments; the latter are compared as well.
     Images,
     /// glTF as text and as GLB, loaded, packed, and rendered with few photons and rays.
     Scenes,

@@ -46,7 +46,9 @@ fn read(folder: &Path, extension: &str, bytes: Vec<u8>, number: u64) -> bool {
     let path = folder.join(format!("input.{kind}"));
     fs::write(&path, file).expect("there is room for an input");
     match extension {
-        "png" | "jpg" | "webp" => told(gltf::load(&path)).is_some_and(|scene| !scene.images.is_empty()),
+        "png" | "jpg" | "webp" | "ktx2" => {
+            told(gltf::load(&path)).is_some_and(|scene| !scene.images.is_empty())
+        }
         "hdr" => told(Environment::load(&path)).is_some(),
         "exr" => {
             let environment = told(Environment::load(&path));

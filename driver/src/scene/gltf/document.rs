@@ -9,7 +9,7 @@ use gltf::json::mesh::Semantic;
 use gltf::json::validation::{Checked, Error as Fault, Validate};
 use miette::{NamedSource, SourceSpan};
 
-use super::extensions::{self, QUANTIZATION, SUPPORTED_EXTENSIONS};
+use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
 use super::files::{Files, read_file};
 use super::parse_cost;
 use super::specular_glossiness::{self, Conversions};
@@ -81,13 +81,7 @@ impl Document {
             if !SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
                 let location = self.location(format!("extensionsRequired[{i}]"));
                 let supported = SUPPORTED_EXTENSIONS.join(", ");
-                let removal = extensions::removal(name);
-                return Err(SceneError::RequiredExtension {
-                    location,
-                    name: name.clone(),
-                    removal,
-                    supported,
-                });
+                return Err(SceneError::RequiredExtension { location, name: name.clone(), supported });
             }
         }
         self.check_positions()?;

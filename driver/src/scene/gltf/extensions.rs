@@ -1,9 +1,10 @@
 //! glTF extensions that the loader supports.
 
 /// Names of the supported extensions.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 19] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 20] = [
     INSTANCING,
     WEBP,
+    BASISU,
     MESHOPT[0],
     MESHOPT[1],
     DRACO,
@@ -39,10 +40,5 @@ pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 /// Image of a texture, in WebP.
 pub(super) const WEBP: &str = "EXT_texture_webp";
 
-/// Command of glTF-Transform that removes an extension without loss of its contents, as a clause of the remedy; empty for others.
-pub(super) fn removal(name: &str) -> &'static str {
-    match name {
-        "KHR_texture_basisu" => ", for example by `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`",
-        _ => "",
-    }
-}
+/// Image of a texture, in KTX2.
+pub(super) const BASISU: &str = "KHR_texture_basisu";

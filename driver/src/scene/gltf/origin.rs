@@ -2,7 +2,7 @@
 
 use gltf::json;
 
-use super::extensions::WEBP;
+use super::extensions::{BASISU, WEBP};
 
 /// Image that a texture refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -20,7 +20,7 @@ impl Origin {
         let extensions = stated.extensions.as_ref();
         let of_extension = |name: &str| extensions?.others.get(name)?.get("source")?.as_u64();
         let own = Some(stated.source.value() as u64);
-        let mut sources = [own].into_iter().chain([of_extension(WEBP)]).flatten();
+        let mut sources = [own].into_iter().chain([of_extension(WEBP), of_extension(BASISU)]).flatten();
         let images = root.images.len() as u64;
         let image = sources.find(|source| *source < images);
         image.map_or(Self::Absent(texture), |image| Self::Image(image as usize))

@@ -1,10 +1,11 @@
-//! Decoding of PNG, JPEG and WebP files to 8-bit RGBA texels.
+//! Decoding of PNG, JPEG, WebP and KTX2 files to 8-bit RGBA texels.
 //!
 //! Sizes are checked in the header, before anything is allocated for them: against limits, and against the maximum that a
 //! file of its length can hold at the best compression, where its format has one. A file's colour space is ignored, as glTF requires.
 
 mod fault;
 mod jpeg;
+mod ktx2;
 mod png;
 mod webp;
 
@@ -28,14 +29,21 @@ pub(super) enum Kind {
     Png,
     Jpeg,
     WebP,
+    Ktx2,
 }
 
 impl Kind {
     /// Format by the first bytes of a file.
     pub(super) fn of(bytes: &[u8]) -> Result<Self, Fault> {
         const REMEDY: &str = "convert the image to PNG, JPEG or WebP";
-        const OTHERS: [(&[u8], &str); 5] =
-            [(b"\xabKTX", "KTX"), (b"GIF8", "GIF"), (b"DDS ", "DDS"), (b"BM", "BMP"), (b"II*\0", "TIFF")];
+        const OTHERS: [(&[u8], &str); 6] = [
+            (b"\xabKTX 11", "KTX 1"),
+            (b"sB\x13\0", "a .basis file"),
+            (b"GIF8", "GIF"),
+            (b"DDS ", "DDS"),
+            (b"BM", "BMP"),
+            (b"II*\0", "TIFF"),
+        ];
         if bytes.starts_with(png::MAGIC) {
             return Ok(Self::Png);
         }
@@ -45,11 +53,16 @@ impl Kind {
         if webp::is_webp(bytes) {
             return Ok(Self::WebP);
         }
+        if bytes.starts_with(ktx2::MAGIC) {
+            return Ok(Self::Ktx2);
+        }
         let other = OTHERS.into_iter().find(|(magic, _)| bytes.starts_with(magic));
         let reason = match other {
             _ if bytes.is_empty() => "the image is empty".to_owned(),
-            Some((_, name)) => format!("the image is neither PNG, JPEG nor WebP, but seems to be {name}"),
-            None => "the image is neither PNG, JPEG nor WebP".to_owned(),
+            Some((_, name)) => {
+                format!("the image is neither PNG, JPEG, WebP nor KTX2, but seems to be {name}")
+            }
+            None => "the image is neither PNG, JPEG, WebP nor KTX2".to_owned(),
         };
         Err(Fault::unreadable(reason, REMEDY))
     }
@@ -60,6 +73,7 @@ impl Kind {
             Self::Png => png::size(bytes),
             Self::Jpeg => jpeg::size(bytes),
             Self::WebP => webp::size(bytes),
+            Self::Ktx2 => ktx2::size(bytes),
         })?;
         check_size(size)?;
         let [width, height] = size;
@@ -78,6 +92,7 @@ impl Kind {
             Self::Png => png::decode(bytes, size),
             Self::Jpeg => jpeg::decode(bytes, size),
             Self::WebP => webp::decode(bytes, size),
+            Self::Ktx2 => ktx2::decode(bytes, size),
         })?;
         let [width, height] = size.map(|side| side as usize);
         if texels.len() == width * height { Ok(texels) } else { Err(Fault::damaged("rows are missing")) }
@@ -109,7 +124,14 @@ mod tests {
         assert_eq!(Kind::of(b"\x89PNG\r\n\x1a\n..."), Ok(Kind::Png));
         assert_eq!(Kind::of(b"\xff\xd8\xff\xe0"), Ok(Kind::Jpeg));
         assert_eq!(Kind::of(b"RIFF....WEBP"), Ok(Kind::WebP));
-        for (bytes, name) in [(&b""[..], "empty"), (b"RIFF....WAVE", "neither"), (b"GIF89a", "GIF")] {
+        assert_eq!(Kind::of(b"\xabKTX 20\xbb\r\n\x1a\n"), Ok(Kind::Ktx2));
+        for (bytes, name) in [
+            (&b""[..], "empty"),
+            (b"RIFF....WAVE", "neither"),
+            (b"GIF89a", "GIF"),
+            (b"\xabKTX 11\xbb\r\n\x1a\n", "KTX 1"),
+            (b"sB\x13\0M\0", ".basis"),
+        ] {
             let fault = Kind::of(bytes).unwrap_err();
             assert!(fault.reason.contains(name), "{fault:?}");
         }
