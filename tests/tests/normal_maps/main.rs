@@ -1,26 +1,18 @@
 //! Normal maps of known appearance: tilted plates under lights and skies, and their adjoint for photons.
 
+mod adjoint;
+
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3, Vec4};
 use photoncard_driver::film::Film;
-use photoncard_driver::pack::PackedScene;
-use photoncard_driver::photon::trace;
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
     Camera, Encoding, Environment, Image, Layers, Material, NormalMap, PunctualKind, PunctualLight,
     Reflection, Scene, Texture,
 };
-use photoncard_firmware::memory::MemoryPort;
-use photoncard_firmware::render::Context;
-use photoncard_firmware::render::specular_path::{Carried, Passes, PathEnd, SpecularPath};
-use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, Surface, closest_hit, read_surface};
-use photoncard_shared::counters::Counters;
-use photoncard_shared::layout::{Photon, decode_direction};
 use photoncard_tests::shapes::{add_ball, add_tangents, add_textured_quad};
-use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, scene};
-use rayon::prelude::*;
+use photoncard_tests::{camera, lambertian, mean, radiances, render_or_panic, scene};
 
 const ALBEDO: f32 = 0.8;
 
@@ -403,100 +395,5 @@ fn glossy_bumpy_balls_have_neither_black_nor_bright_fringes() {
                 "{roughness} {scale}: {least} {mean} {most}"
             );
         }
-    }
-}
-
-/// Pseudorandom number in [0, 1).
-fn random(index: u32, dimension: u32) -> f32 {
-    (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
-}
-
-/// Point of a sequence that is even in four dimensions: multiples of the powers of the root of `g^5 = g + 1` (Roberts 2018).
-fn place(index: u32) -> [f32; 4] {
-    const G: f64 = 1.167_303_978_261_418_7;
-    [1, 2, 3, 4].map(|power| (0.5 + f64::from(index) / G.powi(power)).fract() as f32)
-}
-
-/// A floor, and beside it a glossy wall with bumps that a lamp shines at.
-fn wall_and_floor(normals: &[DVec3], roughness: f32) -> Scene {
-    let lamp = Material { emission: Vec3::splat(10.0), ..lambertian("lamp", 0.0) };
-    // Black would store no photons.
-    let materials = vec![mapped(metal(roughness), 1.0), lambertian("floor", 0.001), lamp];
-    let mut scene = scene(Vec::new(), materials, camera(Vec3::new(0.0, 1.0, 3.0), Vec3::NEG_Z));
-    let wall = [[0., 1.], [0., -1.], [1.5, -1.], [1.5, 1.]].map(|[y, z]| Vec3::new(-1.0, y, z));
-    add_textured_quad(&mut scene, wall, [[0., 9.], [8., 9.], [8., 0.], [0., 0.]], 0);
-    // The wall's u runs along -z.
-    add_tangents(&mut scene, 0, Vec4::new(0.0, 0.0, -1.0, 1.0));
-    let floor = [[-1., 1.], [1., 1.], [1., -1.], [-1., -1.]].map(|[x, z]| Vec3::new(x, 0.0, z));
-    scene.triangles.extend(quad(floor, 1));
-    let lamp = [[2.5, 2.], [0.2, 2.], [0.2, -2.], [2.5, -2.]].map(|[y, z]| Vec3::new(1.0, y, z));
-    scene.triangles.extend(quad([lamp[0], lamp[3], lamp[2], lamp[1]], 2));
-    assert!(scene.triangles[scene.triangles.len() - 1].scaled_normal().x < 0.0, "the lamp faces the wall");
-    assert!(scene.triangles[0].scaled_normal().x > 0.0, "the wall faces the lamp");
-    normal_texture(&mut scene, normals);
-    scene
-}
-
-/// Power that photons bring to the floor by way of the wall, W.
-fn brought(packed: &PackedScene) -> f64 {
-    let pass = trace(packed, 1, 600_000, &|_| true).unwrap();
-    let unit = f64::from(pass.photons.power_unit());
-    // The lamp is towards +x of every point of the floor, the wall towards -x.
-    let is_by_the_wall = |photon: &Photon| decode_direction(photon.direction)[0] < 0.0;
-    let on_the_floor = pass.photons.iter().filter(|photon| photon.position[1].abs() < 1e-3);
-    on_the_floor.filter(is_by_the_wall).map(|photon| f64::from(photon.power.decode()[0]) * unit).sum()
-}
-
-/// Power that paths from the floor find by way of the wall, W.
-fn found(packed: &PackedScene, view: &Camera) -> f64 {
-    const PATHS: u32 = 700_000;
-    const OF_A_TASK: u32 = 10_000;
-    let frame = RenderSettings::default().frame(view, 1.0, None);
-    let of_task = |task: u32| {
-        let (image, mut memory) = packed.view();
-        let mut counters = Counters::ZERO;
-        let counters = &mut counters;
-        let mut context =
-            Context { scene: &image, memory: &mut memory, frame: &frame, counters, outlet: None };
-        (task * OF_A_TASK..(task + 1) * OF_A_TASK).map(|index| path_to_the_lamp(&mut context, index)).sum()
-    };
-    let sums: Vec<f64> = (0..PATHS / OF_A_TASK).into_par_iter().map(of_task).collect();
-    // The floor has 4 m^2, and half of the cosine's integral is on the wall's side.
-    sums.iter().sum::<f64>() / f64::from(PATHS) * 4.0 * PI / 2.0
-}
-
-/// Radiance that path `index` finds from the floor to the wall's side.
-fn path_to_the_lamp<M: MemoryPort>(context: &mut Context<M>, index: u32) -> f64 {
-    let [x, z, u, v] = place(index);
-    let origin = Vec3::new(2.0 * x - 1.0, 1e-5, 2.0 * z - 1.0);
-    let (sine, cosine) = (std::f32::consts::PI * u).sin_cos();
-    let radius = v.sqrt();
-    let direction = Vec3::new(-radius * sine, (1.0 - v).sqrt(), radius * cosine);
-    let mut path = SpecularPath::new(Ray::new(origin, direction), Carried::Radiance, Passes::NarrowLobes);
-    let Some(mut hit) = closest_hit(context.scene, context.memory, &path.ray).unwrap() else { return 0.0 };
-    let mut surface = Surface::NOWHERE;
-    read_surface(context.scene, context.memory, &path.ray, &hit, &|_| 0.0, &mut surface).unwrap();
-    assert!(path.may_pass(&surface), "nothing but the wall is there");
-    let choose = |choice: u32| random(index, choice);
-    match path.follow(context, &mut surface, &mut hit, &choose).unwrap() {
-        PathEnd::Surface => f64::from((path.throughput * surface.emission).x),
-        PathEnd::Escaped | PathEnd::Lost => 0.0,
-    }
-}
-
-#[test]
-fn photons_bring_by_a_bumpy_wall_what_paths_find_there() {
-    let gentle: Vec<_> = (0..16).map(|k| tilted(f64::from(k % 4) * 6.0, 97.0 * f64::from(k))).collect();
-    for (name, normals, roughness, tolerance) in [
-        ("tilted", vec![tilted(15.0, 180.0)], 0.3, 0.01),
-        ("gentle", gentle, 0.3, 0.01),
-        ("bumpy", bumps(), 0.3, 0.02),
-        ("bumpy mirror", bumps(), 0.0, 0.02),
-    ] {
-        let scene = wall_and_floor(&normals, roughness);
-        let packed = PackedScene::new(&scene).unwrap();
-        let (brought, found) = (brought(&packed), found(&packed, &scene.cameras[0]));
-        println!("{name}: {brought:.4} W by photons, {found:.4} W by paths: {:.4}", brought / found);
-        assert!((brought / found - 1.0).abs() < tolerance, "{name}: {brought} {found}");
     }
 }
