@@ -1,4 +1,5 @@
-//! Microfacet lobe of glTF's metallic-roughness model (glTF 2.0, appendix B.3): `f = D V F`, isotropic, single scattering.
+//! Microfacet lobe of glTF's metallic-roughness model (glTF 2.0, appendix B.3, but for the masking):
+//! `f = D V F`, isotropic, single scattering.
 //!
 //! With `n` the normal, `o` and `i` the directions, `h` their half vector and `a = roughness^2`:
 //!
