@@ -46,8 +46,8 @@ pub(crate) struct Sources {
     pub(crate) targets: Targets,
     /// Power of all sources, watts, mean of the channels; 0 if photons may be aimed.
     pub(crate) power: f64,
-    /// Maximum over the sources of power in the strongest channel over probability, watts: the strongest photon, if it
-    /// were the only one.
+    /// Maximum over the sources of power in the strongest channel over probability, watts: the unit of photons' powers is derived from it.
+    /// A photon that is not aimed may be stronger, where photons are.
     pub(crate) strongest: f32,
 }
 

@@ -22,7 +22,7 @@ pub(crate) struct Sphere {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Targets {
     spheres: Vec<Sphere>,
-    /// Probability of aiming at a sphere; other photons are emitted in all directions. 0 without spheres.
+    /// Probability of aiming at a sphere; other photons are emitted in all directions.
     pub(crate) share: f32,
 }
 
@@ -37,6 +37,8 @@ pub(crate) struct Aim {
 
 /// Share of the aimed photons where photons may be needed elsewhere as well.
 const AIMED_SHARE: f32 = 0.9;
+/// Minimum emission of a lamp over the greatest emission.
+const LAMP_SHARE: f32 = 0.01;
 /// Maximum number of spheres.
 const MAX_SPHERES: usize = 32;
 /// Margin of a sphere for rounding: relative to its radius; its square relative to the maximum coordinate.
@@ -48,10 +50,14 @@ impl Targets {
         Self { share: 1.0, ..Self::around(scene, &scene.specular_materials()) }
     }
 
-    /// All surfaces of a scene but lamps, that is uniform emitters: what these reflect of other light hardly shows.
+    /// All surfaces of a scene but lamps, that is uniform emitters of at least [`LAMP_SHARE`] of the greatest emission: what these
+    /// reflect of other light hardly shows.
     pub(super) fn lit(scene: &Scene) -> Self {
-        let is_lit =
-            |material: &Material| material.emission == Vec3::ZERO || material.emissive_texture.is_some();
+        let emission = |material: &Material| material.emission.max_element();
+        let greatest = scene.materials.iter().map(emission).fold(0.0, f32::max);
+        let is_lit = |material: &Material| {
+            emission(material) <= LAMP_SHARE * greatest || material.emissive_texture.is_some()
+        };
         let is_lit: Vec<_> = scene.materials.iter().map(is_lit).collect();
         Self { share: AIMED_SHARE, ..Self::around(scene, &is_lit) }
     }

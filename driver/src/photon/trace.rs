@@ -34,8 +34,9 @@ const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
 /// Number of paths of one task.
 const PATHS_PER_TASK: u64 = 2048;
 /// Number of tasks of a pilot.
-const PILOT_TASKS: u64 = 16;
-/// Photons of aimed paths over those of unaimed ones from which paths are aimed. The powers of unaimed photons are more alike.
+const PILOT_TASKS: u64 = 4;
+/// Minimum of the pilots' effective numbers of photons, aimed over unaimed, for which paths are aimed: 2, so that noise of the pilots
+/// changes nothing in rooms, where both are about equal.
 const MIN_GAIN_BY_AIM: f64 = 2.0;
 /// Maximum number of bounces of a path; only surfaces without loss let a path reach it.
 const MAX_BOUNCES: u32 = 512;
@@ -195,7 +196,9 @@ impl<'s> Tracer<'s> {
         let unaimed = Self::new(packed, packed.sources(), seed, Purpose::Indirect);
         let Some(sources) = packed.aimed_sources() else { return Ok(unaimed) };
         let aimed = Self::new(packed, sources, seed, Purpose::Indirect);
-        let [of_unaimed, of_aimed] = [unaimed.pilot(packed)?, aimed.pilot(packed)?];
+        // Paths of another seed, so that the choice does not depend on the photons of the map.
+        let pilot = |tracer: &Self| Self { seed: !seed, ..*tracer }.pilot(packed);
+        let [of_unaimed, of_aimed] = [pilot(&unaimed)?, pilot(&aimed)?];
         Ok(if of_aimed > MIN_GAIN_BY_AIM * of_unaimed { aimed } else { unaimed })
     }
 

@@ -16,7 +16,7 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_shared::layout::{decode_normal, disc_fraction};
+use photoncard_shared::layout::{decode_direction, decode_normal, disc_fraction};
 
 use super::{Candidate, NearestPhotons};
 use crate::fixed_point::ColourSum;
@@ -34,18 +34,25 @@ const MIN_RADIUS_SHARE: f32 = 1e-6;
 #[inline(always)]
 pub fn reflected_radiance(nearest: &NearestPhotons, position: Vec3, reflection: &PartialReflection) -> Vec3 {
     let lobe = reflection.decode_lobe();
-    simd::run(Estimate { nearest, position, reflection, lobe, lit_by: LitBy::All })
+    let normals = [Vec3::ZERO; 2];
+    simd::run(Estimate::<false> { nearest, position, reflection, lobe, lit_by: LitBy::All, normals })
 }
 
-/// [`reflected_radiance`] of caustics, by a lobe that was not decoded from the record.
+/// [`reflected_radiance`] of caustics, by a lobe that was not decoded from the record; `normals` are the shading normal and the
+/// triangle's.
 #[inline(always)]
 pub fn reflected_caustics(
     nearest: &NearestPhotons,
     position: Vec3,
     (reflection, lobe): (&PartialReflection, DecodedLobe),
     lit_by: LitBy,
+    normals: [Vec3; 2],
 ) -> Vec3 {
-    simd::run(Estimate { nearest, position, reflection, lobe, lit_by })
+    if normals[0] == normals[1] {
+        simd::run(Estimate::<false> { nearest, position, reflection, lobe, lit_by, normals })
+    } else {
+        simd::run(Estimate::<true> { nearest, position, reflection, lobe, lit_by, normals })
+    }
 }
 
 /// Photons that light a lobe; the Lambertian part is lit by all.
@@ -57,8 +64,12 @@ pub enum LitBy {
     Punctual,
 }
 
-/// The [`Kernel`] of [`reflected_radiance`].
-pub struct Estimate<'a, 'n> {
+/// Maximum of `n.i / g.i`, where light comes along the triangle.
+const MAX_SHADING: f32 = 4.0;
+
+/// The [`Kernel`] of [`reflected_radiance`]. With `IS_SHADED` a photon of incidence `i` counts by `n.i / g.i`, `n` the shading normal and `g`
+/// the triangle's: the density of photons is the irradiance of the triangle.
+pub struct Estimate<'a, 'n, const IS_SHADED: bool> {
     /// The nearest photons.
     pub nearest: &'a NearestPhotons<'n>,
     /// Position of the gather, metres.
@@ -69,21 +80,25 @@ pub struct Estimate<'a, 'n> {
     pub lobe: DecodedLobe,
     /// Photons that light the lobe.
     pub lit_by: LitBy,
+    /// The shading normal and the triangle's, with `IS_SHADED`.
+    pub normals: [Vec3; 2],
 }
 
-impl Kernel for Estimate<'_, '_> {
+impl<const IS_SHADED: bool> Kernel for Estimate<'_, '_, IS_SHADED> {
     type Output = Vec3;
 
     #[inline(always)]
     fn run(self, _: impl Isa) -> Vec3 {
-        let Self { nearest, position, reflection, lobe, lit_by } = self;
+        let Self { nearest, position, reflection, lobe, lit_by, normals } = self;
         let (radius_squared, farthest) = if nearest.is_full() {
             let farthest = extreme(nearest, u32::max, |candidate, other| candidate.order() > other.order());
             (farthest.map_or(0.0, |farthest| farthest.distance_squared()), farthest)
         } else {
             (nearest.max_distance_squared(), None)
         };
-        let Some((closest, sums)) = sum(nearest, farthest, Sums::new(reflection, lobe, lit_by)) else {
+        let Some((closest, sums)) =
+            sum(nearest, farthest, Sums::<IS_SHADED>::new((reflection, lobe), lit_by, normals))
+        else {
             return Vec3::ZERO;
         };
         let fraction = disc_fraction(closest.disc());
@@ -116,14 +131,14 @@ fn extreme(
 
 /// Closest photon of the surface, and the sums over its photons without `farthest`, if given.
 #[inline(always)]
-fn sum<'a>(
+fn sum<'a, const IS_SHADED: bool>(
     nearest: &NearestPhotons,
     farthest: Option<Candidate>,
-    mut sums: Sums<'a>,
-) -> Option<(Candidate, Sums<'a>)> {
+    mut sums: Sums<'a, IS_SHADED>,
+) -> Option<(Candidate, Sums<'a, IS_SHADED>)> {
     let (_, contents) = nearest.columns();
     let reflection = sums.reflection;
-    if reflection.is_lambertian() && are_all_of(reflection.normal(), contents) {
+    if !IS_SHADED && reflection.is_lambertian() && are_all_of(reflection.normal(), contents) {
         // With a single photon, `farthest` is the closest too.
         if farthest.is_some() && contents.len() < 2 {
             return None;
@@ -164,28 +179,45 @@ fn are_all_of(normal: u8, contents: &[u64]) -> bool {
 const NORMAL_SHIFT: u32 = 50;
 
 /// Sum of the photons' power, and sum of the power times the lobe's factor.
-struct Sums<'a> {
+struct Sums<'a, const IS_SHADED: bool> {
     reflection: &'a PartialReflection,
     decoded: DecodedLobe,
     lit_by: LitBy,
+    normals: [Vec3; 2],
     power: ColourSum,
     lobe: ColourSum,
 }
 
-impl<'a> Sums<'a> {
+impl<'a, const IS_SHADED: bool> Sums<'a, IS_SHADED> {
     #[inline(always)]
-    fn new(reflection: &'a PartialReflection, decoded: DecodedLobe, lit_by: LitBy) -> Self {
-        Self { reflection, decoded, lit_by, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
+    fn new(
+        (reflection, decoded): (&'a PartialReflection, DecodedLobe),
+        lit_by: LitBy,
+        normals: [Vec3; 2],
+    ) -> Self {
+        Self { reflection, decoded, lit_by, normals, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
     }
 
     #[inline(always)]
     fn add(&mut self, photon: &Candidate) {
-        self.power.add_rgbe(photon.power());
+        let shading = if IS_SHADED { self.shading(photon) } else { 1.0 };
+        if IS_SHADED {
+            self.power.add(Vec3::from_array(photon.power().decode()) * shading);
+        } else {
+            self.power.add_rgbe(photon.power());
+        }
         let is_lit = self.lit_by == LitBy::All || !photon.is_direct();
         if is_lit && !self.reflection.is_lambertian() {
             let factor = PartialReflection::lobe_factor(&self.decoded, photon.direction());
-            self.lobe.add(Vec3::from_array(photon.power().decode()) * factor);
+            self.lobe.add(Vec3::from_array(photon.power().decode()) * (factor * shading));
         }
+    }
+
+    /// `n.i / g.i`, 0 for light from below the shading normal's horizon.
+    fn shading(&self, photon: &Candidate) -> f32 {
+        let incident = Vec3::from_array(decode_direction(photon.direction()));
+        let [shading, geometric] = self.normals.map(|normal| max(normal.dot(incident), 0.0));
+        if shading < MAX_SHADING * geometric { shading / geometric } else { MAX_SHADING }
     }
 
     #[inline(always)]

@@ -41,7 +41,8 @@ pub fn reflected<M: MemoryPort>(
     let (record, lobe) =
         PartialReflection::encode_present(&reflector, Vec3::splat(unit), point.pattern.dither(0));
     let record = record.among(encode_normal(surface.geometric_normal.to_array()));
-    Ok(reflected_caustics(&nearest, position, (&record, lobe), lit_by))
+    let normals = [surface.normal, surface.geometric_normal];
+    Ok(reflected_caustics(&nearest, position, (&record, lobe), lit_by, normals))
 }
 
 /// The reflection that the map lights, and the photons that light its lobe. Gather rays of a narrow lobe meet lights with extent, but

@@ -58,7 +58,7 @@ pub enum Passes {
     Specular,
     /// Narrow lobes besides: for gather rays and photons ([`crate::scene::Reflection::has_narrow_lobe`]).
     NarrowLobes,
-    /// Narrow lobes besides, and an end at those that the caustic map lights ([`crate::scene::Reflection::gathers_caustics`]): for its
+    /// Narrow lobes besides, and an end at those that the caustic map lights ([`crate::scene::Reflection::keeps_caustics`]): for its
     /// photons.
     CausticPhotons,
 }
@@ -144,7 +144,7 @@ impl SpecularPath {
             ..surface.reflector()
         };
         let ends_at_lobe = self.passes == Passes::CausticPhotons && self.bounces > 0;
-        let keeps_lobe = ends_at_lobe && surface.reflection.gathers_caustics();
+        let keeps_lobe = ends_at_lobe && surface.reflection.keeps_caustics();
         if !lobe.reflection.is_black() && !keeps_lobe {
             surface.reflection = surface.reflection.without_narrow_lobe();
         }

@@ -15,6 +15,9 @@ pub(super) fn points_away(normal: Vec3, outgoing: Vec3) -> bool {
 
 /// A shading normal, turned towards the viewer where it points away, as it may at a silhouette.
 pub(super) fn turned(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
+    if normal == geometric_normal {
+        return normal;
+    }
     let cosine = normal.dot(outgoing);
     let turned = if cosine < MIN_COSINE { normal + outgoing * (MIN_COSINE - cosine) } else { normal };
     let turned = unit(turned);

@@ -133,8 +133,7 @@ impl Surface {
     }
 }
 
-/// Reads the surface where a ray meets a triangle into `surface`: in place, as a copy of its 200 bytes costs a chip as much as
-/// a step of the hierarchy. `random` gives [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of its layers; the base is the
+/// Reads the surface where a ray meets a triangle into `surface`: in place, as a chip copies its 230 bytes one by one. `random` gives [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of its layers; the base is the
 /// layer of 0.
 ///
 /// # Errors
@@ -253,7 +252,7 @@ fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
     }
     let [turned, _] = view.normals;
     let share = reflection.glossy_share();
-    if !(reflection.has_narrow_lobe() && share < 1.0) {
+    if !(reflection.has_narrow_lobe() && share > 0.0 && share < 1.0) {
         surface.normal = bent_by_share(turned, share, outgoing, geometric_normal);
         return;
     }
@@ -266,7 +265,7 @@ fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
     let (part, normal, probability) = if random < diffuse_share {
         (reflection.without_narrow_lobe(), normal, diffuse_share)
     } else {
-        (reflection.narrow_lobe(), bent, 1.0 - diffuse_share)
+        (reflection.narrow_lobe_beside_base(), bent, 1.0 - diffuse_share)
     };
     surface.normal = normal;
     surface.reflection = part.dimmed(Vec3::splat(1.0 / probability));
@@ -310,7 +309,9 @@ fn take_layer(
         surface.normal = taken.normal;
     }
     let view = View { normals: [taken.normal, geometric_normal], ..*view };
-    shade_by_parts(surface, &view, random(SURFACE_CHOICES - 1));
+    // The first number is stratified, and free where there is one layer.
+    let choice = if taken.probability < 1.0 { SURFACE_CHOICES - 1 } else { 0 };
+    shade_by_parts(surface, &view, random(choice));
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3, Vec4};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
 use photoncard_driver::render::RenderSettings;
-use photoncard_driver::scene::{Camera, Material, Scene};
+use photoncard_driver::scene::{Camera, Material, Reflection, Scene, Transmission};
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::render::Context;
 use photoncard_firmware::render::specular_path::{Carried, Passes, PathEnd, SpecularPath};
@@ -15,10 +15,10 @@ use photoncard_firmware::scene::{Ray, Surface, closest_hit, read_surface};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::layout::{Photon, decode_direction};
 use photoncard_tests::shapes::{add_tangents, add_textured_quad};
-use photoncard_tests::{camera, lambertian, quad, scene};
+use photoncard_tests::{camera, lambertian, mean, quad, radiances, scene};
 use rayon::prelude::*;
 
-use super::{bumps, mapped, metal, normal_texture, tilted};
+use super::{bumps, directional, film, mapped, metal, normal_texture, plastic, plate, settings, tilted};
 
 /// Pseudorandom number in [0, 1).
 fn random(index: u32, dimension: u32) -> f32 {
@@ -113,4 +113,51 @@ fn photons_bring_by_a_bumpy_wall_what_paths_find_there() {
         println!("{name}: {brought:.4} W by photons, {found:.4} W by paths: {:.4}", brought / found);
         assert!((brought / found - 1.0).abs() < tolerance, "{name}: {brought} {found}");
     }
+}
+
+/// A pane of glass, without thickness.
+fn pane() -> Material {
+    let transmission = Transmission { factor: 1.0, ior: 1.5, is_volume: false, absorption: Vec3::ZERO };
+    let Material { reflection, .. } = plastic(0.0);
+    let Reflection::MetallicRoughness { dielectric, grazing, metallic, roughness, .. } = reflection else {
+        unreachable!("plastic is metallic-roughness");
+    };
+    let transmission = Some(transmission);
+    let reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::ONE,
+        metallic,
+        roughness,
+        dielectric,
+        grazing,
+        transmission,
+    };
+    Material::new("pane", reflection)
+}
+
+/// Sun through a pane lights a floor by the caustic map: by what the pane transmits less than without it, though the lobe and the base of
+/// the floor are parts with normals of their own, for one of which photons are stored.
+#[test]
+fn photons_light_a_floor_of_two_parts_once() {
+    let normals = [tilted(50.0, 180.0), tilted(50.0, 0.0), tilted(20.0, 90.0)];
+    let look = |has_pane: bool| {
+        let view =
+            Camera { vertical_fov: 0.2, ..camera(Vec3::new(-0.9, 0.0, 0.4), Vec3::new(0.9, 0.0, -0.4)) };
+        let mut lit = plate(mapped(plastic(0.3), 1.0), &normals, Vec4::new(1.0, 0.0, 0.0, 1.0), view);
+        lit.materials.push(pane());
+        lit.lights = vec![directional(DVec3::Z, 1.0)];
+        if has_pane {
+            let corners =
+                [[-1.2, -1.2], [1.2, -1.2], [1.2, 1.2], [-1.2, 1.2]].map(|[x, y]| Vec3::new(x, y, 0.6));
+            lit.triangles.extend(quad(corners, 1));
+        }
+        let settings = settings(0, 64).with(|s| {
+            s.photons.caustic_photons = Some(200_000);
+            s.photons.caustic_neighbors = 50;
+        });
+        mean(&radiances(&film(&lit, &settings)))
+    };
+    let reflected = 0.04;
+    let transmitted = 1.0 - 2.0 * reflected / (1.0 + reflected);
+    let share = look(true) / look(false) / transmitted;
+    assert!((share - 1.0).abs() < 0.05, "{share}");
 }

@@ -5,11 +5,11 @@ mod adjoint;
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3, Vec4};
-use photoncard_driver::film::Film;
+use photoncard_driver::film::{Film, Window};
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
     Camera, Encoding, Environment, Image, Layers, Material, NormalMap, PunctualKind, PunctualLight,
-    Reflection, Scene, Texture,
+    Reflection, Scene, Sheen, Texture,
 };
 use photoncard_tests::shapes::{add_ball, add_tangents, add_textured_quad};
 use photoncard_tests::{camera, lambertian, mean, radiances, render_or_panic, scene};
@@ -344,6 +344,25 @@ fn bumpy_plates_of_plastic_lose_no_light_where_the_normal_of_the_lobe_is_bent() 
         let found = in_a_furnace(plastic(roughness as f32), direction);
         println!("{degrees} {roughness}: {found:.4}, expected {expected:.4}");
         assert!((found / expected - 1.0).abs() < 0.01, "{degrees} {roughness}: {found} {expected}");
+    }
+}
+
+/// A sheen has no mirror direction, and the layer's normal alone: each sample shows it.
+#[test]
+fn a_sheen_over_a_tilted_normal_is_even() {
+    let sheen = Sheen { colour: Vec3::ONE, roughness: 0.5, colour_texture: None, roughness_texture: None };
+    let normal = Some(NormalMap { texture: 0, scale: 1.0 });
+    let layers = Layers { normal, sheen: Some(sheen), ..Layers::none(Vec3::ZERO) };
+    let velvet = Material { layers: Some(Box::new(layers)), ..lambertian("velvet", 0.0) };
+    let view = far_camera(Vec3::new(60_f32.to_radians().sin(), 0.0, 0.5));
+    let mut scene = plate(velvet, &[tilted(30.0, 180.0)], Vec4::new(1.0, 0.0, 0.0, 1.0), view);
+    scene.environment = Some(Environment::constant(Vec3::ONE));
+    let settings = settings(16, 16).with(|s| s.picture.crop = Some(Window { x0: 6, x1: 10, y0: 6, y1: 10 }));
+    let all = radiances(&film(&scene, &settings));
+    let middle = mean(&all);
+    assert!(middle > 0.6, "{middle}");
+    for [red, ..] in all {
+        assert!((f64::from(red) / middle - 1.0).abs() < 0.3, "{red} {middle}");
     }
 }
 

@@ -41,7 +41,7 @@ pub(super) struct GgxLobe {
     pub(super) albedo: Vec3,
     /// Coefficients of `F0` and `F90` in the albedo.
     shares: [f32; 2],
-    /// What estimates the lobe's light.
+    /// Estimate of the light that the lobe reflects at the end of a ray.
     pub(super) estimate: Estimate,
 }
 
@@ -51,8 +51,10 @@ pub(super) struct GgxLobe {
 pub(super) enum Estimate {
     /// Photons are gathered for it.
     Photons,
-    /// A ray follows it, and photons of lights without extent may be gathered.
+    /// A ray follows it, and photons of lights without extent are stored and gathered for it.
     Ray,
+    /// As [`Self::Ray`], but photons are stored for the Lambertian part beside it.
+    RayBesideBase,
     /// A ray alone: the lobe is that of a layer beyond the base, and photons are stored for the base.
     RayAlone,
 }

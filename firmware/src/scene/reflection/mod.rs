@@ -125,6 +125,25 @@ impl Reflection {
         }
     }
 
+    /// `true` with a narrow lobe for which photons of lights without extent are stored in the caustic map.
+    #[inline(always)]
+    pub fn keeps_caustics(&self) -> bool {
+        self.gathers_caustics()
+            && !matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.estimate == Estimate::RayBesideBase)
+    }
+
+    /// The narrow lobe alone, as a part beside the Lambertian one, for which photons are stored.
+    #[must_use]
+    pub(in crate::scene) fn narrow_lobe_beside_base(self) -> Self {
+        let mut part = self.narrow_lobe();
+        if let Lobe::Ggx(lobe) = &mut part.lobe
+            && lobe.estimate == Estimate::Ray
+        {
+            lobe.estimate = Estimate::RayBesideBase;
+        }
+        part
+    }
+
     /// The narrow lobe alone; black without one.
     #[must_use]
     pub fn narrow_lobe(self) -> Self {
