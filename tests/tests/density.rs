@@ -54,7 +54,15 @@ impl Map {
         );
         let lobe = reflection.decode_lobe();
         let lit_by = LitBy::All;
-        let estimate = || Estimate { nearest: &nearest, position, reflection: &reflection, lobe, lit_by };
+        let normals = [Vec3::ZERO; 2];
+        let estimate = || Estimate::<false> {
+            nearest: &nearest,
+            position,
+            reflection: &reflection,
+            lobe,
+            lit_by,
+            normals,
+        };
         let mut radiances = Level::ALL.iter().filter_map(|level| level.run(estimate()));
         let radiance = radiances.next().expect("what every processor has");
         assert!(radiances.all(|other| other == radiance), "{position}");
