@@ -2,6 +2,7 @@
 
 mod cards;
 mod choice;
+mod files;
 mod integrator;
 mod outputs;
 mod photons;
@@ -10,6 +11,8 @@ mod render;
 mod schedule;
 mod study;
 mod threads;
+mod tone;
+mod tonemap;
 mod without_effect;
 
 use std::path::PathBuf;
@@ -22,8 +25,10 @@ use photoncard_driver::printable::printable;
 use photoncard_driver::render::CardAddress;
 
 use self::choice::choice;
+pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::render::RenderOptions;
 pub(crate) use self::study::StudyArguments;
+pub(crate) use self::tonemap::TonemapOptions;
 
 /// Global illumination by photon mapping on small rendering chips.
 #[derive(Parser)]
@@ -46,8 +51,10 @@ impl Arguments {
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
-    /// Render a glTF scene to an EXR picture
+    /// Render a glTF scene to a picture, EXR or PNG
     Render(Box<RenderOptions>),
+    /// Tone-map an EXR picture to a PNG, as a render does
+    Tonemap(TonemapOptions),
     /// Print information on a scene
     #[command(subcommand)]
     Scene(SceneCommand),

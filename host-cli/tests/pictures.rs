@@ -41,33 +41,11 @@ fn layers_are_asked_for_by_name_and_leave_the_picture_as_it_is() {
 }
 
 #[test]
-fn exposure_and_tone_curve_change_the_preview_alone() {
-    let room = Room::new();
-    room.write_scene("scene.gltf", &scene());
-    let preview = |options: &[&str]| {
-        let options = [&["-o", "a.exr", "--preview", "a.png"], options].concat();
-        room.rendered("scene.gltf", &options);
-        (room.read("a.exr"), room.read("a.png"))
-    };
-    let (picture, plain) = preview(&[]);
-    assert_eq!((picture.clone(), plain.clone()), preview(&["--exposure=auto", "--tonemap=reinhard"]));
-    for option in ["--exposure=-2.5", "--tonemap=none", "--tonemap=aces"] {
-        let (same, other) = preview(&[option]);
-        assert_eq!(same, picture);
-        assert_ne!(other, plain, "{option}");
-    }
-    for options in [&["--exposure=inf", "--preview=a.png"] as &[_], &["--exposure=1"], &["--tonemap=aces"]] {
-        let outcome = room.render("scene.gltf", &[&["-o", "a.exr"], options].concat());
-        assert_eq!(outcome.status, Some(2), "{options:?}");
-    }
-}
-
-#[test]
-fn a_render_writes_picture_preview_and_statistics() {
+fn a_render_writes_pictures_and_statistics() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
     // One card: bytes in transit to another at the end count as payload, but not yet as sent.
-    let files = ["-o", "a.exr", "--preview", "a.png", "--stats", "a.json", "--card", "emulated:1"];
+    let files = ["-o", "a.exr", "-o", "a.png", "--stats", "a.json", "--card", "emulated:1"];
     let outcome = room.rendered(&cornell, &files);
     assert_eq!(room.names(), ["a.exr", "a.json", "a.png"]);
     assert!(room.read("a.png").starts_with(b"\x89PNG\r\n\x1a\n"));
@@ -93,6 +71,22 @@ fn a_render_writes_picture_preview_and_statistics() {
     for pointer in ["/pixels/mse", "/pixels/rmse", "/pixels/relmse", "/blocks/mse"] {
         assert_eq!(difference.pointer(pointer), Some(&json!(0.0)), "{pointer}");
     }
+}
+
+/// Data alone is on standard output, and the rest where it always is.
+#[test]
+fn statistics_go_to_standard_output_by_a_dash() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for more in [&[][..], &["--quiet", "--counters"]] {
+        let outcome = room.render("scene.gltf", &[&["-o", "a.exr", "--stats", "-"], more].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        let statistics: Value = serde_json::from_str(&outcome.stdout).unwrap();
+        assert_eq!(statistics["width"], 8);
+        assert_eq!(outcome.stderr.is_empty(), !more.is_empty(), "{}", outcome.stderr);
+    }
+    room.rendered("scene.gltf", &["-o", "a.exr", "--stats", "./-"]);
+    assert_eq!(room.names(), ["-", "a.exr", "scene.gltf"]);
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
 }
 
 /// Options that no pixel depends on.
-const OTHERS: [&[&str]; 18] = [
+const OTHERS: [&[&str]; 17] = [
     &["--photon-map", "jensen"],
     &["--tile", "3"],
     &["--order", "naive"],
@@ -48,9 +48,8 @@ const OTHERS: [&[&str]; 18] = [
     &["--cache", "unified=8K/128/2"],
     &["--trace", "a.din.gz", "--card", "emulated:1"],
     &["--threads", "2"],
-    &["--preview", "a.png"],
-    &["--exposure", "1", "--preview", "a.png"],
-    &["--tonemap", "aces", "--preview", "a.png"],
+    &["--exposure", "1", "-o", "a.png"],
+    &["--tonemap", "aces", "-o", "a.png"],
     &["--display-server", "127.0.0.1:1"],
     &["--stats", "a.json"],
 ];

@@ -8,6 +8,8 @@ use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{CardAddress, CardSet};
 
+use super::files::file;
+
 #[derive(Args)]
 pub(crate) struct CardOptions {
     #[arg(
@@ -32,7 +34,7 @@ pub(crate) struct CardOptions {
     #[arg(long, value_name = "CACHES")]
     cache: Option<CacheSettings>,
     /// Write every read of an emulated chip in Dinero's input format, compressed by gzip; a frame has billions: use --crop
-    #[arg(long, value_name = "OUT.din.gz")]
+    #[arg(long, value_name = "OUT.din.gz", value_parser = file())]
     pub(crate) trace: Option<PathBuf>,
 }
 

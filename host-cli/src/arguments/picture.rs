@@ -20,18 +20,29 @@ pub(crate) struct PictureOptions {
     /// Name of the camera [default: the first of the file]
     #[arg(long)]
     camera: Option<String>,
-    /// Layers of the picture besides radiance, with commas between them: direct, indirect, caustic, albedo, N, Z, gathers; or
-    /// all, or none
-    #[arg(long, value_name = "LIST", default_value_t = Layers::default())]
-    pub(crate) aov: Layers,
+    #[arg(
+        long,
+        value_name = "LIST",
+        help = format!(
+            "Layers of the EXR besides radiance, with commas between them: direct, indirect, caustic, albedo, N, Z, gathers; or all, \
+             or none [default: {}]",
+            Layers::default()
+        )
+    )]
+    pub(super) aov: Option<Layers>,
 }
 
 impl PictureOptions {
     /// Settings of these options.
     pub(super) fn settings(&self) -> Picture {
-        let Self { size, crop, camera, aov } = self;
+        let Self { size, crop, camera, aov: _ } = self;
         let (width, height) = size.unwrap_or((SIDE, SIDE));
-        Picture { width, height, crop: *crop, camera: camera.clone(), layers: aov.clone() }
+        Picture { width, height, crop: *crop, camera: camera.clone(), layers: self.layers() }
+    }
+
+    /// Layers of the picture.
+    pub(crate) fn layers(&self) -> Layers {
+        self.aov.clone().unwrap_or_default()
     }
 
     /// Gives the picture the camera's aspect ratio, if no size is given. Returns a notice if the one that is given is of another.

@@ -7,7 +7,7 @@ use photoncard_driver::render::RenderSettings;
 
 use super::cards::CardOptions;
 use super::integrator::IntegratorOptions;
-use super::outputs::{OutputOptions, partial_path};
+use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
 use super::schedule::ScheduleOptions;
@@ -18,9 +18,6 @@ use crate::environment::EnvironmentOption;
 pub(crate) struct RenderOptions {
     /// A glTF 2.0 file, .gltf or .glb
     pub(crate) scene: PathBuf,
-    /// The picture to write, an EXR file: linear RGB radiance and the layers of --aov
-    #[arg(short, long, value_name = "OUT.exr")]
-    pub(crate) output: PathBuf,
     /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha or emission; may be repeated
     #[arg(long = "set", value_name = "ASSIGNMENT")]
     pub(crate) assignments: Vec<String>,
@@ -63,14 +60,9 @@ impl RenderOptions {
             picture: self.picture.settings(),
             photons: self.photons.settings(),
             integrator: self.integrator.settings(),
-            schedule: self.schedule.settings(&self.picture.aov, &cards.addresses),
+            schedule: self.schedule.settings(&self.picture.layers(), &cards.addresses),
             cards,
-            outputs: self.outputs.settings(&self.output),
+            outputs: self.outputs.settings(),
         }
-    }
-
-    /// Path of the file in which finished tiles are kept until the picture is written.
-    pub(crate) fn partial_path(&self) -> PathBuf {
-        partial_path(&self.output)
     }
 }
