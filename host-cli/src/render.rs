@@ -78,8 +78,8 @@ fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<
         scene.environment = Some(environment.load()?);
     }
     scene.check_light().map_err(Failure::input)?;
-    let camera = scene.camera(settings.picture.camera.as_deref()).map_err(Failure::input)?;
-    let misfit = options.picture.fit(camera, &mut settings.picture);
+    let camera = settings.camera(&scene)?;
+    let misfit = options.picture.fit(&camera, &mut settings.picture);
     if !options.quiet {
         for notice in options.without_effect(&scene).into_iter().chain(misfit) {
             say(format_args!("photoncard: {notice}"));

@@ -143,6 +143,14 @@ fn numbers_out_of_range() {
         ("--threads", "0", ["1 to 1024", "leave the option out"]),
         ("--threads", "100000", ["1 to 1024", "leave the option out"]),
         ("--seed", "-1", ["--seed", "invalid"]),
+        ("--camera-at", "1,2", ["three numbers of metres", "0,1.5,4"]),
+        ("--camera-at", "1,2,nan", ["three numbers of metres", "0,1.5,4"]),
+        ("--look-at", "-1,-2,-3,-4", ["three numbers of metres", "0,1.5,4"]),
+        ("--look-at", "0,0.5,3", ["the camera itself is there", "--camera-at"]),
+        ("--fov", "0", ["above 0 and below 180", "such as 40"]),
+        ("--fov", "-20", ["above 0 and below 180", "such as 40"]),
+        ("--fov", "180", ["above 0 and below 180", "such as 40"]),
+        ("--fov", "wide", ["--fov", "invalid"]),
     ] {
         refused(&room, "scene.gltf", &[option, value], &[option, words[0], words[1]]);
     }

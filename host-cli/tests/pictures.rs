@@ -216,3 +216,30 @@ fn the_camera_gives_the_picture_its_aspect_ratio() {
     assert_eq!((narrow.width, narrow.height), (128, 8));
     assert!(!room.rendered("scene.gltf", &["-o", "a.exr", "--size", "128x2"]).stderr.contains("aspect"));
 }
+
+/// A view by options is the one that a file states.
+#[test]
+fn a_view_by_options_is_that_of_a_camera_there() {
+    let room = Room::new();
+    let mut stated = scene();
+    stated["nodes"][1]["translation"] = json!([0.25, 0.75, 2.5]);
+    stated["cameras"][0]["perspective"]["yfov"] = json!(45_f32.to_radians());
+    room.write_scene("stated.gltf", &stated);
+    room.write_scene("other.gltf", &scene());
+    stated["scenes"][0]["nodes"] = json!([0]);
+    room.write_scene("without.gltf", &stated);
+    let pixels = |name: &str, options: &[&str]| {
+        room.rendered(name, &[&["-o", "a.exr"], options].concat());
+        picture(&room, "a.exr").pixels
+    };
+    let expected = pixels("stated.gltf", &[]);
+    let place = ["--camera-at", "0.25,0.75,2.5"];
+    let view = [&place[..], &["--look-at", "0.25,0.75,-7", "--fov", "45"]].concat();
+    for name in ["other.gltf", "without.gltf"] {
+        assert!(pixels(name, &view) == expected, "{name}");
+    }
+    assert!(pixels("without.gltf", &[]) != expected);
+    // What is not given is the camera's own.
+    assert!(pixels("other.gltf", &[&place[..], &["--fov=45"]].concat()) == expected);
+    assert!(pixels("other.gltf", &place) != expected);
+}

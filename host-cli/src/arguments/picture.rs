@@ -20,6 +20,17 @@ pub(crate) struct PictureOptions {
     /// Name of the camera [default: the first of the file]
     #[arg(long)]
     camera: Option<String>,
+    /// Place of the camera, metres [default: the camera's own]
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    camera_at: Option<[f32; 3]>,
+    /// Place in the middle of the picture, metres [default: in the camera's own direction]
+    ///
+    /// The top of the picture is towards +y. Straight up and straight down the right is +x, so that the top is +z and -z.
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    look_at: Option<[f32; 3]>,
+    /// Vertical field of view [default: the camera's own]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    fov: Option<f32>,
     #[arg(
         long,
         value_name = "LIST",
@@ -35,9 +46,18 @@ pub(crate) struct PictureOptions {
 impl PictureOptions {
     /// Settings of these options.
     pub(super) fn settings(&self) -> Picture {
-        let Self { size, crop, camera, aov: _ } = self;
+        let Self { size, crop, camera, camera_at, look_at, fov, aov: _ } = self;
         let (width, height) = size.unwrap_or((SIDE, SIDE));
-        Picture { width, height, crop: *crop, camera: camera.clone(), layers: self.layers() }
+        Picture {
+            width,
+            height,
+            crop: *crop,
+            camera: camera.clone(),
+            camera_at: *camera_at,
+            look_at: *look_at,
+            fov: *fov,
+            layers: self.layers(),
+        }
     }
 
     /// Layers of the picture.
@@ -81,4 +101,11 @@ fn crop(text: &str) -> Result<Window, String> {
         Ok(&[x0, x1, y0, y1]) => Ok(Window { x0, x1, y0, y1 }),
         _ => Err("a crop is X0,X1,Y0,Y1: four whole numbers, such as 0,64,0,64".into()),
     }
+}
+
+fn place(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    let place = numbers.and_then(|numbers| <[f32; 3]>::try_from(numbers).ok());
+    let place = place.filter(|place| place.iter().all(|number| number.is_finite()));
+    place.ok_or_else(|| "a place is X,Y,Z: three numbers of metres, such as 0,1.5,4".into())
 }
