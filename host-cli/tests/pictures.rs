@@ -73,6 +73,29 @@ fn a_render_writes_pictures_and_statistics() {
     }
 }
 
+/// The first line is what was loaded, the last what was written; with a remaining time in between.
+#[test]
+fn a_render_says_what_it_loads_and_what_it_has_done() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let options = ["-o", "a.png", "-o", "./a.exr", "--spp", "3", "--crop", "0,8,0,5", "--tile", "1"];
+    let said = room.rendered("scene.gltf", &options).stderr;
+    let lines: Vec<_> = said.lines().collect();
+    assert_eq!(
+        lines[0],
+        "photoncard: scene.gltf: 3 triangles, 2 materials, 0 images, light of 1 emissive triangle; seen by 'eye', 8 x 8 pixels"
+    );
+    let last = lines[lines.len() - 1];
+    assert!(last.starts_with("photoncard: a.png, ./a.exr: done in "), "{last}");
+    assert!(last.contains("; 3 samples a pixel, 120 in all"), "{last}");
+    let tiles: Vec<_> = lines.iter().filter(|line| line.starts_with("photoncard: tiles ")).collect();
+    assert!(tiles.len() > 1 && tiles.iter().all(|line| line.ends_with(" left")), "{said}");
+    assert!(
+        tiles[tiles.len() - 1].contains("40 of 40") && tiles[tiles.len() - 1].ends_with(", 0 s left"),
+        "{said}"
+    );
+}
+
 /// Data alone is on standard output, and the rest where it always is.
 #[test]
 fn statistics_go_to_standard_output_by_a_dash() {
@@ -170,7 +193,11 @@ fn triangles_of_no_area_are_counted_and_left_out() {
     room.write_scene("scene.gltf", &scene_of(&bytes));
     let outcome = room.rendered("scene.gltf", &["-o", "a.exr"]);
     let told = outcome.stderr.lines().filter(|line| line.contains("zero area")).collect::<Vec<_>>();
-    assert_eq!(told, ["photoncard: triangles of zero area are left out: 1"]);
+    let [told] = told[..] else { panic!("{told:?}") };
+    assert!(
+        told.starts_with("photoncard: scene.gltf: 2 triangles (and 1 of zero area, left out), "),
+        "{told}"
+    );
     let information = room.run(&["scene", "info", "scene.gltf"]).stdout;
     assert!(information.contains("triangles  2\nskipped    1 of zero area\n"), "{information}");
 }
@@ -190,6 +217,8 @@ fn what_is_ignored_is_said_once() {
     let outcome = room.rendered("scene.gltf", &["-o", "a.exr"]);
     let information = room.run(&["scene", "info", "scene.gltf"]).stdout;
     for sentence in ["occlusion textures", "range of lights", "EXT_unheard_of is ignored"] {
+        let lines: Vec<_> = outcome.stderr.lines().filter(|line| line.contains(sentence)).collect();
+        assert!(lines.len() == 1 && lines[0].starts_with("photoncard: ignored: "), "{}", outcome.stderr);
         assert_eq!(outcome.stderr.matches(sentence).count(), 1, "{sentence}: {}", outcome.stderr);
         assert_eq!(information.matches(sentence).count(), 1, "{sentence}: {information}");
     }

@@ -148,6 +148,13 @@ pub struct CardSet {
     pub trace: Option<PathBuf>,
 }
 
+impl CardSet {
+    /// Number of cards, one chip each.
+    pub fn count(&self) -> usize {
+        self.addresses.iter().map(|address| address.emulated_chips().max(1)).sum()
+    }
+}
+
 impl Default for CardSet {
     fn default() -> Self {
         Self {
