@@ -16,13 +16,17 @@ mod tonemap;
 mod without_effect;
 
 use std::path::PathBuf;
+use std::sync::LazyLock;
 
 use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::link::ListenAddress;
 use photoncard_driver::printable::printable;
 use photoncard_driver::render::CardAddress;
+use photoncard_shared::image::LAYOUT_VERSION;
+use photoncard_shared::message::PROTOCOL_VERSION;
 
 use self::choice::choice;
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
@@ -32,11 +36,22 @@ pub(crate) use self::tonemap::TonemapOptions;
 
 /// Global illumination by photon mapping on small rendering chips.
 #[derive(Parser)]
-#[command(version, about, max_term_width = 100)]
+#[command(version, long_version = VERSION.as_str(), about, max_term_width = 100)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
 }
+
+/// Version of the program, of what it shares with cards, and the kinds of links that this build has.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let links = if cfg!(unix) { "serial, tcp, unix, pty" } else { "serial, tcp" };
+    format!(
+        "{}\nprotocol {PROTOCOL_VERSION}, card image layout {LAYOUT_VERSION}\n{} {}, links: {links}",
+        env!("CARGO_PKG_VERSION"),
+        std::env::consts::OS,
+        std::env::consts::ARCH,
+    )
+});
 
 impl Arguments {
     /// Parses the arguments of the process. Invalid ones end it with a message in which they are escaped.
@@ -65,6 +80,16 @@ pub(crate) enum Command {
     Emulate(EmulateOptions),
     /// Compare a picture with a reference
     Diff(DiffOptions),
+    /// Print the completions of a shell: source them, or put them where it looks for them
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+    /// Write manual pages, one for each command, for man
+    Man {
+        /// The folder; it is made if it is missing
+        folder: PathBuf,
+    },
     /// Measure how memory traffic and time depend on orders, caches, techniques and chips
     Study(StudyArguments),
 }
@@ -75,6 +100,9 @@ pub(crate) enum SceneCommand {
     Info {
         /// A glTF 2.0 file, .gltf or .glb
         scene: PathBuf,
+        /// Print them as JSON
+        #[arg(long)]
+        json: bool,
     },
 }
 

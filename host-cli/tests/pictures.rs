@@ -199,7 +199,10 @@ fn triangles_of_no_area_are_counted_and_left_out() {
         "{told}"
     );
     let information = room.run(&["scene", "info", "scene.gltf"]).stdout;
-    assert!(information.contains("triangles  2\nskipped    1 of zero area\n"), "{information}");
+    assert!(
+        information.contains("  triangles   2, 1 of them emissive\n  left out    1 of zero area\n"),
+        "{information}"
+    );
 }
 
 #[test]

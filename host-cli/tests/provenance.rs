@@ -133,7 +133,7 @@ fn a_variant_is_in_the_provenance_and_changes_the_scene() {
     assert_eq!(stated["scene-checksum"], day["scene-checksum"]);
     assert_ne!(stated["scene-checksum"], night["scene-checksum"]);
     let info = room.run(&["scene", "info", "scene.gltf"]).stdout;
-    assert!(info.contains("variant    day\nvariant    night\n"), "{info}");
+    assert!(info.contains("Variants (2)\n  day\n  night\n"), "{info}");
 }
 
 /// A new option must be in one of the lists above.

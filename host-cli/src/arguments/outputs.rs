@@ -13,21 +13,25 @@ use super::files::{PictureFormat, PictureOutput, TextOutput, picture, text};
 use super::tone::ToneOptions;
 
 #[derive(Args)]
+#[command(next_help_heading = "Outputs")]
 pub(crate) struct OutputOptions {
-    /// The picture to write: OUT.exr, linear RGB radiance and the layers of --aov, or OUT.png, tone-mapped; may be repeated
+    /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated
+    ///
+    /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures.
     #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", required = true, value_parser = picture())]
     pub(crate) pictures: Vec<PictureOutput>,
-    /// Continue a render that was stopped or has failed: its finished tiles are kept beside the picture, in
-    /// OUT.exr.partial, until the picture is written
+    /// Continue a render that was stopped or has failed
+    ///
+    /// Finished tiles are kept beside the picture, in OUT.exr.partial, until the picture is written.
     #[arg(long)]
     resume: bool,
     /// Type of the EXR's samples; Z and gathers are always float [default: float]
-    #[arg(long, value_parser = choice::<SampleFormat>())]
+    #[arg(long, value_parser = choice::<SampleFormat>(), hide_short_help = true)]
     pub(super) sample_type: Option<SampleFormat>,
     #[command(flatten)]
     pub(crate) tone: ToneOptions,
     /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port: 14158]
-    #[arg(long, value_name = "HOST:PORT")]
+    #[arg(long, value_name = "HOST:PORT", hide_short_help = true)]
     pub(super) display_server: Option<DisplayAddress>,
     /// Write statistics of the render as JSON; - for standard output
     #[arg(long, value_name = "OUT.json", value_parser = text())]

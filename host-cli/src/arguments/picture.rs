@@ -10,12 +10,15 @@ use photoncard_driver::scene::Camera;
 const SIDE: u32 = 512;
 
 #[derive(Args)]
+#[command(next_help_heading = "Picture and camera")]
 pub(crate) struct PictureOptions {
-    /// Width and height of the picture, pixels [default: 512 on the longer side, in the aspect ratio of the camera; 512x512 if it states none]
+    /// Width and height of the picture, pixels [default: 512 on the longer side]
+    ///
+    /// By default the picture has the aspect ratio that the file states for the camera, or is square if it states none.
     #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true)]
     size: Option<(u32, u32)>,
     /// Render only the columns X0 up to X1 and the rows Y0 up to Y1
-    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, allow_hyphen_values = true, hide_short_help = true)]
     crop: Option<Window>,
     /// Name of the camera [default: the first of the file]
     #[arg(long)]
@@ -34,6 +37,7 @@ pub(crate) struct PictureOptions {
     #[arg(
         long,
         value_name = "LIST",
+        hide_short_help = true,
         help = format!(
             "Layers of the EXR besides radiance, with commas between them: direct, indirect, caustic, albedo, N, Z, gathers; or all, \
              or none [default: {}]",

@@ -18,19 +18,23 @@ use crate::environment::EnvironmentOption;
 pub(crate) struct RenderOptions {
     /// A glTF 2.0 file, .gltf or .glb
     pub(crate) scene: PathBuf,
-    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha or emission; may be repeated
-    #[arg(long = "set", value_name = "ASSIGNMENT")]
+    /// Change a material: MATERIAL.PROPERTY=VALUE; may be repeated
+    ///
+    /// Properties are diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha and emission.
+    #[arg(long = "set", value_name = "ASSIGNMENT", help_heading = "Scene", hide_short_help = true)]
     pub(crate) assignments: Vec<String>,
-    /// Add the light that rough metals and coats reflect several times between their microfacets, as Blender does by default; glTF's
-    /// model leaves it out, and a metal of roughness 1 is less than half as bright
-    #[arg(long)]
+    /// Add the light that rough metals and coats reflect several times between their microfacets
+    ///
+    /// Blender does so by default; glTF's model leaves this light out, and a metal of roughness 1 is less than half as bright.
+    #[arg(long, help_heading = "Scene", hide_short_help = true)]
     pub(crate) energy_compensation: bool,
     /// Variant of the scene's materials, by its name [default: the materials that its meshes state]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Scene", hide_short_help = true)]
     pub(crate) variant: Option<String>,
-    /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and
-    /// top is y; or a constant radiance
-    #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]
+    /// Light from infinitely far: an equirectangular map, .hdr or .exr, or a constant radiance
+    ///
+    /// The middle of the map is -z and its top is y.
+    #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true, help_heading = "Scene")]
     pub(crate) environment: Option<EnvironmentOption>,
     #[command(flatten)]
     pub(crate) picture: PictureOptions,
@@ -45,7 +49,7 @@ pub(crate) struct RenderOptions {
     #[command(flatten)]
     pub(crate) outputs: OutputOptions,
     /// Threads for the host's own work [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true)]
+    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
     pub(crate) threads: Option<usize>,
     /// Show no progress
     #[arg(long)]

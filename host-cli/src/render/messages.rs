@@ -50,9 +50,7 @@ fn loaded(path: &Path, picture: &Picture, scene: &Scene, camera: &Camera) -> Str
 
 /// Sources of light, by kind.
 fn lights(scene: &Scene) -> String {
-    let is_lamp =
-        |material: u32| scene.materials.get(material as usize).is_some_and(|material| material.is_emissive());
-    let emissive = scene.triangles.iter().filter(|triangle| is_lamp(triangle.material)).count();
+    let emissive = scene.emissive_triangles();
     let kinds = [
         (emissive > 0).then(|| counted(emissive, "emissive triangle")),
         (!scene.lights.is_empty()).then(|| counted(scene.lights.len(), "punctual light")),

@@ -25,7 +25,7 @@ impl RenderSettings {
             let target = finite("--look-at", *target)?;
             let forward = (target.as_dvec3() - camera.origin.as_dvec3()).try_normalize();
             let forward = forward.ok_or_else(|| at_the_camera(target))?;
-            [camera.right, camera.up, camera.forward] = upright(forward).map(|axis| axis.as_vec3());
+            [camera.right, camera.up, camera.forward] = upright(forward).map(DVec3::as_vec3);
         }
         if let Some(degrees) = *fov {
             camera.vertical_fov = field_of_view(degrees)?;
