@@ -56,6 +56,13 @@ pub struct RgbImage {
     pub pixels: Vec<[f32; 3]>,
 }
 
+impl RgbImage {
+    /// Columns and rows of the data window; each is at most [`MAX_READ_PIXELS`].
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height].map(|side| side as u32)
+    }
+}
+
 /// Error of [`write()`] and [`read_rgb`].
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -113,7 +120,7 @@ pub enum ExrError {
         bytes: u64,
     },
     /// The picture is too large to be read at once.
-    #[error("{} has {width} x {height} pixels, more than {MAX_READ_PIXELS}; compare crops of it", path.display())]
+    #[error("{} has {width} x {height} pixels, more than {MAX_READ_PIXELS}; take crops of it", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,

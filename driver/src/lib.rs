@@ -39,8 +39,8 @@
 //!
 //! [`RenderSettings`](render::RenderSettings) has the options of `photoncard render` in groups; its default is the
 //! dissertation's nominal frame on one emulated reference chip. [`Rendering`](render::Rendering) holds the
-//! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A tone-mapped PNG is written by [`preview::write_png`], and
-//! two pictures are compared by [`difference`].
+//! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A tone-mapped PNG is written by
+//! [`tone_mapping::write_png`], and two pictures are compared by [`difference`].
 //!
 //! # Cards
 //!
@@ -97,7 +97,7 @@
 //! |---|---|---|
 //! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic |
 //! | tiles | [`sink`] | a finished tile, and [`TileSink`](sink::TileSink), the trait of every output |
-//! | pictures | [`film`], [`layer`], [`exr`], [`preview`], [`difference`] | pixels of a picture; its layers; files; comparison |
+//! | pictures | [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`] | pixels of a picture; its layers; files; comparison |
 //! | scenes | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
 //! | trees | [`bvh`], `fold`, `light` | bounding volume hierarchy; folding of binary trees into wide nodes; light tree and environment |
 //! | card image | [`pack`] | the scene's sections of the card image |
@@ -119,7 +119,7 @@
 //! ```text
 //! scene::gltf -> Scene -> pack -> photon -> photon_map (with density) -> CardImage
 //!     -> session -> link -> card -> link -> session -> dispatcher -> TileSinks: Film, PartialRender, Display
-//! Film -> exr, preview
+//! Film -> exr, tone_mapping
 //! ```
 //!
 //! Terms are defined in `docs/glossary.md`, design decisions and "how to add" lists are in `docs/architecture.md`.
@@ -147,7 +147,6 @@ pub mod pack;
 pub mod partial;
 pub mod photon;
 pub mod photon_map;
-pub mod preview;
 pub mod printable;
 pub mod render;
 pub mod scene;
@@ -155,4 +154,5 @@ pub mod scheduler;
 pub mod session;
 pub mod sink;
 pub mod study;
+pub mod tone_mapping;
 pub mod viewer;

@@ -4,10 +4,10 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::photon_map::PhotonLayout;
-use photoncard_driver::preview::ToneCurve;
 use photoncard_driver::render::{Radiance, Sampling};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::Study;
+use photoncard_driver::tone_mapping::ToneCurve;
 
 fn check<T: Choice + PartialEq + std::fmt::Debug>() {
     for (index, &value) in T::ALL.iter().enumerate() {

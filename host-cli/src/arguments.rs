@@ -2,6 +2,7 @@
 
 mod cards;
 mod choice;
+mod files;
 mod integrator;
 mod outputs;
 mod photons;
@@ -10,28 +11,47 @@ mod render;
 mod schedule;
 mod study;
 mod threads;
+mod tone;
+mod tonemap;
 mod without_effect;
 
 use std::path::PathBuf;
+use std::sync::LazyLock;
 
 use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::link::ListenAddress;
 use photoncard_driver::printable::printable;
 use photoncard_driver::render::CardAddress;
+use photoncard_shared::image::LAYOUT_VERSION;
+use photoncard_shared::message::PROTOCOL_VERSION;
 
 use self::choice::choice;
+pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::render::RenderOptions;
 pub(crate) use self::study::StudyArguments;
+pub(crate) use self::tonemap::TonemapOptions;
 
 /// Global illumination by photon mapping on small rendering chips.
 #[derive(Parser)]
-#[command(version, about, max_term_width = 100)]
+#[command(version, long_version = VERSION.as_str(), about, max_term_width = 100)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
 }
+
+/// Version of the program, of what it shares with cards, and the kinds of links that this build has.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let links = if cfg!(unix) { "serial, tcp, unix, pty" } else { "serial, tcp" };
+    format!(
+        "{}\nprotocol {PROTOCOL_VERSION}, card image layout {LAYOUT_VERSION}\n{} {}, links: {links}",
+        env!("CARGO_PKG_VERSION"),
+        std::env::consts::OS,
+        std::env::consts::ARCH,
+    )
+});
 
 impl Arguments {
     /// Parses the arguments of the process. Invalid ones end it with a message in which they are escaped.
@@ -46,8 +66,10 @@ impl Arguments {
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
-    /// Render a glTF scene to an EXR picture
+    /// Render a glTF scene to a picture, EXR or PNG
     Render(Box<RenderOptions>),
+    /// Tone-map an EXR picture to a PNG, as a render does
+    Tonemap(TonemapOptions),
     /// Print information on a scene
     #[command(subcommand)]
     Scene(SceneCommand),
@@ -58,6 +80,16 @@ pub(crate) enum Command {
     Emulate(EmulateOptions),
     /// Compare a picture with a reference
     Diff(DiffOptions),
+    /// Print the completions of a shell: source them, or put them where it looks for them
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+    /// Write manual pages, one for each command, for man
+    Man {
+        /// The folder; it is made if it is missing
+        folder: PathBuf,
+    },
     /// Measure how memory traffic and time depend on orders, caches, techniques and chips
     Study(StudyArguments),
 }
@@ -68,6 +100,9 @@ pub(crate) enum SceneCommand {
     Info {
         /// A glTF 2.0 file, .gltf or .glb
         scene: PathBuf,
+        /// Print them as JSON
+        #[arg(long)]
+        json: bool,
     },
 }
 

@@ -45,8 +45,8 @@ pub(crate) fn printable_json(text: &str) -> String {
     escaped
 }
 
-/// Writes text to standard output. A reader that closes it early is no error.
-fn write_out(text: &str) -> Result<(), Failure> {
+/// Writes text of the program's own to standard output as it is. A reader that closes it early is no error.
+pub(crate) fn write_out(text: &str) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::output(&error)),

@@ -1,6 +1,7 @@
 //! Failures of a command: message and exit status.
 
 use std::fmt;
+use std::path::Path;
 use std::process::ExitCode;
 
 use miette::{Diagnostic, MietteDiagnostic, Report};
@@ -42,6 +43,12 @@ impl Failure {
         let text = format!("cannot write to standard output: {error}");
         let help = "check the space of the file or the device that it is directed to";
         Self::Work(Report::new(MietteDiagnostic::new(text).with_help(help)))
+    }
+
+    /// Failure of making a folder.
+    pub(crate) fn folder(path: &Path, error: &std::io::Error) -> Self {
+        let text = format!("cannot make the folder {}: {error}", path.display());
+        Self::Input(Report::new(MietteDiagnostic::new(text).with_help("choose another folder")))
     }
 
     /// Exit status.

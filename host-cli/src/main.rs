@@ -8,8 +8,9 @@
 //! | `console`, `report` | the standard streams, with foreign text escaped; layout of errors |
 //! | `failure` | errors with their exit status |
 //! | `arguments`, `environment` | command line: options of every command, and their values |
+//! | `outputs` | checks of output files before any work |
 //! | `progress` | progress of a render |
-//! | `render`, `scene`, `card`, `card_list`, `emulate`, `diff`, `study` | one module for each command |
+//! | `render`, `tonemap`, `scene`, `card`, `card_list`, `emulate`, `diff`, `documents`, `study` | one module for each command |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render from Rust, use
 //! `photoncard_driver` directly.
@@ -20,14 +21,17 @@ mod card;
 mod card_list;
 mod console;
 mod diff;
+mod documents;
 mod emulate;
 mod environment;
 mod failure;
+mod outputs;
 mod progress;
 mod render;
 mod report;
 mod scene;
 mod study;
+mod tonemap;
 
 use std::process::ExitCode;
 
@@ -39,12 +43,15 @@ fn main() -> ExitCode {
     report::lay_out_errors();
     let result = match &arguments.command {
         Command::Render(options) => render::run(options),
-        Command::Scene(SceneCommand::Info { scene }) => scene::info(scene),
+        Command::Tonemap(options) => tonemap::run(options),
+        Command::Scene(SceneCommand::Info { scene, json }) => scene::info(scene, *json),
         Command::Card(CardCommand::List) => card_list::run(),
         Command::Card(CardCommand::Info { card }) => card::info(card),
         Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),
         Command::Emulate(options) => emulate::run(options),
         Command::Diff(options) => diff::run(options),
+        Command::Completions { shell } => documents::completions(*shell),
+        Command::Man { folder } => documents::man(folder),
         Command::Study(arguments) => study::run(arguments),
     };
     match result {

@@ -1,14 +1,18 @@
 //! Progress of a render: a bar on a terminal, otherwise a line for each tenth of a phase.
 
+mod remaining;
+
 use std::error::Error;
+use std::fmt::Arguments;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use photoncard_driver::render::{CardError, Observer, Phase};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
+use self::remaining::Remaining;
 use crate::console::say;
 
 /// Display of a render's progress; SIGINT and SIGTERM stop the render.
@@ -21,17 +25,25 @@ pub(crate) struct Progress {
 struct Display {
     phase: Option<Phase>,
     bar: ProgressBar,
+    remaining: Remaining,
+    /// Number of cards, which render tiles in parallel.
+    cards: usize,
+    /// Number of tiles that an earlier render has finished.
+    resumed: u64,
     on_terminal: bool,
     /// Number of tenths of the phase that were printed, without a terminal.
     told: u64,
 }
 
 impl Progress {
-    /// Starts the display, which is empty if `quiet`. The first signal stops the render, a second one ends the process.
-    pub(crate) fn start(quiet: bool) -> std::io::Result<Self> {
+    /// Starts the display of a render on `cards` cards, which is empty if `quiet`. The first signal stops the render, a second one ends the process.
+    pub(crate) fn start(quiet: bool, cards: usize) -> std::io::Result<Self> {
         let display = Display {
             phase: None,
             bar: ProgressBar::hidden(),
+            remaining: Remaining::new(1, 0),
+            cards,
+            resumed: 0,
             on_terminal: std::io::stderr().is_terminal(),
             told: 0,
         };
@@ -46,16 +58,28 @@ impl Progress {
 
     /// Removes the bar.
     pub(crate) fn finish(&self) {
-        if let Some(display) = &self.display {
-            display.lock().unwrap_or_else(PoisonError::into_inner).bar.finish_and_clear();
+        if let Some(display) = self.display() {
+            display.bar.finish_and_clear();
+        }
+    }
+
+    fn display(&self) -> Option<MutexGuard<'_, Display>> {
+        self.display.as_ref().map(|display| display.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Prints a line above the bar.
+    fn say(&self, line: Arguments) {
+        match self.display() {
+            Some(display) => display.bar.suspend(|| say(line)),
+            None => say(line),
         }
     }
 }
 
 impl Observer for Progress {
     fn progress(&self, phase: Phase, done: u64, total: u64) {
-        if let Some(display) = &self.display {
-            display.lock().unwrap_or_else(PoisonError::into_inner).show(phase, done, total);
+        if let Some(mut display) = self.display() {
+            display.show(phase, done, total);
         }
     }
 
@@ -64,7 +88,8 @@ impl Observer for Progress {
     }
 
     fn resumed(&self, done: usize, total: usize) {
-        if self.display.is_some() {
+        if let Some(mut display) = self.display() {
+            display.resumed = done as u64;
             say(format_args!("photoncard: {done} of {total} tiles were rendered before"));
         }
     }
@@ -74,11 +99,11 @@ impl Observer for Progress {
     }
 
     fn lost(&self, card: &str, error: &CardError) {
-        say(format_args!("photoncard: {card} is lost: {error}; any others go on"));
+        self.say(format_args!("photoncard: {card} is lost: {error}; any others go on"));
     }
 
     fn not_shown(&self, error: &dyn Error) {
-        say(format_args!("photoncard: {error}"));
+        self.say(format_args!("photoncard: {error}"));
     }
 }
 
@@ -91,12 +116,18 @@ impl Display {
         if self.phase != Some(phase) {
             return;
         }
+        // Cards are loaded in parallel; the fastest counts.
+        let done = if phase == Phase::Load { done.max(self.bar.position()) } else { done };
+        let seconds = self.bar.elapsed().as_secs_f64();
+        self.remaining.report(done, total, seconds);
         self.bar.set_position(done);
+        let left = self.remaining.seconds(seconds).map(duration);
+        let left = left.map_or(String::new(), |left| format!(", {left} left"));
+        self.bar.set_prefix(left.clone());
         let tenths = (10 * done).checked_div(total).unwrap_or(0);
         if !self.on_terminal && tenths > self.told {
             self.told = tenths;
-            let seconds = self.bar.elapsed().as_secs_f64();
-            say(format_args!("photoncard: {} {done} of {total}, {seconds:.1} s", name(phase)));
+            say(format_args!("photoncard: {} {done} of {total}, {seconds:.1} s{left}", name(phase)));
         }
     }
 
@@ -104,13 +135,17 @@ impl Display {
         self.bar.finish_and_clear();
         self.phase = Some(phase);
         self.told = 0;
+        self.remaining = match phase {
+            Phase::Tiles => Remaining::new(self.cards, self.resumed),
+            Phase::Photons | Phase::Pack | Phase::Load => Remaining::new(1, 0),
+        };
         let target =
             if self.on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         self.bar = ProgressBar::with_draw_target(Some(total), target);
         let template = match phase {
-            Phase::Load => "{msg:8} {bar:40} {bytes}/{total_bytes} {bytes_per_sec} {eta} left",
+            Phase::Load => "{msg:8} {bar:40} {bytes}/{total_bytes}{prefix}",
             Phase::Pack => "{msg:8} {elapsed}",
-            Phase::Photons | Phase::Tiles => "{msg:8} {bar:40} {pos}/{len} {per_sec} {eta} left",
+            Phase::Photons | Phase::Tiles => "{msg:8} {bar:40} {pos}/{len}{prefix}",
         };
         // The fallback is indicatif's own template.
         self.bar.set_style(
@@ -130,11 +165,40 @@ pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     Ok(stopped)
 }
 
+/// Seconds in words: `8 s`, `2 min 05 s`, `3 h 20 min`.
+pub(crate) fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match (whole / 3600, whole / 60 % 60, whole % 60) {
+        (0, 0, seconds) => format!("{seconds} s"),
+        (0, minutes, seconds) => format!("{minutes} min {seconds:02} s"),
+        (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
+    }
+}
+
 fn name(phase: Phase) -> &'static str {
     match phase {
         Phase::Photons => "photons",
         Phase::Pack => "pack",
         Phase::Load => "load",
         Phase::Tiles => "tiles",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_are_rounded_to_what_matters() {
+        for (seconds, text) in [
+            (0.4, "0 s"),
+            (59.4, "59 s"),
+            (59.6, "1 min 00 s"),
+            (125.0, "2 min 05 s"),
+            (3600.0, "1 h 00 min"),
+            (100_000.0, "27 h 46 min"),
+        ] {
+            assert_eq!(duration(seconds), text);
+        }
     }
 }

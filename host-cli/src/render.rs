@@ -1,101 +1,44 @@
 //! `photoncard render`.
 
-use std::path::Path;
+mod files;
+mod messages;
+
 use std::time::Instant;
 
-use miette::{MietteDiagnostic, Report};
-use photoncard_driver::render::{
-    CardAddress, MemoryStatistics, ReadStatistics, RenderSettings, Rendering, Statistics, render,
-};
+use photoncard_driver::render::{CardAddress, RenderSettings, render};
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scene::gltf::load_for;
-use photoncard_driver::{exr, output, preview};
-use serde_json::{Value, json};
 
 use crate::arguments::RenderOptions;
-use crate::console::{printable_json, say};
-use crate::environment::EnvironmentOption;
+use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
 /// Renders a scene, and writes the picture and all other requested outputs.
 pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let mut settings = options.settings();
-    for path in outputs(options) {
-        output::check_writable(path).map_err(|error| Failure::input_error(&error))?;
-    }
-    check_distinct(options)?;
+    files::check(options)?;
     let start = Instant::now();
     let scene = read_scene(options, &mut settings)?;
     let scene_seconds = start.elapsed().as_secs_f64();
-    let progress = Progress::start(options.quiet).map_err(|error| Failure::work_error(&error))?;
+    let progress = Progress::start(options.quiet, settings.cards.count())
+        .map_err(|error| Failure::work_error(&error))?;
     let result = on_threads(options.threads, || render(&scene, &settings, &progress))?;
     progress.finish();
     let mut rendering = result.inspect_err(|error| {
         if !error.is_input() && progress.has_kept() {
-            let path = options.partial_path();
+            let path = options.outputs.partial_path();
             say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
         }
     })?;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
-    write(options, &settings, &scene, &rendering)?;
-    if let Some(partial) = rendering.partial {
+    files::write(options, &settings, &scene, &rendering)?;
+    if let Some(partial) = rendering.partial.take() {
         partial.remove().map_err(Failure::work)?;
     }
-    if let Some(memory) = rendering.statistics.memory.as_ref().filter(|_| !options.quiet) {
-        tell_memory(memory, &rendering.statistics);
-    }
-    Ok(())
-}
-
-/// Prints a table of the reads of card memory.
-fn tell_memory(memory: &MemoryStatistics, statistics: &Statistics) {
-    let gathers = statistics.gathers;
-    let rays = &statistics.rays;
-    let rays = rays.eye + rays.shadow + rays.gather + rays.survey;
-    say(format_args!("photoncard: memory behind {}", memory.caches));
-    say(format_args!("photoncard:             requests     hits          raw bytes         DRAM bytes"));
-    for (name, reads) in [("photon map", &memory.photon_map), ("scene", &memory.scene)] {
-        let ReadStatistics { requests, raw_bytes, line_hits, dram_bytes, .. } = reads;
-        let hits = 100.0 * *line_hits as f64 / (*requests).max(1) as f64;
-        let line = format!("{name:10} {requests:>12} {hits:>6.2} % {raw_bytes:>18} {dram_bytes:>18}");
-        say(format_args!("photoncard: {line}"));
-    }
-    let each = |bytes: u64, count: u64| bytes as f64 / count.max(1) as f64;
-    let of_gather = each(memory.photon_map.dram_bytes, gathers);
-    let of_ray = each(memory.scene.dram_bytes, rays);
-    say(format_args!("photoncard: {of_gather:.1} DRAM bytes of the photon map a gather, of {gathers}"));
-    say(format_args!("photoncard: {of_ray:.1} DRAM bytes of the scene a ray, of {rays}"));
-}
-
-fn outputs(options: &RenderOptions) -> impl Iterator<Item = &Path> {
-    [
-        Some(&options.output),
-        options.outputs.preview.as_ref(),
-        options.outputs.stats.as_ref(),
-        options.cards.trace.as_ref(),
-    ]
-    .into_iter()
-    .flatten()
-    .map(AsRef::as_ref)
-}
-
-/// Checks that no output replaces the scene, the environment or another output.
-fn check_distinct(options: &RenderOptions) -> Result<(), Failure> {
-    let mut taken = vec![(options.scene.as_path(), "the scene")];
-    if let Some(EnvironmentOption::File(path)) = &options.environment {
-        taken.push((path, "the environment"));
-    }
-    let partial = options.partial_path();
-    for path in outputs(options).chain([partial.as_path()]) {
-        let same = taken.iter().find(|(other, _)| output::is_same_file(path, other));
-        if let Some((_, what)) = same {
-            let text = format!("cannot write {}: it is {what} as well", path.display());
-            let report = MietteDiagnostic::new(text).with_help("give every output a name of its own");
-            return Err(Failure::Input(Report::new(report)));
-        }
-        taken.push((path, "another output"));
+    if !options.quiet {
+        messages::say_done(options, &rendering);
     }
     Ok(())
 }
@@ -115,19 +58,10 @@ fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<
         scene.environment = Some(environment.load()?);
     }
     scene.check_light().map_err(Failure::input)?;
-    let camera = scene.camera(settings.picture.camera.as_deref()).map_err(Failure::input)?;
-    let misfit = options.picture.fit(camera, &mut settings.picture);
+    let camera = settings.camera(&scene)?;
+    let misfit = options.picture.fit(&camera, &mut settings.picture);
     if !options.quiet {
-        for notice in options.without_effect(&scene).into_iter().chain(misfit) {
-            say(format_args!("photoncard: {notice}"));
-        }
-        for notice in &scene.notices {
-            say(format_args!("photoncard: {notice}"));
-        }
-        if scene.skipped_triangles > 0 {
-            let count = scene.skipped_triangles;
-            say(format_args!("photoncard: triangles of zero area are left out: {count}"));
-        }
+        messages::say_loaded(options, settings, &scene, &camera, misfit);
     }
     Ok(scene)
 }
@@ -137,51 +71,4 @@ fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) 
     let Some(threads) = threads else { return Ok(work()) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     Ok(pool.map_err(|error| Failure::work_error(&error))?.install(work))
-}
-
-fn write(
-    options: &RenderOptions,
-    settings: &RenderSettings,
-    scene: &Scene,
-    rendering: &Rendering,
-) -> Result<(), Failure> {
-    let provenance = printable_json(&provenance(options, settings, scene, rendering).to_string());
-    exr::write(
-        &options.output,
-        &rendering.film,
-        &options.picture.aov,
-        &provenance,
-        options.outputs.sample_type,
-    )
-    .map_err(|error| Failure::work_error(&error))?;
-    if let Some(path) = &options.outputs.preview {
-        preview::write_png(path, &rendering.film, options.outputs.tone_mapping())
-            .map_err(|error| Failure::work_error(&error))?;
-    }
-    if let Some(path) = &options.outputs.stats {
-        let text = serde_json::to_string_pretty(&rendering.statistics)
-            .map_err(|error| Failure::work_error(&error))?;
-        output::write(path, (printable_json(&text) + "\n").as_bytes())
-            .map_err(|error| Failure::work_error(&error))?;
-    }
-    Ok(())
-}
-
-/// The identity of the render, with the names of its inputs: nothing that differs between cards.
-fn provenance(
-    options: &RenderOptions,
-    settings: &RenderSettings,
-    scene: &Scene,
-    rendering: &Rendering,
-) -> Value {
-    let mut provenance = settings.identity(scene);
-    let mut add = |name: &str, value| provenance.insert(name.to_owned(), value);
-    add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
-    add("variant", json!(options.variant));
-    add("set", json!(options.assignments));
-    add("energy-compensation", json!(options.energy_compensation));
-    add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));
-    // The automatic distance, if none is given.
-    add("max-distance", json!(rendering.statistics.max_distance));
-    provenance.into()
 }

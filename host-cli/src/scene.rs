@@ -1,5 +1,7 @@
 //! `photoncard scene info`.
 
+mod json;
+
 use std::path::Path;
 
 use photoncard_driver::scene::gltf::load;
@@ -7,27 +9,46 @@ use photoncard_driver::scene::{
     Camera, Encoding, Image, Layers, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture, Wrap,
 };
 
-use crate::console::print;
+use crate::console::{print, print_json};
 use crate::failure::Failure;
 
-/// Prints the contents of a scene.
-pub(crate) fn info(path: &Path) -> Result<(), Failure> {
+/// Prints the contents of a scene: a report, or JSON.
+pub(crate) fn info(path: &Path, json: bool) -> Result<(), Failure> {
     let scene = load(path).map_err(Failure::input)?;
-    let (lower, upper) = scene.bounds();
-    let mut lines = vec![
-        format!("triangles  {}", scene.triangles.len()),
-        format!("skipped    {} of zero area", scene.skipped_triangles),
-        format!("bounds     {lower} to {upper} m"),
-        attributes(&scene),
-        textures(&scene),
-    ];
-    lines.extend(scene.images.iter().map(image));
-    lines.extend(scene.cameras.iter().map(camera));
-    lines.extend(scene.lights.iter().map(light));
-    lines.extend(scene.materials.iter().map(|item| material(item, &scene)));
-    lines.extend(scene.variants.iter().map(|name| format!("variant    {name}")));
-    lines.extend(scene.notices.iter().map(|notice| format!("ignored    {notice}")));
+    if json {
+        return print_json(&format!("{:#}", json::contents(&scene)));
+    }
+    let mut lines = vec![path.display().to_string()];
+    lines.extend(geometry(&scene).map(|row| format!("  {row}")));
+    for (heading, rows) in [
+        ("Cameras", scene.cameras.iter().map(camera).collect::<Vec<_>>()),
+        ("Punctual lights", scene.lights.iter().map(light).collect()),
+        ("Materials", scene.materials.iter().map(|item| material(item, &scene)).collect()),
+        ("Images", scene.images.iter().map(image).collect()),
+        ("Variants", scene.variants.clone()),
+        ("Ignored", scene.notices.clone()),
+    ] {
+        if !rows.is_empty() {
+            lines.push(String::new());
+            lines.push(format!("{heading} ({})", rows.len()));
+            lines.extend(rows.iter().map(|row| format!("  {row}")));
+        }
+    }
     print(&lines)
+}
+
+/// Triangles, size and texels of a scene.
+fn geometry(scene: &Scene) -> [String; 5] {
+    let (lower, upper) = scene.bounds();
+    let size = upper - lower;
+    let emissive = scene.emissive_triangles();
+    [
+        format!("triangles   {}, {emissive} of them emissive", scene.triangles.len()),
+        format!("left out    {} of zero area", scene.skipped_triangles),
+        format!("size        {} x {} x {} m, from {lower} to {upper}", size.x, size.y, size.z),
+        attributes(scene),
+        textures(scene),
+    ]
 }
 
 fn attributes(scene: &Scene) -> String {
@@ -35,14 +56,14 @@ fn attributes(scene: &Scene) -> String {
     let is_coloured = |colours: &[[f32; 4]; 3]| colours.as_flattened().iter().any(|channel| *channel < 1.0);
     let coloured = scene.attributes.iter().filter(|attributes| is_coloured(&attributes.colours)).count();
     let count = scene.attributes.len();
-    format!("attributes {count} triangles: {smooth} with smooth normals, {coloured} with colours")
+    format!("attributes  {count} triangles: {smooth} with smooth normals, {coloured} with colours")
 }
 
 fn textures(scene: &Scene) -> String {
     let texels: usize = scene.images.iter().map(|image| image.texels.len()).sum();
     let bytes: u64 = scene.images.iter().map(Image::bytes).sum();
     let images = scene.images.len();
-    format!("textures   {} of {images} images, {texels} texels, {bytes} bytes", scene.textures.len())
+    format!("textures    {} of {images} images, {texels} texels, {bytes} bytes", scene.textures.len())
 }
 
 fn image(image: &Image) -> String {
@@ -50,14 +71,14 @@ fn image(image: &Image) -> String {
         Encoding::Srgb => "sRGB",
         Encoding::Linear => "linear",
     };
-    format!("image      {}: {} x {}, {encoding}", image.name, image.width, image.height)
+    format!("{}: {} x {}, {encoding}", image.name, image.width, image.height)
 }
 
 fn camera(camera: &Camera) -> String {
     let degrees = camera.vertical_fov.to_degrees();
     let Camera { name, origin, .. } = camera;
     let aspect = camera.aspect.map_or(String::new(), |aspect| format!(", aspect ratio {aspect}"));
-    format!("camera     {name} at {origin}, vertical field of view {degrees:.1} degrees{aspect}")
+    format!("{name}: at {origin}, vertical field of view {degrees:.1} degrees{aspect}")
 }
 
 fn light(light: &PunctualLight) -> String {
@@ -74,7 +95,7 @@ fn light(light: &PunctualLight) -> String {
             format!("directional towards {direction}, {intensity} W/m^2")
         }
     };
-    format!("light      {name}: {kind}")
+    format!("{name}: {kind}")
 }
 
 fn material(material: &Material, scene: &Scene) -> String {
@@ -103,7 +124,7 @@ fn material(material: &Material, scene: &Scene) -> String {
             parts.push(format!("{use_} texture {}", describe(texture, scene)));
         }
     }
-    format!("material   {}: {}", material.name, parts.join(", "))
+    format!("{}: {}", material.name, parts.join(", "))
 }
 
 fn of_layers(layers: &Layers) -> Vec<String> {

@@ -22,9 +22,11 @@ fn refused(room: &Room, scene: &str, options: &[&str], words: &[&str]) {
     let case = format!("{scene} {options:?}");
     room.write("out.exr", "old picture");
     let before = room.names();
-    let mut all = vec!["--preview", "out.png", "--stats", "out.json"];
-    if !options.contains(&"-o") {
-        all.extend(["-o", "out.exr"]);
+    let mut all = vec!["-o", "out.png"];
+    for default in [["-o", "out.exr"], ["--stats", "out.json"]] {
+        if !options.contains(&default[0]) {
+            all.extend(default);
+        }
     }
     all.extend(options);
     check_refused(&room.render(scene, &all), words, &case);
@@ -141,6 +143,14 @@ fn numbers_out_of_range() {
         ("--threads", "0", ["1 to 1024", "leave the option out"]),
         ("--threads", "100000", ["1 to 1024", "leave the option out"]),
         ("--seed", "-1", ["--seed", "invalid"]),
+        ("--camera-at", "1,2", ["three numbers of metres", "0,1.5,4"]),
+        ("--camera-at", "1,2,nan", ["three numbers of metres", "0,1.5,4"]),
+        ("--look-at", "-1,-2,-3,-4", ["three numbers of metres", "0,1.5,4"]),
+        ("--look-at", "0,0.5,3", ["the camera itself is there", "--camera-at"]),
+        ("--fov", "0", ["above 0 and below 180", "such as 40"]),
+        ("--fov", "-20", ["above 0 and below 180", "such as 40"]),
+        ("--fov", "180", ["above 0 and below 180", "such as 40"]),
+        ("--fov", "wide", ["--fov", "invalid"]),
     ] {
         refused(&room, "scene.gltf", &[option, value], &[option, words[0], words[1]]);
     }
@@ -183,7 +193,7 @@ fn environments_that_are_none() {
     ] {
         refused(&room, "scene.gltf", &["--environment", environment], &words);
     }
-    let options = ["--environment", "text.hdr", "-o", "text.hdr"];
+    let options = ["--environment", "text.hdr", "--stats", "text.hdr"];
     refused(&room, "scene.gltf", &options, &["it is the environment as well", "a name of its own"]);
 }
 
@@ -254,22 +264,43 @@ fn an_image_larger_than_the_card() {
 fn outputs_that_cannot_be_written() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
-    fs::create_dir(room.path("folder")).unwrap();
+    fs::create_dir(room.path("folder.exr")).unwrap();
     let scene_before = room.read("scene.gltf");
     let own_name = "a name of its own";
     for (options, words) in [
         (["-o", "absent/out.exr"], ["the folder absent does not exist", "create it"]),
-        (["-o", "folder"], ["a folder has that name", "choose another"]),
-        (["-o", "."], ["names no file", "add a file name"]),
-        (["-o", "folder/../scene.gltf"], ["it is the scene as well", own_name]),
+        (["-o", "folder.exr"], ["a folder has that name", "choose another"]),
+        (["--stats", "."], ["names no file", "add a file name"]),
+        (["--stats", "folder.exr/../scene.gltf"], ["it is the scene as well", own_name]),
         (["-o", "./out.png"], ["it is another output as well", own_name]),
-        (["-o", "folder/../out.json"], ["it is another output as well", own_name]),
+        (["-o", "folder.exr/../out.png"], ["it is another output as well", own_name]),
     ] {
         refused(&room, "scene.gltf", &options, &words);
         assert_eq!(room.read("scene.gltf"), scene_before);
     }
-    let outcome = room.render("scene.gltf", &["-o", "out.exr", "--stats", "out.exr.partial"]);
-    check_refused(&outcome, &["out.exr.partial: it is another output as well", own_name], "partial");
+    for picture in ["out.exr", "out.png"] {
+        let partial = format!("{picture}.partial");
+        let outcome = room.render("scene.gltf", &["-o", picture, "--stats", &partial]);
+        check_refused(&outcome, &[&partial, "it is another output as well", own_name], picture);
+    }
+}
+
+/// The format of a picture is its ending; before a card is reached, or a file is read.
+#[test]
+fn outputs_of_no_known_format() {
+    let room = Room::new();
+    let unread = ["--card", "tcp:127.0.0.1:1"];
+    for name in ["-", "out", ".", "out.jpg", ".exr", "out.exr.partial"] {
+        let outcome = room.render("absent.gltf", &[&["-o", name], &unread[..]].concat());
+        check_refused(&outcome, &["OUT.exr", "OUT.png", "endings"], name);
+        let outcome = room.run(&["tonemap", "absent.exr", "-o", name]);
+        check_refused(&outcome, &["OUT.exr", "OUT.png", "endings"], name);
+    }
+    check_refused(&room.run(&["tonemap", "a.exr", "-o", "b.exr"]), &["the ending .png"], "tonemap");
+    let outcome = room.render("absent.gltf", &["-o", "a.exr", "--trace", "-"]);
+    check_refused(&outcome, &["--trace", "standard output", "./-"], "trace");
+    check_refused(&room.render("absent.gltf", &[]), &["--output", "required"], "no output");
+    assert!(room.names().is_empty());
 }
 
 /// No output is written to a name that is no regular file: a pipe would block, a device or a link would be replaced.
@@ -279,21 +310,20 @@ fn outputs_that_are_no_files() {
     use std::os::unix::fs::symlink;
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
-    assert!(std::process::Command::new("mkfifo").arg(room.path("pipe")).status().unwrap().success());
-    symlink("absent", room.path("broken")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(room.path("pipe.png")).status().unwrap().success());
+    symlink("absent", room.path("broken.exr")).unwrap();
+    let files = ["broken.exr", "pipe.png", "scene.gltf"];
     for (name, kind) in
-        [("pipe", "a named pipe"), ("broken", "a broken symbolic link"), ("/dev/null", "a device")]
+        [("pipe.png", "a named pipe"), ("broken.exr", "a broken symbolic link"), ("/dev/null", "a device")]
     {
-        for option in ["-o", "--preview", "--stats", "--trace"] {
-            let mut options = vec!["--card", "emulated:1", option, name];
-            if option != "-o" {
-                options.extend(["-o", "out.exr"]);
-            }
+        for option in ["-o", "--stats", "--trace"].into_iter().skip(usize::from(name == "/dev/null")) {
+            let options = ["-o", "out.exr", "--card", "emulated:1", option, name];
             check_refused(&room.render("scene.gltf", &options), &[name, kind, "choose another"], option);
-            assert_eq!(room.names(), ["broken", "pipe", "scene.gltf"]);
-            assert!(room.path("broken").is_symlink());
+            assert_eq!(room.names(), files);
+            assert!(room.path("broken.exr").is_symlink());
         }
     }
+    check_refused(&room.run(&["tonemap", "a.exr", "-o", "pipe.png"]), &["a named pipe"], "tonemap");
 }
 
 #[test]

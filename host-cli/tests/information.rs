@@ -4,15 +4,22 @@ mod support;
 
 use std::process::Stdio;
 
+use serde_json::{Value, json};
 use support::{Room, scene, shipped, small_render};
 
 #[test]
 fn scene_info_tells_what_a_scene_holds() {
     let outcome = Room::new().run(&["scene", "info", &shipped("cornell-glossy.gltf")]);
     assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
-    for word in
-        ["triangles  ", "skipped    0", "bounds     ", "camera     ", "material   floor: ", "exponent"]
-    {
+    for word in [
+        "cornell-glossy.gltf\n  triangles ",
+        "\n  left out    0 of zero area\n",
+        "\n  size ",
+        "\n\nCameras (",
+        "\n\nMaterials (",
+        "\n  floor: ",
+        "exponent",
+    ] {
         assert!(outcome.stdout.contains(word), "{word}: {}", outcome.stdout);
     }
     assert!(outcome.stdout.ends_with('\n'));
@@ -28,16 +35,38 @@ fn scene_info_tells_of_textures_lights_and_what_is_ignored() {
     ]);
     assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
     for line in [
-        "attributes 1 triangles: 0 with smooth normals, 0 with colours",
-        "textures   1 of 1 images, 1 texels, 4 bytes",
-        "image      paint: 1 x 1, sRGB",
-        "light      bulb: point at [0, 0, 2], [8, 8, 8] W/sr",
-        "material   painted: base colour [1, 1, 1], metallic 0, roughness 0.5, dielectric [0.04, 0.04, 0.04], base \
+        "  attributes  1 triangles: 0 with smooth normals, 0 with colours",
+        "  textures    1 of 1 images, 1 texels, 4 bytes",
+        "  paint: 1 x 1, sRGB",
+        "  bulb: point at [0, 0, 2], [8, 8, 8] W/sr",
+        "  painted: base colour [1, 1, 1], metallic 0, roughness 0.5, dielectric [0.04, 0.04, 0.04], base \
          texture paint (set 0, clamped across and repeated down)",
-        "ignored    the range of lights is ignored, their light reaches everywhere: light 'bulb'",
+        "  the range of lights is ignored, their light reaches everywhere: light 'bulb'",
     ] {
         assert!(outcome.stdout.lines().any(|found| found == line), "{line}: {}", outcome.stdout);
     }
+}
+
+/// JSON has what the report has, under keys.
+#[test]
+fn scene_info_is_json_for_programs() {
+    let room = Room::new();
+    let painted = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/painted.gltf");
+    let outcome = room.run(&["scene", "info", "--json", painted]);
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    let value: Value = serde_json::from_str(&outcome.stdout).unwrap();
+    assert_eq!(value["triangles"], 1);
+    assert_eq!(value["images"], json!([{"name": "paint", "width": 1, "height": 1, "encoding": "srgb"}]));
+    assert_eq!(value["lights"][0]["name"], "bulb");
+    assert_eq!(value["lights"][0]["at"], json!([0.0, 0.0, 2.0]));
+    assert_eq!(value["materials"][0]["reflection"]["roughness"], 0.5);
+    assert!(value["ignored"].to_string().contains("the range of lights is ignored"), "{value}");
+    room.write_scene("scene.gltf", &scene());
+    let outcome = room.run(&["scene", "info", "--json", "scene.gltf"]);
+    let value: Value = serde_json::from_str(&outcome.stdout).unwrap();
+    assert_eq!((&value["triangles"], &value["emissive_triangles"]), (&json!(3), &json!(1)));
+    assert_eq!(value["cameras"][0]["name"], "eye");
+    assert_eq!(value["bounds"], json!([[-1.0, 0.0, -1.0], [1.0, 1.0, 1.0]]));
 }
 
 /// The machine's own ports; each line has the address of one, by its path.
@@ -94,6 +123,10 @@ fn every_command_has_help() {
         &["card", "ping"],
         &["emulate"],
         &["diff"],
+        &["tonemap"],
+        &["completions"],
+        &["man"],
+        &["study"],
     ] {
         let outcome = Room::new().run(&[command, &["--help"]].concat());
         assert_eq!(outcome.status, Some(0), "{command:?}");

@@ -31,7 +31,7 @@ fn interrupt(phase: &str, options: &[&str]) {
     let room = Room::new();
     room.write("out.exr", "old picture");
     let cornell = shipped("cornell.gltf");
-    let options = [options, &["-o", "out.exr", "--preview", "out.png"]].concat();
+    let options = [options, &["-o", "out.exr", "-o", "out.png"]].concat();
     let mut command = room.command();
     let mut child = command.args(small_render(&cornell, &options)).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);

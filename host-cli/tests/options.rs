@@ -34,6 +34,8 @@ fn options_without_effect_are_said_to_have_none() {
             &["--caustic-neighbors=9", "--caustic-photons=0"],
             "--caustic-neighbors has no effect with --caustic-photons 0",
         ),
+        (&["--exposure=1"], "--exposure has no effect without -o OUT.png"),
+        (&["--tonemap=aces"], "--tonemap has no effect without -o OUT.png"),
     ] {
         let outcome = room.rendered("scene.gltf", &[&["-o", "plain.exr"], options].concat());
         assert!(outcome.stderr.contains(&format!("photoncard: {said}")), "{said}: {}", outcome.stderr);
@@ -46,6 +48,19 @@ fn options_without_effect_are_said_to_have_none() {
         let options = ["-o", "plain.exr", "--gather-rays", "0", option];
         let outcome = room.rendered("scene.gltf", &options);
         assert!(outcome.stderr.contains("has no effect with --gather-rays 0"), "{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn options_of_an_exr_are_said_to_have_no_effect_without_one() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for option in ["--sample-type=half", "--aov=none"] {
+        let said = room.rendered("scene.gltf", &["-o", "a.png", option]).stderr;
+        let (name, _) = option.split_once('=').unwrap();
+        assert!(said.contains(&format!("{name} has no effect without -o OUT.exr")), "{said}");
+        let both = room.rendered("scene.gltf", &["-o", "a.png", "-o", "a.exr", option]).stderr;
+        assert!(!both.contains("no effect"), "{both}");
     }
 }
 

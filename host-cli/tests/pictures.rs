@@ -41,33 +41,11 @@ fn layers_are_asked_for_by_name_and_leave_the_picture_as_it_is() {
 }
 
 #[test]
-fn exposure_and_tone_curve_change_the_preview_alone() {
-    let room = Room::new();
-    room.write_scene("scene.gltf", &scene());
-    let preview = |options: &[&str]| {
-        let options = [&["-o", "a.exr", "--preview", "a.png"], options].concat();
-        room.rendered("scene.gltf", &options);
-        (room.read("a.exr"), room.read("a.png"))
-    };
-    let (picture, plain) = preview(&[]);
-    assert_eq!((picture.clone(), plain.clone()), preview(&["--exposure=auto", "--tonemap=reinhard"]));
-    for option in ["--exposure=-2.5", "--tonemap=none", "--tonemap=aces"] {
-        let (same, other) = preview(&[option]);
-        assert_eq!(same, picture);
-        assert_ne!(other, plain, "{option}");
-    }
-    for options in [&["--exposure=inf", "--preview=a.png"] as &[_], &["--exposure=1"], &["--tonemap=aces"]] {
-        let outcome = room.render("scene.gltf", &[&["-o", "a.exr"], options].concat());
-        assert_eq!(outcome.status, Some(2), "{options:?}");
-    }
-}
-
-#[test]
-fn a_render_writes_picture_preview_and_statistics() {
+fn a_render_writes_pictures_and_statistics() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
     // One card: bytes in transit to another at the end count as payload, but not yet as sent.
-    let files = ["-o", "a.exr", "--preview", "a.png", "--stats", "a.json", "--card", "emulated:1"];
+    let files = ["-o", "a.exr", "-o", "a.png", "--stats", "a.json", "--card", "emulated:1"];
     let outcome = room.rendered(&cornell, &files);
     assert_eq!(room.names(), ["a.exr", "a.json", "a.png"]);
     assert!(room.read("a.png").starts_with(b"\x89PNG\r\n\x1a\n"));
@@ -93,6 +71,45 @@ fn a_render_writes_picture_preview_and_statistics() {
     for pointer in ["/pixels/mse", "/pixels/rmse", "/pixels/relmse", "/blocks/mse"] {
         assert_eq!(difference.pointer(pointer), Some(&json!(0.0)), "{pointer}");
     }
+}
+
+/// The first line is what was loaded, the last what was written; with a remaining time in between.
+#[test]
+fn a_render_says_what_it_loads_and_what_it_has_done() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let options = ["-o", "a.png", "-o", "./a.exr", "--spp", "3", "--crop", "0,8,0,5", "--tile", "1"];
+    let said = room.rendered("scene.gltf", &options).stderr;
+    let lines: Vec<_> = said.lines().collect();
+    assert_eq!(
+        lines[0],
+        "photoncard: scene.gltf: 3 triangles, 2 materials, 0 images, light of 1 emissive triangle; seen by 'eye', 8 x 8 pixels"
+    );
+    let last = lines[lines.len() - 1];
+    assert!(last.starts_with("photoncard: a.png, ./a.exr: done in "), "{last}");
+    assert!(last.contains("; 3 samples a pixel, 120 in all"), "{last}");
+    let tiles: Vec<_> = lines.iter().filter(|line| line.starts_with("photoncard: tiles ")).collect();
+    assert!(tiles.len() > 1 && tiles.iter().all(|line| line.ends_with(" left")), "{said}");
+    assert!(
+        tiles[tiles.len() - 1].contains("40 of 40") && tiles[tiles.len() - 1].ends_with(", 0 s left"),
+        "{said}"
+    );
+}
+
+/// Data alone is on standard output, and the rest where it always is.
+#[test]
+fn statistics_go_to_standard_output_by_a_dash() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for more in [&[][..], &["--quiet", "--counters"]] {
+        let outcome = room.render("scene.gltf", &[&["-o", "a.exr", "--stats", "-"], more].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        let statistics: Value = serde_json::from_str(&outcome.stdout).unwrap();
+        assert_eq!(statistics["width"], 8);
+        assert_eq!(outcome.stderr.is_empty(), !more.is_empty(), "{}", outcome.stderr);
+    }
+    room.rendered("scene.gltf", &["-o", "a.exr", "--stats", "./-"]);
+    assert_eq!(room.names(), ["-", "a.exr", "scene.gltf"]);
 }
 
 #[test]
@@ -176,9 +193,16 @@ fn triangles_of_no_area_are_counted_and_left_out() {
     room.write_scene("scene.gltf", &scene_of(&bytes));
     let outcome = room.rendered("scene.gltf", &["-o", "a.exr"]);
     let told = outcome.stderr.lines().filter(|line| line.contains("zero area")).collect::<Vec<_>>();
-    assert_eq!(told, ["photoncard: triangles of zero area are left out: 1"]);
+    let [told] = told[..] else { panic!("{told:?}") };
+    assert!(
+        told.starts_with("photoncard: scene.gltf: 2 triangles (and 1 of zero area, left out), "),
+        "{told}"
+    );
     let information = room.run(&["scene", "info", "scene.gltf"]).stdout;
-    assert!(information.contains("triangles  2\nskipped    1 of zero area\n"), "{information}");
+    assert!(
+        information.contains("  triangles   2, 1 of them emissive\n  left out    1 of zero area\n"),
+        "{information}"
+    );
 }
 
 #[test]
@@ -196,6 +220,8 @@ fn what_is_ignored_is_said_once() {
     let outcome = room.rendered("scene.gltf", &["-o", "a.exr"]);
     let information = room.run(&["scene", "info", "scene.gltf"]).stdout;
     for sentence in ["occlusion textures", "range of lights", "EXT_unheard_of is ignored"] {
+        let lines: Vec<_> = outcome.stderr.lines().filter(|line| line.contains(sentence)).collect();
+        assert!(lines.len() == 1 && lines[0].starts_with("photoncard: ignored: "), "{}", outcome.stderr);
         assert_eq!(outcome.stderr.matches(sentence).count(), 1, "{sentence}: {}", outcome.stderr);
         assert_eq!(information.matches(sentence).count(), 1, "{sentence}: {information}");
     }
@@ -221,4 +247,31 @@ fn the_camera_gives_the_picture_its_aspect_ratio() {
     let narrow = picture(&room, "a.exr");
     assert_eq!((narrow.width, narrow.height), (128, 8));
     assert!(!room.rendered("scene.gltf", &["-o", "a.exr", "--size", "128x2"]).stderr.contains("aspect"));
+}
+
+/// A view by options is the one that a file states.
+#[test]
+fn a_view_by_options_is_that_of_a_camera_there() {
+    let room = Room::new();
+    let mut stated = scene();
+    stated["nodes"][1]["translation"] = json!([0.25, 0.75, 2.5]);
+    stated["cameras"][0]["perspective"]["yfov"] = json!(45_f32.to_radians());
+    room.write_scene("stated.gltf", &stated);
+    room.write_scene("other.gltf", &scene());
+    stated["scenes"][0]["nodes"] = json!([0]);
+    room.write_scene("without.gltf", &stated);
+    let pixels = |name: &str, options: &[&str]| {
+        room.rendered(name, &[&["-o", "a.exr"], options].concat());
+        picture(&room, "a.exr").pixels
+    };
+    let expected = pixels("stated.gltf", &[]);
+    let place = ["--camera-at", "0.25,0.75,2.5"];
+    let view = [&place[..], &["--look-at", "0.25,0.75,-7", "--fov", "45"]].concat();
+    for name in ["other.gltf", "without.gltf"] {
+        assert!(pixels(name, &view) == expected, "{name}");
+    }
+    assert!(pixels("without.gltf", &[]) != expected);
+    // What is not given is the camera's own.
+    assert!(pixels("other.gltf", &[&place[..], &["--fov=45"]].concat()) == expected);
+    assert!(pixels("other.gltf", &place) != expected);
 }

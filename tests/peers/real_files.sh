@@ -7,8 +7,8 @@
 # or render, or if one that cannot be rendered is not refused with the reason. OPTIONS in the environment are given
 # to each render, in place of those of a small picture: OPTIONS="--size 512x512 --spp 16".
 #
-# It needs curl, tar, Python 3 and 240 MB of packages (packages.sh), which are kept below cargo's target folder; previews are there as
-# well.
+# It needs curl, tar, Python 3 and 240 MB of packages (packages.sh), which are kept below cargo's target folder, and the
+# pictures with them.
 set -euo pipefail
 [ $# -ge 1 ] && [ -x "$1" ] || {
     echo "usage: $0 PHOTONCARD [NAME ...]: PHOTONCARD is the binary to render with, target/release/photoncard" >&2
@@ -26,7 +26,7 @@ render() {
     local name=$1 file=$2 light=$3 refusal=$4 log=$folder/pictures/$1.log status=0
     local -a environment=()
     [ "$light" = own ] || environment=(--environment 1,1,1)
-    "$photoncard" render "$file" --output "$folder/pictures/$name.exr" --preview "$folder/pictures/$name.png" --quiet \
+    "$photoncard" render "$file" --output "$folder/pictures/$name.exr" --output "$folder/pictures/$name.png" --quiet \
         "${options[@]}" "${environment[@]}" >"$log" 2>&1 || status=$?
     case $light in
         refused) [ "$status" = 2 ] && grep -qF "$refusal" "$log" ;;
@@ -60,5 +60,5 @@ while read -r name package path light refusal; do
         failed=1
     fi
 done < <(files)
-echo "previews are in $folder/pictures"
+echo "pictures are in $folder/pictures"
 exit $failed

@@ -53,8 +53,8 @@ impl MappedScene {
     /// If the scene has no camera of the settings' name, the card image is malformed, or threads cannot be started.
     pub fn frame(&self, settings: &RenderSettings) -> Frame {
         let window = settings.window();
-        let camera = self.scene.camera(settings.picture.camera.as_deref()).expect("a camera");
-        let frame = settings.frame(camera, self.max_distance, self.caustics);
+        let camera = settings.camera(&self.scene).expect("a camera");
+        let frame = settings.frame(&camera, self.max_distance, self.caustics);
         let tiles = tiles(window, settings.schedule.tile, settings.schedule.order);
         let pool = rayon::ThreadPoolBuilder::new().stack_size(16 << 20).build().expect("threads");
         let parts: Vec<(Tile, Vec<Vec3>, Counters)> = pool.install(|| {
@@ -93,8 +93,8 @@ impl<'a> IndirectLight<'a> {
     /// # Panics
     /// If the scene has no camera of the settings' name, or the card image is malformed.
     pub fn new(mapped: &'a MappedScene, settings: &RenderSettings, side: u32) -> Self {
-        let camera = mapped.scene.camera(settings.picture.camera.as_deref()).expect("a camera");
-        let frame = settings.frame(camera, mapped.max_distance, mapped.caustics);
+        let camera = settings.camera(&mapped.scene).expect("a camera");
+        let frame = settings.frame(&camera, mapped.max_distance, mapped.caustics);
         let (scene, mut memory) = mapped.image.view();
         let mut counters = Counters::ZERO;
         let mut context = Context {

@@ -72,6 +72,9 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             height: Pixels = 11,
             crop: Pixels = Some(Window { x0: 2, x1: 9, y0: 1, y1: 8 }),
             camera: Pixels = Some("second".to_owned()),
+            camera_at: Pixels = Some([0.1, 0.2, 2.0]),
+            look_at: Pixels = Some([0.1, 0.2, -0.3]),
+            fov: Pixels = Some(20.0),
             layers: Pixels = Layers::all(),
         }
         photons: PhotonMaps {

@@ -73,7 +73,7 @@ pub fn render(
     observer: &dyn Observer,
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
-    let camera = scene.camera(settings.picture.camera.as_deref())?;
+    let camera = settings.camera(scene)?;
     settings.check()?;
     let executor = executor(settings, observer)?;
     let budgets = executor.budgets();
@@ -86,7 +86,7 @@ pub fn render(
     let outputs = Outputs::open(scene, settings, &tiles, &mut film, observer)?;
     let mut times = Times::default();
     let prepared = prepare(scene, settings, &budgets, &mut times, observer)?;
-    let frame = settings.frame(camera, prepared.max_distance, prepared.caustics);
+    let frame = settings.frame(&camera, prepared.max_distance, prepared.caustics);
     let film = Mutex::new(film);
     let sinks = outputs.sinks(&film, executor.finishes_tiles_early());
     let work = Work { image: &prepared.image, frame: &frame, tiles, film: &film, sinks, outputs: &outputs };

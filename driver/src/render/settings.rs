@@ -1,5 +1,6 @@
 //! Settings of a render.
 
+mod camera;
 mod check;
 mod dependence;
 mod groups;

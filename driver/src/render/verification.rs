@@ -3,7 +3,7 @@
 use photoncard_shared::message::Tile;
 
 use super::{RenderError, RenderSettings};
-use crate::scheduler::Scheduler;
+use crate::scheduler::{Scheduler, spread};
 
 impl RenderSettings {
     /// Checks that tiles can be verified, if requested.
@@ -12,12 +12,11 @@ impl RenderSettings {
     /// If there are not two cards, the share is none, or reads are counted, which would be those of both cards.
     pub(super) fn check_verification(&self) -> Result<(), RenderError> {
         let Some(share) = self.cards.verify else { return Ok(()) };
-        let chips: usize = self.cards.addresses.iter().map(|card| card.emulated_chips().max(1)).sum();
         let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
             ["a share of the tiles is above 0 and at most 1", "give a number such as 0.02"]
         } else if self.schedule.order.is_of_whole_frame() {
             ["with --order hilbert the host does the gathers, and no card a whole tile", "use --order sort"]
-        } else if chips < 2 {
+        } else if self.cards.count() < 2 {
             ["a tile is verified by a second card", "give two --card or more, or --card emulated:2"]
         } else if self.modelled_caches().is_some() {
             ["reads of memory are counted once for each tile", "leave --counters, --cache and --trace out"]
@@ -35,11 +34,11 @@ impl RenderSettings {
 
     /// Scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice: all reads count.
     pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
-        let scheduler = Scheduler::new(tiles, cards);
+        // Modelled caches are read in the order of the picture.
         if self.modelled_caches().is_some() {
-            return scheduler;
+            return Scheduler::new(tiles, cards);
         }
-        let scheduler = scheduler.with_helpers();
+        let scheduler = Scheduler::new(spread(tiles), cards).with_helpers();
         match self.cards.verify {
             Some(share) => scheduler.verifying(share, self.integrator.seed),
             None => scheduler,

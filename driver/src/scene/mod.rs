@@ -87,14 +87,20 @@ impl Scene {
         })
     }
 
+    /// Number of triangles that emit light.
+    pub fn emissive_triangles(&self) -> usize {
+        self.triangles.iter().filter(|triangle| self.emits(triangle)).count()
+    }
+
+    fn emits(&self, triangle: &Triangle) -> bool {
+        self.materials.get(triangle.material as usize).is_some_and(Material::is_emissive)
+    }
+
     /// Returns whether any light comes from a triangle, a light without extent, or the environment.
     pub fn has_light(&self) -> bool {
-        let is_light = |triangle: &Triangle| {
-            self.materials.get(triangle.material as usize).is_some_and(Material::is_emissive)
-        };
         self.lights.iter().any(|light| light.intensity.max_element() > 0.0)
             || self.environment.as_ref().is_some_and(Environment::is_lit)
-            || self.triangles.iter().any(is_light)
+            || self.triangles.iter().any(|triangle| self.emits(triangle))
     }
 
     /// Returns whether any triangle focuses light: [`Self::specular_materials`].

@@ -82,9 +82,39 @@ pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     tiles
 }
 
+/// Tiles, numbered from 0, in an order in which the first ones of any number lie all over the picture, so that they take about as long
+/// as any others: by the fraction of `number / golden ratio`. Between the first `k` of `n` numbers there are gaps of three lengths at
+/// most, all about `n / k` (three-gap theorem).
+pub fn spread(mut tiles: Vec<Tile>) -> Vec<Tile> {
+    /// `2^32` over the golden ratio.
+    const GOLDEN: u32 = 0x9E37_79B9;
+    tiles.sort_by_key(|tile| GOLDEN.wrapping_mul(tile.id));
+    tiles
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// All tiles are there once; between the first ones of any number there are no large gaps.
+    #[test]
+    fn spread_tiles_are_the_same_and_lie_all_over_the_picture() {
+        for count in 1..=150 {
+            let all = tiles(Window { x0: 1, x1: 1 + 8 * count, y0: 7, y1: 9 }, 8, GatherOrder::Sort);
+            let found = spread(all.clone());
+            let mut sorted = found.clone();
+            sorted.sort_by_key(|tile| tile.id);
+            assert_eq!(sorted, all);
+            for first in 1..=found.len() {
+                let mut visited: Vec<u32> = found[..first].iter().map(|tile| tile.id).collect();
+                visited.extend([0, count]);
+                visited.sort_unstable();
+                let gap = visited.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap();
+                assert!(gap as usize * first <= 3 * found.len(), "{first} of {count}: {gap}");
+            }
+        }
+        assert_eq!(spread(Vec::new()), []);
+    }
 
     #[test]
     fn tiles_cover_every_pixel_once() {

@@ -130,10 +130,10 @@ impl Bench<'_> {
     /// The parameters of a frame with these settings.
     ///
     /// # Errors
-    /// If the scene has no camera of the settings' name.
+    /// If the settings' camera is not possible in the scene.
     pub fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
-        let camera = self.scene.camera(settings.picture.camera.as_deref())?;
-        Ok(settings.frame(camera, self.mapped.max_distance, self.mapped.caustics))
+        let camera = settings.camera(self.scene)?;
+        Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
     /// Renders tiles, each on a chip with a new memory that `model` makes, so that every tile begins with empty caches.

@@ -8,7 +8,10 @@ use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{CardAddress, CardSet};
 
+use super::files::file;
+
 #[derive(Args)]
+#[command(next_help_heading = "Cards")]
 pub(crate) struct CardOptions {
     #[arg(
         long = "card",
@@ -16,23 +19,24 @@ pub(crate) struct CardOptions {
         help = format!("Where to render: {}; may be repeated [default: a chip a core]", CardAddress::forms())
     )]
     cards: Vec<CardAddress>,
-    /// Share of the tiles, above 0 and at most 1, that two cards render and that are compared bit for bit; of three cards
-    /// the outvoted one is given up, and others render its tiles
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    /// Share of the tiles, above 0 and at most 1, that two cards render and that are compared bit for bit
+    ///
+    /// Of three cards the outvoted one is given up, and others render its tiles.
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, hide_short_help = true)]
     verify: Option<f64>,
     /// Inject faults into the links to the cards, to test their repair: rates per byte as
     /// flips=1e-5,drops=1e-6,repeats=1e-6,delays=1e-4,seed=1
-    #[arg(long, value_name = "FAULTS")]
+    #[arg(long, value_name = "FAULTS", hide_short_help = true)]
     pub(super) faults: Option<LineFaults>,
     /// Model the memory of emulated chips, and report its reads in the statistics
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     counters: bool,
     /// Caches of the modelled memory, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=... [default:
     /// photon=128K/128/4,scene=75K/128/4]
-    #[arg(long, value_name = "CACHES")]
+    #[arg(long, value_name = "CACHES", hide_short_help = true)]
     cache: Option<CacheSettings>,
     /// Write every read of an emulated chip in Dinero's input format, compressed by gzip; a frame has billions: use --crop
-    #[arg(long, value_name = "OUT.din.gz")]
+    #[arg(long, value_name = "OUT.din.gz", value_parser = file(), hide_short_help = true)]
     pub(crate) trace: Option<PathBuf>,
 }
 

@@ -7,27 +7,28 @@ use photoncard_driver::render::{Integrator, MIN_IRRADIANCE_ERROR, Sampling};
 use super::choice::{choice, switch};
 
 #[derive(Args)]
+#[command(next_help_heading = "Rays and samples")]
 pub(crate) struct IntegratorOptions {
     /// Seed of all random numbers
-    #[arg(long, default_value_t = Integrator::default().seed, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = Integrator::default().seed, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) seed: u32,
     /// Final gather rays per sample
     #[arg(long, default_value_t = Integrator::default().gather_rays, allow_negative_numbers = true)]
     pub(super) gather_rays: u32,
     /// Shadow rays per sample
-    #[arg(long, default_value_t = Integrator::default().shadow_rays, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = Integrator::default().shadow_rays, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) shadow_rays: u32,
     /// Samples per pixel
     #[arg(long, default_value_t = Integrator::default().samples, allow_negative_numbers = true)]
     pub(super) spp: u32,
     /// Sampling density of the directions of gather rays; it never changes the picture's expected value
-    #[arg(long, default_value = Integrator::default().sampling.name(), value_parser = choice::<Sampling>())]
+    #[arg(long, default_value = Integrator::default().sampling.name(), value_parser = choice::<Sampling>(), hide_short_help = true)]
     pub(super) sampling: Sampling,
     /// Gather the indirect light of Lambertian surfaces at sparse points, and interpolate between them
     #[arg(long, default_value = "off", value_parser = switch(), action = ArgAction::Set)]
     pub(super) irradiance_cache: bool,
     /// Maximum relative error of interpolated irradiance [default: 0.025]
-    #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true)]
+    #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) ic_error: Option<f32>,
 }
 

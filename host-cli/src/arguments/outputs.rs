@@ -6,95 +6,75 @@ use clap::Args;
 use photoncard_driver::display::{DisplayAddress, DisplaySettings};
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::partial::PartialSettings;
-use photoncard_driver::preview::{ToneCurve, ToneMapping};
 use photoncard_driver::render::TileOutputs;
 
 use super::choice::choice;
+use super::files::{PictureFormat, PictureOutput, TextOutput, picture, text};
+use super::tone::ToneOptions;
 
 #[derive(Args)]
+#[command(next_help_heading = "Outputs")]
 pub(crate) struct OutputOptions {
-    /// Continue a render that was stopped or has failed: its finished tiles are kept beside the picture, in
-    /// OUT.exr.partial, until the picture is written
+    /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated
+    ///
+    /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures.
+    #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", required = true, value_parser = picture())]
+    pub(crate) pictures: Vec<PictureOutput>,
+    /// Continue a render that was stopped or has failed
+    ///
+    /// Finished tiles are kept beside the picture, in OUT.exr.partial, until the picture is written.
     #[arg(long)]
     resume: bool,
-    /// Type of the picture's samples; Z and gathers are always float
-    #[arg(long, default_value = "float", value_parser = choice::<SampleFormat>())]
-    pub(crate) sample_type: SampleFormat,
-    /// Write a tone-mapped PNG as well
-    #[arg(long, value_name = "OUT.png")]
-    pub(crate) preview: Option<PathBuf>,
-    /// Exposure of the PNG in stops: radiance is multiplied by 2^EXPOSURE; or auto, which makes its log-average 0.18
-    #[arg(
-        long,
-        value_name = "EV",
-        requires = "preview",
-        default_value = "auto",
-        value_parser = exposure,
-        allow_negative_numbers = true
-    )]
-    exposure: Exposure,
-    /// Tone curve of the PNG
-    #[arg(
-        long = "tonemap",
-        value_name = "CURVE",
-        requires = "preview",
-        default_value = "reinhard",
-        value_parser = choice::<ToneCurve>()
-    )]
-    tone_curve: ToneCurve,
+    /// Type of the EXR's samples; Z and gathers are always float [default: float]
+    #[arg(long, value_parser = choice::<SampleFormat>(), hide_short_help = true)]
+    pub(super) sample_type: Option<SampleFormat>,
+    #[command(flatten)]
+    pub(crate) tone: ToneOptions,
     /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port: 14158]
-    #[arg(long, value_name = "HOST:PORT")]
-    display_server: Option<DisplayAddress>,
-    /// Write statistics of the render as JSON
-    #[arg(long, value_name = "OUT.json")]
-    pub(crate) stats: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy)]
-enum Exposure {
-    Auto,
-    Stops(f32),
+    #[arg(long, value_name = "HOST:PORT", hide_short_help = true)]
+    pub(super) display_server: Option<DisplayAddress>,
+    /// Write statistics of the render as JSON; - for standard output
+    #[arg(long, value_name = "OUT.json", value_parser = text())]
+    pub(crate) stats: Option<TextOutput>,
 }
 
 impl OutputOptions {
-    /// Settings of these options for the picture in the file `output`.
-    pub(super) fn settings(&self, output: &Path) -> TileOutputs {
+    /// Settings of these options.
+    pub(super) fn settings(&self) -> TileOutputs {
         TileOutputs {
-            partial: Some(PartialSettings { path: partial_path(output), resume: self.resume }),
-            display: self.display(output),
+            partial: Some(PartialSettings { path: self.partial_path(), resume: self.resume }),
+            display: self.display(),
         }
+    }
+
+    /// Path of the file in which finished tiles are kept until the picture is written.
+    pub(crate) fn partial_path(&self) -> PathBuf {
+        let mut name = self.main_path().as_os_str().to_owned();
+        name.push(".partial");
+        name.into()
+    }
+
+    /// Type of an EXR's samples.
+    pub(crate) fn sample_type(&self) -> SampleFormat {
+        self.sample_type.unwrap_or(SampleFormat::Float)
+    }
+
+    /// Returns whether a picture of the format is written.
+    pub(super) fn has(&self, format: PictureFormat) -> bool {
+        self.pictures.iter().any(|picture| picture.format == format)
+    }
+
+    /// Path of the picture that the render is named after: the first EXR, or the first picture without one.
+    fn main_path(&self) -> &Path {
+        let exr = self.pictures.iter().find(|picture| picture.format == PictureFormat::Exr);
+        exr.or(self.pictures.first()).map_or(Path::new(""), |picture| &picture.path)
     }
 
     /// Display server, and the picture's name on it: that of its file.
-    fn display(&self, output: &Path) -> Option<DisplaySettings> {
+    fn display(&self) -> Option<DisplaySettings> {
         let address = self.display_server.clone()?;
-        let image = output.file_name().unwrap_or(output.as_os_str());
+        let path = self.main_path();
+        let image = path.file_name().unwrap_or(path.as_os_str());
         Some(DisplaySettings { address, image: image.to_string_lossy().into_owned() })
-    }
-
-    /// Tone mapping of the PNG.
-    pub(crate) fn tone_mapping(&self) -> ToneMapping {
-        ToneMapping {
-            exposure: match self.exposure {
-                Exposure::Auto => None,
-                Exposure::Stops(stops) => Some(stops),
-            },
-            curve: self.tone_curve,
-        }
-    }
-}
-
-/// Path of the file in which finished tiles are kept until the picture is written.
-pub(super) fn partial_path(output: &Path) -> PathBuf {
-    let mut name = output.as_os_str().to_owned();
-    name.push(".partial");
-    name.into()
-}
-
-fn exposure(text: &str) -> Result<Exposure, String> {
-    match text.parse() {
-        _ if text == "auto" => Ok(Exposure::Auto),
-        Ok(stops) if f32::is_finite(stops) => Ok(Exposure::Stops(stops)),
-        _ => Err("an exposure is a number of stops, such as -1.5, or auto".into()),
     }
 }

@@ -10,28 +10,63 @@ use photoncard_driver::scene::Camera;
 const SIDE: u32 = 512;
 
 #[derive(Args)]
+#[command(next_help_heading = "Picture and camera")]
 pub(crate) struct PictureOptions {
-    /// Width and height of the picture, pixels [default: 512 on the longer side, in the aspect ratio of the camera; 512x512 if it states none]
+    /// Width and height of the picture, pixels [default: 512 on the longer side]
+    ///
+    /// By default the picture has the aspect ratio that the file states for the camera, or is square if it states none.
     #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true)]
     size: Option<(u32, u32)>,
     /// Render only the columns X0 up to X1 and the rows Y0 up to Y1
-    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, allow_hyphen_values = true, hide_short_help = true)]
     crop: Option<Window>,
     /// Name of the camera [default: the first of the file]
     #[arg(long)]
     camera: Option<String>,
-    /// Layers of the picture besides radiance, with commas between them: direct, indirect, caustic, albedo, N, Z, gathers; or
-    /// all, or none
-    #[arg(long, value_name = "LIST", default_value_t = Layers::default())]
-    pub(crate) aov: Layers,
+    /// Place of the camera, metres [default: the camera's own]
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    camera_at: Option<[f32; 3]>,
+    /// Place in the middle of the picture, metres [default: in the camera's own direction]
+    ///
+    /// The top of the picture is towards +y. Straight up and straight down the right is +x, so that the top is +z and -z.
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    look_at: Option<[f32; 3]>,
+    /// Vertical field of view [default: the camera's own]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    fov: Option<f32>,
+    #[arg(
+        long,
+        value_name = "LIST",
+        hide_short_help = true,
+        help = format!(
+            "Layers of the EXR besides radiance, with commas between them: direct, indirect, caustic, albedo, N, Z, gathers; or all, \
+             or none [default: {}]",
+            Layers::default()
+        )
+    )]
+    pub(super) aov: Option<Layers>,
 }
 
 impl PictureOptions {
     /// Settings of these options.
     pub(super) fn settings(&self) -> Picture {
-        let Self { size, crop, camera, aov } = self;
+        let Self { size, crop, camera, camera_at, look_at, fov, aov: _ } = self;
         let (width, height) = size.unwrap_or((SIDE, SIDE));
-        Picture { width, height, crop: *crop, camera: camera.clone(), layers: aov.clone() }
+        Picture {
+            width,
+            height,
+            crop: *crop,
+            camera: camera.clone(),
+            camera_at: *camera_at,
+            look_at: *look_at,
+            fov: *fov,
+            layers: self.layers(),
+        }
+    }
+
+    /// Layers of the picture.
+    pub(crate) fn layers(&self) -> Layers {
+        self.aov.clone().unwrap_or_default()
     }
 
     /// Gives the picture the camera's aspect ratio, if no size is given. Returns a notice if the one that is given is of another.
@@ -70,4 +105,11 @@ fn crop(text: &str) -> Result<Window, String> {
         Ok(&[x0, x1, y0, y1]) => Ok(Window { x0, x1, y0, y1 }),
         _ => Err("a crop is X0,X1,Y0,Y1: four whole numbers, such as 0,64,0,64".into()),
     }
+}
+
+fn place(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    let place = numbers.and_then(|numbers| <[f32; 3]>::try_from(numbers).ok());
+    let place = place.filter(|place| place.iter().all(|number| number.is_finite()));
+    place.ok_or_else(|| "a place is X,Y,Z: three numbers of metres, such as 0,1.5,4".into())
 }

@@ -7,7 +7,7 @@ use photoncard_driver::render::RenderSettings;
 
 use super::cards::CardOptions;
 use super::integrator::IntegratorOptions;
-use super::outputs::{OutputOptions, partial_path};
+use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
 use super::schedule::ScheduleOptions;
@@ -18,22 +18,23 @@ use crate::environment::EnvironmentOption;
 pub(crate) struct RenderOptions {
     /// A glTF 2.0 file, .gltf or .glb
     pub(crate) scene: PathBuf,
-    /// The picture to write, an EXR file: linear RGB radiance and the layers of --aov
-    #[arg(short, long, value_name = "OUT.exr")]
-    pub(crate) output: PathBuf,
-    /// Change a material: MATERIAL.PROPERTY=VALUE with diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha or emission; may be repeated
-    #[arg(long = "set", value_name = "ASSIGNMENT")]
+    /// Change a material: MATERIAL.PROPERTY=VALUE; may be repeated
+    ///
+    /// Properties are diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha and emission.
+    #[arg(long = "set", value_name = "ASSIGNMENT", help_heading = "Scene", hide_short_help = true)]
     pub(crate) assignments: Vec<String>,
-    /// Add the light that rough metals and coats reflect several times between their microfacets, as Blender does by default; glTF's
-    /// model leaves it out, and a metal of roughness 1 is less than half as bright
-    #[arg(long)]
+    /// Add the light that rough metals and coats reflect several times between their microfacets
+    ///
+    /// Blender does so by default; glTF's model leaves this light out, and a metal of roughness 1 is less than half as bright.
+    #[arg(long, help_heading = "Scene", hide_short_help = true)]
     pub(crate) energy_compensation: bool,
     /// Variant of the scene's materials, by its name [default: the materials that its meshes state]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Scene", hide_short_help = true)]
     pub(crate) variant: Option<String>,
-    /// Light from infinitely far: an equirectangular map, a Radiance (.hdr) or EXR (.exr) picture whose middle is -z and
-    /// top is y; or a constant radiance
-    #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]
+    /// Light from infinitely far: an equirectangular map, .hdr or .exr, or a constant radiance
+    ///
+    /// The middle of the map is -z and its top is y.
+    #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true, help_heading = "Scene")]
     pub(crate) environment: Option<EnvironmentOption>,
     #[command(flatten)]
     pub(crate) picture: PictureOptions,
@@ -48,7 +49,7 @@ pub(crate) struct RenderOptions {
     #[command(flatten)]
     pub(crate) outputs: OutputOptions,
     /// Threads for the host's own work [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true)]
+    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
     pub(crate) threads: Option<usize>,
     /// Show no progress
     #[arg(long)]
@@ -63,14 +64,9 @@ impl RenderOptions {
             picture: self.picture.settings(),
             photons: self.photons.settings(),
             integrator: self.integrator.settings(),
-            schedule: self.schedule.settings(&self.picture.aov, &cards.addresses),
+            schedule: self.schedule.settings(&self.picture.layers(), &cards.addresses),
             cards,
-            outputs: self.outputs.settings(&self.output),
+            outputs: self.outputs.settings(),
         }
-    }
-
-    /// Path of the file in which finished tiles are kept until the picture is written.
-    pub(crate) fn partial_path(&self) -> PathBuf {
-        partial_path(&self.output)
     }
 }

@@ -9,19 +9,20 @@ use photoncard_driver::scheduler::GatherOrder;
 use super::choice::choice;
 
 #[derive(Args)]
+#[command(next_help_heading = "Order of the work")]
 pub(crate) struct ScheduleOptions {
     /// Side of a tile, pixels [default: 16; 8 with direct, indirect, caustic or gathers in --aov, unless all cards are of
     /// the kind emulated]
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) tile: Option<u32>,
     /// Order of the photon gathers; it never changes the picture
-    #[arg(long, default_value = Schedule::default().order.name(), value_parser = choice::<GatherOrder>())]
+    #[arg(long, default_value = Schedule::default().order.name(), value_parser = choice::<GatherOrder>(), hide_short_help = true)]
     pub(super) order: GatherOrder,
     /// Direction bins of the gather rays, for orders with bins [default: 99]
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub(super) bins: Option<u32>,
     /// Gathers that may wait on a chip, for orders with a queue [default: the chip's capacity]
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub(super) queue: Option<u32>,
 }
 

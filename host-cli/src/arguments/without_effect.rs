@@ -4,6 +4,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::{Material, Reflection, Scene};
 
+use super::files::PictureFormat;
 use super::render::RenderOptions;
 
 impl RenderOptions {
@@ -65,7 +66,20 @@ impl RenderOptions {
                 format!("with --order {name}, which sends nothing over links"),
             ),
         ];
-        let said = cases.into_iter().filter(|(is_idle, ..)| *is_idle);
+        let said = cases.into_iter().chain(self.of_pictures()).filter(|(is_idle, ..)| *is_idle);
         said.map(|(_, option, why)| format!("{option} has no effect {why}")).collect()
+    }
+    /// Options on a format of pictures that is not written.
+    fn of_pictures(&self) -> [(bool, &'static str, String); 4] {
+        let outputs = &self.outputs;
+        let [no_exr, no_png] = [PictureFormat::Exr, PictureFormat::Png].map(|format| !outputs.has(format));
+        let [of_exr, of_png] = ["without -o OUT.exr", "without -o OUT.png"].map(str::to_owned);
+        let is_shown = outputs.display_server.is_some();
+        [
+            (outputs.tone.exposure.is_some() && no_png, "--exposure", of_png.clone()),
+            (outputs.tone.curve.is_some() && no_png, "--tonemap", of_png),
+            (outputs.sample_type.is_some() && no_exr, "--sample-type", of_exr.clone()),
+            (self.picture.aov.is_some() && no_exr && !is_shown, "--aov", of_exr),
+        ]
     }
 }

@@ -21,7 +21,7 @@ impl RenderSettings {
         let Schedule { tile: _, order: _, bins: _, queue: _ } = schedule;
         let CardSet { addresses: _, faults: _, verify: _, caches: _, trace: _ } = cards;
         let TileOutputs { partial: _, display: _ } = outputs;
-        let Picture { width, height, crop: _, camera, layers } = picture;
+        let Picture { width, height, crop: _, camera, camera_at, look_at, fov, layers } = picture;
         let PhotonMaps {
             count,
             layout: _,
@@ -37,6 +37,9 @@ impl RenderSettings {
             ("size", json!([width, height])),
             ("crop", json!([window.x0, window.x1, window.y0, window.y1])),
             ("camera", json!(camera)),
+            ("camera-at", json!(camera_at)),
+            ("look-at", json!(look_at)),
+            ("fov", json!(fov)),
             ("aov", json!(layers.of_chip().to_string())),
             ("photons", json!(count)),
             ("neighbors", json!(neighbors)),

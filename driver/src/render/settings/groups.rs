@@ -25,13 +25,28 @@ pub struct Picture {
     pub crop: Option<Window>,
     /// Name of the camera; `None` for the first.
     pub camera: Option<String>,
+    /// Place of the camera, metres; `None` for its own.
+    pub camera_at: Option<[f32; 3]>,
+    /// Place in the middle of the picture, metres, with +y upwards; `None` for the camera's own direction.
+    pub look_at: Option<[f32; 3]>,
+    /// Vertical field of view, degrees; `None` for the camera's own.
+    pub fov: Option<f32>,
     /// Layers of the picture besides radiance.
     pub layers: Layers,
 }
 
 impl Default for Picture {
     fn default() -> Self {
-        Self { width: 512, height: 512, crop: None, camera: None, layers: Layers::default() }
+        Self {
+            width: 512,
+            height: 512,
+            crop: None,
+            camera: None,
+            camera_at: None,
+            look_at: None,
+            fov: None,
+            layers: Layers::default(),
+        }
     }
 }
 
@@ -131,6 +146,13 @@ pub struct CardSet {
     pub caches: Option<CacheSettings>,
     /// Trace file of every read of the chip. It takes a single chip; without `caches` the default caches are modelled.
     pub trace: Option<PathBuf>,
+}
+
+impl CardSet {
+    /// Number of cards, one chip each.
+    pub fn count(&self) -> usize {
+        self.addresses.iter().map(|address| address.emulated_chips().max(1)).sum()
+    }
 }
 
 impl Default for CardSet {

@@ -1,16 +1,15 @@
-//! Preview of a film: PNG, 8 bits per channel, tone-mapped to sRGB.
+//! Tone mapping of radiance to a PNG picture in sRGB, 8 bits per channel.
 //!
 //! Radiance is scaled by `2^exposure`, or without an exposure so that the log-average luminance of the lit pixels
 //! becomes 0.18, middle grey (Reinhard, Stark, Shirley, Ferwerda 2002, *Photographic tone reproduction for digital
 //! images*, equations 1 and 2). A [`ToneCurve`] then compresses it, and it is clipped to 1 and encoded with the sRGB
-//! transfer curve. The picture is the film's crop window alone.
+//! transfer curve. Negative radiance is shown black, infinite radiance white.
 
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 use crate::choice::choices;
-use crate::film::{Film, PixelValue};
 use crate::output::{self, OutputError};
 
 /// Tone curve that compresses scaled radiance to the range of a screen.
@@ -72,7 +71,7 @@ const MIDDLE_GREY: f64 = 0.18;
 /// Error of [`write_png`].
 #[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum PreviewError {
+pub enum PngError {
     /// The file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -85,6 +84,16 @@ pub enum PreviewError {
         #[source]
         source: png::EncodingError,
     },
+    /// A pixel has no radiance that could be shown.
+    #[error("pixel ({x}, {y}) of the picture for {} is not a number; repair the picture, or render it again", path.display())]
+    NotANumber {
+        /// The output file.
+        path: PathBuf,
+        /// The pixel's column in the PNG.
+        x: usize,
+        /// The pixel's row in the PNG.
+        y: usize,
+    },
     /// The exposure is not a finite number.
     #[error(
         "an exposure of {exposure} is not possible; state a number of stops, or none for an automatic one"
@@ -95,29 +104,36 @@ pub enum PreviewError {
     },
 }
 
-/// Writes the film's crop window to `path` as PNG, whole or not at all.
+/// Writes a picture of `width` x `height` pixels of linear radiance to `path` as PNG, whole or not at all.
 ///
 /// # Errors
-/// If the file cannot be written, or the exposure is not finite.
-pub fn write_png(path: &Path, film: &Film, mapping: ToneMapping) -> Result<(), PreviewError> {
+/// If the file cannot be written, the exposure is not finite, a pixel is NaN, or there are not `width` x `height` pixels.
+pub fn write_png(
+    path: &Path,
+    [width, height]: [u32; 2],
+    radiance: impl Iterator<Item = [f32; 3]> + Clone,
+    mapping: ToneMapping,
+) -> Result<(), PngError> {
+    if let Some(index) = radiance.clone().position(|pixel| pixel.iter().any(|value| value.is_nan())) {
+        let [x, y] = [index % width.max(1) as usize, index / width.max(1) as usize];
+        return Err(PngError::NotANumber { path: path.to_owned(), x, y });
+    }
     let scale = match mapping.exposure {
-        None => automatic_scale(film),
+        None => automatic_scale(radiance.clone()),
         Some(stops) if stops.is_finite() => libm::exp2f(stops),
-        Some(exposure) => return Err(PreviewError::Exposure { exposure }),
+        Some(exposure) => return Err(PngError::Exposure { exposure }),
     };
-    let window = film.window();
+    let pixels: Vec<u8> = radiance.flat_map(|pixel| tone_map(pixel, scale, mapping.curve)).collect();
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, window.width(), window.height());
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    let shown = |pixel: &PixelValue| tone_map(pixel.radiance, scale, mapping.curve);
-    let pixels: Vec<u8> = film.pixels().iter().flat_map(shown).collect();
     let encoded = encoder.write_header().and_then(|mut writer| {
         writer.write_image_data(&pixels)?;
         writer.finish()
     });
-    encoded.map_err(|source| PreviewError::Encode { path: path.to_owned(), source })?;
+    encoded.map_err(|source| PngError::Encode { path: path.to_owned(), source })?;
     Ok(output::write(path, &bytes)?)
 }
 
@@ -127,10 +143,9 @@ fn luminance([red, green, blue]: [f32; 3]) -> f32 {
 }
 
 /// Factor that brings the log-average luminance of the lit pixels to middle grey; 1 for a black picture.
-fn automatic_scale(film: &Film) -> f32 {
+fn automatic_scale(radiance: impl Iterator<Item = [f32; 3]>) -> f32 {
     let (mut sum, mut count) = (0.0, 0u64);
-    for pixel in film.pixels() {
-        let luminance = f64::from(luminance(pixel.radiance));
+    for luminance in radiance.map(|pixel| f64::from(luminance(pixel))) {
         if luminance > 0.0 && luminance.is_finite() {
             sum += libm::log(luminance);
             count += 1;
@@ -139,8 +154,8 @@ fn automatic_scale(film: &Film) -> f32 {
     if count == 0 { 1.0 } else { (MIDDLE_GREY / libm::exp(sum / count as f64)) as f32 }
 }
 
+/// Code of a screen for a pixel, which must not be NaN.
 fn tone_map(radiance: [f32; 3], scale: f32, curve: ToneCurve) -> [u8; 3] {
-    // Negative and undefined radiance is shown black, infinite radiance white.
     let scaled = radiance.map(|value| (value * scale).clamp(0.0, MOST));
     curve.compress(scaled).map(encode)
 }
@@ -150,23 +165,16 @@ fn encode(linear: f32) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
     let encoded =
         if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::powf(linear, 1.0 / 2.4) - 0.055 };
-    // A conversion from NaN gives 0.
     (255.0 * encoded + 0.5) as u8
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Window;
 
-    fn film(radiance: impl Fn(u32, u32) -> f32) -> Film {
-        let window = Window { x0: 1, x1: 5, y0: 2, y1: 5 };
-        let mut film = Film::new(8, 8, window).unwrap();
-        for (x, y) in (2..5).flat_map(|y| (1..5).map(move |x| (x, y))) {
-            let radiance = [radiance(x, y); 3];
-            film.write(x, y, PixelValue { radiance, ..PixelValue::default() }).unwrap();
-        }
-        film
+    /// Radiance of a picture of 4 x 3 pixels.
+    fn grey(radiance: impl Fn(u32, u32) -> f32) -> Vec<[f32; 3]> {
+        (0..3).flat_map(|y| (0..4).map(move |x| (x, y))).map(|(x, y)| [radiance(x, y); 3]).collect()
     }
 
     fn decode(path: &Path) -> (u32, u32, Vec<u8>) {
@@ -177,41 +185,39 @@ mod tests {
         (info.width, info.height, pixels)
     }
 
-    fn written(name: &str, film: &Film, exposure: Option<f32>, curve: ToneCurve) -> (u32, u32, Vec<u8>) {
+    fn written(radiance: &[[f32; 3]], exposure: Option<f32>, curve: ToneCurve) -> (u32, u32, Vec<u8>) {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(name);
-        write_png(&path, film, ToneMapping { exposure, curve }).unwrap();
+        let path = folder.path().join("picture.png");
+        write_png(&path, [4, 3], radiance.iter().copied(), ToneMapping { exposure, curve }).unwrap();
         decode(&path)
     }
 
     #[test]
-    fn the_preview_is_the_crop_window_and_grows_with_radiance() {
-        let film = film(|x, y| (4 * (y - 2) + x - 1) as f32 * 0.08);
+    fn pixels_are_rows_and_grow_with_radiance() {
+        let picture = grey(|x, y| (4 * y + x) as f32 * 0.08);
         for curve in [ToneCurve::None, ToneCurve::Reinhard, ToneCurve::Aces] {
-            let (width, height, pixels) = written("preview.png", &film, Some(0.0), curve);
+            let (width, height, pixels) = written(&picture, Some(0.0), curve);
             assert_eq!((width, height), (4, 3));
-            let grey: Vec<u8> = pixels.chunks(3).map(|pixel| pixel[0]).collect();
-            assert_eq!(grey[0], 0);
-            assert!(grey.is_sorted_by(|a, b| a < b), "{curve:?} {grey:?}");
+            let codes: Vec<u8> = pixels.chunks(3).map(|pixel| pixel[0]).collect();
+            assert_eq!(codes[0], 0);
+            assert!(codes.is_sorted_by(|a, b| a < b), "{curve:?} {codes:?}");
         }
     }
 
     #[test]
     fn an_automatic_exposure_does_not_depend_on_the_unit_of_radiance() {
-        let of_unit = |unit| {
-            let film = film(|x, y| unit * (x * y) as f32);
-            written("preview.png", &film, None, ToneCurve::Reinhard)
-        };
+        let of_unit =
+            |unit| written(&grey(|x, y| unit * ((x + 1) * (y + 2)) as f32), None, ToneCurve::Reinhard);
         assert_eq!(of_unit(1.0), of_unit(1024.0));
     }
 
     #[test]
     fn a_stop_doubles_radiance() {
-        let [once, twice] = [1.0, 2.0].map(|unit| film(move |x, y| unit * (x * y) as f32 * 0.02));
+        let [once, twice] = [1.0, 2.0].map(|unit| grey(move |x, y| unit * (x * y) as f32 * 0.02));
         for curve in [ToneCurve::None, ToneCurve::Reinhard, ToneCurve::Aces] {
-            let brighter = written("a.png", &once, Some(1.0), curve);
-            assert_eq!(brighter, written("b.png", &twice, Some(0.0), curve));
-            assert_ne!(brighter, written("d.png", &once, Some(0.0), curve));
+            let brighter = written(&once, Some(1.0), curve);
+            assert_eq!(brighter, written(&twice, Some(0.0), curve));
+            assert_ne!(brighter, written(&once, Some(0.0), curve));
         }
     }
 
@@ -248,17 +254,33 @@ mod tests {
     }
 
     #[test]
-    fn odd_values_are_shown_and_odd_exposures_refused() {
+    fn odd_values_are_shown() {
         for curve in [ToneCurve::None, ToneCurve::Reinhard, ToneCurve::Aces] {
-            assert_eq!(tone_map([f32::NAN, -1.0, 0.0], 1.0, curve), [0; 3]);
+            assert_eq!(tone_map([-1.0, f32::NEG_INFINITY, 0.0], 1.0, curve), [0; 3]);
             assert_eq!(tone_map([f32::INFINITY; 3], 1.0, curve), [255; 3]);
             assert_eq!(tone_map([f32::MAX; 3], 1.0, curve), [255; 3]);
         }
-        let black = film(|_, _| 0.0);
-        assert_eq!(automatic_scale(&black), 1.0);
+        assert_eq!(automatic_scale(std::iter::repeat_n([0.0; 3], 9)), 1.0);
+    }
+
+    #[test]
+    fn what_cannot_be_shown_is_refused_and_nothing_written() {
         let folder = tempfile::tempdir().unwrap();
-        let mapping = ToneMapping { exposure: Some(f32::NAN), curve: ToneCurve::default() };
-        let result = write_png(&folder.path().join("x.png"), &black, mapping);
-        assert!(matches!(result, Err(PreviewError::Exposure { .. })));
+        let path = folder.path().join("x.png");
+        let refused = |size, picture: &[[f32; 3]], exposure| {
+            let mapping = ToneMapping { exposure, curve: ToneCurve::default() };
+            let result = write_png(&path, size, picture.iter().copied(), mapping);
+            assert!(!path.exists());
+            result.unwrap_err()
+        };
+        let mut picture = grey(|_, _| 1.0);
+        for exposure in [f32::NAN, f32::INFINITY] {
+            assert!(matches!(refused([4, 3], &picture, Some(exposure)), PngError::Exposure { .. }));
+        }
+        for size in [[4, 4], [0, 3], [4, 2]] {
+            assert!(matches!(refused(size, &picture, None), PngError::Encode { .. }), "{size:?}");
+        }
+        picture[6][1] = f32::NAN;
+        assert!(matches!(refused([4, 3], &picture, None), PngError::NotANumber { x: 2, y: 1, .. }));
     }
 }

@@ -1,0 +1,39 @@
+//! `photoncard completions` and `photoncard man`: documents made from the arguments.
+
+use std::path::Path;
+
+use clap::{Command, CommandFactory};
+use clap_complete::{Shell, generate};
+use clap_mangen::Man;
+use photoncard_driver::output;
+
+use crate::arguments::Arguments;
+use crate::console::write_out;
+use crate::failure::Failure;
+
+/// Name of the command.
+const NAME: &str = env!("CARGO_BIN_NAME");
+
+/// Prints the completions of a shell.
+pub(crate) fn completions(shell: Shell) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    generate(shell, &mut Arguments::command(), NAME, &mut script);
+    write_out(&String::from_utf8_lossy(&script))
+}
+
+/// Writes a manual page for each command.
+pub(crate) fn man(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|error| Failure::folder(folder, &error))?;
+    let mut command = Arguments::command().disable_help_subcommand(true);
+    command.build();
+    write_pages(&command, folder)
+}
+
+/// Writes the manual page of a command, and of all below it.
+fn write_pages(command: &Command, folder: &Path) -> Result<(), Failure> {
+    let page = Man::new(command.clone());
+    let mut text = Vec::new();
+    page.render(&mut text).map_err(|error| Failure::work_error(&error))?;
+    output::write(&folder.join(page.get_filename()), &text).map_err(|error| Failure::work_error(&error))?;
+    command.get_subcommands().try_for_each(|below| write_pages(below, folder))
+}

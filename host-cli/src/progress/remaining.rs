@@ -1,0 +1,200 @@
+//! Estimate of the remaining time of a phase.
+
+use std::collections::VecDeque;
+
+/// Estimate of the remaining time of pieces of work that `workers` do in parallel.
+///
+/// A worker does a piece after another, so that the last completion times of all workers add up to the time that the finished
+/// pieces took. With `n` finished pieces, the mean `t` of the last `min(n, workers)` completion times and `N` pieces in all, the work
+/// ends at about `t N / max(n, workers)`. Between completions the time counts down, until a piece that takes longer than the mean
+/// is overdue. Pieces finished before the start count as done, and not as speed.
+pub(super) struct Remaining {
+    workers: usize,
+    /// Pieces finished before the start.
+    before: u64,
+    done: u64,
+    /// Maximum of `done`, which may fall when finished pieces are taken back.
+    most_done: u64,
+    total: u64,
+    /// Last completion times, seconds since the start: at most one for each worker.
+    completions: VecDeque<f64>,
+}
+
+impl Remaining {
+    /// Estimate at the start, with `before` pieces finished.
+    pub(super) fn new(workers: usize, before: u64) -> Self {
+        let workers = workers.max(1);
+        Self { workers, before, done: before, most_done: before, total: before, completions: VecDeque::new() }
+    }
+
+    /// Reports that `done` of `total` pieces are finished, `now` seconds after the start.
+    pub(super) fn report(&mut self, done: u64, total: u64, now: f64) {
+        let new = done.saturating_sub(self.most_done).min(self.workers as u64);
+        self.completions.extend((0..new).map(|_| now));
+        while self.completions.len() > self.workers {
+            self.completions.pop_front();
+        }
+        (self.done, self.most_done, self.total) = (done, self.most_done.max(done), total);
+    }
+
+    /// Remaining seconds, `now` seconds after the start; `None` before a piece is finished.
+    pub(super) fn seconds(&self, now: f64) -> Option<f64> {
+        let finished = self.most_done - self.before;
+        if finished == 0 {
+            return None;
+        }
+        let left = self.total.saturating_sub(self.done);
+        if left == 0 {
+            return Some(0.0);
+        }
+        let end = |mean: f64, finished: u64, left: u64| {
+            mean * (finished + left) as f64 / finished.max(self.workers as u64) as f64
+        };
+        let known = mean(self.completions.iter().copied());
+        // The next piece is finished now at the earliest.
+        let skipped = (self.completions.len() + 1).saturating_sub(self.workers);
+        let overdue = mean(self.completions.iter().copied().skip(skipped).chain([now]));
+        let expected = end(known, finished, left).max(end(overdue, finished + 1, left - 1));
+        Some((expected - now).max(0.0))
+    }
+}
+
+fn mean(times: impl Iterator<Item = f64> + Clone) -> f64 {
+    times.clone().sum::<f64>() / times.count().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_driver::film::Window;
+    use photoncard_driver::scheduler::{GatherOrder, spread, tiles};
+
+    use super::*;
+
+    /// Estimates of a render whose tiles take `costs` seconds, done in their order by `workers`: at each time the estimate, and the
+    /// time that is left in truth, at all completions and at ten times between each two.
+    fn estimates(costs: &[f64], workers: usize, before: u64) -> Vec<(f64, Option<f64>, f64)> {
+        let mut free = vec![0.0_f64; workers];
+        let mut ends: Vec<f64> = Vec::new();
+        for cost in costs {
+            let first = (0..workers).min_by(|a, b| free[*a].total_cmp(&free[*b])).unwrap();
+            free[first] += cost;
+            ends.push(free[first]);
+        }
+        ends.sort_by(f64::total_cmp);
+        let (end, total) = (ends[ends.len() - 1], before + costs.len() as u64);
+        let mut remaining = Remaining::new(workers, before);
+        let mut found = Vec::new();
+        let mut last = 0.0;
+        for (done, &next) in (before..).zip(&ends) {
+            for step in 0..10 {
+                let now = last + (next - last) * f64::from(step) / 10.0;
+                remaining.report(done, total, now);
+                found.push((now, remaining.seconds(now), end - now));
+            }
+            last = next;
+        }
+        remaining.report(total, total, end);
+        assert_eq!(remaining.seconds(end), Some(0.0));
+        found
+    }
+
+    /// Costs that vary irregularly between `low` and `high`.
+    fn varied(count: usize, low: f64, high: f64) -> Vec<f64> {
+        (0..count).map(|index| low + (high - low) * (0.618_034 * (index + 1) as f64).fract()).collect()
+    }
+
+    /// Checks that the estimate is right within a share of the remaining time once a fifth of the time is over, except for the
+    /// last `tail` seconds, and that it never jumps by more than that share from one report to the next.
+    fn check_steady(estimates: &[(f64, Option<f64>, f64)], share: f64, tail: f64) {
+        let end = estimates[0].2;
+        let mut previous: Option<(f64, f64)> = None;
+        for &(now, found, left) in estimates.iter().filter(|(now, _, left)| *now > 0.2 * end && *left > tail)
+        {
+            let found = found.expect("an estimate after a fifth of the time");
+            assert!((found - left).abs() <= share * left, "{found} s instead of {left} s after {now} s");
+            if let Some((before, estimate)) = previous {
+                let counted = estimate - (now - before);
+                assert!((found - counted).abs() <= share * estimate, "from {estimate} s to {found} s");
+            }
+            previous = Some((now, found));
+        }
+    }
+
+    #[test]
+    fn nothing_is_said_before_the_first_piece() {
+        let mut remaining = Remaining::new(2, 5);
+        for now in [0.0, 10.0] {
+            remaining.report(5, 20, now);
+            assert_eq!(remaining.seconds(now), None);
+        }
+        remaining.report(6, 20, 10.0);
+        assert_eq!(remaining.seconds(10.0), Some(65.0));
+    }
+
+    #[test]
+    fn equal_pieces_are_estimated_exactly_from_the_first_one_on() {
+        for workers in [1, 2, 7, 64] {
+            for (now, found, left) in estimates(&vec![30.0; 64 * 7], workers, 0) {
+                if let Some(found) = found {
+                    // Up to one piece at the end, where some workers have none left.
+                    assert!((found - left).abs() < 30.0 + 1e-6, "{workers}: {found} for {left} after {now}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_slow_card_counts_down_evenly() {
+        check_steady(&estimates(&varied(60, 80.0, 160.0), 1, 0), 0.33, 160.0);
+    }
+
+    #[test]
+    fn pieces_of_unequal_cost_are_right_within_a_third_after_a_fifth() {
+        for workers in [1, 2, 8] {
+            check_steady(&estimates(&varied(256, 0.1, 4.0), workers, 0), 0.33, 8.0);
+        }
+    }
+
+    /// A fourth of the picture costs ten times as much as the rest; its tiles come spread, as a render deals them.
+    #[test]
+    fn a_heavy_region_is_right_within_a_third_after_a_fifth() {
+        for first_heavy in [0, 8, 20, 24] {
+            let tiles = tiles(Window::full(32, 32), 1, GatherOrder::Sort);
+            let cost = |row: u32| if (first_heavy..first_heavy + 8).contains(&row) { 10.0 } else { 1.0 };
+            let costs: Vec<f64> = spread(tiles).iter().map(|tile| cost(tile.y)).collect();
+            // At the end of a render, some of many cards have no tile left.
+            for (workers, end) in [(1, 0.1), (4, 0.1), (16, 0.3)] {
+                let tail = end * costs.iter().sum::<f64>() / workers as f64;
+                check_steady(&estimates(&costs, workers, 0), 0.33, tail);
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_of_an_earlier_render_are_done_and_no_speed() {
+        let costs = varied(100, 1.0, 2.0);
+        let [fresh, resumed] = [0, 900].map(|before| estimates(&costs, 2, before));
+        assert_eq!(fresh, resumed);
+    }
+
+    #[test]
+    fn a_piece_that_takes_long_is_not_nearly_done_for_ever() {
+        let mut remaining = Remaining::new(1, 0);
+        remaining.report(1, 11, 1.0);
+        assert_eq!(remaining.seconds(1.0), Some(10.0));
+        assert_eq!(remaining.seconds(2.0), Some(9.0));
+        // The second piece has taken 9 s: ten more are as long as the mean of 1 s and 9 s.
+        assert!((remaining.seconds(10.0).unwrap() - 45.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn pieces_taken_back_are_left_again() {
+        let mut remaining = Remaining::new(1, 0);
+        remaining.report(5, 10, 5.0);
+        assert_eq!(remaining.seconds(5.0), Some(5.0));
+        remaining.report(2, 10, 5.0);
+        assert_eq!(remaining.seconds(5.0), Some(8.0));
+        remaining.report(10, 10, 13.0);
+        assert_eq!(remaining.seconds(13.0), Some(0.0));
+    }
+}

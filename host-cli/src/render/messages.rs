@@ -1,0 +1,169 @@
+//! Messages of a render: what was loaded, what is ignored, and what was written.
+
+use std::path::Path;
+
+use photoncard_driver::render::{
+    MemoryStatistics, Picture, ReadStatistics, RenderSettings, Rendering, Statistics, Times,
+};
+use photoncard_driver::scene::{Camera, Scene};
+
+use crate::arguments::RenderOptions;
+use crate::console::say;
+use crate::progress::duration;
+
+/// Maximum number of ignored contents that are named, besides their number.
+const NAMED: usize = 3;
+
+/// Prints what was loaded, what is ignored of it, and options without effect.
+pub(super) fn say_loaded(
+    options: &RenderOptions,
+    settings: &RenderSettings,
+    scene: &Scene,
+    camera: &Camera,
+    misfit: Option<String>,
+) {
+    say(format_args!("photoncard: {}", loaded(&options.scene, &settings.picture, scene, camera)));
+    if let Some(line) = ignored(&options.scene, &scene.notices) {
+        say(format_args!("photoncard: ignored: {line}"));
+    }
+    for notice in options.without_effect(scene).into_iter().chain(misfit) {
+        say(format_args!("photoncard: {notice}"));
+    }
+}
+
+/// Contents of a scene, and the view of it.
+fn loaded(path: &Path, picture: &Picture, scene: &Scene, camera: &Camera) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let left_out = match scene.skipped_triangles {
+        0 => String::new(),
+        count => format!(" (and {count} of zero area, left out)"),
+    };
+    let contents = [
+        format!("{}{left_out}", counted(scene.triangles.len(), "triangle")),
+        counted(scene.materials.len(), "material"),
+        counted(scene.images.len(), "image"),
+        lights(scene),
+    ];
+    let Picture { width, height, .. } = picture;
+    format!("{name}: {}; seen by '{}', {width} x {height} pixels", contents.join(", "), camera.name)
+}
+
+/// Sources of light, by kind.
+fn lights(scene: &Scene) -> String {
+    let emissive = scene.emissive_triangles();
+    let kinds = [
+        (emissive > 0).then(|| counted(emissive, "emissive triangle")),
+        (!scene.lights.is_empty()).then(|| counted(scene.lights.len(), "punctual light")),
+        scene.environment.as_ref().filter(|map| map.is_lit()).map(|_| "an environment".to_owned()),
+    ];
+    format!("light of {}", kinds.into_iter().flatten().collect::<Vec<_>>().join(" and "))
+}
+
+/// Contents that are not rendered: the first ones, and the number of the others.
+fn ignored(path: &Path, notices: &[String]) -> Option<String> {
+    let mut said = notices.get(..NAMED.min(notices.len()))?.join("; ");
+    if said.is_empty() {
+        return None;
+    }
+    if notices.len() > NAMED {
+        let more = notices.len() - NAMED;
+        said += &format!("; and {more} more, see photoncard scene info {}", path.display());
+    }
+    Some(said)
+}
+
+/// Prints the end of a render: its pictures, its time and its samples.
+pub(super) fn say_done(options: &RenderOptions, rendering: &Rendering) {
+    let statistics = &rendering.statistics;
+    if let Some(memory) = &statistics.memory {
+        say_memory(memory, statistics);
+    }
+    let pictures = options.outputs.pictures.iter().map(|picture| picture.path.display().to_string());
+    let pictures = pictures.collect::<Vec<_>>().join(", ");
+    say(format_args!("photoncard: {pictures}: {}", summary(statistics, rendering.film.pixels().len())));
+}
+
+/// Time, samples, and what the picture was limited by as far as the statistics know.
+fn summary(statistics: &Statistics, pixels: usize) -> String {
+    let Statistics { samples, rays, lost_paths, time_s, .. } = statistics;
+    let total = if time_s.total < 10.0 { format!("{:.1} s", time_s.total) } else { duration(time_s.total) };
+    let per_pixel = counted(*samples as usize, "sample");
+    let all = pixels as u64 * u64::from(*samples);
+    let (phase, seconds) = longest(time_s);
+    let share = 100.0 * seconds / time_s.total.max(f64::MIN_POSITIVE);
+    let mut text = format!("done in {total}, {share:.0} % of it {phase}; {per_pixel} a pixel, {all} in all");
+    let paths = rays.eye + rays.gather;
+    let lost = 100.0 * *lost_paths as f64 / paths.max(1) as f64;
+    if lost >= 0.1 {
+        text +=
+            &format!("; {lost:.1} % of the paths lost to the limit of specular bounces or to black surfaces");
+    }
+    text
+}
+
+/// The phase that took the most time, and its seconds.
+fn longest(times: &Times) -> (&'static str, f64) {
+    let phases = [
+        ("reading the scene", times.scene),
+        ("tracing photons", times.photons),
+        ("building the card image", times.pack),
+        ("loading the cards", times.load),
+        ("rendering", times.render),
+    ];
+    phases.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
+}
+
+/// Prints a table of the reads of card memory.
+fn say_memory(memory: &MemoryStatistics, statistics: &Statistics) {
+    let gathers = statistics.gathers;
+    let rays = &statistics.rays;
+    let rays = rays.eye + rays.shadow + rays.gather + rays.survey;
+    say(format_args!("photoncard: memory behind {}", memory.caches));
+    say(format_args!("photoncard:             requests     hits          raw bytes         DRAM bytes"));
+    for (name, reads) in [("photon map", &memory.photon_map), ("scene", &memory.scene)] {
+        let ReadStatistics { requests, raw_bytes, line_hits, dram_bytes, .. } = reads;
+        let hits = 100.0 * *line_hits as f64 / (*requests).max(1) as f64;
+        let line = format!("{name:10} {requests:>12} {hits:>6.2} % {raw_bytes:>18} {dram_bytes:>18}");
+        say(format_args!("photoncard: {line}"));
+    }
+    let each = |bytes: u64, count: u64| bytes as f64 / count.max(1) as f64;
+    let of_gather = each(memory.photon_map.dram_bytes, gathers);
+    let of_ray = each(memory.scene.dram_bytes, rays);
+    say(format_args!("photoncard: {of_gather:.1} DRAM bytes of the photon map a gather, of {gathers}"));
+    say(format_args!("photoncard: {of_ray:.1} DRAM bytes of the scene a ray, of {rays}"));
+}
+
+/// A number with its noun.
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_ignored_contents_are_named_and_the_others_counted() {
+        let line = |count: usize| {
+            let notices: Vec<String> = (0..count).map(|index| format!("n{index}")).collect();
+            ignored(Path::new("a.glb"), &notices)
+        };
+        assert_eq!(line(0), None);
+        assert_eq!(line(3).as_deref(), Some("n0; n1; n2"));
+        assert_eq!(line(5).as_deref(), Some("n0; n1; n2; and 2 more, see photoncard scene info a.glb"));
+    }
+
+    #[test]
+    fn the_end_states_time_samples_and_limits() {
+        let mut statistics = Statistics { samples: 4, ..Statistics::default() };
+        statistics.time_s = Times { photons: 1.0, render: 3.0, total: 4.0, ..Times::default() };
+        statistics.rays.eye = 1000;
+        let plain = "done in 4.0 s, 75 % of it rendering; 4 samples a pixel, 40 in all";
+        assert_eq!(summary(&statistics, 10), plain);
+        statistics.lost_paths = 20;
+        let lost = "; 2.0 % of the paths lost to the limit of specular bounces or to black surfaces";
+        assert_eq!(summary(&statistics, 10), format!("{plain}{lost}"));
+        let none = summary(&Statistics::default(), 0);
+        assert!(none.starts_with("done in 0.0 s, 0 %"), "{none}");
+    }
+}

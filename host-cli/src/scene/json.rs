@@ -1,0 +1,99 @@
+//! Contents of a scene as JSON. The keys are stable.
+
+use photoncard_driver::scene::{
+    Camera, Encoding, Image, Material, PunctualKind, PunctualLight, Reflection, Scene,
+};
+use serde_json::{Value, json};
+
+/// All contents of a scene but its vertices and texels.
+pub(super) fn contents(scene: &Scene) -> Value {
+    let (lower, upper) = scene.bounds();
+    json!({
+        "triangles": scene.triangles.len(),
+        "emissive_triangles": scene.emissive_triangles(),
+        "skipped_triangles": scene.skipped_triangles,
+        "bounds": [lower.to_array(), upper.to_array()],
+        "textures": scene.textures.len(),
+        "cameras": scene.cameras.iter().map(camera).collect::<Vec<_>>(),
+        "lights": scene.lights.iter().map(light).collect::<Vec<_>>(),
+        "materials": scene.materials.iter().map(material).collect::<Vec<_>>(),
+        "images": scene.images.iter().map(image).collect::<Vec<_>>(),
+        "variants": scene.variants,
+        "ignored": scene.notices,
+    })
+}
+
+fn camera(camera: &Camera) -> Value {
+    let Camera { name, origin, forward, up, vertical_fov, aspect, right: _ } = camera;
+    json!({
+        "name": name,
+        "at": origin.to_array(),
+        "forward": forward.to_array(),
+        "up": up.to_array(),
+        "fov": vertical_fov.to_degrees(),
+        "aspect": aspect,
+    })
+}
+
+fn light(light: &PunctualLight) -> Value {
+    let PunctualLight { name, kind, intensity } = light;
+    let degrees = |cosine: f32| cosine.clamp(-1.0, 1.0).acos().to_degrees();
+    let (kind, position, direction, cone) = match kind {
+        PunctualKind::Point { position } => ("point", Some(position.to_array()), None, None),
+        PunctualKind::Spot { position, direction, inner_cosine, outer_cosine } => {
+            let cone = [degrees(*inner_cosine), degrees(*outer_cosine)];
+            ("spot", Some(position.to_array()), Some(direction.to_array()), Some(cone))
+        }
+        PunctualKind::Directional { direction } => ("directional", None, Some(direction.to_array()), None),
+    };
+    json!({
+        "name": name,
+        "kind": kind,
+        "at": position,
+        "direction": direction,
+        "cone_degrees": cone,
+        "intensity": intensity.to_array(),
+    })
+}
+
+fn material(material: &Material) -> Value {
+    json!({
+        "name": material.name,
+        "reflection": reflection(&material.reflection),
+        "emission": material.emission.to_array(),
+        "double_sided": material.double_sided,
+        "alpha": material.alpha,
+        "alpha_cutoff": material.alpha_cutoff,
+        "blends": material.blends,
+        "base_texture": material.base_texture,
+        "metallic_roughness_texture": material.metallic_roughness_texture,
+        "emissive_texture": material.emissive_texture,
+    })
+}
+
+fn reflection(reflection: &Reflection) -> Value {
+    match reflection {
+        Reflection::Phong { diffuse, specular, exponent } => json!({
+            "model": "phong",
+            "diffuse": diffuse.to_array(),
+            "specular": specular.to_array(),
+            "exponent": exponent,
+        }),
+        Reflection::MetallicRoughness { base_colour, metallic, roughness, transmission, .. } => json!({
+            "model": "metallic-roughness",
+            "base_colour": base_colour.to_array(),
+            "metallic": metallic,
+            "roughness": roughness,
+            "transmission": transmission.map(|transmission| transmission.factor),
+            "ior": transmission.map(|transmission| transmission.ior),
+        }),
+    }
+}
+
+fn image(image: &Image) -> Value {
+    let encoding = match image.encoding {
+        Encoding::Srgb => "srgb",
+        Encoding::Linear => "linear",
+    };
+    json!({"name": image.name, "width": image.width, "height": image.height, "encoding": encoding})
+}

@@ -1,0 +1,20 @@
+//! `photoncard tonemap`.
+
+use photoncard_driver::exr::read_rgb;
+use photoncard_driver::tone_mapping::{PngError, write_png};
+
+use crate::arguments::TonemapOptions;
+use crate::failure::Failure;
+use crate::outputs;
+
+/// Tone-maps a picture.
+pub(crate) fn run(options: &TonemapOptions) -> Result<(), Failure> {
+    let TonemapOptions { input, output, tone } = options;
+    outputs::check(&[(input, "the picture to read")], &[output], &[])?;
+    let picture = read_rgb(input).map_err(|error| Failure::input_error(&error))?;
+    let written = write_png(output, picture.size(), picture.pixels.iter().copied(), tone.mapping());
+    written.map_err(|error| match error {
+        PngError::NotANumber { .. } => Failure::input_error(&error),
+        _ => Failure::work_error(&error),
+    })
+}
