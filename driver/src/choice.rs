@@ -1,6 +1,6 @@
 //! Choices: enumerations whose values have names, by which options, files and reports refer to them.
 
-use photoncard_shared::message::{Radiance, Sampling};
+use photoncard_shared::message::{Filter, Radiance, Sampling};
 
 /// An enumeration whose values have names.
 pub trait Choice: Copy + Send + Sync + 'static {
@@ -55,6 +55,12 @@ choices!(Sampling {
     Photon = "photon": "The photons that arrive at the point",
     Product = "combined": "The product of both",
     Mixture = "mixture": "The mean of both",
+});
+
+choices!(Filter {
+    Box = "box": "The pixel's square",
+    Gaussian = "gaussian": "A Gaussian of the standard deviation 1/2 pixel, cut off at 3/2 pixels; smooth",
+    BlackmanHarris = "blackman-harris": "A Blackman-Harris window of 3/2 pixels; crisp",
 });
 
 choices!(Radiance {

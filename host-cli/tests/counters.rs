@@ -55,7 +55,8 @@ fn counters_add_up_and_change_no_picture() {
     let cornell = shipped("cornell-glossy.gltf");
     let render = |name: &str, options: &[&str]| {
         let (exr, json) = (format!("{name}.exr"), format!("{name}.json"));
-        let common = ["-o", &exr, "--stats", &json, "--size", "20x20", "--photons", "3000"];
+        let common =
+            ["-o", &exr, "--stats", &json, "--quality", "paper", "--size", "20x20", "--photons", "3000"];
         room.rendered(&cornell, &[&common, options].concat())
     };
     let plain = render("plain", &[]);

@@ -28,7 +28,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 9;
+pub const PROTOCOL_VERSION: u16 = 10;
 
 /// Maximum number of lines of one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
@@ -103,6 +103,21 @@ pub struct FrameParameters {
     /// `true` for pixels with [`PixelLayers`]. Their [`Pixel`]s do not change; tiles have fewer pixels
     /// ([`Budget::pixels_of_tile`]).
     pub layers: bool,
+    /// Pixel filter.
+    pub filter: Filter,
+}
+
+/// Pixel filter: the density of a pixel's samples around its centre, in both directions alike. Samples are drawn from the filter and
+/// count equally (Ernst, Stamminger, Greiner 2006, *Filter importance sampling*), so that no pixel needs those of its neighbours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Filter {
+    /// The pixel's square.
+    #[default]
+    Box,
+    /// A Gaussian of the standard deviation 1/2 pixel, cut off at 3/2 pixels.
+    Gaussian,
+    /// A Blackman-Harris window of four terms, 3/2 pixels wide.
+    BlackmanHarris,
 }
 
 /// Parameters of gathers in the caustic map.

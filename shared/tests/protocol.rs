@@ -233,7 +233,7 @@ fn the_page_is_of_this_version() {
 /// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
 #[test]
 fn golden_structures() {
-    assert_eq!(PROTOCOL_VERSION, 9);
+    assert_eq!(PROTOCOL_VERSION, 10);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,
@@ -280,6 +280,7 @@ fn golden_structures() {
         radiance: Radiance::Precomputed,
         caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
         layers: true,
+        filter: Filter::BlackmanHarris,
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero].concat();
@@ -292,7 +293,7 @@ fn golden_structures() {
         &one,
         &[8, 2, 0xac, 2, 1, 1, 50],
         &one,
-        &[1],
+        &[1, 2],
     ]
     .concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);

@@ -8,8 +8,8 @@ use photoncard_driver::layer::Layers;
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{
-    CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling, Schedule,
-    TileOutputs,
+    CardAddress, CardSet, Filter, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling,
+    Schedule, TileOutputs,
 };
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::GatherOrder;
@@ -76,6 +76,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             look_at: Pixels = Some([0.1, 0.2, -0.3]),
             fov: Pixels = Some(20.0),
             layers: Pixels = Layers::all(),
+            filter: Pixels = Filter::Gaussian,
         }
         photons: PhotonMaps {
             count: Image = 2001,

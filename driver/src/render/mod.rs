@@ -30,10 +30,10 @@ pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use observer::{Observer, Phase, Unobserved};
 pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::MemoryUse;
-pub use photoncard_shared::message::{Radiance, Sampling};
+pub use photoncard_shared::message::{Filter, Radiance, Sampling};
 pub use settings::{
     CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM, PhotonMaps,
-    Picture, RenderSettings, Schedule, TileOutputs,
+    Picture, Quality, RenderSettings, Schedule, TileOutputs,
 };
 pub use statistics::{LinkStatistics, Rays, Statistics};
 pub use times::Times;

@@ -7,7 +7,7 @@ use super::record::{Content, Record};
 use super::{IrradianceCache, LatticePoint};
 use crate::kind::{Capacity, Map};
 use crate::scene::Surface;
-use crate::vector::min;
+use crate::vector::{max, min};
 
 /// Minimum sum of the weights of a sample's records.
 const MIN_WEIGHT: f32 = 0.05;
@@ -71,9 +71,9 @@ impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
     /// Weights of the records for a sample; `None` if it cannot be interpolated.
     fn weights(&self, sample: &SeenSample, allowed: f32) -> Option<Weights> {
         let SeenSample { pixel, film, surface } = *sample;
-        // By pixel, as rounding may move `film` to the border of the next pixel.
+        // By pixel, as the filter may move `film` out of the pixel.
         let cell = self.undivided_cell(pixel)?;
-        let part = |at: f32, from: u32| (at - from as f32) / cell.side() as f32;
+        let part = |at: f32, from: u32| min(max((at - from as f32) / cell.side() as f32, 0.0), 1.0);
         let [x, y] = [part(film[0], cell.corner.x), part(film[1], cell.corner.y)];
         let bilinear = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
         let corners = self.corners(&cell);

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use photoncard_shared::message::Fault;
 
+use super::pixel_filter::place;
 use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choice};
 use super::{Context, PixelSample};
 use crate::memory::{MemoryPort, Stage};
@@ -11,13 +12,14 @@ use crate::scene::light::environment_radiance;
 use crate::scene::{Ray, Seen, Surface, closest_hit, read_surface};
 use crate::vector::unit;
 
-/// Position of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over
-/// its square (box filter).
+/// Position of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over the pixel filter,
+/// which may reach beyond the pixel and the picture.
 pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     let PixelSample { x, y, sample } = pixel;
     let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Pixel);
     let [jitter_x, jitter_y] = pattern.point(sample, context.frame.samples);
-    [x as f32 + jitter_x, y as f32 + jitter_y]
+    let filter = context.frame.filter;
+    [x as f32 + place(filter, jitter_x), y as f32 + place(filter, jitter_y)]
 }
 
 /// Surface that a sample sees.

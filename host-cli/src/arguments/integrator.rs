@@ -12,22 +12,22 @@ pub(crate) struct IntegratorOptions {
     /// Seed of all random numbers
     #[arg(long, default_value_t = Integrator::default().seed, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) seed: u32,
-    /// Final gather rays per sample
-    #[arg(long, default_value_t = Integrator::default().gather_rays, allow_negative_numbers = true)]
-    pub(super) gather_rays: u32,
-    /// Shadow rays per sample
-    #[arg(long, default_value_t = Integrator::default().shadow_rays, allow_negative_numbers = true, hide_short_help = true)]
-    pub(super) shadow_rays: u32,
-    /// Samples per pixel
-    #[arg(long, default_value_t = Integrator::default().samples, allow_negative_numbers = true)]
-    pub(super) spp: u32,
+    /// Final gather rays per sample, or per irradiance record [default: by --quality]
+    #[arg(long, allow_negative_numbers = true)]
+    gather_rays: Option<u32>,
+    /// Shadow rays per sample [default: by --quality]
+    #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
+    shadow_rays: Option<u32>,
+    /// Samples per pixel [default: by --quality]
+    #[arg(long, allow_negative_numbers = true)]
+    spp: Option<u32>,
     /// Sampling density of the directions of gather rays; it never changes the picture's expected value
     #[arg(long, default_value = Integrator::default().sampling.name(), value_parser = choice::<Sampling>(), hide_short_help = true)]
     pub(super) sampling: Sampling,
-    /// Gather the indirect light of Lambertian surfaces at sparse points, and interpolate between them
-    #[arg(long, default_value = "off", value_parser = switch(), action = ArgAction::Set)]
-    pub(super) irradiance_cache: bool,
-    /// Maximum relative error of interpolated irradiance [default: 0.025]
+    /// Gather the indirect light of Lambertian surfaces at sparse points, and interpolate between them [default: by --quality]
+    #[arg(long, value_parser = switch(), action = ArgAction::Set)]
+    irradiance_cache: Option<bool>,
+    /// Maximum relative error of interpolated irradiance [default: by --quality, 0.025 for paper]
     #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) ic_error: Option<f32>,
 }
@@ -36,17 +36,36 @@ pub(crate) struct IntegratorOptions {
 const DEFAULT_IC_ERROR: f32 = 0.025;
 
 impl IntegratorOptions {
-    /// Settings of these options.
-    pub(super) fn settings(&self) -> Integrator {
-        let is_cached = self.irradiance_cache && self.gather_rays > 0;
+    /// Settings of these options; `base` gives those that are not stated.
+    pub(super) fn settings(&self, base: &Integrator) -> Integrator {
+        let gather_rays = self.gather_rays.unwrap_or(base.gather_rays);
+        let error = self.ic_error.or(base.irradiance_error).unwrap_or(DEFAULT_IC_ERROR);
         Integrator {
             seed: self.seed,
-            samples: self.spp,
-            gather_rays: self.gather_rays,
-            shadow_rays: self.shadow_rays,
+            samples: self.spp.unwrap_or(base.samples),
+            gather_rays,
+            shadow_rays: self.shadow_rays.unwrap_or(base.shadow_rays),
             sampling: self.sampling,
-            irradiance_error: is_cached.then_some(self.ic_error.unwrap_or(DEFAULT_IC_ERROR)),
+            irradiance_error: (self.is_cached(base) && gather_rays > 0).then_some(error),
         }
+    }
+
+    fn is_cached(&self, base: &Integrator) -> bool {
+        self.irradiance_cache.unwrap_or(base.irradiance_error.is_some())
+    }
+
+    /// For each option, whether it has no effect, its name, and the reason.
+    pub(super) fn without_effect(&self, base: &Integrator) -> [(bool, &'static str, String); 2] {
+        let is_cached = self.is_cached(base);
+        let has_no_rays = self.gather_rays == Some(0);
+        [
+            (self.ic_error.is_some() && !is_cached, "--ic-error", "without --irradiance-cache on".to_owned()),
+            (
+                self.irradiance_cache == Some(true) && has_no_rays,
+                "--irradiance-cache on",
+                "with --gather-rays 0".to_owned(),
+            ),
+        ]
     }
 }
 

@@ -10,16 +10,16 @@ use super::choice::choice;
 #[derive(Args)]
 #[command(next_help_heading = "Photon maps")]
 pub(crate) struct PhotonOptions {
-    /// Photons stored in the map
-    #[arg(long, default_value_t = PhotonMaps::default().count, allow_negative_numbers = true)]
-    pub(super) photons: usize,
+    /// Photons stored in the map [default: by --quality]
+    #[arg(long, allow_negative_numbers = true)]
+    photons: Option<usize>,
     /// Layout of the photon map in card memory; it never changes the picture
     #[arg(long, default_value = PhotonMaps::default().layout.name(), value_parser = choice::<PhotonLayout>(), hide_short_help = true)]
     pub(super) photon_map: PhotonLayout,
-    /// Photons that a gather searches for
-    #[arg(long, default_value_t = PhotonMaps::default().neighbors, allow_negative_numbers = true, hide_short_help = true)]
-    pub(super) neighbors: u32,
-    /// Photons of the caustic map: light focused by mirrors, glass and glossy surfaces [default: 200000 if the scene has any]
+    /// Photons that a gather searches for [default: by --quality]
+    #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
+    neighbors: Option<u32>,
+    /// Photons of the caustic map: light focused by mirrors, glass and glossy surfaces [default: by --quality, if the scene has any]
     ///
     /// With 0 gather rays carry this light, with more noise, and that of punctual lights is lost.
     #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true)]
@@ -43,20 +43,18 @@ pub(super) enum MaxDistance {
 }
 
 impl PhotonOptions {
-    /// Settings of these options.
-    pub(super) fn settings(&self) -> PhotonMaps {
+    /// Settings of these options; `base` gives those that are not stated.
+    pub(super) fn settings(&self, base: &PhotonMaps) -> PhotonMaps {
         PhotonMaps {
-            count: self.photons,
+            count: self.photons.unwrap_or(base.count),
             layout: self.photon_map,
-            neighbors: self.neighbors,
+            neighbors: self.neighbors.unwrap_or(base.neighbors),
             max_distance: match self.max_distance {
                 MaxDistance::Auto => None,
                 MaxDistance::Metres(distance) => Some(distance),
             },
-            caustic_photons: self.caustic_photons,
-            caustic_neighbors: self
-                .caustic_neighbors
-                .unwrap_or_else(|| PhotonMaps::default().caustic_neighbors),
+            caustic_photons: self.caustic_photons.or(base.caustic_photons),
+            caustic_neighbors: self.caustic_neighbors.unwrap_or(base.caustic_neighbors),
             radiance: self.radiance,
         }
     }

@@ -3,8 +3,10 @@
 use clap::Args;
 use photoncard_driver::film::Window;
 use photoncard_driver::layer::Layers;
-use photoncard_driver::render::Picture;
+use photoncard_driver::render::{Filter, Picture};
 use photoncard_driver::scene::Camera;
+
+use super::choice::choice;
 
 /// Longer side of a picture without a given size, pixels.
 const SIDE: u32 = 512;
@@ -45,12 +47,15 @@ pub(crate) struct PictureOptions {
         )
     )]
     pub(super) aov: Option<Layers>,
+    /// Pixel filter [default: blackman-harris; box with --quality paper]
+    #[arg(long, value_parser = choice::<Filter>(), hide_short_help = true)]
+    filter: Option<Filter>,
 }
 
 impl PictureOptions {
-    /// Settings of these options.
-    pub(super) fn settings(&self) -> Picture {
-        let Self { size, crop, camera, camera_at, look_at, fov, aov: _ } = self;
+    /// Settings of these options; `base` gives those that are not stated.
+    pub(super) fn settings(&self, base: &Picture) -> Picture {
+        let Self { size, crop, camera, camera_at, look_at, fov, aov: _, filter } = self;
         let (width, height) = size.unwrap_or((SIDE, SIDE));
         Picture {
             width,
@@ -61,6 +66,7 @@ impl PictureOptions {
             look_at: *look_at,
             fov: *fov,
             layers: self.layers(),
+            filter: filter.unwrap_or(base.filter),
         }
     }
 

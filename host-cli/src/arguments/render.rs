@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::render::{Quality, RenderSettings};
 
 use super::cards::CardOptions;
+use super::choice::choice;
 use super::integrator::IntegratorOptions;
 use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
@@ -36,6 +38,9 @@ pub(crate) struct RenderOptions {
     /// The middle of the map is -z and its top is y.
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true, help_heading = "Scene")]
     pub(crate) environment: Option<EnvironmentOption>,
+    /// Quality of the picture, by which the options that are not stated are chosen
+    #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
+    pub(super) quality: Quality,
     #[command(flatten)]
     pub(crate) picture: PictureOptions,
     #[command(flatten)]
@@ -60,10 +65,11 @@ impl RenderOptions {
     /// Settings of these options.
     pub(crate) fn settings(&self) -> RenderSettings {
         let cards = self.cards.settings();
+        let base = self.quality.settings();
         RenderSettings {
-            picture: self.picture.settings(),
-            photons: self.photons.settings(),
-            integrator: self.integrator.settings(),
+            picture: self.picture.settings(&base.picture),
+            photons: self.photons.settings(&base.photons),
+            integrator: self.integrator.settings(&base.integrator),
             schedule: self.schedule.settings(&self.picture.layers(), &cards.addresses),
             cards,
             outputs: self.outputs.settings(),

@@ -12,7 +12,7 @@ impl RenderOptions {
     pub(crate) fn without_effect(&self, scene: &Scene) -> Vec<String> {
         let order = self.schedule.order;
         let name = order.name();
-        let is_cached = self.integrator.irradiance_cache;
+        let settings = self.settings();
         let without_specular =
             "without a caustic map: nothing in the scene is a mirror, glass or glossy".to_owned();
         let without_map = if self.photons.caustic_photons == Some(0) {
@@ -30,17 +30,7 @@ impl RenderOptions {
                 "without a metallic-roughness material".to_owned(),
             ),
             (
-                self.integrator.ic_error.is_some() && !is_cached,
-                "--ic-error",
-                "without --irradiance-cache on".to_owned(),
-            ),
-            (
-                is_cached && self.integrator.gather_rays == 0,
-                "--irradiance-cache on",
-                "with --gather-rays 0".to_owned(),
-            ),
-            (
-                self.photons.radiance == Radiance::Precomputed && self.integrator.gather_rays == 0,
+                self.photons.radiance == Radiance::Precomputed && settings.integrator.gather_rays == 0,
                 "--radiance precomputed",
                 "with --gather-rays 0".to_owned(),
             ),
@@ -66,7 +56,9 @@ impl RenderOptions {
                 format!("with --order {name}, which sends nothing over links"),
             ),
         ];
-        let said = cases.into_iter().chain(self.of_pictures()).filter(|(is_idle, ..)| *is_idle);
+        let of_rays = self.integrator.without_effect(&self.quality.settings().integrator);
+        let said =
+            cases.into_iter().chain(of_rays).chain(self.of_pictures()).filter(|(is_idle, ..)| *is_idle);
         said.map(|(_, option, why)| format!("{option} has no effect {why}")).collect()
     }
     /// Options on a format of pictures that is not written.

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 /// Options of a minimal render; a test adds its own.
-const SMALL: [(&str, &str); 5] = [
+const SMALL: [(&str, &str); 6] = [
+    ("--quality", "paper"),
     ("--size", "8x8"),
     ("--photons", "200"),
     ("--gather-rays", "4"),

@@ -224,7 +224,7 @@ def cycles(scene, samples, seed, output):
 def photoncard(arguments, scene_file, options):
     """CPU seconds and picture of photoncard, in Blender's units."""
     output = arguments.folder / "room.exr"
-    command = [arguments.photoncard, "render", scene_file, "-o", output, "--size", f"{arguments.size}x{arguments.size}"]
+    command = [arguments.photoncard, "render", scene_file, "--quality", "paper", "-o", output, "--size", f"{arguments.size}x{arguments.size}"]
     command += ["--aov", "none", "--card", "emulated:1", "--threads", "1", "--quiet", *options.split()]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run([str(word) for word in command], check=False, timeout=LIMIT_S)

@@ -51,7 +51,7 @@ class Renderers:
         for seed in (1, 2):
             output = self.folder / f"{scene.stem}-{seed}.exr"
             light = ",".join([str(stage.SKY)] * 3)
-            command = [self.photoncard, "render", scene, "-o", output, "--size", f"{SIZE}x{SIZE}", "--aov", "none"]
+            command = [self.photoncard, "render", scene, "--quality", "paper", "-o", output, "--size", f"{SIZE}x{SIZE}", "--aov", "none"]
             command += ["--environment", light, "--camera", stage.CAMERA, "--seed", seed, "--card", "emulated:1"]
             run([*command, "--threads", 1, "--quiet", *self.options])
             result.append(pictures.read(output))

@@ -83,7 +83,7 @@ def compare(name, arguments):
     path = reference(comparison, REFERENCES / f"{name}.exr", arguments, [])
     expected = read(path)
     output = arguments.folder / f"{name}.exr"
-    command = [arguments.photoncard, "render", *comparison.common(), "-o", output, "--quiet"]
+    command = [arguments.photoncard, "render", *comparison.common(), "--quality", "paper", "-o", output, "--quiet"]
     run([*command, *(arguments.options or comparison.settings)])
     picture = read(output)
     greatest = np.nan_to_num(blocks(expected, np.max))

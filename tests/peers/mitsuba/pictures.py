@@ -84,7 +84,7 @@ class Renderers:
     def ours(self, comparison, settings, name):
         """Renders with photoncard; its CPU seconds, and the picture."""
         output = self.folder / name
-        command = [self.photoncard, "render", SCENES / comparison.file, "-o", output, "--size", SIZE, "--quiet"]
+        command = [self.photoncard, "render", SCENES / comparison.file, "--quality", "paper", "-o", output, "--size", SIZE, "--quiet"]
         command += ["--card", "emulated:1"]
         before = children_seconds()
         run([*command, *settings.split()])

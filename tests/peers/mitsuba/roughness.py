@@ -34,7 +34,7 @@ def main():
     if not reference.exists():
         limit = ["--per-pass", "64", "--passes", "16", "--every", "16", "--work", arguments.folder]
         run([sys.executable, HERE / "converge.py", SCENE, *size, "--output", reference, *limit])
-    run([arguments.photoncard, "render", SCENE, *size, "-o", output, "--quiet", *(options or SETTINGS)])
+    run([arguments.photoncard, "render", SCENE, *size, "--quality", "paper", "-o", output, "--quiet", *(options or SETTINGS)])
     compare(read(output), read(reference))
 
 

@@ -9,7 +9,7 @@ use photoncard_driver::scene::Material;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::HEADER_LINES;
 use photoncard_shared::message::{
-    CausticGather, Command, Drain, FaultCode, FrameParameters, Radiance, Sampling, Tile,
+    CausticGather, Command, Drain, FaultCode, Filter, FrameParameters, Radiance, Sampling, Tile,
 };
 
 use super::mutation;
@@ -71,6 +71,7 @@ fn frame(choice: u8) -> FrameParameters {
         irradiance_error: is_set(3).then_some(0.2),
         bins: if is_set(4) { 8 } else { 1 },
         drain: [Drain::Immediate, Drain::Hash, Drain::Sort, Drain::Sort][usize::from(choice >> 5 & 3)],
+        filter: [Filter::Box, Filter::Gaussian, Filter::BlackmanHarris][usize::from(choice % 3)],
         queue: if is_set(7) { 3 } else { 64 },
         caustics: choice.is_multiple_of(3).then_some(CausticGather { neighbors: 10, max_distance: 0.3 }),
         layers: choice.count_ones() % 2 == 1,

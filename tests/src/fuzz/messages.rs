@@ -4,8 +4,8 @@ use photoncard_firmware::kind::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::message::{
-    self, Camera, CausticGather, Command, Drain, Fault, FaultCode, FrameParameters, MemoryUse, Radiance,
-    Reply, Sampling, Tile,
+    self, Camera, CausticGather, Command, Drain, Fault, FaultCode, Filter, FrameParameters, MemoryUse,
+    Radiance, Reply, Sampling, Tile,
 };
 
 use super::mutation;
@@ -36,6 +36,7 @@ pub(super) fn frame() -> FrameParameters {
         neighbors: 100,
         max_distance: 0.5,
         sampling: Sampling::Product,
+        filter: Filter::Gaussian,
         irradiance_error: Some(0.1),
         bins: 64,
         drain: Drain::Sort,

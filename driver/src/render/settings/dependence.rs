@@ -21,7 +21,7 @@ impl RenderSettings {
         let Schedule { tile: _, order: _, bins: _, queue: _ } = schedule;
         let CardSet { addresses: _, faults: _, verify: _, caches: _, trace: _ } = cards;
         let TileOutputs { partial: _, display: _ } = outputs;
-        let Picture { width, height, crop: _, camera, camera_at, look_at, fov, layers } = picture;
+        let Picture { width, height, crop: _, camera, camera_at, look_at, fov, layers, filter } = picture;
         let PhotonMaps {
             count,
             layout: _,
@@ -40,6 +40,7 @@ impl RenderSettings {
             ("camera-at", json!(camera_at)),
             ("look-at", json!(look_at)),
             ("fov", json!(fov)),
+            ("filter", json!(filter.name())),
             ("aov", json!(layers.of_chip().to_string())),
             ("photons", json!(count)),
             ("neighbors", json!(neighbors)),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use photoncard_shared::message::{Radiance, Sampling};
+use photoncard_shared::message::{Filter, Radiance, Sampling};
 
 use crate::display::DisplaySettings;
 use crate::emulator::memory_model::CacheSettings;
@@ -33,6 +33,8 @@ pub struct Picture {
     pub fov: Option<f32>,
     /// Layers of the picture besides radiance.
     pub layers: Layers,
+    /// Pixel filter.
+    pub filter: Filter,
 }
 
 impl Default for Picture {
@@ -46,6 +48,7 @@ impl Default for Picture {
             look_at: None,
             fov: None,
             layers: Layers::default(),
+            filter: Filter::Box,
         }
     }
 }
