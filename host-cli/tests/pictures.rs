@@ -271,7 +271,7 @@ fn a_view_by_options_is_that_of_a_camera_there() {
         assert!(pixels(name, &view) == expected, "{name}");
     }
     assert!(pixels("without.gltf", &[]) != expected);
-    // What is not given is the camera's own.
+    // Options that are not given leave the camera's own values.
     assert!(pixels("other.gltf", &[&place[..], &["--fov=45"]].concat()) == expected);
     assert!(pixels("other.gltf", &place) != expected);
 }
