@@ -47,7 +47,7 @@ const MARGIN: f32 = 1e-3;
 impl Targets {
     /// All surfaces of a scene that reflect or transmit specularly: all caustic photons meet one.
     pub(super) fn specular(scene: &Scene) -> Self {
-        Self { share: 1.0, ..Self::around(scene, &scene.specular_materials()) }
+        Self::around(scene, &scene.specular_materials(), 1.0)
     }
 
     /// All surfaces of a scene but lamps, that is uniform emitters of at least [`LAMP_SHARE`] of the greatest emission: what these
@@ -59,11 +59,11 @@ impl Targets {
             emission(material) <= LAMP_SHARE * greatest || material.emissive_texture.is_some()
         };
         let is_lit: Vec<_> = scene.materials.iter().map(is_lit).collect();
-        Self { share: AIMED_SHARE, ..Self::around(scene, &is_lit) }
+        Self::around(scene, &is_lit, AIMED_SHARE)
     }
 
     /// Surfaces of the chosen materials.
-    fn around(scene: &Scene, is_chosen: &[bool]) -> Self {
+    fn around(scene: &Scene, is_chosen: &[bool], share: f32) -> Self {
         let triangles = scene.triangles.iter().filter(|triangle| is_chosen[triangle.material as usize]);
         let all: Vec<[Vec3; 3]> = triangles.map(|triangle| triangle.vertices).collect();
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
@@ -82,7 +82,7 @@ impl Targets {
                 None => parts[index].may_be_split = false,
             }
         }
-        Self { spheres: parts.into_iter().map(|part| part.sphere).collect(), share: 0.0 }
+        Self { spheres: parts.into_iter().map(|part| part.sphere).collect(), share }
     }
 
     pub(crate) fn is_empty(&self) -> bool {

@@ -211,39 +211,33 @@ fn from_emitter(
             })
         }
         EmitterKind::Point { position } => {
-            let position = Vec3::from(position);
-            let aim = aim(way, position, SolidCone::ALL, [c, d]);
-            aim.map(|Aim { towards, measure }| Emission {
-                ray: Ray::new(position, towards),
-                power: intensity * measure,
-                has_extent: true,
-            })
+            from_point(way, position.into(), SolidCone::ALL, [c, d], |_| intensity)
         }
         EmitterKind::Spot { position, direction, scale, offset } => {
-            let [position, axis] = [position, direction].map(Vec3::from);
+            let axis = Vec3::from(direction);
             let height = (1.0 + offset / scale).clamp(0.0, 2.0);
-            let aim = aim(way, position, SolidCone { axis, height }, [c, d]);
-            aim.map(|Aim { towards, measure }| Emission {
-                ray: Ray::new(position, towards),
-                power: intensity * (measure * falloff(axis.dot(towards), scale, offset)),
-                has_extent: true,
-            })
+            let towards = |direction: Vec3| intensity * falloff(axis.dot(direction), scale, offset);
+            from_point(way, position.into(), SolidCone { axis, height }, [c, d], towards)
         }
     })
 }
 
-/// Direction in the cone of emission, or towards the targets.
-fn aim(way: Way, from: Vec3, cone: SolidCone, square: [f32; 2]) -> Option<Aim> {
-    let Way { targets, is_aimed } = way;
+/// Emission from a point by a radiant intensity that lies in a cone, W/sr: towards the targets, or in the cone.
+fn from_point(
+    way: Way,
+    position: Vec3,
+    cone: SolidCone,
+    square: [f32; 2],
+    intensity: impl Fn(Vec3) -> Vec3,
+) -> Option<Emission> {
     let free = Aim { towards: cone.direction(square), measure: cone.solid_angle() };
-    let aim = if is_aimed { targets.direction(from, square)? } else { free };
-    if targets.share == 0.0 || targets.share == 1.0 {
-        return Some(aim);
-    }
-    let Aim { towards, .. } = aim;
-    let free = if cone.holds(towards) { 1.0 / cone.solid_angle() } else { 0.0 };
-    let density = targets.mixed(targets.direction_density(from, towards), free);
-    (density > 0.0).then(|| Aim { towards, measure: 1.0 / density })
+    let Aim { towards, measure } = if way.is_aimed { way.targets.direction(position, square)? } else { free };
+    let ray = Ray::new(position, towards);
+    let emission = Emission { ray, power: intensity(towards) * measure, has_extent: true };
+    way.balanced(Some(emission), |_| {
+        let free = if cone.holds(towards) { 1.0 / cone.solid_angle() } else { 0.0 };
+        [way.targets.direction_density(position, towards), free]
+    })
 }
 
 /// Emission of a point on a triangle, cosine-weighted, per square metre; from both sides if double-sided.
