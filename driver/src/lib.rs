@@ -108,6 +108,7 @@
 //! | sinks | [`viewer`], [`partial`], [`display`] | [`Viewer`](viewer::Viewer), the trait of sinks that show tiles; the file of finished tiles, for `--resume`; the client of a display server |
 //! | cost model | [`cost_model`] | FLOPs and DRAM bytes of a frame by Table 7.1 |
 //! | render | [`render`] | one render from a scene to a complete film; settings, statistics, card addresses |
+//! | quality | [`quality`] | settings for what a picture is needed for, by pilot renders |
 //! | studies | [`study`] | measurements of shipped scenes, and reports |
 //!
 //! Below all of them are [`photoncard_shared`] (formats of memory and wire) and [`photoncard_firmware`]. `pack`, `light`,
@@ -148,6 +149,7 @@ pub mod partial;
 pub mod photon;
 pub mod photon_map;
 pub mod printable;
+pub mod quality;
 pub mod render;
 pub mod scene;
 pub mod scheduler;

@@ -32,6 +32,7 @@ pub(crate) use self::writer::ImageWriter;
 const BYTES_OF_A_TRIANGLE: u64 = 700;
 
 /// The card image of a scene without photons, and the sources that light it.
+#[derive(Clone)]
 pub struct PackedScene {
     image: CardImage,
     sources: Sources,

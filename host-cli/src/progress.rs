@@ -68,7 +68,7 @@ impl Progress {
     }
 
     /// Prints a line above the bar.
-    fn say(&self, line: Arguments) {
+    pub(crate) fn say(&self, line: Arguments) {
         match self.display() {
             Some(display) => display.bar.suspend(|| say(line)),
             None => say(line),
@@ -137,14 +137,14 @@ impl Display {
         self.told = 0;
         self.remaining = match phase {
             Phase::Tiles => Remaining::new(self.cards, self.resumed),
-            Phase::Photons | Phase::Pack | Phase::Load => Remaining::new(1, 0),
+            Phase::Pilot | Phase::Photons | Phase::Pack | Phase::Load => Remaining::new(1, 0),
         };
         let target =
             if self.on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         self.bar = ProgressBar::with_draw_target(Some(total), target);
         let template = match phase {
             Phase::Load => "{msg:8} {bar:40} {bytes}/{total_bytes}{prefix}",
-            Phase::Pack => "{msg:8} {elapsed}",
+            Phase::Pilot | Phase::Pack => "{msg:8} {elapsed}",
             Phase::Photons | Phase::Tiles => "{msg:8} {bar:40} {pos}/{len}{prefix}",
         };
         // The fallback is indicatif's own template.
@@ -177,6 +177,7 @@ pub(crate) fn duration(seconds: f64) -> String {
 
 fn name(phase: Phase) -> &'static str {
     match phase {
+        Phase::Pilot => "pilot",
         Phase::Photons => "photons",
         Phase::Pack => "pack",
         Phase::Load => "load",

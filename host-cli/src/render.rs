@@ -3,9 +3,11 @@
 mod files;
 mod messages;
 
+use std::sync::OnceLock;
 use std::time::Instant;
 
-use photoncard_driver::render::{CardAddress, RenderSettings, render};
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::render::{CardAddress, RenderError, RenderSettings, render_chosen};
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scene::gltf::load_for;
 
@@ -23,7 +25,12 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let scene_seconds = start.elapsed().as_secs_f64();
     let progress = Progress::start(options.quiet, settings.cards.count())
         .map_err(|error| Failure::work_error(&error))?;
-    let result = on_threads(options.threads, || render(&scene, &settings, &progress))?;
+    let chosen = OnceLock::new();
+    let choose = |packed: &PackedScene| {
+        let settings = choose(options, &settings, &scene, packed, &progress)?;
+        Ok(chosen.get_or_init(|| settings).clone())
+    };
+    let result = on_threads(options.threads, || render_chosen(&scene, &settings, &choose, &progress))?;
     progress.finish();
     let mut rendering = result.inspect_err(|error| {
         if !error.is_input() && progress.has_kept() {
@@ -33,6 +40,7 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     })?;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
+    let settings = chosen.into_inner().unwrap_or(settings);
     files::write(options, &settings, &scene, &rendering)?;
     if let Some(partial) = rendering.partial.take() {
         partial.remove().map_err(Failure::work)?;
@@ -41,6 +49,29 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
         messages::say_done(options, &rendering);
     }
     Ok(())
+}
+
+/// Settings of the options, with those of the quality for this scene where none is stated.
+fn choose(
+    options: &RenderOptions,
+    settings: &RenderSettings,
+    scene: &Scene,
+    packed: &PackedScene,
+    progress: &Progress,
+) -> Result<RenderSettings, RenderError> {
+    let fit = options.quality.fit(scene, packed, settings, progress)?;
+    let base = options.quality.settings().with(|base| {
+        if let Some(fit) = &fit {
+            fit.apply(base);
+        }
+    });
+    let picture = settings.picture.clone();
+    let chosen = options.settings_over(&base).with(|chosen| chosen.picture = picture);
+    if !options.quiet {
+        progress
+            .say(format_args!("photoncard: {}", messages::chosen(options.quality, &chosen, fit.as_ref())));
+    }
+    Ok(chosen)
 }
 
 fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {

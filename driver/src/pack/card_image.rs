@@ -10,6 +10,7 @@ use photoncard_shared::image::{Header, Section, SectionKind};
 use photoncard_shared::layout::{BvhNode, NodeBox, WideNode};
 
 /// Card image.
+#[derive(Clone)]
 pub struct CardImage {
     /// Header, as encoded in the first lines.
     pub(super) header: Header,

@@ -33,7 +33,7 @@ pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Filter, Radiance, Sampling};
 pub use settings::{
     CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM, PhotonMaps,
-    Picture, Quality, RenderSettings, Schedule, TileOutputs,
+    Picture, RenderSettings, Schedule, TileOutputs,
 };
 pub use statistics::{LinkStatistics, Rays, Statistics};
 pub use times::Times;
@@ -47,6 +47,7 @@ use self::outputs::Outputs;
 use self::preparation::prepare;
 use self::whole_frame::WholeFrame;
 use crate::film::Film;
+use crate::pack::PackedScene;
 use crate::partial::PartialRender;
 use crate::scene::Scene;
 use crate::scheduler::tiles;
@@ -72,6 +73,20 @@ pub fn render(
     settings: &RenderSettings,
     observer: &dyn Observer,
 ) -> Result<Rendering, RenderError> {
+    render_chosen(scene, settings, &|_| Ok(settings.clone()), observer)
+}
+
+/// Renders a scene with settings that are chosen when the cards have answered and the scene is packed. `choose` takes the packed scene
+/// and returns `settings` with other photons or another integrator.
+///
+/// # Errors
+/// As [`render`], and those of `choose`.
+pub fn render_chosen(
+    scene: &Scene,
+    settings: &RenderSettings,
+    choose: &dyn Fn(&PackedScene) -> Result<RenderSettings, RenderError>,
+    observer: &dyn Observer,
+) -> Result<Rendering, RenderError> {
     let start = Instant::now();
     let camera = settings.camera(scene)?;
     settings.check()?;
@@ -80,12 +95,21 @@ pub fn render(
     for budget in &budgets {
         settings.check_budget(budget)?;
     }
+    let mut times = Times::default();
+    let packed = PackedScene::new(scene)?;
+    times.hierarchy = start.elapsed().as_secs_f64();
+    times.pack = times.hierarchy;
+    let settings = &choose(&packed)?;
+    times.pilot = start.elapsed().as_secs_f64() - times.pack;
+    settings.check()?;
+    for budget in &budgets {
+        settings.check_budget(budget)?;
+    }
     // A film may be large: it is allocated after the settings are checked.
     let mut film = settings.film()?;
     let tiles = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
     let outputs = Outputs::open(scene, settings, &tiles, &mut film, observer)?;
-    let mut times = Times::default();
-    let prepared = prepare(scene, settings, &budgets, &mut times, observer)?;
+    let prepared = prepare(scene, packed, settings, &budgets, &mut times, observer)?;
     let frame = settings.frame(&camera, prepared.max_distance, prepared.caustics);
     let film = Mutex::new(film);
     let sinks = outputs.sinks(&film, executor.finishes_tiles_early());

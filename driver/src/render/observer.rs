@@ -7,6 +7,8 @@ use super::error::CardError;
 /// Phase of a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
+    /// Pilot renders, by which settings are chosen: without progress.
+    Pilot,
     /// Tracing photons: progress in photons.
     Photons,
     /// Building the photon map and the card image: without progress.

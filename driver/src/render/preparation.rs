@@ -23,20 +23,19 @@ pub(super) struct Prepared {
     pub(super) paths: u64,
 }
 
-/// Packs the scene and maps its photons.
+/// Maps the photons of a packed scene.
 ///
 /// # Errors
 /// If the image does not fit a budget, the photons cannot be traced, or the observer stops the render.
 pub(super) fn prepare(
     scene: &Scene,
+    packed: PackedScene,
     settings: &RenderSettings,
     budgets: &[Budget],
     times: &mut Times,
     observer: &dyn Observer,
 ) -> Result<Prepared, RenderError> {
     let start = Instant::now();
-    let packed = PackedScene::new(scene)?;
-    times.hierarchy = start.elapsed().as_secs_f64();
     let photon_settings = settings.photon_settings(scene);
     for budget in budgets {
         photon_map::check_packed(&packed, &photon_settings, budget)?;
@@ -55,7 +54,7 @@ pub(super) fn prepare(
     }
     let PhotonTimes { tracing, building, measuring, estimating } = mapped.times;
     times.photons = tracing.as_secs_f64();
-    times.pack = start.elapsed().as_secs_f64() - times.photons;
+    times.pack += start.elapsed().as_secs_f64() - times.photons;
     times.photon_map = building.as_secs_f64();
     times.discs = measuring.as_secs_f64();
     times.irradiance = estimating.as_secs_f64();

@@ -4,7 +4,6 @@ mod camera;
 mod check;
 mod dependence;
 mod groups;
-mod quality;
 
 use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
@@ -13,7 +12,6 @@ use photoncard_shared::message::{self, CausticGather, FrameParameters};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
-pub use self::quality::Quality;
 use super::address::CardAddress;
 use crate::choice::Choice;
 use crate::emulator::EmulatedKind;

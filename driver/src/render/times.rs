@@ -7,6 +7,8 @@ use serde::Serialize;
 pub struct Times {
     /// Reading the scene file.
     pub scene: f64,
+    /// Pilot renders, by which settings are chosen.
+    pub pilot: f64,
     /// Tracing photons.
     pub photons: f64,
     /// Building hierarchy, photon map and card image.

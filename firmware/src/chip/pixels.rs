@@ -16,8 +16,8 @@ use crate::scene::{Seen, Surface};
 /// The gather point of a sample, its directions not yet chosen.
 fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpose: Purpose) -> GatherPoint {
     let pattern = pattern(frame, at);
-    // With the cache, a Lambertian surface's gather rays are a pixel's in number, without it a sample's.
-    let is_of_pixel = allowed_error(frame).is_some() && surface.reflection.has_lambertian();
+    // With the cache, gather rays are a pixel's in number, without it a sample's.
+    let is_of_pixel = allowed_error(frame).is_some();
     let rays = if is_of_pixel { frame.gather_rays.div_ceil(frame.samples.max(1)) } else { frame.gather_rays };
     if purpose == Purpose::Lobe {
         GatherPoint::lobe(surface, pattern, rays)

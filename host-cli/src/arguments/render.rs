@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
-use photoncard_driver::render::{Quality, RenderSettings};
+use photoncard_driver::quality::Quality;
+use photoncard_driver::render::RenderSettings;
 
 use super::cards::CardOptions;
 use super::choice::choice;
@@ -40,7 +41,7 @@ pub(crate) struct RenderOptions {
     pub(crate) environment: Option<EnvironmentOption>,
     /// Quality of the picture, by which the options that are not stated are chosen
     #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
-    pub(super) quality: Quality,
+    pub(crate) quality: Quality,
     #[command(flatten)]
     pub(crate) picture: PictureOptions,
     #[command(flatten)]
@@ -62,10 +63,14 @@ pub(crate) struct RenderOptions {
 }
 
 impl RenderOptions {
-    /// Settings of these options.
+    /// Settings of these options, with those of the quality for a scene that is not known.
     pub(crate) fn settings(&self) -> RenderSettings {
+        self.settings_over(&self.quality.settings())
+    }
+
+    /// Settings of these options; `base` gives those that are not stated.
+    pub(crate) fn settings_over(&self, base: &RenderSettings) -> RenderSettings {
         let cards = self.cards.settings();
-        let base = self.quality.settings();
         RenderSettings {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),

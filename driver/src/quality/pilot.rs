@@ -1,0 +1,255 @@
+//! Pilot renders: pixels spread over the picture, rendered on emulated chips of this process.
+
+use glam::Vec3;
+use photoncard_firmware::chip::ReferenceChip;
+use photoncard_firmware::fixed_point::ColourSum;
+use photoncard_firmware::sampler::hash;
+use photoncard_shared::budget::SUMS_WITH_LAYERS;
+use photoncard_shared::message::{CausticGather, Tile};
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::spread::Levels;
+use crate::emulator::THREAD_STACK;
+use crate::emulator::direct::{RenderedTile, render_tile};
+use crate::film::Window;
+use crate::pack::PackedScene;
+use crate::photon_map::{MappedImage, PhotonSettings, map_photons};
+use crate::render::{Observer, Phase, RenderError, RenderSettings, Sampling};
+use crate::scene::Scene;
+
+/// Rows and columns of the tiles.
+const TILES: u32 = 8;
+/// Side of a tile, pixels.
+const SIDE: u32 = 4;
+/// Photons of the smaller map; the larger one has four times as many.
+const FEW_PHOTONS: usize = 16_384;
+const MORE: usize = 4;
+/// Numbers of rays that are compared.
+const SHADOW_RAYS: [u32; 2] = [1, 4];
+const GATHER_RAYS: [u32; 2] = [8, 32];
+
+/// Variances and errors that the settings follow from, relative to the radiance of the pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Variances {
+    /// Variance of a sample by one shadow ray.
+    pub(super) shadow_ray: f64,
+    /// Variance of a sample by one gather ray.
+    pub(super) gather_ray: f64,
+    /// Mean squared error that a map of one photon would make in the light of 4x4 pixels, by the law `1 / N`.
+    pub(super) photon: f64,
+    /// Share of the samples that see a surface with a Lambertian part.
+    pub(super) lambertian: f64,
+}
+
+/// Renders the pilots of a picture.
+///
+/// # Errors
+/// If photons cannot be traced, the settings have no possible camera, or the observer stops the render.
+pub(super) fn measure(
+    scene: &Scene,
+    packed: &PackedScene,
+    settings: &RenderSettings,
+    observer: &dyn Observer,
+) -> Result<Variances, RenderError> {
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
+    let pool = threads.stack_size(THREAD_STACK).build().map_err(|error| RenderError::Chips(error.into()))?;
+    // Of the whole picture: a part of it has equal pixels.
+    let tiles = spread_tiles(Window::full(settings.picture.width, settings.picture.height));
+    let pilot = |photons| Pilot::new(scene, packed, settings, photons, observer);
+    let [few, more] = [pilot(FEW_PHOTONS)?, pilot(MORE * FEW_PHOTONS)?];
+    let seeds = [1, 2].map(|seed| settings.integrator.seed ^ hash(seed));
+    let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
+        let render = |seed| {
+            let settings = settings.clone().with(|settings| {
+                let integrator = &mut settings.integrator;
+                (integrator.shadow_rays, integrator.gather_rays) = (shadow_rays, gather_rays);
+                integrator.seed = seed;
+            });
+            more.render(&settings, &pool, &tiles, observer)
+        };
+        Ok([render(seeds[0])?, render(seeds[1])?])
+    };
+    let [few_shadow_rays, shadow_rays] = SHADOW_RAYS;
+    let [few_gather_rays, gather_rays] = GATHER_RAYS;
+    // Light by both kinds of rays has the noise of both: each is varied where there are more of the other.
+    let by_few_shadow_rays = pair(few_shadow_rays, gather_rays)?;
+    let by_few_gather_rays = pair(shadow_rays, few_gather_rays)?;
+    let best = pair(shadow_rays, gather_rays)?;
+    // Rays of equal directions in both maps: what differs is the map.
+    let by_map = settings.clone().with(|settings| {
+        settings.integrator.shadow_rays = 0;
+        settings.integrator.gather_rays = gather_rays;
+        settings.integrator.sampling = Sampling::Reflection;
+    });
+    let maps =
+        [few.render(&by_map, &pool, &tiles, observer)?, more.render(&by_map, &pool, &tiles, observer)?];
+    observer.progress(Phase::Pilot, 1, 1);
+    Ok(Variances {
+        shadow_ray: of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best),
+        gather_ray: of_ray(GATHER_RAYS, &by_few_gather_rays, &best),
+        photon: of_photon(&best, &maps),
+        lambertian: best[0].lambertian,
+    })
+}
+
+/// Variance of a sample by one ray, from a pair of renders by fewer `rays` and the best pair. The variance by `n` rays is `a + v / n`,
+/// with `a` that of the places of the samples and of other rays: two numbers of rays give `v`.
+fn of_ray(rays: [u32; 2], noisy: &[Pixels; 2], best: &[Pixels; 2]) -> f64 {
+    let seen: Vec<usize> = pixels_with_surfaces([&noisy[0], &noisy[1], &best[0], &best[1]]).collect();
+    let radiances = |pixels: &Pixels| seen.iter().map(|&pixel| pixels.radiance(pixel)).collect::<Vec<_>>();
+    let [noisy, best] = [noisy, best].map(|pair| [radiances(&pair[0]), radiances(&pair[1])]);
+    let levels = Levels::new(best[0].iter().zip(&best[1]).map(|(first, second)| 0.5 * (first + second)));
+    let [more, less] = [noisy, best].map(|[first, second]| 0.5 * levels.mean_square(first, second));
+    ((more - less) / (1.0 / f64::from(rays[0]) - 1.0 / f64::from(rays[1]))).max(0.0)
+}
+
+/// Pixels that see a surface in all renders.
+fn pixels_with_surfaces<const N: usize>(renders: [&Pixels; N]) -> impl Iterator<Item = usize> {
+    (0..renders[0].direct.len()).filter(move |&pixel| renders.iter().all(|pixels| pixels.is_seen[pixel]))
+}
+
+/// Mean squared error of tiles by a map of one photon, from the difference of two maps whose errors are independent.
+fn of_photon(best: &[Pixels; 2], maps: &[Pixels; 2]) -> f64 {
+    // All tiles are of equal size.
+    let pixels_of_tile = (best[0].direct.len() / (TILES * TILES) as usize).max(1);
+    let mut tiles = vec![Vec::new(); (TILES * TILES) as usize];
+    for pixel in pixels_with_surfaces([&best[0], &best[1], &maps[0], &maps[1]]) {
+        tiles[pixel / pixels_of_tile].push(pixel);
+    }
+    tiles.retain(|pixels| 2 * pixels.len() > pixels_of_tile);
+    let means = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let mean =
+            |pixels: &Vec<usize>| pixels.iter().map(|&pixel| value(pixel)).sum::<f64>() / pixels.len() as f64;
+        tiles.iter().map(mean).collect()
+    };
+    let levels = Levels::new(means(&|pixel| 0.5 * (best[0].radiance(pixel) + best[1].radiance(pixel))));
+    let [few, more] = [0, 1].map(|map| means(&|pixel| maps[map].indirect[pixel]));
+    levels.mean_square(few, more) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
+}
+
+/// Photon map of a pilot, with the scene.
+struct Pilot<'a> {
+    scene: &'a Scene,
+    mapped: MappedImage,
+    /// If the picture has a caustic map, which takes that light from gather rays.
+    has_caustics: bool,
+}
+
+impl<'a> Pilot<'a> {
+    fn new(
+        scene: &'a Scene,
+        packed: &PackedScene,
+        settings: &RenderSettings,
+        photons: usize,
+        observer: &dyn Observer,
+    ) -> Result<Self, RenderError> {
+        observer.progress(Phase::Pilot, 0, 1);
+        let of_picture = settings.photon_settings(scene);
+        // Caustics add no noise: gathers find an empty map instead of one of its own. Another seed than the picture's, by which
+        // nothing is chosen for its own photons.
+        let photons =
+            PhotonSettings { photons, seed: !settings.integrator.seed, caustic_photons: 0, ..of_picture };
+        let mapped = map_photons(packed.clone(), &photons, &|_| !observer.is_stopped())?;
+        let has_caustics = of_picture.caustic_photons > 0;
+        Ok(Self { scene, mapped, has_caustics })
+    }
+
+    /// Renders one sample of each pixel of the tiles, without the irradiance cache.
+    fn render(
+        &self,
+        settings: &RenderSettings,
+        pool: &ThreadPool,
+        tiles: &[Tile],
+        observer: &dyn Observer,
+    ) -> Result<Pixels, RenderError> {
+        let camera = settings.camera(self.scene)?;
+        let max_distance = self.mapped.max_distance;
+        let neighbors = settings.photons.caustic_neighbors;
+        let caustics = self.has_caustics.then_some(CausticGather { neighbors, max_distance });
+        let mut frame = settings.frame(&camera, max_distance, caustics);
+        (frame.samples, frame.irradiance_error, frame.layers) = (1, None, true);
+        let (image, memory) = self.mapped.image.view();
+        let render_one = |chip: &mut Box<ReferenceChip>, &tile: &Tile| {
+            if observer.is_stopped() {
+                return Err(RenderError::Stopped);
+            }
+            render_tile(chip, &image, memory, &frame, tile, None).map_err(RenderError::Image)
+        };
+        let new_chip = || Box::new(ReferenceChip::new());
+        let rendered: Result<Vec<RenderedTile>, RenderError> =
+            pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect());
+        Ok(Pixels::new(&rendered?, image.header.radiance_unit))
+    }
+}
+
+/// Light of the pixels of a pilot render, means over the channels, W/(sr m^2).
+struct Pixels {
+    direct: Vec<f64>,
+    indirect: Vec<f64>,
+    /// If the sample sees a surface that reflects.
+    is_seen: Vec<bool>,
+    /// Share of the samples that see a surface with a Lambertian part.
+    lambertian: f64,
+}
+
+impl Pixels {
+    fn new(tiles: &[RenderedTile], unit: f32) -> Self {
+        const SUMS: usize = SUMS_WITH_LAYERS as usize;
+        let mean = |sum: &ColourSum| f64::from((sum.value() * unit).element_sum()) / 3.0;
+        let sums = || tiles.iter().flat_map(|tile| tile.sums.chunks(SUMS));
+        let direct = sums().map(|sums| mean(&sums[0])).collect();
+        let indirect = sums().map(|sums| mean(&sums[1])).collect();
+        let is_seen: Vec<bool> = sums().map(|sums| sums[3].value() != Vec3::ZERO).collect();
+        let seen = is_seen.iter().filter(|is_seen| **is_seen).count();
+        let lambertian: u64 = tiles.iter().map(|tile| tile.counters.lambertian_samples).sum();
+        Self { direct, indirect, is_seen, lambertian: lambertian as f64 / seen.max(1) as f64 }
+    }
+
+    fn radiance(&self, pixel: usize) -> f64 {
+        self.direct[pixel] + self.indirect[pixel]
+    }
+}
+
+/// Tiles in a grid of cells over the window, each at a place in its cell by a hash; all of equal size.
+fn spread_tiles(window: Window) -> Vec<Tile> {
+    let [width, height] = [window.width(), window.height()];
+    let (tile_width, tile_height) = (SIDE.min(width), SIDE.min(height));
+    let place = |cell: u32, cells: u32, extent: u32, side: u32, salt: u32| {
+        let free = u64::from(extent - side) + 1;
+        let [low, high] = [cell, cell + 1].map(|cell| free * u64::from(cell) / u64::from(cells));
+        low as u32 + hash(salt) % (high - low).max(1) as u32
+    };
+    (0..TILES * TILES)
+        .map(|id| Tile {
+            id,
+            x: window.x0 + place(id % TILES, TILES, width, tile_width, 2 * id),
+            y: window.y0 + place(id / TILES, TILES, height, tile_height, 2 * id + 1),
+            width: tile_width,
+            height: tile_height,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_lie_in_the_window_and_are_spread_over_it() {
+        for (x1, y1) in [(512, 512), (640, 48), (33, 3), (1, 1)] {
+            let window = Window { x0: 7, x1: 7 + x1, y0: 5, y1: 5 + y1 };
+            let tiles = spread_tiles(window);
+            assert_eq!(tiles.len(), 64);
+            for tile in &tiles {
+                assert!(window.contains(tile.x, tile.y), "{tile:?}");
+                assert!(window.contains(tile.x + tile.width - 1, tile.y + tile.height - 1), "{tile:?}");
+            }
+            if x1 >= 64 && y1 >= 64 {
+                let quarter =
+                    |x, y| tiles.iter().filter(|t| (t.x - 7) / (x1 / 2) == x && (t.y - 5) / (y1 / 2) == y);
+                assert!((0..4).all(|i| quarter(i % 2, i / 2).count().abs_diff(16) <= 4));
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Relative mean squares of differences between renders, of most pixels.
+
+/// Share of the greatest squares that is left out: a few bright pixels would outweigh all others.
+const LEFT_OUT: f64 = 0.02;
+/// Levels that differences are relative to: each pixel's radiance, or the median of the lit ones where it is darker, as noise in the
+/// dark is seen less.
+pub(super) struct Levels(Vec<f64>);
+
+impl Levels {
+    /// Levels of pixels with these radiances; all 1 for a black picture.
+    pub(super) fn new(radiances: impl IntoIterator<Item = f64>) -> Self {
+        let radiances: Vec<f64> = radiances.into_iter().collect();
+        let mut lit: Vec<f64> = radiances.iter().copied().filter(|radiance| *radiance > 0.0).collect();
+        let middle = lit.len() / 2;
+        let median = if lit.is_empty() { 1.0 } else { *lit.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        Self(radiances.into_iter().map(|radiance| radiance.max(median)).collect())
+    }
+
+    /// Mean over most pixels of `((a - b) / level)^2`.
+    pub(super) fn mean_square(
+        &self,
+        a: impl IntoIterator<Item = f64>,
+        b: impl IntoIterator<Item = f64>,
+    ) -> f64 {
+        let pairs = a.into_iter().zip(b).zip(&self.0);
+        let mut squares: Vec<f64> = pairs.map(|((a, b), level)| ((a - b) / level).powi(2)).collect();
+        squares.sort_by(f64::total_cmp);
+        let kept = squares.len() - (LEFT_OUT * squares.len() as f64) as usize;
+        squares.iter().take(kept).sum::<f64>() / kept.max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_relative_to_the_radiance_and_in_the_dark_to_the_median() {
+        let levels = Levels::new([4.0, 8.0, 4.0, 0.01, 1.0]);
+        let square = levels.mean_square([5.0, 8.0, 3.0, 2.01, 1.0], [4.0, 4.0, 4.0, 0.01, 1.0]);
+        assert!((square - (0.0625 + 0.25 + 0.0625 + 0.25) / 5.0).abs() < 1e-12, "{square}");
+        assert_eq!(Levels::new([0.0, 0.0]).mean_square([0.0, 0.0], [0.0, 0.0]), 0.0);
+        assert_eq!(Levels::new([]).mean_square([], []), 0.0);
+    }
+
+    #[test]
+    fn a_few_bright_pixels_do_not_count() {
+        let levels = Levels::new([1.0; 100]);
+        let mut noisy = [1.1; 100];
+        noisy[7] = 1e6;
+        let square = levels.mean_square(noisy, [1.0; 100]);
+        assert!((square - 0.01 * 97.0 / 98.0).abs() < 1e-3, "{square}");
+    }
+}
