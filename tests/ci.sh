@@ -91,6 +91,9 @@ for image in "${images[@]}"; do
     refuse_panics "${CARGO_TARGET_DIR:-target}/${target_of[$image]}/card/$image"
 done
 
+step "figures of docs/bring-up.md"
+tests/bring_up_figures.sh check
+
 # A test that hangs is stopped and named: by nextest one by one, else with its test program.
 step "tests"
 if cargo nextest --version >/dev/null 2>&1; then

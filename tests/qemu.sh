@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds the image of a board and starts it in QEMU, until it is interrupted.
-# On a pty, QEMU prints the path to be used as --card serial:PATH. What the image tells of itself goes to standard error.
+# On a pty, QEMU prints the path to be used as --card serial:PATH. What the image tells of itself goes to standard error, and so does
+# what this script does.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -30,8 +31,24 @@ command -v "${qemu[0]}" >/dev/null || {
     echo "$0: ${qemu[0]} is missing; run: sudo apt-get install $package" >&2
     exit 1
 }
-"${CARGO:-cargo}" build --quiet --locked -p photoncard-firmware --bin "$image" --features "board-$image" \
+cargo=${CARGO:-cargo}
+command -v "$cargo" >/dev/null || {
+    echo "$0: cargo is missing; install Rust 1.90 or later with rustup (https://rustup.rs)" >&2
+    exit 1
+}
+# Checked before the build, which would fail only after it has compiled for this machine.
+has_target() { [ -d "$(rustc --print target-libdir --target "$target" 2>/dev/null)" ]; }
+has_target || {
+    echo "$0: adding the target $target to the toolchain" >&2
+    rustup target add "$target" >&2 && has_target
+} || {
+    echo "$0: the target $target is missing; run: rustup target add $target" >&2
+    exit 1
+}
+echo "$0: building the image of $image, which takes some minutes at first" >&2
+"$cargo" build --quiet --locked -p photoncard-firmware --bin "$image" --features "board-$image" \
     --target "$target" --profile card
+echo "$0: built in $SECONDS s; starting ${qemu[0]}" >&2
 exec "${qemu[@]}" -display none -monitor none -serial "$serial" \
     -semihosting-config enable=on,target=native \
     -kernel "${CARGO_TARGET_DIR:-target}/$target/card/$image"

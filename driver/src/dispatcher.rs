@@ -58,6 +58,8 @@ impl<'a> Dispatcher<'a> {
                     self.scheduler().give_back(card, tile.id, was_at_work, now);
                     self.changed.notify_all();
                 }
+                // A card under test has no job, and is no card of a render.
+                Event::Computed(_) | Event::MemoryTested(_) => {}
             }
         }
         let result = self.scheduler().check(now);

@@ -12,6 +12,7 @@ mod job;
 mod link_bytes;
 mod load;
 mod pixel_limits;
+mod self_test;
 mod state;
 mod tiles;
 
@@ -26,13 +27,14 @@ use std::time::Duration;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{self, Command, MemoryUse, PROTOCOL_VERSION, Reply};
+use photoncard_shared::message::{self, Command, MemoryUse, OPERAND_BYTES, PROTOCOL_VERSION, Reply};
 use photoncard_shared::transport::{Event as LineEvent, Transport};
 
 use self::clock::Clock;
 use self::error::{check_budget, check_versions};
 use self::failures::Failures;
 use self::load::Load;
+use self::self_test::Request;
 use self::state::State;
 use self::tiles::TilesInFlight;
 
@@ -47,6 +49,8 @@ pub struct Session<'a> {
     memory_use: Option<MemoryUse>,
     job: Option<Job<'a>>,
     load: Load,
+    /// Requested part of the self-test.
+    request: Request,
     tiles: TilesInFlight,
     events: VecDeque<Event>,
     bytes: LinkBytes,
@@ -72,6 +76,7 @@ impl<'a> Session<'a> {
             memory_use: None,
             job: None,
             load: Load::default(),
+            request: Request::Nothing,
             tiles: TilesInFlight::default(),
             events: VecDeque::new(),
             bytes: LinkBytes::default(),
@@ -110,6 +115,29 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// Requests the results of operand triples, at most [`message::CASES_PER_COMMAND`], from a card that has said hello and has no job:
+    /// [`Event::Computed`].
+    pub fn compute(&mut self, operands: &[[u8; OPERAND_BYTES]], now: Duration) {
+        self.ask(
+            Request::Compute(operands.len()),
+            &Command::Compute { operands: operands.as_flattened() },
+            now,
+        );
+    }
+
+    /// Requests the test of its memory from a card that has said hello and has no job: [`Event::MemoryTested`], until the test
+    /// is over.
+    pub fn test_memory(&mut self, now: Duration) {
+        self.ask(Request::Memory(None), &Command::TestMemory, now);
+    }
+
+    fn ask(&mut self, request: Request, command: &Command, now: Duration) {
+        self.clock.rest(now);
+        self.request = request;
+        self.send(command);
+        self.state = State::Testing;
+    }
+
     /// Removes and returns the oldest event.
     pub fn next_event(&mut self) -> Option<Event> {
         self.events.pop_front()
@@ -138,7 +166,7 @@ impl<'a> Session<'a> {
     /// Number of lines of the image that the card has or that were sent.
     pub fn loaded_lines(&self) -> usize {
         match self.state {
-            State::Greeting | State::Ready | State::Comparing => 0,
+            State::Greeting | State::Ready | State::Comparing | State::Testing => 0,
             State::Loading => self.load.done(),
             _ => self.job.map_or(0, |job| job.image.len()),
         }
@@ -373,6 +401,14 @@ impl<'a> Session<'a> {
                 let finished = self.tiles.complete(tile, counters, &job.limits)?;
                 self.events.push_back(Event::TileDone(finished));
                 self.failures.completes_tile();
+                Ok(())
+            }
+            (State::Testing, ref reply) => {
+                let (event, is_last) = self.request.take(reply)?;
+                self.events.push_back(event);
+                if is_last {
+                    self.state = State::Ready;
+                }
                 Ok(())
             }
             _ => Err(SessionError::Unexpected("not an answer to what was asked")),

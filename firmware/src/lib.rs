@@ -20,6 +20,7 @@
 //! | [`render`] | passes of a tile: eye rays, direct light, caustics, final gather |
 //! | [`irradiance_cache`] | indirect irradiance, gathered at few points and interpolated between them |
 //! | [`chip`] | state of a tile; one method for each pass |
+//! | [`self_test`] | test of card memory, and of arithmetic |
 //! | [`card`] | protocol of a card: commands in, replies out |
 //! | [`serve`] | main loop of a card on a port |
 //!
@@ -74,6 +75,7 @@ pub mod photon;
 pub mod render;
 pub mod sampler;
 pub mod scene;
+pub mod self_test;
 pub mod serve;
 pub mod simd;
 mod vector;

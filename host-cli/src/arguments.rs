@@ -123,6 +123,14 @@ pub(crate) enum CardCommand {
         #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
         count: u16,
     },
+    /// Test the arithmetic and the whole memory of a card, which forgets its scene; status 1 if it fails
+    Selftest {
+        #[arg(long, default_value_t, help = format!("The card: {}", CardAddress::forms()))]
+        card: CardAddress,
+        /// Print no progress
+        #[arg(long)]
+        quiet: bool,
+    },
 }
 
 #[derive(Args)]

@@ -10,7 +10,7 @@
 //! | `arguments`, `environment` | command line: options of every command, and their values |
 //! | `outputs` | checks of output files before any work |
 //! | `progress` | progress of a render |
-//! | `render`, `tonemap`, `scene`, `card`, `card_list`, `emulate`, `diff`, `documents`, `study` | one module for each command |
+//! | `render`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render from Rust, use
 //! `photoncard_driver` directly.
@@ -19,6 +19,7 @@
 mod arguments;
 mod card;
 mod card_list;
+mod card_self_test;
 mod console;
 mod diff;
 mod documents;
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         Command::Card(CardCommand::List) => card_list::run(),
         Command::Card(CardCommand::Info { card }) => card::info(card),
         Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),
+        Command::Card(CardCommand::Selftest { card, quiet }) => card_self_test::run(card, *quiet),
         Command::Emulate(options) => emulate::run(options),
         Command::Diff(options) => diff::run(options),
         Command::Completions { shell } => documents::completions(*shell),

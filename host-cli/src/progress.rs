@@ -1,4 +1,4 @@
-//! Progress of a render: a bar on a terminal, otherwise a line for each tenth of a phase.
+//! Progress of a render or of a card's self-test: a bar on a terminal, otherwise a line for each tenth of a phase.
 
 mod remaining;
 
@@ -15,7 +15,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use self::remaining::Remaining;
 use crate::console::say;
 
-/// Display of a render's progress; SIGINT and SIGTERM stop the render.
+/// Display of the progress of a render or of a card's self-test; SIGINT and SIGTERM stop it.
 pub(crate) struct Progress {
     stopped: Arc<AtomicBool>,
     kept: AtomicBool,
@@ -36,7 +36,7 @@ struct Display {
 }
 
 impl Progress {
-    /// Starts the display of a render on `cards` cards, which is empty if `quiet`. The first signal stops the render, a second one ends the process.
+    /// Starts the display of work on `cards` cards, which is empty if `quiet`. The first signal stops the work, a second one ends the process.
     pub(crate) fn start(quiet: bool, cards: usize) -> std::io::Result<Self> {
         let display = Display {
             phase: None,
@@ -137,13 +137,13 @@ impl Display {
         self.told = 0;
         self.remaining = match phase {
             Phase::Tiles => Remaining::new(self.cards, self.resumed),
-            Phase::Pilot | Phase::Photons | Phase::Pack | Phase::Load => Remaining::new(1, 0),
+            Phase::Pilot | Phase::Photons | Phase::Pack | Phase::Load | Phase::SelfTest => Remaining::new(1, 0),
         };
         let target =
             if self.on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         self.bar = ProgressBar::with_draw_target(Some(total), target);
         let template = match phase {
-            Phase::Load => "{msg:8} {bar:40} {bytes}/{total_bytes}{prefix}",
+            Phase::Load | Phase::SelfTest => "{msg:8} {bar:40} {bytes}/{total_bytes}{prefix}",
             Phase::Pilot | Phase::Pack => "{msg:8} {elapsed}",
             Phase::Photons | Phase::Tiles => "{msg:8} {bar:40} {pos}/{len}{prefix}",
         };
@@ -182,6 +182,7 @@ fn name(phase: Phase) -> &'static str {
         Phase::Pack => "pack",
         Phase::Load => "load",
         Phase::Tiles => "tiles",
+        Phase::SelfTest => "memory",
     }
 }
 

@@ -112,6 +112,27 @@ fn card_info_tells_what_a_card_holds() {
 }
 
 #[test]
+fn card_selftest_tells_what_was_tested() {
+    let outcome = Room::new().run(&["card", "selftest", "--quiet", "--card", "emulated-micro:2"]);
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    let lines: Vec<_> = outcome.stdout.lines().collect();
+    assert!(
+        lines[0].starts_with("arithmetic      0 of ") && lines[0].contains(" results wrong"),
+        "{lines:?}"
+    );
+    assert_eq!(lines[1], "memory          16777216 bytes: 131072 lines");
+    let patterns = ["walking one", "walking zero", "address", "complement", "byte lanes"];
+    assert_eq!(lines.len(), 2 + patterns.len());
+    for (pattern, line) in patterns.iter().zip(&lines[2..]) {
+        assert!(line.trim_start().starts_with(pattern) && line.ends_with(": 0 wrong words"), "{line}");
+        assert!(line.contains(" MB/s), read in "), "{line}");
+    }
+    let outcome = Room::new().run(&["card", "selftest", "--card", "emulated-micro"]);
+    assert_eq!(outcome.status, Some(0));
+    assert!(outcome.stderr.contains("photoncard: memory 167772160 of 167772160, "), "{}", outcome.stderr);
+}
+
+#[test]
 fn every_command_has_help() {
     for command in [
         &[][..],
@@ -121,6 +142,7 @@ fn every_command_has_help() {
         &["card"],
         &["card", "info"],
         &["card", "ping"],
+        &["card", "selftest"],
         &["emulate"],
         &["diff"],
         &["tonemap"],

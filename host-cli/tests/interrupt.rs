@@ -1,4 +1,4 @@
-//! An interrupt ends a render soon, with status 130 and no file left.
+//! An interrupt ends a render or a self-test soon, with status 130 and no file left.
 #![cfg(unix)]
 
 mod support;
@@ -7,9 +7,9 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use support::{Room, shipped, small_render};
+use support::{Emulator, Room, shipped, small_render};
 
-/// Time limit of a stopped render, generous for a loaded machine.
+/// Time limit of a stopped process, generous for a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Waits for the end of a process, and kills it after the time limit.
@@ -23,7 +23,7 @@ fn wait(child: &mut Child) -> ExitStatus {
     }
     child.kill().unwrap();
     child.wait().unwrap();
-    panic!("the render went on for {PATIENCE:?}");
+    panic!("the process went on for {PATIENCE:?}");
 }
 
 /// Interrupts a render as soon as it has printed `phase`.
@@ -44,6 +44,27 @@ fn interrupt(phase: &str, options: &[&str]) {
     assert_eq!(last.as_deref(), Some("photoncard: stopped; no picture was written"));
     assert_eq!(room.names(), ["out.exr"]);
     assert_eq!(room.read("out.exr"), b"old picture");
+}
+
+/// The card, which goes on with its test, serves the next host.
+#[test]
+fn while_a_card_tests_itself() {
+    let room = Room::new();
+    let card = Emulator::start(&room, "unix:card", &[]);
+    let mut command = room.command();
+    command.args(["card", "selftest", "--card", &card.address]);
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.next().is_some_and(|line| line.starts_with("photoncard: memory ")));
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    assert_eq!(wait(&mut child).code(), Some(130));
+    let last = lines.last();
+    assert_eq!(
+        last.as_deref(),
+        Some("photoncard: stopped; the card holds patterns of the test, and no scene")
+    );
+    assert_eq!(room.run(&["card", "info", "--card", &card.address]).status, Some(0));
 }
 
 #[test]

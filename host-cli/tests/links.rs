@@ -84,6 +84,9 @@ fn cards_tell_of_themselves_over_links() {
             assert!(outcome.stdout.contains(row), "{row}: {}", outcome.stdout);
         }
         assert_eq!(outcome.stdout.lines().count(), 6);
+        let outcome = room.run(&["card", "selftest", "--quiet", "--card", &emulator.address]);
+        assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""), "{listen}");
+        assert!(outcome.stdout.contains("memory          16777216 bytes"), "{}", outcome.stdout);
     }
 }
 

@@ -12,14 +12,21 @@
 //! RenderTile ...  -> Pixels ..., TileDone        at most the budget's `tiles` unanswered
 //! ```
 //!
+//! A self-test takes the place of the image: `Compute -> Computed`, any number, then `TestMemory -> MemoryTested ...`.
+//!
 //! A command that the card cannot execute is answered with [`Reply::Fault`]; the card stays ready for the next one.
 
 mod fault;
 mod pixel;
+mod self_test;
 
 pub use self::fault::{Fault, FaultCode, Parameter};
 pub use self::pixel::{
     LAYER_BYTES, PIXEL_BYTES, PIXELS_BYTES, Pixel, PixelLayers, PixelRecord, record_bytes,
+};
+pub use self::self_test::{
+    CASES_PER_COMMAND, MemoryPattern, MemoryTest, OPERAND_BYTES, RESULT_BYTES, RESULTS, WORDS_PER_LINE,
+    WrongWord, WrongWords,
 };
 
 use serde::{Deserialize, Serialize};
@@ -28,7 +35,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 10;
+pub const PROTOCOL_VERSION: u16 = 11;
 
 /// Maximum number of lines of one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
@@ -227,6 +234,14 @@ pub enum Command<'a> {
     BeginFrame(FrameParameters),
     /// Renders a tile.
     RenderTile(Tile),
+    /// Computes fixed operations on operands.
+    Compute {
+        /// Up to [`CASES_PER_COMMAND`] triples of `f32`, [`OPERAND_BYTES`] each.
+        #[serde(borrow)]
+        operands: &'a [u8],
+    },
+    /// Tests the whole memory. The card forgets what it forgets at a hello, and all written lines.
+    TestMemory,
 }
 
 /// Message from a card to the host.
@@ -279,6 +294,14 @@ pub enum Reply<'a> {
     },
     /// Answer to a command that the card cannot execute.
     Fault(Fault),
+    /// Answer to [`Command::Compute`].
+    Computed {
+        /// The results of each triple, [`RESULT_BYTES`] each.
+        #[serde(borrow)]
+        results: &'a [u8],
+    },
+    /// Answer to [`Command::TestMemory`], repeatedly until the end of the test.
+    MemoryTested(MemoryTest),
 }
 
 /// Writes a message into `bytes` and returns its length; `None` if there is no room.

@@ -181,6 +181,10 @@ fn the_longest_messages_fit_a_frame() {
     assert!(encode(&Reply::Pixels { tile: u32::MAX, first: u32::MAX, data: &pixels }, &mut bytes).is_some());
     let checksums = [0xff; 8 * CHECKSUMS_PER_REPLY as usize];
     assert!(encode(&Reply::Checksums { first: u32::MAX, data: &checksums }, &mut bytes).is_some());
+    let operands = [0xff; CASES_PER_COMMAND * OPERAND_BYTES];
+    assert!(encode(&Command::Compute { operands: &operands }, &mut bytes).is_some());
+    let results = [0xff; CASES_PER_COMMAND * RESULT_BYTES];
+    assert!(encode(&Reply::Computed { results: &results }, &mut bytes).is_some());
 }
 
 fn encoded(message: &impl serde::Serialize) -> Vec<u8> {
@@ -203,6 +207,8 @@ fn opcodes_are_pinned() {
         assert_eq!(encoded(command)[0] as usize, opcode);
     }
     assert_eq!(encoded(&Command::RenderTile(tile)), [6, 1, 2, 3, 4, 5]);
+    assert_eq!(encoded(&Command::Compute { operands: &[9, 8] }), [7, 2, 9, 8]);
+    assert_eq!(encoded(&Command::TestMemory), [8]);
     let hello = |memory_use| {
         let budget = BUDGET;
         Reply::Hello { protocol: 1, layout: 1, budget, written_lines: 0, memory_use, build: "x" }
@@ -214,6 +220,7 @@ fn opcodes_are_pinned() {
         (Reply::FrameAccepted, 3),
         (Reply::Pixels { tile: 1, first: 0, data: &[] }, 4),
         (Reply::TileDone { tile: 1, counters: Counters::ZERO }, 5),
+        (Reply::Computed { results: &[] }, 7),
     ];
     for (reply, opcode) in replies {
         assert_eq!(encoded(&reply)[0], opcode);
@@ -233,7 +240,7 @@ fn the_page_is_of_this_version() {
 /// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
 #[test]
 fn golden_structures() {
-    assert_eq!(PROTOCOL_VERSION, 10);
+    assert_eq!(PROTOCOL_VERSION, 11);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,
@@ -324,6 +331,23 @@ fn golden_structures() {
     assert_eq!(encoded(&Reply::TileDone { tile: 16, counters }), bytes);
 }
 
+/// Progress of a memory test with a wrong word, and without one.
+#[test]
+fn golden_self_test() {
+    for (number, pattern) in (0..).zip(MemoryPattern::ALL) {
+        let first = Some(WrongWord { index: 5, expected: 6, found: 300 });
+        let wrong = WrongWords { count: 3, bits: 4, first };
+        let progress = MemoryTest { lines: 2, pattern, written: 2, checked: 1, wrong };
+        let bytes = [8, 2, number, 2, 1, 3, 4, 1, 5, 6, 0xac, 2];
+        assert_eq!(encoded(&Reply::MemoryTested(progress)), bytes);
+        let progress = MemoryTest { checked: 2, wrong: WrongWords::default(), ..progress };
+        assert_eq!(encoded(&Reply::MemoryTested(progress)), [8, 2, number, 2, 2, 0, 0, 0]);
+        let is_last = number == 4;
+        assert_eq!((progress.is_over(), pattern.next().is_none()), (is_last, is_last));
+    }
+    assert_eq!((OPERAND_BYTES, RESULT_BYTES, CASES_PER_COMMAND, WORDS_PER_LINE), (12, 84, 8, 32));
+}
+
 #[test]
 fn fault_codes_are_pinned() {
     use FaultCode::*;
@@ -341,6 +365,7 @@ fn fault_codes_are_pinned() {
         LineRange,
         Record,
         Depth,
+        Operands,
     ];
     for (number, code) in (0..).zip(codes) {
         assert_eq!(encoded(&Reply::Fault(Fault { code, detail: 7 })), [6, number, 7]);

@@ -5,7 +5,8 @@ use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{
-    self, Command, Fault, FaultCode, LINES_PER_WRITE, MemoryUse, PROTOCOL_VERSION, Reply, record_bytes,
+    self, Command, Fault, FaultCode, LINES_PER_WRITE, MemoryTest, MemoryUse, PROTOCOL_VERSION, Reply,
+    record_bytes,
 };
 use photoncard_shared::transport::Transport;
 
@@ -36,6 +37,10 @@ pub enum Answer {
     TileDone(u32),
     /// [`Reply::Fault`]: code of the fault.
     Fault(FaultCode),
+    /// [`Reply::Computed`]: number of bytes of the results.
+    Computed(usize),
+    /// [`Reply::MemoryTested`]: progress of the test.
+    MemoryTested(MemoryTest),
 }
 
 impl<'a> Wire<'a> {
@@ -50,10 +55,20 @@ impl<'a> Wire<'a> {
     /// # Panics
     /// If the card sends anything but replies.
     pub fn say(&mut self, command: &Command) -> Vec<Answer> {
-        if let Command::BeginFrame(frame) = command {
-            self.layers = frame.layers;
+        self.say_all(std::slice::from_ref(command))
+    }
+
+    /// Sends commands without waiting for answers in between, and lets the card work until it is idle. Returns its answers.
+    ///
+    /// # Panics
+    /// If there are more than the link's window holds, or the card sends anything but replies.
+    pub fn say_all(&mut self, commands: &[Command]) -> Vec<Answer> {
+        for command in commands {
+            if let Command::BeginFrame(frame) = command {
+                self.layers = frame.layers;
+            }
+            assert!(self.host.send(|bytes| message::encode(command, bytes)), "there is room for a command");
         }
-        assert!(self.host.send(|bytes| message::encode(command, bytes)), "there is room for a command");
         self.work()
     }
 
@@ -139,5 +154,7 @@ fn answer(reply: Reply, layers: bool) -> Answer {
         Reply::Pixels { data, .. } => Answer::Pixels(data.len() / record_bytes(layers)),
         Reply::TileDone { tile, .. } => Answer::TileDone(tile),
         Reply::Fault(Fault { code, .. }) => Answer::Fault(code),
+        Reply::Computed { results } => Answer::Computed(results.len()),
+        Reply::MemoryTested(progress) => Answer::MemoryTested(progress),
     }
 }

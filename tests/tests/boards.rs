@@ -1,9 +1,27 @@
-//! Processor-independent parts of boards: the ring between a UART's interrupt and the port.
+//! Processor-independent parts of boards: the ring between a UART's interrupt and the port; and the page that states their sizes.
 
 #[path = "../../firmware/boards/common/ring.rs"]
 mod ring;
 
+use photoncard_firmware::kind::MICRO;
+
 use self::ring::Ring;
+
+/// Sizes that the page on boards states are those of the budget.
+#[test]
+fn the_page_states_the_budget() {
+    let page = include_str!("../../docs/bring-up.md");
+    for (name, bytes, unit, shift) in [
+        ("dram_bytes", MICRO.dram_bytes, "MB", 20),
+        ("sram_bytes", MICRO.sram_bytes, "KB", 10),
+        ("stack_bytes", MICRO.stack_bytes, "KB", 10),
+    ] {
+        let row = format!("| {} {unit} | `MICRO.{name}`", bytes >> shift);
+        assert!(page.contains(&row), "{row}");
+    }
+    let caches = (MICRO.photon_cache_bytes + MICRO.scene_cache_bytes) >> 10;
+    assert!(page.contains(&format!("the {caches} KB of the budget's caches")));
+}
 
 #[test]
 fn a_full_ring_refuses_and_loses_nothing() {

@@ -11,7 +11,8 @@ use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{BvhNode, Links, NodeBox};
 use photoncard_shared::message::{
-    CHUNK_LINES, Command, FaultCode, FrameParameters, MemoryUse, PROTOCOL_VERSION, Radiance, Tile,
+    CASES_PER_COMMAND, CHUNK_LINES, Command, FaultCode, FrameParameters, MemoryUse, OPERAND_BYTES,
+    PROTOCOL_VERSION, RESULT_BYTES, Radiance, Tile,
 };
 use photoncard_tests::wire::{Answer, Wire};
 use photoncard_tests::{camera, lambertian, room, scene, with_room_for_a_card};
@@ -213,6 +214,54 @@ fn a_card_tells_what_its_board_measures_of_its_memory() {
         const MEASURED: MemoryUse = MemoryUse { static_bytes: 100, stack_bytes: 20, stack_used: 10 };
         wire.card.measure_memory_by(|| MEASURED);
         assert_eq!(wire.say(&hello), [Answer::Hello(0, Some(MEASURED))]);
+    });
+}
+
+/// A self-test takes the scene's place, at any time; the next image is loaded as a whole.
+#[test]
+fn a_memory_test_drops_the_scene_and_the_next_load_works() {
+    with_room_for_a_card(|| {
+        let image = image();
+        let mut memory = vec![Line::ZERO; DRAM_LINES];
+        let mut wire = Wire::new(&mut memory);
+        renders_a_tile(&mut wire, &image);
+        let answers = wire.say_all(&[Command::RenderTile(TILE), Command::TestMemory]);
+        let sound = |answer: &Answer| matches!(answer, Answer::MemoryTested(test) if test.wrong.count == 0);
+        assert!(answers.iter().all(sound), "{answers:?}");
+        // A small memory has a report at the end of each pattern's writing, and of its reading.
+        assert_eq!(answers.len(), 10);
+        assert_eq!(wire.say(&Command::RenderTile(TILE)), [Answer::Fault(FaultCode::Order)]);
+        assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::Fault(FaultCode::Order)]);
+        let read = Command::ReadChecksums { first: 0, count: 1 };
+        assert_eq!(wire.say(&read), [Answer::Fault(FaultCode::Chunks)]);
+        assert_eq!(wire.hello(), 0, "no line holds what was written");
+        renders_a_tile(&mut wire, &image);
+        // Another command ends a test.
+        let begin = Command::BeginImage { lines: 2, checksum: 0 };
+        assert_eq!(wire.say_all(&[Command::TestMemory, begin, Command::EndImage]).len(), 1);
+        renders_a_tile(&mut wire, &image);
+    });
+}
+
+#[test]
+fn a_card_computes_between_other_work_alone() {
+    with_room_for_a_card(|| {
+        let mut memory = vec![Line::ZERO; DRAM_LINES];
+        let mut wire = Wire::new(&mut memory);
+        renders_a_tile(&mut wire, &image());
+        let cases = |count: usize| vec![0x3f; OPERAND_BYTES * count];
+        for count in [1, CASES_PER_COMMAND] {
+            let answers = wire.say(&Command::Compute { operands: &cases(count) });
+            assert_eq!(answers, [Answer::Computed(RESULT_BYTES * count)]);
+        }
+        for bytes in [vec![], vec![0; 11], vec![0; 13], cases(CASES_PER_COMMAND + 1)] {
+            let answers = wire.say(&Command::Compute { operands: &bytes });
+            assert_eq!(answers, [Answer::Fault(FaultCode::Operands)], "{} bytes", bytes.len());
+        }
+        // Results and pixels share a buffer.
+        let answers = wire.say_all(&[Command::RenderTile(TILE), Command::Compute { operands: &cases(1) }]);
+        assert_eq!(answers.first(), Some(&Answer::Fault(FaultCode::Order)));
+        assert_eq!(answers.last(), Some(&Answer::TileDone(7)), "the scene is still there");
     });
 }
 

@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 
 use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{
-    CardAddress, CardSet, Integrator, MemoryUse, PhotonMaps, Picture, RenderSettings, card_info,
+    CardAddress, CardSet, Integrator, MemoryUse, PatternTest, PhotonMaps, Picture, RenderSettings,
+    Unobserved, card_info, card_self_test,
 };
 use photoncard_driver::scene::gltf;
 use photoncard_firmware::card::MicroCard;
@@ -154,12 +155,25 @@ fn renders_as_the_emulated_card(name: &str) {
         for (index, (pixel, expected)) in pixels.iter().zip(expected.pixels()).enumerate() {
             assert_eq!(pixel.to_bytes(), expected.to_bytes(), "pixel {index}: {pixel:?}, not {expected:?}");
         }
+        if number == 0 {
+            check_page("card image, bytes", name, statistics.image_bytes as u32);
+        }
         // An image that is loaded already is not sent again.
         assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, number == 1);
     }
+    passes_the_self_test(name, &address);
     renders_everything(name, &address);
     stays_within_the_budget(name, &address);
     drop(machine);
+}
+
+/// The machine computes as the host does, and has all of its memory. The scene after the test is loaded as a whole.
+fn passes_the_self_test(name: &str, address: &CardAddress) {
+    let test = card_self_test(address, &Unobserved).expect("the card answers");
+    for PatternTest { pattern, write, check, .. } in &test.patterns {
+        say(&format!("{name}: {} of {} lines: {write:?}, {check:?}", pattern.name(), test.lines));
+    }
+    assert!(test.is_passed(), "{test:?}");
 }
 
 /// Textures, cut-outs, mirrors, glass and lights of every kind.
@@ -191,10 +205,28 @@ fn stays_within_the_budget(name: &str, address: &CardAddress) {
         card_info(address).expect("the card answers").memory_use.expect("a board measures its memory");
     say(&format!("{name}: {static_bytes} bytes of static data, {stack_used} of {stack_bytes} of stack used"));
     assert!(0 < stack_used && stack_used < stack_bytes && stack_bytes <= MICRO.stack_bytes);
+    check_page("stack used, bytes", name, stack_used);
     assert!(static_bytes as usize >= size_of::<MicroCard<Dram<'static>>>() / 2, "32-bit pointers take half");
     // The images have no caches: the memory that the budget has for caches must stay free.
     let caches = MICRO.photon_cache_bytes + MICRO.scene_cache_bytes;
     assert!(static_bytes + stack_bytes + caches <= MICRO.sram_bytes);
+}
+
+/// Checks a figure of `docs/bring-up.md` that the test measures, in a row of the table of machines: other compilers give others,
+/// within a tenth.
+fn check_page(row: &str, name: &str, measured: u32) {
+    let page = include_str!("../../docs/bring-up.md");
+    let cells = |start: &str| {
+        let line = page.lines().find(|line| line.starts_with(start)).expect("the page has the row");
+        line.split('|').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>()
+    };
+    let column = cells("| under QEMU |").iter().position(|cell| *cell == format!("`{name}`"));
+    let stated = cells(&format!("| {row} |"))[column.expect("the page has the machine")].replace(',', "");
+    let stated: u32 = stated.parse().expect("a number");
+    assert!(
+        stated.abs_diff(measured) <= measured / 10,
+        "docs/bring-up.md states {stated} for {row} of {name}; write {measured}"
+    );
 }
 
 #[test]

@@ -29,6 +29,10 @@ pub enum CardError {
         "another host may be using the card: wait until it is done; or check that a card listens at the address"
     ))]
     Refused,
+    /// Error of a card that was reset during its self-test.
+    #[error("it was reset during its self-test")]
+    #[diagnostic(help("watch the card's own messages, and check its power supply and its watchdog"))]
+    Reset,
     /// Error of the session.
     #[error(transparent)]
     #[diagnostic(transparent)]

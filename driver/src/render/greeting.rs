@@ -4,7 +4,7 @@ use std::hash::{BuildHasher, RandomState};
 use std::time::{Duration, Instant};
 
 use photoncard_shared::budget::Budget;
-use photoncard_shared::link::PortError;
+use photoncard_shared::link::{Port, PortError};
 use photoncard_shared::message::MemoryUse;
 
 use super::exchange::exchange;
@@ -20,12 +20,22 @@ pub(super) struct GreetedCard {
     pub(super) budget: Budget,
 }
 
-/// Error of a greeting.
+/// Error of a greeting, or of the self-test after it.
 pub(super) enum GreetingError {
     /// Error of the card.
     Card(CardError),
-    /// The observer stopped the render.
+    /// The observer stopped the work.
     Stopped,
+}
+
+impl GreetingError {
+    /// The error of a card of this name.
+    pub(super) fn of_card(self, card: String) -> RenderError {
+        match self {
+            Self::Card(source) => RenderError::Card { card, source },
+            Self::Stopped => RenderError::Stopped,
+        }
+    }
 }
 
 impl From<CardError> for GreetingError {
@@ -69,16 +79,14 @@ pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, R
     Ok(answers)
 }
 
-fn open(address: &CardAddress) -> Result<OpenCard, RenderError> {
+/// Starts or connects to the first card at an address.
+pub(super) fn open(address: &CardAddress) -> Result<OpenCard, RenderError> {
     let card = OpenCard::open(0, address, None, &SharedImage::default(), None);
     card.map_err(|source| RenderError::Card { card: card_name(0, address), source })
 }
 
 fn greet_alone(address: &CardAddress, card: OpenCard, start: Instant) -> Result<GreetedCard, RenderError> {
-    greet(card, start, &Unobserved).map_err(|error| match error {
-        GreetingError::Card(source) => RenderError::Card { card: card_name(0, address), source },
-        GreetingError::Stopped => RenderError::Stopped,
-    })
+    greet(card, start, &Unobserved).map_err(|error| error.of_card(card_name(0, address)))
 }
 
 /// Name of a card in errors: its number, and its address if it is not emulated.
@@ -95,15 +103,25 @@ pub(super) fn greet(
     start: Instant,
     observer: &dyn Observer,
 ) -> Result<GreetedCard, GreetingError> {
+    let (session, budget) = greet_port(&mut card, start, observer)?;
+    Ok(GreetedCard { card, session, budget })
+}
+
+/// [`greet`], on any port.
+pub(super) fn greet_port(
+    port: &mut impl Port,
+    start: Instant,
+    observer: &dyn Observer,
+) -> Result<(Session<'static>, Budget), GreetingError> {
     let mut session = Session::new(session_number(), start.elapsed());
     loop {
         if let Some(&budget) = session.budget() {
-            return Ok(GreetedCard { card, session, budget });
+            return Ok((session, budget));
         }
         if observer.is_stopped() {
             return Err(GreetingError::Stopped);
         }
-        exchange(&mut session, &mut card, None, start).map_err(|error| match error {
+        exchange(&mut session, port, None, start).map_err(|error| match error {
             SessionError::Port(PortError::Closed) => CardError::Refused,
             error => CardError::Session(error),
         })?;

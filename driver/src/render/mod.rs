@@ -17,6 +17,7 @@ mod open_card;
 mod outputs;
 mod preparation;
 mod reopening;
+mod self_test;
 mod settings;
 mod statistics;
 mod times;
@@ -29,8 +30,11 @@ pub use greeting::{CardInfo, card_info, card_ping};
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use observer::{Observer, Phase, Unobserved};
 pub use photoncard_shared::budget::MAX_BINS;
-pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Filter, Radiance, Sampling};
+pub use photoncard_shared::message::{MemoryPattern, MemoryUse, WrongWord, WrongWords};
+pub use self_test::{
+    ArithmeticTest, PatternTest, SelfTest, WrongResult, WrongResults, card_self_test, self_test_on,
+};
 pub use settings::{
     CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM, PhotonMaps,
     Picture, RenderSettings, Schedule, TileOutputs,

@@ -1,10 +1,10 @@
-//! Observer of a render, which can stop it.
+//! Observer of a render or of a card's self-test, which can stop it.
 
 use std::error::Error;
 
 use super::error::CardError;
 
-/// Phase of a render.
+/// Phase of a render, or of a card's self-test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Pilot renders, by which settings are chosen: without progress.
@@ -17,14 +17,16 @@ pub enum Phase {
     Load,
     /// Rendering: progress in tiles.
     Tiles,
+    /// Testing a card's memory, which is no phase of a render: progress in bytes, written or read.
+    SelfTest,
 }
 
-/// Observer of a render, which can stop it. Its methods are called from the threads of the render.
+/// Observer of a render or of a card's self-test, which can stop it. Its methods are called from the threads of the work.
 pub trait Observer: Sync {
     /// Reports the progress of a phase: `done` of `total`.
     fn progress(&self, phase: Phase, done: u64, total: u64);
 
-    /// Returns whether the render should stop as soon as possible.
+    /// Returns whether the work should stop as soon as possible.
     fn is_stopped(&self) -> bool;
 
     /// Reports that `done` of `total` tiles are taken over from an earlier render.
@@ -40,7 +42,7 @@ pub trait Observer: Sync {
     fn not_shown(&self, _error: &dyn Error) {}
 }
 
-/// Observer that ignores all reports and never stops the render.
+/// Observer that ignores all reports and never stops the work.
 pub struct Unobserved;
 
 impl Observer for Unobserved {

@@ -1,7 +1,7 @@
 //! Input and output of a session: jobs, tiles and events.
 
 use photoncard_shared::address::Line;
-use photoncard_shared::message::{FrameParameters, Tile};
+use photoncard_shared::message::{FrameParameters, MemoryTest, Tile};
 
 use super::PixelLimits;
 use crate::sink::FinishedTile;
@@ -42,4 +42,8 @@ pub enum Event {
         /// True if the card was working on the tile, which may be the cause.
         was_at_work: bool,
     },
+    /// The card has computed the requested results.
+    Computed(Vec<u8>),
+    /// The card has tested a part of its memory.
+    MemoryTested(MemoryTest),
 }

@@ -17,4 +17,6 @@ pub(super) enum State {
     Framing,
     /// The card has image and frame, and accepts tiles.
     Rendering,
+    /// A part of the self-test is requested.
+    Testing,
 }

@@ -5,8 +5,8 @@ use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
-    self, Command, Fault, FaultCode, FrameParameters, MemoryUse, PIXELS_BYTES, PROTOCOL_VERSION, PixelRecord,
-    Reply, Tile, record_bytes,
+    self, CASES_PER_COMMAND, Command, Fault, FaultCode, FrameParameters, MemoryUse, OPERAND_BYTES,
+    PIXELS_BYTES, PROTOCOL_VERSION, PixelRecord, RESULT_BYTES, Reply, Tile, record_bytes,
 };
 use photoncard_shared::transport::Transport;
 
@@ -16,6 +16,8 @@ use crate::chip::{Chip, Progress};
 use crate::kind::ChipKind;
 use crate::memory::CardMemory;
 use crate::render::Context;
+use crate::self_test::MemoryTester;
+use crate::self_test::arithmetic::compute_bytes;
 
 /// Maximum number of queued tile commands, over all budgets.
 pub(super) const TILE_QUEUE: usize = 4;
@@ -34,7 +36,7 @@ pub(super) struct Engine<K: ChipKind> {
     counters: Counters,
     tiles: Deque<Tile, TILE_QUEUE>,
     at_work: Option<TileWork>,
-    /// Pixels of the tile at work, or checksums, to be sent.
+    /// Pixels of the tile at work, checksums, or results of a computation, to be sent.
     data: heapless::Vec<u8, DATA_BYTES>,
 }
 
@@ -48,9 +50,9 @@ enum TileWork {
     Sent(Tile),
 }
 
-/// Bytes of pixels or checksums in one reply.
+/// Bytes of pixels, checksums or results in one reply.
 const DATA_BYTES: usize = PIXELS_BYTES;
-const _: () = assert!(CHECKSUMS_BYTES <= DATA_BYTES);
+const _: () = assert!(CHECKSUMS_BYTES <= DATA_BYTES && CASES_PER_COMMAND * RESULT_BYTES <= DATA_BYTES);
 
 impl<K: ChipKind> Engine<K> {
     /// The engine of a card that has seen no host yet.
@@ -77,7 +79,7 @@ impl<K: ChipKind> Engine<K> {
         &mut self,
         memory: &mut impl CardMemory,
         command: &Command,
-    ) -> Result<Option<Reply<'static>>, Fault> {
+    ) -> Result<Option<Reply<'_>>, Fault> {
         match *command {
             Command::Hello { .. } => {
                 self.forget();
@@ -112,7 +114,31 @@ impl<K: ChipKind> Engine<K> {
                 Ok(Some(Reply::FrameAccepted))
             }
             Command::RenderTile(tile) => self.accept(tile).map(|()| None),
+            Command::Compute { operands } => self.compute(operands).map(Some),
+            Command::TestMemory => {
+                self.forget();
+                self.written = 0;
+                self.image = ImageState::Testing(MemoryTester::new(memory)?);
+                Ok(None)
+            }
         }
+    }
+
+    /// The results of triples of operands.
+    fn compute(&mut self, operands: &[u8]) -> Result<Reply<'_>, Fault> {
+        if self.is_at_work() {
+            return Err(OUT_OF_ORDER);
+        }
+        let (cases, rest) = operands.as_chunks::<OPERAND_BYTES>();
+        if !(1..=CASES_PER_COMMAND).contains(&cases.len()) || !rest.is_empty() {
+            return Err(Fault { code: FaultCode::Operands, detail: operands.len() as u32 });
+        }
+        self.data.clear();
+        for case in cases {
+            // There is room for CASES_PER_COMMAND.
+            let _ = self.data.extend_from_slice(&compute_bytes(case));
+        }
+        Ok(Reply::Computed { results: &self.data })
     }
 
     fn forget(&mut self) {
@@ -130,7 +156,7 @@ impl<K: ChipKind> Engine<K> {
 
     /// True while there is work to do without a command.
     pub(super) fn has_work(&self) -> bool {
-        self.is_at_work() || matches!(self.image, ImageState::Checking(_))
+        self.is_at_work() || matches!(self.image, ImageState::Checking(_) | ImageState::Testing(_))
     }
 
     fn accept(&mut self, tile: Tile) -> Result<(), Fault> {
@@ -175,23 +201,44 @@ impl<K: ChipKind> Engine<K> {
                 }
             };
         }
-        if let ImageState::Checking(check) = &mut self.image {
-            let result = check.step(memory);
-            if let Ok(None) = result {
-                return Ok(());
-            }
-            self.image = ImageState::None;
-            if let Some(scene) = result? {
-                self.image = ImageState::Ready(scene);
-                send(transport, &Reply::ImageAccepted);
-            }
-            return Ok(());
+        match &self.image {
+            ImageState::Checking(_) => return self.check(memory, transport),
+            ImageState::Testing(_) => return self.test(memory, transport),
+            ImageState::None | ImageState::Loading(_) | ImageState::Ready(_) => {}
         }
         let result = self.render(memory, transport);
         if result.is_err() {
             self.at_work = None;
         }
         result
+    }
+
+    /// Checks the next lines of a received image.
+    fn check(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {
+        let ImageState::Checking(check) = &mut self.image else { return Ok(()) };
+        let result = check.step(memory);
+        if let Ok(None) = result {
+            return Ok(());
+        }
+        self.image = ImageState::None;
+        if let Some(scene) = result? {
+            self.image = ImageState::Ready(scene);
+            send(transport, &Reply::ImageAccepted);
+        }
+        Ok(())
+    }
+
+    /// Tests the next lines of the memory.
+    fn test(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {
+        let ImageState::Testing(tester) = &mut self.image else { return Ok(()) };
+        let result = tester.step(memory);
+        if result.is_err() || matches!(&result, Ok(Some(progress)) if progress.is_over()) {
+            self.image = ImageState::None;
+        }
+        if let Some(progress) = result? {
+            send(transport, &Reply::MemoryTested(progress));
+        }
+        Ok(())
     }
 
     fn render(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {

@@ -7,17 +7,20 @@ use photoncard_shared::message::{CHECKSUMS_PER_REPLY, CHUNK_LINES, Fault, FaultC
 
 use crate::memory::{CardMemory, Stage};
 use crate::scene::SceneImage;
+use crate::self_test::MemoryTester;
 
 /// The fault of a command that needs another one before it.
 pub(super) const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
-/// State of the image in memory.
+/// State of the image in memory, or of the memory's test.
 pub(super) enum ImageState {
     None,
     Loading(Loader),
     /// All lines have been received; their checksum is being computed.
     Checking(Check),
     Ready(SceneImage),
+    /// The memory holds patterns of a test instead.
+    Testing(MemoryTester),
 }
 
 impl ImageState {

@@ -1,5 +1,6 @@
 //! Directly addressed memory: a slice of lines, without copies or counts.
 
+use core::hint::black_box;
 use core::ops::Range;
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
@@ -60,6 +61,11 @@ impl CardMemory for Dram<'_> {
     fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         let first = first.0 as usize;
         copy_lines(lines, self.lines.get_mut(first..first.checked_add(lines.len())?)?);
+        Some(())
+    }
+    fn write_byte(&mut self, address: LineAddress, place: usize, byte: u8) -> Option<()> {
+        // The compiler, which does not know the place, cannot join this store with others to one of a word.
+        *black_box(self.lines.get_mut(address.0 as usize)?.0.get_mut(place)?) = byte;
         Some(())
     }
 }

@@ -55,6 +55,14 @@ pub trait CardMemory: MemoryPort {
 
     /// Writes lines from line `first`; `None`, and nothing is written, if they are not all in the memory.
     fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()>;
+
+    /// Writes one byte of a written line; `None`, and nothing is written, if it is not in the memory. A memory that the processor
+    /// addresses directly stores the byte alone.
+    fn write_byte(&mut self, address: LineAddress, place: usize, byte: u8) -> Option<()> {
+        let mut line = *self.stored(address, 1)?.first()?;
+        *line.0.get_mut(place)? = byte;
+        self.write(address, &[line.0])
+    }
 }
 
 /// Copies lines into a memory's, as many as the shorter slice has.

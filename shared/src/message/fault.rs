@@ -43,6 +43,8 @@ pub enum FaultCode {
     Record,
     /// A bounding volume hierarchy that is deeper than the stack, or no tree; detail: the node.
     Depth,
+    /// Operands are not whole triples, none, or too many; detail: their bytes.
+    Operands,
 }
 
 /// The fields of [`FrameParameters`](super::FrameParameters), by the numbers that [`FaultCode::Parameter`] carries.
@@ -170,6 +172,9 @@ impl fmt::Display for Fault {
             FaultCode::Record => write!(f, "record {detail} is outside its section of the card image"),
             FaultCode::Depth => {
                 write!(f, "the hierarchy is deeper than the traversal stack, or no tree, at node {detail}")
+            }
+            FaultCode::Operands => {
+                write!(f, "{detail} bytes of operands are not whole triples, none, or too many")
             }
         }
     }

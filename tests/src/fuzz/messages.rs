@@ -4,8 +4,8 @@ use photoncard_firmware::kind::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::message::{
-    self, Camera, CausticGather, Command, Drain, Fault, FaultCode, Filter, FrameParameters, MemoryUse,
-    Radiance, Reply, Sampling, Tile,
+    self, Camera, CausticGather, Command, Drain, Fault, FaultCode, Filter, FrameParameters, MemoryPattern,
+    MemoryTest, MemoryUse, Radiance, Reply, Sampling, Tile, WrongWord, WrongWords,
 };
 
 use super::mutation;
@@ -58,6 +58,8 @@ pub(super) fn commands() -> Vec<Vec<u8>> {
         Command::EndImage,
         Command::BeginFrame(frame()),
         Command::RenderTile(Tile { id: 7, x: 300, y: 16, width: 16, height: 16 }),
+        Command::Compute { operands: &data[..24] },
+        Command::TestMemory,
     ];
     commands.iter().map(|command| written(MAX_PAYLOAD, |bytes| message::encode(command, bytes))).collect()
 }
@@ -83,6 +85,18 @@ pub(super) fn replies() -> Vec<Vec<u8>> {
         Reply::Pixels { tile: 7, first: 25, data: &data },
         Reply::TileDone { tile: 7, counters: Counters::ZERO },
         Reply::Fault(Fault { code: FaultCode::Depth, detail: 1 << 30 }),
+        Reply::Computed { results: &data[..168] },
+        Reply::MemoryTested(MemoryTest {
+            lines: 4096,
+            pattern: MemoryPattern::Address,
+            written: 4096,
+            checked: 64,
+            wrong: WrongWords {
+                count: 1,
+                bits: 1,
+                first: Some(WrongWord { index: 7, expected: 7, found: 6 }),
+            },
+        }),
     ];
     replies.iter().map(|reply| written(MAX_PAYLOAD, |bytes| message::encode(reply, bytes))).collect()
 }

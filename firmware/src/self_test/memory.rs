@@ -1,0 +1,143 @@
+//! Test of card memory: each pattern is written over all of it, and read back.
+
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress};
+use photoncard_shared::message::{
+    Fault, FaultCode, MemoryPattern, MemoryTest, WORDS_PER_LINE, WrongWord, WrongWords,
+};
+
+use crate::memory::{CardMemory, outside};
+
+/// Lines written or read in one step: 8 KB.
+const STEP_LINES: u32 = 64;
+
+/// Lines after which a test reports its progress: 1 MB, so that a memory of more than 9 KB/s makes progress within 120 s.
+const REPORT_LINES: u32 = 8192;
+
+/// Value that a pattern gives the word of an index. It is not inlined: each loop over words would be compiled once for each pattern.
+#[inline(never)]
+pub fn expected(pattern: MemoryPattern, index: u32) -> u32 {
+    match pattern {
+        MemoryPattern::WalkingOne => 1 << (index % 32),
+        MemoryPattern::WalkingZero => !(1 << (index % 32)),
+        MemoryPattern::Address => index,
+        MemoryPattern::Complement => !index,
+        MemoryPattern::ByteLanes => {
+            let mut bytes = (!index).to_le_bytes();
+            let (lane, value) = replaced(index);
+            if let Some(byte) = bytes.get_mut(lane) {
+                *byte = value;
+            }
+            u32::from_le_bytes(bytes)
+        }
+    }
+}
+
+/// The byte of a word that [`MemoryPattern::ByteLanes`] replaces, and its new value.
+fn replaced(index: u32) -> (usize, u8) {
+    let lane = index % 4;
+    (lane as usize, (index >> (8 * lane)) as u8)
+}
+
+/// The bytes of a line in a pattern.
+#[inline(never)]
+fn line(pattern: MemoryPattern, address: u32) -> [u8; LINE_BYTES] {
+    let mut bytes = [0; LINE_BYTES];
+    let first = address.wrapping_mul(WORDS_PER_LINE);
+    for (place, word) in (0..).zip(bytes.as_chunks_mut().0) {
+        *word = expected(pattern, first.wrapping_add(place)).to_le_bytes();
+    }
+    bytes
+}
+
+/// A memory test at work.
+pub struct MemoryTester {
+    progress: MemoryTest,
+}
+
+impl MemoryTester {
+    /// A test of a memory.
+    ///
+    /// # Errors
+    /// [`FaultCode::LineRange`] if it has no lines.
+    pub fn new(memory: &impl CardMemory) -> Result<Self, Fault> {
+        let lines = memory.lines();
+        if lines == 0 {
+            return Err(Fault { code: FaultCode::LineRange, detail: 0 });
+        }
+        let [pattern, ..] = MemoryPattern::ALL;
+        let wrong = WrongWords::default();
+        Ok(Self { progress: MemoryTest { lines, pattern, written: 0, checked: 0, wrong } })
+    }
+
+    /// Writes or reads the next lines. Returns the progress if it is to be reported: after each megabyte, and at the end of the
+    /// memory.
+    ///
+    /// # Errors
+    /// [`FaultCode::LineRange`] if the memory has fewer lines than it says.
+    pub fn step(&mut self, memory: &mut impl CardMemory) -> Result<Option<MemoryTest>, Fault> {
+        let progress = &mut self.progress;
+        if let (true, Some(pattern)) = (progress.is_end_of_pattern(), progress.pattern.next()) {
+            let MemoryTest { lines, .. } = *progress;
+            *progress = MemoryTest { lines, pattern, written: 0, checked: 0, wrong: WrongWords::default() };
+        }
+        let done = if progress.written < progress.lines { self.write(memory)? } else { self.check(memory)? };
+        let is_due = done.is_multiple_of(REPORT_LINES) || done == self.progress.lines;
+        Ok(is_due.then_some(self.progress))
+    }
+
+    /// Writes the next lines. Returns the number of lines that hold the pattern.
+    fn write(&mut self, memory: &mut impl CardMemory) -> Result<u32, Fault> {
+        let MemoryTest { lines, pattern, written, .. } = self.progress;
+        let end = written.saturating_add(STEP_LINES).min(lines);
+        for address in written..end {
+            match pattern {
+                MemoryPattern::ByteLanes => replace_bytes(memory, address),
+                pattern => memory.write(LineAddress(address), &[line(pattern, address)]),
+            }
+            .ok_or_else(|| outside(LineAddress(address)))?;
+        }
+        self.progress.written = end;
+        Ok(end)
+    }
+
+    /// Compares the next lines. Returns the number of compared lines.
+    fn check(&mut self, memory: &impl CardMemory) -> Result<u32, Fault> {
+        let MemoryTest { lines, pattern, checked, .. } = self.progress;
+        let end = checked.saturating_add(STEP_LINES).min(lines);
+        let first = LineAddress(checked);
+        let stored = memory.stored(first, end - checked).ok_or_else(|| outside(first))?;
+        for (address, stored) in (checked..end).zip(stored) {
+            let expected = line(pattern, address);
+            if stored.0 != expected {
+                add(&mut self.progress.wrong, address, &expected, stored);
+            }
+        }
+        self.progress.checked = end;
+        Ok(end)
+    }
+}
+
+/// Replaces one byte of each word of a line that holds [`MemoryPattern::Complement`].
+fn replace_bytes(memory: &mut impl CardMemory, address: u32) -> Option<()> {
+    let first = address.wrapping_mul(WORDS_PER_LINE);
+    (0..WORDS_PER_LINE).try_for_each(|word| {
+        let (lane, value) = replaced(first.wrapping_add(word));
+        memory.write_byte(LineAddress(address), 4 * word as usize + lane, value)
+    })
+}
+
+/// Adds the wrong words of a line, of a higher address than those before.
+#[cold]
+#[inline(never)]
+fn add(wrong: &mut WrongWords, address: u32, expected: &[u8; LINE_BYTES], stored: &Line) {
+    let first = address.wrapping_mul(WORDS_PER_LINE);
+    let words = expected.as_chunks().0.iter().zip(stored.0.as_chunks().0);
+    for (place, (expected, found)) in (0..).zip(words) {
+        let [expected, found] = [expected, found].map(|bytes| u32::from_le_bytes(*bytes));
+        if found != expected {
+            wrong.count = wrong.count.saturating_add(1);
+            wrong.bits |= expected ^ found;
+            wrong.first.get_or_insert(WrongWord { index: first.wrapping_add(place), expected, found });
+        }
+    }
+}
