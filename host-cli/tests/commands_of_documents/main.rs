@@ -131,6 +131,7 @@ fn defects_of_a_document_are_found() {
         ("By `photoncard scene show`.", "scene show"),
         ("By `render --out DIR`.", "--out"),
         ("By `cargo test -p photoncard-tests --test absent`.", "absent"),
+        ("By `tests/peers/absent.sh [SCENE ..]`.", "tests/peers/absent.sh"),
         ("See `driver/src/absent.rs`.", "driver/src/absent.rs"),
         ("See [there](docs/absent.md).", "docs/absent.md"),
     ] {

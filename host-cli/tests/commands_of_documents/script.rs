@@ -65,8 +65,9 @@ fn defects_of_command(tree: &CommandTree, words: &[&str]) -> Vec<String> {
         "cargo" => {
             defects.extend(repository::defects_of_cargo(arguments));
             let mut parts = arguments.split(|&argument| argument == "--");
-            let is_program =
-                parts.next().is_some_and(|own| own[0] == "run" && own.ends_with(&["-p", "photoncard"]));
+            let is_program = parts
+                .next()
+                .is_some_and(|own| own.starts_with(&["run"]) && own.ends_with(&["-p", "photoncard"]));
             if let Some(arguments) = parts.next().filter(|_| is_program) {
                 defects.extend(tree.defect_of_arguments(arguments));
             }
@@ -85,6 +86,9 @@ pub(crate) fn defects_of_inline_code(tree: &CommandTree, text: &str) -> Vec<Stri
         ["photoncard", ref words @ ..] => tree.defects_of_form(words),
         ["cargo", ref arguments @ ..] => repository::defects_of_cargo(arguments),
         [option, ..] if option.len() > 2 && option.starts_with("--") => defects_of_options(tree, &words),
+        [program, ..] if program.contains('/') && program.ends_with(".sh") => {
+            return repository::defect_of_script(program).into_iter().collect();
+        }
         _ if text.contains(" --") && tree.is_command(text) => tree.defects_of_form(&words),
         _ => Vec::new(),
     };
