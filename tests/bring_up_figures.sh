@@ -83,7 +83,7 @@ sizes)
     sizes_table | replace_block sizes
     stack=$(sed -nE 's/^ *STACK *:.*LENGTH = ([0-9]+)K.*/\1/p' firmware/boards/mps2_an386/memory.x)
     sizes_of mps2-an386 | awk -v stack="$((stack * 1024))" '{
-        print "   ```"
+        print "   ```text"
         printf "   photoncard on %s: code %d, constants %d, data %d, zeroed data %d, stack %d bytes\n", $1, $2, $3, $4, $5, stack
         print "   ready"
         print "   ```" }' | replace_block ready

@@ -109,6 +109,14 @@ timeout 900 cargo test --workspace --doc --locked
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 
+step "packages"
+unpublished=""
+tests/publishable.sh || {
+    [ $? = 75 ] || fail "the crates cannot be packed"
+    unpublished="the index of crates.io cannot be had"
+    echo "ci: SKIPPED: the rehearsal of 'cargo publish': $unpublished" >&2
+}
+
 # Licences and sources are a test as well (tests/tests/dependencies.rs); advisories need the tool, and a database on GitHub.
 step "dependencies"
 skipped_advisories=""
@@ -124,6 +132,7 @@ else
 fi
 [ -z "$skipped_advisories" ] || echo "ci: SKIPPED: advisories of dependencies: $skipped_advisories" >&2
 
+[ -z "$unpublished" ] || echo "ci: SKIPPED: the rehearsal of 'cargo publish': $unpublished" >&2
 [ ${#unchecked[@]} = 0 ] || echo "ci: SKIPPED: checks for ${unchecked[*]}: rustup cannot add them" >&2
 [ -z "${PHOTONCARD_SKIP_QEMU:-}" ] || echo "ci: SKIPPED: images on QEMU: $PHOTONCARD_SKIP_QEMU" >&2
 step "done"

@@ -14,15 +14,15 @@
 //! use std::path::Path;
 //!
 //! use photoncard_driver::exr::{self, SampleFormat};
-//! use photoncard_driver::render::{RenderSettings, Unobserved, render};
+//! use photoncard_driver::render::{Quality, Unobserved, render};
 //! use photoncard_driver::scene::gltf;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene = gltf::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf")))?;
-//! let settings = RenderSettings::default().with(|settings| {
+//! let settings = Quality::Good.settings().with(|settings| {
 //!     (settings.picture.width, settings.picture.height) = (16, 16);
+//!     // Less than the quality's half a million: an example is to take no time.
 //!     settings.photons.count = 5_000;
-//!     settings.integrator.gather_rays = 8;
 //! });
 //! let rendering = render(&scene, &settings, &Unobserved)?;
 //!
@@ -37,8 +37,9 @@
 //! # }
 //! ```
 //!
-//! [`RenderSettings`](render::RenderSettings) has the options of `photoncard render` in groups; its default is the
-//! dissertation's nominal frame on one emulated reference chip. [`Rendering`](render::Rendering) holds the
+//! [`RenderSettings`](render::RenderSettings) has the options of `photoncard render` in groups.
+//! [`Quality::settings`](render::Quality::settings) chooses samples, rays, photons, cache and filter, as `--quality` does; `RenderSettings::default()` is
+//! [`Quality::Paper`](render::Quality::Paper), the dissertation's nominal frame. All are for one emulated reference chip. [`Rendering`](render::Rendering) holds the
 //! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A tone-mapped PNG is written by
 //! [`tone_mapping::write_png`], and two pictures are compared by [`difference`].
 //!

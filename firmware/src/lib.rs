@@ -3,6 +3,34 @@
 //! No allocator, no I/O, every buffer sized at compile time by a [`kind`] of chip. An emulated card, a machine of QEMU and a
 //! board run the same code. Terms are defined in `docs/glossary.md`.
 //!
+//! # Example
+//!
+//! A card is its firmware and its DRAM. Here it answers a host's first message; on a port [`serve::serve`] moves the bytes:
+//!
+//! ```
+//! use photoncard_firmware::card::MicroCard;
+//! use photoncard_firmware::kind::MICRO;
+//! use photoncard_firmware::memory::Dram;
+//! use photoncard_shared::address::Line;
+//! use photoncard_shared::image::LAYOUT_VERSION;
+//! use photoncard_shared::message::{self, Command, PROTOCOL_VERSION, Reply};
+//! use photoncard_shared::transport::Transport;
+//!
+//! let mut dram = [Line::ZERO; 64];
+//! let mut card = MicroCard::new(Dram::new(&mut dram));
+//! let mut host = Transport::host();
+//! host.open(0x5eed);
+//! host.send(|payload| {
+//!     message::encode(&Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION }, payload)
+//! });
+//!
+//! card.feed(host.outgoing());
+//! host.receive(card.outgoing());
+//! let reply = message::decode(host.take().expect("a card answers a hello"));
+//! let Some(Reply::Hello { budget, .. }) = reply else { panic!("{reply:?}") };
+//! assert_eq!(budget.tile_pixels, MICRO.tile_pixels);
+//! ```
+//!
 //! # Layers
 //!
 //! Modules from bottom to top. A module imports modules of its own row and of rows above it in this table, never of rows below it.

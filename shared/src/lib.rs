@@ -3,6 +3,29 @@
 //! Firmware and host are built on this crate. It defines the contents of a card's memory ([`address`], [`layout`],
 //! [`image`]), the capacities of a chip ([`budget`]), and the protocol of a link ([`message`], [`transport`], [`frame`]).
 //!
+//! # Example
+//!
+//! The first message of a host reaches a card; what carries the bytes is the caller's:
+//!
+//! ```
+//! use photoncard_shared::image::LAYOUT_VERSION;
+//! use photoncard_shared::message::{self, Command, PROTOCOL_VERSION};
+//! use photoncard_shared::transport::Transport;
+//!
+//! let (mut host, mut card) = (Transport::host(), Transport::card());
+//! let hello = Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION };
+//! // A session has a random number.
+//! host.open(0x5eed);
+//! assert!(host.send(|payload| message::encode(&hello, payload)));
+//!
+//! let frame = host.outgoing().to_vec();
+//! host.sent(frame.len());
+//! let (taken, _) = card.receive(&frame);
+//! assert_eq!(taken, frame.len());
+//! let payload = card.take().expect("the link has lost nothing");
+//! assert_eq!(message::decode(payload), Some(hello));
+//! ```
+//!
 //! # Layers
 //!
 //! Card memory, from bottom to top:
