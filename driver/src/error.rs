@@ -286,23 +286,20 @@ pub enum SceneError {
 
     /// Error of a scene without light.
     #[error("the scene has no light")]
-    #[diagnostic(
-        code(scene::no_light),
-        help(
-            "give a material of at least one triangle an emissiveFactor above 0 (and KHR_materials_emissive_strength \
-             for its radiance), place a light of KHR_lights_punctual, or add an environment"
-        )
-    )]
-    NoLight,
+    #[diagnostic(code(scene::no_light), help("{remedy}"))]
+    NoLight {
+        /// Remedy.
+        remedy: &'static str,
+    },
 
     /// Error of a camera name that the scene lacks.
     #[error("the scene has no camera '{name}'")]
-    #[diagnostic(code(scene::camera), help("choose one of: {cameras}"))]
+    #[diagnostic(code(scene::camera), help("{remedy}"))]
     UnknownCamera {
         /// Requested name.
         name: String,
-        /// Names of the scene's cameras.
-        cameras: String,
+        /// Remedy, with the names of the scene's cameras.
+        remedy: String,
     },
 
     /// Error of a variant name that the scene's file lacks.

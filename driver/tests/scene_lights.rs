@@ -2,6 +2,7 @@
 
 mod scene_support;
 
+use std::f32::consts::PI;
 use std::fs;
 use std::path::Path;
 
@@ -9,8 +10,9 @@ use glam::Vec3;
 use miette::Diagnostic;
 use photoncard_driver::error::SceneError;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::scene::{Environment, PunctualKind, Scene};
-use scene_support::load_changed;
+use photoncard_driver::scene::gltf::{self, LoadSettings};
+use photoncard_driver::scene::{Environment, LightUnits, PunctualKind, Scene};
+use scene_support::{load_changed, load_with, push, triangle_bytes, triangle_json};
 use serde_json::{Value, json};
 
 /// The triangle, dark, with a light at the node `lamp`, which turns -z to -x.
@@ -86,13 +88,104 @@ fn lights_that_are_not_possible_are_refused() {
         assert!(error.help().is_some());
     }
     let dark = lit(&json!({"type": "point", "intensity": 0})).unwrap();
-    assert!(matches!(dark.check_light(), Err(SceneError::NoLight)));
+    assert!(matches!(dark.check_light(), Err(SceneError::NoLight { .. })));
     let flat = load_changed(|json| {
         json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "directional"}]}});
         json["nodes"][0]["extensions"] = json!({"KHR_lights_punctual": {"light": 0}});
         json["nodes"][0]["scale"] = json!([1, 1, 0]);
     });
     assert!(flat.unwrap_err().to_string().contains("nodes[0]"));
+}
+
+const BLENDER: &str = "Khronos glTF Blender I/O v5.0.21";
+
+/// A file of `generator` with a point, a directional and a spot light, each of the intensity 683, loaded in `units`.
+fn of_exporter(generator: &str, units: LightUnits) -> Scene {
+    let mut json = triangle_json();
+    json["asset"]["generator"] = json!(generator);
+    let spot = json!({"innerConeAngle": 0.25, "outerConeAngle": 0.5});
+    let lights = json!([{"type": "point", "intensity": 683}, {"type": "directional", "intensity": 683},
+                        {"type": "spot", "intensity": 683, "spot": spot, "name": "stage"}]);
+    json["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
+    for light in 0..3 {
+        push(&mut json, "nodes", json!({"extensions": {"KHR_lights_punctual": {"light": light}}}));
+    }
+    json["scenes"][0]["nodes"] = json!([0, 1, 2, 3, 4]);
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "data.bin", &triangle_bytes());
+    let path = write(folder.path(), "scene.gltf", json.to_string().as_bytes());
+    gltf::load_with(&path, &LoadSettings { light_units: units, ..LoadSettings::default() }).unwrap()
+}
+
+#[test]
+fn units_of_lights_are_the_exporters_unless_they_are_stated() {
+    use LightUnits::{Auto, Photometric, Radiometric, Watts};
+    let (photometric, watts, as_they_stand) = ([1.0, 1.0], [683.0 / (4.0 * PI), 683.0], [683.0, 683.0]);
+    let early = "Khronos glTF Blender I/O v3.3.35";
+    for (generator, units, expected, notice) in [
+        (BLENDER, Auto, photometric, Some("683 lm/W")),
+        (BLENDER, Photometric, photometric, None),
+        (BLENDER, Radiometric, as_they_stand, None),
+        (BLENDER, Watts, watts, None),
+        (early, Auto, watts, Some("watts")),
+        (early, Radiometric, as_they_stand, None),
+        ("another", Auto, as_they_stand, None),
+        ("another", Photometric, photometric, None),
+    ] {
+        let scene = of_exporter(generator, units);
+        let [point, directional, spot] = &scene.lights[..] else { panic!("{:?}", scene.lights) };
+        let found = [point, directional].map(|light| light.intensity.x);
+        assert_eq!((found, spot.intensity), (expected, point.intensity), "{generator} {units:?}");
+        assert_eq!(scene.generator.as_deref(), Some(generator));
+        let on_units: Vec<_> =
+            scene.notices.iter().filter(|notice| notice.contains("--light-units")).collect();
+        match notice {
+            Some(part) => assert!(on_units.len() == 1 && scene.notices[0].contains(part), "{on_units:?}"),
+            None => assert!(on_units.is_empty(), "{generator} {units:?}: {on_units:?}"),
+        }
+    }
+    let sums = [Auto, Photometric, Radiometric, Watts].map(|units| of_exporter(BLENDER, units).checksum());
+    assert_eq!(sums[0], sums[1]);
+    assert!(sums[1] != sums[2] && sums[2] != sums[3] && sums[3] != sums[1], "{sums:?}");
+}
+
+#[test]
+fn penumbras_of_blenders_spots_alone_are_adapted() {
+    let inner = |generator: &str| {
+        let scene = of_exporter(generator, LightUnits::Photometric);
+        let PunctualKind::Spot { inner_cosine, .. } = scene.lights[2].kind else { panic!("{scene:?}") };
+        (inner_cosine, scene.notices.iter().any(|notice| notice.contains("light 'stage'")))
+    };
+    let edge = 0.5_f32.cos();
+    // The blend is half, and 3/4 of its width has the flux of Blender's smooth step.
+    let (found, is_noted) = inner(BLENDER);
+    assert!((found - (edge + 0.375 * (1.0 - edge))).abs() < 1e-6 && is_noted, "{found}");
+    assert_eq!(inner("another"), (libm::cosf(0.25), false));
+}
+
+#[test]
+fn errors_on_files_of_blender_say_what_to_tick() {
+    let scene = |generator: &str| {
+        let mut json = triangle_json();
+        json["asset"]["generator"] = json!(generator);
+        json["materials"][0]["emissiveFactor"] = json!([0, 0, 0]);
+        json["nodes"].as_array_mut().unwrap().iter_mut().for_each(|node| {
+            node.as_object_mut().unwrap().remove("camera");
+        });
+        load_with(&json, &triangle_bytes()).unwrap()
+    };
+    let help = |error: SceneError| error.help().unwrap().to_string();
+    let [of_blender, other] = [BLENDER, "another"].map(scene);
+    for (scene, is_of_blender) in [(of_blender, true), (other, false)] {
+        let dark = help(scene.check_light().unwrap_err());
+        assert_eq!(dark.contains("Punctual Lights"), is_of_blender, "{dark}");
+        assert_eq!(dark.contains("emissiveFactor"), !is_of_blender, "{dark}");
+        let unknown = help(scene.camera(Some("hall")).unwrap_err());
+        assert_eq!(unknown.contains("Include > Data > Cameras"), is_of_blender, "{unknown}");
+        assert!(unknown.contains("choose one of: 'framed'"), "{unknown}");
+        let framed = scene.notices.iter().find(|notice| notice.contains("no perspective camera")).unwrap();
+        assert_eq!(framed.contains("Include > Data > Cameras"), is_of_blender, "{framed}");
+    }
 }
 
 #[test]

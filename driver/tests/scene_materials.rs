@@ -5,7 +5,8 @@ mod scene_support;
 use glam::Vec3;
 use miette::Diagnostic;
 use photoncard_driver::error::SceneError;
-use photoncard_driver::scene::{Material, Reflection, Scene, Transmission, gltf};
+use photoncard_driver::scene::gltf::{self, LoadSettings};
+use photoncard_driver::scene::{Material, Reflection, Scene, Transmission};
 use scene_support::{load_changed, push, triangle_bytes, triangle_json};
 use serde_json::{Value, json};
 
@@ -235,7 +236,8 @@ fn load_variant(json: &Value, variant: Option<&str>) -> Result<Scene, SceneError
     std::fs::write(folder.path().join("data.bin"), triangle_bytes()).unwrap();
     let path = folder.path().join("scene.gltf");
     std::fs::write(&path, json.to_string()).unwrap();
-    gltf::load_for(&path, u32::MAX, variant)
+    let variant = variant.map(str::to_owned);
+    gltf::load_with(&path, &LoadSettings { dram_bytes: u32::MAX, variant, ..LoadSettings::default() })
 }
 
 #[test]

@@ -311,7 +311,8 @@ fn sizes_are_refused_by_the_header() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.glb");
     fs::write(&path, glb(two.json, &two.bytes)).unwrap();
-    check(&gltf::load_for(&path, u32::MAX, None).unwrap_err(), &["images[1]", "268435457 texels"]);
+    let roomy = gltf::LoadSettings { dram_bytes: u32::MAX, ..gltf::LoadSettings::default() };
+    check(&gltf::load_with(&path, &roomy).unwrap_err(), &["images[1]", "268435457 texels"]);
     for (size, part) in [
         ([1, 100_000], "1 x 100000 texels, more than 16384"),
         ([16_385, 1], "16385 x 1"),

@@ -4,6 +4,7 @@ mod cards;
 mod choice;
 mod files;
 mod integrator;
+mod lights;
 mod outputs;
 mod photons;
 mod picture;
@@ -30,6 +31,7 @@ use photoncard_shared::message::PROTOCOL_VERSION;
 
 use self::choice::choice;
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
+pub(crate) use self::lights::LightOptions;
 pub(crate) use self::render::RenderOptions;
 pub(crate) use self::study::StudyArguments;
 pub(crate) use self::tonemap::TonemapOptions;
@@ -103,6 +105,8 @@ pub(crate) enum SceneCommand {
         /// Print them as JSON
         #[arg(long)]
         json: bool,
+        #[command(flatten)]
+        lights: LightOptions,
     },
 }
 

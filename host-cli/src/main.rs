@@ -45,7 +45,7 @@ fn main() -> ExitCode {
     let result = match &arguments.command {
         Command::Render(options) => render::run(options),
         Command::Tonemap(options) => tonemap::run(options),
-        Command::Scene(SceneCommand::Info { scene, json }) => scene::info(scene, *json),
+        Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),
         Command::Card(CardCommand::List) => card_list::run(),
         Command::Card(CardCommand::Info { card }) => card::info(card),
         Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),

@@ -9,7 +9,7 @@ use std::time::Instant;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::render::{CardAddress, RenderError, RenderSettings, render_chosen};
 use photoncard_driver::scene::Scene;
-use photoncard_driver::scene::gltf::load_for;
+use photoncard_driver::scene::gltf::{LoadSettings, load_with};
 
 use crate::arguments::RenderOptions;
 use crate::console::say;
@@ -77,8 +77,9 @@ fn choose(
 fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
     // The image must fit every card.
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
-    let scene = load_for(&options.scene, dram_bytes, options.variant.as_deref());
-    let mut scene = scene.map_err(Failure::input)?;
+    let (variant, light_units) = (options.variant.clone(), options.lights.light_units);
+    let load = LoadSettings { dram_bytes, variant, light_units };
+    let mut scene = load_with(&options.scene, &load).map_err(Failure::input)?;
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
     }

@@ -4,22 +4,25 @@ mod json;
 
 use std::path::Path;
 
-use photoncard_driver::scene::gltf::load;
+use photoncard_driver::scene::gltf::{LoadSettings, load_with};
 use photoncard_driver::scene::{
     Camera, Encoding, Image, Layers, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture, Wrap,
 };
 
+use crate::arguments::LightOptions;
 use crate::console::{print, print_json};
 use crate::failure::Failure;
 
 /// Prints the contents of a scene: a report, or JSON.
-pub(crate) fn info(path: &Path, json: bool) -> Result<(), Failure> {
-    let scene = load(path).map_err(Failure::input)?;
+pub(crate) fn info(path: &Path, json: bool, lights: &LightOptions) -> Result<(), Failure> {
+    let settings = LoadSettings { light_units: lights.light_units, ..LoadSettings::default() };
+    let scene = load_with(path, &settings).map_err(Failure::input)?;
     if json {
         return print_json(&format!("{:#}", json::contents(&scene)));
     }
     let mut lines = vec![path.display().to_string()];
     lines.extend(geometry(&scene).map(|row| format!("  {row}")));
+    lines.extend(scene.generator.iter().map(|generator| format!("  written by  {generator}")));
     for (heading, rows) in [
         ("Cameras", scene.cameras.iter().map(camera).collect::<Vec<_>>()),
         ("Punctual lights", scene.lights.iter().map(light).collect()),

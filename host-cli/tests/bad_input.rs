@@ -163,6 +163,7 @@ fn names_that_do_not_exist() {
     for (option, value, words) in [
         ("--camera", "absent", ["no camera 'absent'", "'eye'"]),
         ("--variant", "night", ["no variant 'night'", "leave the option out"]),
+        ("--light-units", "candela", ["radiometric", "photometric"]),
         ("--set", "floor", ["`floor`", "MATERIAL.PROPERTY=VALUE"]),
         ("--set", "flor.diffuse=0", ["'flor'", "'floor'"]),
         ("--set", "floor.gloss=1", ["'gloss'", "the properties are"]),

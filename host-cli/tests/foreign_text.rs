@@ -37,6 +37,7 @@ fn check_shown(outcome: &Outcome, status: i32, shown: &str, times: usize) {
 
 /// Scene whose objects all have a hostile name.
 fn hostile_scene(mut scene: Value) -> Value {
+    scene["asset"]["generator"] = json!(HOSTILE);
     scene["extensionsUsed"] = json!(["KHR_materials_specular", "KHR_lights_punctual"]);
     let light = json!({"name": HOSTILE, "type": "point", "range": 5.0});
     scene["extensions"] = json!({"KHR_lights_punctual": {"lights": [light]}});
@@ -53,8 +54,8 @@ fn hostile_scene(mut scene: Value) -> Value {
 fn names_of_a_scene_are_shown_escaped() {
     let room = Room::new();
     room.write_scene("scene.gltf", &hostile_scene(scene()));
-    // A camera, two materials, a light, and a notice of it.
-    check_shown(&room.run(&["scene", "info", "scene.gltf"]), 0, SHOWN, 5);
+    // The exporter, a camera, two materials, a light, and a notice of it.
+    check_shown(&room.run(&["scene", "info", "scene.gltf"]), 0, SHOWN, 6);
     check_shown(&room.render("scene.gltf", &["-o", "a.exr"]), 0, SHOWN, 1);
     for options in [["--camera", "absent"], ["--set", "absent.diffuse=0"]] {
         check_shown(&room.render("scene.gltf", &[&options[..], &["-o", "b.exr"]].concat()), 2, SHOWN, 1);

@@ -2,6 +2,7 @@
 
 mod support;
 
+use std::f64::consts::PI;
 use std::process::Stdio;
 
 use serde_json::{Value, json};
@@ -44,6 +45,26 @@ fn scene_info_tells_of_textures_lights_and_what_is_ignored() {
         "  the range of lights is ignored, their light reaches everywhere: light 'bulb'",
     ] {
         assert!(outcome.stdout.lines().any(|found| found == line), "{line}: {}", outcome.stdout);
+    }
+}
+
+/// Blender's 60 W become 60 / (4 pi) W/sr, unless its candela are to be taken as they stand.
+#[test]
+fn scene_info_tells_of_lights_in_the_units_of_their_exporter() {
+    let lights = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/fixtures/blender/lights.glb");
+    for (options, intensity, is_divided) in [
+        (&[][..], 60.0 / (4.0 * PI), true),
+        (&["--light-units", "photometric"], 60.0 / (4.0 * PI), false),
+        (&["--light-units", "radiometric"], 60.0 * 683.0 / (4.0 * PI), false),
+    ] {
+        let report = Room::new().run(&[&["scene", "info", lights], options].concat()).stdout;
+        assert!(report.contains("  written by  Khronos glTF Blender I/O v5.0.21\n"), "{report}");
+        assert_eq!(report.contains("683 lm/W"), is_divided, "{report}");
+        let json = Room::new().run(&[&["scene", "info", "--json", lights], options].concat()).stdout;
+        let value: Value = serde_json::from_str(&json).unwrap();
+        let found = value["lights"][0]["intensity"][0].as_f64().unwrap();
+        assert!((found / intensity - 1.0).abs() < 1e-6, "{found} is not {intensity}");
+        assert_eq!(value["generator"], "Khronos glTF Blender I/O v5.0.21");
     }
 }
 

@@ -34,6 +34,10 @@ fn options_without_effect_are_said_to_have_none() {
             &["--caustic-neighbors=9", "--caustic-photons=0"],
             "--caustic-neighbors has no effect with --caustic-photons 0",
         ),
+        (
+            &["--light-units=watts"],
+            "--light-units has no effect without point, spot or directional lights in the file",
+        ),
         (&["--exposure=1"], "--exposure has no effect without -o OUT.png"),
         (&["--tonemap=aces"], "--tonemap has no effect without -o OUT.png"),
     ] {

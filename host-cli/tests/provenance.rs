@@ -20,6 +20,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--filter", "gaussian"], "filter", json!("gaussian")),
         (&["--aov", "direct"], "aov", json!("direct,indirect,caustic,gathers")),
         (&["--set", "white.diffuse=0.5,0.5,0.5"], "set", json!(["white.diffuse=0.5,0.5,0.5"])),
+        (&["--light-units", "watts"], "light-units", json!("watts")),
         (&["--energy-compensation"], "energy-compensation", json!(true)),
         (&["--environment", "1,2,3"], "environment", json!("1,2,3")),
         (&["--seed", "5"], "seed", json!(5)),

@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-/// A light without extent. glTF's photometric units stand for radiometric ones, unit for unit: candela for W/sr, lux
-/// for W/m^2.
+/// A light without extent, in radiometric units: a file's are converted by its [`LightUnits`](super::LightUnits).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PunctualLight {
     /// Name in the file, or `light N`.

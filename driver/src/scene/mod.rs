@@ -2,12 +2,14 @@
 //!
 //! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel.
 
+mod blender;
 mod camera;
 mod checksum;
 mod environment;
 pub mod gltf;
 mod layers;
 mod light;
+mod light_units;
 mod limits;
 mod map_size;
 mod material;
@@ -25,12 +27,20 @@ pub use self::camera::Camera;
 pub use self::environment::Environment;
 pub use self::layers::{Coat, DiffuseTransmission, Layers, NormalMap, Sheen};
 pub use self::light::{PunctualKind, PunctualLight};
+pub use self::light_units::LightUnits;
 pub use self::limits::BRIGHTEST;
 pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
 pub use self::material::{Material, Reflection, Transmission};
 pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
 pub use self::triangle::{CornerTangents, NO_ATTRIBUTES, NO_TANGENTS, Triangle, VertexAttributes};
 use crate::error::SceneError;
+
+/// Name of the camera in a scene whose file has none.
+const FRAMED: &str = "framed";
+
+/// Remedy of a scene without light.
+const NO_LIGHT: &str = "give a material of at least one triangle an emissiveFactor above 0 (and KHR_materials_emissive_strength \
+                        for its radiance), place a light of KHR_lights_punctual, or add an environment";
 
 /// A scene in world space, every instance resolved. [`gltf::load`] reads one from a file.
 #[derive(Clone, Debug, Default)]
@@ -53,6 +63,8 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// Cameras in file order. Never empty: a file without cameras gets one that frames the scene.
     pub cameras: Vec<Camera>,
+    /// Program that wrote the file (`asset.generator`), if it says so.
+    pub generator: Option<String>,
     /// Names of the file's variants of materials.
     pub variants: Vec<String>,
     /// Sentences on contents of the file that the renderer does not use, each once.
@@ -82,9 +94,19 @@ impl Scene {
             let cameras: Vec<_> = self.cameras.iter().map(|camera| format!("'{}'", camera.name)).collect();
             SceneError::UnknownCamera {
                 name: name.unwrap_or_default().to_owned(),
-                cameras: cameras.join(", "),
+                remedy: self.camera_remedy(&cameras.join(", ")),
             }
         })
+    }
+
+    fn camera_remedy(&self, names: &str) -> String {
+        let choice = format!("choose one of: {names}");
+        let is_framed = self.cameras.iter().all(|camera| camera.name == FRAMED);
+        if is_framed && blender::is_exporter(self.generator.as_deref()) {
+            format!("{choice}; or {}", blender::NO_CAMERA)
+        } else {
+            choice
+        }
     }
 
     /// Number of triangles that emit light.
@@ -162,6 +184,8 @@ impl Scene {
     /// # Errors
     /// [`SceneError::NoLight`].
     pub fn check_light(&self) -> Result<(), SceneError> {
-        if self.has_light() { Ok(()) } else { Err(SceneError::NoLight) }
+        let is_of_blender = blender::is_exporter(self.generator.as_deref());
+        let remedy = if is_of_blender { blender::NO_LIGHT } else { NO_LIGHT };
+        if self.has_light() { Ok(()) } else { Err(SceneError::NoLight { remedy }) }
     }
 }

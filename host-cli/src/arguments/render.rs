@@ -10,6 +10,7 @@ use photoncard_driver::render::RenderSettings;
 use super::cards::CardOptions;
 use super::choice::choice;
 use super::integrator::IntegratorOptions;
+use super::lights::LightOptions;
 use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
@@ -34,6 +35,8 @@ pub(crate) struct RenderOptions {
     /// Variant of the scene's materials, by its name [default: the materials that its meshes state]
     #[arg(long, value_name = "NAME", help_heading = "Scene", hide_short_help = true)]
     pub(crate) variant: Option<String>,
+    #[command(flatten)]
+    pub(crate) lights: LightOptions,
     /// Light from infinitely far: an equirectangular map, .hdr or .exr, or a constant radiance
     ///
     /// The middle of the map is -z and its top is y.

@@ -2,7 +2,7 @@
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::render::Radiance;
-use photoncard_driver::scene::{Material, Reflection, Scene};
+use photoncard_driver::scene::{LightUnits, Material, Reflection, Scene};
 
 use super::files::PictureFormat;
 use super::render::RenderOptions;
@@ -24,6 +24,11 @@ impl RenderOptions {
         let has_lobe =
             |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });
         let cases = [
+            (
+                self.lights.light_units != LightUnits::Auto && scene.lights.is_empty(),
+                "--light-units",
+                "without point, spot or directional lights in the file".to_owned(),
+            ),
             (
                 self.energy_compensation && !scene.materials.iter().any(has_lobe),
                 "--energy-compensation",

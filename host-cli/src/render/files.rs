@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use photoncard_driver::choice::Choice;
 use photoncard_driver::render::{RenderSettings, Rendering};
 use photoncard_driver::scene::Scene;
 use photoncard_driver::tone_mapping::write_png;
@@ -80,6 +81,7 @@ fn provenance(
     let mut add = |name: &str, value| provenance.insert(name.to_owned(), value);
     add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
     add("variant", json!(options.variant));
+    add("light-units", json!(options.lights.light_units.name()));
     add("set", json!(options.assignments));
     add("energy-compensation", json!(options.energy_compensation));
     add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));

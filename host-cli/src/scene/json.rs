@@ -19,6 +19,7 @@ pub(super) fn contents(scene: &Scene) -> Value {
         "materials": scene.materials.iter().map(material).collect::<Vec<_>>(),
         "images": scene.images.iter().map(image).collect::<Vec<_>>(),
         "variants": scene.variants,
+        "generator": scene.generator,
         "ignored": scene.notices,
     })
 }

@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | `sh` | commands | run, as one script in an empty folder with the scenes; renders are reduced (`prelude.sh`) |
 //! | `sh slow` | commands that build, or take minutes | accepted: options and values are parsed, scripts and crates exist |
-//! | `sh network` | commands that take files from elsewhere | accepted |
+//! | `sh network` | commands that take files or programs from elsewhere | accepted |
 //! | `sh hardware` | commands that need a board | accepted |
 //! | `text synopsis` | forms of commands with placeholders | commands and options exist |
 //! | another language | no commands | none |

@@ -21,8 +21,6 @@ import pictures
 import render
 
 HERE = Path(__file__).resolve().parent
-# Blender's exporter writes candela and lux: lm/W.
-LUMENS = 683.0
 RUNS = {
     "cached": "--spp 16 --irradiance-cache on",
     "every sample gathers": "--spp 8 --gather-rays 16",
@@ -232,7 +230,7 @@ def photoncard(arguments, scene_file, options):
         sys.exit("photoncard failed")
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return cpu, pictures.read(output) / LUMENS
+    return cpu, pictures.read(output)
 
 
 def report(table, name, cpu, picture, reference):

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use photoncard_driver::scene::gltf;
+use photoncard_driver::scene::gltf::{self, LoadSettings};
 use tempfile::TempDir;
 
 use super::gltf::glb;
@@ -100,7 +100,8 @@ impl Target for Textures {
 
     fn read(&self, input: &[u8]) -> bool {
         fs::write(self.path(), textured(input)).expect("there is room for a scene");
-        match gltf::load_for(&self.path(), DRAM_BYTES, None) {
+        let settings = LoadSettings { dram_bytes: DRAM_BYTES, ..LoadSettings::default() };
+        match gltf::load_with(&self.path(), &settings) {
             Ok(scene) => match &scene.images[..] {
                 [image] => {
                     assert_eq!(image.texels.len(), image.width as usize * image.height as usize);

@@ -9,7 +9,7 @@ use gltf::json::validation::Checked;
 use super::document::Document;
 use super::notices::Notices;
 use crate::error::SceneError;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, FRAMED, Scene};
 
 /// Width of the default camera's view over the scene's width.
 const MARGIN: f32 = 1.05;
@@ -99,7 +99,7 @@ pub(super) fn frame(scene: &Scene) -> Camera {
     let vertical_fov = std::f32::consts::FRAC_PI_4;
     let distance = MARGIN * half.x.max(half.y).max(0.01 * half.z) / HALF_VIEW_TANGENT;
     Camera {
-        name: "framed".to_owned(),
+        name: FRAMED.to_owned(),
         origin: Vec3::new(centre.x, centre.y, high.z + distance),
         right: Vec3::X,
         up: Vec3::Y,

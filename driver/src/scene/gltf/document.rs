@@ -15,6 +15,7 @@ use super::parse_cost;
 use super::specular_glossiness::{self, Conversions};
 use crate::error::{Location, SceneError};
 use crate::printable::printable;
+use crate::scene::blender;
 use crate::{allocation, foreign};
 
 const GLB_MAGIC: &[u8] = b"glTF";
@@ -53,6 +54,11 @@ impl Document {
     /// BIN chunk of a GLB.
     pub(super) fn blob(&self) -> Option<&[u8]> {
         self.bytes.get(self.blob.clone()?)
+    }
+
+    /// Returns whether Blender's exporter wrote the file.
+    pub(super) fn is_of_blender(&self) -> bool {
+        blender::is_exporter(self.root.asset.generator.as_deref())
     }
 
     /// Returns whether `KHR_mesh_quantization` allows integer vertex attributes.

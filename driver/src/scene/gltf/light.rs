@@ -5,9 +5,10 @@ use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
 use gltf::json::validation::Checked;
 
 use super::document::Document;
+use super::notices::Notices;
 use crate::error::SceneError;
 use crate::scene::limits::EMISSION;
-use crate::scene::{PunctualKind, PunctualLight, Scene};
+use crate::scene::{LightUnits, PunctualKind, PunctualLight, Scene, blender};
 
 /// Minimum difference of the cosines of a spot light's cones, as `KHR_lights_punctual` recommends. Exporters write equal
 /// angles for a sharp edge.
@@ -22,61 +23,115 @@ pub(super) fn lights(document: &Document) -> &[Light] {
     extensions.and_then(|root| root.khr_lights_punctual.as_ref()).map_or(&[], |extension| &extension.lights)
 }
 
-/// Adds the light `index`, which exists, with the transform of `node`.
-pub(super) fn place(
-    document: &Document,
-    index: usize,
-    node: usize,
-    world: &DMat4,
-    scene: &mut Scene,
-) -> Result<(), SceneError> {
-    let light = &lights(document)[index];
-    let item = |field: &str| format!("extensions.KHR_lights_punctual.lights[{index}].{field}");
-    let intensity = Vec3::from(light.color) * light.intensity;
-    let is_possible = |value: f32| value == 0.0 || EMISSION.contains(&value);
-    if !intensity.to_array().into_iter().all(is_possible) {
-        let reason = format!("the light's intensity is {intensity}, its colour included");
-        let remedy = "state a colour of 0 or more, and an intensity of 0, or of 1e-20 to 1e20";
-        return Err(document.invalid(item("intensity"), reason, remedy));
-    }
-    let position = world.w_axis.truncate().as_vec3();
-    let direction = (-world.z_axis.truncate()).try_normalize().map(DVec3::as_vec3);
-    let misplaced = || {
-        let reason = "the light's node, with its parents, gives it no finite position or no direction";
-        let remedy = "give the light's node and its parents a finite position and a scale other than 0";
-        document.invalid(format!("nodes[{node}]"), reason, remedy)
-    };
-    if !position.is_finite() {
-        return Err(misplaced());
-    }
-    let kind = match light.type_ {
-        Checked::Valid(Type::Directional) => {
-            PunctualKind::Directional { direction: direction.ok_or_else(misplaced)? }
-        }
-        Checked::Valid(Type::Spot) => {
-            let (inner_cosine, outer_cosine) = cones(light).ok_or_else(|| {
-                let remedy = "state 0 <= innerConeAngle < outerConeAngle <= pi / 2";
-                document.invalid(item("spot"), "the angles of the light's cones are not possible", remedy)
-            })?;
-            let direction = direction.ok_or_else(misplaced)?;
-            PunctualKind::Spot { position, direction, inner_cosine, outer_cosine }
-        }
-        // Validation has rejected other types.
-        Checked::Valid(Type::Point) | Checked::Invalid => PunctualKind::Point { position },
-    };
-    let name = light.name.clone().unwrap_or_else(|| format!("light {index}"));
-    scene.lights.push(PunctualLight { name, kind, intensity });
-    Ok(())
+/// Conversion of glTF's lights to the scene's.
+pub(super) struct LightPlacer<'a> {
+    document: &'a Document,
+    units: LightUnits,
+    /// Units that the exporter's name has chosen.
+    found: Option<LightUnits>,
 }
 
-/// Cosines of the inner and the outer cone angle of a spot light.
-fn cones(light: &Light) -> Option<(f32, f32)> {
-    let spot = light.spot.as_ref()?;
-    let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
-    let right = std::f32::consts::FRAC_PI_2;
-    if !(outer > 0.0 && outer <= right + ANGLE_TOLERANCE && inner >= 0.0 && inner <= outer) {
-        return None;
+impl<'a> LightPlacer<'a> {
+    pub(super) fn new(document: &'a Document, units: LightUnits) -> Self {
+        let found = match units {
+            LightUnits::Auto => blender::light_units(document.root.asset.generator.as_deref()),
+            _ => None,
+        };
+        Self { document, units: found.unwrap_or(units), found }
     }
-    let (inner, outer) = (libm::cosf(inner), libm::cosf(outer.min(right)));
-    Some((inner, outer.min(inner - MIN_PENUMBRA)))
+
+    /// Adds the light `index`, which exists, with the transform of `node`.
+    pub(super) fn place(
+        &self,
+        index: usize,
+        node: usize,
+        world: &DMat4,
+        scene: &mut Scene,
+        notices: &mut Notices,
+    ) -> Result<(), SceneError> {
+        let light = &lights(self.document)[index];
+        let name = light.name.clone().unwrap_or_else(|| format!("light {index}"));
+        let intensity = self.intensity(index)?;
+        let kind = self.kind(index, node, world)?;
+        notices.blender_units = self.found;
+        if self.document.is_of_blender() && has_penumbra(light) {
+            notices.blender_spots.push(name.clone());
+        }
+        scene.lights.push(PunctualLight { name, kind, intensity });
+        Ok(())
+    }
+
+    /// Colour times intensity, in the scene's units.
+    fn intensity(&self, index: usize) -> Result<Vec3, SceneError> {
+        let light = &lights(self.document)[index];
+        let divisor = match light.type_ {
+            Checked::Valid(Type::Directional) => self.units.directional(),
+            _ => self.units.points(),
+        };
+        let intensity = Vec3::from(light.color) * light.intensity / divisor;
+        let is_possible = |value: f32| value == 0.0 || EMISSION.contains(&value);
+        if intensity.to_array().into_iter().all(is_possible) {
+            return Ok(intensity);
+        }
+        let reason = format!("the light's intensity is {intensity}, its colour and units included");
+        let remedy = "state a colour of 0 or more, and an intensity of 0, or of 1e-20 to 1e20";
+        Err(self.document.invalid(format!("{}.intensity", place(index)), reason, remedy))
+    }
+
+    fn kind(&self, index: usize, node: usize, world: &DMat4) -> Result<PunctualKind, SceneError> {
+        let light = &lights(self.document)[index];
+        let position = world.w_axis.truncate().as_vec3();
+        let direction = (-world.z_axis.truncate()).try_normalize().map(DVec3::as_vec3);
+        let misplaced = || {
+            let reason = "the light's node, with its parents, gives it no finite position or no direction";
+            let remedy = "give the light's node and its parents a finite position and a scale other than 0";
+            self.document.invalid(format!("nodes[{node}]"), reason, remedy)
+        };
+        if !position.is_finite() {
+            return Err(misplaced());
+        }
+        Ok(match light.type_ {
+            Checked::Valid(Type::Directional) => {
+                PunctualKind::Directional { direction: direction.ok_or_else(misplaced)? }
+            }
+            Checked::Valid(Type::Spot) => {
+                let (inner_cosine, outer_cosine) = self.cones(light).ok_or_else(|| {
+                    let reason = "the angles of the light's cones are not possible";
+                    let remedy = "state 0 <= innerConeAngle < outerConeAngle <= pi / 2";
+                    self.document.invalid(format!("{}.spot", place(index)), reason, remedy)
+                })?;
+                let direction = direction.ok_or_else(misplaced)?;
+                PunctualKind::Spot { position, direction, inner_cosine, outer_cosine }
+            }
+            // Validation has rejected other types.
+            Checked::Valid(Type::Point) | Checked::Invalid => PunctualKind::Point { position },
+        })
+    }
+
+    /// Cosines of the inner and the outer cone angle of a spot light.
+    fn cones(&self, light: &Light) -> Option<(f32, f32)> {
+        let spot = light.spot.as_ref()?;
+        let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
+        let right = std::f32::consts::FRAC_PI_2;
+        if !(outer > 0.0 && outer <= right + ANGLE_TOLERANCE && inner >= 0.0 && inner <= outer) {
+            return None;
+        }
+        let outer_cosine = libm::cosf(outer.min(right));
+        let inner_cosine = if self.document.is_of_blender() {
+            blender::inner_cosine(inner, outer, outer_cosine)
+        } else {
+            libm::cosf(inner)
+        };
+        Some((inner_cosine, outer_cosine.min(inner_cosine - MIN_PENUMBRA)))
+    }
+}
+
+fn has_penumbra(light: &Light) -> bool {
+    let has_cones = light.spot.as_ref().is_some_and(|spot| spot.inner_cone_angle < spot.outer_cone_angle);
+    has_cones && matches!(light.type_, Checked::Valid(Type::Spot))
+}
+
+/// Place of a light in the file.
+fn place(index: usize) -> String {
+    format!("extensions.KHR_lights_punctual.lights[{index}]")
 }

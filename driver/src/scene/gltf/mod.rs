@@ -29,6 +29,7 @@ mod parse_cost;
 mod pose;
 mod primitive;
 mod room;
+mod settings;
 mod skin;
 mod solid_glass;
 mod specular_glossiness;
@@ -42,19 +43,18 @@ mod vertex;
 
 use std::path::Path;
 
-use photoncard_firmware::kind::REFERENCE;
-
 use self::accessor::Source;
 use self::buffers::Buffers;
 use self::document::Document;
 pub use self::limits::MAX_TRIANGLES;
 use self::notices::Notices;
 use self::room::Room;
+pub use self::settings::LoadSettings;
 use self::texture::Textures;
 use crate::error::SceneError;
 use crate::scene::Scene;
 
-/// Loads the default scene of a glTF file, or its first, within the memory of the reference chip.
+/// Loads the default scene of a glTF file, or its first, with the default settings: within the memory of the reference chip.
 ///
 /// ```
 /// # use std::path::Path;
@@ -70,32 +70,34 @@ use crate::scene::Scene;
 /// ```
 ///
 /// # Errors
-/// As [`load_for`].
+/// As [`load_with`].
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    load_for(path, REFERENCE.dram_bytes, None)
+    load_with(path, &LoadSettings::default())
 }
 
-/// Loads the default scene of a glTF file, or its first, for cards with `dram_bytes` of memory, in the variant of its materials of a name
-/// (`KHR_materials_variants`), or with the materials that its meshes state.
+/// Loads the default scene of a glTF file, or its first.
 ///
 /// [`Scene::notices`] names the features of the file that are not rendered.
 ///
 /// # Errors
 /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory, or
 /// has no triangle with an area; or if there is no such variant. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
-pub fn load_for(path: &Path, dram_bytes: u32, variant: Option<&str>) -> Result<Scene, SceneError> {
+pub fn load_with(path: &Path, settings: &LoadSettings) -> Result<Scene, SceneError> {
+    let LoadSettings { dram_bytes, variant, light_units } = settings;
     let mut document = Document::read(path)?;
-    variant.map_or(Ok(()), |name| variants::select(&mut document, name))?;
+    variant.as_deref().map_or(Ok(()), |name| variants::select(&mut document, name))?;
     let buffers = Buffers::load(&document)?;
     let source = Source::new(&document, &buffers);
-    let mut room = Room::new(path, dram_bytes.into());
+    let mut room = Room::new(path, (*dram_bytes).into());
     room.materials(document.root.materials.len())?;
     let mut notices = Notices::default();
     let mut textures = Textures::new(&document);
     let materials = material::load(&document, &mut textures)?;
-    let mut scene = Scene { materials, variants: variants::names(&document), ..Scene::default() };
+    let generator = document.root.asset.generator.clone();
+    let variants = variants::names(&document);
+    let mut scene = Scene { materials, variants, generator, ..Scene::default() };
     textures.finish(&source, &mut room, &mut scene, &mut notices.unreadable)?;
-    nodes::place(&source, &mut scene, &mut room, &mut notices)?;
+    nodes::place(&source, *light_units, &mut scene, &mut room, &mut notices)?;
     let file = || path.to_owned();
     match (scene.triangles.is_empty(), scene.skipped_triangles) {
         (true, 0) => return Err(SceneError::NoGeometry { file: file() }),

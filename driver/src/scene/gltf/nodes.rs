@@ -8,7 +8,7 @@ use super::accessor::Source;
 use super::camera::CameraPlacer;
 use super::document::Document;
 use super::instances::Instances;
-use super::light;
+use super::light::LightPlacer;
 use super::mesh::MeshPlacer;
 use super::notices::Notices;
 use super::pose::Pose;
@@ -16,16 +16,17 @@ use super::room::Room;
 use super::skin::Skin;
 use super::transform;
 use crate::error::SceneError;
-use crate::scene::Scene;
+use crate::scene::{LightUnits, Scene};
 
 /// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
 
-/// Adds the meshes, lights and cameras of the scene's nodes.
+/// Adds the meshes, lights and cameras of the scene's nodes; the lights are stated in `units`.
 ///
 /// All triangles are counted before the first is added.
 pub(super) fn place(
     source: &Source<'_>,
+    units: LightUnits,
     scene: &mut Scene,
     room: &mut Room,
     notices: &mut Notices,
@@ -40,6 +41,7 @@ pub(super) fn place(
         source,
         meshes: MeshPlacer::new(source),
         cameras: CameraPlacer::new(document),
+        lights: LightPlacer::new(document, units),
         skins: BTreeMap::new(),
         worlds,
     };
@@ -54,6 +56,7 @@ struct Placer<'a> {
     source: &'a Source<'a>,
     meshes: MeshPlacer<'a>,
     cameras: CameraPlacer<'a>,
+    lights: LightPlacer<'a>,
     skins: BTreeMap<usize, Skin>,
     /// World transforms; `None` for nodes that are not in the scene.
     worlds: Vec<Option<DMat4>>,
@@ -95,7 +98,7 @@ impl Placer<'_> {
         }
         let extensions = node.extensions.as_ref();
         if let Some(light) = extensions.and_then(|extensions| extensions.khr_lights_punctual.as_ref()) {
-            light::place(document, light.light.value(), index, &world, scene)?;
+            self.lights.place(light.light.value(), index, &world, scene, notices)?;
         }
         Ok(())
     }

@@ -12,6 +12,7 @@ use super::material::has_dark_texture;
 use super::names::mesh_name;
 use super::not_finite::NotFinite;
 use super::topology::Topology;
+use crate::scene::{LightUnits, blender};
 
 /// Maximum number of names in a notice; further ones are counted.
 const LISTED: usize = 8;
@@ -23,6 +24,10 @@ pub(super) struct Notices {
     pub(super) orthographic: Vec<String>,
     /// Names of materials of closed meshes that became solid glass.
     pub(super) solid_glass: Vec<String>,
+    /// Units other than radiometric ones in which the lights were read because Blender's exporter wrote them.
+    pub(super) blender_units: Option<LightUnits>,
+    /// Names of Blender's spot lights with a penumbra.
+    pub(super) blender_spots: Vec<String>,
     /// Images that cannot be read, each with its reason.
     pub(super) unreadable: Vec<String>,
     /// True if the scene has no camera and received a default one.
@@ -69,7 +74,7 @@ impl Notices {
     /// All notices of a document, in a fixed order.
     pub(super) fn finish(self, document: &Document) -> Vec<String> {
         let root = &document.root;
-        let mut sentences = Vec::new();
+        let mut sentences = Vec::from_iter(self.blender_units.and_then(of_units).map(str::to_owned));
         if !self.unreadable.is_empty() {
             let images = several(&self.unreadable);
             sentences.push(format!(
@@ -114,6 +119,8 @@ impl Notices {
         let lights = light::lights(document);
         let limited = names("light", lights, |light| light.name.as_ref(), |light| light.range.is_some());
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
+        let penumbra = "inner cones of Blender's spot lights are widened to the flux that Blender renders";
+        note(penumbra, "light", &self.blender_spots);
         note("orthographic cameras are ignored", "camera", &self.orthographic);
         let solid = "closed meshes of glass without a thickness are solid, as in Blender (a thin wall by --set MATERIAL.thickness=0)";
         note(solid, "material", &self.solid_glass);
@@ -122,10 +129,26 @@ impl Notices {
             sentences.push(format!("the extension {extension} is ignored{places}"));
         }
         if self.framed {
-            sentences
-                .push("the scene has no perspective camera: it is framed from the front (+z)".to_owned());
+            let framed = "the scene has no perspective camera: it is framed from the front (+z)";
+            let export =
+                document.is_of_blender().then(|| format!(" (to export one: {})", blender::NO_CAMERA));
+            sentences.push(format!("{framed}{}", export.unwrap_or_default()));
         }
         sentences
+    }
+}
+
+/// Notice on units of lights that the exporter's name has chosen.
+fn of_units(units: LightUnits) -> Option<&'static str> {
+    match units {
+        LightUnits::Auto | LightUnits::Radiometric => None,
+        LightUnits::Photometric => Some(
+            "the factor of 683 lm/W in the lights of Blender's exporter is ignored, since its emissive surfaces lack it (kept by \
+             --light-units radiometric)",
+        ),
+        LightUnits::Watts => Some(
+            "point and spot lights are read in watts, which Blender's exporter wrote before 3.4 (as W/sr by --light-units radiometric)",
+        ),
     }
 }
 

@@ -9,9 +9,6 @@ use crate::allocation;
 use crate::error::SceneError;
 use crate::scene::{Material, Reflection, Scene, Transmission, Triangle};
 
-/// Start of `asset.generator` of Blender's own exporter.
-const BLENDER: &str = "Khronos glTF Blender I/O";
-
 /// Memory of an edge of a triangle while it is matched, bytes.
 const BYTES_OF_AN_EDGE: u64 = 64;
 
@@ -21,8 +18,7 @@ const BYTES_OF_AN_EDGE: u64 = 64;
 /// # Errors
 /// If the memory for the edges is not to be had.
 pub(super) fn make_solid(document: &Document, scene: &mut Scene) -> Result<Vec<String>, SceneError> {
-    let generator = document.root.asset.generator.as_deref().unwrap_or_default();
-    if !generator.starts_with(BLENDER) {
+    if !document.is_of_blender() {
         return Ok(Vec::new());
     }
     let is_wall: Vec<bool> = scene.materials.iter().map(|material| wall(material).is_some()).collect();

@@ -1,0 +1,93 @@
+//! Blender's own exporter: its name and version in `asset.generator`, what it leaves out by default, and its lights.
+
+use super::light_units::LightUnits;
+
+/// Start of `asset.generator` in a file of Blender's exporter; `v` and the version follow.
+const NAME: &str = "Khronos glTF Blender I/O";
+
+/// First version that writes candela and lux; earlier ones write Blender's numbers.
+const PHOTOMETRIC_SINCE: (u32, u32) = (3, 4);
+
+/// Remedy of a file without light.
+pub(super) const NO_LIGHT: &str = "tick Include > Data > Punctual Lights in Blender's export dialog, or pass \
+     export_lights=True to export_scene.gltf; area lights and the world are not exported: make emissive planes of area \
+     lights, and add the world as an environment; or give a material an Emission Strength above 0";
+
+/// Remedy of a file without a camera.
+pub(super) const NO_CAMERA: &str = "tick Include > Data > Cameras in Blender's export dialog, or pass \
+     export_cameras=True to export_scene.gltf";
+
+/// Returns whether a file with this `asset.generator` is of Blender's exporter.
+pub(super) fn is_exporter(generator: Option<&str>) -> bool {
+    generator.is_some_and(|name| name.starts_with(NAME))
+}
+
+/// Units of the lights in a file with this `asset.generator`; `None` if it is not of Blender's exporter.
+///
+/// The exporter's *Lighting Mode* is not in the file: it is taken to be the default, *Standard*.
+pub(super) fn light_units(generator: Option<&str>) -> Option<LightUnits> {
+    let rest = generator?.strip_prefix(NAME)?;
+    let is_early = version(rest).is_some_and(|version| version < PHOTOMETRIC_SINCE);
+    Some(if is_early { LightUnits::Watts } else { LightUnits::Photometric })
+}
+
+/// Major and minor version of ` v5.0.21`.
+fn version(text: &str) -> Option<(u32, u32)> {
+    let mut numbers = text.trim_start().strip_prefix('v')?.split('.').map(str::parse);
+    Some((numbers.next()?.ok()?, numbers.next()?.ok()?))
+}
+
+/// Cosine of the inner cone with which glTF's falloff has the flux of Blender's spot light, by the cosine of its outer cone and the
+/// exporter's angles of both.
+///
+/// The exporter writes `inner = outer (1 - blend)`. Blender's falloff is a smooth step of the cosine, from 0 at `cos outer` to 1 over a
+/// width of `blend (1 - cos outer)`, and its integral over the width is 1/2; that of glTF's square is 1/3. Equal flux takes 3/4 of the width.
+pub(super) fn inner_cosine(inner: f32, outer: f32, outer_cosine: f32) -> f32 {
+    let blend = 1.0 - inner / outer;
+    outer_cosine + 0.75 * blend * (1.0 - outer_cosine)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_version_states_the_units_of_the_lights() {
+        for (generator, units) in [
+            (Some("Khronos glTF Blender I/O v5.0.21"), Some(LightUnits::Photometric)),
+            (Some("Khronos glTF Blender I/O v3.4.50"), Some(LightUnits::Photometric)),
+            (Some("Khronos glTF Blender I/O v3.3.35"), Some(LightUnits::Watts)),
+            (Some("Khronos glTF Blender I/O v1.2.75"), Some(LightUnits::Watts)),
+            (Some("Khronos glTF Blender I/O"), Some(LightUnits::Photometric)),
+            (Some("Khronos glTF Blender I/O v9"), Some(LightUnits::Photometric)),
+            (Some("glTF-Transform v4.5.1"), None),
+            (Some(""), None),
+            (None, None),
+        ] {
+            assert_eq!(light_units(generator), units, "{generator:?}");
+            assert_eq!(is_exporter(generator), units.is_some(), "{generator:?}");
+        }
+    }
+
+    /// Integral of a falloff over the cosine, from 0 to 1.
+    fn flux(falloff: impl Fn(f64) -> f64) -> f64 {
+        let steps = 100_000;
+        (0..steps).map(|step| falloff((f64::from(step) + 0.5) / f64::from(steps))).sum::<f64>()
+            / f64::from(steps)
+    }
+
+    #[test]
+    fn a_spot_has_the_flux_of_blenders_falloff() {
+        for (size, blend) in [(0.8_f64, 0.15), (1.2, 0.5), (1.0, 1.0), (3.1, 0.3)] {
+            let (outer, inner) = (0.5 * size, 0.5 * size * (1.0 - blend));
+            let edge = outer.cos();
+            let of_blender = flux(|cosine| {
+                let t = ((cosine - edge) / (blend * (1.0 - edge))).clamp(0.0, 1.0);
+                t * t * (3.0 - 2.0 * t)
+            });
+            let full = f64::from(inner_cosine(inner as f32, outer as f32, edge as f32));
+            let of_gltf = flux(|cosine| ((cosine - edge) / (full - edge)).clamp(0.0, 1.0).powi(2));
+            assert!((of_gltf / of_blender - 1.0).abs() < 1e-3, "{of_gltf} {of_blender}");
+        }
+    }
+}
