@@ -39,7 +39,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
 }
 
 /// Options that no pixel depends on.
-const OTHERS: [&[&str]; 17] = [
+const OTHERS: [&[&str]; 18] = [
     &["--photon-map", "jensen"],
     &["--tile", "3"],
     &["--order", "naive"],
@@ -52,6 +52,7 @@ const OTHERS: [&[&str]; 17] = [
     &["--counters"],
     &["--cache", "unified=8K/128/2"],
     &["--trace", "a.din.gz", "--card", "emulated:1"],
+    &["--trace-labels", "--trace", "a.din.gz", "--card", "emulated:1"],
     &["--threads", "2"],
     &["--exposure", "1", "-o", "a.png"],
     &["--tonemap", "aces", "-o", "a.png"],

@@ -3,6 +3,7 @@
 pub mod direct;
 mod dram;
 pub mod memory_model;
+mod names;
 pub mod trace;
 pub mod whole_frame;
 
