@@ -8,6 +8,7 @@ mod outputs;
 mod photons;
 mod picture;
 mod render;
+mod scene;
 mod schedule;
 mod study;
 mod threads;
@@ -31,6 +32,7 @@ use photoncard_shared::message::PROTOCOL_VERSION;
 use self::choice::choice;
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::render::RenderOptions;
+pub(crate) use self::scene::SceneOptions;
 pub(crate) use self::study::StudyArguments;
 pub(crate) use self::tonemap::TonemapOptions;
 

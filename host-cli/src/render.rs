@@ -5,13 +5,15 @@ mod messages;
 
 use std::time::Instant;
 
+use photoncard_driver::choice::Choice;
 use photoncard_driver::render::{CardAddress, RenderSettings, render};
 use photoncard_driver::scene::Scene;
-use photoncard_driver::scene::gltf::load_for;
+use serde_json::json;
 
 use crate::arguments::RenderOptions;
 use crate::console::say;
 use crate::failure::Failure;
+use crate::input;
 use crate::progress::Progress;
 
 /// Renders a scene, and writes the picture and all other requested outputs.
@@ -33,7 +35,11 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     })?;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
-    files::write(options, &settings, &scene, &rendering)?;
+    let provenance = &mut rendering.statistics.provenance;
+    provenance.pixels.extend(input::provenance(&options.scene));
+    provenance.work.insert("quality".to_owned(), json!(options.quality.name()));
+    provenance.work.insert("threads".to_owned(), json!(options.threads));
+    files::write(options, &rendering)?;
     if let Some(partial) = rendering.partial.take() {
         partial.remove().map_err(Failure::work)?;
     }
@@ -46,16 +52,9 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
 fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
     // The image must fit every card.
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
-    let scene = load_for(&options.scene, dram_bytes, options.variant.as_deref());
-    let mut scene = scene.map_err(Failure::input)?;
-    for assignment in &options.assignments {
+    let mut scene = input::load(&options.scene, dram_bytes)?;
+    for assignment in &options.scene.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
-    }
-    if options.energy_compensation {
-        scene.compensate_energy();
-    }
-    if let Some(environment) = &options.environment {
-        scene.environment = Some(environment.load()?);
     }
     scene.check_light().map_err(Failure::input)?;
     let camera = settings.camera(&scene)?;

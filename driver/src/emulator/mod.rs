@@ -64,6 +64,15 @@ impl EmulatedKind {
         tag_bytes(&self.budget())
     }
 
+    /// Name of the kind of chip with this budget, which may be on a board: `reference`, `micro` or `other`.
+    pub fn name_of(budget: &Budget) -> &'static str {
+        match *budget {
+            kind::REFERENCE => "reference",
+            kind::MICRO => "micro",
+            _ => "other",
+        }
+    }
+
     pub(crate) fn budget(self) -> Budget {
         match self {
             Self::Reference => Reference::BUDGET,

@@ -16,6 +16,7 @@ mod observer;
 mod open_card;
 mod outputs;
 mod preparation;
+mod provenance;
 mod reopening;
 mod settings;
 mod statistics;
@@ -31,6 +32,7 @@ pub use observer::{Observer, Phase, Unobserved};
 pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::MemoryUse;
 pub use photoncard_shared::message::{Filter, Radiance, Sampling};
+pub use provenance::Provenance;
 pub use settings::{
     CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM, PhotonMaps,
     Picture, Quality, RenderSettings, Schedule, TileOutputs,
@@ -94,7 +96,8 @@ pub fn render(
     times.load = outcome.load_seconds;
     times.render = outcome.render_seconds;
     times.total = start.elapsed().as_secs_f64();
-    let statistics = Statistics::new(settings, &frame, &prepared, &outcome, times);
+    let provenance = Provenance::new(settings, scene, &camera, &frame, &budgets);
+    let statistics = Statistics::new(settings, &frame, &prepared, &outcome, times, provenance);
     let film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
     let partial = outputs.finish(&film);
     Ok(Rendering { film, statistics, partial })

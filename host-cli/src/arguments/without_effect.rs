@@ -25,7 +25,7 @@ impl RenderOptions {
             |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });
         let cases = [
             (
-                self.energy_compensation && !scene.materials.iter().any(has_lobe),
+                self.scene.energy_compensation && !scene.materials.iter().any(has_lobe),
                 "--energy-compensation",
                 "without a metallic-roughness material".to_owned(),
             ),
