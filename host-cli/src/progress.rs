@@ -1,6 +1,6 @@
 //! Progress of a render: a bar on a terminal, otherwise a line for each tenth of a phase.
 
-mod remaining;
+pub(crate) mod remaining;
 
 use std::error::Error;
 use std::fmt::Arguments;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::error::StudyError;
 use super::measure::{Bench, Measurement};
@@ -21,8 +22,8 @@ use crate::scene::gltf;
 
 /// Observer of a study's progress, which can stop it.
 pub trait StudyObserver: Sync {
-    /// Reports that `done` of a study's `total` points are finished. `is_new` if the last was measured now, false if it
-    /// was read from the store.
+    /// Reports that `done` of a study's `total` points are finished: first, with `is_new` false, those in the store; then each
+    /// that was measured.
     fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
 
     /// Reports, as a sentence, the reason why a stored point cannot be used; the point is measured again.
@@ -122,15 +123,21 @@ impl<'a> Laboratory<'a> {
     pub fn measure(&mut self, study: &str, points: &[Point]) -> Result<Results, StudyError> {
         let points = sharing_images(points);
         let total = points.len();
-        let mut results = Results::default();
-        self.observer.progress(study, 0, total, false);
+        let (mut results, mut missing) = (Results::default(), Vec::new());
         for point in points {
+            match self.stored(&point)? {
+                Some(outcome) => results.0.push((point, outcome)),
+                None => missing.push(point),
+            }
+        }
+        self.observer.progress(study, results.0.len(), total, false);
+        for point in missing {
             if self.observer.is_stopped() {
                 return Err(StudyError::Stopped);
             }
-            let (outcome, is_new) = self.outcome(&point)?;
+            let outcome = self.measured(&point)?;
             results.0.push((point, outcome));
-            self.observer.progress(study, results.0.len(), total, is_new);
+            self.observer.progress(study, results.0.len(), total, true);
         }
         Ok(results)
     }
@@ -152,21 +159,30 @@ impl<'a> Laboratory<'a> {
         Ok(&self.loaded[file])
     }
 
-    fn outcome(&mut self, point: &Point) -> Result<(Outcome, bool), StudyError> {
-        let key = point.key(&self.load(point.scene)?.digest);
+    /// Outcome of a point in the store; `None` if it is to be measured.
+    fn stored(&mut self, point: &Point) -> Result<Option<Outcome>, StudyError> {
+        let key = self.key(point)?;
         let noticed = self.store.notices().len();
-        if let Some(outcome) = self.store.get(&point.name(), &key) {
-            return Ok((outcome, false));
-        }
+        let outcome = self.store.get(&point.name(), &key);
         for notice in &self.store.notices()[noticed..] {
             self.observer.notice(notice);
         }
+        Ok(outcome)
+    }
+
+    /// Measures a point, and stores its outcome.
+    fn measured(&mut self, point: &Point) -> Result<Outcome, StudyError> {
         let outcome = match self.measure_one(point) {
             Err(StudyError::Render(RenderError::Stopped)) => return Err(StudyError::Stopped),
             outcome => outcome?,
         };
+        let key = self.key(point)?;
         self.store.put(&point.name(), &key, &outcome)?;
-        Ok((outcome, true))
+        Ok(outcome)
+    }
+
+    fn key(&mut self, point: &Point) -> Result<Value, StudyError> {
+        Ok(point.key(&self.load(&point.scene)?.digest))
     }
 
     fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {
