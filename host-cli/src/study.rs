@@ -1,15 +1,18 @@
 //! `photoncard study`.
 
+mod sweep;
+
 use std::fmt::Write;
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use photoncard_driver::study::report::Provenance;
-use photoncard_driver::study::{Scale, StudyError, StudyObserver, StudyOptions, run as study};
+use photoncard_driver::study::{Scale, StudyError, StudyObserver, StudyOptions, run as study, run_sweep};
 
-use crate::arguments::StudyArguments;
+use crate::arguments::{Selection, StudyArguments, StudyCommand, StudyOutput};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::remaining::Remaining;
@@ -18,19 +21,40 @@ use crate::progress::{duration, stop_on_signals};
 /// Message of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
 
-/// Makes the reports of some studies.
+/// Makes the reports of studies that ship, or of one of the user's own.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
+    match arguments {
+        StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => {
+            let options = sweep::options(sweep, Provenance::here(&command_line()))?;
+            observed(sweep.output.quiet, |progress| run_sweep(options, progress))
+        }
+        StudyArguments { own: None, name: Some(name), output: Some(output), quick, scenes } => {
+            run_shipped(*name, output, *quick, scenes)
+        }
+        _ => unreachable!("name and output are required without a command"),
+    }
+}
+
+fn run_shipped(name: Selection, output: &StudyOutput, quick: bool, scenes: &Path) -> Result<(), Failure> {
     let options = StudyOptions {
-        studies: arguments.name.studies(),
-        scale: if arguments.quick { Scale::QUICK } else { Scale::FULL }.with_sample(arguments.sample),
-        scenes: arguments.scenes.clone(),
-        out: arguments.out.clone(),
-        is_collection: arguments.name.is_collection(),
-        threads: arguments.threads,
+        studies: name.studies(),
+        scale: if quick { Scale::QUICK } else { Scale::FULL }.with_sample(output.sample),
+        scenes: scenes.to_owned(),
+        out: output.out.clone(),
+        is_collection: name.is_collection(),
+        threads: output.threads,
         provenance: Provenance::here(&command_line()),
     };
-    let progress = StudyProgress::start(arguments.quiet).map_err(|error| Failure::work_error(&error))?;
-    let result = study(&options, &progress);
+    if let Some(banner) = options.scale.banner() {
+        say(format_args!("photoncard: {banner}"));
+    }
+    observed(output.quiet, |progress| study(&options, progress))
+}
+
+/// Does work whose progress is shown unless `quiet`.
+fn observed(quiet: bool, work: impl FnOnce(&StudyProgress) -> Result<(), StudyError>) -> Result<(), Failure> {
+    let progress = StudyProgress::start(quiet).map_err(|error| Failure::work_error(&error))?;
+    let result = work(&progress);
     progress.finish();
     result.map_err(|error| match error {
         StudyError::Stopped => Failure::Stopped(STOPPED),
