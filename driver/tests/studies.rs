@@ -13,8 +13,8 @@ use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::report::Provenance;
 use photoncard_driver::study::{
-    Axis, Laboratory, Point, SampleRate, Scale, Study, StudyError, StudyObserver, StudyOptions, Sweep,
-    SweepOptions, Task, run, run_sweep,
+    Axis, AxisError, Laboratory, Point, SampleRate, Scale, Study, StudyError, StudyObserver, StudyOptions,
+    Sweep, SweepOptions, Task, run, run_sweep,
 };
 
 /// Observer that counts measured points, and stops the study after a number of them.
@@ -241,7 +241,7 @@ fn sweep() -> Sweep {
     let point = |values: Vec<(&str, &str)>| {
         let [(_, order), (_, caches)] = values[..] else { panic!("{values:?}") };
         let settings = tiny().settings(GatherOrder::of_name(order).unwrap());
-        Ok::<_, StudyError>(tiny().traffic_behind("mine.gltf", settings, caches.parse().unwrap()))
+        Ok::<_, AxisError>(tiny().traffic_behind("mine.gltf", settings, caches.parse().unwrap()))
     };
     Sweep::new(axes, point).unwrap()
 }

@@ -26,7 +26,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
     match arguments {
         StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => {
             let options = sweep::options(sweep, Provenance::here(&command_line()))?;
-            observed(sweep.output.quiet, |progress| run_sweep(options, progress))
+            observed(sweep.output.quiet, |progress| run_sweep(options, progress).map_err(failure))
         }
         StudyArguments { own: None, name: Some(name), output: Some(output), quick, scenes } => {
             run_shipped(*name, output, *quick, scenes)
@@ -48,19 +48,23 @@ fn run_shipped(name: Selection, output: &StudyOutput, quick: bool, scenes: &Path
     if let Some(banner) = options.scale.banner() {
         say(format_args!("photoncard: {banner}"));
     }
-    observed(output.quiet, |progress| study(&options, progress))
+    observed(output.quiet, |progress| study(&options, progress).map_err(failure))
 }
 
 /// Does work whose progress is shown unless `quiet`.
-fn observed(quiet: bool, work: impl FnOnce(&StudyProgress) -> Result<(), StudyError>) -> Result<(), Failure> {
+fn observed(quiet: bool, work: impl FnOnce(&StudyProgress) -> Result<(), Failure>) -> Result<(), Failure> {
     let progress = StudyProgress::start(quiet).map_err(|error| Failure::work_error(&error))?;
     let result = work(&progress);
     progress.finish();
-    result.map_err(|error| match error {
+    result
+}
+
+fn failure(error: StudyError) -> Failure {
+    match error {
         StudyError::Stopped => Failure::Stopped(STOPPED),
         error if error.is_input() => Failure::input(error),
         error => Failure::work(error),
-    })
+    }
 }
 
 /// Command line as typed, with the program's name without its folder.

@@ -150,7 +150,7 @@ impl Swept<'_> {
                     .filter(|(at, _)| varied.contains(at))
                     .map(|(_, (name, value))| format!("{name} {value}"))
                     .collect();
-                self.line(name.join(", "), axis, indices, |measured| bytes(measured))
+                self.line(name.join(", "), axis, indices, bytes)
             });
             let label = (self.axes.list()[axis].name.as_str(), "", scale(&self.axes.list()[axis]));
             panel(title, label, ("from DRAM", "GB a frame", YScale::Log10), lines.collect())
