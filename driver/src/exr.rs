@@ -203,7 +203,7 @@ fn to_half(value: f32) -> f16 {
 
 /// JSON with every character beyond ASCII escaped: the attribute is ASCII, and only strings of JSON hold other
 /// characters.
-fn ascii(json: &str) -> String {
+pub(crate) fn ascii(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for character in json.chars() {
         if character.is_ascii() {
@@ -223,20 +223,36 @@ fn ascii(json: &str) -> String {
 /// Reads the plain colour channels `R G B` (half, float or unsigned) of the first part that has them.
 ///
 /// # Errors
+/// As [`read_with_provenance`].
+pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
+    read_with_provenance(path).map(|(picture, _)| picture)
+}
+
+/// Reads a picture as [`read_rgb`], and the JSON of its attribute [`PROVENANCE`]; `None` if the file has none, or it is not JSON.
+///
+/// # Errors
 /// If the file cannot be read, is malformed, has no such channels, or has more than [`MAX_READ_PIXELS`]. A file
 /// that states a size its length cannot hold is refused before anything is allocated.
-pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
+pub fn read_with_provenance(path: &Path) -> Result<(RgbImage, Option<String>), ExrError> {
     let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
     let found = std::fs::metadata(path).map_err(unreadable)?;
     if !found.is_file() {
         return Err(unreadable(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
-    decode_rgb(path, &bytes, MAX_READ_PIXELS)
+    decode_walled(path, &bytes, MAX_READ_PIXELS)
 }
 
 /// [`read_rgb`] from the bytes of a file, with at most `most_pixels` pixels.
 pub(crate) fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
+    decode_walled(path, bytes, most_pixels).map(|(picture, _)| picture)
+}
+
+fn decode_walled(
+    path: &Path,
+    bytes: &[u8],
+    most_pixels: u64,
+) -> Result<(RgbImage, Option<String>), ExrError> {
     // The `exr` crate does not check every number of a file: sums of window sizes, offsets of blocks.
     foreign::decode(
         || decode(path, bytes, most_pixels),
@@ -247,7 +263,7 @@ pub(crate) fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<
     )
 }
 
-fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
+fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<(RgbImage, Option<String>), ExrError> {
     let malformed =
         |error: exr::error::Error| ExrError::Malformed { path: path.to_owned(), reason: error.to_string() };
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(malformed)?;
@@ -276,9 +292,20 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrEr
         .from_buffered(Cursor::new(bytes))
         .map_err(malformed)?;
     let layer = image.layer_data;
+    let provenance = provenance(&layer.attributes);
     let Vec2(x, y) = layer.attributes.layer_position;
     let (width, pixels) = layer.channel_data.pixels;
-    Ok(RgbImage { width, height: layer.size.height(), data_window_origin: [x, y], pixels })
+    let picture = RgbImage { width, height: layer.size.height(), data_window_origin: [x, y], pixels };
+    Ok((picture, provenance))
+}
+
+/// The attribute [`PROVENANCE`], if it is JSON.
+fn provenance(attributes: &LayerAttributes) -> Option<String> {
+    let AttributeValue::Text(text) = attributes.other.get(&Text::new_or_none(PROVENANCE)?)? else {
+        return None;
+    };
+    let text = text.to_string();
+    serde_json::from_str::<serde::de::IgnoredAny>(&text).is_ok().then_some(text)
 }
 
 fn has_colour(header: &Header) -> bool {

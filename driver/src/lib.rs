@@ -28,8 +28,8 @@
 //!
 //! let folder = tempfile::tempdir()?;
 //! let path = folder.path().join("cornell.exr");
-//! let identity = serde_json::Value::from(settings.identity(&scene)).to_string();
-//! exr::write(&path, &rendering.film, &settings.picture.layers, &identity, SampleFormat::Float)?;
+//! let provenance = serde_json::to_string(&rendering.statistics.provenance.pixels)?;
+//! exr::write(&path, &rendering.film, &settings.picture.layers, &provenance, SampleFormat::Float)?;
 //! let picture = exr::read_rgb(&path)?;
 //! assert_eq!((picture.width, picture.height), (16, 16));
 //! assert!(picture.pixels.iter().flatten().sum::<f32>() > 0.0);

@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::choice::choices;
+use crate::choice::{Choice, choices};
+use crate::exr::{PROVENANCE, ascii};
 use crate::output::{self, OutputError};
 
 /// Tone curve that compresses scaled radiance to the range of a screen.
@@ -60,6 +61,16 @@ pub struct ToneMapping {
     pub curve: ToneCurve,
 }
 
+impl ToneMapping {
+    /// Exposure in stops, null for the automatic one, and name of the curve.
+    fn to_json(self) -> String {
+        serde_json::json!({"exposure": self.exposure, "tonemap": self.curve.name()}).to_string()
+    }
+}
+
+/// Keyword of the PNG's text chunk that holds exposure and tone curve.
+pub const TONE_MAPPING: &str = "photoncard-tonemap";
+
 /// White point of Reinhard's curve: the scaled luminance that it maps to 1.
 const WHITE: f32 = 4.0;
 /// Maximum of scaled radiance, beyond which it is clamped; its square is finite.
@@ -106,6 +117,9 @@ pub enum PngError {
 
 /// Writes a picture of `width` x `height` pixels of linear radiance to `path` as PNG, whole or not at all.
 ///
+/// The JSON of the picture's provenance is stored in the text chunk [`PROVENANCE`], with characters beyond ASCII as `\u` escapes,
+/// and that of the mapping in the text chunk [`TONE_MAPPING`].
+///
 /// # Errors
 /// If the file cannot be written, the exposure is not finite, a pixel is NaN, or there are not `width` x `height` pixels.
 pub fn write_png(
@@ -113,6 +127,7 @@ pub fn write_png(
     [width, height]: [u32; 2],
     radiance: impl Iterator<Item = [f32; 3]> + Clone,
     mapping: ToneMapping,
+    provenance_json: Option<&str>,
 ) -> Result<(), PngError> {
     if let Some(index) = radiance.clone().position(|pixel| pixel.iter().any(|value| value.is_nan())) {
         let [x, y] = [index % width.max(1) as usize, index / width.max(1) as usize];
@@ -124,17 +139,31 @@ pub fn write_png(
         Some(exposure) => return Err(PngError::Exposure { exposure }),
     };
     let pixels: Vec<u8> = radiance.flat_map(|pixel| tone_map(pixel, scale, mapping.curve)).collect();
+    let mut texts = vec![(TONE_MAPPING, mapping.to_json())];
+    texts.extend(provenance_json.map(|json| (PROVENANCE, ascii(json))));
+    let encoded = encode_png([width, height], &pixels, texts);
+    let bytes = encoded.map_err(|source| PngError::Encode { path: path.to_owned(), source })?;
+    Ok(output::write(path, &bytes)?)
+}
+
+/// Bytes of a PNG file with text chunks.
+fn encode_png(
+    [width, height]: [u32; 2],
+    pixels: &[u8],
+    texts: Vec<(&str, String)>,
+) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    let encoded = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(&pixels)?;
-        writer.finish()
-    });
-    encoded.map_err(|source| PngError::Encode { path: path.to_owned(), source })?;
-    Ok(output::write(path, &bytes)?)
+    for (keyword, text) in texts {
+        encoder.add_text_chunk(keyword.to_owned(), text)?;
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(pixels)?;
+    writer.finish()?;
+    Ok(bytes)
 }
 
 /// Luminance of linear RGB by the weights of Rec. 709.
@@ -188,7 +217,7 @@ mod tests {
     fn written(radiance: &[[f32; 3]], exposure: Option<f32>, curve: ToneCurve) -> (u32, u32, Vec<u8>) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("picture.png");
-        write_png(&path, [4, 3], radiance.iter().copied(), ToneMapping { exposure, curve }).unwrap();
+        write_png(&path, [4, 3], radiance.iter().copied(), ToneMapping { exposure, curve }, None).unwrap();
         decode(&path)
     }
 
@@ -269,7 +298,7 @@ mod tests {
         let path = folder.path().join("x.png");
         let refused = |size, picture: &[[f32; 3]], exposure| {
             let mapping = ToneMapping { exposure, curve: ToneCurve::default() };
-            let result = write_png(&path, size, picture.iter().copied(), mapping);
+            let result = write_png(&path, size, picture.iter().copied(), mapping, None);
             assert!(!path.exists());
             result.unwrap_err()
         };

@@ -6,12 +6,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use photoncard_driver::choice::Choice;
+use photoncard_driver::emulator::EmulatedKind;
+use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::render::{Unobserved, render};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::report::Provenance;
 use photoncard_driver::study::{
-    Laboratory, SampleRate, Scale, Study, StudyError, StudyObserver, StudyOptions, run,
+    Axis, AxisError, Laboratory, Point, SampleRate, Scale, Study, StudyError, StudyObserver, StudyOptions,
+    Sweep, SweepOptions, Task, run, run_sweep,
 };
 
 /// Observer that counts measured points, and stops the study after a number of them.
@@ -113,10 +116,35 @@ fn studies_report_and_a_second_run_renders_nothing_and_says_the_same() {
         };
         assert!(of_kind("html") == 1 && of_kind("csv") > 0 && of_kind("svg") > 0, "{}", study.name());
     }
+    is_a_trial_without_published_figures(&written);
     let second = Counting::up_to(usize::MAX);
     run(&options, &second).unwrap();
     assert_eq!(second.measured(), 0);
     assert_eq!(files(folder.path()), written);
+}
+
+/// Every page of a tiny scale has the banner, every plot its mark, and no file a figure of a publication or a statement on one.
+fn is_a_trial_without_published_figures(files: &BTreeMap<PathBuf, Vec<u8>>) {
+    let banner = tiny().banner().unwrap();
+    for (path, bytes) in files {
+        let (name, text) = (path.display(), String::from_utf8_lossy(bytes));
+        let [is_page, is_plot] =
+            ["html", "svg"].map(|kind| path.extension().is_some_and(|found| found == kind));
+        assert!(!is_page || text.contains(&banner), "{name}");
+        assert!(!is_plot || text.contains("Trial: "), "{name}");
+        assert_ne!(path.file_stem().unwrap(), "published");
+        let text = text.replace(&banner, "");
+        for word in [
+            "ublished",
+            "Figures of Graphics Interface",
+            "dissertation gives",
+            "dissertation says",
+            "is cited",
+            "table, naive",
+        ] {
+            assert!(!text.contains(word), "{word} in {name}");
+        }
+    }
 }
 
 #[test]
@@ -200,4 +228,104 @@ fn a_missing_scene_is_named_with_its_folder() {
     assert!(error.is_input());
     let text = error.to_string();
     assert!(text.contains("cornell.gltf") && text.contains(&folder.path().display().to_string()), "{text}");
+}
+
+/// Sweep of a small scene over orders and caches.
+fn sweep() -> Sweep {
+    let axis = |name: &str, values: &[&str]| Axis {
+        name: name.to_owned(),
+        values: values.iter().map(|&value| value.to_owned()).collect(),
+    };
+    let axes =
+        vec![axis("order", &["naive", "sort"]), axis("cache", &["unified=8K/128/4", "unified=32K/128/4"])];
+    let point = |values: Vec<(&str, &str)>| {
+        let [(_, order), (_, caches)] = values[..] else { panic!("{values:?}") };
+        let settings = tiny().settings(GatherOrder::of_name(order).unwrap());
+        Ok::<_, AxisError>(tiny().traffic_behind("mine.gltf", settings, caches.parse().unwrap()))
+    };
+    Sweep::new(axes, point).unwrap()
+}
+
+fn sweep_options(out: &Path) -> SweepOptions {
+    SweepOptions {
+        sweep: sweep(),
+        name: "mine.gltf".to_owned(),
+        scene: gltf::load(&scenes().join("cornell.gltf")).unwrap(),
+        out: out.to_owned(),
+        threads: Some(2),
+        provenance: Provenance::here("photoncard study sweep"),
+    }
+}
+
+/// Rows of a CSV file without its head.
+fn rows(path: &Path) -> Vec<Vec<String>> {
+    let text = fs::read_to_string(path).unwrap();
+    text.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()
+}
+
+#[test]
+fn a_sweep_is_measured_like_a_study_and_goes_on_where_it_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let stopped = Counting::up_to(1);
+    assert!(matches!(run_sweep(sweep_options(folder.path()), &stopped), Err(StudyError::Stopped)));
+    assert!(files(folder.path()).is_empty());
+    let resumed = Counting::up_to(usize::MAX);
+    run_sweep(sweep_options(folder.path()), &resumed).unwrap();
+    assert_eq!(stopped.measured() + resumed.measured(), 4);
+    let names: Vec<_> =
+        files(folder.path()).into_keys().map(|path| path.file_name().unwrap().to_owned()).collect();
+    let expected = [
+        "by-cache.svg",
+        "by-order.svg",
+        "index.html",
+        "points.csv",
+        "structures-by-cache.svg",
+        "structures-by-order.svg",
+        "structures.csv",
+    ];
+    assert_eq!(names, expected);
+    let values: Vec<_> =
+        rows(&folder.path().join("points.csv")).into_iter().map(|row| row[..2].join(" ")).collect();
+    assert_eq!(
+        values,
+        [
+            "naive unified=8K/128/4",
+            "naive unified=32K/128/4",
+            "sort unified=8K/128/4",
+            "sort unified=32K/128/4"
+        ]
+    );
+    let again = Counting::up_to(usize::MAX);
+    run_sweep(sweep_options(folder.path()), &again).unwrap();
+    assert_eq!(again.measured(), 0);
+}
+
+#[test]
+fn kinds_of_chips_differ_in_traffic_and_are_checked_for_their_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let observer = Counting::up_to(usize::MAX);
+    let mut laboratory = Laboratory::new(folder.path(), &scenes(), Some(2), &observer).unwrap();
+    let on = |chip, settings| {
+        let task =
+            Task::Traffic { chip, caches: CacheSettings::default(), sample: SampleRate::ALL, least_tiles: 1 };
+        Point { task, ..tiny().traffic("cornell.gltf", settings) }
+    };
+    let sorted = tiny().settings(GatherOrder::Sort).with(|s| s.integrator.gather_rays = 32);
+    let [reference, micro] = EmulatedKind::ALL else { panic!("two kinds") };
+    let points = [on(*reference, sorted.clone()), on(*micro, sorted.clone())];
+    let results = laboratory.measure("chips", &points).unwrap();
+    let [reference, micro_traffic] = points.each_ref().map(|point| results.traffic(point));
+    assert_eq!(reference.gathers(), micro_traffic.gathers());
+    let drains = |tile: &photoncard_driver::study::TileMeasurement| tile.counters.drains as f64;
+    assert!(
+        micro_traffic.total(drains).value > reference.total(drains).value,
+        "a smaller queue is drained more often"
+    );
+    for (settings, option) in [
+        (sorted.clone().with(|s| s.schedule.tile = 64), "--tile"),
+        (sorted.with(|s| s.schedule.order = GatherOrder::Hilbert), "--order"),
+    ] {
+        let error = laboratory.measure("chips", &[on(*micro, settings)]).unwrap_err();
+        assert!(error.is_input() && error.to_string().starts_with(option), "{error}");
+    }
 }

@@ -9,8 +9,11 @@ mod outputs;
 mod photons;
 mod picture;
 mod render;
+mod scene;
 mod schedule;
 mod study;
+mod study_output;
+mod sweep;
 mod threads;
 mod tone;
 mod tonemap;
@@ -33,7 +36,10 @@ use self::choice::choice;
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::lights::LightOptions;
 pub(crate) use self::render::RenderOptions;
-pub(crate) use self::study::StudyArguments;
+pub(crate) use self::scene::SceneOptions;
+pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};
+pub(crate) use self::study_output::StudyOutput;
+pub(crate) use self::sweep::{CACHE, SweepArguments};
 pub(crate) use self::tonemap::TonemapOptions;
 
 /// Global illumination by photon mapping on small rendering chips.

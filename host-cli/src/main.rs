@@ -8,6 +8,7 @@
 //! | `console`, `report` | the standard streams, with foreign text escaped; layout of errors |
 //! | `failure` | errors with their exit status |
 //! | `arguments`, `environment` | command line: options of every command, and their values |
+//! | `input` | scene and environment of a render |
 //! | `outputs` | checks of output files before any work |
 //! | `progress` | progress of a render |
 //! | `render`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
@@ -26,6 +27,7 @@ mod documents;
 mod emulate;
 mod environment;
 mod failure;
+mod input;
 mod outputs;
 mod progress;
 mod render;

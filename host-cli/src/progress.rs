@@ -1,6 +1,6 @@
 //! Progress of a render or of a card's self-test: a bar on a terminal, otherwise a line for each tenth of a phase.
 
-mod remaining;
+pub(crate) mod remaining;
 
 use std::error::Error;
 use std::fmt::Arguments;
@@ -137,7 +137,9 @@ impl Display {
         self.told = 0;
         self.remaining = match phase {
             Phase::Tiles => Remaining::new(self.cards, self.resumed),
-            Phase::Pilot | Phase::Photons | Phase::Pack | Phase::Load | Phase::SelfTest => Remaining::new(1, 0),
+            Phase::Pilot | Phase::Photons | Phase::Pack | Phase::Load | Phase::SelfTest => {
+                Remaining::new(1, 0)
+            }
         };
         let target =
             if self.on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };

@@ -6,14 +6,16 @@ mod messages;
 use std::sync::OnceLock;
 use std::time::Instant;
 
+use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::render::{CardAddress, RenderError, RenderSettings, render_chosen};
 use photoncard_driver::scene::Scene;
-use photoncard_driver::scene::gltf::{LoadSettings, load_with};
+use serde_json::json;
 
 use crate::arguments::RenderOptions;
 use crate::console::say;
 use crate::failure::Failure;
+use crate::input;
 use crate::progress::Progress;
 
 /// Renders a scene, and writes the picture and all other requested outputs.
@@ -40,8 +42,11 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     })?;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
-    let settings = chosen.into_inner().unwrap_or(settings);
-    files::write(options, &settings, &scene, &rendering)?;
+    let provenance = &mut rendering.statistics.provenance;
+    provenance.pixels.extend(input::provenance(&options.scene));
+    provenance.work.insert("quality".to_owned(), json!(options.quality.name()));
+    provenance.work.insert("threads".to_owned(), json!(options.threads));
+    files::write(options, &rendering)?;
     if let Some(partial) = rendering.partial.take() {
         partial.remove().map_err(Failure::work)?;
     }
@@ -77,17 +82,9 @@ fn choose(
 fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
     // The image must fit every card.
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
-    let (variant, light_units) = (options.variant.clone(), options.lights.light_units);
-    let load = LoadSettings { dram_bytes, variant, light_units };
-    let mut scene = load_with(&options.scene, &load).map_err(Failure::input)?;
-    for assignment in &options.assignments {
+    let mut scene = input::load(&options.scene, dram_bytes)?;
+    for assignment in &options.scene.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
-    }
-    if options.energy_compensation {
-        scene.compensate_energy();
-    }
-    if let Some(environment) = &options.environment {
-        scene.environment = Some(environment.load()?);
     }
     scene.check_light().map_err(Failure::input)?;
     let camera = settings.camera(&scene)?;

@@ -1,40 +1,70 @@
 //! `photoncard study`.
 
+mod sweep;
+
+use std::fmt::Write;
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use photoncard_driver::study::report::Provenance;
-use photoncard_driver::study::{Scale, StudyError, StudyObserver, StudyOptions, run as study};
+use photoncard_driver::study::{Scale, StudyError, StudyObserver, StudyOptions, run as study, run_sweep};
 
-use crate::arguments::StudyArguments;
+use crate::arguments::{Selection, StudyArguments, StudyCommand, StudyOutput};
 use crate::console::say;
 use crate::failure::Failure;
-use crate::progress::stop_on_signals;
+use crate::progress::remaining::Remaining;
+use crate::progress::{duration, stop_on_signals};
 
 /// Message of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
 
-/// Makes the reports of some studies.
+/// Makes the reports of studies that ship, or of one of the user's own.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
+    match arguments {
+        StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => {
+            let options = sweep::options(sweep, Provenance::here(&command_line()))?;
+            observed(sweep.output.quiet, |progress| run_sweep(options, progress).map_err(failure))
+        }
+        StudyArguments { own: None, name: Some(name), output: Some(output), quick, scenes } => {
+            run_shipped(*name, output, *quick, scenes)
+        }
+        _ => unreachable!("name and output are required without a command"),
+    }
+}
+
+fn run_shipped(name: Selection, output: &StudyOutput, quick: bool, scenes: &Path) -> Result<(), Failure> {
     let options = StudyOptions {
-        studies: arguments.name.studies(),
-        scale: if arguments.quick { Scale::QUICK } else { Scale::FULL }.with_sample(arguments.sample),
-        scenes: arguments.scenes.clone(),
-        out: arguments.out.clone(),
-        is_collection: arguments.name.is_collection(),
-        threads: arguments.threads,
+        studies: name.studies(),
+        scale: if quick { Scale::QUICK } else { Scale::FULL }.with_sample(output.sample),
+        scenes: scenes.to_owned(),
+        out: output.out.clone(),
+        is_collection: name.is_collection(),
+        threads: output.threads,
         provenance: Provenance::here(&command_line()),
     };
-    let progress = StudyProgress::start(arguments.quiet).map_err(|error| Failure::work_error(&error))?;
-    let result = study(&options, &progress);
+    if let Some(banner) = options.scale.banner() {
+        say(format_args!("photoncard: {banner}"));
+    }
+    observed(output.quiet, |progress| study(&options, progress).map_err(failure))
+}
+
+/// Does work whose progress is shown unless `quiet`.
+fn observed(quiet: bool, work: impl FnOnce(&StudyProgress) -> Result<(), Failure>) -> Result<(), Failure> {
+    let progress = StudyProgress::start(quiet).map_err(|error| Failure::work_error(&error))?;
+    let result = work(&progress);
     progress.finish();
-    result.map_err(|error| match error {
+    result
+}
+
+fn failure(error: StudyError) -> Failure {
+    match error {
         StudyError::Stopped => Failure::Stopped(STOPPED),
         error if error.is_input() => Failure::input(error),
         error => Failure::work(error),
-    })
+    }
 }
 
 /// Command line as typed, with the program's name without its folder.
@@ -62,6 +92,8 @@ struct StudyProgress {
 struct Display {
     study: String,
     bar: ProgressBar,
+    /// Remaining time, which the bar shows whenever it is drawn.
+    remaining: Arc<Mutex<Remaining>>,
     on_terminal: bool,
     /// Number of tenths of the study that were printed, without a terminal.
     told: usize,
@@ -72,6 +104,7 @@ impl StudyProgress {
         let display = Display {
             study: String::new(),
             bar: ProgressBar::hidden(),
+            remaining: Arc::new(Mutex::new(Remaining::new(1, 0))),
             on_terminal: std::io::stderr().is_terminal(),
             told: 0,
         };
@@ -80,7 +113,7 @@ impl StudyProgress {
 
     fn finish(&self) {
         if let Some(display) = &self.display {
-            display.lock().unwrap_or_else(PoisonError::into_inner).bar.finish_and_clear();
+            lock(display).bar.finish_and_clear();
         }
     }
 }
@@ -88,13 +121,13 @@ impl StudyProgress {
 impl StudyObserver for StudyProgress {
     fn progress(&self, study: &str, done: usize, total: usize, _: bool) {
         if let Some(display) = &self.display {
-            display.lock().unwrap_or_else(PoisonError::into_inner).show(study, done, total);
+            lock(display).show(study, done, total);
         }
     }
 
     fn notice(&self, text: &str) {
         if let Some(display) = &self.display {
-            let display = display.lock().unwrap_or_else(PoisonError::into_inner);
+            let display = lock(display);
             display.bar.suspend(|| say(format_args!("photoncard: {text}")));
         }
     }
@@ -104,32 +137,50 @@ impl StudyObserver for StudyProgress {
     }
 }
 
+fn lock<T>(value: &Mutex<T>) -> MutexGuard<'_, T> {
+    value.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Remaining time in words, `now` seconds after the start; empty before a point is measured.
+fn left(remaining: &Mutex<Remaining>, now: f64) -> String {
+    let seconds = lock(remaining).seconds(now);
+    seconds.map_or(String::new(), |seconds| format!(", {} left", duration(seconds)))
+}
+
 impl Display {
     fn show(&mut self, study: &str, done: usize, total: usize) {
-        if self.study != study {
-            self.begin(study, total);
+        let is_first = self.study != study;
+        if is_first {
+            self.begin(study, done, total);
         }
+        let seconds = self.bar.elapsed().as_secs_f64();
+        lock(&self.remaining).report(done as u64, total as u64, seconds);
         self.bar.set_position(done as u64);
         let tenths = (10 * done).checked_div(total).unwrap_or(0);
-        if !self.on_terminal && (tenths > self.told || done == 0) {
+        if !self.on_terminal && (tenths > self.told || is_first) {
             self.told = tenths;
-            let seconds = self.bar.elapsed().as_secs_f64();
-            say(format_args!("photoncard: {study} {done} of {total} points, {seconds:.1} s"));
+            let left = left(&self.remaining, seconds);
+            say(format_args!("photoncard: {study} {done} of {total} points, {seconds:.1} s{left}"));
         }
     }
 
-    fn begin(&mut self, study: &str, total: usize) {
+    /// Starts the bar of a study of which `done` points are in the store.
+    fn begin(&mut self, study: &str, done: usize, total: usize) {
         self.bar.finish_and_clear();
         study.clone_into(&mut self.study);
         self.told = 0;
         let target =
             if self.on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         self.bar = ProgressBar::with_draw_target(Some(total as u64), target);
-        let template = "{msg:11} {bar:40} {pos}/{len} points {elapsed} {eta} left";
+        // Points are measured one after another, each on all threads.
+        self.remaining = Arc::new(Mutex::new(Remaining::new(1, done as u64)));
+        let template = "{msg:11} {bar:40} {pos}/{len} points {elapsed}{left}";
         // The fallback is indicatif's own template.
-        self.bar.set_style(
-            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let remaining = self.remaining.clone();
+        self.bar.set_style(style.with_key("left", move |state: &ProgressState, out: &mut dyn Write| {
+            let _ = out.write_str(&left(&remaining, state.elapsed().as_secs_f64()));
+        }));
         self.bar.set_message(study.to_owned());
         self.bar.enable_steady_tick(std::time::Duration::from_secs(1));
     }

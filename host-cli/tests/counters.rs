@@ -2,6 +2,7 @@
 
 mod support;
 
+use std::collections::BTreeMap;
 use std::io;
 
 use flate2::read::GzDecoder;
@@ -120,6 +121,49 @@ fn a_trace_has_a_line_for_every_request_and_every_tile() {
         let counted = ["photon_map", "scene"].map(|half| count(&statistics, half, "requests"));
         assert_eq!((tiles, requests), (4, counted[0] + counted[1]));
     }
+}
+
+/// Requests and bytes by the label at `column` of the lines of a trace.
+fn sums_by_label(text: &str, column: usize) -> BTreeMap<&str, [u64; 2]> {
+    let mut sums: BTreeMap<_, [u64; 2]> = BTreeMap::new();
+    for line in text.lines().filter(|line| line.starts_with("0 ")) {
+        let words: Vec<_> = line.split(' ').collect();
+        assert_eq!(words.len(), 5, "{line}");
+        let [requests, bytes] = sums.entry(words[column]).or_default();
+        *requests += 1;
+        *bytes += words[4].parse::<u64>().unwrap();
+    }
+    sums
+}
+
+#[test]
+fn a_labelled_trace_adds_up_to_the_counters_and_begins_its_lines_as_one_without_labels() {
+    let room = Room::new();
+    let spheres = shipped("cornell-spheres.glb");
+    let options =
+        ["--trace", "a.din.gz", "--caustic-photons", "99", "--irradiance-cache", "on", "--tile", "4"];
+    let traced = |more: &[&str]| {
+        let common = ["-o", "a.exr", "--stats", "a.json", "--card", "emulated:1"];
+        room.rendered(&spheres, &[&common[..], &options, more].concat());
+        io::read_to_string(GzDecoder::new(&*room.read("a.din.gz"))).unwrap()
+    };
+    let (plain, labelled) = (traced(&[]), traced(&["--trace-labels"]));
+    let statistics = statistics(&room, "a.json");
+    for (column, part) in [(2, "structures"), (3, "stages")] {
+        let sums = sums_by_label(&labelled, column);
+        let counted = statistics["memory"][part].as_object().unwrap();
+        assert!(sums.keys().all(|name| counted.contains_key(*name)), "{sums:?}");
+        for name in counted.keys() {
+            let pair =
+                ["requests", "raw_bytes"].map(|key| count(&statistics, &format!("{part}/{name}"), key));
+            assert_eq!(sums.get(name.as_str()).copied().unwrap_or_default(), pair, "{part} {name}");
+        }
+        assert!(sums.len() > 5, "{sums:?}");
+    }
+    let without_labels = |line: &str| line.splitn(3, ' ').take(2).collect::<Vec<_>>().join(" ") + "\n";
+    assert!(labelled.lines().map(without_labels).collect::<String>() == plain);
+    let outcome = room.render(&spheres, &["-o", "b.exr", "--trace-labels"]);
+    assert!(outcome.status == Some(2) && outcome.stderr.contains("--trace <"), "{}", outcome.stderr);
 }
 
 #[test]

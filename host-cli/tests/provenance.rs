@@ -1,4 +1,4 @@
-//! Provenance of a picture: the attribute of the EXR file with everything that its pixels depend on.
+//! Provenance: everything that pixels depend on in pictures, and everything that the work depends on in statistics.
 
 mod support;
 
@@ -40,7 +40,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
 }
 
 /// Options that no pixel depends on.
-const OTHERS: [&[&str]; 17] = [
+const OTHERS: [&[&str]; 18] = [
     &["--photon-map", "jensen"],
     &["--tile", "3"],
     &["--order", "naive"],
@@ -53,6 +53,7 @@ const OTHERS: [&[&str]; 17] = [
     &["--counters"],
     &["--cache", "unified=8K/128/2"],
     &["--trace", "a.din.gz", "--card", "emulated:1"],
+    &["--trace-labels", "--trace", "a.din.gz", "--card", "emulated:1"],
     &["--threads", "2"],
     &["--exposure", "1", "-o", "a.png"],
     &["--tonemap", "aces", "-o", "a.png"],
@@ -86,7 +87,7 @@ fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
     let room = Room::new();
     let plain = rendered(&room, &[]);
     assert_eq!(plain["scene"], "cornell-spheres.glb");
-    let mut keys = BTreeSet::from(["program", "layout", "scene", "scene-checksum", "variant"]);
+    let mut keys = BTreeSet::from(["program", "layout", "scene", "scene-checksum", "variant", "view"]);
     for (options, key, value) in options_of_pixels() {
         let found = rendered(&room, options);
         assert_eq!(found[key], value, "{options:?}");
@@ -97,6 +98,79 @@ fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
     assert_eq!(found, keys);
     for options in OTHERS {
         assert_eq!(rendered(&room, options), plain, "{options:?}");
+    }
+}
+
+/// JSON of a text chunk of a PNG file; `None` without one of the keyword.
+fn text_of_png(file: &[u8], keyword: &str) -> Option<Value> {
+    let reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().expect("a PNG");
+    let chunk = reader.info().uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == keyword);
+    chunk.map(|chunk| serde_json::from_str(&chunk.text).expect("JSON"))
+}
+
+fn statistics(room: &Room) -> Value {
+    serde_json::from_slice(&room.read("a.json")).expect("JSON")
+}
+
+#[test]
+fn all_pictures_and_the_statistics_of_a_render_have_one_provenance() {
+    let room = Room::new();
+    let mut scene = scene();
+    scene["materials"][0]["name"] = json!("Größe \u{202e}");
+    room.write_scene("scene.gltf", &scene);
+    let set = ["--set", "Größe \u{202e}.diffuse=0.25", "--camera-at", "0,0.5,2"];
+    room.rendered("scene.gltf", &[&["-o", "a.exr", "-o", "a.png", "--stats", "a.json"][..], &set].concat());
+    let of_pixels = &statistics(&room)["provenance"]["pixels"];
+    assert_eq!(of_pixels["set"], json!(["Größe \u{202e}.diffuse=0.25"]));
+    assert_eq!(of_pixels["view"]["camera"], "eye");
+    assert_eq!(of_pixels["view"]["at"], json!([0.0, 0.5, 2.0]));
+    assert_eq!(provenance(&room.read("a.exr")), *of_pixels);
+    assert_eq!(text_of_png(&room.read("a.png"), "photoncard").as_ref(), Some(of_pixels));
+    let mapping = json!({"exposure": null, "tonemap": "reinhard"});
+    assert_eq!(text_of_png(&room.read("a.png"), "photoncard-tonemap"), Some(mapping));
+    let outcome = room.run(&["tonemap", "a.exr", "-o", "b.png", "--exposure=-1", "--tonemap=aces"]);
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    assert_eq!(text_of_png(&room.read("b.png"), "photoncard").as_ref(), Some(of_pixels));
+    let mapping = json!({"exposure": -1.0, "tonemap": "aces"});
+    assert_eq!(text_of_png(&room.read("b.png"), "photoncard-tonemap"), Some(mapping));
+}
+
+#[test]
+fn statistics_name_what_the_work_depends_on_besides_pixels() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let work = |options: &[&str]| {
+        room.rendered("scene.gltf", &[&["-o", "a.exr", "--stats", "a.json"], options].concat());
+        statistics(&room)["provenance"]["work"].clone()
+    };
+    let plain = work(&["--card", "emulated:1"]);
+    assert_eq!(plain["protocol"], photoncard_shared::message::PROTOCOL_VERSION);
+    let cases: [(&[&str], &str, Value); 13] = [
+        (&["--photon-map", "jensen"], "photon-map", json!("jensen")),
+        (&["--tile", "3"], "tile", json!(3)),
+        (&["--order", "naive"], "order", json!("naive")),
+        (&["--bins", "5", "--order", "dirbin"], "bins", json!(5)),
+        (&["--queue", "7"], "queue", json!(7)),
+        (&["--card", "emulated-micro:2"], "card", json!(["emulated-micro:2"])),
+        (
+            &["--card", "emulated-micro:2", "--card", "emulated:1"],
+            "chips",
+            json!({"micro": 2, "reference": 1}),
+        ),
+        (&["--verify", "0.5", "--card", "emulated:2"], "verify", json!(0.5)),
+        (
+            &["--faults", "flips=1e-9,seed=3"],
+            "faults",
+            json!("flips=0.000000001,drops=0,repeats=0,delays=0,seed=3"),
+        ),
+        (&["--counters"], "cache", json!("photon=128K/128/4,scene=75K/128/4")),
+        (&["--cache", "unified=8K/128/2"], "cache", json!("unified=8K/128/2")),
+        (&["--quality", "draft"], "quality", json!("draft")),
+        (&["--threads", "2"], "threads", json!(2)),
+    ];
+    for (options, key, value) in cases {
+        assert_ne!(plain[key], value, "{options:?}");
+        assert_eq!(work(options)[key], value, "{options:?}");
     }
 }
 

@@ -85,6 +85,8 @@ fn pictures_of_other_programs_are_tone_mapped() {
     let mut reader = png::Decoder::new(file).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut pixels).unwrap();
+    let texts = reader.info().uncompressed_latin1_text.iter().map(|text| text.keyword.as_str());
+    assert_eq!(texts.collect::<Vec<_>>(), ["photoncard-tonemap"]);
     assert_eq!((info.width, info.height), (5, 4));
     for (place, pixel) in (0..).zip(pixels.chunks(3)) {
         let (x, y) = (place % 5, place / 5);

@@ -1,8 +1,9 @@
 //! Chips without cards and links: tiles rendered straight from a card image, for studies and for whole-frame
 //! reordering.
 
-use photoncard_firmware::chip::{Progress, ReferenceChip};
+use photoncard_firmware::chip::{Chip, Progress};
 use photoncard_firmware::fixed_point::ColourSum;
+use photoncard_firmware::kind::ChipKind;
 use photoncard_firmware::render::{Context, GatherOutlet};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::counters::Counters;
@@ -26,8 +27,8 @@ pub struct RenderedTile {
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for the tile.
-pub fn render_tile(
-    chip: &mut ReferenceChip,
+pub fn render_tile<K: ChipKind>(
+    chip: &mut Chip<K>,
     scene: &SceneImage,
     mut memory: impl MeasuredMemory,
     frame: &FrameParameters,

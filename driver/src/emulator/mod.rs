@@ -3,6 +3,7 @@
 pub mod direct;
 mod dram;
 pub mod memory_model;
+mod names;
 pub mod trace;
 pub mod whole_frame;
 
@@ -61,6 +62,15 @@ impl EmulatedKind {
     /// On-chip memory of the caches' tags, bytes.
     pub fn tag_bytes(self) -> usize {
         tag_bytes(&self.budget())
+    }
+
+    /// Name of the kind of chip with this budget, which may be on a board: `reference`, `micro` or `other`.
+    pub fn name_of(budget: &Budget) -> &'static str {
+        match *budget {
+            kind::REFERENCE => "reference",
+            kind::MICRO => "micro",
+            _ => "other",
+        }
     }
 
     pub(crate) fn budget(self) -> Budget {

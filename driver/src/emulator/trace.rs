@@ -1,11 +1,13 @@
 //! Traces of a chip's memory: every read of its tiles, in the classic input format of the cache simulator Dinero.
 //!
 //! Each line of text is one access: a label, a blank, a byte address in hexadecimal. Label 0 is a read of data; label 4 is
-//! Dinero's escape that flushes its caches, written at the beginning of every tile with address 0. See `docs/memory.md`.
+//! Dinero's escape that flushes its caches, written at the beginning of every tile with address 0. Dinero ignores the rest of
+//! a line: a labelled trace has structure, stage and bytes of the read there. See `docs/memory.md`.
 
+use std::fmt::Arguments;
 use std::io::{self, Write};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -15,36 +17,47 @@ use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
+use crate::choice::Choice;
 use crate::output::{OutputError, PendingFile};
 
 /// Size of a block of text that is compressed at once, bytes.
 const BUFFER: usize = 64 << 10;
-/// Maximum length of a line: a label, a blank, 39 bits in hexadecimal, the line feed.
-const LONGEST_LINE: usize = 16;
+/// Maximum length of a line: a label, 39 bits in hexadecimal, the names of a structure and of a stage, three digits of bytes, blanks
+/// and the line feed.
+const LONGEST_LINE: usize = 64;
 
 const READ: u8 = 0;
 const FLUSH: u8 = 4;
+
+/// File of a trace, and its form.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TraceSettings {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// True if each read is followed by its structure, stage and number of bytes.
+    pub has_labels: bool,
+}
 
 /// Unfinished trace file, compressed by gzip. The file appears under its name only when the trace is finished.
 pub struct TraceFile {
     encoder: GzEncoder<PendingFile>,
     buffer: Vec<u8>,
-    path: PathBuf,
+    settings: TraceSettings,
     /// First failure, after which nothing is written.
     error: Option<io::Error>,
     has_failed: Arc<AtomicBool>,
 }
 
 impl TraceFile {
-    /// Creates a trace that will be stored as `path`.
+    /// Creates a trace that will be stored at the path of `settings`.
     ///
     /// # Errors
     /// As [`crate::output::check_writable`].
-    pub fn create(path: &Path) -> Result<Self, OutputError> {
+    pub fn create(settings: &TraceSettings) -> Result<Self, OutputError> {
         Ok(Self {
-            encoder: GzEncoder::new(PendingFile::create(path)?, Compression::fast()),
+            encoder: GzEncoder::new(PendingFile::create(&settings.path)?, Compression::fast()),
             buffer: Vec::with_capacity(BUFFER),
-            path: path.to_owned(),
+            settings: settings.clone(),
             error: None,
             has_failed: Arc::default(),
         })
@@ -55,12 +68,22 @@ impl TraceFile {
         self.has_failed.clone()
     }
 
-    fn add(&mut self, label: u8, address: u64) {
+    /// Adds a read of `bytes` bytes.
+    fn add_read(&mut self, address: u64, structure: Structure, stage: Stage, bytes: usize) {
+        if self.settings.has_labels {
+            let (structure, stage) = (structure.name(), stage.name());
+            self.add(format_args!("{READ} {address:x} {structure} {stage} {bytes}"));
+        } else {
+            self.add(format_args!("{READ} {address:x}"));
+        }
+    }
+
+    fn add(&mut self, line: Arguments) {
         if self.buffer.len() > BUFFER - LONGEST_LINE {
             self.compress();
         }
         // Writing to a vector cannot fail.
-        let _ = writeln!(self.buffer, "{label} {address:x}");
+        let _ = writeln!(self.buffer, "{line}");
     }
 
     fn compress(&mut self) {
@@ -79,7 +102,7 @@ impl TraceFile {
     /// If any part of it could not be written.
     pub fn finish(mut self) -> Result<(), OutputError> {
         self.compress();
-        let Self { encoder, path, error, .. } = self;
+        let Self { encoder, settings: TraceSettings { path, .. }, error, .. } = self;
         let ended = match error {
             None => encoder.finish(),
             Some(error) => Err(error),
@@ -92,6 +115,7 @@ impl TraceFile {
 pub struct Traced<M> {
     memory: M,
     trace: Option<TraceFile>,
+    stage: Stage,
     /// False before the first tile: earlier reads are not recorded.
     in_tiles: bool,
 }
@@ -99,7 +123,7 @@ pub struct Traced<M> {
 impl<M> Traced<M> {
     /// Memory that records the reads of `memory` in `trace`.
     pub fn new(memory: M, trace: Option<TraceFile>) -> Self {
-        Self { memory, trace, in_tiles: false }
+        Self { memory, trace, stage: Stage::Begin, in_tiles: false }
     }
 
     /// The memory below.
@@ -117,22 +141,24 @@ impl<M: MemoryPort> MemoryPort for Traced<M> {
     #[inline(always)]
     fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault> {
         let place = address.0 as u64 * LINE_BYTES as u64 + used.start as u64;
+        let bytes = used.len();
         let line = self.memory.read(structure, address, used)?;
         if let Some(trace) = self.trace.as_mut().filter(|_| self.in_tiles) {
-            trace.add(READ, place);
+            trace.add_read(place, structure, self.stage, bytes);
         }
         Ok(line)
     }
 
     #[inline(always)]
     fn enter(&mut self, stage: Stage) {
+        self.stage = stage;
         self.memory.enter(stage);
     }
 
     fn begin_tile(&mut self) {
         self.in_tiles = true;
         if let Some(trace) = &mut self.trace {
-            trace.add(FLUSH, 0);
+            trace.add(format_args!("{FLUSH} 0"));
         }
         self.memory.begin_tile();
     }
@@ -164,19 +190,38 @@ mod tests {
     #[test]
     fn a_trace_has_a_flush_for_a_tile_and_a_line_for_a_read_of_it() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("trace.din.gz");
-        let lines = [Line::ZERO; 3];
-        let mut memory = Traced::new(Lines(&lines), Some(TraceFile::create(&path).unwrap()));
-        memory.read(Structure::Header, LineAddress(0), 0..128).unwrap();
-        for line in [2, 1] {
-            memory.begin_tile();
-            memory.read(Structure::Photons, LineAddress(line), 20..40).unwrap();
-            memory.read(Structure::Photons, LineAddress(3), 0..20).unwrap_err();
+        for (has_labels, expected) in [
+            (false, "4 0\n0 114\n4 0\n0 94\n"),
+            (true, "4 0\n0 114 photons gather 20\n4 0\n0 94 photons gather 20\n"),
+        ] {
+            let settings = TraceSettings { path: folder.path().join("trace.din.gz"), has_labels };
+            let lines = [Line::ZERO; 3];
+            let mut memory = Traced::new(Lines(&lines), Some(TraceFile::create(&settings).unwrap()));
+            memory.read(Structure::Header, LineAddress(0), 0..128).unwrap();
+            for line in [2, 1] {
+                memory.begin_tile();
+                memory.enter(Stage::Gather);
+                memory.read(Structure::Photons, LineAddress(line), 20..40).unwrap();
+                memory.read(Structure::Photons, LineAddress(3), 0..20).unwrap_err();
+            }
+            let trace = memory.take_trace().unwrap();
+            assert!(!settings.path.exists());
+            trace.finish().unwrap();
+            let file = fs::File::open(&settings.path).unwrap();
+            assert_eq!(io::read_to_string(GzDecoder::new(file)).unwrap(), expected);
+            fs::remove_file(&settings.path).unwrap();
         }
-        let trace = memory.take_trace().unwrap();
-        assert!(!path.exists());
-        trace.finish().unwrap();
-        let text = io::read_to_string(GzDecoder::new(fs::File::open(&path).unwrap())).unwrap();
-        assert_eq!(text, "4 0\n0 114\n4 0\n0 94\n");
+    }
+
+    /// Text is compressed when the next line might not fit into the buffer.
+    #[test]
+    fn the_longest_line_fits_into_the_room_that_is_kept_for_it() {
+        let longest = |names: Vec<&str>| names.into_iter().map(str::len).max().unwrap();
+        let structure = longest(Structure::ALL.iter().map(|structure| structure.name()).collect());
+        let stage = longest(Stage::ALL.iter().map(|stage| stage.name()).collect());
+        let address = format!("{:x}", u32::MAX as u64 * LINE_BYTES as u64).len();
+        assert!(
+            "0 ".len() + address + " ".len() + structure + " ".len() + stage + " 128\n".len() <= LONGEST_LINE
+        );
     }
 }

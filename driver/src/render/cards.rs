@@ -43,7 +43,7 @@ impl<'a> Cards<'a> {
         settings: &'a RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Self, RenderError> {
-        let mut trace = settings.cards.trace.as_deref().map(TraceFile::create).transpose()?;
+        let mut trace = settings.cards.trace.as_ref().map(TraceFile::create).transpose()?;
         let start = Instant::now();
         let shared = SharedImage::default();
         let CardSet { addresses, faults, .. } = &settings.cards;

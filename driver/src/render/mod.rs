@@ -16,6 +16,7 @@ mod observer;
 mod open_card;
 mod outputs;
 mod preparation;
+mod provenance;
 mod reopening;
 mod self_test;
 mod settings;
@@ -32,6 +33,7 @@ pub use observer::{Observer, Phase, Unobserved};
 pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::{Filter, Radiance, Sampling};
 pub use photoncard_shared::message::{MemoryPattern, MemoryUse, WrongWord, WrongWords};
+pub use provenance::Provenance;
 pub use self_test::{
     ArithmeticTest, PatternTest, SelfTest, WrongResult, WrongResults, card_self_test, self_test_on,
 };
@@ -122,7 +124,8 @@ pub fn render_chosen(
     times.load = outcome.load_seconds;
     times.render = outcome.render_seconds;
     times.total = start.elapsed().as_secs_f64();
-    let statistics = Statistics::new(settings, &frame, &prepared, &outcome, times);
+    let provenance = Provenance::new(settings, scene, &camera, &frame, &budgets);
+    let statistics = Statistics::new(settings, &frame, &prepared, &outcome, times, provenance);
     let film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
     let partial = outputs.finish(&film);
     Ok(Rendering { film, statistics, partial })

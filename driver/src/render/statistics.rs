@@ -6,12 +6,14 @@ use serde::Serialize;
 use super::executor::Outcome;
 use super::preparation::Prepared;
 use super::times::Times;
-use super::{MemoryStatistics, RenderSettings};
+use super::{MemoryStatistics, Provenance, RenderSettings};
 use crate::cost_model::Flops;
 
 /// Contents of the statistics file. The keys are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Statistics {
+    /// Everything that the render depended on.
+    pub provenance: Provenance,
     /// Width of the whole picture, pixels.
     pub width: u32,
     /// Height of the whole picture, pixels.
@@ -90,9 +92,11 @@ impl Statistics {
         prepared: &Prepared,
         outcome: &Outcome,
         time_s: Times,
+        provenance: Provenance,
     ) -> Self {
         let counters = &outcome.counters;
         Self {
+            provenance,
             width: frame.width,
             height: frame.height,
             samples: frame.samples,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::report::ReportError;
 use super::store::StoreError;
+use super::studies::AxisError;
 use crate::error::SceneError;
 use crate::render::RenderError;
 
@@ -17,7 +18,7 @@ pub enum StudyError {
     ))]
     NoScene {
         /// The scene's file.
-        scene: &'static str,
+        scene: String,
         /// The folder of scenes.
         folder: PathBuf,
     },
@@ -25,6 +26,10 @@ pub enum StudyError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
+    /// Error of axes that make no sweep.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Axes(#[from] AxisError),
     /// Error of a point that cannot be measured.
     #[error(transparent)]
     #[diagnostic(transparent)]
@@ -51,7 +56,10 @@ impl StudyError {
     /// 1.
     pub fn is_input(&self) -> bool {
         match self {
-            Self::NoScene { .. } | Self::Scene(_) | Self::Store(StoreError::Folder { .. }) => true,
+            Self::NoScene { .. }
+            | Self::Scene(_)
+            | Self::Axes(_)
+            | Self::Store(StoreError::Folder { .. }) => true,
             Self::Render(error) => error.is_input(),
             Self::Store(_) | Self::Report(_) | Self::Threads(_) | Self::Stopped => false,
         }

@@ -10,6 +10,7 @@ use crate::choice::Choice;
 /// Writes `index.html` into `folder`, which holds the studies' folders.
 pub(super) fn write(
     folder: &Path,
+    banner: Option<String>,
     reports: &[(Study, Report)],
     provenance: &Provenance,
 ) -> Result<(), StudyError> {
@@ -21,6 +22,7 @@ pub(super) fn write(
     });
     let index = Report {
         title: "Studies of photon mapping on rendering chips".to_owned(),
+        banner,
         introduction: vec![
             "Each study renders the same scenes with one thing changed, on emulated chips whose memory is modelled line by \
              line, and reports what was counted. Every table is a CSV file and every plot an SVG file beside its report."

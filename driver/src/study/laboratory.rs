@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::error::StudyError;
 use super::measure::{Bench, Measurement};
@@ -14,15 +15,15 @@ use super::quality::{Quality, Reference};
 use super::store::PointStore;
 use crate::emulator::THREAD_STACK;
 use crate::pack::PackedScene;
-use crate::photon_map::{MappedImage, map_photons};
+use crate::photon_map::{MappedImage, check_image, check_packed, map_photons};
 use crate::render::RenderError;
 use crate::scene::Scene;
 use crate::scene::gltf;
 
 /// Observer of a study's progress, which can stop it.
 pub trait StudyObserver: Sync {
-    /// Reports that `done` of a study's `total` points are finished. `is_new` if the last was measured now, false if it
-    /// was read from the store.
+    /// Reports that `done` of a study's `total` points are finished: first, with `is_new` false, those in the store; then each
+    /// that was measured.
     fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
 
     /// Reports, as a sentence, the reason why a stored point cannot be used; the point is measured again.
@@ -42,10 +43,15 @@ pub enum Outcome {
 }
 
 /// The outcomes of a study's points.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Results(Vec<(Point, Outcome)>);
 
 impl Results {
+    /// The outcomes of points.
+    pub(super) fn new(outcomes: Vec<(Point, Outcome)>) -> Self {
+        Self(outcomes)
+    }
+
     /// Work and memory traffic of a point.
     ///
     /// # Panics
@@ -79,7 +85,7 @@ pub struct Laboratory<'a> {
     store: PointStore,
     pool: ThreadPool,
     observer: &'a dyn StudyObserver,
-    loaded: HashMap<&'static str, LoadedScene>,
+    loaded: HashMap<String, LoadedScene>,
     /// The last point's card image, which the next point may share.
     last: Option<LastImage>,
 }
@@ -122,63 +128,83 @@ impl<'a> Laboratory<'a> {
     pub fn measure(&mut self, study: &str, points: &[Point]) -> Result<Results, StudyError> {
         let points = sharing_images(points);
         let total = points.len();
-        let mut results = Results::default();
-        self.observer.progress(study, 0, total, false);
+        let (mut results, mut missing) = (Vec::new(), Vec::new());
         for point in points {
+            match self.stored(&point)? {
+                Some(outcome) => results.push((point, outcome)),
+                None => missing.push(point),
+            }
+        }
+        self.observer.progress(study, results.len(), total, false);
+        for point in missing {
             if self.observer.is_stopped() {
                 return Err(StudyError::Stopped);
             }
-            let (outcome, is_new) = self.outcome(&point)?;
-            results.0.push((point, outcome));
-            self.observer.progress(study, results.0.len(), total, is_new);
+            let outcome = self.measured(&point)?;
+            results.push((point, outcome));
+            self.observer.progress(study, results.len(), total, true);
         }
-        Ok(results)
+        Ok(Results::new(results))
+    }
+
+    /// Adds a scene of the name, in place of the file in the folder of scenes.
+    pub fn add(&mut self, name: &str, scene: Scene) {
+        let digest = scene.checksum();
+        self.loaded.insert(name.to_owned(), LoadedScene { scene, digest });
     }
 
     /// The scene of a file, before a point's assignments.
     ///
     /// # Errors
     /// If the file is missing or cannot be read.
-    fn load(&mut self, file: &'static str) -> Result<&LoadedScene, StudyError> {
+    fn load(&mut self, file: &str) -> Result<&LoadedScene, StudyError> {
         if !self.loaded.contains_key(file) {
             let path = self.scenes.join(file);
             if !path.is_file() {
-                return Err(StudyError::NoScene { scene: file, folder: self.scenes.clone() });
+                return Err(StudyError::NoScene { scene: file.to_owned(), folder: self.scenes.clone() });
             }
             let scene = gltf::load(&path)?;
-            let digest = scene.checksum();
-            self.loaded.insert(file, LoadedScene { scene, digest });
+            self.add(file, scene);
         }
         Ok(&self.loaded[file])
     }
 
-    fn outcome(&mut self, point: &Point) -> Result<(Outcome, bool), StudyError> {
-        let key = point.key(&self.load(point.scene)?.digest);
+    /// Outcome of a point in the store; `None` if it is to be measured.
+    fn stored(&mut self, point: &Point) -> Result<Option<Outcome>, StudyError> {
+        let key = self.key(point)?;
         let noticed = self.store.notices().len();
-        if let Some(outcome) = self.store.get(&point.name(), &key) {
-            return Ok((outcome, false));
-        }
+        let outcome = self.store.get(&point.name(), &key);
         for notice in &self.store.notices()[noticed..] {
             self.observer.notice(notice);
         }
+        Ok(outcome)
+    }
+
+    /// Measures a point, and stores its outcome.
+    fn measured(&mut self, point: &Point) -> Result<Outcome, StudyError> {
         let outcome = match self.measure_one(point) {
             Err(StudyError::Render(RenderError::Stopped)) => return Err(StudyError::Stopped),
             outcome => outcome?,
         };
+        let key = self.key(point)?;
         self.store.put(&point.name(), &key, &outcome)?;
-        Ok((outcome, true))
+        Ok(outcome)
+    }
+
+    fn key(&mut self, point: &Point) -> Result<Value, StudyError> {
+        Ok(point.key(&self.load(&point.scene)?.digest))
     }
 
     fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {
-        point.settings.check()?;
-        point.settings.check_budget(&photoncard_firmware::kind::REFERENCE)?;
+        point.check()?;
         let mut last = self.image(point)?;
+        check_image(&last.mapped.image, &point.chip().budget()).map_err(RenderError::from)?;
         let is_stopped = || self.observer.is_stopped();
         let bench =
             Bench { scene: &last.scene, mapped: &last.mapped, pool: &self.pool, is_stopped: &is_stopped };
         let outcome = match &point.task {
-            Task::Traffic { caches, sample, least_tiles } => {
-                Outcome::Traffic(bench.traffic(&point.settings, caches, *sample, *least_tiles)?)
+            Task::Traffic { chip, caches, sample, least_tiles } => {
+                Outcome::Traffic(bench.traffic(&point.settings, *chip, caches, *sample, *least_tiles)?)
             }
             &Task::Quality { tiles, reference_rays } => {
                 let known = last.reference.take();
@@ -204,13 +230,14 @@ impl<'a> Laboratory<'a> {
         }
         // The previous image is dropped first: two images may not fit into memory.
         self.last = None;
-        let mut scene = self.load(point.scene)?.scene.clone();
+        let mut scene = self.load(&point.scene)?.scene.clone();
         for assignment in &point.assignments {
             scene.apply(assignment)?;
         }
         scene.check_light()?;
         let packed = PackedScene::new(&scene).map_err(RenderError::from)?;
         let settings = point.settings.photon_settings(&scene);
+        check_packed(&packed, &settings, &point.chip().budget()).map_err(RenderError::from)?;
         let go_on = |_| !self.observer.is_stopped();
         let mapped = self.pool.install(|| map_photons(packed, &settings, &go_on));
         Ok(LastImage { key, scene, mapped: mapped.map_err(RenderError::from)?, reference: None })
@@ -239,7 +266,7 @@ mod tests {
 
     fn point(exponent: u32, layout: PhotonLayout, tile: u32) -> Point {
         Point {
-            scene: "cornell-glossy.gltf",
+            scene: "cornell-glossy.gltf".to_owned(),
             assignments: vec![format!("floor.exponent={exponent}")],
             settings: RenderSettings {
                 photons: PhotonMaps { layout, ..PhotonMaps::default() },

@@ -1,6 +1,7 @@
 //! Measurement of a point: work and memory traffic of a sample of a picture's tiles.
 
-use photoncard_firmware::chip::ReferenceChip;
+use photoncard_firmware::chip::Chip;
+use photoncard_firmware::kind::{ChipKind, Micro, Reference};
 use photoncard_firmware::memory::Lines;
 use photoncard_shared::address::{STRUCTURES, Structure};
 use photoncard_shared::counters::Counters;
@@ -10,6 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::sample::{Chosen, Estimate, SampleRate, choose};
+use crate::emulator::EmulatedKind;
 use crate::emulator::direct::{RenderedTile, render_tile};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
@@ -60,15 +62,20 @@ impl TileMeasurement {
 
     /// Reads of the photon map.
     pub fn photon_map(&self) -> ReadSums {
-        self.reads_of(Structure::is_photon_map)
+        self.sum(Structure::is_photon_map)
     }
 
     /// Reads of everything but the photon map.
     pub fn scene(&self) -> ReadSums {
-        self.reads_of(|structure| !structure.is_photon_map())
+        self.sum(|structure| !structure.is_photon_map())
     }
 
-    fn reads_of(&self, chosen: impl Fn(Structure) -> bool) -> ReadSums {
+    /// Reads of one structure.
+    pub fn reads_of(&self, structure: Structure) -> ReadSums {
+        self.sum(|other| other == structure)
+    }
+
+    fn sum(&self, chosen: impl Fn(Structure) -> bool) -> ReadSums {
         let mut sum = ReadSums::default();
         for (_, reads) in
             Structure::ALL.into_iter().zip(&self.reads).filter(|(structure, _)| chosen(*structure))
@@ -136,18 +143,18 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders tiles, each on a chip with a new memory that `model` makes, so that every tile begins with empty caches.
+    /// Renders tiles, each on a chip of the kind `K` with a new memory that `model` makes, so that every tile begins with empty caches.
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.
-    pub fn render<'b, M: MeasuredMemory>(
+    pub fn render<'b, K: ChipKind, M: MeasuredMemory>(
         &'b self,
         frame: &FrameParameters,
         tiles: &[Tile],
         model: &(impl Fn(Lines<'b>) -> M + Sync),
     ) -> Result<Vec<RenderedTile>, RenderError> {
-        let new_chip = || Box::new(ReferenceChip::new());
-        let render_one = |chip: &mut Box<ReferenceChip>, &tile: &Tile| {
+        let new_chip = || Box::new(Chip::<K>::new());
+        let render_one = |chip: &mut Box<Chip<K>>, &tile: &Tile| {
             if (self.is_stopped)() {
                 return Err(RenderError::Stopped);
             }
@@ -165,6 +172,7 @@ impl Bench<'_> {
     pub fn traffic(
         &self,
         settings: &RenderSettings,
+        chip: EmulatedKind,
         caches: &CacheSettings,
         sample: SampleRate,
         least_tiles: usize,
@@ -176,7 +184,11 @@ impl Bench<'_> {
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
         let tiles: Vec<Tile> = chosen.iter().map(|chosen| chosen.tile).collect();
-        let rendered = self.render(&frame, &tiles, &|memory| caches.over(memory))?;
+        let model = |memory| caches.over(memory);
+        let rendered = match chip {
+            EmulatedKind::Reference => self.render::<Reference, _>(&frame, &tiles, &model),
+            EmulatedKind::Micro => self.render::<Micro, _>(&frame, &tiles, &model),
+        }?;
         let measured = chosen.iter().zip(&rendered).map(|(Chosen { tile, stands_for }, rendered)| {
             TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic)
         });

@@ -29,8 +29,9 @@ pub use self::quality::{Quality, Reference};
 use self::report::{Provenance, Report};
 pub use self::sample::{Estimate, SampleRate, choose};
 pub use self::scale::Scale;
-pub use self::studies::Study;
+pub use self::studies::{Axis, AxisError, MAX_POINTS, Study, Sweep};
 use crate::choice::Choice;
+use crate::scene::Scene;
 
 /// Options of [`run`]: the studies, their scale, and the folders they read and write.
 #[derive(Clone, Debug)]
@@ -68,9 +69,44 @@ pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), S
         reports.push((study, report));
     }
     if options.is_collection {
-        index::write(&options.out, &reports, &options.provenance)?;
+        index::write(&options.out, options.scale.banner(), &reports, &options.provenance)?;
     }
     Ok(())
+}
+
+/// Options of [`run_sweep`].
+pub struct SweepOptions {
+    /// The sweep.
+    pub sweep: Sweep,
+    /// Name of the scene of all points.
+    pub name: String,
+    /// The scene, before a point's assignments.
+    pub scene: Scene,
+    /// The folder of the report.
+    pub out: PathBuf,
+    /// Number of threads; `None` for one per core.
+    pub threads: Option<usize>,
+    /// Provenance of the numbers; the report adds its settings.
+    pub provenance: Provenance,
+}
+
+/// Measures and reports a sweep. All points are checked before the first is measured; finished ones are kept as by [`run`].
+///
+/// # Errors
+/// If a point is not possible or cannot be measured, a file cannot be written, or the observer stops the sweep.
+pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
+    let SweepOptions { sweep, name, scene, out, threads, mut provenance } = options;
+    for point in sweep.points() {
+        point.check()?;
+        point.settings.camera(&scene)?;
+        let mut materials = Scene { materials: scene.materials.clone(), ..Scene::default() };
+        point.assignments.iter().try_for_each(|assignment| materials.apply(assignment))?;
+    }
+    let mut laboratory = Laboratory::new(&out, Path::new(""), threads, observer)?;
+    laboratory.add(&name, scene);
+    let results = laboratory.measure("sweep", sweep.points())?;
+    provenance.settings.extend(sweep.rows());
+    Ok(report::write(&out, &Report { provenance, ..sweep.report(&name, &results) })?)
 }
 
 fn folder(options: &StudyOptions, study: Study) -> PathBuf {

@@ -1,18 +1,21 @@
 //! Points: single measurements, each with everything that its result depends on.
 
-use photoncard_firmware::kind::REFERENCE;
 use serde_json::{Value, json};
 
 use super::sample::SampleRate;
 use crate::choice::Choice;
+use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
-use crate::render::{PhotonMaps, RenderSettings};
+use crate::render::{PhotonMaps, RenderError, RenderSettings};
+
+/// Maximum number of characters of a scene's name in the name of a point's file.
+const MAX_SCENE_NAME: usize = 60;
 
 /// One measurement of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// File name of the scene in the folder of scenes.
-    pub scene: &'static str,
+    /// Name of the scene in the laboratory: its file in the folder of scenes.
+    pub scene: String,
     /// Assignments to the scene's materials, such as `floor.exponent=8`.
     pub assignments: Vec<String>,
     /// Settings of the render.
@@ -26,6 +29,8 @@ pub struct Point {
 pub enum Task {
     /// Work and memory traffic of tiles behind caches that are empty when a tile begins.
     Traffic {
+        /// The kind of chip.
+        chip: EmulatedKind,
         /// The caches between chip and DRAM.
         caches: CacheSettings,
         /// Share of the tiles; [`Hilbert`](crate::scheduler::GatherOrder::Hilbert) renders the whole frame whatever it is.
@@ -43,13 +48,47 @@ pub enum Task {
 }
 
 impl Point {
+    /// Kind of the chips that render the point.
+    pub fn chip(&self) -> EmulatedKind {
+        match self.task {
+            Task::Traffic { chip, .. } => chip,
+            Task::Quality { .. } => EmulatedKind::Reference,
+        }
+    }
+
+    /// Checks the settings against each other and against the kind of chip.
+    ///
+    /// # Errors
+    /// The first setting that is not possible.
+    pub fn check(&self) -> Result<(), RenderError> {
+        let RenderSettings { schedule, .. } = &self.settings;
+        if schedule.order.is_of_whole_frame() && self.chip() != EmulatedKind::Reference {
+            return Err(RenderError::Setting {
+                option: "--order",
+                value: schedule.order.name().to_owned(),
+                reason: format!(
+                    "{} has no room for the gathers of a frame, and only reference chips leave them to the host",
+                    self.chip().name()
+                ),
+                remedy: format!(
+                    "use --card {}, or another --order, such as sort",
+                    EmulatedKind::Reference.name()
+                ),
+            });
+        }
+        self.settings.check()?;
+        self.settings.check_budget(&self.chip().budget())
+    }
+
     /// Name of the point's file: task, scene and order. Points that differ in other settings share it.
     pub fn name(&self) -> String {
         let task = match self.task {
             Task::Traffic { .. } => "traffic",
             Task::Quality { .. } => "quality",
         };
-        let scene = self.scene.split('.').next().unwrap_or_default();
+        let scene = self.scene.split('.').next().unwrap_or_default().chars().take(MAX_SCENE_NAME);
+        let portable = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
+        let scene: String = scene.map(portable).collect();
         format!("{task}-{scene}-{}", self.settings.schedule.order.name())
     }
 
@@ -58,12 +97,12 @@ impl Point {
         let mut key = json!({
             "identity": self.settings.identity_with(scene),
             "work": self.settings.of_work(),
-            "chip": REFERENCE,
+            "chip": self.chip().budget(),
             "scene": self.scene,
             "set": self.assignments,
         });
         key["task"] = match &self.task {
-            Task::Traffic { caches, sample, least_tiles } => {
+            Task::Traffic { chip: _, caches, sample, least_tiles } => {
                 json!({"traffic": {"caches": caches.to_string(), "sample": sample, "least_tiles": least_tiles}})
             }
             Task::Quality { tiles, reference_rays } => {
@@ -77,7 +116,7 @@ impl Point {
     pub fn image_key(&self) -> ImageKey {
         let RenderSettings { photons, integrator, .. } = &self.settings;
         ImageKey {
-            scene: self.scene,
+            scene: self.scene.clone(),
             assignments: self.assignments.clone(),
             seed: integrator.seed,
             photons: photons.clone(),
@@ -88,7 +127,7 @@ impl Point {
 /// Everything that a point's card image depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageKey {
-    scene: &'static str,
+    scene: String,
     assignments: Vec<String>,
     seed: u32,
     photons: PhotonMaps,

@@ -3,6 +3,7 @@
 //! Only the sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels; the
 //! order of the gathers, the tiles, the layout of the photon map and the caches do not.
 
+use photoncard_firmware::kind;
 use photoncard_shared::message::{Radiance, Sampling, Tile};
 use serde::{Deserialize, Serialize};
 
@@ -112,7 +113,7 @@ fn pixels(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<Vec<
     let chosen = choose(&tiles(settings.window(), TILE, settings.schedule.order), count);
     let chosen: Vec<Tile> = chosen.into_iter().map(|chosen| chosen.tile).collect();
     let unit = bench.mapped.image.view().0.header.radiance_unit;
-    let rendered = bench.render(&frame, &chosen, &|memory| memory)?;
+    let rendered = bench.render::<kind::Reference, _>(&frame, &chosen, &|memory| memory)?;
     let sums = rendered.iter().flat_map(|tile| &tile.sums);
     Ok(sums.map(|sum| (sum.value() * unit).to_array()).collect())
 }

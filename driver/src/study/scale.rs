@@ -5,6 +5,7 @@ use photoncard_firmware::kind::REFERENCE;
 use super::point::{Point, Task};
 use super::sample::SampleRate;
 use crate::choice::Choice;
+use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::photon_map::PhotonLayout;
 use crate::render::{Integrator, PhotonMaps, Picture, RenderSettings, Sampling, Schedule};
@@ -66,6 +67,27 @@ impl Scale {
         is_quick: true,
     };
 
+    /// True if all points share the settings of the dissertation's nominal frame. Only figures of such a scale may stand beside
+    /// published ones.
+    pub fn is_nominal(&self) -> bool {
+        let frame =
+            |scale: &Self| (scale.side, scale.photons, scale.neighbors, scale.gather_rays, scale.shadow_rays);
+        frame(self) == frame(&Self::FULL)
+    }
+
+    /// Mark of figures that are not of the nominal frame; `None` for the others.
+    pub fn banner(&self) -> Option<String> {
+        let Self { side, photons, neighbors, gather_rays, .. } = self;
+        let Self { side: nominal_side, photons: nominal_photons, .. } = Self::FULL;
+        (!self.is_nominal()).then(|| {
+            format!(
+                "Trial, no result: {side}x{side} pixels, {photons} photons, {neighbors} neighbours and {gather_rays} gather rays instead \
+                 of the nominal {nominal_side}x{nominal_side} pixels and {nominal_photons} photons. Published figures are left out, and \
+                 nothing here says anything about them."
+            )
+        })
+    }
+
     /// This scale with another share of the tiles.
     pub fn with_sample(self, sample: SampleRate) -> Self {
         Self { sample, ..self }
@@ -114,30 +136,26 @@ impl Scale {
     }
 
     /// A point that measures the traffic of sampled tiles behind the nominal caches.
-    pub fn traffic(&self, scene: &'static str, settings: RenderSettings) -> Point {
+    pub fn traffic(&self, scene: &str, settings: RenderSettings) -> Point {
         self.traffic_behind(scene, settings, CacheSettings::default())
     }
 
     /// A point that measures the traffic of sampled tiles behind `caches`.
-    pub fn traffic_behind(
-        &self,
-        scene: &'static str,
-        settings: RenderSettings,
-        caches: CacheSettings,
-    ) -> Point {
-        let task = Task::Traffic { caches, sample: self.sample, least_tiles: self.least_tiles };
-        Point { scene, assignments: Vec::new(), settings, task }
+    pub fn traffic_behind(&self, scene: &str, settings: RenderSettings, caches: CacheSettings) -> Point {
+        let chip = EmulatedKind::Reference;
+        let task = Task::Traffic { chip, caches, sample: self.sample, least_tiles: self.least_tiles };
+        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
     }
 
     /// A point that measures the traffic of all tiles behind the nominal caches.
-    pub fn whole(&self, scene: &'static str, settings: RenderSettings) -> Point {
+    pub fn whole(&self, scene: &str, settings: RenderSettings) -> Point {
         Self { sample: SampleRate::ALL, ..self.clone() }.traffic(scene, settings)
     }
 
     /// A point that measures the error of [`Self::quality_tiles`] tiles.
-    pub fn quality(&self, scene: &'static str, settings: RenderSettings) -> Point {
+    pub fn quality(&self, scene: &str, settings: RenderSettings) -> Point {
         let task = Task::Quality { tiles: self.quality_tiles, reference_rays: self.reference_rays };
-        Point { scene, assignments: Vec::new(), settings, task }
+        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
     }
 
     /// Settings that all points share, as names and values for a report's provenance.

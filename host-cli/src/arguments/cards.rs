@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::emulator::trace::TraceSettings;
 use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{CardAddress, CardSet};
 
@@ -38,6 +39,9 @@ pub(crate) struct CardOptions {
     /// Write every read of an emulated chip in Dinero's input format, compressed by gzip; a frame has billions: use --crop
     #[arg(long, value_name = "OUT.din.gz", value_parser = file(), hide_short_help = true)]
     pub(crate) trace: Option<PathBuf>,
+    /// Follow each read of the trace by its structure, its stage and its number of bytes, which Dinero ignores
+    #[arg(long, requires = "trace", hide_short_help = true)]
+    trace_labels: bool,
 }
 
 impl CardOptions {
@@ -49,7 +53,7 @@ impl CardOptions {
             faults: self.faults,
             verify: self.verify,
             caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
-            trace: self.trace.clone(),
+            trace: self.trace.clone().map(|path| TraceSettings { path, has_labels: self.trace_labels }),
         }
     }
 }

@@ -2,37 +2,39 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, Subcommand};
 use photoncard_driver::choice::Choice;
-use photoncard_driver::study::{SampleRate, Study};
+use photoncard_driver::study::Study;
 
 use super::choice::possible_value;
-use super::threads::threads;
+use super::study_output::StudyOutput;
+use super::sweep::SweepArguments;
 
+/// A study that ships, or one of the user's own.
 #[derive(Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct StudyArguments {
+    #[command(subcommand)]
+    pub(crate) own: Option<StudyCommand>,
     /// Study to run
-    #[arg(value_name = "NAME", value_parser = Selection::parser())]
-    pub(crate) name: Selection,
-    /// The folder for reports and finished points; it is made if it is missing
-    #[arg(short, long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
+    // Required without a command.
+    #[arg(value_name = "NAME", value_parser = Selection::parser(), required = true)]
+    pub(crate) name: Option<Selection>,
     /// A small picture and few values: about a minute a study
     #[arg(long)]
     pub(crate) quick: bool,
-    /// The share of the tiles that is rendered where not all are needed
-    #[arg(long, value_name = "SHARE", default_value = "1/17", allow_hyphen_values = true)]
-    pub(crate) sample: SampleRate,
     /// The folder of photoncard's own scenes
     #[arg(long, value_name = "DIR", default_value = "scenes")]
     pub(crate) scenes: PathBuf,
-    /// Threads, an emulated chip on each [default: a thread a core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true)]
-    pub(crate) threads: Option<usize>,
-    /// Show no progress
-    #[arg(long)]
-    pub(crate) quiet: bool,
+    #[command(flatten)]
+    pub(crate) output: Option<StudyOutput>,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum StudyCommand {
+    /// Measure a scene of your own over any values of settings, caches and chips
+    Sweep(Box<SweepArguments>),
 }
 
 /// Studies by a name.

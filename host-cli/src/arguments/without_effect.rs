@@ -25,12 +25,12 @@ impl RenderOptions {
             |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });
         let cases = [
             (
-                self.lights.light_units != LightUnits::Auto && scene.lights.is_empty(),
+                self.scene.lights.light_units != LightUnits::Auto && scene.lights.is_empty(),
                 "--light-units",
                 "without point, spot or directional lights in the file".to_owned(),
             ),
             (
-                self.energy_compensation && !scene.materials.iter().any(has_lobe),
+                self.scene.energy_compensation && !scene.materials.iter().any(has_lobe),
                 "--energy-compensation",
                 "without a metallic-roughness material".to_owned(),
             ),

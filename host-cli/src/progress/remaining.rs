@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 /// pieces took. With `n` finished pieces, the mean `t` of the last `min(n, workers)` completion times and `N` pieces in all, the work
 /// ends at about `t N / max(n, workers)`. Between completions the time counts down, until a piece that takes longer than the mean
 /// is overdue. Pieces finished before the start count as done, and not as speed.
-pub(super) struct Remaining {
+pub(crate) struct Remaining {
     workers: usize,
     /// Pieces finished before the start.
     before: u64,
@@ -22,13 +22,13 @@ pub(super) struct Remaining {
 
 impl Remaining {
     /// Estimate at the start, with `before` pieces finished.
-    pub(super) fn new(workers: usize, before: u64) -> Self {
+    pub(crate) fn new(workers: usize, before: u64) -> Self {
         let workers = workers.max(1);
         Self { workers, before, done: before, most_done: before, total: before, completions: VecDeque::new() }
     }
 
     /// Reports that `done` of `total` pieces are finished, `now` seconds after the start.
-    pub(super) fn report(&mut self, done: u64, total: u64, now: f64) {
+    pub(crate) fn report(&mut self, done: u64, total: u64, now: f64) {
         let new = done.saturating_sub(self.most_done).min(self.workers as u64);
         self.completions.extend((0..new).map(|_| now));
         while self.completions.len() > self.workers {
@@ -38,7 +38,7 @@ impl Remaining {
     }
 
     /// Remaining seconds, `now` seconds after the start; `None` before a piece is finished.
-    pub(super) fn seconds(&self, now: f64) -> Option<f64> {
+    pub(crate) fn seconds(&self, now: f64) -> Option<f64> {
         let finished = self.most_done - self.before;
         if finished == 0 {
             return None;

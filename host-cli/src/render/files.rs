@@ -2,39 +2,27 @@
 
 use std::path::Path;
 
-use photoncard_driver::choice::Choice;
-use photoncard_driver::render::{RenderSettings, Rendering};
-use photoncard_driver::scene::Scene;
+use photoncard_driver::render::Rendering;
 use photoncard_driver::tone_mapping::write_png;
 use photoncard_driver::{exr, output};
-use serde_json::{Value, json};
 
 use crate::arguments::{PictureFormat, PictureOutput, RenderOptions, TextOutput};
 use crate::console::{print_json, printable_json};
-use crate::environment::EnvironmentOption;
 use crate::failure::Failure;
-use crate::outputs;
+use crate::{input, outputs};
 
 /// Checks that all files can be written, and that none replaces the scene, the environment or another one.
 pub(super) fn check(options: &RenderOptions) -> Result<(), Failure> {
-    let mut inputs = vec![(options.scene.as_path(), "the scene")];
-    if let Some(EnvironmentOption::File(path)) = &options.environment {
-        inputs.push((path, "the environment"));
-    }
     let mut written: Vec<&Path> = options.outputs.pictures.iter().map(|picture| &*picture.path).collect();
     written.extend(options.outputs.stats.as_ref().and_then(TextOutput::path));
     written.extend(options.cards.trace.as_deref());
-    outputs::check(&inputs, &written, &[&options.outputs.partial_path()])
+    outputs::check(&input::files(&options.scene), &written, &[&options.outputs.partial_path()])
 }
 
 /// Writes pictures and statistics.
-pub(super) fn write(
-    options: &RenderOptions,
-    settings: &RenderSettings,
-    scene: &Scene,
-    rendering: &Rendering,
-) -> Result<(), Failure> {
-    let provenance = printable_json(&provenance(options, settings, scene, rendering).to_string());
+pub(super) fn write(options: &RenderOptions, rendering: &Rendering) -> Result<(), Failure> {
+    let provenance = serde_json::to_string(&rendering.statistics.provenance.pixels);
+    let provenance = printable_json(&provenance.map_err(|error| Failure::work_error(&error))?);
     for picture in &options.outputs.pictures {
         write_picture(picture, options, rendering, &provenance)?;
     }
@@ -64,28 +52,8 @@ fn write_picture(
         PictureFormat::Png => {
             let size = [film.window().width(), film.window().height()];
             let radiance = film.pixels().iter().map(|pixel| pixel.radiance);
-            write_png(path, size, radiance, options.outputs.tone.mapping())
+            write_png(path, size, radiance, options.outputs.tone.mapping(), Some(provenance))
                 .map_err(|error| Failure::work_error(&error))
         }
     }
-}
-
-/// The identity of the render, with the names of its inputs: nothing that differs between cards.
-fn provenance(
-    options: &RenderOptions,
-    settings: &RenderSettings,
-    scene: &Scene,
-    rendering: &Rendering,
-) -> Value {
-    let mut provenance = settings.identity(scene);
-    let mut add = |name: &str, value| provenance.insert(name.to_owned(), value);
-    add("scene", json!(options.scene.file_name().map(|name| name.to_string_lossy())));
-    add("variant", json!(options.variant));
-    add("light-units", json!(options.lights.light_units.name()));
-    add("set", json!(options.assignments));
-    add("energy-compensation", json!(options.energy_compensation));
-    add("environment", json!(options.environment.as_ref().map(EnvironmentOption::name)));
-    // The automatic distance, if none is given.
-    add("max-distance", json!(rendering.statistics.max_distance));
-    provenance.into()
 }

@@ -24,8 +24,8 @@ pub(super) fn say_loaded(
     camera: &Camera,
     misfit: Option<String>,
 ) {
-    say(format_args!("photoncard: {}", loaded(&options.scene, &settings.picture, scene, camera)));
-    if let Some(line) = ignored(&options.scene, &scene.notices) {
+    say(format_args!("photoncard: {}", loaded(&options.scene.path, &settings.picture, scene, camera)));
+    if let Some(line) = ignored(&options.scene.path, &scene.notices) {
         say(format_args!("photoncard: ignored: {line}"));
     }
     for notice in options.without_effect(scene).into_iter().chain(misfit) {

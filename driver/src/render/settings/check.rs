@@ -112,7 +112,7 @@ impl RenderSettings {
     fn check_trace(&self) -> Result<(), RenderError> {
         let Some(trace) = &self.cards.trace else { return Ok(()) };
         let refuse = |reason: &str, remedy: &str| {
-            let value = trace.display().to_string();
+            let value = trace.path.display().to_string();
             Err(RenderError::Setting {
                 option: "--trace",
                 value,

@@ -1,7 +1,7 @@
-//! Settings by the names of their options, in two lists: those that pixels depend on, and those that only the work depends
-//! on.
+//! Settings by the names of their options, in lists: those that pixels depend on, those that only the work depends on, and
+//! those of the cards.
 //!
-//! Both lists destructure the groups field by field, so that a new field cannot be forgotten.
+//! The lists destructure the groups field by field, so that a new field cannot be forgotten.
 
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Map, Value, json};
@@ -76,6 +76,18 @@ impl RenderSettings {
             ("order", json!(order.name())),
             ("bins", json!(bins)),
             ("queue", json!(queue)),
+        ])
+    }
+
+    /// Settings of cards, of their links and of the model of their memory. No pixel depends on them.
+    pub fn of_cards(&self) -> NamedSettings {
+        let CardSet { addresses, faults, verify, caches: _, trace: _ } = &self.cards;
+        let addresses: Vec<_> = addresses.iter().map(ToString::to_string).collect();
+        named([
+            ("card", json!(addresses)),
+            ("faults", json!(faults.map(|faults| faults.to_string()))),
+            ("verify", json!(verify)),
+            ("cache", json!(self.modelled_caches().map(|caches| caches.to_string()))),
         ])
     }
 

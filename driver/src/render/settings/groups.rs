@@ -1,11 +1,10 @@
 //! The groups of settings. Defaults are the dissertation's nominal values (Table 7.1) on one emulated reference chip.
 
-use std::path::PathBuf;
-
 use photoncard_shared::message::{Filter, Radiance, Sampling};
 
 use crate::display::DisplaySettings;
 use crate::emulator::memory_model::CacheSettings;
+use crate::emulator::trace::TraceSettings;
 use crate::film::Window;
 use crate::layer::Layers;
 use crate::link::LineFaults;
@@ -147,8 +146,8 @@ pub struct CardSet {
     pub verify: Option<f64>,
     /// Caches of the memory model; `None` to model none, which costs nothing.
     pub caches: Option<CacheSettings>,
-    /// Trace file of every read of the chip. It takes a single chip; without `caches` the default caches are modelled.
-    pub trace: Option<PathBuf>,
+    /// Trace of every read of the chip. It takes a single chip; without `caches` the default caches are modelled.
+    pub trace: Option<TraceSettings>,
 }
 
 impl CardSet {

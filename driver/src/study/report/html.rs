@@ -13,6 +13,8 @@ const STYLE: &str = include_str!("style.css");
 pub struct Report {
     /// Title of the page.
     pub title: String,
+    /// Warning at the top of the page, if any.
+    pub banner: Option<String>,
     /// Paragraphs before the first section.
     pub introduction: Vec<String>,
     /// Sections in reading order.
@@ -74,6 +76,18 @@ pub struct Provenance {
 }
 
 impl Report {
+    /// The report with a banner, and with titles of plots that say that they are of a trial: their files stand alone too.
+    #[must_use]
+    pub fn marked(mut self, banner: String) -> Self {
+        self.banner = Some(banner);
+        for block in self.sections.iter_mut().flat_map(|section| &mut section.blocks) {
+            if let Block::Plot { plot, .. } = block {
+                plot.title.insert_str(0, "Trial: ");
+            }
+        }
+        self
+    }
+
     /// The report as one self-contained HTML page, with links to the tables and plots beside it. The page is also
     /// well-formed XML.
     pub fn to_html(&self) -> String {
@@ -83,6 +97,9 @@ impl Report {
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>{title}</title>\n\
              <style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n"
         );
+        if let Some(banner) = &self.banner {
+            let _ = writeln!(html, "<p class=\"banner\" role=\"note\">{}</p>", escape(banner));
+        }
         for text in &self.introduction {
             html += &paragraph(text);
         }

@@ -119,6 +119,7 @@ mod tests {
     fn report(blocks: Vec<Block>) -> Report {
         Report {
             title: "Orders <i>\"&\"</i>".to_owned(),
+            banner: Some("A <trial>".to_owned()),
             introduction: vec!["Is a < b && c > d?".to_owned()],
             sections: vec![Section { heading: "Time & <space>".to_owned(), blocks }],
             provenance: Provenance {
@@ -162,6 +163,7 @@ mod tests {
         let texts: Vec<_> = elements.iter().map(|element| element.text.as_str()).collect();
         for text in [
             "Orders <i>\"&\"</i>",
+            "A <trial>",
             "Is a < b && c > d?",
             "Time & <space>",
             "A </p> paragraph.",

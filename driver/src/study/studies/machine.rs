@@ -8,7 +8,7 @@ use super::super::scale::Scale;
 use super::balance::{CREDITS, ORDERS, chip_counts, curves, deal};
 use super::present::{columns, how_it_counts, page, panel, plot, say, section, series, table, text};
 use super::scenes::SCENES;
-use super::workload::{cost, of_frame, tile_seconds};
+use super::workload::{self, cost, of_frame, tile_seconds};
 use crate::cost_model::{Cost, Machine, Origin, Prediction, Resource, Symbols, Workload};
 use crate::scheduler::GatherOrder;
 
@@ -50,21 +50,14 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
 
 /// Table 7.1's symbols with the scale's numbers of tiles, rays, neighbours and photons.
 pub(super) fn symbols(scale: &Scale) -> Symbols {
-    let tile_pixels = Symbols::NOMINAL.tile_pixels;
-    Symbols {
-        tiles: f64::from(scale.side * scale.side) / tile_pixels,
-        gather_rays: f64::from(scale.gather_rays),
-        neighbors: f64::from(scale.neighbors),
-        shadow_rays: f64::from(scale.shadow_rays),
-        photons: scale.photons as f64,
-        ..Symbols::NOMINAL
-    }
+    workload::symbols(&scale.settings(GatherOrder::Sort))
 }
 
-fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
+/// Frames of the table's own counts.
+fn table_frames() -> [Frame; 2] {
     let nominal = Symbols::NOMINAL;
     let (naive_workload, all_workload) = (Workload::naive(&nominal), Workload::nominal(&nominal));
-    let mut frames = vec![
+    [
         Frame {
             name: "table, naive".to_owned(),
             cost: Cost::naive(&naive_workload, &nominal),
@@ -75,7 +68,15 @@ fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
             cost: Cost::new(&all_workload, &nominal),
             workload: all_workload,
         },
-    ];
+    ]
+}
+
+/// Frames of measured counts, after the table's own if the scale is the table's.
+fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
+    let mut frames = Vec::new();
+    if scale.is_nominal() {
+        frames.extend(table_frames());
+    }
     let symbols = symbols(scale);
     for (scene, name) in SCENES {
         let kinds = [("naive", naive(scale, scene)), ("all techniques", all_on(scale, scene))];
@@ -89,11 +90,13 @@ fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
 }
 
 pub(super) fn report(scale: &Scale, results: &Results) -> Report {
+    let nominal = if scale.is_nominal() { "with the nominal values of table 7.1, and " } else { "" };
     let introduction = vec![
-        "How many rendering chips a frame rate takes: the cost model of chapter 7 with the nominal values of table 7.1, and \
-         with what was counted in three scenes, naive and with all techniques (sorted gathers, combined sampling, irradiance \
-         cache, photons in leaves that fill a line)."
-            .to_owned(),
+        format!(
+            "How many rendering chips a frame rate takes: the cost model of chapter 7 {nominal}with what was counted in three \
+             scenes, naive and with all techniques (sorted gathers, combined sampling, irradiance cache, photons in leaves that \
+             fill a line)."
+        ),
         how_it_counts(),
         "A chip has 90 GB/s of memory bandwidth and 500 GFLOPS; memory, arithmetic and the host's link (4 GB/s each way) work \
          at the same time. FLOPs of each operation are the table's throughout: only counts and bytes are measured. C_G, \
@@ -101,21 +104,18 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
             .to_owned(),
     ];
     let frames = frames(scale, results);
+    let mut on_chips =
+        vec![table("rates", rates(&frames)), table("chips", chips(&frames)), frame_rates(&frames)];
+    if scale.is_nominal() {
+        on_chips.push(text(discussion(&frames)));
+    }
     let sections = vec![
         section("Symbols", vec![table("symbols", symbol_table())]),
         section(
             "What a frame takes",
             vec![table("workloads", workloads(&frames)), table("units", units(&frames))],
         ),
-        section(
-            "Chips",
-            vec![
-                table("rates", rates(&frames)),
-                table("chips", chips(&frames)),
-                frame_rates(&frames),
-                text(discussion(&frames)),
-            ],
-        ),
+        section("Chips", on_chips),
         section("Load balance", load_balance(scale, results)),
     ];
     page("Table 7.1: chips for a frame rate", introduction, sections)
@@ -124,7 +124,8 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
 fn symbol_table() -> Table {
     let heads =
         [("symbol", ""), ("value", ""), ("unit", ""), ("meaning", ""), ("from", ""), ("reference", "")];
-    let mut table = Table::new("Symbols and nominal values", columns(&heads));
+    let mut table =
+        Table::new("Symbols of table 7.1, with its values for a frame of 512x512 pixels", columns(&heads));
     for (symbol, value) in Symbols::NOMINAL.rows() {
         let origin = match symbol.origin {
             Origin::Table => "table 7.1",
@@ -275,7 +276,7 @@ fn discussion(frames: &[Frame]) -> String {
         let [flops, bytes] = [total.flops, total.dram_bytes].map(|amount| say(30.0 * amount / 1e12));
         format!("{} TFLOPS and {} TB/s ({})", flops, bytes, frame.name)
     };
-    let all: Vec<_> = frames.iter().skip(2).map(demand).collect();
+    let all: Vec<_> = frames.iter().skip(table_frames().len()).map(demand).collect();
     format!(
         "The dissertation gives 7.4 TFLOPS and 11 TB/s for naive photon mapping at 30 frames/s, and almost two orders of \
          magnitude less bandwidth with its techniques. The table's own row meets the figures because a formula was chosen \

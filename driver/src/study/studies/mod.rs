@@ -7,9 +7,11 @@ mod present;
 mod reordering;
 mod scaling;
 mod scenes;
+mod sweep;
 mod techniques;
 mod workload;
 
+pub use self::sweep::{Axis, AxisError, MAX_POINTS, Sweep};
 use super::laboratory::Results;
 use super::point::Point;
 use super::report::Report;
@@ -51,17 +53,67 @@ impl Study {
         }
     }
 
-    /// The report on the results, without provenance.
+    /// The report on the results, without provenance. It has published figures only beside those of a
+    /// [nominal](Scale::is_nominal) scale.
     ///
     /// # Panics
     /// If `results` lack one of the [points](Self::points) of this scale.
     pub fn report(self, scale: &Scale, results: &Results) -> Report {
-        match self {
+        let report = match self {
             Self::Reordering => reordering::report(scale, results),
             Self::Figure617 => glossy_floor::report(scale, results),
             Self::Table71 => machine::report(scale, results),
             Self::Techniques => techniques::report(scale, results),
             Self::Scaling => scaling::report(scale, results),
+        };
+        match scale.banner() {
+            Some(banner) => report.marked(banner),
+            None => report,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_shared::address::STRUCTURES;
+    use photoncard_shared::counters::Counters;
+
+    use super::super::laboratory::Outcome;
+    use super::super::measure::{Measurement, ReadSums, TileMeasurement};
+    use super::super::point::Task;
+    use super::super::quality::Quality;
+    use super::*;
+    use crate::choice::Choice;
+
+    /// Page of a study on made-up outcomes.
+    fn page(study: Study, scale: &Scale) -> String {
+        let counters =
+            Counters { gathers: 10, gather_rays: 20, eye_rays: 1, photons_found: 500, ..Counters::ZERO };
+        let reads = [ReadSums { requests: 9, raw_bytes: 180, dram_bytes: 128 }; STRUCTURES];
+        let tile = TileMeasurement { tile: 0, stands_for: 1, counters, reads };
+        let outcome = |point: &Point| match point.task {
+            Task::Traffic { .. } => Outcome::Traffic(Measurement { tiles: vec![tile.clone()] }),
+            Task::Quality { .. } => Outcome::Quality(Quality { rmse: 0.1, mean: 1.0, pixels: 1 }),
+        };
+        let points = study.points(scale).into_iter();
+        let results = Results::new(points.map(|point| (point.clone(), outcome(&point))).collect());
+        study.report(scale, &results).to_html()
+    }
+
+    #[test]
+    fn published_figures_are_beside_those_of_the_nominal_frame_alone() {
+        let larger = Scale { side: 1024, ..Scale::FULL };
+        for (study, words) in [
+            (Study::Reordering, "Published figures are of frames"),
+            (Study::Figure617, "is cited for three claims"),
+            (Study::Table71, "The dissertation gives"),
+            (Study::Techniques, "The dissertation says"),
+        ] {
+            for (scale, is_nominal) in [(Scale::FULL, true), (Scale::QUICK, false), (larger.clone(), false)] {
+                let page = page(study, &scale);
+                assert_eq!(page.contains(words), is_nominal, "{}", study.name());
+                assert_eq!(!page.contains("class=\"banner\""), is_nominal, "{}", study.name());
+            }
         }
     }
 }

@@ -37,9 +37,15 @@ pub(super) fn columns(heads: &[(&str, &str)]) -> Vec<Column> {
     heads.iter().map(|&(name, unit)| Column::new(name, unit)).collect()
 }
 
-/// A report whose provenance is still to be added.
+/// A report whose banner and provenance are still to be added.
 pub(super) fn page(title: &str, introduction: Vec<String>, sections: Vec<Section>) -> Report {
-    Report { title: title.to_owned(), introduction, sections, provenance: Provenance::default() }
+    Report {
+        title: title.to_owned(),
+        banner: None,
+        introduction,
+        sections,
+        provenance: Provenance::default(),
+    }
 }
 
 /// A section.

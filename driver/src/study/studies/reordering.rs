@@ -96,17 +96,17 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         "The order hilbert sorts all gathers of the frame, which no chip has room for: a bound. It is not sampled."
             .to_owned(),
     ];
+    let mut by_order = vec![
+        table("orders", orders(&nominal)),
+        plot_of_orders(&nominal),
+        table("gathers", by_gather(scale, &nominal)),
+        text(share_of_gathers(scale, &nominal)),
+    ];
+    if scale.is_nominal() {
+        by_order.extend([text(comparison(scale)), table("published", published(scale, &nominal))]);
+    }
     let sections = vec![
-        section(
-            "Orders",
-            vec![
-                table("orders", orders(&nominal)),
-                plot_of_orders(&nominal),
-                table("gathers", by_gather(scale, &nominal)),
-                text(comparison(scale, &nominal)),
-                table("published", published(scale, &nominal)),
-            ],
-        ),
+        section("Orders", by_order),
         section("Larger tiles", vec![table("tiles", by_tile(scale, results, &nominal))]),
         section("Size of the photon cache", by_size(scale, results)),
         section("Associativity and index", by_associativity(scale, results)),
@@ -216,24 +216,33 @@ fn plot_of_orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measur
     )
 }
 
-/// Paragraph on the share of the rays that end in a gather, which the published figures are to be scaled by.
-fn comparison<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> String {
+/// Paragraph on the share of the rays that end in a gather.
+fn share_of_gathers<'a>(
+    scale: &Scale,
+    nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement,
+) -> String {
     let naive = nominal(GatherOrder::Naive, PhotonLayout::Jensen);
     let gathers = naive.gathers().value;
     let rays = naive.total(|tile| tile.counters.gather_rays as f64).value;
     let all = scale.nominal_gathers();
     format!(
         "Of the {} million gather rays that every pixel together could cast, {} million are cast, as the box does not fill \
-         the picture, and {} million end in a gather, as it is open in front: {} %. Published figures are of frames whose \
-         rays all end in one, so the table below compares with them both as counted and in proportion to all rays. The \
-         published raw bytes follow from 20-byte photons, {} neighbours and {} rays; the other figures depend on choices \
-         that were not published: the layout's order in memory, the cache's associativity, bins, hash and queue.",
+         the picture, and {} million end in a gather, as it is open in front: {} %.",
         say(all / 1e6),
         say(rays / 1e6),
         say(gathers / 1e6),
         say(100.0 * gathers / all),
-        scale.neighbors,
-        scale.gather_rays,
+    )
+}
+
+/// Paragraph on the comparison with published figures.
+fn comparison(scale: &Scale) -> String {
+    format!(
+        "Published figures are of frames whose rays all end in a gather, so the table below compares with them both as counted \
+         and in proportion to all rays. The published raw bytes follow from 20-byte photons, {} neighbours and {} rays; the \
+         other figures depend on choices that were not published: the layout's order in memory, the cache's associativity, \
+         bins, hash and queue.",
+        scale.neighbors, scale.gather_rays,
     )
 }
 

@@ -2,6 +2,7 @@
 
 use super::super::measure::{Measurement, TileMeasurement};
 use crate::cost_model::{Cost, Machine, Symbols, Workload};
+use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 
 type Count<'a> = &'a dyn Fn(&TileMeasurement) -> f64;
@@ -12,6 +13,20 @@ pub(super) fn of_frame(measured: &Measurement, pixels: f64, symbols: &Symbols) -
     let total = |count: Count| measured.total(count).value;
     // Tiles of the table's size, so that tile rates of frames in tiles of any size can be compared.
     of(&total, pixels / symbols.tile_pixels, pixels, symbols)
+}
+
+/// Table 7.1's symbols with the numbers of tiles, rays, neighbours and photons of a render.
+pub(super) fn symbols(settings: &RenderSettings) -> Symbols {
+    let RenderSettings { photons, integrator, .. } = settings;
+    let window = settings.window();
+    Symbols {
+        tiles: f64::from(window.width()) * f64::from(window.height()) / Symbols::NOMINAL.tile_pixels,
+        gather_rays: f64::from(integrator.gather_rays),
+        neighbors: f64::from(photons.neighbors),
+        shadow_rays: f64::from(integrator.shadow_rays),
+        photons: photons.count as f64,
+        ..Symbols::NOMINAL
+    }
 }
 
 /// Workload of one tile.

@@ -1,0 +1,117 @@
+//! Arguments of `photoncard study sweep`.
+
+use clap::Args;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::emulator::EmulatedKind;
+use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::quality::Quality;
+use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::study::{Axis, MAX_POINTS, Point, Scale, Task};
+
+use super::choice::choice;
+use super::integrator::IntegratorOptions;
+use super::photons::PhotonOptions;
+use super::picture::PictureOptions;
+use super::scene::SceneOptions;
+use super::schedule::ScheduleOptions;
+use super::study_output::StudyOutput;
+
+#[derive(Args)]
+pub(crate) struct SweepArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneOptions,
+    #[arg(
+        long,
+        value_name = "OPTION=VALUE,VALUE",
+        value_parser = axis,
+        help = format!(
+            "Vary an option over values; may be repeated: every combination is measured, up to {MAX_POINTS}. Values with commas are \
+             separated by semicolons. A cache may be a SIZE or SIZE/LINE/WAYS of the photon map's"
+        )
+    )]
+    pub(crate) vary: Vec<Axis>,
+    #[command(flatten)]
+    pub(crate) output: StudyOutput,
+    #[command(flatten)]
+    settings: SweepSettings,
+}
+
+/// Options that can be varied.
+#[derive(Args)]
+struct SweepSettings {
+    /// Quality of the picture, by which the options that are not stated are chosen
+    #[arg(long, default_value = Quality::Paper.name(), value_parser = choice::<Quality>())]
+    quality: Quality,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    photons: PhotonOptions,
+    #[command(flatten)]
+    integrator: IntegratorOptions,
+    #[command(flatten)]
+    schedule: ScheduleOptions,
+    /// Kind of the chips
+    #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>(), help_heading = "Cards")]
+    card: EmulatedKind,
+    /// Caches of the modelled memory, as of a render; several are varied [default: photon=128K/128/4,scene=75K/128/4]
+    #[arg(long = "cache", value_name = "CACHES", help_heading = "Cards")]
+    caches: Vec<CacheSettings>,
+}
+
+/// Name of the axis of caches.
+pub(crate) const CACHE: &str = "cache";
+
+impl SweepArguments {
+    /// Axes: those of `--vary`, and the caches if there are several.
+    pub(crate) fn axes(&self) -> Vec<Axis> {
+        let caches = &self.settings.caches;
+        let several = (caches.len() > 1).then(|| Axis {
+            name: CACHE.to_owned(),
+            values: caches.iter().map(ToString::to_string).collect(),
+        });
+        self.vary.iter().cloned().chain(several).collect()
+    }
+
+    /// Point of these options, of the scene `name`, behind the first of the caches.
+    pub(crate) fn point(&self, name: &str) -> Point {
+        let SweepSettings { quality, picture, photons, integrator, schedule, card, caches } = &self.settings;
+        let base = quality.settings();
+        let cards = [CardAddress::Emulated { kind: *card, chips: 1 }];
+        let settings = RenderSettings {
+            picture: picture.settings(&base.picture),
+            photons: photons.settings(&base.photons),
+            integrator: integrator.settings(&base.integrator),
+            schedule: schedule.settings(&picture.layers(), &cards),
+            ..base
+        };
+        let task = Task::Traffic {
+            chip: *card,
+            caches: caches.first().copied().unwrap_or_default(),
+            sample: self.output.sample,
+            least_tiles: Scale::FULL.least_tiles,
+        };
+        Point { scene: name.to_owned(), assignments: self.scene.assignments.clone(), settings, task }
+    }
+
+    /// Options of the picture.
+    pub(crate) fn picture(&self) -> &PictureOptions {
+        &self.settings.picture
+    }
+}
+
+fn axis(text: &str) -> Result<Axis, String> {
+    let form = "write OPTION=VALUE,VALUE, such as order=naive,sort";
+    let (name, values) = text.split_once('=').ok_or_else(|| form.to_owned())?;
+    let options = SweepSettings::augment_args(clap::Command::new("sweep"));
+    let mut names: Vec<_> = options.get_arguments().filter_map(|option| option.get_long()).collect();
+    names.push("set");
+    if !names.contains(&name) {
+        return Err(format!("{name:?} is none of the options that can be varied: {}", names.join(", ")));
+    }
+    let separator = if values.contains(';') { ';' } else { ',' };
+    let values: Vec<_> = values.split(separator).map(|value| value.trim().to_owned()).collect();
+    if values.iter().any(String::is_empty) {
+        return Err(format!("a value is empty; {form}"));
+    }
+    Ok(Axis { name: name.to_owned(), values })
+}

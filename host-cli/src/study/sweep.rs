@@ -1,0 +1,109 @@
+//! Sweep of `photoncard study sweep`: its points, by the arguments with some of them replaced.
+
+use std::collections::BTreeSet;
+
+use clap::{CommandFactory, FromArgMatches};
+use miette::{MietteDiagnostic, Report};
+use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::scene::Scene;
+use photoncard_driver::study::report::Provenance;
+use photoncard_driver::study::{AxisError, Point, Sweep, SweepOptions, Task};
+
+use crate::arguments::{Arguments, CACHE, Command, StudyArguments, StudyCommand, SweepArguments};
+use crate::console::say;
+use crate::failure::Failure;
+use crate::input;
+
+/// Name and value of an axis.
+type Value<'a> = (&'a str, &'a str);
+
+/// Loads the scene of a sweep, and makes its points.
+pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Result<SweepOptions, Failure> {
+    let scene = input::load(&arguments.scene, u32::MAX)?;
+    let name = input::name(&arguments.scene);
+    let mut notices = BTreeSet::new();
+    let sweep = Sweep::new(arguments.axes(), |values| {
+        let made = point(arguments, &values, &scene, &mut notices);
+        made.map_err(PointError)
+    });
+    let sweep = sweep.map_err(|PointError(failure)| failure)?;
+    if !arguments.output.quiet {
+        notices.iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
+    }
+    // Assignments are settings of the points.
+    let inputs = input::provenance(&arguments.scene).into_iter().filter(|(name, _)| name != "set");
+    let mut settings: Vec<_> = inputs.map(|(name, value)| (name, value.to_string())).collect();
+    settings.push(("scene-checksum".to_owned(), scene.checksum()));
+    let provenance = Provenance { settings, ..provenance };
+    let (out, threads) = (arguments.output.out.clone(), arguments.output.threads);
+    Ok(SweepOptions { sweep, name, scene, out, threads, provenance })
+}
+
+/// Point of the arguments with values replaced. The picture has the camera's aspect ratio, if no size is given.
+fn point(
+    arguments: &SweepArguments,
+    values: &[Value],
+    scene: &Scene,
+    notices: &mut BTreeSet<String>,
+) -> Result<Point, Failure> {
+    let (caches, others): (Vec<_>, Vec<_>) = values.iter().copied().partition(|(name, _)| *name == CACHE);
+    let replaced = replaced(&others).map_err(|error| refused(&others, &reason(&error)))?;
+    let arguments = replaced.as_ref().unwrap_or(arguments);
+    let mut point = arguments.point(&input::name(&arguments.scene));
+    if let (Some((_, text)), Task::Traffic { caches: behind, .. }) = (caches.first(), &mut point.task) {
+        *behind = cache(text).map_err(|reason| refused(&caches, &reason))?;
+    }
+    let camera = point.settings.camera(scene)?;
+    notices.extend(arguments.picture().fit(&camera, &mut point.settings.picture));
+    Ok(point)
+}
+
+/// Arguments of the command line with values replaced; `None` if none are.
+fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
+    if values.is_empty() {
+        return Ok(None);
+    }
+    // The last one of repeated options counts.
+    let command = Arguments::command().mut_subcommand("study", |study| {
+        study.mut_subcommand("sweep", |sweep| sweep.args_override_self(true))
+    });
+    let added = values.iter().map(|(name, value)| format!("--{name}={value}").into());
+    let matches = command.try_get_matches_from(std::env::args_os().chain(added))?;
+    match Arguments::from_arg_matches(&matches)?.command {
+        Command::Study(StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. }) => Ok(Some(*sweep)),
+        _ => Ok(None),
+    }
+}
+
+/// Caches of `--vary cache=`: as of `--cache`, or those of the photon map alone as SIZE/LINE/WAYS or SIZE.
+fn cache(text: &str) -> Result<CacheSettings, String> {
+    match (text.contains('='), text.contains('/')) {
+        (true, _) => text.parse(),
+        (false, true) => format!("photon={text}").parse(),
+        (false, false) => format!("photon={text}/128/4").parse(),
+    }
+}
+
+/// The first paragraph of an error of arguments.
+fn reason(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let text = text.strip_prefix("error: ").unwrap_or(&text);
+    text.split("\n\n").next().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Failure of values that their options refuse.
+fn refused(values: &[Value], reason: &str) -> Failure {
+    let values: Vec<_> = values.iter().map(|(name, value)| format!("{name}={value}")).collect();
+    let text = format!("--vary {} is not possible: {reason}", values.join(" with "));
+    let help = "correct the values; photoncard study sweep --help names those of each option";
+    Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
+}
+
+/// Failure of a point, or of the axes.
+struct PointError(Failure);
+
+impl From<AxisError> for PointError {
+    fn from(error: AxisError) -> Self {
+        Self(Failure::input(error))
+    }
+}
