@@ -22,6 +22,9 @@ pub(crate) struct Progress {
     display: Option<Mutex<Display>>,
 }
 
+/// Seconds of a phase before its first line, without a terminal: short phases are not worth lines.
+const SILENT_SECONDS: f64 = 1.0;
+
 struct Display {
     phase: Option<Phase>,
     bar: ProgressBar,
@@ -125,7 +128,7 @@ impl Display {
         let left = left.map_or(String::new(), |left| format!(", {left} left"));
         self.bar.set_prefix(left.clone());
         let tenths = (10 * done).checked_div(total).unwrap_or(0);
-        if !self.on_terminal && tenths > self.told {
+        if !self.on_terminal && tenths > self.told && seconds >= SILENT_SECONDS {
             self.told = tenths;
             say(format_args!("photoncard: {} {done} of {total}, {seconds:.1} s{left}", name(phase)));
         }

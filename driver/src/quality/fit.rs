@@ -36,8 +36,11 @@ pub struct Measured {
 
 /// Aims of a quality, and the bounds within which they are followed.
 struct Aims {
-    /// Relative standard deviation of a pixel by shadow rays, and by gather rays.
+    /// Relative standard deviation of a pixel by its shadow rays.
     noise: f64,
+    /// Relative standard deviation of a record, or of a pixel, by its gather rays: less, as pixels around a record share its error, which
+    /// shows as a blotch.
+    blotches: f64,
     /// Relative error of 4x4 pixels by the photon map.
     map_error: f64,
     shadow_rays: RangeInclusive<u32>,
@@ -45,8 +48,6 @@ struct Aims {
     photons: RangeInclusive<usize>,
 }
 
-/// Variance of a pixel whose irradiance is interpolated between records, over that of one record.
-const INTERPOLATED: f64 = 0.5;
 /// Share of samples with a Lambertian part below which nothing is interpolated.
 const FEW_LAMBERTIAN: f64 = 0.05;
 
@@ -67,6 +68,7 @@ impl Quality {
         Some(match self {
             Self::Draft => Aims {
                 noise: 0.06,
+                blotches: 0.06,
                 map_error: 0.015,
                 shadow_rays: 1..=4,
                 gather_rays: 32..=128,
@@ -74,13 +76,15 @@ impl Quality {
             },
             Self::Good => Aims {
                 noise: 0.02,
+                blotches: 0.02,
                 map_error: 0.006,
                 shadow_rays: 1..=8,
-                gather_rays: 64..=400,
+                gather_rays: 64..=512,
                 photons: 100_000..=1_000_000,
             },
             Self::Final => Aims {
                 noise: 0.007,
+                blotches: 0.01,
                 map_error: 0.003,
                 shadow_rays: 1..=16,
                 gather_rays: 200..=1600,
@@ -114,14 +118,13 @@ impl Aims {
     /// The cheapest settings within the bounds that meet the aims.
     fn fit(&self, variances: &Variances, samples: u32, error: Option<f32>) -> Fit {
         let Variances { shadow_ray, gather_ray, photon, lambertian } = *variances;
-        let allowed = self.noise * self.noise;
-        let of_pixel = INTERPOLATED * gather_ray / allowed;
-        let gather_rays = within(of_pixel, &self.gather_rays, 8);
+        let gather_rays = within(gather_ray / (self.blotches * self.blotches), &self.gather_rays, 8);
+        let allowed = self.noise * self.noise * f64::from(samples.max(1));
         let is_cached = lambertian >= FEW_LAMBERTIAN;
         Fit {
             photons: photons(photon / (self.map_error * self.map_error), &self.photons),
             gather_rays: if is_cached { gather_rays } else { gather_rays.div_ceil(samples.max(1)) },
-            shadow_rays: within(shadow_ray / (allowed * f64::from(samples.max(1))), &self.shadow_rays, 1),
+            shadow_rays: within(shadow_ray / allowed, &self.shadow_rays, 1),
             irradiance_error: error.filter(|_| is_cached),
             measured: Measured {
                 shadow_ray: shadow_ray.sqrt(),
@@ -143,4 +146,50 @@ fn photons(number: f64, bounds: &RangeInclusive<usize>) -> usize {
     let bounded = number.clamp(*bounds.start() as f64, *bounds.end() as f64) as usize;
     let digit = 10_usize.pow(bounded.max(10).ilog10() - 1);
     bounded.div_ceil(digit) * digit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VARIANCES: Variances =
+        Variances { shadow_ray: 0.03, gather_ray: 0.1, photon: 10.0, lambertian: 1.0 };
+
+    fn good(variances: Variances) -> Fit {
+        Quality::Good.aims().unwrap().fit(&variances, 16, Some(0.1))
+    }
+
+    /// Variances of 0.03 / (16 * 5) and 0.1 / 256 are the squares of 2 %, and 10 / 280,000 that of 0.6 %.
+    #[test]
+    fn the_fewest_rays_and_photons_that_meet_the_aims_are_chosen() {
+        let fit = good(VARIANCES);
+        assert_eq!([fit.shadow_rays, fit.gather_rays], [5, 256]);
+        assert_eq!((fit.photons, fit.irradiance_error), (280_000, Some(0.1)));
+    }
+
+    #[test]
+    fn light_without_noise_takes_the_fewest_rays_and_noisy_light_no_more_than_the_most() {
+        let none = good(Variances { shadow_ray: 0.0, gather_ray: 0.0, photon: 0.0, ..VARIANCES });
+        assert_eq!((none.shadow_rays, none.gather_rays, none.photons), (1, 64, 100_000));
+        let endless =
+            good(Variances { shadow_ray: 1e9, gather_ray: 1e9, photon: f64::INFINITY, ..VARIANCES });
+        assert_eq!((endless.shadow_rays, endless.gather_rays, endless.photons), (8, 512, 1_000_000));
+    }
+
+    #[test]
+    fn without_lambertian_surfaces_samples_share_a_pixels_gather_rays() {
+        let fit = good(Variances { lambertian: 0.01, ..VARIANCES });
+        assert_eq!((fit.irradiance_error, fit.gather_rays), (None, 16));
+    }
+
+    #[test]
+    fn a_better_quality_never_takes_fewer_of_anything() {
+        let fits = [Quality::Draft, Quality::Good, Quality::Final].map(|quality| {
+            quality.aims().unwrap().fit(&VARIANCES, quality.settings().integrator.samples, Some(0.1))
+        });
+        for [worse, better] in [[fits[0], fits[1]], [fits[1], fits[2]]] {
+            assert!(worse.photons <= better.photons && worse.gather_rays <= better.gather_rays);
+        }
+        assert!(Quality::Paper.aims().is_none());
+    }
 }

@@ -53,7 +53,7 @@ pub(super) fn measure(
     observer: &dyn Observer,
 ) -> Result<Variances, RenderError> {
     let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
-    let pool = threads.stack_size(THREAD_STACK).build().map_err(|error| RenderError::Chips(error.into()))?;
+    let pool = threads.stack_size(THREAD_STACK).build().map_err(RenderError::Chips)?;
     // Of the whole picture: a part of it has equal pixels.
     let tiles = spread_tiles(Window::full(settings.picture.width, settings.picture.height));
     let pilot = |photons| Pilot::new(scene, packed, settings, photons, observer);
