@@ -72,6 +72,14 @@ struct KeptTiles {
 }
 
 impl PartialRender {
+    /// Checks that the file may be opened by [`Self::begin`], before there are settings.
+    ///
+    /// # Errors
+    /// If the file is no partial render, in use by another render or unreadable.
+    pub(crate) fn check_free(partial: &PartialSettings) -> Result<(), PartialError> {
+        file::open(&partial.path, false).map(drop)
+    }
+
     /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on. With
     /// [`PartialSettings::resume`] the tiles of the file are written into the film.
     ///

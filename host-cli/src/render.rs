@@ -8,7 +8,8 @@ use std::time::Instant;
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::render::{CardAddress, RenderError, RenderSettings, render_chosen};
+use photoncard_driver::quality::Fit;
+use photoncard_driver::render::{CardAddress, RenderSettings, render_chosen};
 use photoncard_driver::scene::Scene;
 use serde_json::json;
 
@@ -27,10 +28,11 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let scene_seconds = start.elapsed().as_secs_f64();
     let progress = Progress::start(options.quiet, settings.cards.count())
         .map_err(|error| Failure::work_error(&error))?;
-    let chosen = OnceLock::new();
+    let found = OnceLock::new();
     let choose = |packed: &PackedScene| {
-        let settings = choose(options, &settings, &scene, packed, &progress)?;
-        Ok(chosen.get_or_init(|| settings).clone())
+        let fit = options.quality.fit(&scene, packed, &settings, &progress)?;
+        let fit = found.get_or_init(|| fit).as_ref();
+        Ok(chosen(options, &settings, fit, &progress))
     };
     let result = on_threads(options.threads, || render_chosen(&scene, &settings, &choose, &progress))?;
     progress.finish();
@@ -46,6 +48,8 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     provenance.pixels.extend(input::provenance(&options.scene));
     provenance.work.insert("quality".to_owned(), json!(options.quality.name()));
     provenance.work.insert("threads".to_owned(), json!(options.threads));
+    let pilot = found.into_inner().flatten().map(|fit| fit.measured);
+    provenance.work.insert("pilot".to_owned(), json!(pilot));
     files::write(options, &rendering)?;
     if let Some(partial) = rendering.partial.take() {
         partial.remove().map_err(Failure::work)?;
@@ -56,27 +60,21 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Settings of the options, with those of the quality for this scene where none is stated.
-fn choose(
+/// Settings of the options, with those that the quality has found for this scene where none is stated.
+fn chosen(
     options: &RenderOptions,
     settings: &RenderSettings,
-    scene: &Scene,
-    packed: &PackedScene,
+    fit: Option<&Fit>,
     progress: &Progress,
-) -> Result<RenderSettings, RenderError> {
-    let fit = options.quality.fit(scene, packed, settings, progress)?;
-    let base = options.quality.settings().with(|base| {
-        if let Some(fit) = &fit {
-            fit.apply(base);
-        }
-    });
+) -> RenderSettings {
+    let Some(fit) = fit else { return settings.clone() };
+    let base = options.quality.settings().with(|base| fit.apply(base));
     let picture = settings.picture.clone();
     let chosen = options.settings_over(&base).with(|chosen| chosen.picture = picture);
     if !options.quiet {
-        progress
-            .say(format_args!("photoncard: {}", messages::chosen(options.quality, &chosen, fit.as_ref())));
+        progress.say(format_args!("photoncard: {}", messages::chosen(options.quality, &chosen)));
     }
-    Ok(chosen)
+    chosen
 }
 
 fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {

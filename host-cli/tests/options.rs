@@ -34,10 +34,6 @@ fn options_without_effect_are_said_to_have_none() {
             &["--caustic-neighbors=9", "--caustic-photons=0"],
             "--caustic-neighbors has no effect with --caustic-photons 0",
         ),
-        (
-            &["--light-units=watts"],
-            "--light-units has no effect without point, spot or directional lights in the file",
-        ),
         (&["--exposure=1"], "--exposure has no effect without -o OUT.png"),
         (&["--tonemap=aces"], "--tonemap has no effect without -o OUT.png"),
     ] {
@@ -48,6 +44,10 @@ fn options_without_effect_are_said_to_have_none() {
         let quiet = room.rendered("scene.gltf", &[&["-o", "plain.exr", "--quiet"], options].concat());
         assert_eq!(quiet.stderr, "", "{options:?}");
     }
+    // The units are in the picture's provenance.
+    let outcome = room.rendered("scene.gltf", &["-o", "units.exr", "--light-units=watts"]);
+    let said = "--light-units has no effect without point, spot or directional lights in the file";
+    assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
     for option in ["--irradiance-cache=on", "--radiance=precomputed"] {
         let options = ["-o", "plain.exr", "--gather-rays", "0", option];
         let outcome = room.rendered("scene.gltf", &options);

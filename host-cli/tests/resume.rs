@@ -87,7 +87,7 @@ fn only_the_same_picture_is_gone_on_with() {
         assert!(words.iter().all(|word| outcome.stderr.contains(word)), "{words:?}: {}", outcome.stderr);
         assert_eq!(room.names(), ["a.exr.partial"]);
     };
-    refused(&["--seed", "7", "--neighbors", "60"], &["seed was 0 and is 7", "neighbors was 50 and is 60"]);
+    refused(&["--seed", "7", "--neighbors", "60"], &["seed was 0 and is 7", "neighbors was 24 and is 60"]);
     refused(&["--radiance", "precomputed"], &["radiance was", "precomputed"]);
     refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene-checksum was"]);
     refused(&["--order", "hilbert"], &["--resume with --order hilbert is not possible"]);

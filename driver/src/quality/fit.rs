@@ -2,10 +2,12 @@
 
 use std::ops::RangeInclusive;
 
+use serde::Serialize;
+
 use super::Quality;
 use super::pilot::{Variances, measure};
 use crate::pack::PackedScene;
-use crate::render::{Observer, RenderError, RenderSettings};
+use crate::render::{Integrator, Observer, RenderError, RenderSettings};
 use crate::scene::Scene;
 
 /// Settings that suit a scene.
@@ -24,7 +26,7 @@ pub struct Fit {
 }
 
 /// Relative standard deviations of samples in a pilot render.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
     /// By one shadow ray.
     pub shadow_ray: f64,
@@ -94,8 +96,9 @@ impl Quality {
         })
     }
 
-    /// Settings of this quality that suit a scene, by pilot renders with the camera, the size, the samples and the materials of
-    /// `settings`; `None` where no setting depends on the scene. They depend on nothing else, such as cards or threads.
+    /// Settings of this quality that suit a scene, by pilot renders with the camera, the size, the samples and the seed of `settings`;
+    /// `None` where no setting depends on the scene. Without an irradiance cache in `settings` there is none. Cards, threads and the crop
+    /// window have no effect.
     ///
     /// # Errors
     /// As [`render`](crate::render::render).
@@ -109,8 +112,8 @@ impl Quality {
         settings.check()?;
         let Some(aims) = self.aims() else { return Ok(None) };
         let variances = measure(scene, packed, settings, observer)?;
-        let error = self.settings().integrator.irradiance_error;
-        Ok(Some(aims.fit(&variances, settings.integrator.samples, error)))
+        let Integrator { samples, irradiance_error, .. } = settings.integrator;
+        Ok(Some(aims.fit(&variances, samples, irradiance_error)))
     }
 }
 
@@ -120,12 +123,12 @@ impl Aims {
         let Variances { shadow_ray, gather_ray, photon, lambertian } = *variances;
         let gather_rays = within(gather_ray / (self.blotches * self.blotches), &self.gather_rays, 8);
         let allowed = self.noise * self.noise * f64::from(samples.max(1));
-        let is_cached = lambertian >= FEW_LAMBERTIAN;
+        let error = error.filter(|_| lambertian >= FEW_LAMBERTIAN);
         Fit {
             photons: photons(photon / (self.map_error * self.map_error), &self.photons),
-            gather_rays: if is_cached { gather_rays } else { gather_rays.div_ceil(samples.max(1)) },
+            gather_rays: if error.is_some() { gather_rays } else { gather_rays.div_ceil(samples.max(1)) },
             shadow_rays: within(shadow_ray / allowed, &self.shadow_rays, 1),
-            irradiance_error: error.filter(|_| is_cached),
+            irradiance_error: error,
             measured: Measured {
                 shadow_ray: shadow_ray.sqrt(),
                 gather_ray: gather_ray.sqrt(),

@@ -84,7 +84,6 @@ pub(super) fn measure(
     });
     let maps =
         [few.render(&by_map, &pool, &tiles, observer)?, more.render(&by_map, &pool, &tiles, observer)?];
-    observer.progress(Phase::Pilot, 1, 1);
     Ok(Variances {
         shadow_ray: of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best),
         gather_ray: of_ray(GATHER_RAYS, &by_few_gather_rays, &best),

@@ -101,6 +101,7 @@ pub fn render_chosen(
     for budget in &budgets {
         settings.check_budget(budget)?;
     }
+    settings.outputs.partial.as_ref().map(PartialRender::check_free).transpose()?;
     let mut times = Times::default();
     let packed = PackedScene::new(scene)?;
     times.hierarchy = start.elapsed().as_secs_f64();

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use photoncard_driver::choice::Choice;
-use photoncard_driver::quality::{Fit, Measured, Quality};
+use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{
     MemoryStatistics, Picture, ReadStatistics, RenderSettings, Rendering, Statistics, Times,
 };
@@ -33,33 +33,22 @@ pub(super) fn say_loaded(
     }
 }
 
-/// Settings of a render that its quality chose, and what they follow from.
-pub(super) fn chosen(quality: Quality, settings: &RenderSettings, fit: Option<&Fit>) -> String {
+/// Settings of a render, with those that its quality has found for the scene.
+pub(super) fn chosen(quality: Quality, settings: &RenderSettings) -> String {
     let RenderSettings { photons, integrator, .. } = settings;
-    let cache = match integrator.irradiance_error {
-        Some(error) => format!("irradiance interpolated to within {error}"),
-        None => "no irradiance interpolated".to_owned(),
+    let (interpolated, of) = match integrator.irradiance_error {
+        Some(error) => (format!("irradiance interpolated to within {error}"), "a pixel and a record"),
+        None => ("no irradiance interpolated".to_owned(), "a sample"),
     };
-    let of_gather_ray = if integrator.irradiance_error.is_some() { "a pixel or record" } else { "a sample" };
-    let mut text = format!(
-        "{}: {} a pixel, {} a sample, {} {of_gather_ray}, {cache}, {} photons, {} neighbours",
+    format!(
+        "quality {}: {} a pixel; {} a sample, {} {of}; {interpolated}; {} photons, {} a gather",
         quality.name(),
         counted(integrator.samples as usize, "sample"),
         counted(integrator.shadow_rays as usize, "shadow ray"),
         counted(integrator.gather_rays as usize, "gather ray"),
         photons.count,
         photons.neighbors,
-    );
-    if let Some(Fit { measured, .. }) = fit {
-        let Measured { shadow_ray, gather_ray, million_photons } = measured;
-        text += &format!(
-            "; a pilot's noise: {:.0} % by a shadow ray, {:.0} % by a gather ray, {:.2} % by a million photons",
-            100.0 * shadow_ray,
-            100.0 * gather_ray,
-            100.0 * million_photons
-        );
-    }
-    text
+    )
 }
 
 /// Contents of a scene, and the view of it.

@@ -84,7 +84,12 @@ impl CommandTree {
     fn lacks(&self, group: &str, form: &str) -> bool {
         let below = form[group.len()..].trim_start();
         let is_group = self.options.keys().any(|command| command.starts_with(&format!("{group} ")));
-        is_group && below.starts_with(|c: char| c.is_ascii_lowercase())
+        let word =
+            below.split_whitespace().next().filter(|word| word.starts_with(|c: char| c.is_ascii_lowercase()));
+        let is_refused = |word| {
+            self.defect_of_arguments(&[&group.split(' ').collect::<Vec<_>>()[..], &[word]].concat()).is_some()
+        };
+        is_group && word.is_some_and(is_refused)
     }
 }
 

@@ -1,0 +1,114 @@
+//! Qualities: settings that pilot renders find for a scene.
+
+use glam::Vec3;
+use photoncard_driver::film::Window;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::quality::{Fit, Quality};
+use photoncard_driver::render::{RenderSettings, Unobserved};
+use photoncard_driver::scene::gltf;
+use photoncard_driver::scene::{Material, PunctualKind, PunctualLight, Reflection, Scene};
+use photoncard_tests::{camera, lambertian, room, scene};
+
+/// Settings of the quality `good` for a small picture.
+fn small() -> RenderSettings {
+    Quality::Good.settings().with(|settings| {
+        (settings.picture.width, settings.picture.height) = (64, 48);
+    })
+}
+
+fn fit(scene: &Scene, settings: &RenderSettings) -> Fit {
+    let packed = PackedScene::new(scene).expect("packs");
+    let fit = Quality::Good.fit(scene, &packed, settings, &Unobserved);
+    fit.unwrap_or_else(|error| panic!("{error}")).expect("good depends on the scene")
+}
+
+fn shipped(name: &str) -> Scene {
+    let path = format!("{}/../scenes/{name}", env!("CARGO_MANIFEST_DIR"));
+    gltf::load(path.as_ref()).expect("a shipped scene loads")
+}
+
+/// A room with white walls of which one emits.
+fn lit_room() -> Scene {
+    let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
+    let materials = vec![lambertian("wall", 0.5), lamp];
+    scene(room([0, 0, 0, 1, 0, 0]), materials, camera(Vec3::new(0.0, 0.0, 0.9), Vec3::NEG_Z))
+}
+
+/// The room with a light in its middle instead.
+fn room_with_a_point() -> Scene {
+    let mut scene =
+        scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::new(0.0, 0.0, 0.9), Vec3::NEG_Z));
+    let kind = PunctualKind::Point { position: Vec3::ZERO };
+    scene.lights.push(PunctualLight { name: "light".into(), kind, intensity: Vec3::ONE });
+    scene
+}
+
+#[test]
+fn they_depend_neither_on_threads_nor_on_the_crop_window() {
+    let scene = shipped("cornell.gltf");
+    let settings = small();
+    let expected = fit(&scene, &settings);
+    let cropped = settings.clone().with(|s| s.picture.crop = Some(Window { x0: 0, x1: 1, y0: 0, y1: 1 }));
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        assert_eq!(pool.install(|| fit(&scene, &settings)), expected);
+        assert_eq!(pool.install(|| fit(&scene, &cropped)), expected);
+    }
+}
+
+/// Light of a point is one value, and a wall that emits is seen under many angles.
+#[test]
+fn a_point_takes_one_shadow_ray_and_a_wall_more() {
+    assert_eq!(fit(&room_with_a_point(), &small()).shadow_rays, 1);
+    assert!(fit(&lit_room(), &small()).shadow_rays > 1);
+}
+
+/// With more samples each has fewer shadow rays.
+#[test]
+fn samples_share_the_shadow_rays_of_a_pixel() {
+    let few = fit(&lit_room(), &small());
+    let many = fit(&lit_room(), &small().with(|s| s.integrator.samples = 1024));
+    assert!(many.shadow_rays < few.shadow_rays, "{many:?} {few:?}");
+    assert_eq!((many.gather_rays, many.photons), (few.gather_rays, few.photons));
+}
+
+#[test]
+fn without_a_cache_samples_share_the_gather_rays_of_a_pixel() {
+    let cached = fit(&lit_room(), &small());
+    let uncached = fit(&lit_room(), &small().with(|s| s.integrator.irradiance_error = None));
+    assert_eq!(uncached.gather_rays, cached.gather_rays.div_ceil(16));
+    assert_eq!(uncached.irradiance_error, None);
+}
+
+/// Metal has no Lambertian part.
+#[test]
+fn nothing_is_interpolated_where_hardly_any_surface_is_lambertian() {
+    let mut scene = lit_room();
+    scene.materials[0].reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::splat(0.5),
+        metallic: 1.0,
+        roughness: 0.6,
+        dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
+        transmission: None,
+    };
+    assert_eq!(fit(&scene, &small()).irradiance_error, None);
+    assert!(fit(&lit_room(), &small()).irradiance_error.is_some());
+}
+
+/// Light that comes over many surfaces from one spot takes more gather rays and photons than light from a lamp in view.
+#[test]
+fn indirect_light_from_a_spot_takes_more_rays_and_photons() {
+    let [lamp, spot] = ["cornell.gltf", "cornell-uplight.gltf"].map(|name| fit(&shipped(name), &small()));
+    assert!(spot.gather_rays > lamp.gather_rays && spot.photons > lamp.photons, "{lamp:?} {spot:?}");
+    assert!(spot.shadow_rays < lamp.shadow_rays, "{lamp:?} {spot:?}");
+}
+
+#[test]
+fn the_dissertations_values_depend_on_no_scene() {
+    let scene = lit_room();
+    let packed = PackedScene::new(&scene).expect("packs");
+    let fit = Quality::Paper.fit(&scene, &packed, &RenderSettings::default(), &Unobserved).expect("no pilot");
+    assert_eq!(fit, None);
+    assert_eq!(Quality::Paper.settings(), RenderSettings::default());
+}
