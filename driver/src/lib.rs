@@ -14,7 +14,8 @@
 //! use std::path::Path;
 //!
 //! use photoncard_driver::exr::{self, SampleFormat};
-//! use photoncard_driver::render::{Quality, Unobserved, render};
+//! use photoncard_driver::quality::Quality;
+//! use photoncard_driver::render::{Unobserved, render};
 //! use photoncard_driver::scene::gltf;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -38,8 +39,9 @@
 //! ```
 //!
 //! [`RenderSettings`](render::RenderSettings) has the options of `photoncard render` in groups.
-//! [`Quality::settings`](render::Quality::settings) chooses samples, rays, photons, cache and filter, as `--quality` does; `RenderSettings::default()` is
-//! [`Quality::Paper`](render::Quality::Paper), the dissertation's nominal frame. All are for one emulated reference chip. [`Rendering`](render::Rendering) holds the
+//! [`Quality::settings`](quality::Quality::settings) has samples, cache and filter of a `--quality`, with middle numbers of rays and photons, which
+//! [`Quality::fit`](quality::Quality::fit) chooses for a scene, within [`render_chosen`](render::render_chosen). `RenderSettings::default()` is
+//! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All are for one emulated reference chip. [`Rendering`](render::Rendering) holds the
 //! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A tone-mapped PNG is written by
 //! [`tone_mapping::write_png`], and two pictures are compared by [`difference`].
 //!

@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::quality::Fit;
-use photoncard_driver::render::{CardAddress, RenderSettings, render_chosen};
+use photoncard_driver::quality::{Fit, Stated};
+use photoncard_driver::render::{CardAddress, Integrator, PhotonMaps, RenderSettings, render_chosen};
 use photoncard_driver::scene::Scene;
 use serde_json::json;
 
@@ -30,9 +30,13 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
         .map_err(|error| Failure::work_error(&error))?;
     let found = OnceLock::new();
     let choose = |packed: &PackedScene| {
-        let fit = options.quality.fit(&scene, packed, &settings, &progress)?;
-        let fit = found.get_or_init(|| fit).as_ref();
-        Ok(chosen(options, &settings, fit, &progress))
+        let stated = options.stated();
+        let fit = if stated == Stated::ALL {
+            None
+        } else {
+            options.quality.fit(&scene, packed, &settings, &progress)?
+        };
+        Ok(chosen(options, &settings, found.get_or_init(|| fit).as_ref(), &progress))
     };
     let result = on_threads(options.threads, || render_chosen(&scene, &settings, &choose, &progress))?;
     progress.finish();
@@ -60,21 +64,22 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Settings of the options, with those that the quality has found for this scene where none is stated.
+/// Photons and integrator of the options, with what the quality has found for this scene where nothing is stated.
 fn chosen(
     options: &RenderOptions,
     settings: &RenderSettings,
     fit: Option<&Fit>,
     progress: &Progress,
-) -> RenderSettings {
-    let Some(fit) = fit else { return settings.clone() };
-    let base = options.quality.settings().with(|base| fit.apply(base));
-    let picture = settings.picture.clone();
-    let chosen = options.settings_over(&base).with(|chosen| chosen.picture = picture);
-    if !options.quiet {
+) -> (PhotonMaps, Integrator) {
+    let chosen = settings.clone().with(|settings| {
+        if let Some(fit) = fit {
+            fit.apply(settings, options.stated());
+        }
+    });
+    if !options.quiet && fit.is_some() {
         progress.say(format_args!("photoncard: {}", messages::chosen(options.quality, &chosen)));
     }
-    chosen
+    (chosen.photons, chosen.integrator)
 }
 
 fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {

@@ -351,7 +351,7 @@ fn an_observer_stops_the_test() {
 }
 
 proptest! {
-    /// What the host expects is IEEE 754's: a double holds sums, products, quotients and roots of floats with so many digits that the
+    /// The expected results are IEEE 754's: a double holds sums, products, quotients and roots of floats with so many digits that the
     /// second rounding, to a float, gives the correctly rounded result (Figueroa 1995).
     #[test]
     fn the_hosts_results_are_correctly_rounded(bits in any::<[u32; 3]>()) {

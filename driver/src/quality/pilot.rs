@@ -1,11 +1,10 @@
 //! Pilot renders: pixels spread over the picture, rendered on emulated chips of this process.
 
 use glam::Vec3;
-use photoncard_firmware::chip::ReferenceChip;
-use photoncard_firmware::fixed_point::ColourSum;
+use photoncard_firmware::chip::{ReferenceChip, light_of};
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::budget::SUMS_WITH_LAYERS;
-use photoncard_shared::message::{CausticGather, Tile};
+use photoncard_shared::message::{CausticGather, PixelLayers, Tile};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -25,6 +24,12 @@ const SIDE: u32 = 4;
 /// Photons of the smaller map; the larger one has four times as many.
 const FEW_PHOTONS: usize = 16_384;
 const MORE: usize = 4;
+/// Seeds of a pair of renders, and of the photons: of none of the picture's random numbers, so that pictures of all seeds have equal
+/// settings.
+const SEEDS: [u32; 2] = [0x5eed_0001, 0x5eed_0002];
+const PHOTON_SEED: u32 = 0x5eed_0003;
+/// Minimum side of the picture, pixels: tiles of smaller ones would overlap.
+const MIN_SIDE: u32 = TILES * SIDE;
 /// Numbers of rays that are compared.
 const SHADOW_RAYS: [u32; 2] = [1, 4];
 const GATHER_RAYS: [u32; 2] = [8, 32];
@@ -54,11 +59,11 @@ pub(super) fn measure(
 ) -> Result<Variances, RenderError> {
     let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
     let pool = threads.stack_size(THREAD_STACK).build().map_err(RenderError::Chips)?;
+    let settings = &enlarged(settings);
     // Of the whole picture: a part of it has equal pixels.
     let tiles = spread_tiles(Window::full(settings.picture.width, settings.picture.height));
     let pilot = |photons| Pilot::new(scene, packed, settings, photons, observer);
     let [few, more] = [pilot(FEW_PHOTONS)?, pilot(MORE * FEW_PHOTONS)?];
-    let seeds = [1, 2].map(|seed| settings.integrator.seed ^ hash(seed));
     let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
         let render = |seed| {
             let settings = settings.clone().with(|settings| {
@@ -68,7 +73,7 @@ pub(super) fn measure(
             });
             more.render(&settings, &pool, &tiles, observer)
         };
-        Ok([render(seeds[0])?, render(seeds[1])?])
+        Ok([render(SEEDS[0])?, render(SEEDS[1])?])
     };
     let [few_shadow_rays, shadow_rays] = SHADOW_RAYS;
     let [few_gather_rays, gather_rays] = GATHER_RAYS;
@@ -81,6 +86,7 @@ pub(super) fn measure(
         settings.integrator.shadow_rays = 0;
         settings.integrator.gather_rays = gather_rays;
         settings.integrator.sampling = Sampling::Reflection;
+        settings.integrator.seed = SEEDS[0];
     });
     let maps =
         [few.render(&by_map, &pool, &tiles, observer)?, more.render(&by_map, &pool, &tiles, observer)?];
@@ -145,10 +151,8 @@ impl<'a> Pilot<'a> {
     ) -> Result<Self, RenderError> {
         observer.progress(Phase::Pilot, 0, 1);
         let of_picture = settings.photon_settings(scene);
-        // Caustics add no noise: gathers find an empty map instead of one of its own. Another seed than the picture's, by which
-        // nothing is chosen for its own photons.
-        let photons =
-            PhotonSettings { photons, seed: !settings.integrator.seed, caustic_photons: 0, ..of_picture };
+        // Caustics add no noise: gathers find an empty map instead of one of its own.
+        let photons = PhotonSettings { photons, seed: PHOTON_SEED, caustic_photons: 0, ..of_picture };
         let mapped = map_photons(packed.clone(), &photons, &|_| !observer.is_stopped())?;
         let has_caustics = of_picture.caustic_photons > 0;
         Ok(Self { scene, mapped, has_caustics })
@@ -186,7 +190,7 @@ impl<'a> Pilot<'a> {
 struct Pixels {
     direct: Vec<f64>,
     indirect: Vec<f64>,
-    /// If the sample sees a surface that reflects.
+    /// If the sample gathers: it sees a surface that reflects more than mirror images.
     is_seen: Vec<bool>,
     /// Share of the samples that see a surface with a Lambertian part.
     lambertian: f64,
@@ -194,12 +198,15 @@ struct Pixels {
 
 impl Pixels {
     fn new(tiles: &[RenderedTile], unit: f32) -> Self {
-        const SUMS: usize = SUMS_WITH_LAYERS as usize;
-        let mean = |sum: &ColourSum| f64::from((sum.value() * unit).element_sum()) / 3.0;
-        let sums = || tiles.iter().flat_map(|tile| tile.sums.chunks(SUMS));
-        let direct = sums().map(|sums| mean(&sums[0])).collect();
-        let indirect = sums().map(|sums| mean(&sums[1])).collect();
-        let is_seen: Vec<bool> = sums().map(|sums| sums[3].value() != Vec3::ZERO).collect();
+        let mean = |light: [f32; 3]| f64::from((Vec3::from(light) * unit).element_sum()) / 3.0;
+        let layers: Vec<PixelLayers> = tiles
+            .iter()
+            .flat_map(|tile| tile.sums.chunks(SUMS_WITH_LAYERS as usize))
+            .map(|sums| light_of(sums).1.unwrap_or_default())
+            .collect();
+        let direct = layers.iter().map(|layers| mean(layers.direct)).collect();
+        let indirect = layers.iter().map(|layers| mean(layers.indirect)).collect();
+        let is_seen: Vec<bool> = layers.iter().map(|layers| layers.gathers > 0.0).collect();
         let seen = is_seen.iter().filter(|is_seen| **is_seen).count();
         let lambertian: u64 = tiles.iter().map(|tile| tile.counters.lambertian_samples).sum();
         Self { direct, indirect, is_seen, lambertian: lambertian as f64 / seen.max(1) as f64 }
@@ -208,6 +215,16 @@ impl Pixels {
     fn radiance(&self, pixel: usize) -> f64 {
         self.direct[pixel] + self.indirect[pixel]
     }
+}
+
+/// Settings of a picture of equal aspect whose sides are at least [`MIN_SIDE`].
+fn enlarged(settings: &RenderSettings) -> RenderSettings {
+    let [width, height] = [settings.picture.width, settings.picture.height];
+    let factor = MIN_SIDE.div_ceil(width.min(height).max(1));
+    settings.clone().with(|settings| {
+        let picture = &mut settings.picture;
+        (picture.width, picture.height) = (width.saturating_mul(factor), height.saturating_mul(factor));
+    })
 }
 
 /// Tiles in a grid of cells over the window, each at a place in its cell by a hash; all of equal size.

@@ -79,18 +79,22 @@ pub fn render(
     settings: &RenderSettings,
     observer: &dyn Observer,
 ) -> Result<Rendering, RenderError> {
-    render_chosen(scene, settings, &|_| Ok(settings.clone()), observer)
+    let stated = |_: &PackedScene| Ok((settings.photons.clone(), settings.integrator.clone()));
+    render_chosen(scene, settings, &stated, observer)
 }
 
-/// Renders a scene with settings that are chosen when the cards have answered and the scene is packed. `choose` takes the packed scene
-/// and returns `settings` with other photons or another integrator.
+/// Photons and integrator that are chosen for a packed scene.
+pub type Chosen = Result<(PhotonMaps, Integrator), RenderError>;
+
+/// Renders a scene with photons and an integrator that are chosen when the cards have answered and the scene is packed. `choose` takes
+/// the packed scene; everything else is by `settings`.
 ///
 /// # Errors
 /// As [`render`], and those of `choose`.
 pub fn render_chosen(
     scene: &Scene,
     settings: &RenderSettings,
-    choose: &dyn Fn(&PackedScene) -> Result<RenderSettings, RenderError>,
+    choose: &dyn Fn(&PackedScene) -> Chosen,
     observer: &dyn Observer,
 ) -> Result<Rendering, RenderError> {
     let start = Instant::now();
@@ -103,11 +107,14 @@ pub fn render_chosen(
     }
     settings.outputs.partial.as_ref().map(PartialRender::check_free).transpose()?;
     let mut times = Times::default();
+    let packing = Instant::now();
     let packed = PackedScene::new(scene)?;
-    times.hierarchy = start.elapsed().as_secs_f64();
+    times.hierarchy = packing.elapsed().as_secs_f64();
     times.pack = times.hierarchy;
-    let settings = &choose(&packed)?;
-    times.pilot = start.elapsed().as_secs_f64() - times.pack;
+    let choosing = Instant::now();
+    let (photons, integrator) = choose(&packed)?;
+    times.pilot = choosing.elapsed().as_secs_f64();
+    let settings = &RenderSettings { photons, integrator, ..settings.clone() };
     settings.check()?;
     for budget in &budgets {
         settings.check_budget(budget)?;

@@ -63,7 +63,7 @@ pub(super) fn sums_of<'a>(sums: &'a [ColourSum], frame: &FrameParameters, pixel:
 }
 
 /// Radiance of a pixel, and its layers if the frame has any, from its sums; in the image's radiance units.
-pub(super) fn light_of(sums: &[ColourSum]) -> (Vec3, Option<PixelLayers>) {
+pub fn light_of(sums: &[ColourSum]) -> (Vec3, Option<PixelLayers>) {
     match sums {
         [direct, indirect, caustic, gathers] => {
             let mut all = *direct;

@@ -18,7 +18,7 @@ use photoncard_shared::message::{Fault, FrameParameters, PixelRecord, Tile};
 
 pub use self::completion::Completion;
 use self::gathers::Gathers;
-pub use self::light::Component;
+pub use self::light::{Component, light_of};
 use self::light::{add_light, sums_of};
 use self::position::{Block, Pass, Position};
 use self::stored_point::StoredPoint;

@@ -2,6 +2,7 @@
 
 use clap::{ArgAction, Args};
 use photoncard_driver::choice::Choice;
+use photoncard_driver::quality::Stated;
 use photoncard_driver::render::{Integrator, MIN_IRRADIANCE_ERROR, Sampling};
 
 use super::choice::{choice, switch};
@@ -12,10 +13,10 @@ pub(crate) struct IntegratorOptions {
     /// Seed of all random numbers
     #[arg(long, default_value_t = Integrator::default().seed, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) seed: u32,
-    /// Final gather rays per sample, or per irradiance record [default: by --quality]
+    /// Final gather rays per sample; with the irradiance cache per record, and per pixel where none is [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true)]
     gather_rays: Option<u32>,
-    /// Shadow rays per sample [default: by --quality]
+    /// Shadow rays per sample [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     shadow_rays: Option<u32>,
     /// Samples per pixel [default: by --quality]
@@ -47,6 +48,16 @@ impl IntegratorOptions {
             shadow_rays: self.shadow_rays.unwrap_or(base.shadow_rays),
             sampling: self.sampling,
             irradiance_error: (self.is_cached(base) && gather_rays > 0).then_some(error),
+        }
+    }
+
+    /// Options that are stated, of those that a quality chooses for a scene.
+    pub(super) fn stated(&self) -> Stated {
+        Stated {
+            gather_rays: self.gather_rays.is_some(),
+            shadow_rays: self.shadow_rays.is_some(),
+            cache: self.irradiance_cache.is_some() || self.ic_error.is_some(),
+            photons: false,
         }
     }
 

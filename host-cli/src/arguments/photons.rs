@@ -10,7 +10,7 @@ use super::choice::choice;
 #[derive(Args)]
 #[command(next_help_heading = "Photon maps")]
 pub(crate) struct PhotonOptions {
-    /// Photons stored in the map [default: by --quality]
+    /// Photons stored in the map [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true)]
     photons: Option<usize>,
     /// Layout of the photon map in card memory; it never changes the picture
@@ -43,6 +43,11 @@ pub(super) enum MaxDistance {
 }
 
 impl PhotonOptions {
+    /// Returns whether the number of photons is stated.
+    pub(super) fn states_photons(&self) -> bool {
+        self.photons.is_some()
+    }
+
     /// Settings of these options; `base` gives those that are not stated.
     pub(super) fn settings(&self, base: &PhotonMaps) -> PhotonMaps {
         PhotonMaps {

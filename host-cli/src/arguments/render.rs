@@ -2,7 +2,7 @@
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
-use photoncard_driver::quality::Quality;
+use photoncard_driver::quality::{Quality, Stated};
 use photoncard_driver::render::RenderSettings;
 
 use super::cards::CardOptions;
@@ -43,14 +43,15 @@ pub(crate) struct RenderOptions {
 }
 
 impl RenderOptions {
-    /// Settings of these options, with those of the quality for a scene that is not known.
-    pub(crate) fn settings(&self) -> RenderSettings {
-        self.settings_over(&self.quality.settings())
+    /// Options that are stated, of those that a quality chooses for a scene.
+    pub(crate) fn stated(&self) -> Stated {
+        Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
-    /// Settings of these options; `base` gives those that are not stated.
-    pub(crate) fn settings_over(&self, base: &RenderSettings) -> RenderSettings {
+    /// Settings of these options, with those of the quality for a scene that is not known.
+    pub(crate) fn settings(&self) -> RenderSettings {
         let cards = self.cards.settings();
+        let base = self.quality.settings();
         RenderSettings {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),

@@ -125,6 +125,7 @@ fn summary(statistics: &Statistics, pixels: usize) -> String {
 fn longest(times: &Times) -> (&'static str, f64) {
     let phases = [
         ("reading the scene", times.scene),
+        ("choosing settings", times.pilot),
         ("tracing photons", times.photons),
         ("building the card image", times.pack),
         ("loading the cards", times.load),

@@ -1,6 +1,7 @@
 //! Sweep of `photoncard study sweep`: its points, by the arguments with some of them replaced.
 
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 
 use clap::{CommandFactory, FromArgMatches};
 use miette::{MietteDiagnostic, Report};
@@ -68,7 +69,11 @@ fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
         study.mut_subcommand("sweep", |sweep| sweep.args_override_self(true))
     });
     let added = values.iter().map(|(name, value)| format!("--{name}={value}").into());
-    let matches = command.try_get_matches_from(std::env::args_os().chain(added))?;
+    let mut given: Vec<OsString> = std::env::args_os().collect();
+    // Words after `--` are no options.
+    let end = given.iter().position(|word| word == "--").unwrap_or(given.len());
+    given.splice(end..end, added);
+    let matches = command.try_get_matches_from(given)?;
     match Arguments::from_arg_matches(&matches)?.command {
         Command::Study(StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. }) => Ok(Some(*sweep)),
         _ => Ok(None),

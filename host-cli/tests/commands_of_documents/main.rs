@@ -24,7 +24,7 @@ mod script;
 use command_tree::CommandTree;
 use markdown::{Document, Piece};
 
-/// What a fenced block is, by its info string.
+/// Kind of a fenced block, by its info string.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Run,

@@ -19,7 +19,7 @@ pub(crate) struct Document {
 pub(crate) enum Piece {
     /// A block of code.
     Block {
-        /// What follows the opening fence; empty without it.
+        /// Info string after the opening fence; empty without one.
         info: String,
         text: String,
     },

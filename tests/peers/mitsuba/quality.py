@@ -14,13 +14,13 @@ the whole command; of Mitsuba those of the call that renders, with kernels compi
 import argparse
 import csv
 import json
-import resource
-import subprocess
 import sys
 from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
+
+from pictures import children_seconds, run
 
 mi.set_variant("scalar_rgb")
 
@@ -30,17 +30,16 @@ BLOCK, FILLED, DARK = 16, 0.25, 0.05
 # The sky around a staged file (cycles/stage.py).
 STAGE_SKY = "0.2,0.2,0.2"
 QUALITIES = ["draft", "good", "final"]
-# What is varied around the quality `good`, one at a time.
+# Options that are varied around the quality `good`, one at a time.
 AROUND = [
-    *(f"--photons {photons}" for photons in (100_000, 200_000, 500_000, 1_000_000, 2_000_000)),
+    *(f"--photons {photons}" for photons in (100_000, 400_000, 1_600_000)),
     *(f"--neighbors {neighbors}" for neighbors in (12, 50, 100)),
-    *(f"--gather-rays {rays}" for rays in (64, 128, 256, 400)),
+    *(f"--gather-rays {rays}" for rays in (64, 128, 256, 512)),
     *(f"--shadow-rays {rays}" for rays in (1, 2, 4, 8)),
-    *(f"--ic-error {error}" for error in (0.05, 0.2, 0.4)),
-    *(f"--spp {samples}" for samples in (4, 8, 32)),
-    "--irradiance-cache off --gather-rays 16",
+    *(f"--ic-error {error}" for error in (0.05, 0.2)),
+    *(f"--spp {samples}" for samples in (8, 32)),
+    "--irradiance-cache off",
     "--radiance precomputed",
-    "--tile 32",
     "--tile 64",
 ]
 MITSUBA_SAMPLES = 64
@@ -195,21 +194,6 @@ def read(path):
     """An EXR picture, rows from the top."""
     bitmap = mi.Bitmap(str(path)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
     return np.array(bitmap).astype(float)
-
-
-def run(command):
-    """What a command prints."""
-    words = [str(word) for word in command]
-    done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=False)
-    if done.returncode != 0:
-        sys.exit(f"failed: {' '.join(words)}")
-    return done.stdout
-
-
-def children_seconds():
-    """CPU seconds of commands that have ended."""
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime
 
 
 if __name__ == "__main__":

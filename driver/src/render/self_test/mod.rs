@@ -48,7 +48,7 @@ impl SelfTest {
     }
 }
 
-/// Tests the first card at an address. The card forgets its scene. The observer is told of bytes of memory that were written or
+/// Tests the first card at an address. The card forgets its scene. The observer receives the bytes of memory that were written or
 /// read.
 ///
 /// # Errors

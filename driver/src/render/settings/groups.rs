@@ -93,7 +93,7 @@ pub struct Integrator {
     pub seed: u32,
     /// Number of samples per pixel.
     pub samples: u32,
-    /// Number of final gather rays per sample.
+    /// Number of final gather rays per sample; with an irradiance cache per record, and per pixel of other samples.
     pub gather_rays: u32,
     /// Number of shadow rays per sample.
     pub shadow_rays: u32,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use gltf::json;
+use gltf::json::extensions::scene::khr_lights_punctual::Light;
 use gltf::json::mesh::Semantic;
 use gltf::json::validation::{Checked, Error as Fault, Validate};
 use miette::{NamedSource, SourceSpan};
@@ -38,6 +39,14 @@ pub(super) struct Document {
 }
 
 impl Document {
+    /// Lights of `KHR_lights_punctual`.
+    pub(super) fn lights(&self) -> &[Light] {
+        let extensions = self.root.extensions.as_ref();
+        extensions
+            .and_then(|root| root.khr_lights_punctual.as_ref())
+            .map_or(&[], |extension| &extension.lights)
+    }
+
     pub(super) fn read(path: &Path) -> Result<Self, SceneError> {
         let bytes =
             read_file(path).map_err(|source| SceneError::Unreadable { file: path.to_owned(), source })?;

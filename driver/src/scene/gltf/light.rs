@@ -17,12 +17,6 @@ const MIN_PENUMBRA: f32 = 0.001;
 /// Tolerance by which a rounded outer cone angle may exceed a right angle.
 const ANGLE_TOLERANCE: f32 = 1e-4;
 
-/// Lights of the file.
-pub(super) fn lights(document: &Document) -> &[Light] {
-    let extensions = document.root.extensions.as_ref();
-    extensions.and_then(|root| root.khr_lights_punctual.as_ref()).map_or(&[], |extension| &extension.lights)
-}
-
 /// Conversion of glTF's lights to the scene's.
 pub(super) struct LightPlacer<'a> {
     document: &'a Document,
@@ -49,7 +43,7 @@ impl<'a> LightPlacer<'a> {
         scene: &mut Scene,
         notices: &mut Notices,
     ) -> Result<(), SceneError> {
-        let light = &lights(self.document)[index];
+        let light = &self.document.lights()[index];
         let name = light.name.clone().unwrap_or_else(|| format!("light {index}"));
         let intensity = self.intensity(index)?;
         let kind = self.kind(index, node, world)?;
@@ -63,7 +57,7 @@ impl<'a> LightPlacer<'a> {
 
     /// Colour times intensity, in the scene's units.
     fn intensity(&self, index: usize) -> Result<Vec3, SceneError> {
-        let light = &lights(self.document)[index];
+        let light = &self.document.lights()[index];
         let divisor = match light.type_ {
             Checked::Valid(Type::Directional) => self.units.directional(),
             _ => self.units.points(),
@@ -79,7 +73,7 @@ impl<'a> LightPlacer<'a> {
     }
 
     fn kind(&self, index: usize, node: usize, world: &DMat4) -> Result<PunctualKind, SceneError> {
-        let light = &lights(self.document)[index];
+        let light = &self.document.lights()[index];
         let position = world.w_axis.truncate().as_vec3();
         let direction = (-world.z_axis.truncate()).try_normalize().map(DVec3::as_vec3);
         let misplaced = || {

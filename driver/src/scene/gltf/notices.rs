@@ -7,7 +7,6 @@ use gltf::json;
 
 use super::document::Document;
 use super::extensions::SUPPORTED_EXTENSIONS;
-use super::light;
 use super::material::has_dark_texture;
 use super::names::mesh_name;
 use super::not_finite::NotFinite;
@@ -116,7 +115,7 @@ impl Notices {
         note("morph targets are ignored, the base shape is rendered", "mesh", &morphed);
         let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
         note("animations are ignored, the scene is rendered as it stands", "animation", &moving);
-        let lights = light::lights(document);
+        let lights = document.lights();
         let limited = names("light", lights, |light| light.name.as_ref(), |light| light.range.is_some());
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
         let penumbra = "inner cones of Blender's spot lights are widened to the flux that Blender renders";
