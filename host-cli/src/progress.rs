@@ -22,7 +22,7 @@ pub(crate) struct Progress {
     display: Option<Mutex<Display>>,
 }
 
-/// Seconds of a phase before the tiles until its first line, without a terminal: short ones are not worth lines.
+/// Seconds of a phase before the tiles until its first line, without a terminal.
 const SILENT_SECONDS: f64 = 1.0;
 
 struct Display {
@@ -128,8 +128,8 @@ impl Display {
         let left = left.map_or(String::new(), |left| format!(", {left} left"));
         self.bar.set_prefix(left.clone());
         let tenths = (10 * done).checked_div(total).unwrap_or(0);
-        let is_brief =
-            matches!(phase, Phase::Pilot | Phase::Photons | Phase::Load) && seconds < SILENT_SECONDS;
+        // A phase before the tiles that is brief prints its end alone.
+        let is_brief = phase != Phase::Tiles && done < total && seconds < SILENT_SECONDS;
         if !self.on_terminal && tenths > self.told && !is_brief {
             self.told = tenths;
             say(format_args!("photoncard: {} {done} of {total}, {seconds:.1} s{left}", name(phase)));
