@@ -43,7 +43,10 @@ while IFS='|' read -r title name scene options; do
     seconds=$({ TIMEFORMAT='%U %S' && time "$photoncard" render "$scene" -o "docs/gallery/$name.png" $options --quiet; } 2>&1)
     {
         printf '\n## %s\n\n![%s](gallery/%s.png)\n\n' "$title" "$title" "$name"
-        printf '```text\nphotoncard render %s -o %s.png %s\n```\n\n' "${scene#"$peers"/*/}" "$name" "$options" | sed 's/ *$//'
+        # Files of others are not there when the commands of documents are tested.
+        kind=sh
+        [ "$scene" = "${scene#"$peers"}" ] || kind='sh network'
+        printf '```%s\nphotoncard render %s -o %s.png %s\n```\n\n' "$kind" "${scene#"$peers"/*/}" "$name" "$options" | sed 's/ *$//'
         awk '{ printf "%.0f CPU seconds.\n", $1 + $2 }' <<<"$seconds"
     } >>"$page.partial"
 done < <(pictures)

@@ -22,7 +22,7 @@ def main():
     """See the module."""
     arguments = parse()
     width, height = (int(side) for side in arguments.size.split("x"))
-    scene = scenes.load(arguments.scene, width, height, arguments.camera)
+    scene = scenes.load(arguments.scene, width, height, arguments.camera, arguments.environment)
     integrator = mi.load_dict({"type": "path"})
     # The kernels do not depend on the number of samples.
     render(scene, integrator, 1, seed=0)
@@ -41,6 +41,7 @@ def parse():
     parser.add_argument("scene")
     parser.add_argument("--size", default="512x512")
     parser.add_argument("--camera")
+    parser.add_argument("--environment", help="an equirectangular map")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--spp", type=int, nargs="+", required=True)
     parser.add_argument("--output", nargs="+", required=True, help="an EXR for each number of samples")
