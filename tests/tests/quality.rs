@@ -56,18 +56,19 @@ fn they_depend_neither_on_threads_nor_on_the_crop_window() {
     }
 }
 
-/// Light of a point is one value, and a wall that emits is seen under many angles.
+/// Light of a point is one value, and the parts of a lamp are at different distances, angles and behind different things.
 #[test]
-fn a_point_takes_one_shadow_ray_and_a_wall_more() {
+fn a_point_takes_one_shadow_ray_and_a_lamp_more() {
     assert_eq!(fit(&room_with_a_point(), &small()).shadow_rays, 1);
-    assert!(fit(&lit_room(), &small()).shadow_rays > 1);
+    assert!(fit(&shipped("cornell.gltf"), &small()).shadow_rays > 1);
 }
 
 /// With more samples each has fewer shadow rays.
 #[test]
 fn samples_share_the_shadow_rays_of_a_pixel() {
-    let few = fit(&lit_room(), &small());
-    let many = fit(&lit_room(), &small().with(|s| s.integrator.samples = 1024));
+    let scene = shipped("cornell.gltf");
+    let few = fit(&scene, &small());
+    let many = fit(&scene, &small().with(|s| s.integrator.samples = 1024));
     assert!(many.shadow_rays < few.shadow_rays, "{many:?} {few:?}");
     assert_eq!((many.gather_rays, many.photons), (few.gather_rays, few.photons));
 }
@@ -82,14 +83,13 @@ fn they_do_not_depend_on_the_seed() {
 /// Pictures of a few pixels are as noisy as large ones.
 #[test]
 fn they_are_found_for_pictures_of_a_pixel() {
-    let of_size = |width, height| {
-        fit(&lit_room(), &small().with(|s| (s.picture.width, s.picture.height) = (width, height)))
-    };
-    let expected = of_size(32, 32);
+    let scene = shipped("cornell.gltf");
+    let of_size = |side| fit(&scene, &small().with(|s| (s.picture.width, s.picture.height) = (side, side)));
+    let expected = of_size(32);
     for side in [1, 2, 8] {
-        assert_eq!(of_size(side, side), expected, "{side}");
+        assert_eq!(of_size(side), expected, "{side}");
     }
-    assert!(expected.shadow_rays > 1);
+    assert!(expected.shadow_rays > 1, "{expected:?}");
 }
 
 /// Metal has no Lambertian part.
