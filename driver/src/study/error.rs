@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use super::axes::AxisError;
 use super::report::ReportError;
 use super::store::StoreError;
-use super::studies::AxisError;
 use crate::error::SceneError;
 use crate::render::RenderError;
 

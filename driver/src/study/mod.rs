@@ -5,6 +5,7 @@
 //! in a [`Laboratory`], which keeps their outcomes, and writes the report. [`crate::cost_model`] predicts the chips that a
 //! frame rate takes, [`load_balance`] how evenly tiles load them.
 
+mod axes;
 mod error;
 mod index;
 mod laboratory;
@@ -21,6 +22,7 @@ mod studies;
 
 use std::path::{Path, PathBuf};
 
+pub use self::axes::{Axis, AxisError, MAX_POINTS};
 pub use self::error::StudyError;
 pub use self::laboratory::{Laboratory, Outcome, Results, StudyObserver};
 pub use self::measure::{Bench, Measurement, ReadSums, TileMeasurement};
@@ -29,7 +31,7 @@ pub use self::quality::{Quality, Reference};
 use self::report::{Provenance, Report};
 pub use self::sample::{Estimate, SampleRate, choose};
 pub use self::scale::Scale;
-pub use self::studies::{Axis, AxisError, MAX_POINTS, Study, Sweep};
+pub use self::studies::{Study, Sweep};
 use crate::choice::Choice;
 use crate::scene::Scene;
 

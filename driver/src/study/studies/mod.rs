@@ -11,7 +11,7 @@ mod sweep;
 mod techniques;
 mod workload;
 
-pub use self::sweep::{Axis, AxisError, MAX_POINTS, Sweep};
+pub use self::sweep::Sweep;
 use super::laboratory::Results;
 use super::point::Point;
 use super::report::Report;

@@ -1,14 +1,12 @@
 //! Sweep: a study of a scene of the user's own, over any settings of the render and of the chip.
 
-mod axes;
 mod report;
 
 use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use self::axes::Axes;
-pub use self::axes::{Axis, AxisError, MAX_POINTS};
+use super::super::axes::{Axes, Axis, AxisError};
 use super::super::laboratory::Results;
 use super::super::point::{Point, Task};
 use super::super::report::Report;

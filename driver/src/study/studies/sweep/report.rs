@@ -2,6 +2,7 @@
 
 use photoncard_shared::address::Structure;
 
+use super::super::super::axes::{Axes, Axis};
 use super::super::super::laboratory::Results;
 use super::super::super::measure::Measurement;
 use super::super::super::point::Point;
@@ -11,7 +12,6 @@ use super::super::present::{
     cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table,
 };
 use super::super::workload::{cost, of_frame, symbols};
-use super::axes::{Axes, Axis};
 use crate::choice::Choice;
 use crate::cost_model::Machine;
 
