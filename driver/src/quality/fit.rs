@@ -58,8 +58,8 @@ pub struct Measured {
 struct Aims {
     /// Relative standard deviation of a pixel by its shadow rays.
     noise: f64,
-    /// Relative standard deviation of a record, or of a pixel, by its gather rays: less, as pixels around a record share its error, which
-    /// shows as a blotch.
+    /// Relative standard deviation of a record, or of a pixel, by its gather rays. Pixels around a record share its error, which shows as
+    /// a blotch.
     blotches: f64,
     /// Relative error of 4x4 pixels by the photon map.
     map_error: f64,
