@@ -34,8 +34,14 @@ impl<'a> Dispatcher<'a> {
     /// Assigns tiles to a card until its credits are used up.
     pub fn supply(&self, card: CardNumber, session: &mut Session, now: Duration) {
         while session.wants_tile() {
-            let Some(assignment) = self.scheduler().take(card, now) else { break };
-            session.give(assignment);
+            match self.scheduler().take(card, now) {
+                Some(assignment) => session.give(assignment),
+                None => {
+                    session.flush();
+                    session.prepare();
+                    break;
+                }
+            }
             session.prepare();
         }
     }

@@ -63,6 +63,8 @@ pub struct Session<'a> {
     failures: Failures,
     /// True if the card was working on a suspect tile when it was last greeted.
     left_suspect: bool,
+    /// True after a [`Command::Flush`], until the next tile.
+    is_flushed: bool,
 }
 
 impl<'a> Session<'a> {
@@ -86,6 +88,7 @@ impl<'a> Session<'a> {
             clock: Clock::new(now),
             failures: Failures::default(),
             left_suspect: false,
+            is_flushed: false,
         };
         session.greet_card();
         session
@@ -155,7 +158,22 @@ impl<'a> Session<'a> {
     /// Assigns a tile to a card for which [`Self::wants_tile`] is true.
     pub fn give(&mut self, assignment: Assignment) {
         self.tiles.push(assignment);
+        self.is_flushed = false;
         self.send(&Command::RenderTile(assignment.tile));
+    }
+
+    /// Sends [`Command::Flush`] to a card for which [`Self::wants_tile`] is true and there is no tile: it does the gathers of its
+    /// tiles in flight instead of waiting for another.
+    pub fn flush(&mut self) {
+        if !self.tiles.is_empty() && !std::mem::replace(&mut self.is_flushed, true) {
+            self.send(&Command::Flush);
+        }
+    }
+
+    /// Maximum number of tiles that the card works on at once.
+    fn at_work(&self) -> usize {
+        let of_card = self.budget.map_or(1, |budget| budget.in_flight);
+        self.job.map_or(of_card, |job| of_card.min(job.frame.in_flight)) as usize
     }
 
     /// Statistics of the link so far.
@@ -293,7 +311,7 @@ impl<'a> Session<'a> {
         if self.clock.must_ask(now) {
             self.transport.probe();
         }
-        let rays = self.job.map_or(0, |job| self.tiles.most_rays(job.frame));
+        let rays = self.job.map_or(0, |job| self.tiles.most_rays(self.at_work(), job.frame));
         let result = self.clock.check(rays, slowest, now);
         if matches!(result, Err(SessionError::Standstill(_))) {
             self.fail()?;
@@ -303,7 +321,8 @@ impl<'a> Session<'a> {
 
     /// Returns the unfinished tiles of a card that is lost or was reset, as events.
     pub fn give_back(&mut self) {
-        self.tiles.give_back(&mut self.events);
+        let at_work = self.at_work();
+        self.tiles.give_back(at_work, &mut self.events);
     }
 
     /// Greets the card again, with a new session number, after its link was closed or it was silent. Its tiles are

@@ -29,15 +29,15 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     lines.extend(kind.into_iter().flat_map(|kind| sram_rows(kind, budget.sram_bytes as usize)));
     lines.extend([
         format!("dram            {} bytes", budget.dram_bytes),
-        format!("tile            {} pixels, {} tiles at once", budget.tile_pixels, budget.tiles),
+        format!(
+            "tile            {} pixels, {} tiles in flight, {} at once",
+            budget.tile_pixels, budget.in_flight, budget.tiles
+        ),
         format!("neighbors       {}", budget.neighbors),
         format!("gather rays     {} a sample", budget.gather_rays),
         format!("bins            {MAX_BINS} of directions"),
         format!("gather queue    {} gathers", budget.gather_queue),
-        format!(
-            "records         {} of irradiance, {} gathered at once",
-            budget.irradiance_records, budget.gathered_records
-        ),
+        format!("records         {} of irradiance a tile in flight", budget.irradiance_records),
         format!("shadow rays     {} a sample", budget.shadow_rays),
         format!("samples         {} a pixel", budget.samples),
     ]);

@@ -20,6 +20,10 @@ fn options_without_effect_are_said_to_have_none() {
             &["--queue=9", "--order=dirbin"],
             "--queue has no effect with --order dirbin, by which no gathers wait",
         ),
+        (
+            &["--in-flight=1", "--order=naive"],
+            "--in-flight has no effect with --order naive, by which no gathers wait",
+        ),
         (&["--queue=9", "--order=hilbert"], "--queue has no effect with --order hilbert"),
         (&["--faults=flips=1e-9", "--order=hilbert"], "--faults has no effect with --order hilbert"),
         (
@@ -74,7 +78,7 @@ fn options_with_effect_are_not() {
     let small = ["-o", "a.exr", "--caustic-photons=99"];
     for options in [
         &["--irradiance-cache=on", "--ic-error=0.1"][..],
-        &["--bins=9", "--queue=9", "--order=hash"],
+        &["--bins=9", "--queue=9", "--in-flight=2", "--order=hash"],
         &["--bins=9", "--order=dirbin"],
         &["--caustic-neighbors=9"],
         &["--radiance=precomputed", "--faults=flips=1e-9"],

@@ -40,12 +40,13 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
 }
 
 /// Options that no pixel depends on.
-const OTHERS: [&[&str]; 18] = [
+const OTHERS: [&[&str]; 19] = [
     &["--photon-map", "jensen"],
     &["--tile", "3"],
     &["--order", "naive"],
     &["--bins", "5"],
     &["--queue", "7"],
+    &["--in-flight", "1"],
     &["--card", "emulated-micro:2"],
     &["--verify", "0.5", "--card", "emulated:2"],
     &["--faults", "flips=1e-6"],
@@ -145,12 +146,13 @@ fn statistics_name_what_the_work_depends_on_besides_pixels() {
     };
     let plain = work(&["--card", "emulated:1"]);
     assert_eq!(plain["protocol"], photoncard_shared::message::PROTOCOL_VERSION);
-    let cases: [(&[&str], &str, Value); 13] = [
+    let cases: [(&[&str], &str, Value); 14] = [
         (&["--photon-map", "jensen"], "photon-map", json!("jensen")),
         (&["--tile", "3"], "tile", json!(3)),
         (&["--order", "naive"], "order", json!("naive")),
         (&["--bins", "5", "--order", "dirbin"], "bins", json!(5)),
         (&["--queue", "7"], "queue", json!(7)),
+        (&["--in-flight", "1"], "in-flight", json!(1)),
         (&["--card", "emulated-micro:2"], "card", json!(["emulated-micro:2"])),
         (
             &["--card", "emulated-micro:2", "--card", "emulated:1"],

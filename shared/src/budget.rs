@@ -27,14 +27,14 @@ pub struct Budget {
     pub gather_queue: u32,
     /// Maximum number of irradiance records of one block of a tile; a power of two.
     pub irradiance_records: u32,
-    /// Maximum number of irradiance records gathered at once.
-    pub gathered_records: u32,
     /// Maximum number of shadow rays of a sample.
     pub shadow_rays: u32,
     /// Maximum number of samples of a pixel.
     pub samples: u32,
     /// Maximum number of tile commands queued or at work on a chip: its credits.
     pub tiles: u32,
+    /// Maximum number of tiles in flight: tiles whose gathers may wait at once.
+    pub in_flight: u32,
 }
 
 /// Sums that a chip keeps for each pixel of a picture with layers: direct, indirect and caustic light, and a count of
@@ -52,6 +52,12 @@ impl Budget {
         self.tile_pixels / sums_of_pixel(layers)
     }
 }
+
+/// Maximum of [`Budget::in_flight`] over all chips.
+pub const MAX_IN_FLIGHT: u32 = 8;
+
+/// Maximum of [`Budget::tile_pixels`], and of [`Budget::irradiance_records`], over all chips.
+pub const MAX_TILE_PIXELS: u32 = 1 << 15;
 
 /// Maximum of [`Budget::gather_rays`] over all chips.
 pub const MAX_GATHER_RAYS: u32 = 1 << 14;

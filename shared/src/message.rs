@@ -9,7 +9,8 @@
 //! WriteLines ...  -> (nothing)                   any number, in any order, each up to eight lines
 //! EndImage        -> ImageAccepted               after the check of the checksum and the header
 //! BeginFrame      -> FrameAccepted
-//! RenderTile ...  -> Pixels ..., TileDone        at most the budget's `tiles` unanswered
+//! RenderTile ...  -> Pixels ..., TileDone        at most the budget's `tiles` unanswered, in any order
+//! Flush           -> (nothing)                   no tile follows for now: gathers that wait are done
 //! ```
 //!
 //! A self-test takes the place of the image: `Compute -> Computed`, any number, then `TestMemory -> MemoryTested ...`.
@@ -35,7 +36,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 11;
+pub const PROTOCOL_VERSION: u16 = 12;
 
 /// Maximum number of lines of one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
@@ -112,6 +113,8 @@ pub struct FrameParameters {
     pub layers: bool,
     /// Pixel filter.
     pub filter: Filter,
+    /// Maximum number of tiles in flight, at least 1; a chip limits it to [`Budget::in_flight`].
+    pub in_flight: u32,
 }
 
 /// Pixel filter: the density of a pixel's samples around its centre, in both directions alike. Samples are drawn from the filter and
@@ -167,9 +170,9 @@ pub enum Drain {
     /// At the end of their ray, without a queue.
     #[default]
     Immediate,
-    /// By a spatial hash of their position, when the queue is full or their results are needed.
+    /// By a spatial hash of their position, when the queue is full or no other work is left.
     Hash,
-    /// Along a Hilbert curve, when the queue is full or their results are needed.
+    /// Along a Hilbert curve, when the queue is full or no other work is left.
     Sort,
 }
 
@@ -242,6 +245,9 @@ pub enum Command<'a> {
     },
     /// Tests the whole memory. The card forgets what it forgets at a hello, and all written lines.
     TestMemory,
+    /// Ends the wait for further tiles: gathers that wait are done when no other work is left. The next
+    /// [`Command::RenderTile`] revokes it.
+    Flush,
 }
 
 /// Message from a card to the host.
@@ -275,7 +281,8 @@ pub enum Reply<'a> {
     ImageAccepted,
     /// Answer to [`Command::BeginFrame`]: the card can render it.
     FrameAccepted,
-    /// Consecutive pixels of a tile in row-major order, [`record_bytes`] each.
+    /// Consecutive pixels of a tile in row-major order, [`record_bytes`] each. Every pixel of a tile is sent once; parts of a tile may
+    /// come in any order.
     Pixels {
         /// The tile's number.
         tile: u32,

@@ -21,10 +21,10 @@ const BUDGET: Budget = Budget {
     gather_rays: 1 << 14,
     gather_queue: 12_640,
     irradiance_records: 512,
-    gathered_records: 511,
     shadow_rays: 64,
     samples: 4097,
     tiles: 4,
+    in_flight: 2,
 };
 
 const HEADER: FrameHeader =
@@ -209,6 +209,7 @@ fn opcodes_are_pinned() {
     assert_eq!(encoded(&Command::RenderTile(tile)), [6, 1, 2, 3, 4, 5]);
     assert_eq!(encoded(&Command::Compute { operands: &[9, 8] }), [7, 2, 9, 8]);
     assert_eq!(encoded(&Command::TestMemory), [8]);
+    assert_eq!(encoded(&Command::Flush), [9]);
     let hello = |memory_use| {
         let budget = BUDGET;
         Reply::Hello { protocol: 1, layout: 1, budget, written_lines: 0, memory_use, build: "x" }
@@ -240,7 +241,7 @@ fn the_page_is_of_this_version() {
 /// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
 #[test]
 fn golden_structures() {
-    assert_eq!(PROTOCOL_VERSION, 11);
+    assert_eq!(PROTOCOL_VERSION, 12);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,
@@ -252,10 +253,10 @@ fn golden_structures() {
         gather_rays: 8,
         gather_queue: 9,
         irradiance_records: 10,
-        gathered_records: 11,
-        shadow_rays: 12,
-        samples: 13,
-        tiles: 300,
+        shadow_rays: 11,
+        samples: 12,
+        tiles: 13,
+        in_flight: 300,
     };
     let hello =
         Reply::Hello { protocol: 6, layout: 5, budget, written_lines: 14, memory_use: None, build: "x" };
@@ -288,6 +289,7 @@ fn golden_structures() {
         caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
         layers: true,
         filter: Filter::BlackmanHarris,
+        in_flight: 9,
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero].concat();
@@ -300,7 +302,7 @@ fn golden_structures() {
         &one,
         &[8, 2, 0xac, 2, 1, 1, 50],
         &one,
-        &[1, 2],
+        &[1, 2, 9],
     ]
     .concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);

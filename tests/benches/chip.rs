@@ -7,19 +7,19 @@ use std::sync::LazyLock;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Vec3;
+use photoncard_driver::emulator::direct::render_tiles;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::{RenderSettings, Schedule};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
-use photoncard_firmware::chip::{Progress, ReferenceChip};
+use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
-use photoncard_firmware::render::Context;
+use photoncard_firmware::render::RenderJob;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{Ray, Surface, closest_hit, is_occluded, read_surface};
-use photoncard_shared::counters::Counters;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::Photon;
 use photoncard_shared::message::{Radiance, Tile};
@@ -173,14 +173,11 @@ fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
         RenderSettings { schedule: Schedule { order, ..Schedule::default() }, ..RenderSettings::default() };
     let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance, None);
     let (scene, _) = CORNELL.image.view();
-    let mut counters = Counters::ZERO;
-    let mut context =
-        Context { scene: &scene, memory: &mut memory, frame: &frame, counters: &mut counters, outlet: None };
+    let mut job = RenderJob { scene: &scene, memory: &mut memory, frame: &frame, outlet: None };
     let mut chip = Box::new(ReferenceChip::new());
     let tile = Tile { id: 0, x: 256, y: 256, width: 16, height: 16 };
     bencher.counter(ItemsCount::new(256_usize)).bench_local(|| {
-        assert!(chip.begin(context.memory, context.frame, tile));
-        while chip.step(&mut context).expect("sound") == Progress::Busy {}
+        render_tiles(&mut chip, &mut job, &[tile], |_, _| true).expect("sound");
     });
 }
 

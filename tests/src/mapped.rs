@@ -9,6 +9,7 @@ use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::tiles;
 use photoncard_firmware::chip::ReferenceChip;
+use photoncard_firmware::gather::{GatherTarget, PointIndex};
 use photoncard_firmware::photon::CandidateBuffer;
 use photoncard_firmware::render::eye::see;
 use photoncard_firmware::render::final_gather::{cast, gathered};
@@ -97,13 +98,8 @@ impl<'a> IndirectLight<'a> {
         let frame = settings.frame(&camera, mapped.max_distance, mapped.caustics);
         let (scene, mut memory) = mapped.image.view();
         let mut counters = Counters::ZERO;
-        let mut context = Context {
-            scene: &scene,
-            memory: &mut memory,
-            frame: &frame,
-            counters: &mut counters,
-            outlet: None,
-        };
+        let mut context =
+            Context { scene: &scene, memory: &mut memory, frame: &frame, counters: &mut counters };
         let middle = |i: u32, size: u32| (i as f32 + 0.5) / side as f32 * size as f32;
         let places =
             (0..side * side).map(|i| [middle(i % side, frame.width), middle(i / side, frame.height)]);
@@ -124,20 +120,16 @@ impl<'a> IndirectLight<'a> {
         let gather = |(index, surface): (usize, &Surface)| {
             let (scene, mut memory) = self.mapped.image.view();
             let mut counters = Counters::ZERO;
-            let mut context = Context {
-                scene: &scene,
-                memory: &mut memory,
-                frame: &frame,
-                counters: &mut counters,
-                outlet: None,
-            };
+            let mut context =
+                Context { scene: &scene, memory: &mut memory, frame: &frame, counters: &mut counters };
             let mut candidates = CandidateBuffer::<512>::new();
             let pattern = Pattern::new(seed, index as u32, 0, 0, Dimension::Gather);
             let mut point = GatherPoint::sample(*surface, pattern, rays);
             point.choose_directions(&mut context, candidates.view()).expect("sound");
             let mut sum = Vec3::ZERO;
+            let target = GatherTarget::new(0, PointIndex::Pixel(0));
             for ray in 0..rays {
-                let end = cast(&mut context, &point, 0, 1.0, ray).expect("sound");
+                let end = cast(&mut context, &point, target, 1.0, ray).expect("sound");
                 if let Some(request) = end.and_then(|end| end.request) {
                     sum += gathered(&mut context, &request, candidates.view()).expect("sound");
                 }

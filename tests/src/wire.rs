@@ -1,6 +1,7 @@
 //! A card on a lossless link, driven command by command.
 
-use photoncard_firmware::card::MicroCard;
+use photoncard_firmware::card::Card;
+use photoncard_firmware::kind::{ChipKind, Micro};
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::checksum::image_checksum;
@@ -11,9 +12,9 @@ use photoncard_shared::message::{
 use photoncard_shared::transport::Transport;
 
 /// A card, and the host's end of its link, through which a test gives commands.
-pub struct Wire<'a> {
+pub struct Wire<'a, K: ChipKind = Micro> {
     /// The card.
-    pub card: Box<MicroCard<Dram<'a>>>,
+    pub card: Box<Card<K, Dram<'a>>>,
     host: Transport,
     session: u32,
     /// True if the last frame begun has layers.
@@ -44,9 +45,16 @@ pub enum Answer {
 }
 
 impl<'a> Wire<'a> {
-    /// A card that was just switched on, with `memory` for its DRAM.
+    /// A micro card that was just switched on, with `memory` for its DRAM.
     pub fn new(memory: &'a mut [Line]) -> Self {
-        let card = Box::new(MicroCard::new(Dram::new(memory)));
+        Self::of_kind(memory)
+    }
+}
+
+impl<'a, K: ChipKind> Wire<'a, K> {
+    /// A card of a kind that was just switched on, with `memory` for its DRAM.
+    pub fn of_kind(memory: &'a mut [Line]) -> Self {
+        let card = Box::new(Card::new(Dram::new(memory)));
         Self { card, host: Transport::host(), session: 0, layers: false }
     }
 

@@ -5,7 +5,7 @@ use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::trace;
 use photoncard_driver::photon_map::store_photons;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
-use photoncard_firmware::kind::MICRO;
+use photoncard_firmware::kind::{MICRO, Reference};
 use photoncard_shared::address::Line;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::image::{Header, SectionKind};
@@ -76,6 +76,40 @@ fn commands_out_of_order_are_faults_and_the_card_goes_on() {
         assert_eq!(wire.say(&Command::EndImage), fault(FaultCode::ImageChecksum));
         assert_eq!(wire.say_bytes(&[0xff; 9]), fault(FaultCode::Message));
         renders_a_tile(&mut wire, &image());
+    });
+}
+
+/// Gathers of a tile wait for those of the next, unless none follows.
+#[test]
+fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
+    with_room_for_a_card(|| {
+        let mut memory = vec![Line::ZERO; DRAM_LINES];
+        let mut wire = Wire::<Reference>::of_kind(&mut memory);
+        wire.hello();
+        wire.load(image().lines());
+        let done = |id| [Answer::Pixels(25), Answer::Pixels(25), Answer::Pixels(14), Answer::TileDone(id)];
+        let begin = |in_flight| Command::BeginFrame(FrameParameters { in_flight, ..frame() });
+        let tile = |id| Command::RenderTile(Tile { id, ..TILE });
+        assert_eq!(wire.say(&begin(0)), [Answer::Fault(FaultCode::Parameter)]);
+        assert_eq!(wire.say(&begin(1)), [Answer::FrameAccepted]);
+        assert_eq!(wire.say(&tile(1)), done(1), "there is no room for another");
+        assert_eq!(wire.say(&begin(2)), [Answer::FrameAccepted]);
+        assert_eq!(wire.say(&tile(2)), []);
+        assert!(!wire.card.is_busy());
+        assert_eq!(wire.say(&begin(2)), [Answer::Fault(FaultCode::Order)], "a tile is in flight");
+        assert_eq!(wire.say(&Command::Flush), done(2));
+        assert_eq!(wire.say(&Command::Flush), []);
+        // A second tile fills the chip, a third waits for a place.
+        assert_eq!(wire.say(&tile(3)), []);
+        assert_eq!(wire.say(&tile(4)), [done(3), done(4)].concat());
+        assert_eq!(wire.say(&tile(5)), []);
+        // A hello drops what is in flight.
+        wire.hello();
+        assert_eq!(wire.say(&Command::Flush), []);
+        assert!(!wire.card.is_busy());
+        wire.load(image().lines());
+        wire.say(&begin(2));
+        assert_eq!(wire.say_all(&[tile(6), Command::Flush]), done(6));
     });
 }
 

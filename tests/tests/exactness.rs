@@ -1,6 +1,7 @@
 //! Exactness: renders that differ only in ordering, tile size, chips or threads have identical pixels.
 
-use photoncard_driver::film::{Film, PixelValue, Window};
+use photoncard_driver::film::{Film, FilmPixel, PixelValue, Window};
+use photoncard_driver::layer::Layers;
 use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{
     CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling, Schedule,
@@ -9,8 +10,10 @@ use photoncard_driver::render::{
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::kind::{MICRO, REFERENCE};
+use photoncard_shared::message::PixelLayers;
 use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
+use proptest::prelude::*;
 
 fn glossy() -> Scene {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf");
@@ -61,7 +64,7 @@ fn variants() -> Vec<RenderSettings> {
         (tile, Hilbert, None, None),
     ];
     let scheduled = schedules.map(|(tile, order, bins, queue)| RenderSettings {
-        schedule: Schedule { tile, order, bins, queue },
+        schedule: Schedule { tile, order, bins, queue, in_flight: None },
         ..settings()
     });
     let cards = [
@@ -70,12 +73,14 @@ fn variants() -> Vec<RenderSettings> {
         (&["emulated-micro:2"], tile, Sort, Some(1000)),
         (&["emulated:7"], tile, Sort, None),
         (&["emulated:3"], tile, Naive, None),
+        (&["emulated-large:1"], 6, Sort, None),
+        (&["emulated-large:2", "emulated:1"], 8, Hash, Some(300)),
         (&["emulated:7"], 4, Tiled, None),
         (&["emulated-micro:2", "emulated:1"], tile, Tiled, None),
         (&["emulated:3"], 7, Hilbert, None),
     ];
     let dealt = cards.map(|(cards, tile, order, queue)| RenderSettings {
-        schedule: Schedule { tile, order, bins: None, queue },
+        schedule: Schedule { tile, order, bins: None, queue, in_flight: None },
         cards: CardSet { addresses: cards.iter().copied().map(card).collect(), ..CardSet::default() },
         ..settings()
     });
@@ -115,6 +120,51 @@ fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
             let film = render_or_panic(scene, &variant).film;
             assert!(bits(&film) == expected, "{variant:?} changes the picture");
         }
+    }
+}
+
+/// Bits of a film's layers; zero in a film without layers.
+fn layer_bits(film: &Film) -> Vec<[u32; 10]> {
+    let of_pixel = |pixel: FilmPixel| {
+        let PixelLayers { direct, indirect, caustic, gathers } = pixel.layers;
+        let [[a, b, c], [d, e, f], [g, h, i]] = [direct, indirect, caustic];
+        [a, b, c, d, e, f, g, h, i, gathers].map(f32::to_bits)
+    };
+    film.all().map(of_pixel).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    /// Any number of tiles in flight, on any chips, in any order with a queue of any size: gathers wait across tiles.
+    #[test]
+    fn nor_do_tiles_in_flight(
+        tile in 2_u32..9,
+        order in prop::sample::select(&[GatherOrder::DirectionBins, GatherOrder::Hash, GatherOrder::Sort][..]),
+        queue in prop_oneof![Just(None), (1_u32..700).prop_map(Some)],
+        in_flight in prop_oneof![Just(None), Just(Some(1)), Just(Some(2))],
+        cards in prop::sample::select(&["emulated:1", "emulated:3", "emulated-large:1", "emulated-large:2"][..]),
+        irradiance_error in prop::sample::select(&[None, Some(0.1), Some(1e-4)][..]),
+        has_layers: bool,
+    ) {
+        let scene = everything();
+        let base = settings().with(|s| {
+            (s.picture.width, s.picture.height) = (19, 17);
+            s.photons.count = 3000;
+            s.photons.caustic_photons = Some(500);
+            s.integrator.gather_rays = 5;
+            s.integrator.irradiance_error = irradiance_error;
+            s.picture.layers = if has_layers { Layers::all() } else { Layers::default() };
+            s.schedule.tile = 8;
+        });
+        let expected = render_or_panic(&scene, &base).film;
+        let changed = base.with(|s| {
+            s.schedule = Schedule { tile, order, bins: None, queue, in_flight };
+            s.cards.addresses = vec![card(cards)];
+        });
+        let film = render_or_panic(&scene, &changed).film;
+        prop_assert!(bits(&film) == bits(&expected));
+        prop_assert!(layer_bits(&film) == layer_bits(&expected));
     }
 }
 

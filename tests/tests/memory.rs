@@ -30,7 +30,8 @@ fn settings() -> RenderSettings {
         picture: Picture { width: 21, height: 18, ..Picture::default() },
         photons: PhotonMaps { count: 5000, neighbors: 30, ..PhotonMaps::default() },
         integrator: Integrator { gather_rays: 8, shadow_rays: 2, ..Integrator::default() },
-        schedule: Schedule { tile: 8, ..Schedule::default() },
+        // With several tiles in flight misses depend on the tiles that a chip has together.
+        schedule: Schedule { tile: 8, in_flight: Some(1), ..Schedule::default() },
         cards: CardSet { addresses: vec!["emulated:1".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     }
@@ -247,6 +248,38 @@ fn what_is_counted_does_not_depend_on_how_tiles_are_dealt() {
             assert_eq!(traffic.photon_map_bytes(), one.photon_map.dram_bytes);
             assert_eq!(traffic.scene_bytes(), one.scene.dram_bytes);
         });
+    }
+}
+
+#[test]
+fn tiles_in_flight_request_as_much_and_fetch_less_of_the_photon_map() {
+    let with = |cards: &str, in_flight| {
+        measured(&settings().with(|s| {
+            s.integrator.irradiance_error = Some(0.05);
+            s.schedule.in_flight = in_flight;
+            s.cards.caches = Some(caches(SPLIT));
+            s.cards.addresses = vec![cards.parse().unwrap()];
+        }))
+    };
+    let requests = |memory: &MemoryStatistics| {
+        let stages = &memory.stages;
+        [stages.eye, stages.survey, stages.table, stages.shadow, stages.gather_ray, stages.gather]
+            .map(|reads| (reads.requests, reads.raw_bytes))
+    };
+    let (one, of_one) = with("emulated-large:1", Some(1));
+    let mut before = (of_one.drains, one.photon_map.dram_bytes);
+    for in_flight in [Some(2), None] {
+        let (several, of_several) = with("emulated-large:1", in_flight);
+        assert_eq!(requests(&several), requests(&one));
+        assert_eq!(of_several.gathers, of_one.gathers);
+        let after = (of_several.drains, several.photon_map.dram_bytes);
+        assert!(after.0 < before.0 && after.1 < before.1, "{in_flight:?}: {after:?} instead of {before:?}");
+        // Nothing in it depends on time.
+        assert_eq!(with("emulated-large:1", in_flight).0, several);
+        before = after;
+    }
+    for cards in ["emulated:3", "emulated-large:2"] {
+        assert_eq!(requests(&with(cards, None).0), requests(&one));
     }
 }
 

@@ -101,6 +101,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             order: Work = GatherOrder::Naive,
             bins: Work = Some(7),
             queue: Work = Some(9),
+            in_flight: Work = Some(1),
         }
         cards: CardSet {
             addresses: Nothing = cards("emulated-micro:2"),

@@ -1,11 +1,13 @@
 //! Chips without cards and links: tiles rendered straight from a card image, for studies and for whole-frame
 //! reordering.
 
-use photoncard_firmware::chip::{Chip, Progress};
+use photoncard_firmware::chip::{Chip, FinishedPixel, PixelView, Progress};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::kind::ChipKind;
-use photoncard_firmware::render::{Context, GatherOutlet};
+use photoncard_firmware::memory::MemoryPort;
+use photoncard_firmware::render::{GatherOutlet, RenderJob};
 use photoncard_firmware::scene::SceneImage;
+use photoncard_shared::budget::sums_of_pixel;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters, Tile};
 
@@ -16,14 +18,27 @@ pub struct RenderedTile {
     /// Light of the pixels, row by row, in the image's radiance units: one sum per pixel, or with layers
     /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
     pub sums: Vec<ColourSum>,
+    /// The other channels of the pixels, row by row.
+    pub views: Vec<PixelView>,
     /// Counts of the work.
     pub counters: Counters,
     /// Memory traffic; zero for a memory that is not modelled.
     pub traffic: MemoryTraffic,
 }
 
+impl RenderedTile {
+    /// The tile of complete pixels, in any order.
+    fn new(mut pixels: Vec<FinishedPixel>, frame: &FrameParameters, counters: Counters) -> Self {
+        pixels.sort_by_key(|pixel| pixel.index);
+        let mut sums = Vec::with_capacity(pixels.len() * sums_of_pixel(frame.layers) as usize);
+        pixels.iter().for_each(|pixel| sums.extend_from_slice(pixel.light.sums(frame)));
+        let views = pixels.into_iter().map(|pixel| pixel.view).collect();
+        Self { sums, views, counters, traffic: MemoryTraffic::ZERO }
+    }
+}
+
 /// Renders a tile on a chip with a memory of its own. With an `outlet` the pixels' gathers are sent to it instead, and the
-/// caller evaluates them and completes the pixels.
+/// caller evaluates them and adds them to the sums.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for the tile.
@@ -35,18 +50,55 @@ pub fn render_tile<K: ChipKind>(
     tile: Tile,
     outlet: Option<&mut (dyn GatherOutlet + 'static)>,
 ) -> Result<RenderedTile, Fault> {
-    let mut counters = Counters::ZERO;
     let outlet = outlet.map(|outlet| outlet as &mut dyn GatherOutlet);
-    let mut context = Context { scene, memory: &mut memory, frame, counters: &mut counters, outlet };
-    if !chip.begin(context.memory, frame, tile) {
-        return Err(Fault { code: FaultCode::Tile, detail: tile.id });
-    }
-    while chip.step(&mut context)? == Progress::Busy {}
-    if context.outlet.is_none() {
-        // Counts the reads with which a card completes its pixels.
-        for index in 0..tile.pixels() as usize {
-            while chip.complete(&mut context, index)?.is_none() {}
+    let job = &mut RenderJob { scene, memory: &mut memory, frame, outlet };
+    let mut rendered = None;
+    render_tiles(chip, job, &[tile], |_, tile| {
+        rendered = Some(tile);
+        true
+    })?;
+    let rendered = rendered.ok_or(Fault { code: FaultCode::Tile, detail: tile.id })?;
+    Ok(RenderedTile { traffic: memory.traffic(), ..rendered })
+}
+
+/// Renders tiles on a chip, with as many in flight as the frame and the chip allow. `take` is called with each tile when it is done, in
+/// any order, without its traffic, and returns whether to go on.
+///
+/// # Errors
+/// If the card image is malformed, or the chip has no room for a tile.
+pub fn render_tiles<K: ChipKind, M: MemoryPort>(
+    chip: &mut Chip<K>,
+    job: &mut RenderJob<M>,
+    tiles: &[Tile],
+    mut take: impl FnMut(&Tile, RenderedTile) -> bool,
+) -> Result<(), Fault> {
+    chip.clear();
+    let mut next = tiles.iter();
+    let mut in_flight: Vec<(&Tile, Vec<FinishedPixel>)> = Vec::new();
+    loop {
+        match chip.step(job)? {
+            Progress::Busy => {}
+            Progress::Pixel(pixel) => {
+                let of_tile = in_flight.iter_mut().find(|(tile, _)| tile.id == pixel.tile);
+                of_tile.into_iter().for_each(|(_, pixels)| pixels.push(pixel));
+            }
+            Progress::Tile(id, counters) => {
+                let Some(index) = in_flight.iter().position(|(tile, _)| tile.id == id) else { continue };
+                let (tile, pixels) = in_flight.remove(index);
+                if !take(tile, RenderedTile::new(pixels, job.frame, counters)) {
+                    return Ok(());
+                }
+            }
+            Progress::Idle => match next.next() {
+                Some(tile) => {
+                    if !chip.begin(job.memory, job.frame, *tile) {
+                        return Err(Fault { code: FaultCode::Tile, detail: tile.id });
+                    }
+                    in_flight.push((tile, Vec::with_capacity(tile.pixels() as usize)));
+                }
+                None if chip.flush(job.frame) => {}
+                None => return Ok(()),
+            },
         }
     }
-    Ok(RenderedTile { sums: chip.sums().to_vec(), counters, traffic: memory.traffic() })
 }

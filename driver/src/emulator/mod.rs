@@ -14,7 +14,7 @@ use std::thread::JoinHandle;
 use photoncard_firmware::card::{Card, sram_bytes};
 use photoncard_firmware::chip::Chip;
 use photoncard_firmware::kind::{
-    self, ChipKind as _, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
+    self, ChipKind as _, Large, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
 };
 use photoncard_firmware::memory::CardMemory;
 use photoncard_firmware::serve::serve;
@@ -33,12 +33,15 @@ use crate::link::{LoopbackPort, loopback};
 pub enum EmulatedKind {
     /// A chip of the budget [`REFERENCE`](photoncard_firmware::kind::REFERENCE).
     Reference,
+    /// A chip of the budget [`LARGE`](photoncard_firmware::kind::LARGE).
+    Large,
     /// A chip of the budget [`MICRO`](photoncard_firmware::kind::MICRO).
     Micro,
 }
 
 choices!(EmulatedKind {
     Reference = "emulated": "The reference chip",
+    Large = "emulated-large": "The large chip",
     Micro = "emulated-micro": "The micro chip",
 });
 
@@ -47,6 +50,7 @@ impl EmulatedKind {
     pub fn sram_bytes(self) -> usize {
         match self {
             Self::Reference => sram_bytes::<Reference>(),
+            Self::Large => sram_bytes::<Large>(),
             Self::Micro => sram_bytes::<Micro>(),
         }
     }
@@ -55,6 +59,7 @@ impl EmulatedKind {
     pub fn techniques(self) -> TechniqueMemory {
         match self {
             Self::Reference => Chip::<Reference>::TECHNIQUES,
+            Self::Large => Chip::<Large>::TECHNIQUES,
             Self::Micro => Chip::<Micro>::TECHNIQUES,
         }
     }
@@ -64,10 +69,11 @@ impl EmulatedKind {
         tag_bytes(&self.budget())
     }
 
-    /// Name of the kind of chip with this budget, which may be on a board: `reference`, `micro` or `other`.
+    /// Name of the kind of chip with this budget, which may be on a board: `reference`, `large`, `micro` or `other`.
     pub fn name_of(budget: &Budget) -> &'static str {
         match *budget {
             kind::REFERENCE => "reference",
+            kind::LARGE => "large",
             kind::MICRO => "micro",
             _ => "other",
         }
@@ -76,6 +82,7 @@ impl EmulatedKind {
     pub(crate) fn budget(self) -> Budget {
         match self {
             Self::Reference => Reference::BUDGET,
+            Self::Large => Large::BUDGET,
             Self::Micro => Micro::BUDGET,
         }
     }
@@ -215,6 +222,7 @@ fn serve_on<M: CardMemory, R>(
 ) -> R {
     match kind {
         EmulatedKind::Reference => serve_kind::<Reference, M, R>(memory, port, end),
+        EmulatedKind::Large => serve_kind::<Large, M, R>(memory, port, end),
         EmulatedKind::Micro => serve_kind::<Micro, M, R>(memory, port, end),
     }
 }

@@ -7,7 +7,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
-use photoncard_firmware::chip::{Completion, Component, ReferenceChip};
+use photoncard_firmware::chip::{Component, PixelView, ReferenceChip};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::kind::ReferenceCandidates;
@@ -23,7 +23,7 @@ use super::THREAD_STACK;
 use super::direct::{RenderedTile, render_tile};
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::pack::CardImage;
-use crate::sink::{FinishedTile, TileSink, pixel_positions};
+use crate::sink::{FinishedTile, TileSink};
 
 /// Maximum number of gathers that are kept at once, 32 bytes each: 4.3 GB.
 const MAX_GATHERS: u64 = 1 << 27;
@@ -76,6 +76,8 @@ struct Waiting {
 /// that are still to be added to them.
 struct Frame {
     sums: Vec<ColourSum>,
+    /// The other channels of the pixels.
+    views: Vec<PixelView>,
     waiting: Vec<Waiting>,
     counters: Counters,
     traffic: MemoryTraffic,
@@ -84,15 +86,16 @@ struct Frame {
 /// A tile whose rays are cast, with the gathers that it leaves to the host.
 struct CastTile {
     tile: RenderedTile,
-    waiting: Vec<GatherRequest>,
+    /// Gathers, each with the index of its pixel in the tile.
+    waiting: Vec<(u32, GatherRequest)>,
 }
 
 /// Collector of a chip's gathers.
-struct Outlet(Vec<GatherRequest>);
+struct Outlet(Vec<(u32, GatherRequest)>);
 
 impl GatherOutlet for Outlet {
-    fn take(&mut self, request: GatherRequest) {
-        self.0.push(request);
+    fn take(&mut self, pixel: u32, request: GatherRequest) {
+        self.0.push((pixel, request));
     }
 }
 
@@ -175,7 +178,7 @@ fn render_with<'a, M: MeasuredMemory>(
             return Err(FrameError::Stopped);
         }
     }
-    complete(job, model, &mut all, sinks)?;
+    complete(job, &all, sinks)?;
     Ok(CurveOutcome { counters: all.counters, traffic: all.traffic })
 }
 
@@ -199,11 +202,13 @@ impl Frame {
         }
         let mut all = Self {
             sums: Vec::new(),
+            views: Vec::new(),
             waiting: Vec::new(),
             counters: Counters::ZERO,
             traffic: MemoryTraffic::ZERO,
         };
         all.sums.try_reserve_exact(sums as usize).map_err(|_| too_many())?;
+        all.views.try_reserve_exact(pixels as usize).map_err(|_| too_many())?;
         all.waiting.try_reserve_exact(gathers as usize).map_err(|_| too_many())?;
         Ok(all)
     }
@@ -220,13 +225,12 @@ impl Frame {
             self.waiting.try_reserve(waiting.len()).map_err(|_| too_many())?;
             let first = self.sums.len() as u32;
             self.sums.extend(tile.sums);
+            self.views.extend(tile.views);
             self.counters.add(&tile.counters);
             self.traffic.add(&tile.traffic);
-            let sum_of = |request: &GatherRequest| {
-                first + Component::Indirect.sum_of(frame, request.target.into()) as u32
-            };
-            self.waiting
-                .extend(waiting.into_iter().map(|request| Waiting { sum: sum_of(&request), request }));
+            let sum_of = |pixel: u32| first + Component::Indirect.sum_of(frame, pixel as usize) as u32;
+            let waiting = waiting.into_iter();
+            self.waiting.extend(waiting.map(|(pixel, request)| Waiting { sum: sum_of(pixel), request }));
         }
         Ok(())
     }
@@ -251,33 +255,19 @@ fn cast_tiles<'a, M: MeasuredMemory>(
     tiles.par_iter().map_init(new_chip, cast_one).collect()
 }
 
-/// Completes the pixels, and puts the tiles into sinks.
-fn complete<'a, M: MeasuredMemory>(
-    job: CurveJob<'a>,
-    model: &impl Fn(Lines<'a>) -> M,
-    all: &mut Frame,
-    sinks: &[&dyn TileSink],
-) -> Result<(), FrameError> {
-    let (scene, memory) = job.image.view();
-    let mut memory = model(memory);
-    let counters = &mut all.counters;
-    let mut context =
-        Context { scene: &scene, memory: &mut memory, frame: job.frame, counters, outlet: None };
+/// Puts the tiles into sinks.
+fn complete(job: CurveJob, all: &Frame, sinks: &[&dyn TileSink]) -> Result<(), FrameError> {
+    let (scene, _) = job.image.view();
     let sums_of_pixel = sums_of_pixel(job.frame.layers) as usize;
-    let mut sums = all.sums.chunks_exact(sums_of_pixel);
+    let mut pixels = all.views.iter().zip(all.sums.chunks_exact(sums_of_pixel));
     for tile in job.tiles {
-        let pixels: Result<Vec<PixelRecord>, Fault> = (pixel_positions(tile).zip(sums.by_ref()))
-            .map(|((x, y), sums)| {
-                let mut completion = Completion::NOTHING;
-                while !completion.step(&mut context, x, y)? {}
-                Ok(completion.pixel(&context, sums))
-            })
-            .collect();
-        let finished = FinishedTile::of_pixels(*tile, pixels?, job.frame.layers)
+        let of_tile = pixels.by_ref().take(tile.pixels() as usize);
+        let records: Vec<PixelRecord> =
+            of_tile.map(|(view, sums)| view.record(&scene, job.frame, sums)).collect();
+        let finished = FinishedTile::of_pixels(*tile, records, job.frame.layers)
             .ok_or(Fault { code: FaultCode::Tile, detail: tile.id })?;
         sinks.iter().for_each(|sink| sink.put(&finished));
     }
-    all.traffic.add(&memory.traffic());
     Ok(())
 }
 
@@ -297,13 +287,8 @@ fn do_gathers<'a, M: MeasuredMemory>(
     let (scene, memory) = job.image.view();
     let mut memory = model(memory);
     let mut counters = Counters::ZERO;
-    let mut context = Context {
-        scene: &scene,
-        memory: &mut memory,
-        frame: job.frame,
-        counters: &mut counters,
-        outlet: None,
-    };
+    let mut context =
+        Context { scene: &scene, memory: &mut memory, frame: job.frame, counters: &mut counters };
     let mut candidates = ReferenceCandidates::new();
     let mut brought = Vec::with_capacity(waiting.len());
     for Waiting { sum, request, .. } in waiting {

@@ -142,6 +142,7 @@ impl RenderSettings {
             caustics,
             layers: self.picture.layers.are_of_chip(),
             filter: self.picture.filter,
+            in_flight: self.schedule.in_flight.unwrap_or(u32::MAX),
         }
     }
 

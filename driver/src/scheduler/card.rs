@@ -25,7 +25,7 @@ pub(super) struct Card {
     pub(super) standing: Standing,
     /// Tile of which the card sent wrong pixels.
     pub(super) lie: Option<Tile>,
-    /// Indices of the tiles assigned to the card; it works on the first.
+    /// Indices of the tiles assigned to the card; it works on the first ones, as many as it has in flight.
     pub(super) tiles: Vec<usize>,
     /// Work on the tiles that this card alone has rendered.
     pub(super) counters: Counters,

@@ -39,7 +39,7 @@ pub enum Event {
     TileLost {
         /// The returned tile.
         tile: Tile,
-        /// True if the card was working on the tile, which may be the cause.
+        /// True if the card may have been working on the tile, which may be the cause.
         was_at_work: bool,
     },
     /// The card has computed the requested results.

@@ -1,8 +1,9 @@
 //! Measurement of a point: work and memory traffic of a sample of a picture's tiles.
 
 use photoncard_firmware::chip::Chip;
-use photoncard_firmware::kind::{ChipKind, Micro, Reference};
+use photoncard_firmware::kind::{ChipKind, Large, Micro, Reference};
 use photoncard_firmware::memory::Lines;
+use photoncard_firmware::render::RenderJob;
 use photoncard_shared::address::{STRUCTURES, Structure};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
@@ -12,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sample::{Chosen, Estimate, SampleRate, choose};
 use crate::emulator::EmulatedKind;
-use crate::emulator::direct::{RenderedTile, render_tile};
+use crate::emulator::direct::{RenderedTile, render_tile, render_tiles};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
 use crate::photon_map::MappedImage;
@@ -164,8 +165,8 @@ impl Bench<'_> {
         self.pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
     }
 
-    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or, in an order
-    /// [of the whole frame](crate::scheduler::GatherOrder::is_of_whole_frame), of all.
+    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or of all if there are several in flight or the order
+    /// is [of the whole frame](crate::scheduler::GatherOrder::is_of_whole_frame).
     ///
     /// # Errors
     /// If the scene has no camera of the settings' name, the card image is malformed, or the bench is stopped.
@@ -182,17 +183,55 @@ impl Bench<'_> {
         if settings.schedule.order.is_of_whole_frame() {
             return self.whole_frame(&frame, &all, caches);
         }
+        if settings.schedule.order.has_queue() && frame.in_flight.min(chip.budget().in_flight) > 1 {
+            return match chip {
+                EmulatedKind::Reference => self.in_flight::<Reference>(&frame, &all, caches),
+                EmulatedKind::Large => self.in_flight::<Large>(&frame, &all, caches),
+                EmulatedKind::Micro => self.in_flight::<Micro>(&frame, &all, caches),
+            };
+        }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
         let tiles: Vec<Tile> = chosen.iter().map(|chosen| chosen.tile).collect();
         let model = |memory| caches.over(memory);
         let rendered = match chip {
             EmulatedKind::Reference => self.render::<Reference, _>(&frame, &tiles, &model),
+            EmulatedKind::Large => self.render::<Large, _>(&frame, &tiles, &model),
             EmulatedKind::Micro => self.render::<Micro, _>(&frame, &tiles, &model),
         }?;
         let measured = chosen.iter().zip(&rendered).map(|(Chosen { tile, stands_for }, rendered)| {
             TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic)
         });
         Ok(Measurement { tiles: measured.collect() })
+    }
+
+    /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows: what a tile reads depends
+    /// on the tiles that it is in flight with.
+    fn in_flight<K: ChipKind>(
+        &self,
+        frame: &FrameParameters,
+        tiles: &[Tile],
+        caches: &CacheSettings,
+    ) -> Result<Measurement, RenderError> {
+        let (scene, memory) = self.mapped.image.view();
+        let mut memory = caches.over(memory);
+        let mut counters = Counters::ZERO;
+        let mut stopped = (self.is_stopped)();
+        self.pool.install(|| {
+            let mut chip = Box::new(Chip::<K>::new());
+            let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
+            render_tiles(&mut chip, job, tiles, |_, tile| {
+                counters.add(&tile.counters);
+                stopped = (self.is_stopped)();
+                !stopped
+            })
+            .map_err(RenderError::Image)
+        })?;
+        if stopped {
+            return Err(RenderError::Stopped);
+        }
+        Ok(Measurement {
+            tiles: vec![TileMeasurement::new(0, 1, counters, &MeasuredMemory::traffic(&memory))],
+        })
     }
 
     fn whole_frame(

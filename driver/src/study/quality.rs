@@ -102,7 +102,7 @@ impl Reference {
 /// `settings` with tiles, order and queues replaced, which do not change pixels: the fastest order.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
     RenderSettings {
-        schedule: Schedule { tile: TILE, order: GatherOrder::Sort, bins: None, queue: None },
+        schedule: Schedule { tile: TILE, order: GatherOrder::Sort, bins: None, queue: None, in_flight: None },
         ..settings.clone()
     }
 }

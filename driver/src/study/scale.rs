@@ -98,7 +98,7 @@ impl Scale {
         if self.is_quick { quick.to_vec() } else { full.to_vec() }
     }
 
-    /// Settings without any technique but an order: 16x16 tiles, rays by the reflection, Jensen's kd-tree.
+    /// Settings without any technique but an order: 16x16 tiles, one in flight, rays by the reflection, Jensen's kd-tree.
     pub fn settings(&self, order: GatherOrder) -> RenderSettings {
         RenderSettings {
             picture: Picture { width: self.side, height: self.side, ..Picture::default() },
@@ -114,7 +114,7 @@ impl Scale {
                 sampling: Sampling::Reflection,
                 ..Integrator::default()
             },
-            schedule: Schedule { order, ..Schedule::default() },
+            schedule: Schedule { order, in_flight: Some(1), ..Schedule::default() },
             ..RenderSettings::default()
         }
     }
@@ -145,6 +145,18 @@ impl Scale {
         let chip = EmulatedKind::Reference;
         let task = Task::Traffic { chip, caches, sample: self.sample, least_tiles: self.least_tiles };
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
+    }
+
+    /// A point that measures the traffic of all tiles in flight on one chip of a kind, behind `caches`.
+    pub(super) fn on_one_chip(
+        &self,
+        scene: &str,
+        settings: RenderSettings,
+        chip: EmulatedKind,
+        caches: CacheSettings,
+    ) -> Point {
+        let task = Task::Traffic { chip, caches, sample: SampleRate::ALL, least_tiles: self.least_tiles };
+        Point { task, ..self.traffic_behind(scene, settings, caches) }
     }
 
     /// A point that measures the traffic of all tiles behind the nominal caches.
@@ -180,6 +192,7 @@ impl Scale {
             ("caches, unless said otherwise", CacheSettings::default().to_string()),
             ("share of the tiles rendered", format!("{}, at least {}", self.sample, self.least_tiles)),
             ("caches at a tile's begin", "empty".to_owned()),
+            ("tiles in flight, unless said otherwise", "1".to_owned()),
         ]
         .map(|(name, value)| (name.to_owned(), value))
         .to_vec()

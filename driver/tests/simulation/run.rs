@@ -35,7 +35,7 @@ pub(crate) struct Outcome {
     pub(crate) pixels: Option<Vec<PixelValue>>,
     /// Tiles in the sinks.
     pub(crate) tiles: HashMap<u32, FinishedTile>,
-    /// Counters of the picture's tiles.
+    /// Counters of the picture's tiles: [`work`].
     pub(crate) counters: Counters,
     pub(crate) counts: TileCounts,
     pub(crate) bytes: LinkBytes,
@@ -49,13 +49,20 @@ pub(crate) struct Outcome {
     pub(crate) steps: u64,
 }
 
+/// Counters without those that depend on the tiles that a chip has in flight together.
+fn work(counters: Counters) -> Counters {
+    Counters { drains: 0, most_waiting: 0, ..counters }
+}
+
 /// Sink that records its tiles.
 #[derive(Default)]
 pub(crate) struct Ledger(Mutex<HashMap<u32, FinishedTile>>);
 
 impl TileSink for Ledger {
     fn put(&self, tile: &FinishedTile) {
-        let before = self.0.lock().unwrap().insert(tile.tile().id, tile.clone());
+        let mut tile = tile.clone();
+        tile.counters = work(tile.counters);
+        let before = self.0.lock().unwrap().insert(tile.tile().id, tile);
         assert_eq!(before, None, "a tile is put twice");
     }
 
@@ -108,7 +115,7 @@ impl<'a> Run<'a> {
             pixels: (end == End::Complete).then(|| film.pixels().to_vec()),
             end,
             tiles: ledger.0.lock().unwrap().clone(),
-            counters: scheduler.counters(),
+            counters: work(scheduler.counters()),
             counts: scheduler.counts(),
             bytes,
             working: (0..cards).filter(|&card| scheduler.counters_of(card).eye_rays > 0).count(),

@@ -5,14 +5,15 @@ use std::time::Duration;
 use photoncard_driver::dispatcher::Dispatcher;
 use photoncard_driver::scheduler::{CardNumber, SchedulerError, Standing};
 use photoncard_driver::session::{Session, SessionError};
-use photoncard_firmware::card::MicroCard;
+use photoncard_firmware::card::Card;
+use photoncard_firmware::kind::ChipKind;
 use photoncard_shared::frame::{Frame, FrameReader};
 use photoncard_shared::message::{self, Command};
 
 use crate::conditions::Run;
 use crate::liar::Voice;
 use crate::line::{Queue, Random};
-use crate::world::{Fixture, Memory};
+use crate::world::{Fixture, Memory, Several};
 
 /// Virtual time of a step.
 const STEP: Duration = Duration::from_micros(100);
@@ -32,7 +33,7 @@ pub(crate) enum Health {
 /// Card with its link and its session.
 pub(crate) struct Station<'a> {
     pub(crate) number: CardNumber,
-    pub(crate) card: Box<MicroCard<Memory>>,
+    pub(crate) card: Box<Card<Several, Memory>>,
     pub(crate) session: Session<'a>,
     /// True after the card was silent for too long, until it is loaded again.
     pub(crate) is_lost: bool,
@@ -102,7 +103,8 @@ impl<'a> Station<'a> {
         }
         self.befall(run, step, random);
         let is_at_work = self.session.is_loaded() && self.card.is_busy();
-        if is_at_work && self.tiles.first().is_some_and(|tile| run.poison.contains(tile)) {
+        let mut in_flight = self.tiles.iter().take(Several::BUDGET.in_flight as usize);
+        if is_at_work && in_flight.any(|tile| run.poison.contains(tile)) {
             self.reset_card(run);
         }
         if self.health == Health::Well {

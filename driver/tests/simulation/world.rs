@@ -10,9 +10,11 @@ use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings,
 use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
 use photoncard_driver::scheduler::{Scheduler, tiles};
 use photoncard_driver::session::{Job, PixelLimits};
-use photoncard_firmware::card::MicroCard;
+use photoncard_firmware::card::Card;
+use photoncard_firmware::kind::{ChipKind, Entries, MICRO, TechniqueMemory};
 use photoncard_firmware::memory::{CardMemory, MemoryPort, copy_lines};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::budget::{Budget, gather_candidates};
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters};
 
@@ -85,6 +87,21 @@ impl CardMemory for Memory {
     }
 }
 
+/// The kind of a micro chip with several tiles in flight.
+pub(crate) enum Several {}
+
+impl ChipKind for Several {
+    const BUDGET: Budget = Budget { sram_bytes: 512 << 10, tiles: 4, in_flight: 3, ..MICRO };
+    const TECHNIQUE_LIMITS: TechniqueMemory =
+        TechniqueMemory { reordering: 32 << 10, irradiance_cache: 160 << 10, importance_sampling: 16 << 10 };
+    type TilePixels = Entries<{ MICRO.tile_pixels as usize }>;
+    type Candidates = Entries<{ gather_candidates(MICRO.neighbors) }>;
+    type GatherQueue = Entries<{ MICRO.gather_queue as usize }>;
+    type IrradianceRecords = Entries<{ MICRO.irradiance_records as usize }>;
+    type Points = Entries<{ MICRO.tile_pixels as usize }>;
+    type Flights = Entries<3>;
+}
+
 /// Shared state of all runs.
 pub(crate) struct Fixture {
     settings: RenderSettings,
@@ -114,9 +131,9 @@ impl Fixture {
     }
 
     /// Card that was just switched on.
-    pub(crate) fn card(&self) -> Box<MicroCard<Memory>> {
+    pub(crate) fn card(&self) -> Box<Card<Several, Memory>> {
         let lines = self.mapped.image.lines().len();
-        Box::new(MicroCard::new(Memory { lines: vec![Line::ZERO; lines] }))
+        Box::new(Card::new(Memory { lines: vec![Line::ZERO; lines] }))
     }
 
     pub(crate) fn film(&self) -> Film {

@@ -4,7 +4,7 @@
 use photoncard_firmware::chip::{MicroChip, Progress};
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::render::{Context, GatherOutlet};
+use photoncard_firmware::render::{GatherOutlet, RenderJob};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::Line;
 use photoncard_shared::counters::Counters;
@@ -33,7 +33,7 @@ const TILE_SIDE: u32 = 16;
 struct Nowhere;
 
 impl GatherOutlet for Nowhere {
-    fn take(&mut self, _: GatherRequest) {}
+    fn take(&mut self, _: u32, _: GatherRequest) {}
 }
 
 /// Renders the tile. The line after the image holds the length of the frame's parameters, and the parameters. Returns the
@@ -47,13 +47,17 @@ pub(crate) fn render(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option
     }
     let middle = |side: u32| side.saturating_sub(TILE_SIDE) / 2;
     let [x, y] = [middle(frame.width), middle(frame.height)];
-    let (memory, counters) = (&mut Lines(lines), &mut Counters::ZERO.clone());
     let mut nowhere = Nowhere;
     let outlet = (work == Work::Rays).then_some(&mut nowhere as &mut dyn GatherOutlet);
-    let mut context = Context { scene: &scene, memory, frame: &frame, counters, outlet };
-    if !chip.begin(context.memory, context.frame, Tile { id: 0, x, y, width: TILE_SIDE, height: TILE_SIDE }) {
+    let mut job = RenderJob { scene: &scene, memory: &mut Lines(lines), frame: &frame, outlet };
+    if !chip.begin(job.memory, job.frame, Tile { id: 0, x, y, width: TILE_SIDE, height: TILE_SIDE }) {
         return None;
     }
-    while chip.step(&mut context).ok()? == Progress::Busy {}
-    Some(*context.counters)
+    loop {
+        match chip.step(&mut job).ok()? {
+            Progress::Tile(_, counters) => return Some(counters),
+            Progress::Idle if !chip.flush(job.frame) => return None,
+            Progress::Busy | Progress::Pixel(_) | Progress::Idle => {}
+        }
+    }
 }

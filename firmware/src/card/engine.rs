@@ -15,12 +15,12 @@ use super::load::{CHECKSUMS_BYTES, Checksums, ImageState, Loader, OUT_OF_ORDER};
 use crate::chip::{Chip, Progress};
 use crate::kind::ChipKind;
 use crate::memory::CardMemory;
-use crate::render::Context;
+use crate::render::RenderJob;
 use crate::self_test::MemoryTester;
 use crate::self_test::arithmetic::compute_bytes;
 
 /// Maximum number of queued tile commands, over all budgets.
-pub(super) const TILE_QUEUE: usize = 4;
+pub(super) const TILE_QUEUE: usize = 8;
 
 /// Image, frame and tiles of a card: the state that commands change.
 pub(super) struct Engine<K: ChipKind> {
@@ -32,22 +32,20 @@ pub(super) struct Engine<K: ChipKind> {
     written: u32,
     checksums: Option<Checksums>,
     frame: Option<FrameParameters>,
-    /// Counters of the tile at work.
-    counters: Counters,
+    /// Tiles that the chip has not begun.
     tiles: Deque<Tile, TILE_QUEUE>,
-    at_work: Option<TileWork>,
-    /// Pixels of the tile at work, checksums, or results of a computation, to be sent.
+    /// Number of tiles that the chip has begun, and whose end is not sent.
+    begun: usize,
+    /// A tile whose pixels are sent, with its counters.
+    finished: Option<(u32, Counters)>,
+    /// True if the host sends no further tile for now.
+    is_flushed: bool,
+    /// True if the chip has nothing to do before the next command.
+    waits: bool,
+    /// Tile and index of the first pixel in `data`.
+    first: (u32, u32),
+    /// Consecutive pixels of a tile, checksums, or results of a computation, to be sent.
     data: heapless::Vec<u8, DATA_BYTES>,
-}
-
-/// Progress of the tile at work.
-#[derive(Clone, Copy)]
-enum TileWork {
-    Rendering(Tile),
-    /// The pixels from this one on are still to be completed and sent.
-    Sending(Tile, u32),
-    /// All pixels are sent.
-    Sent(Tile),
 }
 
 /// Bytes of pixels, checksums or results in one reply.
@@ -64,9 +62,12 @@ impl<K: ChipKind> Engine<K> {
             written: 0,
             checksums: None,
             frame: None,
-            counters: Counters::ZERO,
             tiles: Deque::new(),
-            at_work: None,
+            begun: 0,
+            finished: None,
+            is_flushed: false,
+            waits: false,
+            first: (0, 0),
             data: heapless::Vec::new(),
         }
     }
@@ -114,6 +115,11 @@ impl<K: ChipKind> Engine<K> {
                 Ok(Some(Reply::FrameAccepted))
             }
             Command::RenderTile(tile) => self.accept(tile).map(|()| None),
+            Command::Flush => {
+                self.is_flushed = true;
+                self.waits = false;
+                Ok(None)
+            }
             Command::Compute { operands } => self.compute(operands).map(Some),
             Command::TestMemory => {
                 self.forget();
@@ -146,17 +152,26 @@ impl<K: ChipKind> Engine<K> {
         self.checksums = None;
         self.frame = None;
         self.tiles.clear();
-        self.at_work = None;
+        self.drop_begun();
     }
 
-    /// True while tiles or checksums are at work.
+    /// Drops the tiles that the chip has begun.
+    fn drop_begun(&mut self) {
+        self.chip.clear();
+        self.begun = 0;
+        self.finished = None;
+        self.data.clear();
+    }
+
+    /// True while tiles wait or are in flight, or checksums are at work.
     fn is_at_work(&self) -> bool {
-        self.at_work.is_some() || !self.tiles.is_empty() || self.checksums.is_some()
+        self.begun > 0 || !self.tiles.is_empty() || self.checksums.is_some()
     }
 
     /// True while there is work to do without a command.
     pub(super) fn has_work(&self) -> bool {
-        self.is_at_work() || matches!(self.image, ImageState::Checking(_) | ImageState::Testing(_))
+        self.is_at_work() && !self.waits
+            || matches!(self.image, ImageState::Checking(_) | ImageState::Testing(_))
     }
 
     fn accept(&mut self, tile: Tile) -> Result<(), Fault> {
@@ -168,14 +183,15 @@ impl<K: ChipKind> Engine<K> {
             return Err(Fault { code: FaultCode::Tile, detail: tile.id });
         }
         let too_many = Fault { code: FaultCode::TooManyTiles, detail: tile.id };
-        let waiting = self.tiles.len() + usize::from(self.at_work.is_some());
-        if waiting >= K::BUDGET.tiles as usize {
+        if self.tiles.len() + self.begun >= K::BUDGET.tiles as usize {
             return Err(too_many);
         }
+        self.is_flushed = false;
+        self.waits = false;
         self.tiles.push_back(tile).map_err(|_| too_many)
     }
 
-    /// Does the next piece of work. A fault ends the tile at work.
+    /// Does the next piece of work. A fault ends the tiles that the chip has begun.
     ///
     /// # Errors
     /// The fault to be sent.
@@ -208,7 +224,7 @@ impl<K: ChipKind> Engine<K> {
         }
         let result = self.render(memory, transport);
         if result.is_err() {
-            self.at_work = None;
+            self.drop_begun();
         }
         result
     }
@@ -241,54 +257,64 @@ impl<K: ChipKind> Engine<K> {
         Ok(())
     }
 
+    /// Does the next piece of the chip's work; at most one reply is sent.
     fn render(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {
         let (Some(scene), Some(frame)) = (self.image.scene(), self.frame.as_ref()) else { return Ok(()) };
-        match self.at_work {
-            None => {
-                if let Some(tile) = self.tiles.pop_front() {
-                    if !self.chip.begin(memory, frame, tile) {
-                        return Err(Fault { code: FaultCode::Tile, detail: tile.id });
-                    }
-                    self.data.clear();
-                    self.counters = Counters::ZERO;
-                    self.at_work = Some(TileWork::Rendering(tile));
-                }
+        if let Some((tile, counters)) = self.finished.take() {
+            send(transport, &Reply::TileDone { tile, counters });
+            self.begun = self.begun.saturating_sub(1);
+            return Ok(());
+        }
+        match self.chip.step(&mut RenderJob { scene, memory, frame, outlet: None })? {
+            Progress::Busy => {}
+            Progress::Pixel(pixel) => {
+                let record = pixel.record(scene, frame);
+                self.add_pixel((pixel.tile, pixel.index), &record, transport);
             }
-            Some(TileWork::Rendering(tile)) => {
-                let counters = &mut self.counters;
-                let progress =
-                    self.chip.step(&mut Context { scene, memory, frame, counters, outlet: None })?;
-                if progress == Progress::Complete {
-                    self.at_work = Some(TileWork::Sending(tile, 0));
-                }
+            Progress::Tile(tile, counters) => {
+                self.send_pixels(transport);
+                self.finished = Some((tile, counters));
             }
-            Some(TileWork::Sending(tile, next)) => {
-                let counters = &mut self.counters;
-                let context = &mut Context { scene, memory, frame, counters, outlet: None };
-                let Some(record) = self.chip.complete(context, next as usize)? else { return Ok(()) };
-                let PixelRecord { pixel, layers } = record;
-                let data = &mut self.data;
-                let bytes = record_bytes(frame.layers);
-                // There is room: what is full is sent.
-                let _ = data.extend_from_slice(&pixel.to_bytes());
-                if let Some(layers) = layers {
-                    let _ = data.extend_from_slice(&layers.to_bytes());
+            Progress::Idle => match self.tiles.pop_front() {
+                Some(tile) if !self.chip.begin(memory, frame, tile) => {
+                    return Err(Fault { code: FaultCode::Tile, detail: tile.id });
                 }
-                let is_last = next as u64 + 1 >= tile.pixels();
-                if data.len() + bytes > data.capacity() || is_last {
-                    let first = next + 1 - (data.len() / bytes) as u32;
-                    send(transport, &Reply::Pixels { tile: tile.id, first, data });
-                    data.clear();
-                }
-                self.at_work =
-                    Some(if is_last { TileWork::Sent(tile) } else { TileWork::Sending(tile, next + 1) });
-            }
-            Some(TileWork::Sent(tile)) => {
-                send(transport, &Reply::TileDone { tile: tile.id, counters: self.counters });
-                self.at_work = None;
-            }
+                Some(_) => self.begun += 1,
+                None => self.waits = !(self.is_flushed && self.chip.flush(frame)),
+            },
         }
         Ok(())
+    }
+
+    /// Adds a pixel, by tile and index, to those to be sent, which are sent if it is not the next of them or no other fits.
+    fn add_pixel(&mut self, (tile, index): (u32, u32), record: &PixelRecord, transport: &mut Transport) {
+        let bytes = record_bytes(record.layers.is_some());
+        let (first_tile, first) = self.first;
+        let next = first + (self.data.len() / bytes) as u32;
+        if (tile, index) != (first_tile, next) {
+            self.send_pixels(transport);
+        }
+        if self.data.is_empty() {
+            self.first = (tile, index);
+        }
+        // There is room: what is full is sent.
+        let _ = self.data.extend_from_slice(&record.pixel.to_bytes());
+        if let Some(layers) = &record.layers {
+            let _ = self.data.extend_from_slice(&layers.to_bytes());
+        }
+        // A reply has room for several pixels: the first of a new one does not fill it, so that one reply is sent at most.
+        if self.data.len() + bytes > self.data.capacity() {
+            self.send_pixels(transport);
+        }
+    }
+
+    /// Sends the pixels that wait, if any.
+    fn send_pixels(&mut self, transport: &mut Transport) {
+        if !self.data.is_empty() {
+            let (tile, first) = self.first;
+            send(transport, &Reply::Pixels { tile, first, data: &self.data });
+            self.data.clear();
+        }
     }
 }
 

@@ -26,6 +26,7 @@ pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParamet
         (Parameter::IrradianceError, frame.irradiance_error.is_none_or(is_irradiance_error)),
         (Parameter::Bins, within(frame.bins, MAX_BINS)),
         (Parameter::Queue, frame.queue >= 1),
+        (Parameter::InFlight, frame.in_flight >= 1),
         (Parameter::Radiance, frame.radiance == Radiance::Density || has_irradiance(header)),
         (
             Parameter::Caustics,

@@ -1,74 +1,94 @@
-//! The completion of a pixel: its albedo, normal and depth.
+//! The completion of a pixel, once no gather of its block waits: light that needs no gather rays, albedo, normal and depth.
 //!
-//! They are computed again from all samples, as no chip has room to keep them; in steps, as a pixel may have thousands.
+//! Every sample is looked at again, as no chip has room to keep them.
 
-use glam::Vec3;
-use photoncard_shared::message::{Fault, Pixel, PixelLayers, PixelRecord};
+use photoncard_shared::message::Fault;
 
-use super::light::light_of;
-use crate::fixed_point::ColourSum;
-use crate::memory::MemoryPort;
-use crate::render::{Context, PixelSample, eye};
+use super::buffers::Shared;
+use super::finished_pixel::{Completion, FinishedPixel, PixelView};
+use super::flight::Flight;
+use super::light::{Component, PixelLight};
+use super::pixels::{allowed_error_at, direct_light, pixel_point, sample_share, seen_sample};
+use crate::irradiance_cache::IrradianceCache;
+use crate::kind::ChipKind;
+use crate::memory::{MemoryPort, Stage};
+use crate::render::eye::{Sight, View};
+use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
 
-/// Samples of one step.
-const SAMPLES_PER_STEP: u32 = 64;
-
-/// Sums over the samples of a pixel so far.
-#[derive(Clone, Copy)]
-pub struct Completion {
-    albedo: Vec3,
-    normal: Vec3,
-    depth: f32,
-    /// Samples that see a surface.
-    surfaces: u32,
-    /// The next sample to look at.
-    next: u32,
-}
-
-impl Completion {
-    /// Sums of no sample.
-    pub const NOTHING: Self =
-        Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, depth: 0.0, surfaces: 0, next: 0 };
-
-    /// Adds the next samples of the pixel in column `x` and row `y` of the picture. `true` if they were the last.
+impl<K: ChipKind> Flight<K> {
+    /// Completes the next sample of the present pixel. Returns the pixel with its last sample.
     ///
     /// # Errors
     /// If the image is not sound.
-    pub fn step<M: MemoryPort>(&mut self, context: &mut Context<M>, x: u32, y: u32) -> Result<bool, Fault> {
-        let samples = context.frame.samples;
-        let end = samples.min(self.next.saturating_add(SAMPLES_PER_STEP));
-        for sample in self.next..end {
-            let sight = eye::view(context, PixelSample { x, y, sample })?;
-            let Some(view) = sight.surface() else { continue };
-            let surface = &view.surface;
-            self.albedo += surface.reflector().albedo();
-            self.normal += surface.normal;
-            self.depth += view.depth;
-            self.surfaces += 1;
-        }
-        self.next = end;
-        Ok(end >= samples)
-    }
-
-    /// The pixel, after the last step, from its sums of light.
-    pub fn pixel<M>(&self, context: &Context<M>, sums: &[ColourSum]) -> PixelRecord {
-        let per_sample = 1.0 / context.frame.samples.max(1) as f32;
-        let per_surface = 1.0 / self.surfaces as f32;
-        let unit = context.scene.header.radiance_unit;
-        let (radiance, layers) = light_of(sums);
-        let pixel = Pixel {
-            radiance: (radiance * unit).to_array(),
-            albedo: (self.albedo * per_sample).clamp(Vec3::ZERO, Vec3::ONE).to_array(),
-            normal: (self.normal * per_sample).to_array(),
-            depth: if self.surfaces > 0 { self.depth * per_surface } else { f32::INFINITY },
-        };
-        let scaled = |light: [f32; 3]| light.map(|component| component * unit);
-        let layers = layers.map(|PixelLayers { direct, indirect, caustic, gathers }| PixelLayers {
-            direct: scaled(direct),
-            indirect: scaled(indirect),
-            caustic: scaled(caustic),
-            gathers,
+    pub(super) fn complete<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+        flight: usize,
+    ) -> Result<Option<FinishedPixel>, Fault> {
+        let pixel = self.position.index;
+        let stored = self.sum(pixel).map(|number| shared.sums.light(job.frame, (flight, number)));
+        let mut completion = self.completion.take().unwrap_or_else(|| Completion {
+            light: stored.unwrap_or(PixelLight::NONE),
+            view: PixelView::NOTHING,
+            sample: 0,
         });
-        PixelRecord { pixel, layers }
+        let at = self.sample(pixel, completion.sample);
+        let context = &mut job.context(&mut self.counters);
+        match eye::view(context, at)? {
+            Sight::Background(radiance) => {
+                completion.light.add(context.frame, Component::Direct, radiance * sample_share(context));
+            }
+            Sight::Surface(view) => {
+                completion.view.add(&view);
+                light_sample(context, &self.cache, shared, (at, &view), &mut completion.light)?;
+            }
+        }
+        completion.sample += 1;
+        if completion.sample < context.frame.samples {
+            self.completion = Some(completion);
+            return Ok(None);
+        }
+        let Completion { light, view, .. } = completion;
+        Ok(Some(FinishedPixel { tile: self.tile.id, index: self.index_in_tile(pixel), light, view }))
     }
+}
+
+/// Adds emission and interpolated irradiance of a sample and, without gather rays, its light by shadow rays and caustics.
+fn light_sample<K: ChipKind, M: MemoryPort>(
+    context: &mut Context<M>,
+    cache: &IrradianceCache<K::IrradianceRecords>,
+    shared: &mut Shared<K>,
+    (at, view): (PixelSample, &View),
+    light: &mut PixelLight,
+) -> Result<(), Fault> {
+    let frame = context.frame;
+    let share = sample_share(context);
+    let surface = &view.surface;
+    light.add(frame, Component::Direct, surface.emission * share);
+    let allowed = allowed_error_at(frame, view);
+    let interpolated =
+        allowed.and_then(|allowed| cache.interpolate(&seen_sample(context, at, view), allowed));
+    if let Some(irradiance) = interpolated {
+        let reflected = surface.reflector().lambertian_albedo() * irradiance;
+        light.add(frame, Component::Indirect, reflected * share);
+    }
+    let purpose = if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample };
+    let mut point = pixel_point(frame, at, view, purpose);
+    if point.rays > 0 {
+        if purpose == Purpose::Sample {
+            light.count_gather(frame);
+        }
+        return Ok(());
+    }
+    context.memory.enter(Stage::Shadow);
+    // The bits of a surface depend on the way it is read.
+    if let Some(seen) = &view.seen {
+        let film = eye::film_position(context, at);
+        eye::surface(context, film, seen, &mut point.surface)?;
+    }
+    for (component, brought) in direct_light(context, at, &point, shared)? {
+        light.add(frame, component, brought);
+    }
+    Ok(())
 }

@@ -10,14 +10,11 @@ use crate::photon::{CandidateStorage, Candidates};
 use crate::render::Context;
 use crate::render::final_gather::gathered;
 
-/// Candidate buffer of a gather, and the gather queue.
+/// Candidate buffer of a gather, and the gather queue, whose requests are of all tiles in flight.
 pub(super) struct Gathers<C: Capacity, Q: Capacity> {
     candidates: C::Candidates,
     queue: GatherQueue<Q>,
 }
-
-/// Number of queued gathers done in one call of [`Gathers::drain`].
-const GATHERS_PER_STEP: usize = 16;
 
 impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
     pub(super) const fn new() -> Self {
@@ -49,8 +46,8 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         self.queue.len() >= most_waiting::<Q>(frame)
     }
 
-    /// Queues a gather, or does it at once: without deferred reordering, or if the queue has filled up since the last
-    /// check of [`Self::is_full`]. `add` is called with a finished gather and its radiance.
+    /// Queues a gather, or does it at once and returns its radiance: without deferred reordering, or if the queue has filled
+    /// up since the last check of [`Self::is_full`].
     ///
     /// # Errors
     /// If the image is not sound.
@@ -58,48 +55,39 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         &mut self,
         context: &mut Context<M>,
         request: GatherRequest,
-        add: &mut impl FnMut(&GatherRequest, Vec3),
-    ) -> Result<(), Fault> {
+    ) -> Result<Option<Vec3>, Fault> {
         let must_not_wait = context.frame.drain == Drain::Immediate || self.is_full(context.frame);
         let rejected = if must_not_wait { Err(request) } else { self.queue.push(request) };
-        rejected.or_else(|request| self.gather(context, &request, add))
+        match rejected {
+            Ok(()) => Ok(None),
+            Err(request) => self.gather(context, &request).map(Some),
+        }
     }
 
-    fn begin_drain<M>(&mut self, context: &mut Context<M>) {
-        let counters = &mut *context.counters;
-        counters.drains += 1;
-        counters.most_waiting = counters.most_waiting.max(self.queue.len() as u64);
-        self.queue.begin_drain(context.frame.drain);
+    /// Begins a drain. Returns the number of gathers that wait, and the first; `None` if there are none.
+    pub(super) fn begin_drain(&mut self, drain: Drain) -> Option<(usize, &GatherRequest)> {
+        if self.queue.is_empty() {
+            return None;
+        }
+        self.queue.begin_drain(drain);
+        self.queue.first().map(|first| (self.queue.len(), first))
     }
 
-    /// Does the next [`GATHERS_PER_STEP`] queued gathers; `add` is called with each and its radiance.
+    /// The next gather of the drain; `None` ends it.
+    pub(super) fn take(&mut self) -> Option<GatherRequest> {
+        self.queue.take()
+    }
+
+    /// Does a gather. Returns its radiance.
     ///
     /// # Errors
     /// If the image is not sound.
-    pub(super) fn drain<M: MemoryPort>(
-        &mut self,
-        context: &mut Context<M>,
-        add: &mut impl FnMut(&GatherRequest, Vec3),
-    ) -> Result<(), Fault> {
-        if !self.queue.is_draining() {
-            self.begin_drain(context);
-        }
-        for _ in 0..GATHERS_PER_STEP {
-            let Some(request) = self.queue.take() else { break };
-            self.gather(context, &request, add)?;
-        }
-        Ok(())
-    }
-
-    fn gather<M: MemoryPort>(
+    pub(super) fn gather<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
         request: &GatherRequest,
-        add: &mut impl FnMut(&GatherRequest, Vec3),
-    ) -> Result<(), Fault> {
-        let brought = gathered(context, request, self.candidates.view())?;
-        add(request, brought);
-        Ok(())
+    ) -> Result<Vec3, Fault> {
+        gathered(context, request, self.candidates.view())
     }
 }
 

@@ -1,8 +1,7 @@
-//! Sums of a tile's pixels: one for each pixel, or with layers one for each component of its light.
+//! Components of a pixel's light, and their sums: one for each pixel, or with layers one for each component.
 //!
 //! Fixed-point sums are exact, so that layers do not change a bit of a pixel's radiance: it is the sum of the
-//! components. With layers a pixel takes [`SUMS_WITH_LAYERS`] sums of the buffer, the last of which counts gathers, and
-//! a tile has at most a fourth of the pixels.
+//! components. With layers a pixel takes [`SUMS_WITH_LAYERS`] sums, the last of which counts gathers.
 
 use glam::Vec3;
 use photoncard_shared::budget::{SUMS_WITH_LAYERS, sums_of_pixel};
@@ -23,7 +22,7 @@ pub enum Component {
 }
 
 impl Component {
-    /// Index of the component's sum of a pixel, among the tile's sums.
+    /// Index of the component's sum among the sums of consecutive pixels.
     #[inline(always)]
     pub fn sum_of(self, frame: &FrameParameters, pixel: usize) -> usize {
         if frame.layers { pixel * SUMS_WITH_LAYERS as usize + self as usize } else { pixel }
@@ -34,32 +33,41 @@ impl Component {
 const GATHERS: usize = Component::Caustic as usize + 1;
 const _: () = assert!(GATHERS + 1 == SUMS_WITH_LAYERS as usize);
 
-/// Adds light, in the image's radiance units, to a component of pixel `target`.
-#[inline]
-pub(super) fn add_light(
-    sums: &mut [ColourSum],
-    frame: &FrameParameters,
-    target: u16,
-    component: Component,
-    brought: Vec3,
-) {
-    if let Some(sum) = sums.get_mut(component.sum_of(frame, target.into())) {
-        sum.add_light(brought);
-    }
-}
+/// Sums of one pixel, in the image's radiance units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelLight([ColourSum; SUMS_WITH_LAYERS as usize]);
 
-/// Counts a sample of a pixel with a final gather of its own, if the frame has layers.
-#[inline]
-pub(super) fn count_gather(sums: &mut [ColourSum], frame: &FrameParameters, pixel: usize) {
-    if let Some(sum) = sums.get_mut(pixel * SUMS_WITH_LAYERS as usize + GATHERS).filter(|_| frame.layers) {
-        sum.add_light(Vec3::X);
-    }
-}
+impl PixelLight {
+    /// No light.
+    pub(super) const NONE: Self = Self([ColourSum::ZERO; SUMS_WITH_LAYERS as usize]);
 
-/// Sums of one pixel of a tile; empty past the last pixel.
-pub(super) fn sums_of<'a>(sums: &'a [ColourSum], frame: &FrameParameters, pixel: usize) -> &'a [ColourSum] {
-    let count = sums_of_pixel(frame.layers) as usize;
-    sums.get(pixel * count..(pixel + 1) * count).unwrap_or_default()
+    /// The light of stored sums, which may be fewer than a pixel can have.
+    pub(super) fn of(sums: &[ColourSum]) -> Self {
+        let mut light = Self::NONE;
+        light.0.iter_mut().zip(sums).for_each(|(sum, stored)| *sum = *stored);
+        light
+    }
+
+    /// Adds light, in the image's radiance units, to a component.
+    #[inline]
+    pub(super) fn add(&mut self, frame: &FrameParameters, component: Component, brought: Vec3) {
+        if let Some(sum) = self.0.get_mut(component.sum_of(frame, 0)) {
+            sum.add_light(brought);
+        }
+    }
+
+    /// Counts a sample with a final gather of its own, if the frame has layers.
+    #[inline]
+    pub(super) fn count_gather(&mut self, frame: &FrameParameters) {
+        if let Some(sum) = self.0.get_mut(GATHERS).filter(|_| frame.layers) {
+            sum.add_light(Vec3::X);
+        }
+    }
+
+    /// The sums: one, or in a frame with layers [`SUMS_WITH_LAYERS`].
+    pub fn sums(&self, frame: &FrameParameters) -> &[ColourSum] {
+        self.0.get(..sums_of_pixel(frame.layers) as usize).unwrap_or_default()
+    }
 }
 
 /// Radiance of a pixel, and its layers if the frame has any, from its sums; in the image's radiance units.

@@ -1,34 +1,44 @@
-//! One chip: the state of a tile, and its passes.
+//! One chip: its tiles in flight, and their passes.
 //!
-//! A tile is rendered in one block or, if its irradiance records do not fit into the cache, in several smaller ones. A
-//! block goes through the passes of `position`; every pass is done for all pixels before the next begins, so that
-//! gathers of neighbouring pixels are adjacent. Each call of [`Chip::step`] does a small piece of this work.
+//! A tile goes through the passes of `position`, block by block; every pass is done for all gather points before the next begins, so
+//! that gathers of neighbouring points are adjacent. When all rays of a block are cast, its gathers wait in the queue with those of
+//! other tiles, and the next tile begins: the queue is drained when it is full, or when there is nothing else to do. Pixels are
+//! completed when the last gather of their block is done. Each call of [`Chip::step`] does a small piece of this work.
+//!
+//! | state | kept from the command to the last pixel, of each tile in flight |
+//! |---|---|
+//! | `Flight` | tile, counters, progress, irradiance records |
+//! | `PixelSums` | sums of the pixels with gather rays: a ring for all tiles in flight |
+//! | `Points` | nothing: gather points of the tile whose rays are being cast |
+//! | `Gathers` | nothing: the queue, each gather with its tile in flight |
 
+mod buffers;
 mod completion;
+mod finished_pixel;
+mod flight;
 mod gathers;
 mod light;
+mod pixel_sums;
 mod pixels;
+mod points;
 mod position;
 mod records;
 mod stored_point;
 
-use heapless::Vec;
-use photoncard_shared::budget::sums_of_pixel;
-use photoncard_shared::message::{Fault, FrameParameters, PixelRecord, Tile};
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{Fault, FrameParameters, Tile};
 
-pub use self::completion::Completion;
-use self::gathers::Gathers;
-pub use self::light::{Component, light_of};
-use self::light::{add_light, sums_of};
-use self::position::{Block, Pass, Position};
-use self::stored_point::StoredPoint;
-use crate::fixed_point::ColourSum;
-use crate::gather::GatherQueue;
+use self::buffers::Shared;
+pub use self::finished_pixel::{FinishedPixel, PixelView};
+use self::flight::{Flight, allowed_error};
+pub use self::light::{Component, PixelLight, light_of};
+use self::position::{Pass, Position};
+use crate::gather::{GatherQueue, PointIndex};
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
-use crate::kind::{self, Buffer, Capacity, ChipKind, Micro, Reference, TechniqueMemory};
+use crate::kind::{self, Array, Capacity, ChipKind, Micro, Reference, TechniqueMemory};
 use crate::memory::MemoryPort;
-use crate::render::{Context, PixelSample};
+use crate::render::RenderJob;
 
 /// The chip of the budget [`REFERENCE`](crate::kind::REFERENCE).
 pub type ReferenceChip = Chip<Reference>;
@@ -37,37 +47,31 @@ pub type MicroChip = Chip<Micro>;
 
 /// A chip of one kind, which gives the capacities of all its buffers.
 pub struct Chip<K: ChipKind> {
-    /// Origins of gather rays: the surface that each pixel of the tile sees in the current sample, or irradiance
-    /// records.
-    points: <K::TilePixels as Capacity>::Buffer<StoredPoint>,
-    /// Sums of the tile's pixels, in the image's radiance units: [`sums_of_pixel`] for each pixel.
-    sums: <K::TilePixels as Capacity>::Buffer<ColourSum>,
-    gathers: Gathers<K::Candidates, K::GatherQueue>,
-    cache: IrradianceCache<K::IrradianceRecords, K::GatheredRecords>,
-    tile: Tile,
-    /// Blocks of the tile that have not begun, the next on top.
-    blocks: Vec<Block, MAX_BLOCKS>,
-    block: Block,
-    position: Position,
-    /// State of [`Self::complete`] for the current pixel.
-    completion: Completion,
+    flights: <K::Flights as Capacity>::Array<Flight<K>>,
+    /// The tile in flight whose rays are being cast.
+    active: Option<usize>,
+    shared: Shared<K>,
 }
-
-/// Capacity of the stack of blocks: enough for all halvings of a tile.
-const MAX_BLOCKS: usize = 32;
 
 /// Number of rays and gathers after which a step ends.
 const WORK_OF_STEP: u64 = 16;
 /// Maximum number of pieces of one step, as some pieces cast no ray.
 const PIECES_PER_STEP: u32 = 64;
+/// Maximum number of queued gathers done in one piece.
+const GATHERS_PER_PIECE: u64 = 16;
 
 /// Result of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Progress {
-    /// The tile is not complete.
+    /// There is more to do.
     Busy,
-    /// The tile's pixels are complete.
-    Complete,
+    /// A pixel of a tile is complete. The pixels of a tile come row by row or, if it is rendered in several blocks, row by row
+    /// of each block.
+    Pixel(FinishedPixel),
+    /// A tile is complete, with its last pixel before: its number, and the counts of its work.
+    Tile(u32, Counters),
+    /// There is nothing to do before the next [`Chip::begin`], for which there is room, or [`Chip::flush`].
+    Idle,
 }
 
 impl<K: ChipKind> Default for Chip<K> {
@@ -80,157 +84,189 @@ impl<K: ChipKind> Chip<K> {
     /// On-chip memory that each technique adds to the chip.
     pub const TECHNIQUES: TechniqueMemory = TechniqueMemory {
         reordering: size_of::<GatherQueue<K::GatherQueue>>(),
-        irradiance_cache: size_of::<IrradianceCache<K::IrradianceRecords, K::GatheredRecords>>(),
-        importance_sampling: K::TilePixels::ENTRIES * size_of::<DirectionTable>(),
+        irradiance_cache: K::Flights::ENTRIES * size_of::<IrradianceCache<K::IrradianceRecords>>(),
+        importance_sampling: K::Points::ENTRIES * size_of::<DirectionTable>(),
     };
 
     /// A chip without a tile.
     pub const fn new() -> Self {
         const { kind::check::<K>() };
-        Self {
-            points: Buffer::EMPTY,
-            sums: Buffer::EMPTY,
-            gathers: Gathers::new(),
-            cache: IrradianceCache::new(),
-            tile: Tile { id: 0, x: 0, y: 0, width: 0, height: 0 },
-            blocks: Vec::new(),
-            block: Block::EMPTY,
-            position: Position::DONE,
-            completion: Completion::NOTHING,
-        }
+        Self { flights: Array::VACANT, active: None, shared: Shared::new() }
     }
 
     /// Maximum number of pixels of a tile of a frame.
     pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
-        K::TilePixels::ENTRIES as u64 / u64::from(sums_of_pixel(frame.layers))
+        u64::from(K::BUDGET.pixels_of_tile(frame.layers))
     }
 
-    /// Begins a tile of a frame. Returns false if the tile has no pixels or more than [`Self::tile_pixels`].
+    /// Drops all tiles.
+    pub fn clear(&mut self) {
+        self.active = None;
+        self.shared.gathers.clear();
+        for (number, flight) in self.flights.values_mut().iter_mut().enumerate() {
+            flight.vacate();
+            self.shared.sums.end(number);
+        }
+    }
+
+    /// Begins a tile of a frame. Returns false if the tile has no pixels or more than [`Self::tile_pixels`], or as many tiles
+    /// are in flight as the frame or the chip allows.
     #[must_use]
     pub fn begin(&mut self, memory: &mut impl MemoryPort, frame: &FrameParameters, tile: Tile) -> bool {
-        memory.begin_tile();
-        self.tile = tile;
-        self.position = Position::DONE;
-        self.completion = Completion::NOTHING;
-        self.points.view_mut().clear();
-        self.sums.view_mut().clear();
-        self.gathers.clear();
-        self.blocks.clear();
         if tile.pixels() == 0 || tile.pixels() > self.tile_pixels(frame) {
             return false;
         }
-        let pixels = tile.pixels() as usize;
-        self.points.view_mut().resize(pixels, StoredPoint::NOTHING).is_ok()
-            && self
-                .sums
-                .view_mut()
-                .resize(pixels * sums_of_pixel(frame.layers) as usize, ColourSum::ZERO)
-                .is_ok()
-            && self.blocks.push(Block::whole(tile.width, tile.height)).is_ok()
+        let Some(number) = self.vacant(frame) else { return false };
+        let Some(flight) = self.flights.values_mut().get_mut(number) else { return false };
+        memory.begin_tile();
+        flight.begin(tile);
+        true
     }
 
-    /// Does the next pieces of the tile, about 16 rays and gathers: a card polls its link after each step, which must
+    /// Number of a vacant place for a tile in flight.
+    fn vacant(&self, frame: &FrameParameters) -> Option<usize> {
+        let flights = self.flights.values().iter().take(frame.in_flight.max(1) as usize);
+        flights.map(Flight::pass).position(|pass| pass == Pass::Vacant)
+    }
+
+    /// Number of the first tile in flight for which something holds.
+    fn find(&self, holds: impl Fn(&Flight<K>) -> bool) -> Option<usize> {
+        self.flights.values().iter().position(holds)
+    }
+
+    /// Begins to do the gathers that wait, as no tile follows. Returns false if there are none.
+    pub fn flush(&mut self, frame: &FrameParameters) -> bool {
+        let waits = !self.shared.gathers.is_empty();
+        if waits && !self.shared.gathers.is_draining() {
+            self.begin_drain(frame);
+        }
+        waits
+    }
+
+    /// Does the next pieces of work, about 16 rays and gathers: a card polls its link after each step, which must
     /// be short enough for a prompt reply and long enough to make the cost of polling negligible.
     ///
     /// # Errors
-    /// If the image is not sound.
-    pub fn step<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<Progress, Fault> {
-        let done = context.counters.rays_and_gathers();
+    /// If the image is not sound. All tiles should be dropped then.
+    pub fn step<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<Progress, Fault> {
+        let mut work = 0;
         for _ in 0..PIECES_PER_STEP {
-            if self.piece(context)? == Progress::Complete {
-                return Ok(Progress::Complete);
+            let progress = self.piece(job, &mut work)?;
+            if !matches!(progress, Progress::Busy) {
+                return Ok(progress);
             }
-            if context.counters.rays_and_gathers().wrapping_sub(done) >= WORK_OF_STEP {
+            if work >= WORK_OF_STEP {
                 break;
             }
         }
         Ok(Progress::Busy)
     }
 
-    /// Does the next piece of the tile: one pass of one pixel or record; in the passes of gather rays, rays of one
-    /// direction bin of it; in the survey, one cell of the lattice or one ray; or some of the queued gathers.
+    /// Does the next piece of work, and adds its rays and gathers to `work`: some of the queued gathers, one sample of a pixel to be
+    /// completed, or a piece of a pass.
     #[inline(always)]
-    fn piece<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<Progress, Fault> {
-        let pass = self.position.pass;
-        let must_be_empty = matches!(pass, Pass::Done | Pass::RecordSums);
-        let must_drain = self.gathers.is_full(context.frame) || must_be_empty && !self.gathers.is_empty();
-        if self.gathers.is_draining() || must_drain {
-            self.drain(context)?;
+    fn piece<M: MemoryPort>(&mut self, job: &mut RenderJob<M>, work: &mut u64) -> Result<Progress, Fault> {
+        if self.shared.gathers.is_draining() {
+            self.drain(job)?;
+            *work += GATHERS_PER_PIECE;
             return Ok(Progress::Busy);
         }
+        if let Some(number) = self.find(Flight::is_completable) {
+            return self.complete(job, number, work);
+        }
+        let Some(number) = self.active else { return Ok(self.go_on(job.frame)) };
+        let Self { flights, shared, .. } = self;
+        let Some(flight) = flights.values_mut().get_mut(number) else { return Ok(Progress::Idle) };
+        let pass = flight.pass();
+        if shared.gathers.is_full(job.frame) || pass == Pass::Eye && !flight.has_room(job.frame, shared) {
+            self.begin_drain(job.frame);
+            return Ok(Progress::Busy);
+        }
+        let done = flight.counters.rays_and_gathers();
         match pass {
-            Pass::Survey => self.survey(context)?,
-            Pass::RecordPoints => self.choose_record_point(context)?,
-            Pass::RecordRays => self.cast_for_record(context)?,
-            Pass::RecordSums => self.end_records(context),
-            Pass::Eye => self.look(context)?,
-            Pass::Direct => self.light_directly(context)?,
-            Pass::Rays => self.cast_for_pixel(context)?,
-            Pass::Done => return Ok(self.next_block(context)),
+            Pass::Survey => flight.survey(job, shared)?,
+            Pass::RecordPoints => flight.choose_record_point(job, shared)?,
+            Pass::RecordRays => flight.cast_for_record(job, shared, number)?,
+            Pass::Eye => flight.look(job, shared, number)?,
+            Pass::Direct => flight.light_directly(job, shared, number)?,
+            Pass::Rays => flight.cast_for_pixel(job, shared, number)?,
+            Pass::Vacant | Pass::NextBlock | Pass::Wait | Pass::Complete => self.active = None,
+        }
+        if let Some(flight) = self.flights.values().get(number) {
+            *work += flight.counters.rays_and_gathers().wrapping_sub(done);
         }
         Ok(Progress::Busy)
     }
 
-    /// Begins the next block; the tile is complete if there is none.
-    fn next_block<M>(&mut self, context: &Context<M>) -> Progress {
-        let Some(block) = self.blocks.pop() else { return Progress::Complete };
-        self.block = block;
-        match allowed_error(context.frame) {
-            None => self.position = Position::at(Pass::Eye),
-            Some(_) => self.begin_records(),
+    /// Begins the next block of a tile in flight. Without one the chip has room for a tile or must drain its queue.
+    fn go_on(&mut self, frame: &FrameParameters) -> Progress {
+        if let Some(number) = self.find(|flight| flight.pass() == Pass::NextBlock)
+            && let Some(flight) = self.flights.values_mut().get_mut(number)
+        {
+            self.shared.sums.begin(number);
+            flight.begin_block(frame);
+            self.active = Some(number);
+            return Progress::Busy;
         }
-        Progress::Busy
+        if self.vacant(frame).is_none() && self.flush(frame) { Progress::Busy } else { Progress::Idle }
     }
 
-    /// Index in the tile of the current pixel, and its current sample.
-    fn present(&self) -> (usize, PixelSample) {
-        let [column, row] = self.block.pixel(self.position.index);
-        let at = PixelSample { x: self.tile.x + column, y: self.tile.y + row, sample: self.position.sample };
-        ((row * self.tile.width + column) as usize, at)
+    /// Completes the next sample of a block whose gathers are done.
+    fn complete<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        number: usize,
+        work: &mut u64,
+    ) -> Result<Progress, Fault> {
+        let Self { flights, shared, .. } = self;
+        let Some(flight) = flights.values_mut().get_mut(number) else { return Ok(Progress::Idle) };
+        if flight.pass() == Pass::Wait {
+            if let Some(allowed) = allowed_error(job.frame) {
+                flight.cache.end_gather(&mut job.context(&mut flight.counters), allowed);
+            }
+            flight.position = Position::at(Pass::Complete);
+        }
+        if flight.position.index >= flight.block.pixels() {
+            shared.sums.end(number);
+            if flight.has_blocks() {
+                flight.position = Position::at(Pass::NextBlock);
+                return Ok(Progress::Busy);
+            }
+            flight.vacate();
+            return Ok(Progress::Tile(flight.tile.id, flight.counters));
+        }
+        let done = flight.counters.rays_and_gathers();
+        let finished = flight.complete(job, shared, number)?;
+        *work += flight.counters.rays_and_gathers().wrapping_sub(done);
+        flight.position.index += u32::from(finished.is_some());
+        Ok(finished.map_or(Progress::Busy, Progress::Pixel))
+    }
+
+    /// Begins a drain of the queue, which is counted with the tile of its first gather.
+    fn begin_drain(&mut self, frame: &FrameParameters) {
+        let Some((waiting, first)) = self.shared.gathers.begin_drain(frame.drain) else { return };
+        if let Some(flight) = self.flights.values_mut().get_mut(first.target.flight()) {
+            flight.counters.drains += 1;
+            flight.counters.most_waiting = flight.counters.most_waiting.max(waiting as u64);
+        }
     }
 
     /// Does some of the queued gathers, and adds their radiance to records or pixels.
-    fn drain<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let Self { sums, gathers, cache, position, .. } = self;
-        let frame = context.frame;
-        if matches!(position.pass, Pass::RecordRays | Pass::RecordSums) {
-            return gathers.drain(context, &mut |request, brought| {
-                cache.add(request.target, request.cell, brought);
-            });
+    fn drain<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<(), Fault> {
+        let Self { flights, shared, .. } = self;
+        for _ in 0..GATHERS_PER_PIECE {
+            let Some(request) = shared.gathers.take() else { break };
+            let (number, point) = (request.target.flight(), request.target.point());
+            let Some(flight) = flights.values_mut().get_mut(number) else { continue };
+            let brought = shared.gathers.gather(&mut job.context(&mut flight.counters), &request)?;
+            flight.waiting = flight.waiting.saturating_sub(1);
+            match point {
+                PointIndex::Pixel(pixel) => {
+                    shared.sums.add(job.frame, (number, pixel), Component::Indirect, brought);
+                }
+                PointIndex::Record(record) => flight.cache.add(record, request.target.cell(), brought),
+            }
         }
-        gathers.drain(context, &mut |request, brought| {
-            add_light(sums.view_mut(), frame, request.target, Component::Indirect, brought);
-        })
+        Ok(())
     }
-
-    /// Sums of the complete tile's pixels, row-major, in the image's radiance units: one for each pixel, or
-    /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`] in a frame with layers.
-    pub fn sums(&self) -> &[ColourSum] {
-        self.sums.view()
-    }
-
-    /// Computes the record of pixel `index`, row-major, of the complete tile, some samples at a call: `None` until the
-    /// last sample. To be called for one pixel until its record is returned.
-    ///
-    /// # Errors
-    /// If the image is not sound.
-    pub fn complete<M: MemoryPort>(
-        &mut self,
-        context: &mut Context<M>,
-        index: usize,
-    ) -> Result<Option<PixelRecord>, Fault> {
-        let width = self.tile.width.max(1);
-        let [x, y] = [self.tile.x + index as u32 % width, self.tile.y + index as u32 / width];
-        if !self.completion.step(context, x, y)? {
-            return Ok(None);
-        }
-        let completion = core::mem::replace(&mut self.completion, Completion::NOTHING);
-        // The sums of an index past the last pixel are empty: no light.
-        Ok(Some(completion.pixel(context, sums_of(self.sums.view(), context.frame, index))))
-    }
-}
-
-/// Error bound of interpolated irradiance; `None` if the frame interpolates none.
-fn allowed_error(frame: &FrameParameters) -> Option<f32> {
-    frame.irradiance_error.filter(|_| frame.gather_rays > 0)
 }

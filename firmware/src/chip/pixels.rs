@@ -1,165 +1,229 @@
-//! The passes of a block's pixels, sample by sample.
+//! The passes of a block's pixels, stripe by stripe and sample by sample: gather rays of the samples whose irradiance is not
+//! interpolated, and direct light, which is weighted against these rays.
 
 use photoncard_shared::message::{Fault, FrameParameters};
 
-use super::light::{Component, add_light, count_gather};
+use super::buffers::Shared;
+use super::flight::{Flight, allowed_error};
+use super::light::Component;
 use super::position::Pass;
 use super::stored_point::{StoredPoint, StoredRays, pattern};
-use super::{Chip, allowed_error};
-use crate::irradiance_cache::SeenSample;
-use crate::kind::{Buffer, ChipKind};
+use crate::gather::{GatherTarget, PointIndex};
+use crate::irradiance_cache::{IrradianceCache, SeenSample};
+use crate::kind::{Capacity, ChipKind};
 use crate::memory::{MemoryPort, Stage};
-use crate::render::eye::{Sight, View};
-use crate::render::{Context, GatherPoint, PixelSample, Purpose, caustic, direct, eye, final_gather};
-use crate::scene::{Seen, Surface};
+use crate::render::eye::View;
+use crate::render::{
+    Context, GatherPoint, PixelSample, Purpose, RenderJob, caustic, direct, eye, final_gather,
+};
+use crate::scene::Seen;
 
 /// The gather point of a sample, its directions not yet chosen.
-fn pixel_point(frame: &FrameParameters, at: PixelSample, surface: Surface, purpose: Purpose) -> GatherPoint {
+pub(super) fn pixel_point(
+    frame: &FrameParameters,
+    at: PixelSample,
+    view: &View,
+    purpose: Purpose,
+) -> GatherPoint {
     let pattern = pattern(frame, at);
     // With the cache, gather rays are a pixel's in number, without it a sample's.
     let is_of_pixel = allowed_error(frame).is_some();
     let rays = if is_of_pixel { frame.gather_rays.div_ceil(frame.samples.max(1)) } else { frame.gather_rays };
     if purpose == Purpose::Lobe {
-        GatherPoint::lobe(surface, pattern, rays)
+        GatherPoint::lobe(view.surface, pattern, rays)
     } else {
-        GatherPoint::sample(surface, pattern, rays)
+        GatherPoint::sample(view.surface, pattern, rays)
     }
 }
 
-impl<K: ChipKind> Chip<K> {
-    /// Casts the eye ray of the present sample; adds the light that needs no other ray.
-    pub(super) fn look<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let (index, at) = self.present();
-        let mut stored = StoredPoint::NOTHING;
-        match eye::view(context, at)? {
-            Sight::Background(radiance) => {
-                let light = radiance * sample_share(context);
-                add_light(self.sums.view_mut(), context.frame, index as u16, Component::Direct, light);
-            }
-            Sight::Surface(view) => {
-                let purpose = self.light_at_once(context, index, at, &view);
-                let mut point = pixel_point(context.frame, at, view.surface, purpose);
-                if purpose == Purpose::Sample && point.rays > 0 {
-                    count_gather(self.sums.view_mut(), context.frame, index);
+/// The error bound within which the irradiance of a sample may be interpolated; `None` if it is gathered.
+pub(super) fn allowed_error_at(frame: &FrameParameters, view: &View) -> Option<f32> {
+    // Records lie where eye rays meet surfaces, not behind mirrors and glass.
+    allowed_error(frame).filter(|_| view.is_first && view.surface.reflection.has_lambertian())
+}
+
+/// The sample of a view, for the irradiance cache.
+pub(super) fn seen_sample<'a, M>(context: &Context<M>, at: PixelSample, view: &'a View) -> SeenSample<'a> {
+    SeenSample { pixel: [at.x, at.y], film: eye::film_position(context, at), surface: &view.surface }
+}
+
+/// The gather point of a sample by geometry alone, its directions not yet chosen.
+fn gather_point<M, R: Capacity>(
+    context: &Context<M>,
+    cache: &IrradianceCache<R>,
+    at: PixelSample,
+    view: &View,
+) -> GatherPoint {
+    let allowed = allowed_error_at(context.frame, view);
+    let is_interpolated =
+        allowed.is_some_and(|allowed| cache.covers(&seen_sample(context, at, view), allowed));
+    let purpose = if is_interpolated { Purpose::Lobe } else { Purpose::Sample };
+    pixel_point(context.frame, at, view, purpose)
+}
+
+impl<K: ChipKind> Flight<K> {
+    /// Number of pixels of the stripe, all of which may have gather points.
+    fn stripe(&self) -> u32 {
+        self.block.pixels().saturating_sub(self.position.first).min(K::Points::ENTRIES as u32)
+    }
+
+    /// True if the pixel of the next eye ray has a sum, or there is room for one.
+    pub(super) fn has_room(&self, frame: &FrameParameters, shared: &Shared<K>) -> bool {
+        self.sum(self.position.first + self.position.index).is_some() || shared.sums.has_room(frame)
+    }
+
+    /// Casts the eye ray of a sample, and stores its gather point if it has gather rays.
+    pub(super) fn look<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+        flight: usize,
+    ) -> Result<(), Fault> {
+        if self.position.index == 0 {
+            shared.points.clear();
+        }
+        let pixel = self.position.first + self.position.index;
+        let at = self.sample(pixel, self.position.sample);
+        let frame = job.frame;
+        let context = &mut job.context(&mut self.counters);
+        if let Some(view) = eye::view(context, at)?.surface() {
+            let mut point = gather_point(context, &self.cache, at, &view);
+            let is_lambertian = frame.gather_rays > 0 && view.surface.reflection.has_lambertian();
+            context.counters.lambertian_samples += u64::from(is_lambertian);
+            context.counters.interpolated_samples += u64::from(point.purpose == Purpose::Lobe);
+            if point.rays > 0 {
+                point.choose_directions(context, shared.gathers.candidates())?;
+                if self.sum(pixel).is_none() {
+                    self.set_sum(pixel, shared.sums.push(frame, flight));
                 }
-                point.choose_directions(context, self.gathers.candidates())?;
-                stored = StoredPoint {
+                let stored = StoredPoint {
                     seen: view.seen.unwrap_or(Seen::ELSEWHERE),
                     directions: point.directions,
                     rays: StoredRays::new(&point),
                 };
+                shared.points.push(pixel as u16, stored);
             }
         }
-        if let Some(slot) = self.points.view_mut().get_mut(index) {
-            *slot = stored;
-        }
-        if self.position.next_index(self.block.pixels()) {
-            self.position.pass = Pass::Direct;
+        if self.position.next_index(self.stripe()) {
+            if shared.points.len() > 0 {
+                self.position.pass = Pass::Direct;
+            } else {
+                self.end_sample(frame);
+            }
         }
         Ok(())
     }
 
-    /// Adds emission and interpolated irradiance, which need no ray. Returns the purpose of the gather rays.
-    fn light_at_once<M: MemoryPort>(
+    /// Adds the light of shadow rays and caustics to the pixel of the present gather point.
+    pub(super) fn light_directly<M: MemoryPort>(
         &mut self,
-        context: &mut Context<M>,
-        index: usize,
-        at: PixelSample,
-        View { surface, is_first, .. }: &View,
-    ) -> Purpose {
-        let frame = context.frame;
-        let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
-        let sample = SeenSample { pixel: [at.x, at.y], film: eye::film_position(context, at), surface };
-        // Records lie where eye rays meet surfaces, not behind mirrors and glass.
-        let allowed = allowed_error(frame).filter(|_| is_lambertian && *is_first);
-        let interpolated = allowed.and_then(|allowed| self.cache.interpolate(&sample, allowed));
-        context.counters.lambertian_samples += u64::from(is_lambertian);
-        context.counters.interpolated_samples += u64::from(interpolated.is_some());
-        let (share, target) = (sample_share(context), index as u16);
-        add_light(self.sums.view_mut(), frame, target, Component::Direct, surface.emission * share);
-        let Some(light) = interpolated else { return Purpose::Sample };
-        let reflected = surface.reflector().lambertian_albedo() * light;
-        add_light(self.sums.view_mut(), frame, target, Component::Indirect, reflected * share);
-        Purpose::Lobe
-    }
-
-    /// Adds the light of shadow rays and caustics to the present pixel.
-    pub(super) fn light_directly<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let (index, at) = self.present();
-        context.memory.enter(Stage::Shadow);
-        let stored = self.points.view().get(index).copied().unwrap_or(StoredPoint::NOTHING);
-        let mut point = stored.point(context.frame, at);
-        if stored.read_surface(context, at, &mut point.surface)? {
-            let reflected = direct::reflected(context, at, &point)?;
-            let light = reflected * sample_share(context);
-            add_light(self.sums.view_mut(), context.frame, index as u16, Component::Direct, light);
-            let focused = caustic::reflected(context, &point, self.gathers.candidates())?;
-            let light = focused / context.frame.samples.max(1) as f32;
-            add_light(self.sums.view_mut(), context.frame, index as u16, Component::Caustic, light);
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+        flight: usize,
+    ) -> Result<(), Fault> {
+        let present = shared.points.get(self.position.index);
+        if let Some((pixel, stored)) = present
+            && let Some(number) = self.sum(pixel.into())
+        {
+            let at = self.sample(pixel.into(), self.position.sample);
+            let context = &mut job.context(&mut self.counters);
+            context.memory.enter(Stage::Shadow);
+            let mut point = stored.point(context.frame, at);
+            if stored.read_surface(context, at, &mut point.surface)? {
+                let light = direct_light(context, at, &point, shared)?;
+                for (component, light) in light {
+                    shared.sums.add(context.frame, (flight, number), component, light);
+                }
+            }
         }
-        if self.position.next_index(self.block.pixels()) {
+        if self.position.next_index(shared.points.len()) {
             self.position.pass = Pass::Rays;
         }
         Ok(())
     }
 
-    /// Goes on to the next pixel of the present row that has rays, or to the row's last one. Where irradiance is interpolated
-    /// few pixels have any, and every direction bin looks for them.
-    fn skip_pixels_without_rays(&mut self) {
-        let [column, row] = self.block.pixel(self.position.index);
-        let first = (row * self.tile.width + column) as usize;
-        let left = (self.block.x + self.block.width).saturating_sub(column) as usize;
-        let rest = self.points.view().get(first..first + left).unwrap_or_default();
-        let skipped = rest.iter().position(|stored| stored.rays.number() > 0);
-        self.position.index += skipped.unwrap_or(left.saturating_sub(1)) as u32;
-    }
-
-    /// Casts gather rays of the present bin, of the next pixel of the row that has any.
-    pub(super) fn cast_for_pixel<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        self.skip_pixels_without_rays();
-        let (index, at) = self.present();
-        let Self { points, sums, gathers, position, .. } = self;
-        let frame = context.frame;
-        context.memory.enter(Stage::GatherRay);
-        let stored = points.view().get(index).copied().unwrap_or(StoredPoint::NOTHING);
-        let of_bin = stored.rays_of_bin(frame, at, position.bin);
-        if !of_bin.is_empty()
-            && let mut point = stored.point(frame, at)
-            && stored.read_surface(context, at, &mut point.surface)?
+    /// Casts gather rays of the present bin, of the present gather point.
+    pub(super) fn cast_for_pixel<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+        flight: usize,
+    ) -> Result<(), Fault> {
+        let present = shared.points.get(self.position.index);
+        if let Some((pixel, stored)) = present
+            && let Some(number) = self.sum(pixel.into())
         {
-            let share = 1.0 / frame.samples as f32;
-            let (rays, is_last) = position.next_rays(of_bin);
-            for ray in rays {
-                // A block has at most `Budget::tile_pixels` pixels, whose indices fit in 16 bits.
-                let end = final_gather::cast(context, &point, index as u16, share, ray)?;
-                let Some(end) = end else { continue };
-                add_light(sums.view_mut(), frame, index as u16, Component::Direct, end.direct);
-                match (end.request, &mut context.outlet) {
-                    (None, _) => {}
-                    (Some(request), Some(outlet)) => {
-                        outlet.take(request);
-                    }
-                    (Some(request), None) => {
-                        gathers.submit(context, request, &mut |request, brought| {
-                            add_light(sums.view_mut(), frame, request.target, Component::Indirect, brought);
-                        })?;
+            let at = self.sample(pixel.into(), self.position.sample);
+            let index_in_tile = self.index_in_tile(pixel.into());
+            let of_bin = stored.rays_of_bin(job.frame, at, self.position.bin);
+            let (context, outlet) = &mut job.context_and_outlet(&mut self.counters);
+            context.memory.enter(Stage::GatherRay);
+            let mut point = stored.point(context.frame, at);
+            if !of_bin.is_empty() && stored.read_surface(context, at, &mut point.surface)? {
+                let share = 1.0 / context.frame.samples as f32;
+                let (rays, is_last) = self.position.next_rays(of_bin);
+                let target = GatherTarget::new(flight, PointIndex::Pixel(number));
+                for ray in rays {
+                    let Some(end) = final_gather::cast(context, &point, target, share, ray)? else {
+                        continue;
+                    };
+                    shared.sums.add(context.frame, (flight, number), Component::Direct, end.direct);
+                    match (end.request, outlet.as_deref_mut()) {
+                        (None, _) => {}
+                        (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),
+                        (Some(request), None) => match shared.gathers.submit(context, request)? {
+                            None => self.waiting += 1,
+                            Some(brought) => {
+                                shared.sums.add(
+                                    context.frame,
+                                    (flight, number),
+                                    Component::Indirect,
+                                    brought,
+                                );
+                            }
+                        },
                     }
                 }
-            }
-            if !is_last {
-                return Ok(());
+                if !is_last {
+                    return Ok(());
+                }
             }
         }
-        if position.next_index(self.block.pixels()) && position.next_bin(frame.bins) {
-            let is_last = position.next_sample(frame.samples);
-            position.pass = if is_last { Pass::Done } else { Pass::Eye };
+        if self.position.next_index(shared.points.len()) && self.position.next_bin(job.frame.bins) {
+            self.end_sample(job.frame);
         }
         Ok(())
     }
+
+    /// Goes on to the next sample of the stripe, or to the next stripe.
+    fn end_sample(&mut self, frame: &FrameParameters) {
+        let position = &mut self.position;
+        position.pass = Pass::Eye;
+        if position.next_sample(frame.samples) {
+            position.first += K::Points::ENTRIES as u32;
+            if position.first >= self.block.pixels() {
+                position.pass = Pass::Wait;
+            }
+        }
+    }
+}
+
+/// Light of shadow rays and caustics at a point, of one sample of a pixel, in the image's radiance units.
+pub(super) fn direct_light<K: ChipKind, M: MemoryPort>(
+    context: &mut Context<M>,
+    at: PixelSample,
+    point: &GatherPoint,
+    shared: &mut Shared<K>,
+) -> Result<[(Component, glam::Vec3); 2], Fault> {
+    let reflected = direct::reflected(context, at, point)?;
+    let direct = reflected * sample_share(context);
+    let focused = caustic::reflected(context, point, shared.gathers.candidates())?;
+    let caustic = focused / context.frame.samples.max(1) as f32;
+    Ok([(Component::Direct, direct), (Component::Caustic, caustic)])
 }
 
 /// The factor from a sample's radiance, W/(sr m^2), to its term in the pixel's sum.
 #[inline(always)]
-fn sample_share<M>(context: &Context<M>) -> f32 {
+pub(super) fn sample_share<M>(context: &Context<M>) -> f32 {
     1.0 / (context.frame.samples.max(1) as f32 * context.scene.header.radiance_unit)
 }

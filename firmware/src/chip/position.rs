@@ -45,26 +45,30 @@ impl Block {
     }
 }
 
-/// Passes of a block, in order. The passes from [`Pass::Survey`] to [`Pass::RecordSums`] are skipped without the
+/// Passes of a block, in order. The passes from [`Pass::Survey`] to [`Pass::RecordRays`] are skipped without the
 /// irradiance cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
+    /// No tile.
+    Vacant,
+    /// The next block has not begun.
+    NextBlock,
     /// Survey: placement of irradiance records, level by level of the lattice.
     Survey,
-    /// Directions of the gather rays of the next records, as many as are gathered at once.
+    /// Directions of the gather rays of the records.
     RecordPoints,
     /// Gather rays of the records, bin by bin.
     RecordRays,
-    /// Irradiance of the records, once the gather queue is empty.
-    RecordSums,
-    /// Eye rays of one sample of each pixel.
+    /// Eye rays of one sample of each pixel of a stripe.
     Eye,
-    /// Shadow rays and caustic gathers of the sample.
+    /// Shadow rays and caustic gathers of the samples with gather rays.
     Direct,
-    /// Gather rays of the sample, bin by bin.
+    /// Gather rays of the samples, bin by bin.
     Rays,
-    /// End of the block, once the gather queue is empty.
-    Done,
+    /// All rays are cast; gathers wait.
+    Wait,
+    /// Completion of the pixels, once no gather waits.
+    Complete,
 }
 
 /// Progress of a block.
@@ -74,7 +78,9 @@ pub(super) struct Position {
     pub(super) sample: u32,
     /// Direction bin.
     pub(super) bin: u32,
-    /// Index of the pixel in the block, or of the record among those being gathered.
+    /// First pixel of the stripe: the pixels of the block, row-major, whose gather points are stored together.
+    pub(super) first: u32,
+    /// Index of the pixel in the stripe or in the block, of the lattice point, or of the gather point.
     pub(super) index: u32,
     /// Number of rays of the bin already cast.
     rays: u32,
@@ -84,11 +90,11 @@ pub(super) struct Position {
 const RAYS_PER_STEP: u32 = 64;
 
 impl Position {
-    pub(super) const DONE: Self = Self::at(Pass::Done);
+    pub(super) const VACANT: Self = Self::at(Pass::Vacant);
 
     /// The beginning of a pass, at the first sample.
     pub(super) const fn at(pass: Pass) -> Self {
-        Self { pass, sample: 0, bin: 0, index: 0, rays: 0 }
+        Self { pass, sample: 0, bin: 0, first: 0, index: 0, rays: 0 }
     }
 
     /// The next rays to cast, at most [`RAYS_PER_STEP`], of the current bin's rays `of_bin`, and whether they are the

@@ -2,19 +2,17 @@
 
 use photoncard_shared::message::Fault;
 
+use super::buffers::Shared;
+use super::flight::{Flight, allowed_error};
 use super::position::{Pass, Position};
-use super::{Chip, MAX_BLOCKS, allowed_error};
-use crate::irradiance_cache::{Full, Window};
-use crate::kind::{Buffer, ChipKind};
+use super::stored_point::StoredPoint;
+use crate::gather::{GatherTarget, PointIndex};
+use crate::irradiance_cache::Full;
+use crate::kind::ChipKind;
 use crate::memory::MemoryPort;
-use crate::render::{Context, GatherPoint, final_gather};
+use crate::render::{GatherPoint, RenderJob, final_gather};
 
-impl<K: ChipKind> Chip<K> {
-    fn window(&self) -> Window {
-        let [x0, y0] = [self.tile.x + self.block.x, self.tile.y + self.block.y];
-        Window { x0, x1: x0 + self.block.width, y0, y1: y0 + self.block.height }
-    }
-
+impl<K: ChipKind> Flight<K> {
     /// Begins the survey of the block's records.
     pub(super) fn begin_records(&mut self) {
         self.position = Position::at(Pass::Survey);
@@ -23,99 +21,82 @@ impl<K: ChipKind> Chip<K> {
         }
     }
 
-    /// Replaces the block, whose records do not fit into the cache, by its two halves. A block of one pixel always
-    /// fits.
-    fn divide_block(&mut self) {
-        let Some([first, second]) = self.block.halves().filter(|_| self.blocks.len() + 2 <= MAX_BLOCKS)
-        else {
-            // Never reached: the cache has room for one pixel, and the stack of blocks for all halvings of a tile.
-            // Every sample would then do its own final gather.
-            return self.do_without_records();
-        };
-        for half in [second, first] {
-            let _ = self.blocks.push(half);
-        }
-        self.position = Position::DONE;
-    }
-
-    fn do_without_records(&mut self) {
-        self.cache.forget();
-        self.position = Position::at(Pass::Eye);
-    }
-
     /// Does the next step of the survey.
-    pub(super) fn survey<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let Some(allowed) = allowed_error(context.frame) else {
+    pub(super) fn survey<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+    ) -> Result<(), Fault> {
+        let Some(allowed) = allowed_error(job.frame) else {
             self.do_without_records();
             return Ok(());
         };
-        match self.cache.survey(context, &self.window(), allowed)? {
-            Ok(true) => self.begin_gather(),
+        let window = self.window();
+        match self.cache.survey(&mut job.context(&mut self.counters), &window, allowed)? {
+            Ok(true) => {
+                shared.points.clear();
+                self.position = Position::at(Pass::RecordPoints);
+            }
             Ok(false) => {}
             Err(Full) => self.divide_block(),
         }
         Ok(())
     }
 
-    /// Begins the gather of the next records, or the eye rays if all records are gathered.
-    fn begin_gather(&mut self) {
-        let count = self.cache.begin_gather(self.points.view().len());
-        self.position = Position::at(if count > 0 { Pass::RecordPoints } else { Pass::Eye });
-    }
-
     /// Chooses the directions of one record's gather rays.
     pub(super) fn choose_record_point<M: MemoryPort>(
         &mut self,
-        context: &mut Context<M>,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
     ) -> Result<(), Fault> {
         let index = self.position.index;
-        let point = self.cache.point(context.frame, index);
-        if let (Some(mut point), Some(stored)) = (point, self.points.view_mut().get_mut(index as usize)) {
-            point.choose_directions(context, self.gathers.candidates())?;
-            self.cache.set_point(index, &point);
-            stored.directions = point.directions;
+        if let Some(mut point) = self.cache.point(job.frame, index) {
+            point.choose_directions(&mut job.context(&mut self.counters), shared.gathers.candidates())?;
+            self.cache.begin_gather(index, &point);
+            // An index fits 15 bits, by the check of the kind's capacities.
+            shared.points.push(index as u16, StoredPoint::of_record(&point));
         }
-        if self.position.next_index(self.cache.being_gathered()) {
+        if self.position.next_index(self.cache.lattice_points()) {
             self.position = Position::at(Pass::RecordRays);
         }
         Ok(())
     }
 
     /// Casts gather rays of the current direction bin for one record.
-    pub(super) fn cast_for_record<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
-        let Self { points, cache, gathers, position, .. } = self;
-        let index = position.index;
-        let point = cache.point(context.frame, index);
-        if let (Some(point), Some(stored)) = (point, points.view().get(index as usize)) {
+    pub(super) fn cast_for_record<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+        flight: usize,
+    ) -> Result<(), Fault> {
+        let Shared { points, gathers, .. } = shared;
+        let Self { cache, counters, position, waiting, .. } = self;
+        let bins = job.frame.bins;
+        if let Some((record, stored)) = points.get(position.index)
+            && let Some(point) = cache.point(job.frame, record.into())
+        {
+            let context = &mut job.context(counters);
             let point = &GatherPoint { directions: stored.directions, ..point };
-            let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, context.frame.bins);
+            let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, bins);
             let (rays, is_last) = position.next_rays(of_bin);
+            let target = GatherTarget::new(flight, PointIndex::Record(record));
             for ray in rays {
-                // `index` fits 16 bits: it is below GATHERED.
-                let end = final_gather::cast(context, point, index as u16, 1.0, ray)?;
-                let Some(end) = end else { continue };
-                cache.add(index as u16, end.cell, end.direct);
+                let Some(end) = final_gather::cast(context, point, target, 1.0, ray)? else { continue };
+                cache.add(record, end.cell, end.direct);
                 if let Some(request) = end.request {
-                    gathers.submit(context, request, &mut |request, brought| {
-                        cache.add(request.target, request.cell, brought);
-                    })?;
+                    match gathers.submit(context, request)? {
+                        None => *waiting += 1,
+                        Some(brought) => cache.add(record, end.cell, brought),
+                    }
                 }
             }
             if !is_last {
                 return Ok(());
             }
         }
-        if position.next_index(cache.being_gathered()) && position.next_bin(context.frame.bins) {
-            self.position = Position::at(Pass::RecordSums);
+        if position.next_index(points.len()) && position.next_bin(bins) {
+            self.position = Position::at(Pass::Eye);
         }
         Ok(())
-    }
-
-    /// Turns the sums of the gathered records into their irradiance, and begins the next records.
-    pub(super) fn end_records<M: MemoryPort>(&mut self, context: &mut Context<M>) {
-        if let Some(allowed) = allowed_error(context.frame) {
-            self.cache.end_gather(context, allowed);
-        }
-        self.begin_gather();
     }
 }

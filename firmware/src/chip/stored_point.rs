@@ -17,22 +17,20 @@ pub(super) struct StoredPoint {
     /// Of pixels: the triangle and the place on it; elsewhere if it is seen by way of perfectly specular surfaces.
     pub(super) seen: Seen,
     pub(super) directions: DirectionTable,
-    /// Of pixels: the number of rays to cast, and their purpose.
+    /// The number of rays to cast, and their purpose.
     pub(super) rays: StoredRays,
 }
 
 const _: () = assert!(size_of::<StoredPoint>() == 48);
 
-/// The number of a pixel's rays, none in most where irradiance is interpolated; and whether they are for the lobe alone.
+/// The number of a point's rays, and whether they are for the lobe alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StoredRays(u16);
 
-const _: () = assert!(MAX_GATHER_RAYS < StoredRays::OF_LOBE as u32 - 1);
+const _: () = assert!(MAX_GATHER_RAYS < StoredRays::OF_LOBE as u32);
 
 impl StoredRays {
     const OF_LOBE: u16 = 1 << 15;
-    /// No surface.
-    pub(super) const NOWHERE: Self = Self(u16::MAX);
 
     pub(super) fn new(point: &GatherPoint) -> Self {
         let of_lobe = if point.purpose == Purpose::Lobe { Self::OF_LOBE } else { 0 };
@@ -40,27 +38,26 @@ impl StoredRays {
     }
 
     #[inline(always)]
-    pub(super) fn number(self) -> u32 {
-        if self == Self::NOWHERE { 0 } else { u32::from(self.0 & !Self::OF_LOBE) }
+    fn number(self) -> u32 {
+        u32::from(self.0 & !Self::OF_LOBE)
     }
 
     #[inline(always)]
-    pub(super) fn purpose(self) -> Purpose {
+    fn purpose(self) -> Purpose {
         if self.0 & Self::OF_LOBE != 0 { Purpose::Lobe } else { Purpose::Sample }
     }
 }
 
 impl StoredPoint {
-    pub(super) const NOTHING: Self =
-        Self { seen: Seen::NOWHERE, directions: DirectionTable::COSINE, rays: StoredRays::NOWHERE };
+    /// The point of an irradiance record: the record has its surface.
+    pub(super) fn of_record(point: &GatherPoint) -> Self {
+        Self { seen: Seen::NOWHERE, directions: point.directions, rays: StoredRays::new(point) }
+    }
 
     /// The rays of a direction bin: known before the surface is read again.
     #[inline(always)]
     pub(super) fn rays_of_bin(&self, frame: &FrameParameters, at: PixelSample, bin: u32) -> Range<u32> {
-        match self.rays.number() {
-            0 => 0..0,
-            rays => self.directions.rays(pattern(frame, at), rays, bin, frame.bins),
-        }
+        self.directions.rays(pattern(frame, at), self.rays.number(), bin, frame.bins)
     }
 
     /// The gather point of a sample of a pixel, but for its surface.
@@ -83,9 +80,6 @@ impl StoredPoint {
         at: PixelSample,
         surface: &mut Surface,
     ) -> Result<bool, Fault> {
-        if self.rays == StoredRays::NOWHERE {
-            return Ok(false);
-        }
         if self.seen.is_elsewhere() {
             // The way there is followed again.
             let Some(view) = eye::view(context, at)?.surface() else { return Ok(false) };

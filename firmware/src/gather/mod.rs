@@ -1,6 +1,6 @@
 //! Waiting photon gathers, and their order.
 //!
-//! The end of a gather ray becomes a [`GatherRequest`] of 24 bytes: position, partial reflection, pixel. Requests may be executed in any
+//! The end of a gather ray becomes a [`GatherRequest`] of 24 bytes: position, partial reflection, target. Requests may be executed in any
 //! order, as sums are in fixed point. In an order with spatial coherence, photons of one gather are still in the cache for the next
 //! (Steinhurst, Coombe, Lastra 2005, *Reordering for cache conscious photon mapping*):
 //!
@@ -15,4 +15,4 @@ mod request;
 
 pub use order::{HilbertCode, hilbert_cell, hilbert_index};
 pub use queue::GatherQueue;
-pub use request::GatherRequest;
+pub use request::{GatherRequest, GatherTarget, PointIndex};

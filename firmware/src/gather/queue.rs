@@ -1,4 +1,4 @@
-//! The gather queue of deferred reordering: requests are kept until the queue is full or their results are needed, and
+//! The gather queue of deferred reordering: requests are kept until the queue is full or no other work is left, and
 //! are then done in the order of [`super::HilbertCode::key`]. A full queue is drained before the next request; nothing is
 //! lost.
 
@@ -59,6 +59,11 @@ impl<C: Capacity> GatherQueue<C> {
         // In descending order, as requests are popped from the end.
         self.waiting.view_mut().sort_unstable_by_key(|request| u64::MAX - request.position.key(drain));
         self.draining = true;
+    }
+
+    /// The first request of a drain that has begun.
+    pub fn first(&self) -> Option<&GatherRequest> {
+        self.waiting.view().last()
     }
 
     /// The next request; `None` ends the drain.

@@ -53,7 +53,7 @@ struct Weights {
     weights: [f32; 4],
 }
 
-impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
+impl<R: Capacity> IrradianceCache<R> {
     pub(super) fn corners(&self, cell: &Cell) -> Corners<'_> {
         Corners(cell.corners().map(|corner| self.records.get(&corner).and_then(Option::as_ref)))
     }
@@ -84,6 +84,11 @@ impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
             *weight *= if error < allowed { 1.0 - error / allowed } else { 0.0 };
         }
         (weights.iter().sum::<f32>() >= MIN_WEIGHT).then_some(Weights { cell, weights })
+    }
+
+    /// True if a sample is interpolated: by the geometry of the records, gathered or not.
+    pub fn covers(&self, sample: &SeenSample, allowed: f32) -> bool {
+        self.weights(sample, allowed).is_some()
     }
 
     /// Interpolated indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample needs a final gather of

@@ -13,7 +13,9 @@
 //! - A sample interpolates the up to four corner records of its undivided cell that are valid at the surface it sees,
 //!   with weights that are continuous across cells of one size. Without a valid record it casts gather rays of its own.
 //! - All records are gathered. The coefficients of their gradients are known from the survey, so that their gathers may
-//!   be reordered like all others. Hardly any record is wasted: each is a corner of an undivided cell.
+//!   be reordered like all others, and wait with those of the pixels: geometry alone decides which samples are
+//!   interpolated, and their light is added when all gathers of the block are done. Hardly any record is wasted: each is a
+//!   corner of an undivided cell.
 //!
 //! Two tiles with a common lattice point therefore compute the same record, and there are no seams. A tile whose
 //! records do not fit into the cache is rendered in smaller blocks: more records are computed twice, and no pixel
@@ -36,70 +38,45 @@ use glam::Vec3;
 use heapless::Vec;
 use photoncard_shared::message::FrameParameters;
 
-use self::gradient::{coefficients, rotation};
-use self::record::{Content, Irradiance, Record};
+use self::gradient::coefficients;
+use self::record::{Content, GatherSums, Record};
 use self::survey_state::Survey;
-use crate::fixed_point::ColourSum;
-use crate::importance::CELLS;
-use crate::kind::{Buffer, Capacity, Map};
+use crate::kind::{Capacity, Map};
 use crate::render::{Context, GatherPoint};
 use crate::sampler::{Dimension, Pattern};
-use crate::vector::{from_upper_half, max, upper_half};
+use crate::vector::max;
 
 /// Maximum number of coarsest cells that a block may overlap.
 const MAX_ROOTS: usize = 16;
 /// Maximum number of records of a block of one pixel: 4 corners, and 5 more for each division.
 const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
-/// Irradiance records of a block: up to `R`, a power of two, of which up to `G` are gathered at once.
-pub struct IrradianceCache<R: Capacity, G: Capacity> {
+/// Irradiance records of a block: up to `R`, a power of two.
+pub struct IrradianceCache<R: Capacity> {
     /// Records by lattice point; `None` where no surface with a Lambertian part is seen.
     records: R::Map<LatticePoint, Option<Record>>,
     /// Coarsest cells, each with a bit mask of the divided cells in its quadtree ([`lattice::Cell::tree_number`]).
     roots: Vec<(LatticePoint, u32), MAX_ROOTS>,
     survey: Survey,
-    gathered: G::Buffer<GatheredRecord>,
-    /// Index of the first record that is not yet gathered or being gathered.
-    next: usize,
-}
-
-/// Sums of a record that is being gathered.
-struct GatheredRecord {
-    /// Index of the record.
-    record: usize,
-    /// Coefficients of each cell for the translational gradient, bfloat16.
-    coefficients: [[u16; 2]; CELLS],
-    mean: ColourSum,
-    translation: [ColourSum; 2],
-    rotation: [ColourSum; 2],
 }
 
 /// Error: the cache's buffers do not suffice for the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Full;
 
-impl<R: Capacity, G: Capacity> Default for IrradianceCache<R, G> {
+impl<R: Capacity> Default for IrradianceCache<R> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
-    const SUFFICES: () = {
-        assert!(R::ENTRIES >= MIN_RECORDS, "a block of one pixel must fit");
-        assert!(G::ENTRIES > 0 && G::ENTRIES <= 1 << 16, "a gather's target is told in 16 bits");
-    };
+impl<R: Capacity> IrradianceCache<R> {
+    const SUFFICES: () = assert!(R::ENTRIES >= MIN_RECORDS, "a block of one pixel must fit");
 
     /// A cache without records.
     pub const fn new() -> Self {
         let () = Self::SUFFICES;
-        Self {
-            records: Map::EMPTY,
-            roots: Vec::new(),
-            survey: Survey::BEGIN,
-            gathered: Buffer::EMPTY,
-            next: 0,
-        }
+        Self { records: Map::EMPTY, roots: Vec::new(), survey: Survey::BEGIN }
     }
 
     /// Removes all records and begins with the coarsest cells of a window of the picture.
@@ -125,86 +102,50 @@ impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
         self.records.clear();
         self.roots.clear();
         self.survey = Survey::BEGIN;
-        self.gathered.view_mut().clear();
-        self.next = 0;
     }
 
-    /// Begins the gather of the next records, up to `most`. Returns their number; 0 if all records are gathered.
-    pub fn begin_gather(&mut self, most: usize) -> u32 {
-        self.gathered.view_mut().clear();
-        while self.gathered.view().len() < most.min(G::ENTRIES) {
-            let Some((_, record)) = self.records.entry(self.next) else { break };
-            if let Some(Record { content: Content::Surveyed(_), .. }) = record {
-                let gathered = GatheredRecord {
-                    record: self.next,
-                    coefficients: [[0; 2]; CELLS],
-                    mean: ColourSum::ZERO,
-                    translation: [ColourSum::ZERO; 2],
-                    rotation: [ColourSum::ZERO; 2],
-                };
-                // Always fits: the loop ends at its capacity.
-                let _ = self.gathered.view_mut().push(gathered);
-            }
-            self.next += 1;
-        }
-        self.gathered.view().len() as u32
+    /// Number of lattice points, with a record or without.
+    pub fn lattice_points(&self) -> u32 {
+        self.records.entries() as u32
     }
 
-    /// Gather point of record `index` of the records being gathered, without directions; `None` if there is no such
-    /// record.
+    /// Gather point of the record at the lattice point `index`, without directions; `None` without a record.
     #[inline(always)]
     pub fn point(&self, frame: &FrameParameters, index: u32) -> Option<GatherPoint> {
-        let gathered = self.gathered.view().get(index as usize)?;
-        let (&LatticePoint { x, y }, record) = self.records.entry(gathered.record)?;
+        let (&LatticePoint { x, y }, record) = self.records.entry(index as usize)?;
         let pattern = Pattern::new(frame.seed, x, y, 0, Dimension::Irradiance);
         Some(GatherPoint::record(record.as_ref()?.surface(), pattern, frame.gather_rays))
     }
 
-    /// Number of records being gathered.
-    pub fn being_gathered(&self) -> u32 {
-        self.gathered.view().len() as u32
-    }
-
-    /// Sets the directions of record `index` of the records being gathered, which determine its gradient's
-    /// coefficients.
-    pub fn set_point(&mut self, index: u32, point: &GatherPoint) {
-        let Some(gathered) = self.gathered.view_mut().get_mut(index as usize) else { return };
-        let record = self.records.entry(gathered.record).and_then(|(_, record)| record.as_ref());
-        if let Some(Record { content: Content::Surveyed(distances), .. }) = record {
-            gathered.coefficients = coefficients(point, distances).map(|cell| cell.map(upper_half));
+    /// Begins the gather of a record, by the directions of its gather point, which determine its gradient's coefficients.
+    pub fn begin_gather(&mut self, index: u32, point: &GatherPoint) {
+        if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
+            && let Content::Surveyed(distances) = &record.content
+        {
+            record.content = Content::Gathering(GatherSums::new(&coefficients(point, distances)));
         }
     }
 
-    /// Adds the radiance of a gather ray in a cell of the hemisphere to record `index` of the records being gathered.
+    /// Adds the radiance of a gather ray in a cell of the hemisphere to a record that is being gathered.
     #[inline]
     pub fn add(&mut self, index: u16, cell: u8, brought: Vec3) {
-        let Some(gathered) = self.gathered.view_mut().get_mut(index as usize) else { return };
-        gathered.mean.add(brought);
-        if let Some(coefficients) = gathered.coefficients.get(cell as usize) {
-            for (sum, coefficient) in gathered.translation.iter_mut().zip(coefficients) {
-                sum.add(brought * from_upper_half(*coefficient));
-            }
-        }
-        for (sum, coefficient) in gathered.rotation.iter_mut().zip(rotation(cell)) {
-            sum.add(brought * coefficient);
+        if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
+            && let Content::Gathering(sums) = &mut record.content
+        {
+            sums.add(cell, brought);
         }
     }
 
-    /// Ends the gather of the records: turns their sums into irradiance over pi, W/(sr m^2).
+    /// Ends the gather of all records: turns their sums into irradiance over pi, W/(sr m^2).
     pub fn end_gather<M>(&mut self, context: &mut Context<M>, allowed: f32) {
         let unit = context.scene.header.radiance_unit;
-        for gathered in self.gathered.view() {
+        for index in 0..self.records.entries() {
+            let Some((_, Some(record))) = self.records.entry_mut(index) else { continue };
+            let Content::Gathering(sums) = &record.content else { continue };
             context.counters.records += 1;
-            let record = self.records.entry_mut(gathered.record);
-            let Some((_, Some(record))) = record else { continue };
-            let irradiance = Irradiance {
-                mean: gathered.mean.value() * unit,
-                translation: gathered.translation.map(|sum| sum.value() * (unit / record.distance)),
-                rotation: gathered.rotation.map(|sum| sum.value() * unit),
-            };
+            let irradiance = sums.irradiance(unit, record.distance);
             let reach = libm::sqrtf(allowed) * record.radius;
             record.content = Content::Gathered(irradiance.limited(max(reach, record.distance)));
         }
-        self.gathered.view_mut().clear();
     }
 }

@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::gradient::Distances;
+use super::gradient::{Coefficients, Distances, rotation};
+use crate::fixed_point::ColourSum;
 use crate::importance::CELLS;
 use crate::scene::Surface;
 use crate::vector::{from_upper_half, max, tangents, upper_half};
@@ -15,8 +16,55 @@ pub(super) enum Content {
     Surveying([u16; CELLS]),
     /// After the survey: distances to the surroundings.
     Surveyed(Distances),
+    /// During the gather: its sums.
+    Gathering(GatherSums),
     /// After the gather: irradiance.
     Gathered(Irradiance),
+}
+
+/// Sums of a record that is being gathered, in the image's radiance units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GatherSums {
+    /// Coefficients of each cell for the translational gradient, bfloat16.
+    coefficients: [[u16; 2]; CELLS],
+    mean: ColourSum,
+    translation: [ColourSum; 2],
+    rotation: [ColourSum; 2],
+}
+
+impl GatherSums {
+    /// Empty sums.
+    pub(super) fn new(coefficients: &Coefficients) -> Self {
+        Self {
+            coefficients: coefficients.map(|cell| cell.map(upper_half)),
+            mean: ColourSum::ZERO,
+            translation: [ColourSum::ZERO; 2],
+            rotation: [ColourSum::ZERO; 2],
+        }
+    }
+
+    /// Adds the radiance of a gather ray in a cell of the hemisphere.
+    #[inline]
+    pub(super) fn add(&mut self, cell: u8, brought: Vec3) {
+        self.mean.add(brought);
+        if let Some(coefficients) = self.coefficients.get(cell as usize) {
+            for (sum, coefficient) in self.translation.iter_mut().zip(coefficients) {
+                sum.add(brought * from_upper_half(*coefficient));
+            }
+        }
+        for (sum, coefficient) in self.rotation.iter_mut().zip(rotation(cell)) {
+            sum.add(brought * coefficient);
+        }
+    }
+
+    /// The irradiance, with the radiance unit and the record's harmonic mean distance, metres.
+    pub(super) fn irradiance(&self, unit: f32, distance: f32) -> Irradiance {
+        Irradiance {
+            mean: self.mean.value() * unit,
+            translation: self.translation.map(|sum| sum.value() * (unit / distance)),
+            rotation: self.rotation.map(|sum| sum.value() * unit),
+        }
+    }
 }
 
 /// Indirect irradiance at a record. Gradients are in the surface's tangent plane, components along tangent and

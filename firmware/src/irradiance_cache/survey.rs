@@ -22,7 +22,7 @@ use crate::scene::{Ray, Surface, closest_hit};
 /// Minimum reach of a record, pixels.
 const MIN_REACH: f32 = 3.0;
 
-impl<R: Capacity, G: Capacity> IrradianceCache<R, G> {
+impl<R: Capacity> IrradianceCache<R> {
     /// Does the next piece of the survey: one lattice cell, or one ray of one record. Returns whether it was the last.
     ///
     /// # Errors

@@ -18,6 +18,8 @@ pub trait Capacity: 'static {
     type Buffer<T>: Buffer<T>;
     /// A hash map of up to [`Self::ENTRIES`] values, which must be a power of two.
     type Map<K: Eq + Hash, V>: Map<K, V>;
+    /// An array of [`Self::ENTRIES`] values, there from the beginning.
+    type Array<T: Vacant>: Array<T>;
     /// A buffer of [`Self::ENTRIES`] candidates of a photon search.
     type Candidates: CandidateStorage;
 }
@@ -29,6 +31,7 @@ impl<const N: usize> Capacity for Entries<N> {
     const ENTRIES: usize = N;
     type Buffer<T> = Vec<T, N>;
     type Map<K: Eq + Hash, V> = FnvIndexMap<K, V, N>;
+    type Array<T: Vacant> = [T; N];
     type Candidates = CandidateBuffer<N>;
 }
 
@@ -55,6 +58,38 @@ impl<T, const N: usize> Buffer<T> for Vec<T, N> {
     #[inline(always)]
     fn view_mut(&mut self) -> &mut VecView<T> {
         self.as_mut_view()
+    }
+}
+
+/// A value of large state, which is built in place and never moved.
+pub trait Vacant {
+    /// The value without a use.
+    const VACANT: Self;
+}
+
+/// An array of fixed length.
+pub trait Array<T> {
+    /// The array of values without a use.
+    const VACANT: Self;
+
+    /// The values, to be read.
+    fn values(&self) -> &[T];
+
+    /// The values, to be changed.
+    fn values_mut(&mut self) -> &mut [T];
+}
+
+impl<T: Vacant, const N: usize> Array<T> for [T; N] {
+    const VACANT: Self = [T::VACANT; N];
+
+    #[inline(always)]
+    fn values(&self) -> &[T] {
+        self
+    }
+
+    #[inline(always)]
+    fn values_mut(&mut self) -> &mut [T] {
+        self
     }
 }
 

@@ -1,7 +1,7 @@
 //! The trait of a kind of chip, and the memory of its techniques and caches.
 
 use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::budget::{Budget, gather_candidates};
+use photoncard_shared::budget::{Budget, MAX_IN_FLIGHT, MAX_TILE_PIXELS, gather_candidates};
 
 use super::capacity::Capacity;
 use crate::memory::CacheEntry;
@@ -20,8 +20,10 @@ pub trait ChipKind: 'static {
     type GatherQueue: Capacity;
     /// [`Budget::irradiance_records`].
     type IrradianceRecords: Capacity;
-    /// [`Budget::gathered_records`].
-    type GatheredRecords: Capacity;
+    /// Gather points whose rays are cast together: of the records of a block, or of as many pixels of it.
+    type Points: Capacity;
+    /// [`Budget::in_flight`].
+    type Flights: Capacity;
 }
 
 /// On-chip memory that each technique adds to a chip, bytes.
@@ -29,9 +31,9 @@ pub trait ChipKind: 'static {
 pub struct TechniqueMemory {
     /// Deferred reordering: the gather queue.
     pub reordering: usize,
-    /// Irradiance cache: its records, and the sums of the records being gathered.
+    /// Irradiance cache: the records of all tiles in flight, with their sums.
     pub irradiance_cache: usize,
-    /// Combined importance sampling: a direction table for every pixel of a tile.
+    /// Combined importance sampling: a direction table for every gather point.
     pub importance_sampling: usize,
 }
 
@@ -50,10 +52,17 @@ pub(crate) const fn check<K: ChipKind>() {
     assert!(K::TilePixels::ENTRIES == budget.tile_pixels as usize, "TilePixels is not of the budget");
     assert!(K::Candidates::ENTRIES == gather_candidates(budget.neighbors), "Candidates is not of the budget");
     assert!(K::GatherQueue::ENTRIES == budget.gather_queue as usize, "GatherQueue is not of the budget");
-    let records = [K::IrradianceRecords::ENTRIES, K::GatheredRecords::ENTRIES];
-    assert!(records[0] == budget.irradiance_records as usize, "IrradianceRecords is not of the budget");
-    assert!(records[1] == budget.gathered_records as usize, "GatheredRecords is not of the budget");
-    assert!(budget.tile_pixels <= 1 << 16, "the target of a gather has 16 bits");
+    let records = K::IrradianceRecords::ENTRIES;
+    assert!(records == budget.irradiance_records as usize, "IrradianceRecords is not of the budget");
+    assert!(K::Flights::ENTRIES == budget.in_flight as usize, "Flights is not of the budget");
+    assert!(K::Points::ENTRIES >= records, "all records of a block are gathered together");
+    assert!(budget.tile_pixels <= MAX_TILE_PIXELS, "the target of a gather has 15 bits for a pixel");
+    assert!(records <= MAX_TILE_PIXELS as usize, "the target of a gather has 15 bits for a record");
+    assert!(
+        budget.in_flight >= 1 && budget.in_flight <= MAX_IN_FLIGHT,
+        "the target of a gather has 3 bits for its tile"
+    );
+    assert!(budget.in_flight <= budget.tiles, "a tile in flight takes a credit");
 }
 
 /// On-chip memory of a budget's caches and their tags, bytes.

@@ -17,10 +17,10 @@ pub const MICRO: Budget = Budget {
     gather_rays: MAX_GATHER_RAYS,
     gather_queue: 1024,
     irradiance_records: 128,
-    gathered_records: 128,
     shadow_rays: 64,
     samples: 4096,
     tiles: 2,
+    in_flight: 1,
 };
 
 /// The kind of the micro chip: [`MICRO`].
@@ -38,5 +38,6 @@ impl ChipKind for Micro {
     type Candidates = Entries<{ gather_candidates(MICRO.neighbors) }>;
     type GatherQueue = Entries<{ MICRO.gather_queue as usize }>;
     type IrradianceRecords = Entries<{ MICRO.irradiance_records as usize }>;
-    type GatheredRecords = Entries<{ MICRO.gathered_records as usize }>;
+    type Points = Entries<256>;
+    type Flights = Entries<{ MICRO.in_flight as usize }>;
 }

@@ -6,11 +6,13 @@
 
 mod capacity;
 mod chip_kind;
+mod large;
 mod micro;
 mod reference;
 
-pub use capacity::{Buffer, Capacity, Entries, Map};
+pub use capacity::{Array, Buffer, Capacity, Entries, Map, Vacant};
 pub(crate) use chip_kind::check;
 pub use chip_kind::{ChipKind, TechniqueMemory, cache_bytes, tag_bytes};
+pub use large::{LARGE, Large};
 pub use micro::{MICRO, Micro};
 pub use reference::{REFERENCE, Reference, ReferenceCandidates};

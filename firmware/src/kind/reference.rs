@@ -7,7 +7,7 @@ use super::chip_kind::{ChipKind, TechniqueMemory};
 use crate::photon::CandidateBuffer;
 
 /// Budget of the reference chip: a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB (section 7.3.2);
-/// tiles have up to 64x64 pixels (16x16 in the dissertation).
+/// tiles have up to 64x64 pixels (16x16 in the dissertation). Two tiles in flight leave room for the gather points of half a tile.
 pub const REFERENCE: Budget = Budget {
     sram_bytes: 1 << 20,
     dram_bytes: 512 << 20,
@@ -17,12 +17,12 @@ pub const REFERENCE: Budget = Budget {
     tile_pixels: 4096,
     neighbors: 256,
     gather_rays: MAX_GATHER_RAYS,
-    gather_queue: 12_640,
+    gather_queue: 10_000,
     irradiance_records: 512,
-    gathered_records: 512,
     shadow_rays: 64,
     samples: 4096,
     tiles: 4,
+    in_flight: 2,
 };
 
 /// The kind of the reference chip: [`REFERENCE`].
@@ -33,14 +33,15 @@ impl ChipKind for Reference {
     const BUDGET: Budget = REFERENCE;
     const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
         reordering: 299 << 10,
-        irradiance_cache: 189 << 10,
+        irradiance_cache: 320 << 10,
         importance_sampling: 136 << 10,
     };
     type TilePixels = Entries<{ REFERENCE.tile_pixels as usize }>;
     type Candidates = Entries<{ gather_candidates(REFERENCE.neighbors) }>;
     type GatherQueue = Entries<{ REFERENCE.gather_queue as usize }>;
     type IrradianceRecords = Entries<{ REFERENCE.irradiance_records as usize }>;
-    type GatheredRecords = Entries<{ REFERENCE.gathered_records as usize }>;
+    type Points = Entries<2048>;
+    type Flights = Entries<{ REFERENCE.in_flight as usize }>;
 }
 
 /// Buffer of the candidates of a search with all neighbours of [`REFERENCE`]: for searches on the host.

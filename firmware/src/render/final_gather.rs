@@ -7,7 +7,7 @@ use photoncard_shared::message::{Fault, Radiance};
 
 use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choice};
 use super::{Context, GatherPoint, direct};
-use crate::gather::{GatherRequest, HilbertCode};
+use crate::gather::{GatherRequest, GatherTarget, HilbertCode};
 use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
@@ -33,7 +33,7 @@ pub struct GatherRayEnd {
 pub fn cast<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
-    target: u16,
+    target: GatherTarget,
     share: f32,
     index: u32,
 ) -> Result<Option<GatherRayEnd>, Fault> {
@@ -81,8 +81,7 @@ pub fn cast<M: MemoryPort>(
             weight * (header.photon_power_unit / header.radiance_unit),
             point.pattern.dither(index),
         ),
-        target,
-        cell: sampled.cell,
+        target: target.in_cell(sampled.cell),
     });
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request }))
 }

@@ -30,14 +30,43 @@ pub struct Context<'a, M> {
     pub frame: &'a FrameParameters,
     /// Counters of the tile.
     pub counters: &'a mut Counters,
+}
+
+/// Arguments of a chip's work on all its tiles.
+pub struct RenderJob<'a, M> {
+    /// Sections of the card image.
+    pub scene: &'a SceneImage,
+    /// Card memory.
+    pub memory: &'a mut M,
+    /// Frame parameters.
+    pub frame: &'a FrameParameters,
     /// Receiver of the pixels' gathers, if the chip does not execute them itself.
     pub outlet: Option<&'a mut dyn GatherOutlet>,
 }
 
+impl<M> RenderJob<'_, M> {
+    /// Arguments of a pass of a tile, with its counters.
+    #[inline(always)]
+    pub fn context<'b>(&'b mut self, counters: &'b mut Counters) -> Context<'b, M> {
+        Context { scene: self.scene, memory: self.memory, frame: self.frame, counters }
+    }
+
+    /// Arguments of a pass of a tile, and the receiver of its gathers.
+    #[inline(always)]
+    pub(crate) fn context_and_outlet<'b>(
+        &'b mut self,
+        counters: &'b mut Counters,
+    ) -> (Context<'b, M>, Option<&'b mut dyn GatherOutlet>) {
+        let Self { scene, memory, frame, outlet } = self;
+        let outlet = outlet.as_deref_mut().map(|outlet| outlet as &mut dyn GatherOutlet);
+        (Context { scene, memory, frame, counters }, outlet)
+    }
+}
+
 /// Receiver of gathers of pixels: a host with memory for the gathers of a whole frame (`--order hilbert`).
 pub trait GatherOutlet {
-    /// Takes a gather; its target is the pixel's index in the tile.
-    fn take(&mut self, request: GatherRequest);
+    /// Takes a gather of a pixel, by its index in the tile.
+    fn take(&mut self, pixel: u32, request: GatherRequest);
 }
 
 /// One sample of one pixel, on which random numbers depend.

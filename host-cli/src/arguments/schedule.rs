@@ -24,6 +24,9 @@ pub(crate) struct ScheduleOptions {
     /// Gathers that may wait on a chip, for orders with a queue [default: the chip's capacity]
     #[arg(long, hide_short_help = true)]
     pub(super) queue: Option<u32>,
+    /// Tiles in flight on a chip, whose gathers may wait in the queue together [default: the chip's capacity]
+    #[arg(long, hide_short_help = true)]
+    pub(super) in_flight: Option<u32>,
 }
 
 impl ScheduleOptions {
@@ -34,6 +37,7 @@ impl ScheduleOptions {
             order: self.order,
             bins: self.bins,
             queue: self.queue,
+            in_flight: self.in_flight,
         }
     }
 }

@@ -84,6 +84,8 @@ impl SweepArguments {
             schedule: schedule.settings(&picture.layers(), &cards),
             ..base
         };
+        // With several tiles in flight no tile can be measured alone.
+        let settings = settings.with(|s| s.schedule.in_flight = s.schedule.in_flight.or(Some(1)));
         let task = Task::Traffic {
             chip: *card,
             caches: caches.first().copied().unwrap_or_default(),

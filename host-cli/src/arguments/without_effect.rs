@@ -50,6 +50,11 @@ impl RenderOptions {
                 format!("with --order {name}, by which no gathers wait on a chip"),
             ),
             (
+                self.schedule.in_flight.is_some() && !order.has_queue(),
+                "--in-flight",
+                format!("with --order {name}, by which no gathers wait on a chip"),
+            ),
+            (
                 self.photons.caustic_photons.is_some_and(|photons| photons > 0) && !has_map,
                 "--caustic-photons",
                 without_specular,

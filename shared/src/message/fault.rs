@@ -85,11 +85,15 @@ pub enum Parameter {
     Caustics,
     /// Layers of the pixels.
     Layers,
+    /// Pixel filter.
+    Filter,
+    /// Tiles in flight.
+    InFlight,
 }
 
 impl Parameter {
     /// All parameters, in the order of their numbers.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::Width,
         Self::Height,
         Self::Camera,
@@ -107,6 +111,8 @@ impl Parameter {
         Self::Radiance,
         Self::Caustics,
         Self::Layers,
+        Self::Filter,
+        Self::InFlight,
     ];
 
     /// The fault of a card that cannot render with this parameter's value.
@@ -134,6 +140,8 @@ impl Parameter {
             Self::Radiance => "radiance at the ends of gather rays",
             Self::Caustics => "gathers of caustics",
             Self::Layers => "layers",
+            Self::Filter => "pixel filter",
+            Self::InFlight => "tiles in flight",
         }
     }
 }

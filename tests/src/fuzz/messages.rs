@@ -44,6 +44,7 @@ pub(super) fn frame() -> FrameParameters {
         radiance: Radiance::Precomputed,
         caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
         layers: false,
+        in_flight: 3,
     }
 }
 
@@ -60,6 +61,7 @@ pub(super) fn commands() -> Vec<Vec<u8>> {
         Command::RenderTile(Tile { id: 7, x: 300, y: 16, width: 16, height: 16 }),
         Command::Compute { operands: &data[..24] },
         Command::TestMemory,
+        Command::Flush,
     ];
     commands.iter().map(|command| written(MAX_PAYLOAD, |bytes| message::encode(command, bytes))).collect()
 }

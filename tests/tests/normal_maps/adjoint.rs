@@ -70,8 +70,7 @@ fn found(packed: &PackedScene, view: &Camera) -> f64 {
         let (image, mut memory) = packed.view();
         let mut counters = Counters::ZERO;
         let counters = &mut counters;
-        let mut context =
-            Context { scene: &image, memory: &mut memory, frame: &frame, counters, outlet: None };
+        let mut context = Context { scene: &image, memory: &mut memory, frame: &frame, counters };
         (task * OF_A_TASK..(task + 1) * OF_A_TASK).map(|index| path_to_the_lamp(&mut context, index)).sum()
     };
     let sums: Vec<f64> = (0..PATHS / OF_A_TASK).into_par_iter().map(of_task).collect();

@@ -52,6 +52,9 @@ impl RenderSettings {
         if self.schedule.queue.is_some() || self.schedule.order.has_queue() {
             on_card("--queue", self.schedule.queue.unwrap_or(1), 1, budget.gather_queue)?;
         }
+        if let Some(in_flight) = self.schedule.in_flight {
+            on_card("--in-flight", in_flight, 1, budget.in_flight)?;
+        }
         on_card("--tile", self.schedule.tile, 1, budget.pixels_of_tile(false).isqrt())?;
         self.check_tile_with_layers(budget)
     }

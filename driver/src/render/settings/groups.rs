@@ -127,11 +127,13 @@ pub struct Schedule {
     pub bins: Option<u32>,
     /// Maximum number of gathers that wait on a chip, for orders with a queue; `None` for the chip's capacity.
     pub queue: Option<u32>,
+    /// Maximum number of tiles in flight on a chip; `None` for the chip's own.
+    pub in_flight: Option<u32>,
 }
 
 impl Default for Schedule {
     fn default() -> Self {
-        Self { tile: 16, order: GatherOrder::Sort, bins: None, queue: None }
+        Self { tile: 16, order: GatherOrder::Sort, bins: None, queue: None, in_flight: None }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The studies: each a list of points, and a report on their outcomes.
 
 mod balance;
+mod flights;
 mod glossy_floor;
 mod machine;
 mod present;

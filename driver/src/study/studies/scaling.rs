@@ -1,4 +1,5 @@
-//! Traffic over the number of photons, the side of tiles and the size of the queue; time over the number of chips.
+//! Traffic over the number of photons, the side of tiles, the size of the queue and the number of tiles in flight; time over the number of
+//! chips.
 
 use photoncard_firmware::kind::REFERENCE;
 
@@ -8,6 +9,7 @@ use super::super::point::Point;
 use super::super::report::{Block, Column, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
 use super::balance::{CREDITS, chip_counts, curves, deal};
+use super::flights;
 use super::machine::symbols;
 use super::present::{
     columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table, text,
@@ -123,6 +125,7 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
         }
     }
     points.push(chips_point(scale));
+    points.extend(flights::points(scale));
     points
 }
 
@@ -135,6 +138,7 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     ];
     let mut sections: Vec<_> =
         SWEEPS.iter().map(|sweep| section(sweep.heading, sweep.blocks(scale, results))).collect();
+    sections.push(section("Tiles in flight", flights::blocks(scale, results)));
     sections.push(section("Chips", chips(scale, results)));
     page("Scaling", introduction, sections)
 }

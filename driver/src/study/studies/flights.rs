@@ -1,0 +1,101 @@
+//! Tiles in flight: bytes of whole frames whose gathers wait across tiles.
+
+use photoncard_firmware::kind::{LARGE, REFERENCE};
+
+use super::super::laboratory::Results;
+use super::super::point::Point;
+use super::super::report::{Block, Table};
+use super::super::scale::Scale;
+use super::present::{GIGA, columns, table, text};
+use super::scenes::SCENES;
+use crate::choice::Choice;
+use crate::emulator::EmulatedKind;
+use crate::emulator::memory_model::{CacheSettings, CacheSpec};
+use crate::scheduler::GatherOrder;
+
+/// A chip, and the number of tiles that it has in flight.
+#[derive(Clone, Copy)]
+struct Setup {
+    chip: EmulatedKind,
+    in_flight: u32,
+    /// Bytes of the cache of the scene.
+    scene_cache: u32,
+}
+
+const SETUPS: [Setup; 3] = [
+    Setup { chip: EmulatedKind::Reference, in_flight: 1, scene_cache: REFERENCE.scene_cache_bytes },
+    Setup {
+        chip: EmulatedKind::Reference,
+        in_flight: REFERENCE.in_flight,
+        scene_cache: REFERENCE.scene_cache_bytes,
+    },
+    Setup { chip: EmulatedKind::Large, in_flight: LARGE.in_flight, scene_cache: LARGE.scene_cache_bytes },
+];
+
+impl Setup {
+    /// All techniques, by the whole frame on one chip.
+    fn point(self, scale: &Scale, scene: &str) -> Point {
+        let settings = scale.all_on().with(|s| s.schedule.in_flight = Some(self.in_flight));
+        let scene_cache = CacheSpec { bytes: self.scene_cache, ..CacheSpec::SCENE };
+        let caches = CacheSettings::Split { photon: CacheSpec::PHOTON, scene: scene_cache };
+        scale.on_one_chip(scene, settings, self.chip, caches)
+    }
+}
+
+fn naive(scale: &Scale, scene: &str) -> Point {
+    scale.traffic(scene, scale.settings(GatherOrder::Naive))
+}
+
+pub(super) fn points(scale: &Scale) -> Vec<Point> {
+    let of_scene = |(scene, _): (&str, _)| {
+        let setups = SETUPS.map(|setup| setup.point(scale, scene));
+        std::iter::once(naive(scale, scene)).chain(setups).collect::<Vec<_>>()
+    };
+    SCENES.into_iter().flat_map(of_scene).collect()
+}
+
+pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
+    let heads = [
+        ("scene", ""),
+        ("chip", ""),
+        ("on-chip memory", "KB"),
+        ("tiles in flight", ""),
+        ("gather queue", ""),
+        ("drains", ""),
+        ("photon map from DRAM", "GB"),
+        ("scene from DRAM", "GB"),
+        ("photon map: less than naive", "times"),
+        ("both: less than naive", "times"),
+    ];
+    let title = format!("All techniques at {} gather rays, whole frames", scale.gather_rays);
+    let mut rows = Table::new(title, columns(&heads));
+    for (scene, name) in SCENES {
+        let naive = results.traffic(&naive(scale, scene));
+        for setup in SETUPS {
+            let measured = results.traffic(&setup.point(scale, scene));
+            let [map, of_scene, both] =
+                [measured.photon_map_bytes(), measured.scene_bytes(), measured.dram_bytes()]
+                    .map(|estimate| estimate.value);
+            let budget = setup.chip.budget();
+            rows.push(vec![
+                name.into(),
+                setup.chip.name().into(),
+                (budget.sram_bytes >> 10).into(),
+                setup.in_flight.into(),
+                budget.gather_queue.into(),
+                measured.total(|tile| tile.counters.drains as f64).value.into(),
+                (map / GIGA).into(),
+                (of_scene / GIGA).into(),
+                (naive.photon_map_bytes().value / map).into(),
+                (naive.dram_bytes().value / both).into(),
+            ]);
+        }
+    }
+    vec![
+        text(
+            "With one tile in flight a chip drains its queue at the end of every tile, however few gathers wait; with several, when \
+             the queue is full. A frame with several tiles in flight is rendered as a whole, on one chip.",
+        ),
+        table("tiles-in-flight", rows),
+    ]
+}

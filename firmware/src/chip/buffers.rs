@@ -1,0 +1,20 @@
+//! Buffers that the tiles in flight of a chip share.
+
+use super::gathers::Gathers;
+use super::pixel_sums::PixelSums;
+use super::points::Points;
+use crate::kind::ChipKind;
+
+/// Gather points, sums and gathers of a chip.
+pub(super) struct Shared<K: ChipKind> {
+    /// Gather points of the active tile.
+    pub(super) points: Points<K::Points>,
+    pub(super) sums: PixelSums<K::TilePixels>,
+    pub(super) gathers: Gathers<K::Candidates, K::GatherQueue>,
+}
+
+impl<K: ChipKind> Shared<K> {
+    pub(super) const fn new() -> Self {
+        Self { points: Points::new(), sums: PixelSums::new(), gathers: Gathers::new() }
+    }
+}

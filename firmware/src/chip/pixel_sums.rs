@@ -1,0 +1,196 @@
+//! Sums of the pixels that gather rays are cast for, of all tiles in flight.
+//!
+//! Only such a pixel has light that waits: everything else is added when the pixel is completed. The sums lie in a ring,
+//! in runs of one tile each; a run grows while the tile's eye rays are cast, and ends with the tile.
+
+use glam::Vec3;
+use photoncard_shared::budget::{MAX_IN_FLIGHT, sums_of_pixel};
+use photoncard_shared::message::FrameParameters;
+
+use super::light::{Component, PixelLight};
+use crate::fixed_point::ColourSum;
+use crate::kind::{Buffer, Capacity};
+
+/// The ring of sums, in the image's radiance units: [`sums_of_pixel`] for each pixel.
+pub(super) struct PixelSums<C: Capacity> {
+    sums: C::Buffer<ColourSum>,
+    runs: [Run; MAX_IN_FLIGHT as usize],
+    /// Place in the ring of the next pixel.
+    end: u32,
+}
+
+/// Consecutive pixels in the ring, of one tile in flight.
+#[derive(Clone, Copy)]
+struct Run {
+    first: u32,
+    count: u32,
+}
+
+impl Run {
+    const EMPTY: Self = Self { first: 0, count: 0 };
+
+    /// True if the run holds a place of a ring of `places`.
+    fn holds(&self, place: u32, places: u32) -> bool {
+        (place + places - self.first) % places < self.count
+    }
+}
+
+impl<C: Capacity> PixelSums<C> {
+    pub(super) const fn new() -> Self {
+        Self { sums: Buffer::EMPTY, runs: [Run::EMPTY; MAX_IN_FLIGHT as usize], end: 0 }
+    }
+
+    /// Number of pixels that the ring has room for; at least 1, so that division by it cannot panic.
+    fn places(frame: &FrameParameters) -> u32 {
+        (C::ENTRIES as u32 / sums_of_pixel(frame.layers)).max(1)
+    }
+
+    /// Begins the run of a tile in flight at the end of all others.
+    pub(super) fn begin(&mut self, flight: usize) {
+        // Always fits: the buffer's own capacity.
+        let _ = self.sums.view_mut().resize(C::ENTRIES, ColourSum::ZERO);
+        // The ring of a frame with layers has fewer places.
+        if self.runs.iter().all(|run| run.count == 0) {
+            self.end = 0;
+        }
+        if let Some(run) = self.runs.get_mut(flight) {
+            *run = Run { first: self.end, count: 0 };
+        }
+    }
+
+    /// Ends the run of a tile in flight, whose sums are read.
+    pub(super) fn end(&mut self, flight: usize) {
+        if let Some(run) = self.runs.get_mut(flight) {
+            *run = Run::EMPTY;
+        }
+    }
+
+    /// True if there is room for another pixel.
+    pub(super) fn has_room(&self, frame: &FrameParameters) -> bool {
+        let places = Self::places(frame);
+        !self.runs.iter().any(|run| run.holds(self.end, places))
+    }
+
+    /// Appends a pixel without light to the run of the tile in flight that began last, and returns its number in the run. To be called
+    /// only if [`Self::has_room`].
+    pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> u16 {
+        let count = sums_of_pixel(frame.layers) as usize;
+        let first = self.end as usize * count;
+        self.sums.view_mut().get_mut(first..first + count).unwrap_or_default().fill(ColourSum::ZERO);
+        self.end = (self.end + 1) % Self::places(frame);
+        let Some(run) = self.runs.get_mut(flight) else { return 0 };
+        run.count += 1;
+        // Below the pixels of a tile, which fit 15 bits.
+        (run.count - 1) as u16
+    }
+
+    fn place(&self, frame: &FrameParameters, flight: usize, number: u16) -> usize {
+        let first = self.runs.get(flight).map_or(0, |run| run.first);
+        ((first + u32::from(number)) % Self::places(frame)) as usize
+    }
+
+    /// Adds light, in the image's radiance units, to a component of pixel `number` of a tile in flight.
+    #[inline]
+    pub(super) fn add(
+        &mut self,
+        frame: &FrameParameters,
+        (flight, number): (usize, u16),
+        component: Component,
+        brought: Vec3,
+    ) {
+        let place = self.place(frame, flight, number);
+        if let Some(sum) = self.sums.view_mut().get_mut(component.sum_of(frame, place)) {
+            sum.add_light(brought);
+        }
+    }
+
+    /// Light of pixel `number` of a tile in flight.
+    pub(super) fn light(&self, frame: &FrameParameters, (flight, number): (usize, u16)) -> PixelLight {
+        let count = sums_of_pixel(frame.layers) as usize;
+        let first = self.place(frame, flight, number) * count;
+        PixelLight::of(self.sums.view().get(first..first + count).unwrap_or_default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use photoncard_shared::message::Camera;
+
+    use super::*;
+    use crate::kind::Entries;
+
+    fn frame(layers: bool) -> FrameParameters {
+        let camera = Camera { origin: [0.0; 3], forward: [0.0; 3], right: [0.0; 3], up: [0.0; 3] };
+        FrameParameters {
+            width: 8,
+            height: 8,
+            camera,
+            seed: 0,
+            samples: 1,
+            gather_rays: 1,
+            shadow_rays: 1,
+            neighbors: 2,
+            max_distance: 1.0,
+            sampling: Default::default(),
+            irradiance_error: None,
+            bins: 1,
+            drain: Default::default(),
+            queue: 1,
+            radiance: Default::default(),
+            caustics: None,
+            layers,
+            filter: Default::default(),
+            in_flight: 3,
+        }
+    }
+
+    /// Tiles begin and end in many orders; each pixel keeps its own light, and all places are used again.
+    #[test]
+    fn every_pixel_of_every_tile_in_flight_has_a_sum_of_its_own() {
+        for layers in [false, true] {
+            let frame = &frame(layers);
+            let mut sums = PixelSums::<Entries<24>>::new();
+            let places = PixelSums::<Entries<24>>::places(frame) as u16;
+            let mut held: [Vec<f32>; 3] = Default::default();
+            for step in 0..3000_u32 {
+                let flight = (crate::sampler::hash(step) % 3) as usize;
+                check(&sums, frame, &held);
+                sums.end(flight);
+                held[flight].clear();
+                sums.begin(flight);
+                let wanted = crate::sampler::hash(!step) % 12;
+                for number in 0..wanted {
+                    if !sums.has_room(frame) {
+                        let used: usize = held.iter().map(Vec::len).sum();
+                        assert!(used > 0, "an empty ring has room");
+                        break;
+                    }
+                    assert_eq!(u32::from(sums.push(frame, flight)), number);
+                    let light = (3 * step + number) as f32;
+                    sums.add(frame, (flight, number as u16), Component::Indirect, Vec3::splat(light));
+                    held[flight].push(light);
+                }
+            }
+            // A tile alone has all places.
+            (0..3).for_each(|flight| sums.end(flight));
+            sums.begin(1);
+            for number in 0..places {
+                assert!(sums.has_room(frame));
+                assert_eq!(sums.push(frame, 1), number);
+            }
+            assert!(!sums.has_room(frame));
+        }
+    }
+
+    fn check(sums: &PixelSums<Entries<24>>, frame: &FrameParameters, held: &[Vec<f32>; 3]) {
+        for (flight, lights) in held.iter().enumerate() {
+            for (number, &light) in (0..).zip(lights) {
+                let mut expected = PixelLight::NONE;
+                expected.add(frame, Component::Indirect, Vec3::splat(light));
+                assert_eq!(sums.light(frame, (flight, number)), expected);
+            }
+        }
+    }
+}

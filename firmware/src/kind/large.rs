@@ -1,0 +1,36 @@
+//! The large chip: the reference chip with twice its on-chip memory.
+
+use photoncard_shared::budget::{Budget, gather_candidates};
+
+use super::capacity::Entries;
+use super::chip_kind::{ChipKind, TechniqueMemory};
+use super::reference::REFERENCE;
+
+/// Budget of the large chip: a longer gather queue, as many tiles in flight as fill it, and a scene cache of 128 KB.
+pub const LARGE: Budget = Budget {
+    sram_bytes: 2 << 20,
+    scene_cache_bytes: 128 << 10,
+    gather_queue: 32_000,
+    tiles: 8,
+    in_flight: 4,
+    ..REFERENCE
+};
+
+/// The kind of the large chip: [`LARGE`].
+#[derive(Clone, Copy, Debug)]
+pub enum Large {}
+
+impl ChipKind for Large {
+    const BUDGET: Budget = LARGE;
+    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
+        reordering: 752 << 10,
+        irradiance_cache: 640 << 10,
+        importance_sampling: 136 << 10,
+    };
+    type TilePixels = Entries<{ LARGE.tile_pixels as usize }>;
+    type Candidates = Entries<{ gather_candidates(LARGE.neighbors) }>;
+    type GatherQueue = Entries<{ LARGE.gather_queue as usize }>;
+    type IrradianceRecords = Entries<{ LARGE.irradiance_records as usize }>;
+    type Points = Entries<{ LARGE.tile_pixels as usize }>;
+    type Flights = Entries<{ LARGE.in_flight as usize }>;
+}
