@@ -1,18 +1,16 @@
 //! Measurement of a point: work and memory traffic of a sample of a picture's tiles.
 
-use photoncard_firmware::chip::Chip;
 use photoncard_firmware::kind::{ChipKind, Micro, Reference};
 use photoncard_firmware::memory::Lines;
 use photoncard_shared::address::{STRUCTURES, Structure};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
 use rayon::ThreadPool;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::sample::{Chosen, Estimate, SampleRate, choose};
 use crate::emulator::EmulatedKind;
-use crate::emulator::direct::{RenderedTile, render_tile};
+use crate::emulator::direct::{RenderedTile, render_tiles};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
 use crate::photon_map::MappedImage;
@@ -153,15 +151,7 @@ impl Bench<'_> {
         tiles: &[Tile],
         model: &(impl Fn(Lines<'b>) -> M + Sync),
     ) -> Result<Vec<RenderedTile>, RenderError> {
-        let new_chip = || Box::new(Chip::<K>::new());
-        let render_one = |chip: &mut Box<Chip<K>>, &tile: &Tile| {
-            if (self.is_stopped)() {
-                return Err(RenderError::Stopped);
-            }
-            let (scene, memory) = self.mapped.image.view();
-            render_tile(chip, &scene, model(memory), frame, tile, None).map_err(RenderError::Image)
-        };
-        self.pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
+        Ok(render_tiles::<K, M>(self.pool, &self.mapped.image, frame, tiles, model, self.is_stopped)?)
     }
 
     /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or, in an order
