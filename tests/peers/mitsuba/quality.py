@@ -1,4 +1,4 @@
-"""Renders scenes at each quality and around it, and prints the errors of the pictures over the CPU seconds that they took.
+"""Renders scenes at each quality and by a grid of settings, and prints the errors of the pictures over the CPU seconds that they took.
 
 Two pictures of different seeds are rendered at each setting. Columns of the CSV, in % of the reference's mean:
 
@@ -30,17 +30,17 @@ BLOCK, FILLED, DARK = 16, 0.25, 0.05
 # The sky around a staged file (cycles/stage.py).
 STAGE_SKY = "0.2,0.2,0.2"
 QUALITIES = ["draft", "good", "final"]
-# Options that are varied around the quality `good`, one at a time.
-AROUND = [
-    *(f"--photons {photons}" for photons in (100_000, 400_000, 1_600_000)),
-    *(f"--neighbors {neighbors}" for neighbors in (12, 50, 100)),
-    *(f"--gather-rays {rays}" for rays in (64, 128, 256, 512)),
-    *(f"--shadow-rays {rays}" for rays in (1, 2, 4, 8)),
-    *(f"--ic-error {error}" for error in (0.05, 0.2)),
-    *(f"--spp {samples}" for samples in (8, 32)),
-    "--irradiance-cache off",
-    "--radiance precomputed",
-    "--tile 64",
+# Settings of a sweep: samples, shadow rays, gather rays and photons.
+SWEEP = [
+    f"--spp {samples} --shadow-rays {shadow_rays} --gather-rays {gather_rays} --photons {photons}"
+    for samples, shadow_rays, gather_rays, photons in (
+        (16, 4, 128, 300_000),
+        (32, 1, 128, 300_000),
+        (32, 2, 128, 300_000),
+        (32, 2, 256, 300_000),
+        (64, 1, 128, 300_000),
+        (64, 2, 400, 600_000),
+    )
 ]
 MITSUBA_SAMPLES = 64
 
@@ -108,7 +108,7 @@ def main():
     table.writerow(columns)
     for name in arguments.scenes or known:
         scene = known[name]
-        settings = arguments.options or [*(f"--quality {quality}" for quality in QUALITIES), *(AROUND if arguments.sweep else [])]
+        settings = arguments.options or [*(f"--quality {quality}" for quality in QUALITIES), *(SWEEP if arguments.sweep else [])]
         for options in settings:
             pictures, seconds = photoncard(arguments, scene, options)
             write(table, name, options, seconds, measure(scene, pictures))
@@ -123,7 +123,7 @@ def parse():
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
     parser.add_argument("--photoncard", type=Path, required=True, help="the command")
     parser.add_argument("--peers", type=Path, required=True, help="the folder of peers, below cargo's target folder")
-    parser.add_argument("--sweep", action="store_true", help="also vary each setting around the quality `good`")
+    parser.add_argument("--sweep", action="store_true", help="also render by a grid of settings")
     parser.add_argument("--mitsuba", action="store_true", help="also render shipped scenes with Mitsuba")
     parser.add_argument("--options", action="append", default=[], help="settings instead of the qualities; may be repeated")
     return parser.parse_args()
