@@ -44,8 +44,8 @@ AROUND = [
     "--radiance precomputed",
     "--tile 64",
 ]
-# Samples a pixel of the peers, and the seeds of their pictures, which no reference has.
-SAMPLES, SEEDS = 64, (1001, 2001)
+# The seeds of the peers' pictures, which no reference has.
+SEEDS = (1001, 2001)
 # A peer's mean may be off by this share, or by as many standard errors of its noise.
 MEAN_ERROR, STANDARD_ERRORS = 0.005, 3.0
 
@@ -53,7 +53,7 @@ MEAN_ERROR, STANDARD_ERRORS = 0.005, 3.0
 class Scene:
     """A scene, its converged picture, and the view of it."""
 
-    def __init__(self, file, references, size="256x256", environment=None, exclude=None, mask=None, is_export=False):
+    def __init__(self, file, references, size="256x256", environment=None, exclude=None, mask=None, samples=None, is_export=False):
         self.file = file
         # Pictures whose mean is the converged one.
         self.references = references
@@ -63,6 +63,8 @@ class Scene:
         self.exclude = exclude
         # A file of the pixels that count; None for all.
         self.mask = mask
+        # Samples a pixel of references that Cycles renders if they are missing, by the seeds 1 and 2; None for others.
+        self.samples = samples
         # If the file is Blender's export of the scene that `cycles/room.py` builds.
         self.is_export = is_export
         self.options = ["--environment", environment] if environment else []
@@ -95,13 +97,17 @@ def scenes(peers):
     for name in ("DamagedHelmet", "flight-helmet", "camera"):
         masks = sorted((peers / "surfaces").glob(f"{name}-cycles-*.npy"), key=lambda path: path.stat().st_mtime)
         if masks:
-            halves = [masks[-1].with_name(f"{masks[-1].stem}-{half}.exr") for half in (1, 2)]
             staged = peers / "surfaces" / f"{name}.glb"
-            found[name] = Scene(staged, halves, environment=STAGE_SKY, mask=masks[-1])
-    room, halves = peers / "room" / "room.glb", [peers / "references" / f"blender-room-{half}.exr" for half in (1, 2)]
+            found[name] = Scene(staged, halves(peers, name), environment=STAGE_SKY, mask=masks[-1], samples=1024)
+    room = peers / "room" / "room.glb"
     if room.exists():
-        found["blender-room"] = Scene(room, halves, size="192x192", is_export=True)
+        found["blender-room"] = Scene(room, halves(peers, "blender-room"), size="192x192", samples=4096, is_export=True)
     return found
+
+
+def halves(peers, name):
+    """The references that Cycles renders of a scene."""
+    return [peers / "references" / f"{name}-cycles-{half}.exr" for half in (1, 2)]
 
 
 def main():
@@ -116,11 +122,12 @@ def main():
     table.writerow(columns)
     for name in arguments.scenes or known:
         scene = known[name]
+        converge(arguments, scene)
         for options in settings(arguments):
             pictures, seconds = photoncard(arguments, scene, options)
             write(table, name, options, seconds, measure(scene, pictures))
         for program, render in peers(arguments):
-            compare(table, name, scene, program, render(arguments, scene))
+            compare(table, name, scene, f"{program}, {arguments.samples} samples", render(arguments, scene))
 
 
 def parse():
@@ -132,6 +139,7 @@ def parse():
     parser.add_argument("--sweep", action="store_true", help="also vary each setting around the quality `good`")
     parser.add_argument("--mitsuba", action="store_true", help="also render shipped scenes with Mitsuba")
     parser.add_argument("--cycles", action="store_true", help="also render with Blender's Cycles")
+    parser.add_argument("--samples", type=int, default=64, help="samples a pixel of the peers")
     parser.add_argument("--peers-only", action="store_true", help="render with peers alone")
     parser.add_argument("--options", action="append", default=[], help="settings instead of the qualities; may be repeated")
     return parser.parse_args()
@@ -149,10 +157,10 @@ def peers(arguments):
     return [*([("Mitsuba", mitsuba)] if arguments.mitsuba else []), *([("Cycles", cycles)] if arguments.cycles else [])]
 
 
-def compare(table, name, scene, program, rendered):
+def compare(table, name, scene, peer, rendered):
     """Writes the row of a peer, or says why there is none."""
     if rendered is None:
-        print(f"{name}: no {program}: what makes its scene of a file reads shipped ones alone", file=sys.stderr)
+        print(f"{name}: no row of {peer}: what makes its scene of a file reads shipped ones alone", file=sys.stderr)
         return
     pictures, seconds = rendered
     columns = measure(scene, pictures)
@@ -160,9 +168,9 @@ def compare(table, name, scene, program, rendered):
     _, counts = scene.reference()
     allowed = max(MEAN_ERROR, STANDARD_ERRORS * noise / math.sqrt(2.0 * counts.sum()))
     if abs(mean - 1.0) > allowed:
-        print(f"{name}: no {program}: its mean is {mean:.4f} of the reference's, off by more than {allowed:.4f}", file=sys.stderr)
+        print(f"{name}: no row of {peer}: its mean is {mean:.4f} of the reference's, off by more than {allowed:.4f}", file=sys.stderr)
         return
-    write(table, name, f"{program}, {SAMPLES} samples", seconds, columns)
+    write(table, name, peer, seconds, columns)
 
 
 def photoncard(arguments, scene, options):
@@ -183,7 +191,7 @@ def mitsuba(arguments, scene):
     pictures, seconds = [], []
     for seed, output in zip(SEEDS, outputs(arguments), strict=True):
         command = [sys.executable, HERE / "render.py", scene.file, "--size", scene.size, "--seed", seed]
-        command += ["--spp", SAMPLES, "--output", output]
+        command += ["--spp", arguments.samples, "--output", output]
         seconds.append(json.loads(run([*command, *scene.options]))["cpu_s"])
         pictures.append(read(output))
     return pictures, sum(seconds) / 2.0
@@ -191,12 +199,27 @@ def mitsuba(arguments, scene):
 
 def cycles(arguments, scene):
     """Two pictures, and the mean CPU seconds in which one is rendered."""
+    seconds = run_cycles(arguments, scene, arguments.samples, SEEDS, outputs(arguments))
+    return [read(output) for output in outputs(arguments)], sum(seconds) / 2.0
+
+
+def converge(arguments, scene):
+    """Renders references of Cycles that are missing."""
+    for seed, path in enumerate(scene.references, 1):
+        if scene.samples and not path.exists():
+            unfinished = path.with_suffix(".unfinished.exr")
+            unfinished.parent.mkdir(exist_ok=True)
+            run_cycles(arguments, scene, scene.samples, [seed], [unfinished])
+            unfinished.replace(path)
+
+
+def run_cycles(arguments, scene, samples, seeds, pictures):
+    """Renders a picture by each seed; the CPU seconds of each."""
     command = [arguments.peers / "cycles" / "bin" / "python", HERE.parent / "cycles" / "quality.py", scene.file]
-    command += ["--size", scene.size, "--samples", SAMPLES, "--seeds", *SEEDS, "--outputs", *outputs(arguments)]
+    command += ["--size", scene.size, "--samples", samples, "--seeds", *seeds, "--outputs", *pictures]
     command += ["--built"] if scene.is_export else []
     # Blender reports on the standard output as well.
-    seconds = json.loads(run([*command, *scene.options]).splitlines()[-1])["cpu_s"]
-    return [read(output) for output in outputs(arguments)], sum(seconds) / 2.0
+    return json.loads(run([*command, *scene.options]).splitlines()[-1])["cpu_s"]
 
 
 def outputs(arguments):
