@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The qualities of `photoncard render`, and settings around them: errors over CPU seconds, as CSV.
+# The qualities of `photoncard render`, and a grid of settings: errors over CPU seconds, as CSV.
 #
 #   tests/peers/quality.sh PHOTONCARD [--sweep] [--mitsuba] [--cycles] [--peers-only] [SCENE ...]
 #

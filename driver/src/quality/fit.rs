@@ -67,12 +67,16 @@ pub struct Measured {
 const FEW_LAMBERTIAN: f64 = 0.05;
 /// Number of shadow rays of a sample.
 const SHADOW_RAYS: RangeInclusive<u32> = 1..=16;
-/// CPU time in that of a sample without its rays to lights: of a shadow ray, of a gather ray with its gather, and of a photon.
+/// CPU time of a shadow ray over that of a sample without its rays to lights, as measured in rooms and halls.
 const COST_OF_SHADOW_RAY: f64 = 0.4;
+/// CPU time of a gather ray with its gather, likewise.
 const COST_OF_GATHER_RAY: f64 = 1.2;
+/// CPU time of tracing and storing a photon, likewise.
 const COST_OF_PHOTON: f64 = 2.5;
-/// Weight of the variance of gather rays: several records are interpolated.
-const WEIGHT_OF_GATHER_RAYS: f64 = 0.5;
+/// Minimum number of gather rays that a pixel is taken to cost for each one of its own: the surveyed tiles may miss what gathers.
+const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
+/// Weight of the variance of gather rays where several records are interpolated.
+const WEIGHT_OF_RECORDS: f64 = 0.5;
 /// Weight of the squared error of the map in 4x4 pixels: it is no noise of a pixel, but a blotch.
 const WEIGHT_OF_MAP: f64 = 6.0;
 
@@ -103,7 +107,7 @@ impl Fit {
 }
 
 impl Quality {
-    /// Settings of this quality that suit a scene, by pilot renders with camera, size and sampling of `settings`; `None` where no
+    /// Settings of this quality that suit a scene, by pilot renders with view, filter and sampling of `settings`; `None` where no
     /// setting depends on the scene. Seed, cards, threads and crop window have no effect.
     ///
     /// # Errors
@@ -117,30 +121,43 @@ impl Quality {
     ) -> Result<Option<Fit>, RenderError> {
         settings.check()?;
         let Some(level) = self.level() else { return Ok(None) };
-        let pixels = f64::from(settings.picture.width) * f64::from(settings.picture.height);
-        Ok(Some(level.fit(&measure(scene, packed, settings, observer)?, pixels)))
+        let of = Pictured {
+            pixels: f64::from(settings.picture.width) * f64::from(settings.picture.height),
+            is_cached: settings.integrator.irradiance_error.is_some(),
+        };
+        Ok(Some(level.fit(&measure(scene, packed, settings, observer)?, &of)))
     }
 }
 
+/// A picture, as far as a fit depends on it.
+struct Pictured {
+    /// Number of pixels.
+    pixels: f64,
+    /// If the irradiance cache may be used.
+    is_cached: bool,
+}
+
 impl Level {
-    /// Settings for the variances of a scene in a picture of `pixels` pixels: those with the least sum of time and variance.
+    /// Settings for the variances of a scene in a picture: those with the least sum of time and variance.
     ///
     /// With `n` of something, samples or rays or photons, a pixel takes the time `c n` and has the variance `v / n`. The sum of
     /// `c n + w^2 v / n` is the least for `n = w sqrt(v / c)`, `w` the worth of accuracy.
-    fn fit(&self, variances: &Variances, pixels: f64) -> Fit {
+    fn fit(&self, variances: &Variances, of: &Pictured) -> Fit {
         let Variances { place, shadow_ray, gather_ray, photon, lambertian, gather_rays_per_ray } = *variances;
         let number = |variance: f64, cost: f64| self.worth * (variance / cost).sqrt();
         let samples = within(number(place, 1.0), &self.samples, 4);
         let shadow_rays = number(shadow_ray, COST_OF_SHADOW_RAY) / f64::from(samples);
-        let gather_rays =
-            number(WEIGHT_OF_GATHER_RAYS * gather_ray, COST_OF_GATHER_RAY * gather_rays_per_ray);
-        let photons = number(WEIGHT_OF_MAP * photon, COST_OF_PHOTON / pixels);
+        let interpolates = of.is_cached && lambertian >= FEW_LAMBERTIAN;
+        let weight = if interpolates { WEIGHT_OF_RECORDS } else { 1.0 };
+        let cost = COST_OF_GATHER_RAY * gather_rays_per_ray.max(MIN_GATHER_RAYS_PER_RAY);
+        let gather_rays = number(weight * gather_ray, cost);
+        let photons = number(WEIGHT_OF_MAP * photon, COST_OF_PHOTON / of.pixels);
         Fit {
             samples,
             photons: rounded(photons, &self.photons),
             gather_rays: within(gather_rays, &self.gather_rays, 8),
             shadow_rays: within(shadow_rays, &SHADOW_RAYS, 1),
-            interpolates: lambertian >= FEW_LAMBERTIAN,
+            interpolates,
             measured: Measured {
                 place: place.sqrt(),
                 shadow_ray: shadow_ray.sqrt(),
@@ -152,8 +169,11 @@ impl Level {
     }
 }
 
-/// The least multiple of `step` that is not below a number, within bounds.
+/// The least multiple of `step` that is not below a number, within bounds; the maximum for no number.
 fn within(number: f64, bounds: &RangeInclusive<u32>, step: u32) -> u32 {
+    if number.is_nan() {
+        return *bounds.end();
+    }
     let steps = (number / f64::from(step)).ceil() as u32;
     steps.saturating_mul(step).clamp(*bounds.start(), *bounds.end())
 }
@@ -178,10 +198,10 @@ mod tests {
         lambertian: 1.0,
         gather_rays_per_ray: 0.2,
     };
-    const PIXELS: f64 = 65_536.0;
+    const PICTURED: Pictured = Pictured { pixels: 65_536.0, is_cached: true };
 
     fn good(variances: Variances) -> Fit {
-        Quality::Good.level().unwrap().fit(&variances, PIXELS)
+        Quality::Good.level().unwrap().fit(&variances, &PICTURED)
     }
 
     /// Time and weighted variance of a pixel.
@@ -191,10 +211,10 @@ mod tests {
         let time = samples
             + rays * COST_OF_SHADOW_RAY
             + gather_rays * gather_rays_per_ray * COST_OF_GATHER_RAY
-            + photons * COST_OF_PHOTON / PIXELS;
+            + photons * COST_OF_PHOTON / PICTURED.pixels;
         let variance = place / samples
             + shadow_ray / rays
-            + gather_ray * WEIGHT_OF_GATHER_RAYS / gather_rays
+            + gather_ray * WEIGHT_OF_RECORDS / gather_rays
             + photon * WEIGHT_OF_MAP / photons;
         time + Quality::Good.level().unwrap().worth.powi(2) * variance
     }
@@ -223,15 +243,24 @@ mod tests {
             let fit = good(values);
             (fit.samples, fit.shadow_rays, fit.gather_rays, fit.photons)
         };
-        assert_eq!(all(0.0), (24, 1, 64, 200_000));
+        assert_eq!(all(0.0), (24, 1, 128, 200_000));
         for endless in [1e12, f64::INFINITY] {
             assert_eq!(all(endless), (48, 16, 1024, 1_000_000));
         }
         assert_eq!(good(Variances { photon: f64::NAN, ..VARIANCES }).photons, 1_000_000);
         assert_eq!(
             good(Variances { gather_ray: 0.0, gather_rays_per_ray: 0.0, ..VARIANCES }).gather_rays,
-            64
+            128
         );
+    }
+
+    /// Rays of records are shared by the pixels around them.
+    #[test]
+    fn pixels_without_records_take_more_rays_for_equal_costs() {
+        let level = Quality::Good.level().unwrap();
+        let alone = level.fit(&VARIANCES, &Pictured { is_cached: false, ..PICTURED });
+        assert!(!alone.interpolates && alone.gather_rays > good(VARIANCES).gather_rays);
+        assert_eq!(alone.gather_rays, good(Variances { lambertian: 0.0, ..VARIANCES }).gather_rays);
     }
 
     #[test]
@@ -267,10 +296,11 @@ mod tests {
     #[test]
     fn a_better_quality_never_takes_fewer_of_anything() {
         let fits = [Quality::Draft, Quality::Good, Quality::Final]
-            .map(|quality| quality.level().unwrap().fit(&VARIANCES, PIXELS));
+            .map(|quality| quality.level().unwrap().fit(&VARIANCES, &PICTURED));
         for [worse, better] in [[fits[0], fits[1]], [fits[1], fits[2]]] {
             assert!(worse.samples <= better.samples && worse.photons <= better.photons);
             assert!(worse.gather_rays <= better.gather_rays);
+            assert!(worse.samples * worse.shadow_rays <= better.samples * better.shadow_rays);
         }
         assert!(Quality::Paper.level().is_none());
     }

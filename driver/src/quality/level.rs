@@ -60,7 +60,7 @@ impl Quality {
             Self::Good => Level {
                 worth: 400.0,
                 samples: 24..=48,
-                gather_rays: 64..=1024,
+                gather_rays: 128..=1024,
                 photons: 200_000..=1_000_000,
                 caustic_photons: 200_000,
                 irradiance_error: 0.1,
@@ -77,20 +77,22 @@ impl Quality {
         })
     }
 
-    /// Settings of this quality for a scene that is not known: middle values where [`Self::fit`] chooses.
+    /// Settings of this quality for a scene that is not known: the fewest samples, and middle numbers of rays and photons, where [`Self::fit`]
+    /// chooses.
     pub fn settings(self) -> RenderSettings {
         let Some(level) = self.level() else { return RenderSettings::default() };
         RenderSettings {
             picture: Picture { filter: Filter::BlackmanHarris, ..Picture::default() },
             photons: PhotonMaps {
-                count: (level.photons.start() + level.photons.end()) / 2,
+                count: middle(*level.photons.start(), *level.photons.end()),
                 neighbors: NEIGHBORS,
                 caustic_photons: Some(level.caustic_photons),
                 ..PhotonMaps::default()
             },
             integrator: Integrator {
                 samples: *level.samples.start(),
-                gather_rays: (level.gather_rays.start() + level.gather_rays.end()) / 2,
+                gather_rays: middle(*level.gather_rays.start() as usize, *level.gather_rays.end() as usize)
+                    as u32,
                 shadow_rays: 4,
                 irradiance_error: Some(level.irradiance_error),
                 ..Integrator::default()
@@ -98,4 +100,9 @@ impl Quality {
             ..RenderSettings::default()
         }
     }
+}
+
+/// Geometric mean of two numbers.
+fn middle(low: usize, high: usize) -> usize {
+    (low * high).isqrt()
 }

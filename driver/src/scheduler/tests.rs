@@ -37,9 +37,9 @@ fn an_idle_card_takes_what_is_at_another_for_too_long_and_the_first_answer_count
         assert_eq!(take(&mut scheduler, card, Duration::ZERO), Some(id));
     }
     // A card that is alone takes more.
-    [0, 2].map(|card| scheduler.set_standing(card, Standing::Lost));
+    [0, 2].into_iter().for_each(|card| scheduler.set_standing(card, Standing::Lost));
     assert_eq!(take(&mut scheduler, 1, Duration::ZERO), Some(3));
-    [0, 2].map(|card| scheduler.set_standing(card, Standing::Living));
+    [0, 2].into_iter().for_each(|card| scheduler.set_standing(card, Standing::Living));
     answer(&mut scheduler, 2, 2, 0, SECOND);
     // The mean time is a second: tiles are duplicated after two.
     assert_eq!(take(&mut scheduler, 2, 3 * SECOND / 2), None);

@@ -87,7 +87,7 @@ def glass(tree, principled):
 def absorb(volume):
     """Absorption of glTF's coefficient `-density ln(colour)`; Blender's, by the importer's colour and density, is `density (1 - colour)`."""
     colour, density = volume.inputs["Color"], volume.inputs["Density"]
-    coefficients = [-density.default_value * math.log(value) for value in colour.default_value[:3]]
+    coefficients = [-density.default_value * math.log(max(value, 1e-6)) for value in colour.default_value[:3]]
     greatest = max(coefficients)
     if greatest > 0.0:
         density.default_value = greatest

@@ -68,7 +68,7 @@ fn a_second_credit_hides_the_latency_of_the_link() {
     assert!(four.idle_share() <= two.idle_share() + ROUNDING);
 }
 
-/// Of tiles behind a long one there is one at most, however many credits a card has.
+/// Of eight tiles for two cards one waits behind the long one, however many credits a card has.
 #[test]
 fn few_tiles_wait_behind_a_long_one() {
     let mut costs = [1.0; 8];
