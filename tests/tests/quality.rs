@@ -63,14 +63,21 @@ fn a_point_takes_one_shadow_ray_and_a_lamp_more() {
     assert!(fit(&shipped("cornell.gltf"), &small()).shadow_rays > 1);
 }
 
-/// With more samples each has fewer shadow rays.
+/// Textures and edges are seen by more samples, not by more rays.
 #[test]
-fn samples_share_the_shadow_rays_of_a_pixel() {
+fn a_textured_room_takes_more_samples_than_one_of_plain_walls() {
+    let [plain, textured] = ["cornell.gltf", "room.glb"].map(|name| fit(&shipped(name), &small()));
+    assert!(textured.samples > plain.samples, "{textured:?} {plain:?}");
+    assert!(textured.measured.place > plain.measured.place, "{textured:?} {plain:?}");
+}
+
+/// In a larger picture records lie farther apart, in pixels.
+#[test]
+fn a_pixel_of_a_larger_picture_has_a_smaller_share_in_the_gather_rays_of_records() {
     let scene = shipped("cornell.gltf");
-    let few = fit(&scene, &small());
-    let many = fit(&scene, &small().with(|s| s.integrator.samples = 1024));
-    assert!(many.shadow_rays < few.shadow_rays, "{many:?} {few:?}");
-    assert_eq!((many.gather_rays, many.photons), (few.gather_rays, few.photons));
+    let of_side = |side| fit(&scene, &small().with(|s| (s.picture.width, s.picture.height) = (side, side)));
+    let [small, large] = [128, 512].map(|side| of_side(side).measured.gather_rays_per_ray);
+    assert!(large < 0.7 * small, "{large} {small}");
 }
 
 /// Pictures of two seeds, of which the difference is noise, have equal settings.

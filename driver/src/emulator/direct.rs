@@ -4,14 +4,17 @@
 use photoncard_firmware::chip::{Chip, FinishedPixel, PixelView, Progress};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::kind::ChipKind;
-use photoncard_firmware::memory::MemoryPort;
+use photoncard_firmware::memory::{Lines, MemoryPort};
 use photoncard_firmware::render::{GatherOutlet, RenderJob};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::budget::sums_of_pixel;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters, Tile};
+use rayon::ThreadPool;
+use rayon::prelude::*;
 
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
+use crate::pack::CardImage;
 
 /// A rendered tile, with its work and memory traffic.
 pub struct RenderedTile {
@@ -35,6 +38,47 @@ impl RenderedTile {
         let views = pixels.into_iter().map(|pixel| pixel.view).collect();
         Self { sums, views, counters, traffic: MemoryTraffic::ZERO }
     }
+}
+
+/// Error of [`render_tiles_apart`].
+#[derive(Debug, thiserror::Error)]
+pub enum TileError {
+    /// Error of a malformed image, or of a tile that is too large.
+    #[error("{0}")]
+    Fault(Fault),
+    /// The work was stopped.
+    #[error("the render was stopped")]
+    Stopped,
+}
+
+impl From<Fault> for TileError {
+    fn from(fault: Fault) -> Self {
+        Self::Fault(fault)
+    }
+}
+
+/// Renders tiles on chips of the kind `K`, one a thread of `pool`, whose stacks must hold a chip while it is built. Each tile has a new
+/// memory that `model` makes, so that it begins with empty caches. `is_stopped` is polled before each.
+///
+/// # Errors
+/// If the card image is malformed, or the work is stopped.
+pub fn render_tiles_apart<'a, K: ChipKind, M: MeasuredMemory>(
+    pool: &ThreadPool,
+    image: &'a CardImage,
+    frame: &FrameParameters,
+    tiles: &[Tile],
+    model: &(impl Fn(Lines<'a>) -> M + Sync),
+    is_stopped: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<RenderedTile>, TileError> {
+    let (scene, memory) = image.view();
+    let new_chip = || Box::new(Chip::<K>::new());
+    let render_one = |chip: &mut Box<Chip<K>>, &tile: &Tile| {
+        if is_stopped() {
+            return Err(TileError::Stopped);
+        }
+        Ok(render_tile(chip, &scene, model(memory), frame, tile, None)?)
+    };
+    pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
 }
 
 /// Renders a tile on a chip with a memory of its own. With an `outlet` the pixels' gathers are sent to it instead, and the

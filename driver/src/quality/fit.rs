@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use super::level::Quality;
+use super::level::{Level, Quality};
 use super::pilot::{Variances, measure};
 use crate::pack::PackedScene;
 use crate::render::{Observer, RenderError, RenderSettings};
@@ -13,6 +13,8 @@ use crate::scene::Scene;
 /// Settings that suit a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
+    /// Number of samples of a pixel.
+    pub samples: u32,
     /// Number of photons in the map.
     pub photons: usize,
     /// Number of gather rays of a pixel, and of an irradiance record.
@@ -28,6 +30,8 @@ pub struct Fit {
 /// Settings that a fit leaves as they are, because they are stated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stated {
+    /// Number of samples.
+    pub samples: bool,
     /// Number of photons.
     pub photons: bool,
     /// Number of gather rays.
@@ -40,46 +44,56 @@ pub struct Stated {
 
 impl Stated {
     /// All settings that a fit would choose.
-    pub const ALL: Self = Self { photons: true, gather_rays: true, shadow_rays: true, cache: true };
+    pub const ALL: Self =
+        Self { samples: true, photons: true, gather_rays: true, shadow_rays: true, cache: true };
 }
 
-/// Relative standard deviations of samples in a pilot render.
+/// Relative standard deviations of samples in a pilot render, and their costs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
+    /// By the place of a sample in its pixel.
+    pub place: f64,
     /// By one shadow ray.
     pub shadow_ray: f64,
     /// By one gather ray.
     pub gather_ray: f64,
     /// Error of 4x4 pixels by a map of a million photons.
     pub million_photons: f64,
-}
-
-/// Aims of a quality, and the bounds within which they are followed.
-struct Aims {
-    /// Relative standard deviation of a pixel by its shadow rays.
-    noise: f64,
-    /// Relative standard deviation of a record, or of a pixel, by its gather rays. Pixels around a record share its error, which shows as
-    /// a blotch.
-    blotches: f64,
-    /// Relative error of 4x4 pixels by the photon map.
-    map_error: f64,
-    shadow_rays: RangeInclusive<u32>,
-    gather_rays: RangeInclusive<u32>,
-    photons: RangeInclusive<usize>,
+    /// Number of gather rays that a pixel costs for each one of its own, by irradiance records and samples without.
+    pub gather_rays_per_ray: f64,
 }
 
 /// Share of samples with a Lambertian part below which nothing is interpolated.
 const FEW_LAMBERTIAN: f64 = 0.05;
+/// Number of shadow rays of a sample.
+const SHADOW_RAYS: RangeInclusive<u32> = 1..=16;
+/// CPU time of a shadow ray over that of a sample without its rays to lights, as measured in rooms and halls.
+const COST_OF_SHADOW_RAY: f64 = 0.4;
+/// CPU time of a gather ray with its gather, likewise.
+const COST_OF_GATHER_RAY: f64 = 1.2;
+/// CPU time of tracing and storing a photon, likewise.
+const COST_OF_PHOTON: f64 = 2.5;
+/// Minimum number of gather rays that a pixel is taken to cost for each one of its own: the surveyed tiles may miss what gathers.
+const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
+/// Weight of the variance of gather rays where several records are interpolated.
+const WEIGHT_OF_RECORDS: f64 = 0.5;
+/// Weight of the squared error of the map in 4x4 pixels: it is no noise of a pixel, but a blotch.
+const WEIGHT_OF_MAP: f64 = 6.0;
 
 impl Fit {
-    /// Changes settings to these, but for the stated ones. Without a cache the samples of a pixel share its gather rays.
+    /// Changes settings to these, but for the stated ones. Samples of a stated number share the shadow rays of a pixel, and without a cache
+    /// its gather rays.
     pub fn apply(&self, settings: &mut RenderSettings, stated: Stated) {
         let RenderSettings { photons, integrator, .. } = settings;
+        if !stated.samples {
+            integrator.samples = self.samples;
+        }
         if !stated.photons {
             photons.count = self.photons;
         }
         if !stated.shadow_rays {
-            integrator.shadow_rays = self.shadow_rays;
+            let of_pixel = f64::from(self.shadow_rays) * f64::from(self.samples);
+            integrator.shadow_rays = within(of_pixel / f64::from(integrator.samples.max(1)), &SHADOW_RAYS, 1);
         }
         if !stated.cache && !self.interpolates {
             integrator.irradiance_error = None;
@@ -93,38 +107,7 @@ impl Fit {
 }
 
 impl Quality {
-    /// Aims of this quality; `None` where no setting depends on the scene.
-    fn aims(self) -> Option<Aims> {
-        Some(match self {
-            Self::Draft => Aims {
-                noise: 0.06,
-                blotches: 0.06,
-                map_error: 0.01,
-                shadow_rays: 1..=4,
-                gather_rays: 32..=128,
-                photons: 100_000..=400_000,
-            },
-            Self::Good => Aims {
-                noise: 0.02,
-                blotches: 0.02,
-                map_error: 0.003,
-                shadow_rays: 1..=8,
-                gather_rays: 64..=512,
-                photons: 200_000..=1_000_000,
-            },
-            Self::Final => Aims {
-                noise: 0.007,
-                blotches: 0.01,
-                map_error: 0.0015,
-                shadow_rays: 1..=16,
-                gather_rays: 200..=1600,
-                photons: 1_000_000..=4_000_000,
-            },
-            Self::Paper => return None,
-        })
-    }
-
-    /// Settings of this quality that suit a scene, by pilot renders with camera, size, samples and sampling of `settings`; `None` where no
+    /// Settings of this quality that suit a scene, by pilot renders with view, filter and sampling of `settings`; `None` where no
     /// setting depends on the scene. Seed, cards, threads and crop window have no effect.
     ///
     /// # Errors
@@ -137,39 +120,66 @@ impl Quality {
         observer: &dyn Observer,
     ) -> Result<Option<Fit>, RenderError> {
         settings.check()?;
-        let Some(aims) = self.aims() else { return Ok(None) };
-        let variances = measure(scene, packed, settings, observer)?;
-        Ok(Some(aims.fit(&variances, settings.integrator.samples)))
+        let Some(level) = self.level() else { return Ok(None) };
+        let of = Pictured {
+            pixels: f64::from(settings.picture.width) * f64::from(settings.picture.height),
+            is_cached: settings.integrator.irradiance_error.is_some(),
+        };
+        Ok(Some(level.fit(&measure(scene, packed, settings, observer)?, &of)))
     }
 }
 
-impl Aims {
-    /// The cheapest settings within the bounds that meet the aims.
-    fn fit(&self, variances: &Variances, samples: u32) -> Fit {
-        let Variances { shadow_ray, gather_ray, photon, lambertian } = *variances;
-        let allowed = self.noise * self.noise * f64::from(samples.max(1));
+/// A picture, as far as a fit depends on it.
+struct Pictured {
+    /// Number of pixels.
+    pixels: f64,
+    /// If the irradiance cache may be used.
+    is_cached: bool,
+}
+
+impl Level {
+    /// Settings for the variances of a scene in a picture: those with the least sum of time and variance.
+    ///
+    /// With `n` of something, samples or rays or photons, a pixel takes the time `c n` and has the variance `v / n`. The sum of
+    /// `c n + w^2 v / n` is the least for `n = w sqrt(v / c)`, `w` the worth of accuracy.
+    fn fit(&self, variances: &Variances, of: &Pictured) -> Fit {
+        let Variances { place, shadow_ray, gather_ray, photon, lambertian, gather_rays_per_ray } = *variances;
+        let number = |variance: f64, cost: f64| self.worth * (variance / cost).sqrt();
+        let samples = within(number(place, 1.0), &self.samples, 4);
+        let shadow_rays = number(shadow_ray, COST_OF_SHADOW_RAY) / f64::from(samples);
+        let interpolates = of.is_cached && lambertian >= FEW_LAMBERTIAN;
+        let weight = if interpolates { WEIGHT_OF_RECORDS } else { 1.0 };
+        let cost = COST_OF_GATHER_RAY * gather_rays_per_ray.max(MIN_GATHER_RAYS_PER_RAY);
+        let gather_rays = number(weight * gather_ray, cost);
+        let photons = number(WEIGHT_OF_MAP * photon, COST_OF_PHOTON / of.pixels);
         Fit {
-            photons: photons(photon / (self.map_error * self.map_error), &self.photons),
-            gather_rays: within(gather_ray / (self.blotches * self.blotches), &self.gather_rays, 8),
-            shadow_rays: within(shadow_ray / allowed, &self.shadow_rays, 1),
-            interpolates: lambertian >= FEW_LAMBERTIAN,
+            samples,
+            photons: rounded(photons, &self.photons),
+            gather_rays: within(gather_rays, &self.gather_rays, 8),
+            shadow_rays: within(shadow_rays, &SHADOW_RAYS, 1),
+            interpolates,
             measured: Measured {
+                place: place.sqrt(),
                 shadow_ray: shadow_ray.sqrt(),
                 gather_ray: gather_ray.sqrt(),
                 million_photons: (photon / 1e6).sqrt(),
+                gather_rays_per_ray,
             },
         }
     }
 }
 
-/// The least multiple of `step` that is not below a number, within bounds.
+/// The least multiple of `step` that is not below a number, within bounds; the maximum for no number.
 fn within(number: f64, bounds: &RangeInclusive<u32>, step: u32) -> u32 {
+    if number.is_nan() {
+        return *bounds.end();
+    }
     let steps = (number / f64::from(step)).ceil() as u32;
     steps.saturating_mul(step).clamp(*bounds.start(), *bounds.end())
 }
 
 /// A number of photons within bounds, rounded up to two digits; the maximum for none that is finite.
-fn photons(number: f64, bounds: &RangeInclusive<usize>) -> usize {
+fn rounded(number: f64, bounds: &RangeInclusive<usize>) -> usize {
     let finite = if number.is_finite() { number } else { *bounds.end() as f64 };
     let bounded = finite.clamp(*bounds.start() as f64, *bounds.end() as f64) as usize;
     let digit = 10_usize.pow(bounded.max(10).ilog10() - 1);
@@ -180,31 +190,77 @@ fn photons(number: f64, bounds: &RangeInclusive<usize>) -> usize {
 mod tests {
     use super::*;
 
-    const VARIANCES: Variances =
-        Variances { shadow_ray: 0.03, gather_ray: 0.1, photon: 5.0, lambertian: 1.0 };
+    const VARIANCES: Variances = Variances {
+        place: 0.0036,
+        shadow_ray: 0.04,
+        gather_ray: 0.12,
+        photon: 3.0,
+        lambertian: 1.0,
+        gather_rays_per_ray: 0.2,
+    };
+    const PICTURED: Pictured = Pictured { pixels: 65_536.0, is_cached: true };
 
     fn good(variances: Variances) -> Fit {
-        Quality::Good.aims().unwrap().fit(&variances, 16)
+        Quality::Good.level().unwrap().fit(&variances, &PICTURED)
     }
 
-    /// Variances of 0.03 / (16 * 5) and 0.1 / 256 are the squares of 2 %, and 5 / 560,000 that of 0.3 %.
+    /// Time and weighted variance of a pixel.
+    fn loss(variances: &Variances, [samples, shadow_rays, gather_rays, photons]: [f64; 4]) -> f64 {
+        let Variances { place, shadow_ray, gather_ray, photon, gather_rays_per_ray, .. } = variances;
+        let rays = samples * shadow_rays;
+        let time = samples
+            + rays * COST_OF_SHADOW_RAY
+            + gather_rays * gather_rays_per_ray * COST_OF_GATHER_RAY
+            + photons * COST_OF_PHOTON / PICTURED.pixels;
+        let variance = place / samples
+            + shadow_ray / rays
+            + gather_ray * WEIGHT_OF_RECORDS / gather_rays
+            + photon * WEIGHT_OF_MAP / photons;
+        time + Quality::Good.level().unwrap().worth.powi(2) * variance
+    }
+
     #[test]
-    fn the_fewest_rays_and_photons_that_meet_the_aims_are_chosen() {
+    fn other_settings_cost_more_than_they_are_worth() {
         let fit = good(VARIANCES);
-        assert_eq!([fit.shadow_rays, fit.gather_rays], [5, 256]);
-        assert_eq!((fit.photons, fit.interpolates), (560_000, true));
+        let chosen = [fit.samples, fit.shadow_rays, fit.gather_rays, fit.photons as u32].map(f64::from);
+        assert_eq!(chosen, [24.0, 6.0, 200.0, 280_000.0]);
+        for (index, factor) in (0..4).flat_map(|index| [(index, 0.7), (index, 1.4)]) {
+            let mut other = chosen;
+            other[index] *= factor;
+            if index == 0 {
+                // The shadow rays of a pixel, not of a sample.
+                other[1] /= factor;
+            }
+            assert!(loss(&VARIANCES, other) > loss(&VARIANCES, chosen), "{index} {factor}");
+        }
     }
 
     #[test]
     fn light_without_noise_takes_the_fewest_rays_and_noisy_light_no_more_than_the_most() {
-        let none = good(Variances { shadow_ray: 0.0, gather_ray: 0.0, photon: 0.0, ..VARIANCES });
-        assert_eq!((none.shadow_rays, none.gather_rays, none.photons), (1, 64, 200_000));
+        let all = |value| {
+            let values =
+                Variances { place: value, shadow_ray: value, gather_ray: value, photon: value, ..VARIANCES };
+            let fit = good(values);
+            (fit.samples, fit.shadow_rays, fit.gather_rays, fit.photons)
+        };
+        assert_eq!(all(0.0), (24, 1, 128, 200_000));
         for endless in [1e12, f64::INFINITY] {
-            let endless =
-                good(Variances { shadow_ray: endless, gather_ray: endless, photon: endless, ..VARIANCES });
-            assert_eq!((endless.shadow_rays, endless.gather_rays, endless.photons), (8, 512, 1_000_000));
+            assert_eq!(all(endless), (48, 16, 1024, 1_000_000));
         }
         assert_eq!(good(Variances { photon: f64::NAN, ..VARIANCES }).photons, 1_000_000);
+        assert_eq!(
+            good(Variances { gather_ray: 0.0, gather_rays_per_ray: 0.0, ..VARIANCES }).gather_rays,
+            128
+        );
+    }
+
+    /// Rays of records are shared by the pixels around them.
+    #[test]
+    fn pixels_without_records_take_more_rays_for_equal_costs() {
+        let level = Quality::Good.level().unwrap();
+        let alone = level.fit(&VARIANCES, &Pictured { is_cached: false, ..PICTURED });
+        assert!(!alone.interpolates && alone.gather_rays > good(VARIANCES).gather_rays);
+        assert_eq!(alone.gather_rays, good(Variances { lambertian: 0.0, ..VARIANCES }).gather_rays);
     }
 
     #[test]
@@ -214,21 +270,38 @@ mod tests {
         let applied = |stated| initial.clone().with(|settings| fit.apply(settings, stated));
         assert_eq!(applied(Stated::ALL), initial);
         let of_samples = applied(Stated::default()).integrator;
-        assert_eq!((of_samples.irradiance_error, of_samples.gather_rays), (None, 16));
+        assert_eq!((of_samples.irradiance_error, of_samples.gather_rays), (None, 9));
+        assert_eq!((of_samples.samples, of_samples.shadow_rays), (24, 6));
         let cached = applied(Stated { cache: true, ..Stated::default() }).integrator;
-        assert_eq!((cached.irradiance_error, cached.gather_rays), (initial.integrator.irradiance_error, 256));
+        assert_eq!((cached.irradiance_error, cached.gather_rays), (initial.integrator.irradiance_error, 200));
         let photons = applied(Stated { photons: true, ..Stated::default() });
         assert_eq!(photons.photons.count, initial.photons.count);
-        assert_eq!(photons.integrator.shadow_rays, 5);
+        assert_eq!(photons.integrator.shadow_rays, 6);
+    }
+
+    #[test]
+    fn samples_of_a_stated_number_share_the_rays_of_a_pixel() {
+        let fit = good(VARIANCES);
+        for (samples, shadow_rays) in [(1, 16), (64, 3), (1000, 1)] {
+            let mut settings = Quality::Good.settings();
+            settings.integrator.samples = samples;
+            fit.apply(&mut settings, Stated { samples: true, ..Stated::default() });
+            assert_eq!(
+                (settings.integrator.samples, settings.integrator.shadow_rays),
+                (samples, shadow_rays)
+            );
+        }
     }
 
     #[test]
     fn a_better_quality_never_takes_fewer_of_anything() {
         let fits = [Quality::Draft, Quality::Good, Quality::Final]
-            .map(|quality| quality.aims().unwrap().fit(&VARIANCES, quality.settings().integrator.samples));
+            .map(|quality| quality.level().unwrap().fit(&VARIANCES, &PICTURED));
         for [worse, better] in [[fits[0], fits[1]], [fits[1], fits[2]]] {
-            assert!(worse.photons <= better.photons && worse.gather_rays <= better.gather_rays);
+            assert!(worse.samples <= better.samples && worse.photons <= better.photons);
+            assert!(worse.gather_rays <= better.gather_rays);
+            assert!(worse.samples * worse.shadow_rays <= better.samples * better.shadow_rays);
         }
-        assert!(Quality::Paper.aims().is_none());
+        assert!(Quality::Paper.level().is_none());
     }
 }

@@ -1,26 +1,26 @@
 //! Pilot renders: pixels spread over the picture, rendered on emulated chips of this process.
 
 use glam::Vec3;
-use photoncard_firmware::chip::{ReferenceChip, light_of};
+use photoncard_firmware::chip::light_of;
+use photoncard_firmware::kind::Reference;
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::budget::SUMS_WITH_LAYERS;
-use photoncard_shared::message::{CausticGather, PixelLayers, Tile};
+use photoncard_shared::message::{CausticGather, FrameParameters, PixelLayers, Tile};
 use rayon::ThreadPool;
-use rayon::prelude::*;
 
 use super::spread::Levels;
 use crate::emulator::THREAD_STACK;
-use crate::emulator::direct::{RenderedTile, render_tile};
+use crate::emulator::direct::{RenderedTile, render_tiles_apart};
 use crate::film::Window;
 use crate::pack::PackedScene;
 use crate::photon_map::{MappedImage, PhotonSettings, map_photons};
 use crate::render::{Observer, Phase, RenderError, RenderSettings, Sampling};
 use crate::scene::Scene;
 
-/// Rows and columns of the tiles.
-const TILES: u32 = 8;
-/// Side of a tile, pixels.
-const SIDE: u32 = 4;
+/// Tiles in a grid of cells, for the noise: each at a place in its cell by a hash.
+const SPREAD: Grid = Grid { cells: 8, side: 4 };
+/// Tiles in which irradiance records are placed: large, as tiles compute records at their borders of their own.
+const SURVEYED: Grid = Grid { cells: 4, side: 32 };
 /// Photons of the smaller map; the larger one has four times as many.
 const FEW_PHOTONS: usize = 16_384;
 const MORE: usize = 4;
@@ -29,7 +29,7 @@ const MORE: usize = 4;
 const SEEDS: [u32; 2] = [0x5eed_0001, 0x5eed_0002];
 const PHOTON_SEED: u32 = 0x5eed_0003;
 /// Minimum side of the picture, pixels: tiles of smaller ones would overlap.
-const MIN_SIDE: u32 = TILES * SIDE;
+const MIN_SIDE: u32 = SPREAD.cells * SPREAD.side;
 /// Numbers of rays that are compared.
 const SHADOW_RAYS: [u32; 2] = [1, 4];
 const GATHER_RAYS: [u32; 2] = [8, 32];
@@ -37,6 +37,8 @@ const GATHER_RAYS: [u32; 2] = [8, 32];
 /// Variances and errors that the settings follow from, relative to the radiance of the pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Variances {
+    /// Variance of a sample by its place: by edges and textures in a pixel. A lower bound: strata make that of several rays less than `v / n`.
+    pub(super) place: f64,
     /// Variance of a sample by one shadow ray.
     pub(super) shadow_ray: f64,
     /// Variance of a sample by one gather ray.
@@ -45,6 +47,9 @@ pub(super) struct Variances {
     pub(super) photon: f64,
     /// Share of the samples that see a surface with a Lambertian part.
     pub(super) lambertian: f64,
+    /// Number of gather rays that a pixel costs for each one of its own: those of irradiance records, and of samples between which
+    /// nothing is interpolated.
+    pub(super) gather_rays_per_ray: f64,
 }
 
 /// Renders the pilots of a picture.
@@ -61,7 +66,8 @@ pub(super) fn measure(
     let pool = threads.stack_size(THREAD_STACK).build().map_err(RenderError::Chips)?;
     let settings = &enlarged(settings);
     // Of the whole picture: a part of it has equal pixels.
-    let tiles = spread_tiles(Window::full(settings.picture.width, settings.picture.height));
+    let window = Window::full(settings.picture.width, settings.picture.height);
+    let tiles = SPREAD.tiles(window);
     let pilot = |photons| Pilot::new(scene, packed, settings, photons, observer);
     let [few, more] = [pilot(FEW_PHOTONS)?, pilot(MORE * FEW_PHOTONS)?];
     let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
@@ -71,7 +77,7 @@ pub(super) fn measure(
                 (integrator.shadow_rays, integrator.gather_rays) = (shadow_rays, gather_rays);
                 integrator.seed = seed;
             });
-            more.render(&settings, &pool, &tiles, observer)
+            more.render_pixels(&settings, &pool, &tiles, observer)
         };
         Ok([render(SEEDS[0])?, render(SEEDS[1])?])
     };
@@ -88,25 +94,36 @@ pub(super) fn measure(
         settings.integrator.sampling = Sampling::Reflection;
         settings.integrator.seed = SEEDS[0];
     });
-    let maps =
-        [few.render(&by_map, &pool, &tiles, observer)?, more.render(&by_map, &pool, &tiles, observer)?];
+    let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &pool, &tiles, observer);
+    let maps = [render_map(&few)?, render_map(&more)?];
+    let surveyed = SURVEYED.tiles(window);
+    let [shadow_ray, gather_ray] =
+        [of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best), of_ray(GATHER_RAYS, &by_few_gather_rays, &best)];
+    let of_rays = shadow_ray / f64::from(shadow_rays) + gather_ray / f64::from(gather_rays);
     Ok(Variances {
-        shadow_ray: of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best),
-        gather_ray: of_ray(GATHER_RAYS, &by_few_gather_rays, &best),
+        place: (of_pairs(&best, &best)[1] - of_rays).max(0.0),
+        shadow_ray,
+        gather_ray,
         photon: of_photon(&best, &maps),
         lambertian: best[0].lambertian,
+        gather_rays_per_ray: few.gather_rays_per_ray(settings, &pool, &surveyed, observer)?,
     })
 }
 
 /// Variance of a sample by one ray, from a pair of renders by fewer `rays` and the best pair. The variance by `n` rays is `a + v / n`,
 /// with `a` that of the places of the samples and of other rays: two numbers of rays give `v`.
 fn of_ray(rays: [u32; 2], noisy: &[Pixels; 2], best: &[Pixels; 2]) -> f64 {
+    let [more, less] = of_pairs(noisy, best);
+    ((more - less) / (1.0 / f64::from(rays[0]) - 1.0 / f64::from(rays[1]))).max(0.0)
+}
+
+/// Variances of a sample in two pairs of renders, where all four see a surface.
+fn of_pairs(noisy: &[Pixels; 2], best: &[Pixels; 2]) -> [f64; 2] {
     let seen: Vec<usize> = pixels_with_surfaces([&noisy[0], &noisy[1], &best[0], &best[1]]).collect();
     let radiances = |pixels: &Pixels| seen.iter().map(|&pixel| pixels.radiance(pixel)).collect::<Vec<_>>();
     let [noisy, best] = [noisy, best].map(|pair| [radiances(&pair[0]), radiances(&pair[1])]);
     let levels = Levels::new(best[0].iter().zip(&best[1]).map(|(first, second)| 0.5 * (first + second)));
-    let [more, less] = [noisy, best].map(|[first, second]| 0.5 * levels.mean_square(first, second));
-    ((more - less) / (1.0 / f64::from(rays[0]) - 1.0 / f64::from(rays[1]))).max(0.0)
+    [noisy, best].map(|[first, second]| 0.5 * levels.mean_square(first, second))
 }
 
 /// Pixels that see a surface in all renders.
@@ -117,8 +134,8 @@ fn pixels_with_surfaces<const N: usize>(renders: [&Pixels; N]) -> impl Iterator<
 /// Mean squared error of tiles by a map of one photon, from the difference of two maps whose errors are independent.
 fn of_photon(best: &[Pixels; 2], maps: &[Pixels; 2]) -> f64 {
     // All tiles are of equal size.
-    let pixels_of_tile = (best[0].direct.len() / (TILES * TILES) as usize).max(1);
-    let mut tiles = vec![Vec::new(); (TILES * TILES) as usize];
+    let pixels_of_tile = (best[0].direct.len() / SPREAD.number()).max(1);
+    let mut tiles = vec![Vec::new(); SPREAD.number()];
     for pixel in pixels_with_surfaces([&best[0], &best[1], &maps[0], &maps[1]]) {
         tiles[pixel / pixels_of_tile].push(pixel);
     }
@@ -158,31 +175,54 @@ impl<'a> Pilot<'a> {
         Ok(Self { scene, mapped, has_caustics })
     }
 
+    /// Number of gather rays of tiles with the irradiance cache, for each ray of a pixel.
+    fn gather_rays_per_ray(
+        &self,
+        settings: &RenderSettings,
+        pool: &ThreadPool,
+        tiles: &[Tile],
+        observer: &dyn Observer,
+    ) -> Result<f64, RenderError> {
+        let mut frame = self.frame(settings)?;
+        (frame.samples, frame.shadow_rays, frame.gather_rays, frame.seed) = (1, 0, 1, SEEDS[0]);
+        let rendered = self.render(&frame, pool, tiles, observer)?;
+        let rays: u64 = rendered.iter().map(|tile| tile.counters.gather_rays).sum();
+        let pixels: usize = tiles.iter().map(|tile| tile.pixels() as usize).sum();
+        Ok(rays as f64 / pixels.max(1) as f64)
+    }
+
     /// Renders one sample of each pixel of the tiles, without the irradiance cache.
-    fn render(
+    fn render_pixels(
         &self,
         settings: &RenderSettings,
         pool: &ThreadPool,
         tiles: &[Tile],
         observer: &dyn Observer,
     ) -> Result<Pixels, RenderError> {
+        let mut frame = self.frame(settings)?;
+        (frame.samples, frame.irradiance_error, frame.layers) = (1, None, true);
+        let rendered = self.render(&frame, pool, tiles, observer)?;
+        Ok(Pixels::new(&rendered, self.mapped.image.view().0.header.radiance_unit))
+    }
+
+    fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
         let camera = settings.camera(self.scene)?;
         let max_distance = self.mapped.max_distance;
         let neighbors = settings.photons.caustic_neighbors;
         let caustics = self.has_caustics.then_some(CausticGather { neighbors, max_distance });
-        let mut frame = settings.frame(&camera, max_distance, caustics);
-        (frame.samples, frame.irradiance_error, frame.layers) = (1, None, true);
-        let (image, memory) = self.mapped.image.view();
-        let render_one = |chip: &mut Box<ReferenceChip>, &tile: &Tile| {
-            if observer.is_stopped() {
-                return Err(RenderError::Stopped);
-            }
-            render_tile(chip, &image, memory, &frame, tile, None).map_err(RenderError::Image)
-        };
-        let new_chip = || Box::new(ReferenceChip::new());
-        let rendered: Result<Vec<RenderedTile>, RenderError> =
-            pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect());
-        Ok(Pixels::new(&rendered?, image.header.radiance_unit))
+        Ok(settings.frame(&camera, max_distance, caustics))
+    }
+
+    fn render(
+        &self,
+        frame: &FrameParameters,
+        pool: &ThreadPool,
+        tiles: &[Tile],
+        observer: &dyn Observer,
+    ) -> Result<Vec<RenderedTile>, RenderError> {
+        let is_stopped = || observer.is_stopped();
+        let image = &self.mapped.image;
+        Ok(render_tiles_apart::<Reference, _>(pool, image, frame, tiles, &|memory| memory, &is_stopped)?)
     }
 }
 
@@ -227,24 +267,41 @@ fn enlarged(settings: &RenderSettings) -> RenderSettings {
     })
 }
 
-/// Tiles in a grid of cells over the window, each at a place in its cell by a hash; all of equal size.
-fn spread_tiles(window: Window) -> Vec<Tile> {
-    let [width, height] = [window.width(), window.height()];
-    let (tile_width, tile_height) = (SIDE.min(width), SIDE.min(height));
-    let place = |cell: u32, cells: u32, extent: u32, side: u32, salt: u32| {
-        let free = u64::from(extent - side) + 1;
-        let [low, high] = [cell, cell + 1].map(|cell| free * u64::from(cell) / u64::from(cells));
-        low as u32 + hash(salt) % (high - low).max(1) as u32
-    };
-    (0..TILES * TILES)
-        .map(|id| Tile {
-            id,
-            x: window.x0 + place(id % TILES, TILES, width, tile_width, 2 * id),
-            y: window.y0 + place(id / TILES, TILES, height, tile_height, 2 * id + 1),
-            width: tile_width,
-            height: tile_height,
-        })
-        .collect()
+/// A grid of cells over a picture, with a tile in each.
+struct Grid {
+    /// Rows and columns.
+    cells: u32,
+    /// Side of a tile, pixels.
+    side: u32,
+}
+
+impl Grid {
+    /// Number of tiles.
+    const fn number(&self) -> usize {
+        (self.cells * self.cells) as usize
+    }
+
+    /// Tiles of equal size in a window, each at a place in its cell by a hash; fewer, or of the window's size, if that is small.
+    fn tiles(&self, window: Window) -> Vec<Tile> {
+        let side = self.side;
+        let [width, height] = [window.width(), window.height()];
+        let [columns, rows] = [width, height].map(|extent| self.cells.min(extent.div_ceil(side)));
+        let (tile_width, tile_height) = (side.min(width), side.min(height));
+        let place = |cell: u32, cells: u32, extent: u32, side: u32, salt: u32| {
+            let free = u64::from(extent - side) + 1;
+            let [low, high] = [cell, cell + 1].map(|cell| free * u64::from(cell) / u64::from(cells));
+            low as u32 + hash(salt) % (high - low).max(1) as u32
+        };
+        (0..columns * rows)
+            .map(|id| Tile {
+                id,
+                x: window.x0 + place(id % columns, columns, width, tile_width, 2 * id),
+                y: window.y0 + place(id / columns, rows, height, tile_height, 2 * id + 1),
+                width: tile_width,
+                height: tile_height,
+            })
+            .collect()
+    }
 }
 
 #[cfg(test)]
@@ -255,8 +312,8 @@ mod tests {
     fn tiles_lie_in_the_window_and_are_spread_over_it() {
         for (x1, y1) in [(512, 512), (640, 48), (33, 3), (1, 1)] {
             let window = Window { x0: 7, x1: 7 + x1, y0: 5, y1: 5 + y1 };
-            let tiles = spread_tiles(window);
-            assert_eq!(tiles.len(), 64);
+            let tiles = SPREAD.tiles(window);
+            assert_eq!(tiles.len() as u32, x1.div_ceil(4).min(8) * y1.div_ceil(4).min(8));
             for tile in &tiles {
                 assert!(window.contains(tile.x, tile.y), "{tile:?}");
                 assert!(window.contains(tile.x + tile.width - 1, tile.y + tile.height - 1), "{tile:?}");

@@ -2,6 +2,7 @@
 
 use photoncard_shared::message::Fault;
 
+use crate::emulator::direct::TileError;
 use crate::emulator::whole_frame::FrameError;
 use crate::error::SceneError;
 use crate::film::FilmError;
@@ -150,6 +151,15 @@ impl From<FrameError> for RenderError {
                 reason: error.to_string(),
                 remedy: "render a part with --crop, fewer --spp or --gather-rays, or use --order sort".into(),
             },
+        }
+    }
+}
+
+impl From<TileError> for RenderError {
+    fn from(error: TileError) -> Self {
+        match error {
+            TileError::Fault(fault) => Self::Image(fault),
+            TileError::Stopped => Self::Stopped,
         }
     }
 }

@@ -11,6 +11,8 @@ use crate::session::Assignment;
 const HELP_AFTER: u32 = 2;
 /// Time after which an idle card duplicates another card's tile while no tile is done.
 const HELP_WITHOUT_MEAN: Duration = Duration::from_secs(1);
+/// Number of waiting tiles for each other card, and each tile that a card has, at which it may have one more.
+const PLENTY: usize = 4;
 /// Number of tiles awaiting comparison that are searched for a card before other waiting tiles are considered.
 pub(super) const COMPARED_AT_ONCE: usize = 256;
 
@@ -27,7 +29,7 @@ impl Scheduler {
         }
         let is_idle = tiles.is_empty();
         let index = (self.next_compared(card))
-            .or_else(|| self.next_waiting(is_idle))
+            .or_else(|| if self.has_share(card) { self.next_waiting(is_idle) } else { None })
             .or_else(|| self.compared_for(card, usize::MAX))
             .or_else(|| if is_idle { self.next_set_apart(card) } else { None })
             .or_else(|| self.next_to_help(card, now))?;
@@ -40,6 +42,13 @@ impl Scheduler {
     /// Returns whether any card has crashed at a tile.
     fn is_suspect(&self, index: usize) -> bool {
         !self.entries[index].crashes.is_empty()
+    }
+
+    /// Returns whether a card may have one tile more: any card that has none, and others as long as plenty wait for each other card. Tiles
+    /// that wait at a card behind a long one are late, and near the end no card would be free to take them.
+    fn has_share(&self, card: CardNumber) -> bool {
+        let others = self.living().filter(|&other| other != card).count();
+        self.waiting.len() > PLENTY * self.cards[card].tiles.len() * others
     }
 
     /// Next tile that no card has; a suspect one only for an idle card.

@@ -1,7 +1,7 @@
 //! Assignment of tiles to cards.
 //!
-//! Tiles wait in one queue. A card with a free credit takes the next one; no card waits for another, and results arrive in
-//! any order. A tile's pixels do not depend on its card or its time.
+//! Tiles wait in one queue. A card with a free credit takes the next one, unless so few are left that other cards would go without; no
+//! card waits for another, and results arrive in any order. A tile's pixels do not depend on its card or its time.
 //!
 //! - A tile to be verified is rendered by a second card as soon as one is free. If they differ, a third decides; the tiles
 //!   that the outvoted card alone has rendered are rendered again.

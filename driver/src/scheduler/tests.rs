@@ -33,10 +33,14 @@ fn answer(scheduler: &mut Scheduler, card: CardNumber, id: u32, value: u8, now: 
 #[test]
 fn an_idle_card_takes_what_is_at_another_for_too_long_and_the_first_answer_counts() {
     let mut scheduler = scheduler(4, 3).with_helpers();
-    for (card, id) in [(0, 0), (1, 1), (1, 2), (2, 3)] {
+    for (card, id) in [(0, 0), (1, 1), (2, 2)] {
         assert_eq!(take(&mut scheduler, card, Duration::ZERO), Some(id));
     }
-    answer(&mut scheduler, 2, 3, 0, SECOND);
+    // A card that is alone takes more.
+    [0, 2].into_iter().for_each(|card| scheduler.set_standing(card, Standing::Lost));
+    assert_eq!(take(&mut scheduler, 1, Duration::ZERO), Some(3));
+    [0, 2].into_iter().for_each(|card| scheduler.set_standing(card, Standing::Living));
+    answer(&mut scheduler, 2, 2, 0, SECOND);
     // The mean time is a second: tiles are duplicated after two.
     assert_eq!(take(&mut scheduler, 2, 3 * SECOND / 2), None);
     assert_eq!(take(&mut scheduler, 2, 2 * SECOND), Some(0));
@@ -47,8 +51,22 @@ fn an_idle_card_takes_what_is_at_another_for_too_long_and_the_first_answer_count
     // A card's second tile is not late while it works on the first.
     answer(&mut scheduler, 1, 1, 0, 5 * SECOND);
     assert_eq!(take(&mut scheduler, 0, 6 * SECOND), None);
-    answer(&mut scheduler, 1, 2, 0, 6 * SECOND);
+    answer(&mut scheduler, 1, 3, 0, 6 * SECOND);
     assert!(scheduler.is_complete() && scheduler.counters().eye_rays == 40);
+}
+
+#[test]
+fn the_last_tiles_go_singly_to_idle_cards() {
+    let mut scheduler = scheduler(20, 4);
+    let taken = |scheduler: &mut Scheduler, card| {
+        std::iter::from_fn(|| take(scheduler, card, Duration::ZERO)).count()
+    };
+    // 19 wait after the first tile, more than 4 for each of three other cards.
+    assert_eq!([0, 1, 2, 3].map(|card| taken(&mut scheduler, card)), [2, 2, 2, 2]);
+    for id in 0..8 {
+        answer(&mut scheduler, id as CardNumber / 2, id, 0, SECOND);
+    }
+    assert_eq!([0, 1, 2, 3].map(|card| taken(&mut scheduler, card)), [1, 1, 1, 1]);
 }
 
 #[test]
@@ -183,11 +201,10 @@ fn a_tile_that_has_taken_two_cards_waits_until_all_others_are_done() {
         scheduler.give_back(card, 0, true, SECOND);
         scheduler.set_standing(card, Standing::GivenUp);
     }
-    assert_eq!([take(&mut scheduler, 2, SECOND), take(&mut scheduler, 2, SECOND)], [Some(1), Some(2)]);
+    assert_eq!([take(&mut scheduler, 2, SECOND), take(&mut scheduler, 3, SECOND)], [Some(1), Some(2)]);
+    answer(&mut scheduler, 3, 2, 0, SECOND);
     assert_eq!(take(&mut scheduler, 3, SECOND), None);
     answer(&mut scheduler, 2, 1, 0, SECOND);
-    assert_eq!(take(&mut scheduler, 3, SECOND), None);
-    answer(&mut scheduler, 2, 2, 0, SECOND);
     for card in [3, 2, 2] {
         assert!(scheduler.check(SECOND).is_ok());
         let other = 5 - card;

@@ -8,12 +8,11 @@ use photoncard_shared::address::{STRUCTURES, Structure};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
 use rayon::ThreadPool;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::sample::{Chosen, Estimate, SampleRate, choose};
 use crate::emulator::EmulatedKind;
-use crate::emulator::direct::{RenderedTile, render_tile, render_tiles};
+use crate::emulator::direct::{RenderedTile, render_tiles, render_tiles_apart};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
 use crate::photon_map::MappedImage;
@@ -154,15 +153,7 @@ impl Bench<'_> {
         tiles: &[Tile],
         model: &(impl Fn(Lines<'b>) -> M + Sync),
     ) -> Result<Vec<RenderedTile>, RenderError> {
-        let new_chip = || Box::new(Chip::<K>::new());
-        let render_one = |chip: &mut Box<Chip<K>>, &tile: &Tile| {
-            if (self.is_stopped)() {
-                return Err(RenderError::Stopped);
-            }
-            let (scene, memory) = self.mapped.image.view();
-            render_tile(chip, &scene, model(memory), frame, tile, None).map_err(RenderError::Image)
-        };
-        self.pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
+        Ok(render_tiles_apart::<K, M>(self.pool, &self.mapped.image, frame, tiles, model, self.is_stopped)?)
     }
 
     /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or of all if there are several in flight or the order

@@ -19,7 +19,7 @@ pub(crate) struct IntegratorOptions {
     /// Shadow rays per sample [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     shadow_rays: Option<u32>,
-    /// Samples per pixel [default: by --quality]
+    /// Samples per pixel [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true)]
     spp: Option<u32>,
     /// Sampling density of the directions of gather rays; it never changes the picture's expected value
@@ -54,6 +54,7 @@ impl IntegratorOptions {
     /// Options that are stated, of those that a quality chooses for a scene.
     pub(super) fn stated(&self) -> Stated {
         Stated {
+            samples: self.spp.is_some(),
             gather_rays: self.gather_rays.is_some(),
             shadow_rays: self.shadow_rays.is_some(),
             cache: self.irradiance_cache.is_some() || self.ic_error.is_some(),

@@ -97,7 +97,7 @@ def settle(scene, size, samples):
 
 
 def sky(scene, radiance):
-    """The same radiance from everywhere."""
+    """The same radiance from everywhere, by the node that is returned."""
     scene.world = bpy.data.worlds.new("sky")
     tree = scene.world.node_tree
     background = tree.nodes.get("Background") or tree.nodes.new("ShaderNodeBackground")
@@ -105,6 +105,7 @@ def sky(scene, radiance):
     tree.links.new(background.outputs["Background"], output.inputs["Surface"])
     background.inputs["Color"].default_value = (radiance, radiance, radiance, 1.0)
     background.inputs["Strength"].default_value = 1.0
+    return background
 
 
 def lamp(material):
@@ -191,10 +192,7 @@ def is_used(socket):
 def replace(material, principled):
     """Puts gltf.osl in the place of a Principled BSDF."""
     tree = material.node_tree
-    script = tree.nodes.new("ShaderNodeScript")
-    script.mode = "INTERNAL"
-    script.bytecode = bytecode()
-    script.bytecode_hash = hashlib.md5(script.bytecode.encode()).hexdigest()
+    script = script_node(tree, "gltf.osl")
     for name, (kind, original) in PARAMETERS.items():
         target, source = script.inputs.new(f"NodeSocket{kind}", name), principled.inputs[original]
         if source.is_linked:
@@ -208,13 +206,22 @@ def replace(material, principled):
         tree.links.new(closure, link.to_socket)
 
 
+def script_node(tree, file):
+    """A node of a shader beside this file, without sockets."""
+    script = tree.nodes.new("ShaderNodeScript")
+    script.mode = "INTERNAL"
+    script.bytecode = bytecode(file)
+    script.bytecode_hash = hashlib.md5(script.bytecode.encode()).hexdigest()
+    return script
+
+
 @functools.cache
-def bytecode():
-    """gltf.osl, compiled. The operator that Blender's nodes have for it needs a module that `bpy` lacks."""
+def bytecode(file):
+    """A shader, compiled. The operator that Blender's nodes have for it needs a module that `bpy` lacks."""
     with tempfile.TemporaryDirectory() as folder:
-        compiled = Path(folder) / "gltf.oso"
-        if not _cycles.osl_compile(str(HERE / "gltf.osl"), str(compiled)):
-            sys.exit(f"{HERE / 'gltf.osl'} does not compile")
+        compiled = Path(folder) / "compiled.oso"
+        if not _cycles.osl_compile(str(HERE / file), str(compiled)):
+            sys.exit(f"{HERE / file} does not compile")
         return compiled.read_text()
 
 

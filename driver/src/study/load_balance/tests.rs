@@ -1,3 +1,4 @@
+use photoncard_firmware::sampler::hash;
 use proptest::prelude::*;
 
 use super::*;
@@ -62,16 +63,28 @@ fn a_second_credit_hides_the_latency_of_the_link() {
     let [one, two, four] = [1, 2, 4].map(|credits| balance(&costs, TileOrder::Picture, 4, credits, link));
     // A tile is as long as the way to the host and back: with one credit half of the time is waiting.
     assert!((one.idle_share() - 0.5).abs() < 0.01, "{}", one.idle_share());
-    assert!(two.idle_share() < 0.02, "{}", two.idle_share());
+    // But for the last tiles, of which each chip has one.
+    assert!(two.idle_share() < 0.05, "{}", two.idle_share());
     assert!(four.idle_share() <= two.idle_share() + ROUNDING);
 }
 
+/// Of eight tiles for two cards one waits behind the long one, however many credits a card has.
 #[test]
-fn tiles_behind_a_long_one_wait_for_it() {
+fn few_tiles_wait_behind_a_long_one() {
     let mut costs = [1.0; 8];
     costs[0] = 10.0;
     let makespan = |credits| balance(&costs, TileOrder::Picture, 2, credits, NO_LINK).makespan_seconds;
-    assert_eq!([makespan(1), makespan(4), makespan(8)], [10.0, 13.0, 17.0]);
+    assert_eq!([makespan(1), makespan(4), makespan(8)], [10.0, 11.0, 11.0]);
+}
+
+/// Chips with credits for four tiles are hardly more idle than those that are dealt one at a time.
+#[test]
+fn credits_leave_many_chips_busy() {
+    let costs: Vec<f64> = (0..1024).map(|tile| 1.0 + f64::from(hash(tile) % 100) / 50.0).collect();
+    for chips in [8, 64, 256] {
+        let idle = |credits| balance(&costs, TileOrder::Picture, chips, credits, NO_LINK).idle_share();
+        assert!(idle(4) < idle(1) + 0.03, "{chips} chips: {} {}", idle(4), idle(1));
+    }
 }
 
 #[test]

@@ -1,0 +1,95 @@
+//! Tables of measurements in documents: their rows follow from the CSV files beside them. `UPDATE_DOCS=1 cargo test -p photoncard-tests --test
+//! measured_tables` writes them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A line of `docs/quality.csv`: a scene by some settings, or by a peer.
+struct Row {
+    scene: String,
+    settings: String,
+    /// CPU time, s.
+    seconds: f64,
+    /// Relative error, %.
+    error: f64,
+    /// Mean, median and 95th percentile of the errors of blocks, as written.
+    others: [String; 3],
+}
+
+impl Row {
+    fn new(line: &str) -> Option<Self> {
+        let (scene, rest) = line.split_once(',')?;
+        // The settings may hold commas.
+        let mut fields: Vec<&str> = rest.rsplitn(8, ',').collect();
+        fields.reverse();
+        let [settings, seconds, _noise, _bias, error, others @ ..] = &fields[..] else { return None };
+        Some(Self {
+            scene: scene.to_owned(),
+            settings: settings.trim_matches('"').to_owned(),
+            seconds: seconds.parse().ok()?,
+            error: error.parse().ok()?,
+            others: <[&str; 3]>::try_from(others).ok()?.map(str::to_owned),
+        })
+    }
+
+    /// Time times squared error: of independent samples it is the same by any number.
+    fn cost(&self) -> f64 {
+        self.seconds * self.error * self.error
+    }
+}
+
+/// The lines of the table of `docs/quality.md`.
+fn quality_table(csv: &str) -> Vec<String> {
+    let rows: Vec<Row> = csv.lines().skip(1).filter_map(Row::new).collect();
+    assert_eq!(rows.len(), csv.lines().count() - 1, "each line of the CSV is a row");
+    rows.iter().filter_map(|row| row.settings.strip_prefix("--quality ").map(|quality| (row, quality))).map(|(row, quality)| {
+        let of_scene = || rows.iter().filter(|other| other.scene == row.scene);
+        let times = |peer: &str| {
+            let found = of_scene().find(|other| other.settings.starts_with(peer));
+            found.map_or_else(String::new, |peer| format!("{:.1}", peer.cost() / row.cost()))
+        };
+        let ours = of_scene().filter(|other| other.settings.starts_with("--"));
+        let best = ours.map(Row::cost).fold(f64::INFINITY, f64::min);
+        let Row { scene, seconds, error, others: [mean, median, p95], .. } = row;
+        let [mitsuba, cycles] = ["Mitsuba", "Cycles"].map(times);
+        let of_best = row.cost() / best;
+        format!(
+            "| {scene} | `{quality}` | {seconds:.1} | {error:.2} | {mean} | {median} | {p95} | {mitsuba} | {cycles} | {of_best:.1} |"
+        )
+    }).collect()
+}
+
+fn documents() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
+}
+
+/// The first row of the table under a heading row, and the row behind it.
+fn table_of(document: &str, heading: &str) -> (usize, usize) {
+    let lines: Vec<&str> = document.lines().collect();
+    let first = lines.iter().position(|line| *line == heading).expect("the document has the table") + 2;
+    let length = lines[first..].iter().take_while(|line| line.starts_with('|')).count();
+    (first, first + length)
+}
+
+#[test]
+fn the_table_of_qualities_is_that_of_its_csv() {
+    const HEADING: &str = "| scene | quality | CPU s | error, % | mean | median, % | p95, % | Mitsuba, times | Cycles, times | best, times |";
+    let path = documents().join("quality.md");
+    let read = |path: &Path| fs::read_to_string(path).expect("the document can be read");
+    let (document, expected) = (read(&path), quality_table(&read(&documents().join("quality.csv"))));
+    let (first, end) = table_of(&document, HEADING);
+    let lines: Vec<&str> = document.lines().collect();
+    if lines[first..end] == expected {
+        return;
+    }
+    assert!(std::env::var_os("UPDATE_DOCS").is_some(), "expected:\n{}", expected.join("\n"));
+    let expected: Vec<&str> = expected.iter().map(String::as_str).collect();
+    fs::write(&path, [&lines[..first], &expected, &lines[end..]].concat().join("\n") + "\n")
+        .expect("written");
+}
+
+#[test]
+fn ratios_are_those_of_time_times_squared_error() {
+    let csv = "scene,settings\nbox,--quality good,2.00,1,0,3.00,1.0001,0.4,2.0\nbox,\"Mitsuba, 64 samples\",1.00,1,0,12.00,1.0,0.5,2.5\nbox,--spp 2 --photons 3,1.00,1,0,3.00,1.0,0.4,2.0";
+    assert_eq!(quality_table(csv), ["| box | `good` | 2.0 | 3.00 | 1.0001 | 0.4 | 2.0 | 8.0 |  | 2.0 |"]);
+}
