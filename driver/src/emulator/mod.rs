@@ -1,5 +1,6 @@
 //! Emulated cards: the firmware on threads of this process, one chip per thread, each on a loopback link.
 
+pub mod contents;
 pub mod direct;
 mod dram;
 pub mod memory_model;
