@@ -167,6 +167,35 @@ fn a_labelled_trace_adds_up_to_the_counters_and_begins_its_lines_as_one_without_
 }
 
 #[test]
+fn a_trace_of_the_dram_has_a_line_for_every_line_that_was_fetched() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for (format, cache) in [
+        ("ramulator", "photon=4K/128/4,scene=4K/128/4"),
+        ("dramsim3", "unified=8K/256/2"),
+        ("dramsim3", "photon=4K/128/4,scene=4K/128/4"),
+    ] {
+        let files = ["-o", "a.exr", "--stats", "a.json", "--trace", "a.gz", "--trace-format", format];
+        let options = ["--card", "emulated:1", "--tile", "4", "--cache", cache];
+        room.rendered("scene.gltf", &[&files[..], &options].concat());
+        let statistics = statistics(&room, "a.json");
+        let fetched: u64 =
+            ["photon_map", "scene"].map(|half| count(&statistics, half, "dram_bytes")).iter().sum();
+        let text = io::read_to_string(GzDecoder::new(&*room.read("a.gz"))).unwrap();
+        assert_eq!(text.lines().count() as u64 * 128, fetched, "{format} {cache}");
+        for (cycle, line) in text.lines().enumerate() {
+            let address = match line.split(' ').collect::<Vec<_>>()[..] {
+                ["LD", address] if format == "ramulator" => address,
+                [address, "READ", at] if format == "dramsim3" && at == cycle.to_string() => address,
+                _ => panic!("{line}"),
+            };
+            let address = u64::from_str_radix(address.strip_prefix("0x").unwrap(), 16).unwrap();
+            assert!(address.is_multiple_of(128) && address < statistics["image_bytes"].as_u64().unwrap());
+        }
+    }
+}
+
+#[test]
 fn a_trace_is_of_one_chip() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
@@ -175,6 +204,10 @@ fn a_trace_is_of_one_chip() {
         (&["--card", "emulated:2"][..], ["several chips", "--card emulated:1"]),
         (&["--card", "emulated:1", "--card", "emulated:1"], ["several chips", "--card emulated:1"]),
         (&["--card", "emulated:1", "--order", "hilbert"], ["--order hilbert", "such as sort"]),
+        (
+            &["--card", "emulated:1", "--trace-labels", "--trace-format", "ramulator"],
+            ["has no labels", "--trace-format dinero"],
+        ),
         (&["--card", "emulated:1", "--trace", "absent/a.gz"], ["folder absent", "create it"]),
         (&["--card", "emulated:1", "--trace", "out.exr"], ["another output", "a name of its own"]),
     ] {

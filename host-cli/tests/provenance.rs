@@ -40,7 +40,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
 }
 
 /// Options that no pixel depends on.
-const OTHERS: [&[&str]; 19] = [
+const OTHERS: [&[&str]; 20] = [
     &["--photon-map", "jensen"],
     &["--tile", "3"],
     &["--order", "naive"],
@@ -54,6 +54,7 @@ const OTHERS: [&[&str]; 19] = [
     &["--counters"],
     &["--cache", "unified=8K/128/2"],
     &["--trace", "a.din.gz", "--card", "emulated:1"],
+    &["--trace-format", "ramulator", "--trace", "a.gz", "--card", "emulated:1"],
     &["--trace-labels", "--trace", "a.din.gz", "--card", "emulated:1"],
     &["--threads", "2"],
     &["--exposure", "1", "-o", "a.png"],

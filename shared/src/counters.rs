@@ -38,8 +38,16 @@ pub struct Counters {
     pub photons_taken: u64,
     /// Candidates read by selections of the k nearest.
     pub photons_selected: u64,
+    /// Comparisons of distances in these selections, but for candidates of equal distances.
+    pub distances_compared: u64,
     /// Photons returned by searches.
     pub photons_found: u64,
+    /// Photons whose power was reflected by a lobe as well, each by its direction; those of the caustic map included.
+    pub photons_reflected: u64,
+    /// Photons of [`Self::photons_reflected`] whose lobe is a microfacet model.
+    pub photons_on_microfacets: u64,
+    /// Normals of photons that were decoded, to find those of the surface.
+    pub normals_decoded: u64,
     /// Searches for the nearest irradiance point.
     pub lookups: u64,
     /// Irradiance points whose distance was computed.
@@ -68,7 +76,11 @@ impl Counters {
         photons_tested: 0,
         photons_taken: 0,
         photons_selected: 0,
+        distances_compared: 0,
         photons_found: 0,
+        photons_reflected: 0,
+        photons_on_microfacets: 0,
+        normals_decoded: 0,
         lookups: 0,
         points_tested: 0,
         drains: 0,
@@ -76,13 +88,14 @@ impl Counters {
     };
 
     /// Counts a search for the k nearest photons: photons tested, photons that became candidates, candidates read by
-    /// selections, photons found.
+    /// selections and their comparisons, photons found.
     #[inline(always)]
-    pub fn count_gather(&mut self, tested: u32, taken: u32, selected: u32, found: u32) {
+    pub fn count_gather(&mut self, tested: u32, taken: u32, [selected, compared]: [u32; 2], found: u32) {
         self.gathers += 1;
         self.photons_tested += u64::from(tested);
         self.photons_taken += u64::from(taken);
         self.photons_selected += u64::from(selected);
+        self.distances_compared += u64::from(compared);
         self.photons_found += u64::from(found);
     }
 
@@ -111,7 +124,12 @@ impl Counters {
         self.photons_tested = self.photons_tested.saturating_add(other.photons_tested);
         self.photons_taken = self.photons_taken.saturating_add(other.photons_taken);
         self.photons_selected = self.photons_selected.saturating_add(other.photons_selected);
+        self.distances_compared = self.distances_compared.saturating_add(other.distances_compared);
         self.photons_found = self.photons_found.saturating_add(other.photons_found);
+        self.photons_reflected = self.photons_reflected.saturating_add(other.photons_reflected);
+        self.photons_on_microfacets =
+            self.photons_on_microfacets.saturating_add(other.photons_on_microfacets);
+        self.normals_decoded = self.normals_decoded.saturating_add(other.normals_decoded);
         self.lookups = self.lookups.saturating_add(other.lookups);
         self.points_tested = self.points_tested.saturating_add(other.points_tested);
         self.drains = self.drains.saturating_add(other.drains);

@@ -323,13 +323,18 @@ fn golden_structures() {
         photons_tested: 13,
         photons_taken: 14,
         photons_selected: 15,
-        photons_found: 16,
-        lookups: 17,
-        points_tested: 18,
-        drains: 19,
+        distances_compared: 16,
+        photons_found: 17,
+        photons_reflected: 18,
+        photons_on_microfacets: 19,
+        normals_decoded: 20,
+        lookups: 21,
+        points_tested: 22,
+        drains: 23,
         most_waiting: 300,
     };
-    let bytes = [5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 0xac, 2];
+    let bytes =
+        [5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 0xac, 2];
     assert_eq!(encoded(&Reply::TileDone { tile: 16, counters }), bytes);
 }
 

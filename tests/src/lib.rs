@@ -6,6 +6,7 @@ pub mod fuzz;
 pub mod hostile;
 pub mod lru;
 pub mod mapped;
+pub mod operations;
 pub mod shapes;
 pub mod wire;
 

@@ -66,7 +66,7 @@ impl Map {
         let mut radiances = Level::ALL.iter().filter_map(|level| level.run(estimate()));
         let radiance = radiances.next().expect("what every processor has");
         assert!(radiances.all(|other| other == radiance), "{position}");
-        radiance.x as f64
+        f64::from(radiance.radiance.x)
     }
 
     /// Mean radiance of a hundred points along a line.

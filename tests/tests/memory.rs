@@ -1,5 +1,6 @@
 //! Model of a chip's memory: it counts reads and cache misses, and does not change the picture.
 
+use photoncard_driver::emulator::contents::Inspected;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use photoncard_driver::pack::PackedScene;
@@ -156,7 +157,7 @@ fn a_cache_in_arrays_is_the_cache_in_vectors() {
         let in_array = || LineCache::new(shape, [CacheEntry::EMPTY; 128], [Line::ZERO; 128]).unwrap();
         for tile in &frame.tiles[..3] {
             let dram = Counted::new(frame.lines());
-            let board = Counted::new(LineCaches::new(dram, in_array(), in_array()));
+            let board = Inspected::new(Counted::new(LineCaches::new(dram, in_array(), in_array())));
             let board = frame.tile(&mut chip, board, *tile);
             let emulated = frame.tile(&mut chip, caches(SPLIT).over(frame.lines()), *tile);
             let direct = frame.tile(&mut chip, frame.lines(), *tile);

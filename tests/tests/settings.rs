@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use photoncard_driver::display::DisplaySettings;
-use photoncard_driver::emulator::trace::TraceSettings;
+use photoncard_driver::emulator::trace::{TraceFormat, TraceSettings};
 use photoncard_driver::film::{Film, Window};
 use photoncard_driver::layer::Layers;
 use photoncard_driver::partial::PartialSettings;
@@ -108,7 +108,11 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             faults: Nothing = Some("flips=1e-5,seed=1".parse().expect("faults")),
             verify: Nothing = Some(0.5),
             caches: Nothing = Some("unified=8K/128/2".parse().expect("caches")),
-            trace: Nothing = Some(TraceSettings { path: folder.join("reads.din.gz"), has_labels: true }),
+            trace: Nothing = Some(TraceSettings {
+                path: folder.join("reads.din.gz"),
+                format: TraceFormat::Dinero,
+                has_labels: true,
+            }),
         }
         outputs: TileOutputs {
             partial: Nothing = Some(PartialSettings { path: folder.join("a.exr.partial"), resume: false }),

@@ -2,17 +2,22 @@
 //!
 //! [`Symbols`] are the parameters of Table 7.1, a [`Workload`] the counts of rays, gathers and bytes of one frame, a
 //! [`Cost`] the FLOPs and bytes that they take of each unit of the chip, and a [`Prediction`] the speed of a
-//! [`Machine`] at that cost. [`Flops`] are the operations of work that chips counted. Formulas: `docs/scaling.md`.
+//! [`Machine`] at that cost. [`Flops`] are the operations of work that chips counted, at the table's cost of each piece; [`arithmetic`] are those
+//! that the firmware does. Formulas: `docs/scaling.md`.
 
+pub mod arithmetic;
 mod flops;
 mod prediction;
 mod symbols;
+pub mod timing;
 mod workload;
 
 pub use flops::Flops;
 pub use prediction::{ChipsNeeded, Machine, Prediction, Resource};
 pub use symbols::{Origin, Symbol, SymbolError, Symbols};
 pub use workload::Workload;
+
+use self::arithmetic::{Arithmetic, Unit};
 
 /// Colour channels: a reflection function is evaluated for each.
 const CHANNELS: f64 = 3.0;
@@ -60,6 +65,26 @@ impl Cost {
         let evaluations = workload.ray_gathers * workload.photons_per_gather + reflected_rays(workload);
         let reflection = evaluations * (symbols.reflection_stage_1 + symbols.reflection_stage_2);
         Self::of_units(workload, symbols, reflection)
+    }
+
+    /// Cost by counted arithmetic: rays against boxes and triangles, and surfaces, in the ray caster; searches and all reflection in the
+    /// gather unit; directions, irradiance cache and pixels in the controller.
+    pub fn counted(workload: &Workload, arithmetic: &Arithmetic) -> Self {
+        let flops = |units: &[Unit]| arithmetic.sum(|unit| units.contains(&unit)).flops();
+        Self {
+            ray_caster: UnitCost {
+                flops: flops(&[Unit::Traversal, Unit::Triangles, Unit::Shading]),
+                dram_bytes: workload.scene_bytes,
+            },
+            controller: UnitCost {
+                flops: flops(&[Unit::Sampling, Unit::IrradianceCache, Unit::Pixels]),
+                dram_bytes: 0.0,
+            },
+            gather_unit: UnitCost {
+                flops: flops(&[Unit::Search, Unit::Selection, Unit::Reflection, Unit::Light]),
+                dram_bytes: workload.photon_map_bytes,
+            },
+        }
     }
 
     /// Cost without the controller. `reflection`: FLOPs of all reflection functions, of one channel.

@@ -9,6 +9,8 @@ use photoncard_firmware::memory::{
 };
 use photoncard_shared::address::{LINE_BYTES, Line, Structure};
 
+use super::contents::{Contents, Inspected};
+
 /// Caches between a chip and its DRAM: the argument of `--cache`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CacheSettings {
@@ -169,17 +171,17 @@ fn cache(text: &str) -> Result<CacheSpec, String> {
     }
 }
 
-/// A memory behind caches, with counters above and below them.
-pub type ModelledMemory<M> = Counted<LineCaches<Counted<M>, Vec<CacheEntry>, Vec<Line>>>;
+/// A memory behind caches, with counters above and below them, and of what the chip's lines contain.
+pub type ModelledMemory<M> = Inspected<Counted<LineCaches<Counted<M>, Vec<CacheEntry>, Vec<Line>>>>;
 
 impl CacheSettings {
     /// A memory behind these caches.
     pub fn over<M: MemoryPort>(&self, memory: M) -> ModelledMemory<M> {
         let dram = Counted::new(memory);
-        Counted::new(match self {
+        Inspected::new(Counted::new(match self {
             Self::Split { photon, scene } => LineCaches::new(dram, photon.cache(), scene.cache()),
             Self::Unified(cache) => LineCaches::unified(dram, cache.cache()),
-        })
+        }))
     }
 }
 
@@ -190,16 +192,20 @@ pub struct MemoryTraffic {
     pub requested: Traffic,
     /// Reads from DRAM, below the caches: lines of card memory.
     pub fetched: Traffic,
+    /// Contents of the lines that the chip read.
+    pub contents: Contents,
 }
 
 impl MemoryTraffic {
     /// No traffic.
-    pub const ZERO: Self = Self { requested: Traffic::ZERO, fetched: Traffic::ZERO };
+    pub const ZERO: Self =
+        Self { requested: Traffic::ZERO, fetched: Traffic::ZERO, contents: Contents::ZERO };
 
     /// Adds the traffic of another chip.
     pub fn add(&mut self, other: &Self) {
         self.requested.add(&other.requested);
         self.fetched.add(&other.fetched);
+        self.contents.add(&other.contents);
     }
 
     /// Reads of the chosen structures for tiles: requested, and fetched from DRAM.
@@ -230,15 +236,16 @@ impl MeasuredMemory for Lines<'_> {
     }
 }
 
-impl<M: MemoryPort, E, L> MeasuredMemory for Counted<LineCaches<Counted<M>, E, L>>
+impl<M: MemoryPort, E, L> MeasuredMemory for Inspected<Counted<LineCaches<Counted<M>, E, L>>>
 where
     E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>,
     L: AsRef<[Line]> + AsMut<[Line]>,
 {
     fn traffic(&self) -> MemoryTraffic {
         MemoryTraffic {
-            requested: Self::traffic(self).clone(),
-            fetched: self.below().below().traffic().clone(),
+            requested: self.below().traffic().clone(),
+            fetched: self.below().below().below().traffic().clone(),
+            contents: *self.contents(),
         }
     }
 }

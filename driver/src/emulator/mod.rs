@@ -1,5 +1,6 @@
 //! Emulated cards: the firmware on threads of this process, one chip per thread, each on a loopback link.
 
+pub mod contents;
 pub mod direct;
 mod dram;
 pub mod memory_model;
@@ -204,10 +205,17 @@ fn run(
     match model {
         None => serve_on(kind, dram, port, |_| None),
         Some(MemoryModel { caches, trace }) => {
-            let memory = Traced::new(caches.over(dram), trace);
+            let (below, above) = match trace {
+                Some(trace) if trace.is_below_caches() => (Some(trace), None),
+                trace => (None, trace),
+            };
+            let memory = Traced::new(caches.over(Traced::new(dram, below)), above);
             serve_on(kind, memory, port, |memory| {
-                let trace = memory.take_trace();
-                Some(MemoryRecord { traffic: MeasuredMemory::traffic(memory.below()), trace })
+                let traffic = MeasuredMemory::traffic(memory.below());
+                // Below the caches: what counts contents, requests, the caches themselves, and what counts fetches.
+                let dram = memory.below_mut().below_mut().below_mut().below_mut();
+                let below = dram.below_mut().take_trace();
+                Some(MemoryRecord { traffic, trace: memory.take_trace().or(below) })
             })
         }
     }

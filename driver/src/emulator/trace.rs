@@ -1,8 +1,9 @@
-//! Traces of a chip's memory: every read of its tiles, in the classic input format of the cache simulator Dinero.
+//! Traces of a chip's memory: every read of its tiles, above the caches for a cache simulator, or below them for a DRAM simulator.
 //!
-//! Each line of text is one access: a label, a blank, a byte address in hexadecimal. Label 0 is a read of data; label 4 is
-//! Dinero's escape that flushes its caches, written at the beginning of every tile with address 0. Dinero ignores the rest of
-//! a line: a labelled trace has structure, stage and bytes of the read there. See `docs/memory.md`.
+//! Above the caches a trace has the classic input format of Dinero. Each line of text is one access: a label, a blank, a byte address in
+//! hexadecimal. Label 0 is a read of data; label 4 is Dinero's escape that flushes its caches, written at the beginning of every tile
+//! with address 0. Dinero ignores the rest of a line: a labelled trace has structure, stage and bytes of the read there. Below the
+//! caches, each line of text is a fetch of one line of card memory, in the format of Ramulator 2 or of `DRAMsim3`. See `docs/memory.md`.
 
 use std::fmt::Arguments;
 use std::io::{self, Write};
@@ -17,7 +18,7 @@ use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
-use crate::choice::Choice;
+use crate::choice::{Choice, choices};
 use crate::output::{OutputError, PendingFile};
 
 /// Size of a block of text that is compressed at once, bytes.
@@ -29,12 +30,39 @@ const LONGEST_LINE: usize = 64;
 const READ: u8 = 0;
 const FLUSH: u8 = 4;
 
+/// Format of a trace.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TraceFormat {
+    /// Reads above the caches, for Dinero.
+    #[default]
+    Dinero,
+    /// Lines from DRAM, for Ramulator 2's load-store trace.
+    Ramulator,
+    /// Lines from DRAM, for `DRAMsim3`: each a cycle after the one before, so that the DRAM is never without work.
+    Dramsim3,
+}
+
+choices!(TraceFormat {
+    Dinero = "dinero": "Reads above the caches, for Dinero",
+    Ramulator = "ramulator": "Lines from DRAM, for Ramulator 2",
+    Dramsim3 = "dramsim3": "Lines from DRAM, for DRAMsim3",
+});
+
+impl TraceFormat {
+    /// True for traces of the DRAM, false for those of the chip's requests.
+    pub fn is_below_caches(self) -> bool {
+        self != Self::Dinero
+    }
+}
+
 /// File of a trace, and its form.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TraceSettings {
     /// Path of the file.
     pub path: PathBuf,
-    /// True if each read is followed by its structure, stage and number of bytes.
+    /// Format of the lines.
+    pub format: TraceFormat,
+    /// True if each read of [`TraceFormat::Dinero`] is followed by its structure, stage and number of bytes.
     pub has_labels: bool,
 }
 
@@ -43,6 +71,8 @@ pub struct TraceFile {
     encoder: GzEncoder<PendingFile>,
     buffer: Vec<u8>,
     settings: TraceSettings,
+    /// Number of fetches written.
+    fetches: u64,
     /// First failure, after which nothing is written.
     error: Option<io::Error>,
     has_failed: Arc<AtomicBool>,
@@ -58,6 +88,7 @@ impl TraceFile {
             encoder: GzEncoder::new(PendingFile::create(&settings.path)?, Compression::fast()),
             buffer: Vec::with_capacity(BUFFER),
             settings: settings.clone(),
+            fetches: 0,
             error: None,
             has_failed: Arc::default(),
         })
@@ -68,13 +99,37 @@ impl TraceFile {
         self.has_failed.clone()
     }
 
+    /// Returns whether the trace is of the DRAM.
+    pub fn is_below_caches(&self) -> bool {
+        self.settings.format.is_below_caches()
+    }
+
     /// Adds a read of `bytes` bytes.
     fn add_read(&mut self, address: u64, structure: Structure, stage: Stage, bytes: usize) {
-        if self.settings.has_labels {
+        if self.is_below_caches() {
+            self.add_fetch(address);
+        } else if self.settings.has_labels {
             let (structure, stage) = (structure.name(), stage.name());
             self.add(format_args!("{READ} {address:x} {structure} {stage} {bytes}"));
         } else {
             self.add(format_args!("{READ} {address:x}"));
+        }
+    }
+
+    /// Adds a fetch of a line from DRAM.
+    fn add_fetch(&mut self, address: u64) {
+        let cycle = self.fetches;
+        match self.settings.format {
+            TraceFormat::Ramulator => self.add(format_args!("LD 0x{address:x}")),
+            _ => self.add(format_args!("0x{address:x} READ {cycle}")),
+        }
+        self.fetches += 1;
+    }
+
+    /// Begins a tile: a cache simulator empties its caches.
+    fn begin_tile(&mut self) {
+        if !self.is_below_caches() {
+            self.add(format_args!("{FLUSH} 0"));
         }
     }
 
@@ -131,6 +186,11 @@ impl<M> Traced<M> {
         &self.memory
     }
 
+    /// The memory below, mutable.
+    pub fn below_mut(&mut self) -> &mut M {
+        &mut self.memory
+    }
+
     /// Takes the trace; later reads are not recorded.
     pub fn take_trace(&mut self) -> Option<TraceFile> {
         self.trace.take()
@@ -143,7 +203,7 @@ impl<M: MemoryPort> MemoryPort for Traced<M> {
         let place = address.0 as u64 * LINE_BYTES as u64 + used.start as u64;
         let bytes = used.len();
         let line = self.memory.read(structure, address, used)?;
-        if let Some(trace) = self.trace.as_mut().filter(|_| self.in_tiles) {
+        if let Some(trace) = self.trace.as_mut().filter(|_| self.in_tiles && self.stage != Stage::Begin) {
             trace.add_read(place, structure, self.stage, bytes);
         }
         Ok(line)
@@ -158,7 +218,7 @@ impl<M: MemoryPort> MemoryPort for Traced<M> {
     fn begin_tile(&mut self) {
         self.in_tiles = true;
         if let Some(trace) = &mut self.trace {
-            trace.add(format_args!("{FLUSH} 0"));
+            trace.begin_tile();
         }
         self.memory.begin_tile();
     }
@@ -188,20 +248,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_trace_has_a_flush_for_a_tile_and_a_line_for_a_read_of_it() {
+    fn a_trace_has_a_flush_for_a_tile_and_lines_for_a_read_of_it() {
         let folder = tempfile::tempdir().unwrap();
-        for (has_labels, expected) in [
-            (false, "4 0\n0 114\n4 0\n0 94\n"),
-            (true, "4 0\n0 114 photons gather 20\n4 0\n0 94 photons gather 20\n"),
+        use TraceFormat::{Dinero, Dramsim3, Ramulator};
+        for (format, has_labels, used, expected) in [
+            (Dinero, false, 20..40, "4 0\n0 114\n4 0\n0 94\n"),
+            (Dinero, true, 20..40, "4 0\n0 114 photons gather 20\n4 0\n0 94 photons gather 20\n"),
+            (Ramulator, false, 0..128, "LD 0x100\nLD 0x80\n"),
+            (Dramsim3, false, 0..128, "0x100 READ 0\n0x80 READ 1\n"),
         ] {
-            let settings = TraceSettings { path: folder.path().join("trace.din.gz"), has_labels };
+            let path = folder.path().join("trace.gz");
+            let settings = TraceSettings { path, format, has_labels };
             let lines = [Line::ZERO; 3];
             let mut memory = Traced::new(Lines(&lines), Some(TraceFile::create(&settings).unwrap()));
             memory.read(Structure::Header, LineAddress(0), 0..128).unwrap();
             for line in [2, 1] {
                 memory.begin_tile();
                 memory.enter(Stage::Gather);
-                memory.read(Structure::Photons, LineAddress(line), 20..40).unwrap();
+                memory.read(Structure::Photons, LineAddress(line), used.clone()).unwrap();
                 memory.read(Structure::Photons, LineAddress(3), 0..20).unwrap_err();
             }
             let trace = memory.take_trace().unwrap();
@@ -223,5 +287,6 @@ mod tests {
         assert!(
             "0 ".len() + address + " ".len() + structure + " ".len() + stage + " 128\n".len() <= LONGEST_LINE
         );
+        assert!("0x READ \n".len() + address + u64::MAX.to_string().len() <= LONGEST_LINE);
     }
 }

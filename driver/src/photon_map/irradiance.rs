@@ -85,7 +85,7 @@ impl<'a> Estimator<'a> {
         let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
         gather(&self.scene, &mut self.memory, PhotonMap::Indirect, position, &mut nearest)?;
         let diffuser = PartialReflection::diffuser(normal);
-        let irradiance = reflected_radiance(&nearest, position, &diffuser).to_array();
+        let irradiance = reflected_radiance(&nearest, position, &diffuser).radiance.to_array();
         Ok(StoredPhoton::at(point, IrradiancePoint { irradiance, normal }.to_content()))
     }
 }

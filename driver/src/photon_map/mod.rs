@@ -9,6 +9,7 @@ mod kd_tree;
 mod leaves;
 mod radius;
 mod settings;
+mod size;
 mod store;
 
 use std::time::{Duration, Instant};
@@ -19,6 +20,7 @@ pub use self::budget::{check_image, check_packed};
 pub use self::irradiance::precompute_irradiance;
 pub use self::kd_tree::to_kd_tree;
 pub use self::settings::{PhotonLayout, PhotonSettings};
+pub use self::size::PhotonMapSize;
 use self::store::store_caustics;
 pub use self::store::store_photons;
 use crate::density::{automatic_max_distance, caustic_max_distance, measure_discs};

@@ -12,10 +12,11 @@ use serde::{Deserialize, Serialize};
 
 use super::sample::{Chosen, Estimate, SampleRate, choose};
 use crate::emulator::EmulatedKind;
+use crate::emulator::contents::Contents;
 use crate::emulator::direct::{RenderedTile, render_tiles, render_tiles_apart};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
-use crate::photon_map::MappedImage;
+use crate::photon_map::{MappedImage, PhotonMapSize};
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::Scene;
 use crate::scheduler::tiles;
@@ -42,6 +43,8 @@ pub struct TileMeasurement {
     pub counters: Counters,
     /// Reads of each structure, in the order of [`Structure::ALL`].
     pub reads: [ReadSums; STRUCTURES],
+    /// Contents of the lines that were read.
+    pub contents: Contents,
 }
 
 /// Work and memory traffic of a point.
@@ -49,6 +52,8 @@ pub struct TileMeasurement {
 pub struct Measurement {
     /// The rendered tiles, in the picture's order; a single one if the frame was rendered as a whole.
     pub tiles: Vec<TileMeasurement>,
+    /// The photon map of the image.
+    pub map: PhotonMapSize,
 }
 
 impl TileMeasurement {
@@ -57,7 +62,7 @@ impl TileMeasurement {
             let [requested, fetched] = traffic.of(|other| other == structure);
             ReadSums { requests: requested.requests, raw_bytes: requested.bytes, dram_bytes: fetched.bytes }
         });
-        Self { tile, stands_for, counters, reads }
+        Self { tile, stands_for, counters, reads, contents: traffic.contents }
     }
 
     /// Reads of the photon map.
@@ -192,7 +197,7 @@ impl Bench<'_> {
         let measured = chosen.iter().zip(&rendered).map(|(Chosen { tile, stands_for }, rendered)| {
             TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic)
         });
-        Ok(Measurement { tiles: measured.collect() })
+        Ok(Measurement { tiles: measured.collect(), map: PhotonMapSize::of(&self.mapped.image) })
     }
 
     /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows: what a tile reads depends
@@ -222,6 +227,7 @@ impl Bench<'_> {
         }
         Ok(Measurement {
             tiles: vec![TileMeasurement::new(0, 1, counters, &MeasuredMemory::traffic(&memory))],
+            map: PhotonMapSize::of(&self.mapped.image),
         })
     }
 
@@ -235,6 +241,6 @@ impl Bench<'_> {
         let job = CurveJob { image: &self.mapped.image, frame, tiles, chips };
         let outcome = render_along_curve(job, Some(caches), &[], &|_, _| !(self.is_stopped)())?;
         let whole = TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic);
-        Ok(Measurement { tiles: vec![whole] })
+        Ok(Measurement { tiles: vec![whole], map: PhotonMapSize::of(&self.mapped.image) })
     }
 }

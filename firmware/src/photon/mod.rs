@@ -16,7 +16,9 @@ use photoncard_shared::message::Fault;
 pub use candidates::{Candidate, CandidateBuffer, CandidateStorage, Candidates};
 pub use irradiance::{FoundIrradiance, PointSearch, nearest_irradiance};
 pub use nearest::NearestPhotons;
-pub use radiance::{Estimate, LitBy, MIN_NORMAL_COSINE, SameSurface, reflected_caustics, reflected_radiance};
+pub use radiance::{
+    Estimate, LitBy, MIN_NORMAL_COSINE, Reflected, SameSurface, reflected_caustics, reflected_radiance,
+};
 
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
@@ -105,6 +107,6 @@ impl Kernel for Selection<'_> {
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
         let length = self.candidates.capacity();
-        select::select(isa, self.candidates, length, self.count)
+        select::select(isa, self.candidates, length, self.count).map(|chosen| chosen.last)
     }
 }

@@ -8,7 +8,7 @@ use photoncard_shared::budget::selected_candidates;
 
 use super::candidates::{Candidate, Candidates};
 use super::collector::Collector;
-use super::select::select;
+use super::select::{Chosen, select};
 use crate::simd::{Isa, LANES};
 
 /// The nearest photons found so far, in a borrowed buffer.
@@ -22,6 +22,8 @@ pub struct NearestPhotons<'a> {
     max_distance_squared: f32,
     /// Candidates read by selections.
     selected: u32,
+    /// Comparisons of distances by selections.
+    compared: u32,
     /// Candidates dropped by selections.
     dropped: u32,
 }
@@ -43,6 +45,7 @@ impl<'a> NearestPhotons<'a> {
             limit,
             max_distance_squared: limit,
             selected: 0,
+            compared: 0,
             dropped: 0,
         }
     }
@@ -70,8 +73,10 @@ impl<'a> NearestPhotons<'a> {
         }
         self.selected += self.length as u32;
         self.dropped += (self.length - self.neighbors) as u32;
-        if let Some(last) = select(isa, self.candidates.reborrow(), self.length, self.neighbors) {
+        let chosen = select(isa, self.candidates.reborrow(), self.length, self.neighbors);
+        if let Some(Chosen { last, compared }) = chosen {
             self.limit = last.distance_squared();
+            self.compared += compared;
         }
         self.length = self.neighbors;
     }
@@ -112,9 +117,9 @@ impl<'a> NearestPhotons<'a> {
         self.dropped + self.length as u32
     }
 
-    /// Number of candidates read by selections so far.
-    pub fn selected(&self) -> u32 {
-        self.selected
+    /// Number of candidates read by selections so far, and of the comparisons of their distances.
+    pub fn selections(&self) -> [u32; 2] {
+        [self.selected, self.compared]
     }
 
     /// True if there are at least as many candidates as photons asked for.

@@ -30,9 +30,22 @@ pub const MIN_NORMAL_COSINE: f32 = 0.75;
 /// Minimum radius of a disc over the query's greatest coordinate, about its rounding error: photons at one point have no density.
 const MIN_RADIUS_SHARE: f32 = 1e-6;
 
-/// Radiance of a gather at a position, in the units of the reflection: the photons' power, reflected, over the area of their disc.
+/// Light that photons bring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reflected {
+    /// Radiance, in the units of the reflection.
+    pub radiance: Vec3,
+    /// Number of photons' normals that were decoded.
+    pub normals_decoded: u32,
+}
+
+/// Radiance of a gather at a position: the photons' power, reflected, over the area of their disc.
 #[inline(always)]
-pub fn reflected_radiance(nearest: &NearestPhotons, position: Vec3, reflection: &PartialReflection) -> Vec3 {
+pub fn reflected_radiance(
+    nearest: &NearestPhotons,
+    position: Vec3,
+    reflection: &PartialReflection,
+) -> Reflected {
     let lobe = reflection.decode_lobe();
     let normals = [Vec3::ZERO; 2];
     simd::run(Estimate::<false> { nearest, position, reflection, lobe, lit_by: LitBy::All, normals })
@@ -47,7 +60,7 @@ pub fn reflected_caustics(
     (reflection, lobe): (&PartialReflection, DecodedLobe),
     lit_by: LitBy,
     normals: [Vec3; 2],
-) -> Vec3 {
+) -> Reflected {
     if normals[0] == normals[1] {
         simd::run(Estimate::<false> { nearest, position, reflection, lobe, lit_by, normals })
     } else {
@@ -85,10 +98,10 @@ pub struct Estimate<'a, 'n, const IS_SHADED: bool> {
 }
 
 impl<const IS_SHADED: bool> Kernel for Estimate<'_, '_, IS_SHADED> {
-    type Output = Vec3;
+    type Output = Reflected;
 
     #[inline(always)]
-    fn run(self, _: impl Isa) -> Vec3 {
+    fn run(self, _: impl Isa) -> Reflected {
         let Self { nearest, position, reflection, lobe, lit_by, normals } = self;
         let (radius_squared, farthest) = if nearest.is_full() {
             let farthest = extreme(nearest, u32::max, |candidate, other| candidate.order() > other.order());
@@ -99,12 +112,12 @@ impl<const IS_SHADED: bool> Kernel for Estimate<'_, '_, IS_SHADED> {
         let Some((closest, sums)) =
             sum(nearest, farthest, Sums::<IS_SHADED>::new((reflection, lobe), lit_by, normals))
         else {
-            return Vec3::ZERO;
+            return Reflected { radiance: Vec3::ZERO, normals_decoded: 0 };
         };
         let fraction = disc_fraction(closest.disc());
         let least = MIN_RADIUS_SHARE * magnitude(&[position]);
         let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
-        sums.reflected() * (1.0 / area)
+        Reflected { radiance: sums.reflected() * (1.0 / area), normals_decoded: sums.normals_decoded }
     }
 }
 
@@ -164,6 +177,7 @@ fn sum<'a, const IS_SHADED: bool>(
             sums.add(&candidate);
         }
     }
+    sums.normals_decoded = same_surface.decoded;
     Some((closest?, sums))
 }
 
@@ -186,6 +200,7 @@ struct Sums<'a, const IS_SHADED: bool> {
     normals: [Vec3; 2],
     power: ColourSum,
     lobe: ColourSum,
+    normals_decoded: u32,
 }
 
 impl<'a, const IS_SHADED: bool> Sums<'a, IS_SHADED> {
@@ -195,7 +210,8 @@ impl<'a, const IS_SHADED: bool> Sums<'a, IS_SHADED> {
         lit_by: LitBy,
         normals: [Vec3; 2],
     ) -> Self {
-        Self { reflection, decoded, lit_by, normals, power: ColourSum::ZERO, lobe: ColourSum::ZERO }
+        let [power, lobe] = [ColourSum::ZERO; 2];
+        Self { reflection, decoded, lit_by, normals, power, lobe, normals_decoded: 0 }
     }
 
     #[inline(always)]
@@ -230,13 +246,15 @@ impl<'a, const IS_SHADED: bool> Sums<'a, IS_SHADED> {
 pub struct SameSurface {
     normal: Vec3,
     last: (u8, bool),
+    /// Number of normals decoded so far.
+    decoded: u32,
 }
 
 impl SameSurface {
     /// The test for a surface whose normal has this code.
     #[inline(always)]
     pub fn new(code: u8) -> Self {
-        Self { normal: unit(decode_normal(code).into()), last: (code, true) }
+        Self { normal: unit(decode_normal(code).into()), last: (code, true), decoded: 0 }
     }
 
     /// `true` for a photon of the surface, by its normal's code.
@@ -244,6 +262,7 @@ impl SameSurface {
     pub fn holds(&mut self, code: u8) -> bool {
         if self.last.0 != code {
             let other = unit(decode_normal(code).into());
+            self.decoded += 1;
             self.last = (code, other.dot(self.normal) >= MIN_NORMAL_COSINE);
         }
         self.last.1

@@ -19,6 +19,14 @@ const PIVOTS: u32 = 16;
 /// Maximum number of candidates sorted by insertion.
 const FEW: usize = 16;
 
+/// Result of a selection.
+pub(super) struct Chosen {
+    /// The farthest candidate that was selected.
+    pub(super) last: Candidate,
+    /// Number of comparisons of distances, but for those of quickselect and of candidates of equal distances.
+    pub(super) compared: u32,
+}
+
 /// Moves the `count` nearest of the first `length` candidates to the front, unordered, and returns the farthest of
 /// them. All elements behind, past `length` too, are meaningless afterwards. `None`, without a change, if `count` is 0
 /// or above `length`.
@@ -28,25 +36,35 @@ pub(super) fn select(
     mut candidates: Candidates,
     length: usize,
     count: usize,
-) -> Option<Candidate> {
+) -> Option<Chosen> {
     if count == 0 || length < count {
         return None;
     }
-    match guess(candidates.distances.get(..length)?, count) {
-        Some([low, high]) => keep(isa, candidates, length, count, low, high),
-        None => part(candidates.first(length)?.cells(), count - 1),
-    }
+    let (interval, guesses) = guess(candidates.distances.get(..length)?, count)?;
+    let Some(interval) = interval else {
+        let last = part(candidates.first(length)?.cells(), count - 1)?;
+        return Some(Chosen { last, compared: comparisons(length, guesses, 0) });
+    };
+    let (last, between) = keep(isa, candidates, length, count, interval)?;
+    Some(Chosen { last, compared: comparisons(length, guesses + 1, between) })
+}
+
+/// Comparisons of a selection: of all distances with the greatest so far; in each pass with both ends of the interval; and
+/// in the interval of each with all lanes, and with the last.
+#[inline(always)]
+fn comparisons(length: usize, passes: u32, between: usize) -> u32 {
+    length as u32 * (1 + 2 * passes) + (between * (BETWEEN + 1)) as u32
 }
 
 /// Bits of an interval `low <= d < high` that contains the `count`-th squared distance and at most [`BETWEEN`] in all;
-/// `None` if [`GUESSES`] do not find one.
+/// `None` if [`GUESSES`] do not find one. And the number of guesses.
 #[inline(always)]
-fn guess(distances: &[u32], count: usize) -> Option<[u32; 2]> {
+fn guess(distances: &[u32], count: usize) -> Option<(Option<[u32; 2]>, u32)> {
     let farthest = distances.iter().copied().max()?;
     let (wanted, slack) = (count as f32, distances.len() as f32 / 40.0);
     let step = f32::from_bits(farthest) / distances.len() as f32;
     let [mut low, mut high] = [(wanted - slack).max(0.0) * step, (wanted + slack) * step];
-    for _ in 0..GUESSES {
+    for guesses in 1..=GUESSES {
         let [nearer_than_low, nearer_than_high] = count_nearer(distances, low.to_bits(), high.to_bits());
         if count <= nearer_than_low {
             high = low;
@@ -55,7 +73,7 @@ fn guess(distances: &[u32], count: usize) -> Option<[u32; 2]> {
             low = high;
             high *= (wanted + slack) / nearer_than_high as f32;
         } else if nearer_than_high - nearer_than_low <= BETWEEN {
-            return Some([low.to_bits(), high.to_bits()]);
+            return Some((Some([low.to_bits(), high.to_bits()]), guesses));
         } else {
             let step = (high - low) / (nearer_than_high - nearer_than_low) as f32;
             let rank = (count - nearer_than_low) as f32;
@@ -63,7 +81,7 @@ fn guess(distances: &[u32], count: usize) -> Option<[u32; 2]> {
             low += (rank - slack).max(0.0) * step;
         }
     }
-    None
+    Some((None, GUESSES))
 }
 
 #[inline(always)]
@@ -77,16 +95,15 @@ fn count_nearer(distances: &[u32], low: u32, high: u32) -> [usize; 2] {
     nearer.map(|count| count as usize)
 }
 
-/// [`select`] with an interval of [`guess`].
+/// [`select`] with an interval of [`guess`]. Returns the farthest candidate, and the number of those in the interval.
 #[inline(always)]
 fn keep(
     isa: impl Isa,
     candidates: Candidates,
     length: usize,
     count: usize,
-    low: u32,
-    high: u32,
-) -> Option<Candidate> {
+    [low, high]: [u32; 2],
+) -> Option<(Candidate, usize)> {
     let Candidates { distances, contents } = candidates;
     let mut aside = Aside { distances: [0; BETWEEN + LANES], contents: [0; BETWEEN + LANES], count: 0 };
     let (mut kept, mut first) = (0, 0);
@@ -112,12 +129,13 @@ fn keep(
             aside.push(candidate)?;
         }
     }
+    let between = aside.count;
     let last = aside.select(isa, count - kept - 1)?;
     let chosen = aside.distances.iter().zip(&aside.contents);
     for (index, (&distance, &content)) in (kept..count).zip(chosen) {
         all.set(index, Candidate { distance, content });
     }
-    Some(last)
+    Some((last, between))
 }
 
 /// Mask of the first `count` lanes, `count` at least 1; all lanes above [`LANES`].

@@ -6,7 +6,7 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{CausticGather, Fault};
 
-use super::search::search;
+use super::search::{count_reflection, search};
 use super::{Context, GatherPoint};
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, LitBy, NearestPhotons, PhotonMap, reflected_caustics};
@@ -42,7 +42,9 @@ pub fn reflected<M: MemoryPort>(
         PartialReflection::encode_present(&reflector, Vec3::splat(unit), point.pattern.dither(0));
     let record = record.among(encode_normal(surface.geometric_normal.to_array()));
     let normals = [surface.normal, surface.geometric_normal];
-    Ok(reflected_caustics(&nearest, position, (&record, lobe), lit_by, normals))
+    let reflected = reflected_caustics(&nearest, position, (&record, lobe), lit_by, normals);
+    count_reflection(context.counters, &record, &nearest, &reflected);
+    Ok(reflected.radiance)
 }
 
 /// The reflection that the map lights, and the photons that light its lobe. Gather rays of a narrow lobe meet lights with extent, but

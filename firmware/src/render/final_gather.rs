@@ -5,6 +5,7 @@
 use glam::Vec3;
 use photoncard_shared::message::{Fault, Radiance};
 
+use super::search::count_reflection;
 use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choice};
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, GatherTarget, HilbertCode};
@@ -166,7 +167,9 @@ pub fn gathered<M: MemoryPort>(
         );
     }
     let nearest = nearest_photons(context, position, candidates)?;
-    Ok(reflected_radiance(&nearest, position, &request.reflection))
+    let reflected = reflected_radiance(&nearest, position, &request.reflection);
+    count_reflection(context.counters, &request.reflection, &nearest, &reflected);
+    Ok(reflected.radiance)
 }
 
 /// Precomputed irradiance of the nearest irradiance point of a surface, photon power units/m^2; 0 without one.
@@ -189,6 +192,6 @@ fn nearest_photons<'a, M: MemoryPort>(
     let frame = context.frame;
     let mut nearest = NearestPhotons::new(candidates, frame.neighbors, frame.max_distance);
     let tested = gather(context.scene, context.memory, PhotonMap::Indirect, position, &mut nearest)?;
-    context.counters.count_gather(tested, nearest.taken(), nearest.selected(), nearest.len() as u32);
+    context.counters.count_gather(tested, nearest.taken(), nearest.selections(), nearest.len() as u32);
     Ok(nearest)
 }

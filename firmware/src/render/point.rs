@@ -87,7 +87,12 @@ impl GatherPoint {
             let frame = context.frame;
             let mut nearest = NearestPhotons::new(candidates, frame.neighbors, frame.max_distance);
             let tested = search(context, PhotonMap::Indirect, position, &mut nearest)?;
-            context.counters.count_gather(tested, nearest.taken(), nearest.selected(), nearest.len() as u32);
+            context.counters.count_gather(
+                tested,
+                nearest.taken(),
+                nearest.selections(),
+                nearest.len() as u32,
+            );
             let code = encode_normal(geometric_normal.to_array());
             IncidentFlux::new(&nearest, normal, code, reflector.albedo()).table(sampling, &reflector)
         };

@@ -1,11 +1,30 @@
-//! Photon search at points that the eye sees.
+//! Photon search at points that the eye sees, and counts of the reflection of photons.
 
 use glam::Vec3;
+use photoncard_shared::counters::Counters;
 use photoncard_shared::message::Fault;
 
 use super::Context;
 use crate::memory::MemoryPort;
-use crate::photon::{NearestPhotons, PhotonMap, gather};
+use crate::photon::{NearestPhotons, PhotonMap, Reflected, gather};
+use crate::scene::PartialReflection;
+
+/// Counts the photons that a lobe reflects, and the normals that were decoded for it.
+#[inline(always)]
+pub(super) fn count_reflection(
+    counters: &mut Counters,
+    reflection: &PartialReflection,
+    nearest: &NearestPhotons,
+    reflected: &Reflected,
+) {
+    counters.normals_decoded += u64::from(reflected.normals_decoded);
+    if !reflection.is_lambertian() {
+        counters.photons_reflected += nearest.len() as u64;
+        if reflection.is_of_microfacets() {
+            counters.photons_on_microfacets += nearest.len() as u64;
+        }
+    }
+}
 
 /// Collects the photons of a map nearest to a position in `nearest`, for direction tables and caustics. These searches are few and share
 /// one copy of the code, unlike gathers at the ends of rays.

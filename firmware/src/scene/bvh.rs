@@ -166,6 +166,7 @@ pub(super) fn read_triangle(
     index: u32,
 ) -> Result<Triangle, Fault> {
     let [leaf, slot] = [index / LEAF_TRIANGLES as u32, index % LEAF_TRIANGLES as u32];
-    let line = scene.line(memory, SectionKind::Triangles, leaf, 0..LINE_BYTES as u32)?;
+    // All but the last byte, the numbers of triangles and vertices, which only a visit of the leaf needs.
+    let line = scene.line(memory, SectionKind::Triangles, leaf, 0..LINE_BYTES as u32 - 1)?;
     Ok(BvhLeaf(line).triangle(slot as usize))
 }

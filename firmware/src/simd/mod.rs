@@ -6,7 +6,7 @@
 //! contracted, so that all give the same bits; [`Portable`] is the fallback for every processor.
 
 mod kernel;
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
 #[expect(
     unsafe_code,
     reason = "instructions that only some processors have are called when they are known to be there"
@@ -18,9 +18,9 @@ pub use self::kernel::{HALF_LANES, Isa, Kernel, LANES, Portable};
 /// Runs a kernel with the best instruction set of the processor.
 #[inline(always)]
 pub fn run<K: Kernel>(kernel: K) -> K::Output {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     return x86::run(kernel);
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(not(all(target_arch = "x86_64", target_feature = "sse2")))]
     kernel.run(Portable)
 }
 
@@ -30,28 +30,28 @@ pub enum Level {
     /// [`Portable`].
     Portable,
     /// AVX2 of x86-64.
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     Avx2,
     /// AVX-512 of x86-64.
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     Avx512,
 }
 
 impl Level {
     /// All instruction sets of this architecture.
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     pub const ALL: &[Self] = &[Self::Portable, Self::Avx2, Self::Avx512];
     /// All instruction sets of this architecture.
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(not(all(target_arch = "x86_64", target_feature = "sse2")))]
     pub const ALL: &[Self] = &[Self::Portable];
 
     /// Runs a kernel with this instruction set; `None` if the processor lacks it.
     pub fn run<K: Kernel>(self, kernel: K) -> Option<K::Output> {
         match self {
             Self::Portable => Some(kernel.run(Portable)),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
             Self::Avx2 => x86::run_with_avx2(kernel),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
             Self::Avx512 => x86::run_with_avx512(kernel),
         }
     }

@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
-use photoncard_driver::emulator::trace::TraceSettings;
+use photoncard_driver::emulator::trace::{TraceFormat, TraceSettings};
 use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{CardAddress, CardSet};
 
+use super::choice::choice;
 use super::files::file;
 
 #[derive(Args)]
@@ -36,10 +38,20 @@ pub(crate) struct CardOptions {
     /// photon=128K/128/4,scene=75K/128/4]
     #[arg(long, value_name = "CACHES", hide_short_help = true)]
     cache: Option<CacheSettings>,
-    /// Write every read of an emulated chip in Dinero's input format, compressed by gzip; a frame has billions: use --crop
-    #[arg(long, value_name = "OUT.din.gz", value_parser = file(), hide_short_help = true)]
+    /// Write every read of an emulated chip for a simulator of caches or of DRAM, compressed by gzip; a frame has billions: use
+    /// --crop
+    #[arg(long, value_name = "OUT.gz", value_parser = file(), hide_short_help = true)]
     pub(crate) trace: Option<PathBuf>,
-    /// Follow each read of the trace by its structure, its stage and its number of bytes, which Dinero ignores
+    /// Reads and format of the trace
+    #[arg(
+        long,
+        default_value = TraceFormat::default().name(),
+        value_parser = choice::<TraceFormat>(),
+        requires = "trace",
+        hide_short_help = true
+    )]
+    trace_format: TraceFormat,
+    /// Follow each read of a trace for Dinero by its structure, its stage and its number of bytes, which Dinero ignores
     #[arg(long, requires = "trace", hide_short_help = true)]
     trace_labels: bool,
 }
@@ -53,7 +65,11 @@ impl CardOptions {
             faults: self.faults,
             verify: self.verify,
             caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
-            trace: self.trace.clone().map(|path| TraceSettings { path, has_labels: self.trace_labels }),
+            trace: self.trace.clone().map(|path| TraceSettings {
+                path,
+                format: self.trace_format,
+                has_labels: self.trace_labels,
+            }),
         }
     }
 }

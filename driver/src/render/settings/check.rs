@@ -123,6 +123,12 @@ impl RenderSettings {
                 remedy: remedy.into(),
             })
         };
+        if trace.has_labels && trace.format.is_below_caches() {
+            return refuse(
+                "a trace of the DRAM has no labels",
+                "leave --trace-labels out, or use --trace-format dinero",
+            );
+        }
         if self.schedule.order.is_of_whole_frame() {
             return refuse(
                 "with --order hilbert no one chip reads the photon map",

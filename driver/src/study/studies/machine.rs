@@ -5,11 +5,14 @@ use super::super::load_balance::Balance;
 use super::super::point::Point;
 use super::super::report::{self, Block, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
+use super::arithmetic::{self, CountedFrame};
 use super::balance::{CREDITS, ORDERS, chip_counts, curves, deal};
 use super::present::{columns, how_it_counts, page, panel, plot, say, section, series, table, text};
 use super::scenes::SCENES;
 use super::workload::{self, cost, of_frame, tile_seconds};
+use crate::cost_model::arithmetic::Arithmetic;
 use crate::cost_model::{Cost, Machine, Origin, Prediction, Resource, Symbols, Workload};
+use crate::photon_map::PhotonMapSize;
 use crate::scheduler::GatherOrder;
 
 /// Maximum number of chips in the plots.
@@ -19,12 +22,29 @@ const MAX_CHIPS: usize = 1024;
 struct Frame {
     name: String,
     workload: Workload,
+    /// Cost by Table 7.1's constants.
     cost: Cost,
+    /// Counted arithmetic, and the cost by it; `None` for a frame of the table's own counts.
+    counted: Option<(Arithmetic, Cost)>,
+    /// The photon map.
+    map: PhotonMapSize,
 }
 
 impl Frame {
-    fn prediction(&self) -> Prediction {
+    /// Prediction by Table 7.1's constants.
+    fn nominal_prediction(&self) -> Prediction {
         Prediction::new(&self.workload, &self.cost, &Machine::NOMINAL)
+    }
+
+    /// Prediction by counted arithmetic, or by the constants of the table's own frames.
+    fn prediction(&self) -> Prediction {
+        let cost = self.counted.as_ref().map_or(&self.cost, |(_, cost)| cost);
+        Prediction::new(&self.workload, cost, &Machine::NOMINAL)
+    }
+
+    fn counted(&self) -> Option<CountedFrame<'_>> {
+        let (arithmetic, _) = self.counted.as_ref()?;
+        Some(CountedFrame { name: &self.name, workload: &self.workload, nominal: &self.cost, arithmetic })
     }
 }
 
@@ -57,16 +77,21 @@ pub(super) fn symbols(scale: &Scale) -> Symbols {
 fn table_frames() -> [Frame; 2] {
     let nominal = Symbols::NOMINAL;
     let (naive_workload, all_workload) = (Workload::naive(&nominal), Workload::nominal(&nominal));
+    let map = PhotonMapSize { photons: nominal.photons as u64, bytes: nominal.photon_map_bytes() as u64 };
     [
         Frame {
             name: "table, naive".to_owned(),
             cost: Cost::naive(&naive_workload, &nominal),
             workload: naive_workload,
+            counted: None,
+            map,
         },
         Frame {
             name: "table, all techniques".to_owned(),
             cost: Cost::new(&all_workload, &nominal),
             workload: all_workload,
+            counted: None,
+            map,
         },
     ]
 }
@@ -77,13 +102,16 @@ fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
     if scale.is_nominal() {
         frames.extend(table_frames());
     }
-    let symbols = symbols(scale);
     for (scene, name) in SCENES {
         let kinds = [("naive", naive(scale, scene)), ("all techniques", all_on(scale, scene))];
         frames.extend(kinds.map(|(kind, point)| {
-            let workload = of_frame(results.traffic(&point), symbols.pixels(), &symbols);
+            let measured = results.traffic(&point);
+            let symbols = workload::symbols_of(&point.settings, measured);
+            let workload = of_frame(measured, symbols.pixels(), &symbols);
             let cost = cost(&workload, &symbols, point.settings.schedule.order);
-            Frame { name: format!("{name}, {kind}"), workload, cost }
+            let arithmetic = arithmetic::of_frame(measured, &symbols);
+            let counted = Some((arithmetic, Cost::counted(&workload, &arithmetic)));
+            Frame { name: format!("{name}, {kind}"), workload, cost, counted, map: measured.map }
         }));
     }
     frames
@@ -99,11 +127,14 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         ),
         how_it_counts(),
         "A chip has 90 GB/s of memory bandwidth and 500 GFLOPS; memory, arithmetic and the host's link (4 GB/s each way) work \
-         at the same time. FLOPs of each operation are the table's throughout: only counts and bytes are measured. C_G, \
-         the FLOPs of a gather, is for 100 neighbours."
+         at the same time. FLOPs stand in two columns: by the table's constants times measured counts (C_G, the FLOPs of a \
+         gather, is for 100 neighbours); and counted, every addition, multiplication, division, square root and comparison \
+         that the firmware does in one lane of its vectors, lanes without work left out. Additions of photons' power in fixed \
+         point and arithmetic of addresses are not floating point, and not counted."
             .to_owned(),
     ];
     let frames = frames(scale, results);
+    let counted: Vec<_> = frames.iter().filter_map(Frame::counted).collect();
     let mut on_chips =
         vec![table("rates", rates(&frames)), table("chips", chips(&frames)), frame_rates(&frames)];
     if scale.is_nominal() {
@@ -114,6 +145,13 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         section(
             "What a frame takes",
             vec![table("workloads", workloads(&frames)), table("units", units(&frames))],
+        ),
+        section(
+            "Counted arithmetic",
+            vec![
+                table("arithmetic", arithmetic::comparison(&counted)),
+                table("operations", arithmetic::operations(&counted)),
+            ],
         ),
         section("Chips", on_chips),
         section("Load balance", load_balance(scale, results)),
@@ -153,9 +191,11 @@ fn workloads(frames: &[Frame]) -> Table {
         ("records", ""),
         ("photons a gather", ""),
         ("interpolated", ""),
+        ("N_PM", ""),
+        ("photon map", "MB"),
     ];
     let mut table = Table::new("Counts of a frame, in millions but for photons a gather", columns(&heads));
-    for Frame { name, workload, .. } in frames {
+    for Frame { name, workload, map, .. } in frames {
         table.push(vec![
             name.as_str().into(),
             (workload.rays() / 1e6).into(),
@@ -164,6 +204,8 @@ fn workloads(frames: &[Frame]) -> Table {
             (workload.records / 1e6).into(),
             workload.photons_per_gather.into(),
             (workload.interpolated_samples / 1e6).into(),
+            (map.photons as f64 / 1e6).into(),
+            (map.bytes as f64 / 1e6).into(),
         ]);
     }
     table
@@ -172,6 +214,7 @@ fn workloads(frames: &[Frame]) -> Table {
 fn units(frames: &[Frame]) -> Table {
     let heads = [
         ("frame", ""),
+        ("FLOPs by", ""),
         ("ray caster", "GFLOP"),
         ("controller", "GFLOP"),
         ("gather unit", "GFLOP"),
@@ -182,15 +225,19 @@ fn units(frames: &[Frame]) -> Table {
         "FLOPs of each unit and bytes from DRAM of a frame, on all chips together",
         columns(&heads),
     );
-    for Frame { name, cost, .. } in frames {
-        table.push(vec![
-            name.as_str().into(),
-            (cost.ray_caster.flops / 1e9).into(),
-            (cost.controller.flops / 1e9).into(),
-            (cost.gather_unit.flops / 1e9).into(),
-            (cost.ray_caster.dram_bytes / 1e9).into(),
-            (cost.gather_unit.dram_bytes / 1e9).into(),
-        ]);
+    for Frame { name, cost, counted, .. } in frames {
+        let by_table = [("Table 7.1", cost)].into_iter();
+        for (source, cost) in by_table.chain(counted.iter().map(|(_, cost)| ("counted", cost))) {
+            table.push(vec![
+                name.as_str().into(),
+                source.into(),
+                (cost.ray_caster.flops / 1e9).into(),
+                (cost.controller.flops / 1e9).into(),
+                (cost.gather_unit.flops / 1e9).into(),
+                (cost.ray_caster.dram_bytes / 1e9).into(),
+                (cost.gather_unit.dram_bytes / 1e9).into(),
+            ]);
+        }
     }
     table
 }
@@ -208,8 +255,9 @@ fn rates(frames: &[Frame]) -> Table {
         ("frame", ""),
         ("at 30 frames/s", "TFLOPS"),
         ("at 30 frames/s", "TB/s"),
+        ("counted, at 30 frames/s", "TFLOPS"),
         ("by bandwidth", "tiles/s"),
-        ("by arithmetic", "tiles/s"),
+        ("by counted arithmetic", "tiles/s"),
         ("binds", ""),
     ];
     let mut table = Table::new("Demand of 30 frames/s, and tiles that one chip renders", columns(&heads));
@@ -220,6 +268,7 @@ fn rates(frames: &[Frame]) -> Table {
             frame.name.as_str().into(),
             (30.0 * total.flops / 1e12).into(),
             (30.0 * total.dram_bytes / 1e12).into(),
+            frame.counted.as_ref().map(|(_, cost)| 30.0 * cost.total().flops / 1e12).into(),
             prediction.bandwidth_tiles_per_second.into(),
             prediction.computation_tiles_per_second.into(),
             resource(prediction.binding(1)).into(),
@@ -232,19 +281,24 @@ fn chips(frames: &[Frame]) -> Table {
     let heads = [
         ("frame", ""),
         ("by bandwidth", "chips"),
-        ("by arithmetic", "chips"),
-        ("overall", "chips"),
+        ("by arithmetic, Table 7.1", "chips"),
+        ("overall, Table 7.1", "chips"),
+        ("by counted arithmetic", "chips"),
+        ("overall, counted", "chips"),
         ("host link's load", "%"),
     ];
     let mut table = Table::new("Chips for 30 frames/s", columns(&heads));
     for frame in frames {
+        let needed = frame.nominal_prediction().chips_needed(30.0);
         let prediction = frame.prediction();
-        let needed = prediction.chips_needed(30.0);
+        let by_count = frame.counted.as_ref().map(|_| prediction.chips_needed(30.0));
         table.push(vec![
             frame.name.as_str().into(),
             needed.bandwidth.into(),
             needed.computation.into(),
             needed.overall.into(),
+            by_count.map(|needed| needed.computation).into(),
+            by_count.and_then(|needed| needed.overall).into(),
             (100.0 * prediction.link_load(30.0)).into(),
         ]);
     }
@@ -291,7 +345,7 @@ fn discussion(frames: &[Frame]) -> String {
 
 fn load_balance(scale: &Scale, results: &Results) -> Vec<Block> {
     let mut blocks = vec![text(
-        "Each tile of 16x16 pixels of a whole frame with all techniques takes max(bytes from DRAM / 90 GB/s, FLOPs / 500 GFLOPS). The \
+        "Each tile of 16x16 pixels of a whole frame with all techniques takes max(bytes from DRAM / 90 GB/s, counted FLOPs / 500 GFLOPS). The \
          scheduler deals these tiles to chips whose links take no time. Speed-up is over one chip; the idle share is the \
          chips' time without work until the last is done. Longest first needs the times in advance: a bound.",
     )];

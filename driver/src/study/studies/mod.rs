@@ -1,5 +1,6 @@
 //! The studies: each a list of points, and a report on their outcomes.
 
+mod arithmetic;
 mod balance;
 mod flights;
 mod glossy_floor;
@@ -10,6 +11,7 @@ mod scaling;
 mod scenes;
 mod sweep;
 mod techniques;
+mod times;
 mod workload;
 
 pub use self::sweep::Sweep;
@@ -85,15 +87,20 @@ mod tests {
     use super::super::quality::Quality;
     use super::*;
     use crate::choice::Choice;
+    use crate::emulator::contents::Contents;
+    use crate::photon_map::PhotonMapSize;
 
     /// Page of a study on made-up outcomes.
     fn page(study: Study, scale: &Scale) -> String {
         let counters =
             Counters { gathers: 10, gather_rays: 20, eye_rays: 1, photons_found: 500, ..Counters::ZERO };
         let reads = [ReadSums { requests: 9, raw_bytes: 180, dram_bytes: 128 }; STRUCTURES];
-        let tile = TileMeasurement { tile: 0, stands_for: 1, counters, reads };
+        let tile = TileMeasurement { tile: 0, stands_for: 1, counters, reads, contents: Contents::ZERO };
         let outcome = |point: &Point| match point.task {
-            Task::Traffic { .. } => Outcome::Traffic(Measurement { tiles: vec![tile.clone()] }),
+            Task::Traffic { .. } => Outcome::Traffic(Measurement {
+                tiles: vec![tile.clone()],
+                map: PhotonMapSize { photons: 500_000, bytes: 7_000_000 },
+            }),
             Task::Quality { .. } => Outcome::Quality(Quality { rmse: 0.1, mean: 1.0, pixels: 1 }),
         };
         let points = study.points(scale).into_iter();

@@ -13,6 +13,8 @@ use super::present::{
     table, text,
 };
 use super::scenes::CORNELL;
+use super::times;
+use super::workload::symbols;
 use crate::choice::Choice;
 use crate::emulator::memory_model::{CacheSettings, CacheSpec};
 use crate::photon_map::PhotonLayout;
@@ -101,6 +103,8 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         plot_of_orders(&nominal),
         table("gathers", by_gather(scale, &nominal)),
         text(share_of_gathers(scale, &nominal)),
+        table("times", by_time(scale, &nominal)),
+        text(times::ASSUMPTIONS),
     ];
     if scale.is_nominal() {
         by_order.extend([text(comparison(scale)), table("published", published(scale, &nominal))]);
@@ -173,6 +177,13 @@ fn by_tile<'a>(
         }
     }
     table
+}
+
+fn by_time<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {
+    let symbols = symbols(&scale.settings(GatherOrder::Naive));
+    by_order("Time of one chip for the frame", &times::HEADS, nominal, |measured| {
+        times::cells(measured, &symbols)
+    })
 }
 
 fn by_gather<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {

@@ -1,6 +1,7 @@
 //! Measured counts as workloads of the cost model.
 
 use super::super::measure::{Measurement, TileMeasurement};
+use crate::cost_model::arithmetic::{Arithmetic, Work};
 use crate::cost_model::{Cost, Machine, Symbols, Workload};
 use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
@@ -27,6 +28,11 @@ pub(super) fn symbols(settings: &RenderSettings) -> Symbols {
         photons: photons.count as f64,
         ..Symbols::NOMINAL
     }
+}
+
+/// [`symbols`] of a measured frame: `N_PM` is the number of photons in its map.
+pub(super) fn symbols_of(settings: &RenderSettings, measured: &Measurement) -> Symbols {
+    Symbols { photons: measured.map.photons as f64, ..symbols(settings) }
 }
 
 /// Workload of one tile.
@@ -62,10 +68,11 @@ pub(super) fn cost(workload: &Workload, symbols: &Symbols, order: GatherOrder) -
     if order == GatherOrder::Naive { Cost::naive(workload, symbols) } else { Cost::new(workload, symbols) }
 }
 
-/// Seconds that a chip takes for each tile: `max(bytes from DRAM / bandwidth, FLOPs / FLOPS)`.
+/// Seconds that a chip takes for each tile: `max(bytes from DRAM / bandwidth, counted FLOPs / FLOPS)`.
 pub(super) fn tile_seconds(measured: &Measurement, symbols: &Symbols, machine: &Machine) -> Vec<f64> {
     let seconds = |tile: &TileMeasurement| {
-        let cost = Cost::new(&of_tile(tile, symbols), symbols).total();
+        let work = Work::new(&tile.counters, &tile.contents, symbols.gather_rays);
+        let cost = Cost::counted(&of_tile(tile, symbols), &Arithmetic::of(&work)).total();
         (cost.dram_bytes / machine.bandwidth).max(cost.flops / machine.flops)
     };
     measured.tiles.iter().map(seconds).collect()

@@ -80,6 +80,13 @@ impl PartialReflection {
         self.lobe == Rgbe::default()
     }
 
+    /// `true` if the lobe, where there is one, is a microfacet model's.
+    #[inline(always)]
+    pub fn is_of_microfacets(&self) -> bool {
+        let Shape([_, _, third, _]) = self.shape;
+        third & GGX != 0
+    }
+
     /// The Lambertian part's factor of the photons' power.
     #[inline(always)]
     pub fn lambertian(&self) -> Vec3 {

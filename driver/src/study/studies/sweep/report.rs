@@ -8,12 +8,13 @@ use super::super::super::measure::Measurement;
 use super::super::super::point::Point;
 use super::super::super::report::{self, Block, Cell, Column, Report, Series, Table, XScale, YScale};
 use super::super::super::sample::Estimate;
+use super::super::arithmetic;
 use super::super::present::{
     cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table,
 };
-use super::super::workload::{cost, of_frame, symbols};
+use super::super::workload::{of_frame, symbols};
 use crate::choice::Choice;
-use crate::cost_model::Machine;
+use crate::cost_model::{Cost, Machine};
 
 /// Maximum number of lines in a plot.
 const MAX_LINES: usize = 8;
@@ -251,6 +252,6 @@ fn numbers(axis: &Axis) -> Option<Vec<f64>> {
 fn chip_seconds(point: &Point, measured: &Measurement) -> [f64; 2] {
     let symbols = symbols(&point.settings);
     let workload = of_frame(measured, symbols.pixels(), &symbols);
-    let total = cost(&workload, &symbols, point.settings.schedule.order).total();
+    let total = Cost::counted(&workload, &arithmetic::of_frame(measured, &symbols)).total();
     [total.dram_bytes / Machine::NOMINAL.bandwidth, total.flops / Machine::NOMINAL.flops]
 }

@@ -1,0 +1,170 @@
+//! Contents of the lines that a chip reads: the boxes, triangles and photons among which it searches.
+//!
+//! A chip tests all that is in a line, so that these counts are exact numbers of the steps of its units; the cost model
+//! ([`crate::cost_model`]) multiplies them by the operations of a step.
+
+use std::ops::Range;
+
+use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::layout::{BvhLeaf, PhotonLeaf, WideNode};
+use photoncard_shared::message::Fault;
+use serde::{Deserialize, Serialize};
+
+/// Counts of what was in the lines that a chip read for tiles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Contents {
+    /// Nodes of the bounding volume hierarchy.
+    pub nodes: u64,
+    /// Boxes in these nodes.
+    pub boxes: u64,
+    /// Leaves of the hierarchy, without those that are read again for one triangle of a surface.
+    pub leaves: u64,
+    /// Vertices in these leaves.
+    pub vertices: u64,
+    /// Triangles in these leaves.
+    pub triangles: u64,
+    /// Records of materials.
+    pub materials: u64,
+    /// Records of lights: nodes of the light tree, emitters.
+    pub lights: u64,
+    /// Nodes of photon maps and above irradiance points.
+    pub photon_nodes: u64,
+    /// Boxes in these nodes.
+    pub photon_boxes: u64,
+    /// Leaves of photons and irradiance points.
+    pub photon_leaves: u64,
+    /// Photons and irradiance points in these leaves.
+    pub photons: u64,
+    /// Photons of Jensen's kd-tree, each a node.
+    pub tree_photons: u64,
+}
+
+impl Contents {
+    /// Nothing was read.
+    pub const ZERO: Self = Self {
+        nodes: 0,
+        boxes: 0,
+        leaves: 0,
+        vertices: 0,
+        triangles: 0,
+        materials: 0,
+        lights: 0,
+        photon_nodes: 0,
+        photon_boxes: 0,
+        photon_leaves: 0,
+        photons: 0,
+        tree_photons: 0,
+    };
+
+    /// Adds the counts of another chip.
+    pub fn add(&mut self, other: &Self) {
+        self.nodes += other.nodes;
+        self.boxes += other.boxes;
+        self.leaves += other.leaves;
+        self.vertices += other.vertices;
+        self.triangles += other.triangles;
+        self.materials += other.materials;
+        self.lights += other.lights;
+        self.photon_nodes += other.photon_nodes;
+        self.photon_boxes += other.photon_boxes;
+        self.photon_leaves += other.photon_leaves;
+        self.photons += other.photons;
+        self.tree_photons += other.tree_photons;
+    }
+
+    /// Counts the contents of a line of which `bytes` bytes are used.
+    fn count(&mut self, structure: Structure, line: &[u8; LINE_BYTES], bytes: usize) {
+        match structure {
+            Structure::Nodes => {
+                self.nodes += 1;
+                self.boxes += u64::from(WideNode(line).children());
+            }
+            // A triangle that is known needs no numbers of triangles and vertices, the last byte.
+            Structure::Triangles if bytes < LINE_BYTES => {}
+            Structure::Triangles => {
+                self.leaves += 1;
+                self.vertices += u64::from(BvhLeaf(line).vertices());
+                self.triangles += u64::from(BvhLeaf(line).triangles());
+            }
+            Structure::Materials => self.materials += 1,
+            Structure::Emitters => self.lights += 1,
+            Structure::PhotonNodes | Structure::CausticNodes | Structure::IrradianceNodes => {
+                self.photon_nodes += 1;
+                self.photon_boxes += u64::from(WideNode(line).children());
+            }
+            // A leaf is read as a whole, a node of the kd-tree as one record of a line.
+            Structure::Photons if bytes < LINE_BYTES => self.tree_photons += 1,
+            Structure::Photons | Structure::CausticPhotons | Structure::IrradiancePoints => {
+                self.photon_leaves += 1;
+                self.photons += u64::from(PhotonLeaf::read(line).photons());
+            }
+            Structure::Header | Structure::Attributes | Structure::Textures => {}
+        }
+    }
+}
+
+/// Memory that counts the contents of the lines that are read for tiles.
+pub struct Inspected<M> {
+    memory: M,
+    stage: Stage,
+    contents: Contents,
+}
+
+impl<M> Inspected<M> {
+    /// Counts the contents of the lines of `memory`.
+    pub fn new(memory: M) -> Self {
+        Self { memory, stage: Stage::Begin, contents: Contents::ZERO }
+    }
+
+    /// Contents counted so far.
+    pub fn contents(&self) -> &Contents {
+        &self.contents
+    }
+
+    /// The memory below.
+    pub fn below(&self) -> &M {
+        &self.memory
+    }
+
+    /// The memory below, mutable.
+    pub fn below_mut(&mut self) -> &mut M {
+        &mut self.memory
+    }
+}
+
+impl<M: MemoryPort> MemoryPort for Inspected<M> {
+    #[inline(always)]
+    fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault> {
+        let bytes = used.len();
+        let line = self.memory.read(structure, address, used)?;
+        if self.stage != Stage::Begin {
+            self.contents.count(structure, &line.0, bytes);
+        }
+        Ok(line)
+    }
+
+    #[inline(always)]
+    fn enter(&mut self, stage: Stage) {
+        self.stage = stage;
+        self.memory.enter(stage);
+    }
+
+    fn begin_tile(&mut self) {
+        self.memory.begin_tile();
+    }
+}
+
+impl<M: CardMemory> CardMemory for Inspected<M> {
+    fn lines(&self) -> u32 {
+        self.memory.lines()
+    }
+
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        self.memory.stored(first, count)
+    }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(first, lines)
+    }
+}

@@ -1,0 +1,81 @@
+//! The firmware of a reference chip, compiled without floating-point instructions: every operation is a call, which is counted by its
+//! kind and its place in the code (`counters`). A program of Linux on x86-64 without libraries.
+//!
+//! Standard input is a file of lines: a card image, the frame's parameters, and tiles, each of the last two as a byte of length and a
+//! message. Standard output is, for each tile, its counters in such a line; and behind them three numbers of eight bytes for each place
+//! that did something: the kind, the address behind the call, the count.
+#![no_std]
+#![no_main]
+
+mod counters;
+mod linux;
+
+use photoncard_firmware::chip::{Progress, ReferenceChip};
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::render::Context;
+use photoncard_firmware::scene::SceneImage;
+use photoncard_shared::address::{LINE_BYTES, Line};
+use photoncard_shared::counters::Counters;
+use photoncard_shared::image::Header;
+use photoncard_shared::message::{self, FrameParameters, Tile};
+
+use self::counters::{CODE_BYTES, KINDS, OPERATION_COUNTS};
+
+static mut CHIP: ReferenceChip = ReferenceChip::new();
+
+/// A message in a line, behind its length.
+fn message<'a, T: serde::Deserialize<'a>>(line: &'a Line) -> Option<T> {
+    let (&length, bytes) = line.0.split_first()?;
+    message::decode(bytes.get(..length.into())?)
+}
+
+/// Renders a tile and completes its pixels, as a card does.
+fn render(lines: &[Line], scene: &SceneImage, frame: &FrameParameters, tile: Tile) -> Option<Counters> {
+    // SAFETY: the program has one thread, and the reference ends with this call.
+    let chip = unsafe { &mut *(&raw mut CHIP) };
+    let (memory, counters) = (&mut Lines(lines), &mut Counters::ZERO.clone());
+    let mut context = Context { scene, memory, frame, counters, outlet: None };
+    if !chip.begin(context.memory, context.frame, tile) {
+        return None;
+    }
+    while chip.step(&mut context).ok()? == Progress::Busy {}
+    for index in 0..tile.pixels() as usize {
+        while chip.complete(&mut context, index).ok()?.is_none() {}
+    }
+    Some(*context.counters)
+}
+
+fn run() -> Option<()> {
+    let lines = linux::standard_input()?;
+    let scene = SceneImage { header: Header::read(lines.first_chunk()?).ok()? };
+    let [frame, tiles @ ..] = lines.get(scene.header.lines as usize..)? else { return None };
+    let frame: FrameParameters = message(frame)?;
+    for tile in tiles {
+        let counters = render(lines, &scene, &frame, message(tile)?)?;
+        let mut line = [0; LINE_BYTES];
+        let (length, bytes) = line.split_first_mut()?;
+        *length = message::encode(&counters, bytes)? as u8;
+        linux::write(&line)?;
+    }
+    for kind in 0..KINDS {
+        for place in 0..CODE_BYTES {
+            // SAFETY: nothing writes while this is read.
+            let count = unsafe { OPERATION_COUNTS[kind][place] };
+            if count > 0 {
+                let record = [kind as u64, linux::address(place), count];
+                linux::write(record.map(u64::to_le_bytes).as_flattened())?;
+            }
+        }
+    }
+    Some(())
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn program() -> ! {
+    linux::exit(if run().is_some() { 0 } else { 1 })
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    linux::exit(2)
+}

@@ -1,0 +1,90 @@
+//! Tiles of a scene, whose operations are counted and computed from their steps.
+
+use std::path::Path;
+
+use photoncard_driver::choice::Choice;
+use photoncard_driver::cost_model::arithmetic::{Arithmetic, OPERATIONS, Operations, Step, Unit, Work};
+use photoncard_driver::emulator::contents::Contents;
+use photoncard_driver::emulator::direct::render_tile;
+use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::photon_map::map_photons;
+use photoncard_driver::render::RenderSettings;
+use photoncard_driver::scene::gltf;
+use photoncard_driver::scheduler::tiles;
+use photoncard_firmware::chip::ReferenceChip;
+use photoncard_shared::counters::Counters;
+
+use super::{Instrument, STEPS};
+
+/// Operations of some tiles of a scene, and the work that they took.
+pub struct Run {
+    /// Counters of all tiles.
+    pub counters: Counters,
+    /// Work of all tiles.
+    pub work: Work,
+    /// Operations that were counted in each step, in the order of [`Step::ALL`].
+    pub steps: [Operations; STEPS],
+}
+
+impl Run {
+    /// Renders `count` tiles of a scene that ships, spread over the picture: where operations are counted, and on an emulated chip.
+    ///
+    /// # Panics
+    /// If the scene cannot be rendered, or the two do not count equal work.
+    pub fn new(instrument: &Instrument, scene: &str, settings: &RenderSettings, count: usize) -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(scene);
+        let scene = gltf::load(&path).expect("a scene that ships loads");
+        let packed = PackedScene::new(&scene).expect("it is packed");
+        let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("it is lit");
+        let camera = settings.camera(&scene).expect("it has a camera");
+        let frame = settings.frame(&camera, mapped.max_distance, mapped.caustics);
+        let all = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
+        let step = (all.len() / count).max(1);
+        let chosen: Vec<_> = all.iter().skip(step / 2).step_by(step).copied().collect();
+        let counted = instrument.count(&mapped.image, &frame, &chosen);
+        let (mut counters, mut contents) = (Counters::ZERO, Contents::ZERO);
+        let mut chip = Box::new(ReferenceChip::new());
+        for (&tile, counted) in chosen.iter().zip(&counted.counters) {
+            let (image, memory) = mapped.image.view();
+            let memory = CacheSettings::default().over(memory);
+            let rendered = render_tile(&mut chip, &image, memory, &frame, tile, None).expect("a sound image");
+            assert_eq!(rendered.counters, *counted, "tile {}", tile.id);
+            counters.add(&rendered.counters);
+            contents.add(&rendered.traffic.contents);
+        }
+        let mut steps = counted.steps;
+        let work = Work::new(&counters, &contents, f64::from(frame.gather_rays));
+        // Comparisons of bits are no calls: chip and memory model count them.
+        let compared = Step::ALL.iter().position(|&step| step == Step::Compared).expect("it is one of all");
+        steps[compared].compare = Step::Compared.count(&work);
+        Self { counters, work, steps }
+    }
+
+    /// Operations of a unit, as they were counted.
+    pub fn counted(&self, unit: Unit) -> Operations {
+        let mut sum = Operations::default();
+        let of_unit = Step::ALL.iter().zip(&self.steps).filter(|(step, _)| step.unit() == unit);
+        of_unit.for_each(|(_, operations)| sum.add(operations));
+        sum
+    }
+
+    /// Operations of all units by the cost model.
+    pub fn modelled(&self) -> Arithmetic {
+        Arithmetic::of(&self.work)
+    }
+}
+
+/// Mean operations of each step over some runs; what [`OPERATIONS`] says of steps that none has taken.
+pub fn means(runs: &[Run]) -> [Operations; STEPS] {
+    let mut means = OPERATIONS;
+    for (index, (step, mean)) in Step::ALL.iter().zip(&mut means).enumerate() {
+        let steps: f64 = runs.iter().map(|run| step.count(&run.work)).sum();
+        if steps > 0.0 {
+            let mut sum = Operations::default();
+            runs.iter().for_each(|run| sum.add(&run.steps[index]));
+            *mean = sum.times(1.0 / steps);
+        }
+    }
+    means
+}

@@ -1,0 +1,75 @@
+//! The cost model's operations of a step are those of the firmware: counted again, and equal to what the model computes.
+
+use std::io::Write;
+
+use photoncard_driver::choice::Choice;
+use photoncard_driver::cost_model::arithmetic::{OPERATIONS, Operations, Step, Unit};
+use photoncard_driver::photon_map::PhotonLayout;
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Sampling};
+use photoncard_driver::scheduler::GatherOrder;
+use photoncard_tests::operations::Instrument;
+use photoncard_tests::operations::run::Run;
+
+/// Steps whose lanes all do the same, whatever the data.
+const FIXED: [Step; 7] =
+    [Step::Ray, Step::Node, Step::Box, Step::Vertex, Step::Triangle, Step::PhotonBox, Step::Photon];
+
+fn settings(layout: PhotonLayout, sampling: Sampling, irradiance_error: Option<f32>) -> RenderSettings {
+    RenderSettings {
+        picture: Picture { width: 64, height: 64, ..Picture::default() },
+        photons: PhotonMaps { count: 20_000, neighbors: 60, layout, ..PhotonMaps::default() },
+        integrator: Integrator {
+            gather_rays: 40,
+            shadow_rays: 4,
+            sampling,
+            irradiance_error,
+            ..Integrator::default()
+        },
+        ..RenderSettings::default()
+    }
+    .with(|s| s.schedule.order = GatherOrder::Sort)
+}
+
+/// Relative difference of two numbers.
+fn difference(a: f64, b: f64) -> f64 {
+    (a - b).abs() / b.abs().max(f64::MIN_POSITIVE)
+}
+
+fn check(name: &str, run: &Run) {
+    for step in FIXED {
+        let index = Step::ALL.iter().position(|&other| other == step).expect("it is one of all");
+        let modelled = OPERATIONS[index].times(step.count(&run.work));
+        assert_eq!(run.steps[index], modelled, "{name}: {}", step.name());
+    }
+    let modelled = run.modelled();
+    let mut total = Operations::default();
+    Unit::ALL.iter().for_each(|&unit| total.add(&run.counted(unit)));
+    let of_all = modelled.sum(|_| true).flops();
+    assert!(difference(of_all, total.flops()) < 0.05, "{name}: {of_all} instead of {}", total.flops());
+    // A fifth of the unit, or a twentieth of all: directions depend on the few surfaces of the tiles, and on their bins.
+    for &unit in Unit::ALL {
+        let (counted, modelled) = (run.counted(unit).flops(), modelled.unit(unit).flops());
+        let allowed = (0.2 * counted).max(0.05 * total.flops());
+        let name = format!("{name}: {}", unit.name());
+        assert!((modelled - counted).abs() < allowed, "{name}: {modelled} instead of {counted}");
+    }
+}
+
+#[test]
+fn the_model_computes_the_operations_that_the_firmware_does() {
+    let instrument = match Instrument::build() {
+        Ok(instrument) => instrument,
+        Err(reason) => {
+            // Visible although the test passes; the test goes on if standard error is closed.
+            let _ = writeln!(std::io::stderr(), "SKIPPED: operations are not counted: {reason}");
+            return;
+        }
+    };
+    for (scene, layout, sampling, error) in [
+        ("cornell.gltf", PhotonLayout::Lines, Sampling::Product, Some(0.1)),
+        ("cornell-glossy.gltf", PhotonLayout::Jensen, Sampling::Reflection, None),
+        ("roughness.glb", PhotonLayout::Lines, Sampling::Reflection, None),
+    ] {
+        check(scene, &Run::new(&instrument, scene, &settings(layout, sampling, error), 2));
+    }
+}
