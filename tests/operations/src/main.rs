@@ -12,7 +12,7 @@ mod linux;
 
 use photoncard_firmware::chip::{Progress, ReferenceChip};
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::render::Context;
+use photoncard_firmware::render::RenderJob;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::counters::Counters;
@@ -33,16 +33,17 @@ fn message<'a, T: serde::Deserialize<'a>>(line: &'a Line) -> Option<T> {
 fn render(lines: &[Line], scene: &SceneImage, frame: &FrameParameters, tile: Tile) -> Option<Counters> {
     // SAFETY: the program has one thread, and the reference ends with this call.
     let chip = unsafe { &mut *(&raw mut CHIP) };
-    let (memory, counters) = (&mut Lines(lines), &mut Counters::ZERO.clone());
-    let mut context = Context { scene, memory, frame, counters, outlet: None };
-    if !chip.begin(context.memory, context.frame, tile) {
+    let mut job = RenderJob { scene, memory: &mut Lines(lines), frame, outlet: None };
+    if !chip.begin(job.memory, job.frame, tile) {
         return None;
     }
-    while chip.step(&mut context).ok()? == Progress::Busy {}
-    for index in 0..tile.pixels() as usize {
-        while chip.complete(&mut context, index).ok()?.is_none() {}
+    loop {
+        match chip.step(&mut job).ok()? {
+            Progress::Tile(_, counters) => return Some(counters),
+            Progress::Idle if !chip.flush(job.frame) => return None,
+            Progress::Busy | Progress::Pixel(_) | Progress::Idle => {}
+        }
     }
-    Some(*context.counters)
 }
 
 fn run() -> Option<()> {
