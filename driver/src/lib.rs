@@ -39,7 +39,7 @@
 //! ```
 //!
 //! [`RenderSettings`](render::RenderSettings) has the options of `photoncard render` in groups.
-//! [`Quality::settings`](quality::Quality::settings) has samples, cache and filter of a `--quality`, with middle numbers of rays and photons, which
+//! [`Quality::settings`](quality::Quality::settings) has cache and filter of a `--quality`, with the fewest samples and middle numbers of rays and photons, which
 //! [`Quality::fit`](quality::Quality::fit) chooses for a scene, within [`render_chosen`](render::render_chosen). `RenderSettings::default()` is
 //! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All are for one emulated reference chip. [`Rendering`](render::Rendering) holds the
 //! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A tone-mapped PNG is written by

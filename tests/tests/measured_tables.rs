@@ -32,7 +32,7 @@ impl Row {
         })
     }
 
-    /// Time times squared error: of independent samples it is the same by any number.
+    /// Time times squared error, which does not depend on the number of independent samples.
     fn cost(&self) -> f64 {
         self.seconds * self.error * self.error
     }

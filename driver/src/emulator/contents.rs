@@ -73,15 +73,14 @@ impl Contents {
         self.tree_photons += other.tree_photons;
     }
 
-    /// Counts the contents of a line of which `bytes` bytes are used.
-    fn count(&mut self, structure: Structure, line: &[u8; LINE_BYTES], bytes: usize) {
+    /// Counts the contents of a line of which the bytes `used` are used.
+    fn count(&mut self, structure: Structure, line: &[u8; LINE_BYTES], used: &Range<u32>) {
         match structure {
             Structure::Nodes => {
                 self.nodes += 1;
                 self.boxes += u64::from(WideNode(line).children());
             }
-            // A triangle that is known needs no numbers of triangles and vertices, the last byte.
-            Structure::Triangles if bytes < LINE_BYTES => {}
+            Structure::Triangles if *used == BvhLeaf::OF_TRIANGLE => {}
             Structure::Triangles => {
                 self.leaves += 1;
                 self.vertices += u64::from(BvhLeaf(line).vertices());
@@ -94,7 +93,7 @@ impl Contents {
                 self.photon_boxes += u64::from(WideNode(line).children());
             }
             // A leaf is read as a whole, a node of the kd-tree as one record of a line.
-            Structure::Photons if bytes < LINE_BYTES => self.tree_photons += 1,
+            Structure::Photons if used.len() < LINE_BYTES => self.tree_photons += 1,
             Structure::Photons | Structure::CausticPhotons | Structure::IrradiancePoints => {
                 self.photon_leaves += 1;
                 self.photons += u64::from(PhotonLeaf::read(line).photons());
@@ -136,10 +135,9 @@ impl<M> Inspected<M> {
 impl<M: MemoryPort> MemoryPort for Inspected<M> {
     #[inline(always)]
     fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault> {
-        let bytes = used.len();
-        let line = self.memory.read(structure, address, used)?;
+        let line = self.memory.read(structure, address, used.clone())?;
         if self.stage != Stage::Begin {
-            self.contents.count(structure, &line.0, bytes);
+            self.contents.count(structure, &line.0, &used);
         }
         Ok(line)
     }

@@ -68,7 +68,7 @@ pub(super) fn measure(
     // Of the whole picture: a part of it has equal pixels.
     let window = Window::full(settings.picture.width, settings.picture.height);
     let tiles = SPREAD.tiles(window);
-    let pilot = |photons| Pilot::new(scene, packed, settings, photons, observer);
+    let pilot = |photons| Pilot::new(scene, packed, settings, photons, &pool, observer);
     let [few, more] = [pilot(FEW_PHOTONS)?, pilot(MORE * FEW_PHOTONS)?];
     let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
         let render = |seed| {
@@ -77,7 +77,7 @@ pub(super) fn measure(
                 (integrator.shadow_rays, integrator.gather_rays) = (shadow_rays, gather_rays);
                 integrator.seed = seed;
             });
-            more.render_pixels(&settings, &pool, &tiles, observer)
+            more.render_pixels(&settings, &tiles)
         };
         Ok([render(SEEDS[0])?, render(SEEDS[1])?])
     };
@@ -94,41 +94,42 @@ pub(super) fn measure(
         settings.integrator.sampling = Sampling::Reflection;
         settings.integrator.seed = SEEDS[0];
     });
-    let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &pool, &tiles, observer);
+    let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &tiles);
     let maps = [render_map(&few)?, render_map(&more)?];
-    let surveyed = SURVEYED.tiles(window);
     let [shadow_ray, gather_ray] =
         [of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best), of_ray(GATHER_RAYS, &by_few_gather_rays, &best)];
     let of_rays = shadow_ray / f64::from(shadow_rays) + gather_ray / f64::from(gather_rays);
     Ok(Variances {
-        place: (of_pairs(&best, &best)[1] - of_rays).max(0.0),
+        place: (of_pairs([&best])[0] - of_rays).max(0.0),
         shadow_ray,
         gather_ray,
         photon: of_photon(&best, &maps),
         lambertian: best[0].lambertian,
-        gather_rays_per_ray: few.gather_rays_per_ray(settings, &pool, &surveyed, observer)?,
+        gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
     })
 }
 
 /// Variance of a sample by one ray, from a pair of renders by fewer `rays` and the best pair. The variance by `n` rays is `a + v / n`,
 /// with `a` that of the places of the samples and of other rays: two numbers of rays give `v`.
 fn of_ray(rays: [u32; 2], noisy: &[Pixels; 2], best: &[Pixels; 2]) -> f64 {
-    let [more, less] = of_pairs(noisy, best);
+    let [more, less] = of_pairs([noisy, best]);
     ((more - less) / (1.0 / f64::from(rays[0]) - 1.0 / f64::from(rays[1]))).max(0.0)
 }
 
-/// Variances of a sample in two pairs of renders, where all four see a surface.
-fn of_pairs(noisy: &[Pixels; 2], best: &[Pixels; 2]) -> [f64; 2] {
-    let seen: Vec<usize> = pixels_with_surfaces([&noisy[0], &noisy[1], &best[0], &best[1]]).collect();
+/// Variances of a sample in pairs of renders, where all see a surface, relative to the radiance in the last pair.
+fn of_pairs<const N: usize>(pairs: [&[Pixels; 2]; N]) -> [f64; N] {
+    let seen: Vec<usize> = pixels_with_surfaces(&pairs).collect();
     let radiances = |pixels: &Pixels| seen.iter().map(|&pixel| pixels.radiance(pixel)).collect::<Vec<_>>();
-    let [noisy, best] = [noisy, best].map(|pair| [radiances(&pair[0]), radiances(&pair[1])]);
-    let levels = Levels::new(best[0].iter().zip(&best[1]).map(|(first, second)| 0.5 * (first + second)));
-    [noisy, best].map(|[first, second]| 0.5 * levels.mean_square(first, second))
+    let pairs = pairs.map(|pair| pair.each_ref().map(radiances));
+    let best = pairs.last().into_iter().flat_map(|[first, second]| first.iter().zip(second));
+    let levels = Levels::new(best.map(|(first, second)| 0.5 * (first + second)));
+    pairs.map(|[first, second]| 0.5 * levels.mean_square(first, second))
 }
 
 /// Pixels that see a surface in all renders.
-fn pixels_with_surfaces<const N: usize>(renders: [&Pixels; N]) -> impl Iterator<Item = usize> {
-    (0..renders[0].direct.len()).filter(move |&pixel| renders.iter().all(|pixels| pixels.is_seen[pixel]))
+fn pixels_with_surfaces(pairs: &[&[Pixels; 2]]) -> impl Iterator<Item = usize> {
+    let pixels = pairs.first().map_or(0, |[first, _]| first.direct.len());
+    (0..pixels).filter(move |&pixel| pairs.iter().copied().flatten().all(|pixels| pixels.is_seen[pixel]))
 }
 
 /// Mean squared error of tiles by a map of one photon, from the difference of two maps whose errors are independent.
@@ -136,7 +137,7 @@ fn of_photon(best: &[Pixels; 2], maps: &[Pixels; 2]) -> f64 {
     // All tiles are of equal size.
     let pixels_of_tile = (best[0].direct.len() / SPREAD.number()).max(1);
     let mut tiles = vec![Vec::new(); SPREAD.number()];
-    for pixel in pixels_with_surfaces([&best[0], &best[1], &maps[0], &maps[1]]) {
+    for pixel in pixels_with_surfaces(&[best, maps]) {
         tiles[pixel / pixels_of_tile].push(pixel);
     }
     tiles.retain(|pixels| 2 * pixels.len() > pixels_of_tile);
@@ -150,10 +151,12 @@ fn of_photon(best: &[Pixels; 2], maps: &[Pixels; 2]) -> f64 {
     levels.mean_square(few, more) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
 }
 
-/// Photon map of a pilot, with the scene.
+/// Photon map of a pilot, with the scene, and the threads of its chips.
 struct Pilot<'a> {
     scene: &'a Scene,
     mapped: MappedImage,
+    pool: &'a ThreadPool,
+    observer: &'a dyn Observer,
     /// If the picture has a caustic map, which takes that light from gather rays.
     has_caustics: bool,
 }
@@ -164,7 +167,8 @@ impl<'a> Pilot<'a> {
         packed: &PackedScene,
         settings: &RenderSettings,
         photons: usize,
-        observer: &dyn Observer,
+        pool: &'a ThreadPool,
+        observer: &'a dyn Observer,
     ) -> Result<Self, RenderError> {
         observer.progress(Phase::Pilot, 0, 1);
         let of_picture = settings.photon_settings(scene);
@@ -172,36 +176,24 @@ impl<'a> Pilot<'a> {
         let photons = PhotonSettings { photons, seed: PHOTON_SEED, caustic_photons: 0, ..of_picture };
         let mapped = map_photons(packed.clone(), &photons, &|_| !observer.is_stopped())?;
         let has_caustics = of_picture.caustic_photons > 0;
-        Ok(Self { scene, mapped, has_caustics })
+        Ok(Self { scene, mapped, pool, observer, has_caustics })
     }
 
     /// Number of gather rays of tiles with the irradiance cache, for each ray of a pixel.
-    fn gather_rays_per_ray(
-        &self,
-        settings: &RenderSettings,
-        pool: &ThreadPool,
-        tiles: &[Tile],
-        observer: &dyn Observer,
-    ) -> Result<f64, RenderError> {
+    fn gather_rays_per_ray(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<f64, RenderError> {
         let mut frame = self.frame(settings)?;
         (frame.samples, frame.shadow_rays, frame.gather_rays, frame.seed) = (1, 0, 1, SEEDS[0]);
-        let rendered = self.render(&frame, pool, tiles, observer)?;
+        let rendered = self.render(&frame, tiles)?;
         let rays: u64 = rendered.iter().map(|tile| tile.counters.gather_rays).sum();
         let pixels: usize = tiles.iter().map(|tile| tile.pixels() as usize).sum();
         Ok(rays as f64 / pixels.max(1) as f64)
     }
 
     /// Renders one sample of each pixel of the tiles, without the irradiance cache.
-    fn render_pixels(
-        &self,
-        settings: &RenderSettings,
-        pool: &ThreadPool,
-        tiles: &[Tile],
-        observer: &dyn Observer,
-    ) -> Result<Pixels, RenderError> {
+    fn render_pixels(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<Pixels, RenderError> {
         let mut frame = self.frame(settings)?;
         (frame.samples, frame.irradiance_error, frame.layers) = (1, None, true);
-        let rendered = self.render(&frame, pool, tiles, observer)?;
+        let rendered = self.render(&frame, tiles)?;
         Ok(Pixels::new(&rendered, self.mapped.image.view().0.header.radiance_unit))
     }
 
@@ -213,16 +205,10 @@ impl<'a> Pilot<'a> {
         Ok(settings.frame(&camera, max_distance, caustics))
     }
 
-    fn render(
-        &self,
-        frame: &FrameParameters,
-        pool: &ThreadPool,
-        tiles: &[Tile],
-        observer: &dyn Observer,
-    ) -> Result<Vec<RenderedTile>, RenderError> {
-        let is_stopped = || observer.is_stopped();
+    fn render(&self, frame: &FrameParameters, tiles: &[Tile]) -> Result<Vec<RenderedTile>, RenderError> {
+        let is_stopped = || self.observer.is_stopped();
         let image = &self.mapped.image;
-        Ok(render_tiles_apart::<Reference, _>(pool, image, frame, tiles, &|memory| memory, &is_stopped)?)
+        Ok(render_tiles_apart::<Reference, _>(self.pool, image, frame, tiles, &|memory| memory, &is_stopped)?)
     }
 }
 

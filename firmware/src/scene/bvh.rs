@@ -3,7 +3,6 @@
 
 use core::ops::ControlFlow;
 
-use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::BVH_STACK;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, Triangle, WideNode};
@@ -166,7 +165,6 @@ pub(super) fn read_triangle(
     index: u32,
 ) -> Result<Triangle, Fault> {
     let [leaf, slot] = [index / LEAF_TRIANGLES as u32, index % LEAF_TRIANGLES as u32];
-    // All but the last byte, the numbers of triangles and vertices, which only a visit of the leaf needs.
-    let line = scene.line(memory, SectionKind::Triangles, leaf, 0..LINE_BYTES as u32 - 1)?;
+    let line = scene.line(memory, SectionKind::Triangles, leaf, BvhLeaf::OF_TRIANGLE)?;
     Ok(BvhLeaf(line).triangle(slot as usize))
 }

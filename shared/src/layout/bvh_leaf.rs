@@ -2,6 +2,8 @@
 //!
 //! A shared vertex is stored once: a line holds eight triangles of a mesh, or three separate ones.
 
+use core::ops::Range;
+
 use super::{read_f32, read_u32, write_f32, write_u32};
 use crate::address::LINE_BYTES;
 
@@ -51,6 +53,9 @@ pub struct Triangle {
 }
 
 impl BvhLeaf<'_> {
+    /// Bytes that a triangle of known slot is in: all but the number of triangles and vertices, which a visit of the leaf needs.
+    pub const OF_TRIANGLE: Range<u32> = 0..LINE_BYTES as u32 - 1;
+
     /// Number of triangles, at most [`LEAF_TRIANGLES`].
     #[inline(always)]
     pub fn triangles(&self) -> u32 {

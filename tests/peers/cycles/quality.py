@@ -35,7 +35,7 @@ def main():
         render.shade(scene, "principled")
     else:
         furnish(scene, arguments)
-    # What is built for the first picture is kept for the others.
+    # Shaders and scene of the first picture are kept for the others.
     scene.render.use_persistent_data = True
     bpy.ops.render.render()
     scene.cycles.samples = arguments.samples
