@@ -322,7 +322,7 @@ fn kinds_of_chips_differ_in_traffic_and_are_checked_for_their_room() {
         "a smaller queue is drained more often"
     );
     for (settings, option) in [
-        (sorted.clone().with(|s| s.schedule.tile = 64), "--tile"),
+        (sorted.clone().with(|s| s.schedule.tile = Some(64)), "--tile"),
         (sorted.with(|s| s.schedule.order = GatherOrder::Hilbert), "--order"),
     ] {
         let error = laboratory.measure("chips", &[on(micro, settings)]).unwrap_err();

@@ -10,6 +10,7 @@ use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::tiles;
 use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::gather::{GatherTarget, PointIndex};
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::photon::CandidateBuffer;
 use photoncard_firmware::render::eye::see;
 use photoncard_firmware::render::final_gather::{cast, gathered};
@@ -56,7 +57,7 @@ impl MappedScene {
         let window = settings.window();
         let camera = settings.camera(&self.scene).expect("a camera");
         let frame = settings.frame(&camera, self.max_distance, self.caustics);
-        let tiles = tiles(window, settings.schedule.tile, settings.schedule.order);
+        let tiles = tiles(window, settings.tile_side(&[REFERENCE]), settings.schedule.order);
         let pool = rayon::ThreadPoolBuilder::new().stack_size(16 << 20).build().expect("threads");
         let parts: Vec<(Tile, Vec<Vec3>, Counters)> = pool.install(|| {
             let new_chip = || Box::new(ReferenceChip::new());

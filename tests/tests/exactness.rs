@@ -48,7 +48,7 @@ fn pixel_bits(pixel: &PixelValue) -> [u32; 10] {
 /// Settings that no pixel may depend on.
 fn variants() -> Vec<RenderSettings> {
     use GatherOrder::{DirectionBins, Hash, Hilbert, Naive, Sort, Tiled};
-    let tile = Schedule::default().tile;
+    let tile = 16;
     let schedules = [
         (tile, Naive, None, None),
         (8, Tiled, None, None),
@@ -64,7 +64,7 @@ fn variants() -> Vec<RenderSettings> {
         (tile, Hilbert, None, None),
     ];
     let scheduled = schedules.map(|(tile, order, bins, queue)| RenderSettings {
-        schedule: Schedule { tile, order, bins, queue, in_flight: None },
+        schedule: Schedule { tile: Some(tile), order, bins, queue, in_flight: None },
         ..settings()
     });
     let cards = [
@@ -80,7 +80,7 @@ fn variants() -> Vec<RenderSettings> {
         (&["emulated:3"], 7, Hilbert, None),
     ];
     let dealt = cards.map(|(cards, tile, order, queue)| RenderSettings {
-        schedule: Schedule { tile, order, bins: None, queue, in_flight: None },
+        schedule: Schedule { tile: Some(tile), order, bins: None, queue, in_flight: None },
         cards: CardSet { addresses: cards.iter().copied().map(card).collect(), ..CardSet::default() },
         ..settings()
     });
@@ -155,11 +155,11 @@ proptest! {
             s.integrator.gather_rays = 5;
             s.integrator.irradiance_error = irradiance_error;
             s.picture.layers = if has_layers { Layers::all() } else { Layers::default() };
-            s.schedule.tile = 8;
+            s.schedule.tile = Some(8);
         });
         let expected = render_or_panic(&scene, &base).film;
         let changed = base.with(|s| {
-            s.schedule = Schedule { tile, order, bins: None, queue, in_flight };
+            s.schedule = Schedule { tile: Some(tile), order, bins: None, queue, in_flight };
             s.cards.addresses = vec![card(cards)];
         });
         let film = render_or_panic(&scene, &changed).film;
@@ -211,7 +211,7 @@ fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
             s.integrator.irradiance_error = Some(1e-5);
             s.integrator.gather_rays = 2;
             s.integrator.samples = 1;
-            s.schedule.tile = tile;
+            s.schedule.tile = Some(tile);
             s.schedule.order = order;
             s.cards.addresses = vec![card(cards)];
         })
@@ -239,7 +239,7 @@ fn nor_do_they_where_samples_are_rounded_to_the_next_pixel() {
             s.integrator.irradiance_error = Some(1e-6);
             s.integrator.gather_rays = 1;
             s.integrator.samples = 8;
-            s.schedule.tile = tile;
+            s.schedule.tile = Some(tile);
         })
     };
     let expected = bits(&render_or_panic(&scene, &settings(16)).film);

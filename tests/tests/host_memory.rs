@@ -27,7 +27,7 @@ fn settings(chips: usize) -> RenderSettings {
         picture: Picture { width: 32, height: 32, ..Picture::default() },
         photons: PhotonMaps { count: PHOTONS, ..PhotonMaps::default() },
         integrator: Integrator { gather_rays: 1, ..Integrator::default() },
-        schedule: Schedule { tile: 16, ..Schedule::default() },
+        schedule: Schedule { tile: Some(16), ..Schedule::default() },
         cards: CardSet {
             addresses: vec![format!("emulated:{chips}").parse().expect("an address")],
             ..CardSet::default()

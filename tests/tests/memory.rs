@@ -12,6 +12,7 @@ use photoncard_driver::render::{
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::{GatherOrder, tiles};
 use photoncard_firmware::chip::ReferenceChip;
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::memory::{
     CacheEntry, CacheShape, Counted, LineCache, LineCaches, Lines, MemoryPort, SetIndex, Stage,
 };
@@ -32,7 +33,7 @@ fn settings() -> RenderSettings {
         photons: PhotonMaps { count: 5000, neighbors: 30, ..PhotonMaps::default() },
         integrator: Integrator { gather_rays: 8, shadow_rays: 2, ..Integrator::default() },
         // With several tiles in flight misses depend on the tiles that a chip has together.
-        schedule: Schedule { tile: 8, in_flight: Some(1), ..Schedule::default() },
+        schedule: Schedule { tile: Some(8), in_flight: Some(1), ..Schedule::default() },
         cards: CardSet { addresses: vec!["emulated:1".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     }
@@ -62,7 +63,7 @@ impl Frame {
         Self {
             mapped,
             frame,
-            tiles: tiles(settings.window(), settings.schedule.tile, settings.schedule.order),
+            tiles: tiles(settings.window(), settings.tile_side(&[REFERENCE]), settings.schedule.order),
         }
     }
 

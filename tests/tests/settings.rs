@@ -97,7 +97,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             irradiance_error: Pixels = Some(0.5),
         }
         schedule: Schedule {
-            tile: Work = 5,
+            tile: Work = Some(5),
             order: Work = GatherOrder::Naive,
             bins: Work = Some(7),
             queue: Work = Some(9),

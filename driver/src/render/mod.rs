@@ -114,14 +114,16 @@ pub fn render_chosen(
     let choosing = Instant::now();
     let (photons, integrator) = choose(&packed)?;
     times.pilot = choosing.elapsed().as_secs_f64();
-    let settings = &RenderSettings { photons, integrator, ..settings.clone() };
+    let tile = settings.tile_side(&budgets);
+    let schedule = Schedule { tile: Some(tile), ..settings.schedule.clone() };
+    let settings = &RenderSettings { photons, integrator, schedule, ..settings.clone() };
     settings.check()?;
     for budget in &budgets {
         settings.check_budget(budget)?;
     }
     // A film may be large: it is allocated after the settings are checked.
     let mut film = settings.film()?;
-    let tiles = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
+    let tiles = tiles(settings.window(), tile, settings.schedule.order);
     let outputs = Outputs::open(scene, settings, &tiles, &mut film, observer)?;
     let prepared = prepare(scene, packed, settings, &budgets, &mut times, observer)?;
     let frame = settings.frame(&camera, prepared.max_distance, prepared.caustics);

@@ -8,16 +8,13 @@ mod groups;
 use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
+use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{self, CausticGather, FrameParameters};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
-use super::address::CardAddress;
-use crate::choice::Choice;
-use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::film::{Film, FilmError, Window};
-use crate::layer::Layers;
 use crate::photon_map::PhotonSettings;
 use crate::scene::{Camera, Scene};
 
@@ -41,6 +38,13 @@ pub struct RenderSettings {
 /// Default number of direction bins: three per entry of the table that samples directions.
 const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 
+/// Minimum number of tiles a card by default: about a sixteenth of the time a card waits for the last tile of another.
+const TILES_OF_CARD: u64 = 8;
+
+/// Side of tiles that are not divided for more cards by default, pixels: that of the coarsest cells of irradiance records, which
+/// narrower tiles would compute several times.
+const NARROWEST_TILE: u32 = 16;
+
 /// Default number of caustic photons for a scene with a specular surface.
 pub const DEFAULT_CAUSTIC_PHOTONS: usize = 200_000;
 
@@ -57,16 +61,25 @@ impl RenderSettings {
         self.picture.crop.unwrap_or(Window::full(self.picture.width, self.picture.height))
     }
 
-    /// Default side of a tile, pixels. Unless all cards are emulated reference chips, it is limited to the tile of the
-    /// smallest kind of chip, as remote cards are not known yet.
-    pub fn default_tile(layers: &Layers, cards: &[CardAddress]) -> u32 {
-        let kinds = cards.iter().flat_map(|card| match card {
-            CardAddress::Emulated { kind, .. } => std::slice::from_ref(kind),
-            // A card elsewhere may be of any kind.
-            CardAddress::Remote(_) => EmulatedKind::ALL,
-        });
-        let sides = kinds.map(|kind| kind.budget().pixels_of_tile(layers.are_of_chip()).isqrt());
-        sides.fold(Schedule::default().tile, u32::min)
+    /// Side of the tiles on cards of `budgets`, pixels: [`Schedule::tile`]; without one the widest that each card has room for, as
+    /// it reads the least memory, but halved while the window has fewer than [`TILES_OF_CARD`] tiles for each card, down to
+    /// [`NARROWEST_TILE`].
+    pub fn tile_side(&self, budgets: &[Budget]) -> u32 {
+        if let Some(side) = self.schedule.tile {
+            return side;
+        }
+        let room = budgets.iter().map(|budget| budget.pixels_of_tile(self.picture.layers.are_of_chip()));
+        let widest = room.min().unwrap_or(NARROWEST_TILE.pow(2)).isqrt().max(1);
+        let window = self.window();
+        let wanted = TILES_OF_CARD.saturating_mul(budgets.len() as u64);
+        let tiles = |side: u32| {
+            [window.x1 - window.x0, window.y1 - window.y0]
+                .map(|extent| u64::from(extent.div_ceil(side)))
+                .iter()
+                .product::<u64>()
+        };
+        let narrower = |&side: &u32| (side / 2 >= NARROWEST_TILE && tiles(side) < wanted).then_some(side / 2);
+        std::iter::successors(Some(widest), narrower).last().unwrap_or(widest)
     }
 
     /// Empty film for the picture.
@@ -158,5 +171,34 @@ impl RenderSettings {
             right: scaled(camera.right, half_width),
             up: scaled(camera.up, half_height),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_firmware::kind::{MICRO, REFERENCE};
+
+    use super::*;
+    use crate::layer::Layers;
+
+    #[test]
+    fn tiles_are_as_wide_as_all_cards_have_room_for_while_each_has_several() {
+        let side = |width, height, budgets: &[Budget]| {
+            let picture = Picture { width, height, ..Picture::default() };
+            RenderSettings { picture, ..RenderSettings::default() }.tile_side(budgets)
+        };
+        assert_eq!(side(512, 512, &[REFERENCE; 2]), 64);
+        assert_eq!(side(512, 512, &[REFERENCE; 9]), 32);
+        assert_eq!(side(512, 512, &[REFERENCE; 1000]), 16);
+        assert_eq!(side(20, 10, &[REFERENCE; 2]), 16);
+        assert_eq!(side(1 << 16, 1 << 16, &[REFERENCE, MICRO, REFERENCE]), 16);
+    }
+
+    #[test]
+    fn tiles_with_layers_fit_and_a_stated_side_stays() {
+        let settings = RenderSettings::default().with(|s| s.picture.layers = Layers::all());
+        assert_eq!(settings.tile_side(&[REFERENCE]), 32);
+        assert_eq!(settings.tile_side(&[MICRO]), 8);
+        assert_eq!(settings.with(|s| s.schedule.tile = Some(5)).tile_side(&[REFERENCE; 3]), 5);
     }
 }

@@ -270,7 +270,7 @@ mod tests {
             assignments: vec![format!("floor.exponent={exponent}")],
             settings: RenderSettings {
                 photons: PhotonMaps { layout, ..PhotonMaps::default() },
-                schedule: Schedule { tile, ..Schedule::default() },
+                schedule: Schedule { tile: Some(tile), ..Schedule::default() },
                 ..RenderSettings::default()
             },
             task: Task::Quality { tiles: 1, reference_rays: 1 },

@@ -175,7 +175,7 @@ impl Bench<'_> {
         least_tiles: usize,
     ) -> Result<Measurement, RenderError> {
         let frame = self.frame(settings)?;
-        let all = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
+        let all = tiles(settings.window(), settings.tile_side(&[chip.budget()]), settings.schedule.order);
         if settings.schedule.order.is_of_whole_frame() {
             return self.whole_frame(&frame, &all, caches);
         }

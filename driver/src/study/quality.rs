@@ -102,7 +102,13 @@ impl Reference {
 /// `settings` with tiles, order and queues replaced, which do not change pixels: the fastest order.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
     RenderSettings {
-        schedule: Schedule { tile: TILE, order: GatherOrder::Sort, bins: None, queue: None, in_flight: None },
+        schedule: Schedule {
+            tile: Some(TILE),
+            order: GatherOrder::Sort,
+            bins: None,
+            queue: None,
+            in_flight: None,
+        },
         ..settings.clone()
     }
 }

@@ -11,6 +11,8 @@ use crate::photon_map::PhotonLayout;
 use crate::render::{Integrator, PhotonMaps, Picture, RenderSettings, Sampling, Schedule};
 use crate::scheduler::GatherOrder;
 
+/// Side of the dissertation's tiles, pixels.
+pub(super) const TILE: u32 = 16;
 /// Side of the largest tile that the reference chip has room for, pixels.
 pub(super) const WIDEST_TILE: u32 = REFERENCE.tile_pixels.isqrt();
 
@@ -114,7 +116,7 @@ impl Scale {
                 sampling: Sampling::Reflection,
                 ..Integrator::default()
             },
-            schedule: Schedule { order, in_flight: Some(1), ..Schedule::default() },
+            schedule: Schedule { tile: Some(TILE), order, in_flight: Some(1), ..Schedule::default() },
             ..RenderSettings::default()
         }
     }
@@ -126,13 +128,13 @@ impl Scale {
             s.photons.layout = PhotonLayout::Lines;
             s.integrator.sampling = Sampling::Product;
             s.integrator.irradiance_error = Some(IRRADIANCE_ERROR);
-            s.schedule.tile = WIDEST_TILE;
+            s.schedule.tile = Some(WIDEST_TILE);
         })
     }
 
     /// [`Self::all_on`] in the dissertation's tiles of 16x16 pixels, of which a frame has enough for many chips.
     pub fn all_on_in_small_tiles(&self) -> RenderSettings {
-        self.all_on().with(|s| s.schedule.tile = Schedule::default().tile)
+        self.all_on().with(|s| s.schedule.tile = Some(TILE))
     }
 
     /// A point that measures the traffic of sampled tiles behind the nominal caches.
@@ -182,10 +184,7 @@ impl Scale {
             ("photons a gather looks for", self.neighbors.to_string()),
             ("gather rays a pixel", self.gather_rays.to_string()),
             ("shadow rays a pixel", self.shadow_rays.to_string()),
-            (
-                "tiles",
-                format!("{0}x{0} pixels; in the naive order rows of as many pixels", settings.schedule.tile),
-            ),
+            ("tiles", format!("{TILE}x{TILE} pixels; in the naive order rows of as many pixels")),
             ("sampling of gather rays", "brdf, unless said otherwise".to_owned()),
             ("photon map", format!("{}, unless said otherwise", settings.photons.layout.name())),
             ("error of the irradiance cache, where it is on", IRRADIANCE_ERROR.to_string()),

@@ -55,7 +55,7 @@ fn settings() -> RenderSettings {
         picture: Picture { width: 12, height: 10, ..Picture::default() },
         photons: PhotonMaps { count: 60, neighbors: 8, ..PhotonMaps::default() },
         integrator: Integrator { gather_rays: 2, shadow_rays: 1, ..Integrator::default() },
-        schedule: Schedule { tile: 3, ..Schedule::default() },
+        schedule: Schedule { tile: Some(3), ..Schedule::default() },
         ..RenderSettings::default()
     }
 }
@@ -142,8 +142,8 @@ impl Fixture {
 
     /// Scheduler of the picture's tiles, a share of which is verified.
     pub(crate) fn scheduler(&self, cards: usize, verify: Option<f64>, seed: u32) -> Scheduler {
-        let Schedule { tile, order, .. } = self.settings.schedule;
-        let scheduler = Scheduler::new(tiles(self.settings.window(), tile, order), cards).with_helpers();
+        let tiles = tiles(self.settings.window(), self.settings.tile_side(&[]), self.settings.schedule.order);
+        let scheduler = Scheduler::new(tiles, cards).with_helpers();
         match verify {
             Some(share) => scheduler.verifying(share, seed),
             None => scheduler,

@@ -56,7 +56,7 @@ impl RenderOptions {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),
             integrator: self.integrator.settings(&base.integrator),
-            schedule: self.schedule.settings(&self.picture.layers(), &cards.addresses),
+            schedule: self.schedule.settings(),
             cards,
             outputs: self.outputs.settings(),
         }

@@ -2,8 +2,7 @@
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
-use photoncard_driver::layer::Layers;
-use photoncard_driver::render::{CardAddress, RenderSettings, Schedule};
+use photoncard_driver::render::Schedule;
 use photoncard_driver::scheduler::GatherOrder;
 
 use super::choice::choice;
@@ -11,8 +10,8 @@ use super::choice::choice;
 #[derive(Args)]
 #[command(next_help_heading = "Order of the work")]
 pub(crate) struct ScheduleOptions {
-    /// Side of a tile, pixels [default: 16; 8 with direct, indirect, caustic or gathers in --aov, unless all cards are of
-    /// the kind emulated]
+    /// Side of a tile, pixels [default: the widest that all cards have room for, halved down to 16 until each has eight
+    /// tiles]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) tile: Option<u32>,
     /// Order of the photon gathers; it never changes the picture
@@ -30,10 +29,10 @@ pub(crate) struct ScheduleOptions {
 }
 
 impl ScheduleOptions {
-    /// Settings of these options for a picture with the layers `layers` on `cards`.
-    pub(super) fn settings(&self, layers: &Layers, cards: &[CardAddress]) -> Schedule {
+    /// Settings of these options.
+    pub(super) fn settings(&self) -> Schedule {
         Schedule {
-            tile: self.tile.unwrap_or_else(|| RenderSettings::default_tile(layers, cards)),
+            tile: self.tile,
             order: self.order,
             bins: self.bins,
             queue: self.queue,

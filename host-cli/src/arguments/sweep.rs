@@ -5,7 +5,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::quality::Quality;
-use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::render::RenderSettings;
 use photoncard_driver::study::{Axis, MAX_POINTS, Point, Scale, Task};
 
 use super::choice::choice;
@@ -76,12 +76,11 @@ impl SweepArguments {
     pub(crate) fn point(&self, name: &str) -> Point {
         let SweepSettings { quality, picture, photons, integrator, schedule, card, caches } = &self.settings;
         let base = quality.settings();
-        let cards = [CardAddress::Emulated { kind: *card, chips: 1 }];
         let settings = RenderSettings {
             picture: picture.settings(&base.picture),
             photons: photons.settings(&base.photons),
             integrator: integrator.settings(&base.integrator),
-            schedule: schedule.settings(&picture.layers(), &cards),
+            schedule: schedule.settings(),
             ..base
         };
         // With several tiles in flight no tile can be measured alone.

@@ -13,6 +13,7 @@ use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::tiles;
 use photoncard_firmware::chip::ReferenceChip;
+use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::counters::Counters;
 
 use super::{Instrument, STEPS};
@@ -39,7 +40,7 @@ impl Run {
         let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("it is lit");
         let camera = settings.camera(&scene).expect("it has a camera");
         let frame = settings.frame(&camera, mapped.max_distance, mapped.caustics);
-        let all = tiles(settings.window(), settings.schedule.tile, settings.schedule.order);
+        let all = tiles(settings.window(), settings.tile_side(&[REFERENCE]), settings.schedule.order);
         let step = (all.len() / count).max(1);
         let chosen: Vec<_> = all.iter().skip(step / 2).step_by(step).copied().collect();
         let counted = instrument.count(&mapped.image, &frame, &chosen);

@@ -55,7 +55,7 @@ impl RenderSettings {
         if let Some(in_flight) = self.schedule.in_flight {
             on_card("--in-flight", in_flight, 1, budget.in_flight)?;
         }
-        on_card("--tile", self.schedule.tile, 1, budget.pixels_of_tile(false).isqrt())?;
+        on_card("--tile", self.schedule.tile.unwrap_or(1), 1, budget.pixels_of_tile(false).isqrt())?;
         self.check_tile_with_layers(budget)
     }
 
@@ -88,7 +88,8 @@ impl RenderSettings {
     /// Checks that a chip has room for a tile with layers, if the picture has layers of chips.
     fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
         let most = budget.pixels_of_tile(self.picture.layers.are_of_chip()).isqrt();
-        if self.schedule.tile <= most {
+        let side = self.schedule.tile.unwrap_or(1);
+        if side <= most {
             return Ok(());
         }
         let leave_out = "leave direct, indirect, caustic and gathers out of --aov: with them a chip keeps four sums a pixel";
@@ -102,7 +103,7 @@ impl RenderSettings {
         }
         Err(RenderError::Setting {
             option: "--tile",
-            value: self.schedule.tile.to_string(),
+            value: side.to_string(),
             reason: format!("with --aov {} it must be 1 to {most} on this card", self.picture.layers),
             remedy: format!("choose {most} or less, or {leave_out}"),
         })
@@ -245,7 +246,7 @@ mod tests {
         }
         let layers = RenderSettings {
             picture: Picture { layers: "all".parse().unwrap(), ..Picture::default() },
-            schedule: Schedule { tile: 1, ..Schedule::default() },
+            schedule: Schedule { tile: Some(1), ..Schedule::default() },
             ..RenderSettings::default()
         };
         let (reason, remedy) = refusal(&layers, &Budget { tile_pixels: 1, ..REFERENCE });

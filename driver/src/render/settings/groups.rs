@@ -119,8 +119,8 @@ impl Default for Integrator {
 /// Order of the work. No pixel depends on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
-    /// Side of a tile, pixels.
-    pub tile: u32,
+    /// Side of a tile, pixels; `None` for one that suits cards and picture ([`tile_side`](super::RenderSettings::tile_side)).
+    pub tile: Option<u32>,
     /// Order of the photon gathers.
     pub order: GatherOrder,
     /// Number of direction bins of the gather rays, for orders with bins; `None` for the default.
@@ -133,7 +133,7 @@ pub struct Schedule {
 
 impl Default for Schedule {
     fn default() -> Self {
-        Self { tile: 16, order: GatherOrder::Sort, bins: None, queue: None, in_flight: None }
+        Self { tile: None, order: GatherOrder::Sort, bins: None, queue: None, in_flight: None }
     }
 }
 

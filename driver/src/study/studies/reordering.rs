@@ -67,7 +67,7 @@ fn point(scale: &Scale, order: GatherOrder, layout: PhotonLayout, caches: CacheS
 fn sorted(scale: &Scale, layout: PhotonLayout, tile: u32) -> Point {
     let settings = scale.settings(GatherOrder::Sort).with(|s| {
         s.photons.layout = layout;
-        s.schedule.tile = tile;
+        s.schedule.tile = Some(tile);
     });
     scale.traffic(CORNELL, settings)
 }

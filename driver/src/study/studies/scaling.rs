@@ -60,7 +60,7 @@ const SWEEPS: [Sweep; 3] = [
         axis: "side of a tile (pixels)",
         lines: &[SORT, SORT_LINES, ALL_ON],
         values: |_| powers(4, REFERENCE.tile_pixels.isqrt()),
-        set: |settings, side| settings.schedule.tile = side,
+        set: |settings, side| settings.schedule.tile = Some(side),
     },
     Sweep {
         name: "queue",

@@ -3,7 +3,7 @@
 use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{self, Block, Cell, Report, Table, XScale, YScale};
-use super::super::scale::{IRRADIANCE_ERROR, Scale, WIDEST_TILE};
+use super::super::scale::{IRRADIANCE_ERROR, Scale, TILE, WIDEST_TILE};
 use super::present::{
     GIGA, cell, columns, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
 };
@@ -24,8 +24,6 @@ struct Technique {
     tile: u32,
 }
 
-/// Side of the dissertation's tiles, pixels.
-const TILE: u32 = 16;
 const NAIVE: Technique = Technique {
     name: "naive",
     order: GatherOrder::Naive,
@@ -91,7 +89,7 @@ impl Technique {
             s.integrator.gather_rays = gather_rays;
             s.integrator.sampling = self.sampling;
             s.integrator.irradiance_error = self.irradiance_error;
-            s.schedule.tile = self.tile;
+            s.schedule.tile = Some(self.tile);
         })
     }
 
