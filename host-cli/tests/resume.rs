@@ -52,7 +52,7 @@ fn resumes(room: &Room, options: &[&str], expected: &[u8]) {
     let options = [options, &["--resume"]].concat();
     let outcome = room.run(&arguments(&shipped("cornell.gltf"), &options));
     assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
-    assert!(outcome.stderr.contains("of 64 tiles were rendered before"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("tiles were rendered before"), "{}", outcome.stderr);
     assert!(room.read("a.exr") == expected);
     assert!(!room.names().contains(&"a.exr.partial".to_owned()));
 }
