@@ -6,7 +6,7 @@ use photoncard_firmware::memory::Lines;
 use photoncard_firmware::render::RenderJob;
 use photoncard_shared::address::{STRUCTURES, Structure};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{FrameParameters, Tile};
+use photoncard_shared::message::{Fault, FrameParameters, Tile};
 use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
@@ -212,16 +212,15 @@ impl Bench<'_> {
         let mut memory = caches.over(memory);
         let mut counters = Counters::ZERO;
         let mut stopped = (self.is_stopped)();
-        self.pool.install(|| {
-            let mut chip = Box::new(Chip::<K>::new());
-            let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
-            render_tiles(&mut chip, job, tiles, |_, tile| {
+        let rendered = self.pool.install(|| {
+            let mut job = RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
+            render_on_new_chip::<K, _>(&mut job, tiles, |tile| {
                 counters.add(&tile.counters);
                 stopped = (self.is_stopped)();
                 !stopped
             })
-            .map_err(RenderError::Image)
-        })?;
+        });
+        rendered.map_err(RenderError::Image)?;
         if stopped {
             return Err(RenderError::Stopped);
         }
@@ -243,4 +242,17 @@ impl Bench<'_> {
         let whole = TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic);
         Ok(Measurement { tiles: vec![whole], map: PhotonMapSize::of(&self.mapped.image) })
     }
+}
+
+/// Renders tiles on a chip of the kind `K` until `finished` returns `false`.
+///
+/// Never inlined: a chip is made on the stack, and only threads of the pool have room for one.
+#[inline(never)]
+fn render_on_new_chip<K: ChipKind, M: MeasuredMemory>(
+    job: &mut RenderJob<M>,
+    tiles: &[Tile],
+    mut finished: impl FnMut(&RenderedTile) -> bool,
+) -> Result<(), Fault> {
+    let mut chip = Box::new(Chip::<K>::new());
+    render_tiles(&mut chip, job, tiles, |_, tile| finished(&tile))
 }
