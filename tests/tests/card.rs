@@ -103,8 +103,11 @@ fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
         assert_eq!(wire.say(&tile(3)), []);
         assert_eq!(wire.say(&tile(4)), [done(3), done(4)].concat());
         assert_eq!(wire.say(&tile(5)), []);
-        // A hello drops what is in flight.
+        // A hello drops what is in flight, and the next command is carried out without a wait.
         wire.hello();
+        assert!(!wire.card.is_busy());
+        let checksums = wire.say(&Command::ReadChecksums { first: 0, count: 1 });
+        assert!(matches!(checksums[..], [Answer::Checksums(_)]), "{checksums:?}");
         assert_eq!(wire.say(&Command::Flush), []);
         assert!(!wire.card.is_busy());
         wire.load(image().lines());

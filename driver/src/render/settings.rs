@@ -38,8 +38,8 @@ pub struct RenderSettings {
 /// Default number of direction bins: three per entry of the table that samples directions.
 const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 
-/// Minimum number of tiles a card by default: about a sixteenth of the time a card waits for the last tile of another.
-const TILES_OF_CARD: u64 = 8;
+/// Minimum number of tiles for each of several cards by default. A card waits for the last tile of another half a tile's time on average.
+const TILES_OF_CARD: u64 = 4;
 
 /// Side of tiles that are not divided for more cards by default, pixels: that of the coarsest cells of irradiance records, which
 /// narrower tiles would compute several times.
@@ -62,8 +62,7 @@ impl RenderSettings {
     }
 
     /// Side of the tiles on cards of `budgets`, pixels: [`Schedule::tile`]; without one the widest that each card has room for, as
-    /// it reads the least memory, but halved while the window has fewer than [`TILES_OF_CARD`] tiles for each card, down to
-    /// [`NARROWEST_TILE`].
+    /// it reads the least memory; for several cards halved while the window has fewer than four tiles for each, down to 16 pixels.
     pub fn tile_side(&self, budgets: &[Budget]) -> u32 {
         if let Some(side) = self.schedule.tile {
             return side;
@@ -71,7 +70,7 @@ impl RenderSettings {
         let room = budgets.iter().map(|budget| budget.pixels_of_tile(self.picture.layers.are_of_chip()));
         let widest = room.min().unwrap_or(NARROWEST_TILE.pow(2)).isqrt().max(1);
         let window = self.window();
-        let wanted = TILES_OF_CARD.saturating_mul(budgets.len() as u64);
+        let wanted = if budgets.len() > 1 { TILES_OF_CARD * budgets.len() as u64 } else { 1 };
         let tiles = |side: u32| {
             [window.x1 - window.x0, window.y1 - window.y0]
                 .map(|extent| u64::from(extent.div_ceil(side)))
@@ -188,7 +187,9 @@ mod tests {
             RenderSettings { picture, ..RenderSettings::default() }.tile_side(budgets)
         };
         assert_eq!(side(512, 512, &[REFERENCE; 2]), 64);
-        assert_eq!(side(512, 512, &[REFERENCE; 9]), 32);
+        assert_eq!(side(10, 10, &[REFERENCE]), 64);
+        assert_eq!(side(512, 512, &[REFERENCE; 16]), 64);
+        assert_eq!(side(512, 512, &[REFERENCE; 17]), 32);
         assert_eq!(side(512, 512, &[REFERENCE; 1000]), 16);
         assert_eq!(side(20, 10, &[REFERENCE; 2]), 16);
         assert_eq!(side(1 << 16, 1 << 16, &[REFERENCE, MICRO, REFERENCE]), 16);

@@ -40,7 +40,7 @@ pub(super) struct Engine<K: ChipKind> {
     finished: Option<(u32, Counters)>,
     /// True if the host sends no further tile for now.
     is_flushed: bool,
-    /// True if the chip has nothing to do before the next command.
+    /// True if tiles are in flight and the chip has nothing to do for them before the next command.
     waits: bool,
     /// Tile and index of the first pixel in `data`.
     first: (u32, u32),
@@ -160,17 +160,25 @@ impl<K: ChipKind> Engine<K> {
         self.chip.clear();
         self.begun = 0;
         self.finished = None;
+        self.is_flushed = false;
+        self.waits = false;
         self.data.clear();
+    }
+
+    /// True while tiles wait or are in flight.
+    fn has_tiles(&self) -> bool {
+        self.begun > 0 || !self.tiles.is_empty()
     }
 
     /// True while tiles wait or are in flight, or checksums are at work.
     fn is_at_work(&self) -> bool {
-        self.begun > 0 || !self.tiles.is_empty() || self.checksums.is_some()
+        self.has_tiles() || self.checksums.is_some()
     }
 
     /// True while there is work to do without a command.
     pub(super) fn has_work(&self) -> bool {
-        self.is_at_work() && !self.waits
+        self.has_tiles() && !self.waits
+            || self.checksums.is_some()
             || matches!(self.image, ImageState::Checking(_) | ImageState::Testing(_))
     }
 
@@ -263,6 +271,9 @@ impl<K: ChipKind> Engine<K> {
         if let Some((tile, counters)) = self.finished.take() {
             send(transport, &Reply::TileDone { tile, counters });
             self.begun = self.begun.saturating_sub(1);
+            return Ok(());
+        }
+        if !self.has_tiles() {
             return Ok(());
         }
         match self.chip.step(&mut RenderJob { scene, memory, frame, outlet: None })? {

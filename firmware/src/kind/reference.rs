@@ -17,12 +17,12 @@ pub const REFERENCE: Budget = Budget {
     tile_pixels: 4096,
     neighbors: 256,
     gather_rays: MAX_GATHER_RAYS,
-    gather_queue: 10_000,
+    gather_queue: 17_400,
     irradiance_records: 512,
     shadow_rays: 64,
     samples: 4096,
     tiles: 4,
-    in_flight: 2,
+    in_flight: 1,
 };
 
 /// The kind of the reference chip: [`REFERENCE`].
@@ -32,7 +32,7 @@ pub enum Reference {}
 impl ChipKind for Reference {
     const BUDGET: Budget = REFERENCE;
     const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
-        reordering: 299 << 10,
+        reordering: 560 << 10,
         irradiance_cache: 320 << 10,
         importance_sampling: 136 << 10,
     };

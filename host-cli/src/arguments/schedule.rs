@@ -10,8 +10,8 @@ use super::choice::choice;
 #[derive(Args)]
 #[command(next_help_heading = "Order of the work")]
 pub(crate) struct ScheduleOptions {
-    /// Side of a tile, pixels [default: the widest that all cards have room for, halved down to 16 until each has eight
-    /// tiles]
+    /// Side of a tile, pixels [default: the widest that all cards have room for, for several cards halved until each
+    /// has four tiles, down to 16]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) tile: Option<u32>,
     /// Order of the photon gathers; it never changes the picture
