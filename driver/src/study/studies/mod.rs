@@ -4,6 +4,7 @@ mod arithmetic;
 mod balance;
 mod flights;
 mod glossy_floor;
+mod interactive;
 mod machine;
 mod present;
 mod reordering;
@@ -15,6 +16,8 @@ mod times;
 mod workload;
 
 pub use self::sweep::Sweep;
+use super::error::StudyError;
+use super::host::{HostBench, HostFrame};
 use super::laboratory::Results;
 use super::point::Point;
 use super::report::Report;
@@ -34,6 +37,8 @@ pub enum Study {
     Techniques,
     /// Memory traffic over photons, tile sides and queue sizes; time over chips.
     Scaling,
+    /// Parts of a frame while camera and lights move.
+    Interactive,
 }
 
 choices!(Study {
@@ -42,6 +47,7 @@ choices!(Study {
     Table71 = "table-7.1": "Chips for a frame rate, by nominal and by measured counts",
     Techniques = "techniques": "Each technique alone and together, at as many rays and at equal quality",
     Scaling = "scaling": "Photons, tile sides, queues and chips",
+    Interactive = "interactive": "Parts of a frame while camera and lights move",
 });
 
 impl Study {
@@ -53,6 +59,18 @@ impl Study {
             Self::Table71 => machine::points(scale),
             Self::Techniques => techniques::points(scale),
             Self::Scaling => scaling::points(scale),
+            Self::Interactive => interactive::points(scale),
+        }
+    }
+
+    /// Measures the host's work that the report needs besides the points.
+    ///
+    /// # Errors
+    /// As [`HostBench::measure`].
+    pub fn host_frames(self, scale: &Scale, bench: &mut HostBench) -> Result<Vec<HostFrame>, StudyError> {
+        match self {
+            Self::Interactive => interactive::host_frames(scale, bench),
+            _ => Ok(Vec::new()),
         }
     }
 
@@ -61,13 +79,14 @@ impl Study {
     ///
     /// # Panics
     /// If `results` lack one of the [points](Self::points) of this scale.
-    pub fn report(self, scale: &Scale, results: &Results) -> Report {
+    pub fn report(self, scale: &Scale, results: &Results, host: &[HostFrame]) -> Report {
         let report = match self {
             Self::Reordering => reordering::report(scale, results),
             Self::Figure617 => glossy_floor::report(scale, results),
             Self::Table71 => machine::report(scale, results),
             Self::Techniques => techniques::report(scale, results),
             Self::Scaling => scaling::report(scale, results),
+            Self::Interactive => interactive::report(scale, results, host),
         };
         match scale.banner() {
             Some(banner) => report.marked(banner),
@@ -105,7 +124,7 @@ mod tests {
         };
         let points = study.points(scale).into_iter();
         let results = Results::new(points.map(|point| (point.clone(), outcome(&point))).collect());
-        study.report(scale, &results).to_html()
+        study.report(scale, &results, &[]).to_html()
     }
 
     #[test]
