@@ -63,10 +63,10 @@ pub struct StudyOptions {
 /// If a scene is missing, a point cannot be measured, a file cannot be written, or the observer stops the study.
 pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
     let mut laboratory = Laboratory::new(&options.out, &options.scenes, options.threads, observer)?;
+    let mut bench = HostBench::new(&options.out, &options.scenes, options.threads, observer)?;
     let mut reports: Vec<(Study, Report)> = Vec::new();
     for &study in &options.studies {
         let results = laboratory.measure(study.name(), &study.points(&options.scale))?;
-        let mut bench = HostBench::new(&options.out, &options.scenes, options.threads, observer)?;
         let mut report =
             study.report(&options.scale, &results, &study.host_frames(&options.scale, &mut bench)?);
         report.provenance = options.provenance.clone();
