@@ -100,6 +100,7 @@ mod tests {
     use photoncard_shared::address::STRUCTURES;
     use photoncard_shared::counters::Counters;
 
+    use super::super::host::{Change, Changed};
     use super::super::laboratory::Outcome;
     use super::super::measure::{Measurement, ReadSums, TileMeasurement};
     use super::super::point::Task;
@@ -108,6 +109,34 @@ mod tests {
     use crate::choice::Choice;
     use crate::emulator::contents::Contents;
     use crate::photon_map::PhotonMapSize;
+
+    /// Host's work, made up.
+    fn host_frame() -> HostFrame {
+        let change = |change| Changed { change, bytes: 6_000_000, of: 8_000_000 };
+        HostFrame {
+            image_bytes: 8_000_000,
+            map: PhotonMapSize { photons: 500_000, bytes: 7_000_000 },
+            threads: 2,
+            tracing: 0.5,
+            building: 0.25,
+            measuring: 0.25,
+            changes: vec![
+                change(Change::Dimmed),
+                change(Change::Replaced(0.1)),
+                change(Change::Replaced(1.0)),
+            ],
+        }
+    }
+
+    #[test]
+    fn interactive_frames_take_the_threads_and_links_of_their_measurements() {
+        let page = page(Study::Interactive, &Scale::FULL);
+        // 30 frames of a second each on two threads.
+        assert!(page.contains(">60<"), "threads");
+        assert!(
+            page.contains("all lights dimmed to a half") && page.contains("10 % of the photons traced anew")
+        );
+    }
 
     /// Page of a study on made-up outcomes.
     fn page(study: Study, scale: &Scale) -> String {
@@ -124,7 +153,7 @@ mod tests {
         };
         let points = study.points(scale).into_iter();
         let results = Results::new(points.map(|point| (point.clone(), outcome(&point))).collect());
-        study.report(scale, &results, &[]).to_html()
+        study.report(scale, &results, &[(); 9].map(|()| host_frame())).to_html()
     }
 
     #[test]
