@@ -42,7 +42,8 @@
 //! [`Quality::settings`](quality::Quality::settings) has cache and filter of a `--quality`, with the fewest samples and middle numbers of rays and photons, which
 //! [`Quality::fit`](quality::Quality::fit) chooses for a scene, within [`render_chosen`](render::render_chosen). `RenderSettings::default()` is
 //! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All are for one emulated reference chip. [`Rendering`](render::Rendering) holds the
-//! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A tone-mapped PNG is written by
+//! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A [`Renderer`](render::Renderer) renders further pictures on cards that stay
+//! open. A tone-mapped PNG is written by
 //! [`tone_mapping::write_png`], and two pictures are compared by [`difference`].
 //!
 //! # Cards

@@ -5,6 +5,7 @@
 //! Threads, ports, time, scheduler and sinks are outside: [`crate::render`] runs one session per thread, a simulator many
 //! in one.
 
+mod channel;
 mod clock;
 mod error;
 mod failures;
@@ -12,28 +13,31 @@ mod job;
 mod link_bytes;
 mod load;
 mod pixel_limits;
+mod replies;
 mod self_test;
 mod state;
 mod tiles;
+mod upload;
 
 pub use error::SessionError;
 pub use job::{Assignment, Event, Job};
 pub use link_bytes::LinkBytes;
 pub use pixel_limits::PixelLimits;
+pub use upload::Upload;
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::frame::MAX_PAYLOAD;
-use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{self, Command, MemoryUse, OPERAND_BYTES, PROTOCOL_VERSION, Reply};
-use photoncard_shared::transport::{Event as LineEvent, Transport};
+use photoncard_shared::message::{self, Command, MemoryUse, OPERAND_BYTES};
+use photoncard_shared::transport::Event as LineEvent;
 
+use self::channel::Channel;
 use self::clock::Clock;
-use self::error::{check_budget, check_versions};
+use self::error::check_versions;
 use self::failures::Failures;
-use self::load::Load;
+use self::load::{Comparison, Load};
 use self::self_test::Request;
 use self::state::State;
 use self::tiles::TilesInFlight;
@@ -42,23 +46,21 @@ use self::tiles::TilesInFlight;
 const MAX_CREDITS: u32 = 16;
 
 /// Session with one card.
-pub struct Session<'a> {
+pub struct Session {
     state: State,
     budget: Option<Budget>,
     build: String,
     memory_use: Option<MemoryUse>,
-    job: Option<Job<'a>>,
+    job: Option<Job>,
+    comparison: Comparison,
     load: Load,
     /// Requested part of the self-test.
     request: Request,
     tiles: TilesInFlight,
+    /// Maximum number of replies about tiles of an earlier frame that may still come.
+    stale_replies: u64,
     events: VecDeque<Event>,
-    bytes: LinkBytes,
-    transport: Transport,
-    /// Encoded commands that wait for room in the send window.
-    commands: VecDeque<Vec<u8>>,
-    /// Number of the link's current session.
-    number: u32,
+    channel: Channel,
     clock: Clock,
     failures: Failures,
     /// True if the card was working on a suspect tile when it was last greeted.
@@ -67,7 +69,7 @@ pub struct Session<'a> {
     is_flushed: bool,
 }
 
-impl<'a> Session<'a> {
+impl Session {
     /// Session that starts with a greeting. `number` distinguishes it from frames of other sessions on the line; any value
     /// is valid.
     pub fn new(number: u32, now: Duration) -> Self {
@@ -77,14 +79,13 @@ impl<'a> Session<'a> {
             build: String::new(),
             memory_use: None,
             job: None,
+            comparison: Comparison::default(),
             load: Load::default(),
             request: Request::Nothing,
             tiles: TilesInFlight::default(),
+            stale_replies: 0,
             events: VecDeque::new(),
-            bytes: LinkBytes::default(),
-            transport: Transport::host(),
-            commands: VecDeque::new(),
-            number,
+            channel: Channel::before(number),
             clock: Clock::new(now),
             failures: Failures::default(),
             left_suspect: false,
@@ -109,12 +110,32 @@ impl<'a> Session<'a> {
         self.memory_use
     }
 
-    /// Sets the job of the card, which starts as soon as the card has answered the greeting.
-    pub fn start(&mut self, job: Job<'a>, now: Duration) {
-        self.job = Some(job);
+    /// Sets the job of the card, which starts as soon as the card has answered the greeting. A card that has rendered another job
+    /// receives only what it lacks; what is left of that job is dropped.
+    pub fn start(&mut self, job: Job, now: Duration) {
         self.clock.rest(now);
-        if self.state == State::Ready {
-            self.begin_load();
+        self.events.clear();
+        let before = self.job.replace(job);
+        match (self.state, before) {
+            (State::Greeting, _) => {}
+            (State::Ready, _) => self.begin_load(),
+            (State::Rendering, Some(before)) => self.go_on_from(&before.upload, now),
+            _ => self.greet_anew(now),
+        }
+    }
+
+    /// Continues with the job on a card that holds the image `held`, and may be at work on tiles of an earlier frame.
+    fn go_on_from(&mut self, held: &Upload, now: Duration) {
+        let Some(job) = &self.job else { return };
+        let Some(runs) = job.upload.missing_from(held.checksum()) else { return self.greet_anew(now) };
+        let is_held = job.upload.checksum() == held.checksum();
+        self.channel.drop_commands();
+        self.stale_replies = std::mem::take(&mut self.tiles).most_replies();
+        if is_held {
+            self.begin_frame();
+        } else {
+            self.load = Load::new(runs, true);
+            self.begin_image();
         }
     }
 
@@ -149,10 +170,7 @@ impl<'a> Session<'a> {
     /// Returns whether the card has a free credit, and the send window room for a command.
     pub fn wants_tile(&self) -> bool {
         let credits = self.budget.map_or(1, |budget| budget.tiles.min(MAX_CREDITS) as usize);
-        self.is_loaded()
-            && self.tiles.len() < credits
-            && self.commands.is_empty()
-            && self.transport.can_send()
+        self.is_loaded() && self.tiles.len() < credits && self.channel.is_free()
     }
 
     /// Assigns a tile to a card for which [`Self::wants_tile`] is true.
@@ -173,12 +191,12 @@ impl<'a> Session<'a> {
     /// Maximum number of tiles that the card works on at once.
     fn at_work(&self) -> usize {
         let of_card = self.budget.map_or(1, |budget| budget.in_flight);
-        self.job.map_or(of_card, |job| of_card.min(job.frame.in_flight)) as usize
+        self.job.as_ref().map_or(of_card, |job| of_card.min(job.frame.in_flight)) as usize
     }
 
     /// Statistics of the link so far.
     pub fn link_bytes(&self) -> LinkBytes {
-        LinkBytes { line: self.transport.statistics(), ..self.bytes }
+        self.channel.statistics()
     }
 
     /// Number of lines of the image that the card has or that were sent.
@@ -186,8 +204,12 @@ impl<'a> Session<'a> {
         match self.state {
             State::Greeting | State::Ready | State::Comparing | State::Testing => 0,
             State::Loading => self.load.done(),
-            _ => self.job.map_or(0, |job| job.image.len()),
+            _ => self.upload_lines(),
         }
+    }
+
+    fn upload_lines(&self) -> usize {
+        self.job.as_ref().map_or(0, |job| job.upload.lines().len())
     }
 
     /// Returns whether the card has the image and the frame.
@@ -197,39 +219,33 @@ impl<'a> Session<'a> {
 
     /// Returns whether the card is loaded, has no tile, and no bytes are to be sent.
     pub fn is_idle(&mut self) -> bool {
-        self.is_loaded() && !self.is_waiting() && self.transport.outgoing().is_empty()
+        self.is_loaded() && !self.is_waiting() && self.channel.transport.outgoing().is_empty()
     }
 
     /// Returns whether an answer of the card is due.
     fn is_waiting(&self) -> bool {
         match self.state {
             State::Ready => false,
-            State::Rendering => !self.tiles.is_empty() || !self.transport.is_acknowledged(),
+            State::Rendering => !self.tiles.is_empty() || !self.channel.transport.is_acknowledged(),
             _ => true,
         }
     }
 
     /// Fills the send window with commands and lines of the image.
     pub fn prepare(&mut self) {
-        while self.transport.can_send() {
-            if let Some(command) = self.commands.pop_front() {
-                self.transport.send(|bytes| {
-                    bytes.get_mut(..command.len())?.copy_from_slice(&command);
-                    Some(command.len())
-                });
-            } else if !self.load_more() {
-                break;
-            }
-        }
+        self.channel.forward();
+        while self.channel.is_free() && self.load_more() {}
     }
 
     /// Sends the next lines of the image, or the command that ends it. Returns false if the session is not loading.
     fn load_more(&mut self) -> bool {
-        let (State::Loading, Some(job)) = (self.state, self.job) else { return false };
-        let sent = self.load.next_lines(job.image, &mut self.transport);
-        self.bytes.payload += sent as u64;
+        let (State::Loading, Some(job)) = (self.state, &self.job) else { return false };
+        let sent = self.load.next_lines(&job.upload, &mut self.channel.transport);
+        self.channel.bytes.image += sent as u64;
+        self.channel.bytes.payload += sent as u64;
         if sent == 0 {
             self.send(&Command::EndImage);
+            self.channel.forward();
             self.state = State::Accepting;
         }
         true
@@ -237,18 +253,19 @@ impl<'a> Session<'a> {
 
     /// Bytes to send now.
     pub fn outgoing(&mut self) -> &[u8] {
-        self.transport.outgoing()
+        self.channel.transport.outgoing()
     }
 
     /// Returns whether there are bytes to send before the card answers.
     pub fn has_more_to_send(&mut self) -> bool {
-        !self.transport.outgoing().is_empty() || self.state == State::Loading && self.transport.can_send()
+        !self.channel.transport.outgoing().is_empty()
+            || self.state == State::Loading && self.channel.transport.can_send()
     }
 
     /// Removes the first `bytes` bytes of [`Self::outgoing`], which were sent.
     pub fn sent(&mut self, bytes: usize, now: Duration) {
-        self.transport.sent(bytes);
-        self.bytes.wire += bytes as u64;
+        self.channel.transport.sent(bytes);
+        self.channel.bytes.wire += bytes as u64;
         if bytes > 0 {
             self.clock.sent(now);
         }
@@ -259,20 +276,20 @@ impl<'a> Session<'a> {
     /// # Errors
     /// If they violate the protocol, report a fault of the card, or show that it has failed too often.
     pub fn receive(&mut self, mut bytes: &[u8], now: Duration) -> Result<(), SessionError> {
-        self.bytes.wire += bytes.len() as u64;
+        self.channel.bytes.wire += bytes.len() as u64;
         while !bytes.is_empty() {
-            let passed = self.transport.passed();
-            let (taken, event) = self.transport.receive(bytes);
+            let passed = self.channel.transport.passed();
+            let (taken, event) = self.channel.transport.receive(bytes);
             bytes = &bytes[taken..];
             match event {
                 None => {}
                 Some(LineEvent::Heard) => self.clock.heard(now),
                 Some(LineEvent::Unknown) if self.clock.has_heard() => self.reset(now)?,
                 // The greeting was lost.
-                Some(LineEvent::Unknown) => self.transport.send_again(),
+                Some(LineEvent::Unknown) => self.channel.transport.send_again(),
             }
             let mut payload = [0; MAX_PAYLOAD];
-            while let Some(message) = self.transport.take() {
+            while let Some(message) = self.channel.transport.take() {
                 let payload = &mut payload[..message.len()];
                 payload.copy_from_slice(message);
                 if let (State::Greeting, Some(versions)) = (self.state, message::hello_versions(payload)) {
@@ -281,7 +298,7 @@ impl<'a> Session<'a> {
                 let reply = message::decode(payload).ok_or(SessionError::Unexpected("not a reply"))?;
                 self.take(&reply)?;
             }
-            if self.transport.passed() != passed {
+            if self.channel.transport.passed() != passed {
                 self.clock.passed(now);
             }
         }
@@ -290,7 +307,7 @@ impl<'a> Session<'a> {
 
     /// Acknowledges received frames; to be called when the line is quiet.
     pub fn acknowledge(&mut self) {
-        self.transport.acknowledge();
+        self.channel.transport.acknowledge();
     }
 
     /// Advances the clock; to be called often. Probes a card that has been quiet for too long. `slowest` is the maximum
@@ -309,9 +326,9 @@ impl<'a> Session<'a> {
             return self.reset(now);
         }
         if self.clock.must_ask(now) {
-            self.transport.probe();
+            self.channel.transport.probe();
         }
-        let rays = self.job.map_or(0, |job| self.tiles.most_rays(self.at_work(), job.frame));
+        let rays = self.job.as_ref().map_or(0, |job| self.tiles.most_rays(self.at_work(), &job.frame));
         let result = self.clock.check(rays, slowest, now);
         if matches!(result, Err(SessionError::Standstill(_))) {
             self.fail()?;
@@ -330,8 +347,13 @@ impl<'a> Session<'a> {
     pub fn greet_again(&mut self, now: Duration) {
         self.left_suspect = self.tiles.is_at_suspect();
         self.give_back();
-        self.bytes.resets += 1;
-        self.number = self.number.wrapping_add(1);
+        self.channel.bytes.resets += 1;
+        self.greet_anew(now);
+    }
+
+    /// Greets the card with a new session number; what it works at is dropped.
+    fn greet_anew(&mut self, now: Duration) {
+        self.tiles = TilesInFlight::default();
         self.clock = Clock::new(now);
         self.greet_card();
     }
@@ -351,96 +373,37 @@ impl<'a> Session<'a> {
 
     fn greet_card(&mut self) {
         self.state = State::Greeting;
-        self.commands.clear();
-        self.transport.open(self.number);
-        self.send(&Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION });
+        self.stale_replies = 0;
+        self.channel.greet();
     }
 
     fn send(&mut self, command: &Command) {
-        let mut bytes = vec![0; MAX_PAYLOAD];
-        // Every command fits a frame: tests cover the longest.
-        if let Some(length) = message::encode(command, &mut bytes) {
-            bytes.truncate(length);
-            self.commands.push_back(bytes);
-        }
+        self.channel.send(command);
     }
 
     /// Requests the next checksums of the card's chunks; after the last ones starts to send lines.
     fn begin_load(&mut self) {
-        let Some(job) = self.job else { return };
-        if let Some(question) = self.load.next_question(job.image) {
+        let Some(job) = &self.job else { return };
+        if let Some(question) = self.comparison.next_question(&job.upload) {
             self.send(&question);
             self.state = State::Comparing;
             return;
         }
-        let lines = job.image.len() as u32;
-        self.send(&Command::BeginImage { lines, checksum: job.checksum });
+        self.load = Load::new(self.comparison.finish(&job.upload), false);
+        self.begin_image();
+    }
+
+    fn begin_image(&mut self) {
+        let Some(Job { upload, .. }) = &self.job else { return };
+        let command = Command::BeginImage { lines: upload.lines().len() as u32, checksum: upload.checksum() };
+        self.send(&command);
         self.state = State::Loading;
     }
 
-    fn take(&mut self, reply: &Reply) -> Result<(), SessionError> {
-        match (self.state, *reply) {
-            (State::Greeting, Reply::Hello { budget, written_lines, memory_use, build, .. }) => {
-                build.clone_into(&mut self.build);
-                self.memory_use = memory_use;
-                self.greet(budget, written_lines)?;
-                self.load = Load::new(written_lines);
-                if self.job.is_some() {
-                    self.begin_load();
-                }
-                Ok(())
-            }
-            (_, Reply::Fault(fault)) => Err(SessionError::Fault(fault)),
-            (State::Comparing, Reply::Checksums { first, data }) => {
-                let Some(job) = self.job else { return Ok(()) };
-                self.load.compare(job.image, first, data)?;
-                self.begin_load();
-                Ok(())
-            }
-            (State::Accepting, Reply::ImageAccepted) => {
-                let Some(job) = self.job else { return Ok(()) };
-                self.failures.is_loaded(job.image.len() as u32);
-                self.send(&Command::BeginFrame(*job.frame));
-                self.state = State::Framing;
-                Ok(())
-            }
-            (State::Framing, Reply::FrameAccepted) => {
-                self.state = State::Rendering;
-                self.events.push_back(Event::Ready);
-                Ok(())
-            }
-            (State::Rendering, Reply::Pixels { tile, first, data }) => {
-                let Some(job) = &self.job else { return Ok(()) };
-                self.tiles.take_pixels(tile, first, data, &job.limits)?;
-                self.bytes.payload += data.len() as u64;
-                Ok(())
-            }
-            (State::Rendering, Reply::TileDone { tile, counters }) => {
-                let Some(job) = &self.job else { return Ok(()) };
-                let finished = self.tiles.complete(tile, counters, &job.limits)?;
-                self.events.push_back(Event::TileDone(finished));
-                self.failures.completes_tile();
-                Ok(())
-            }
-            (State::Testing, ref reply) => {
-                let (event, is_last) = self.request.take(reply)?;
-                self.events.push_back(event);
-                if is_last {
-                    self.state = State::Ready;
-                }
-                Ok(())
-            }
-            _ => Err(SessionError::Unexpected("not an answer to what was asked")),
-        }
-    }
-
-    fn greet(&mut self, budget: Budget, written_lines: u32) -> Result<(), SessionError> {
-        check_budget(&budget, self.budget.as_ref())?;
-        if self.failures.says_hello(written_lines) && !self.left_suspect {
-            self.failures.count()?;
-        }
-        self.budget = Some(budget);
-        self.state = State::Ready;
-        Ok(())
+    fn begin_frame(&mut self) {
+        let Some(job) = &self.job else { return };
+        let command = Command::BeginFrame(job.frame);
+        self.send(&command);
+        self.state = State::Framing;
     }
 }

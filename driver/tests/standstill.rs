@@ -3,11 +3,12 @@
 
 mod scripted_card;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use photoncard_driver::render::{Integrator, Picture, RenderSettings};
 use photoncard_driver::scene::Camera;
-use photoncard_driver::session::{Assignment, Event, Job, PixelLimits, Session, SessionError};
+use photoncard_driver::session::{Assignment, Event, Job, PixelLimits, Session, SessionError, Upload};
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
@@ -37,7 +38,7 @@ fn frame() -> FrameParameters {
     .frame(&camera, 1.0, None)
 }
 
-const IMAGE: [Line; 100] = [Line::ZERO; 100];
+const IMAGE_LINES: usize = 100;
 const STEP: Duration = Duration::from_millis(100);
 
 /// Limits of the pixels of an image in units of 1, with the grid of a small scene.
@@ -47,8 +48,8 @@ fn limits(frame: &FrameParameters) -> PixelLimits {
 }
 
 /// Session in virtual time.
-struct Bench<'a> {
-    session: Session<'a>,
+struct Bench {
+    session: Session,
     /// Tiles that wait for the card.
     waiting: Vec<Tile>,
     /// Maximum time of a ray, seconds, if known.
@@ -57,10 +58,11 @@ struct Bench<'a> {
     now: Duration,
 }
 
-impl<'a> Bench<'a> {
-    fn new(frame: &'a FrameParameters) -> Self {
+impl Bench {
+    fn new(frame: &FrameParameters) -> Self {
         let mut session = Session::new(1, Duration::ZERO);
-        session.start(Job { image: &IMAGE, checksum: 0, frame, limits: limits(frame) }, Duration::ZERO);
+        let upload = Arc::new(Upload::new(Arc::new(vec![Line::ZERO; IMAGE_LINES])));
+        session.start(Job { upload, frame: *frame, limits: limits(frame) }, Duration::ZERO);
         Self { session, waiting: vec![TILE], slowest: None, events: Vec::new(), now: Duration::ZERO }
     }
 
@@ -136,7 +138,7 @@ fn keeping(command: &Command) -> Option<Reply<'static>> {
         Command::ReadChecksums { first, .. } => Some(Reply::Checksums { first: *first, data: &[0; 8] }),
         command => sound(command).map(|reply| match reply {
             Reply::Hello { protocol, layout, budget, memory_use, build, .. } => {
-                let written_lines = IMAGE.len() as u32;
+                let written_lines = IMAGE_LINES as u32;
                 Reply::Hello { protocol, layout, budget, written_lines, memory_use, build }
             }
             reply => reply,

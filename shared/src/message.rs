@@ -216,7 +216,8 @@ pub enum Command<'a> {
         /// Number of chunks.
         count: u32,
     },
-    /// Announces an image: number of lines, and checksum of all its bytes.
+    /// Announces an image: number of lines, and checksum of all its bytes. Written lines stay, so that only those need be written in
+    /// which the image differs from the one before.
     BeginImage {
         /// Lines.
         lines: u32,
@@ -233,7 +234,8 @@ pub enum Command<'a> {
     },
     /// Ends the image, which is then checked.
     EndImage,
-    /// Sets the parameters of the tiles that follow.
+    /// Sets the parameters of the tiles that follow. Tiles of an earlier frame are dropped; messages about them may still come before the
+    /// answer.
     BeginFrame(FrameParameters),
     /// Renders a tile.
     RenderTile(Tile),

@@ -3,15 +3,17 @@
 //! [`Symbols`] are the parameters of Table 7.1, a [`Workload`] the counts of rays, gathers and bytes of one frame, a
 //! [`Cost`] the FLOPs and bytes that they take of each unit of the chip, and a [`Prediction`] the speed of a
 //! [`Machine`] at that cost. [`Flops`] are the operations of work that chips counted, at the table's cost of each piece; [`arithmetic`] are those
-//! that the firmware does. Formulas: `docs/scaling.md`.
+//! that the firmware does. A [`Distribution`] is the time of an upload to all chips. Formulas: `docs/scaling.md`.
 
 pub mod arithmetic;
+mod distribution;
 mod flops;
 mod prediction;
 mod symbols;
 pub mod timing;
 mod workload;
 
+pub use distribution::Distribution;
 pub use flops::Flops;
 pub use prediction::{ChipsNeeded, Machine, Prediction, Resource};
 pub use symbols::{Origin, Symbol, SymbolError, Symbols};

@@ -1,6 +1,7 @@
 //! Symbols of the cost model: Table 7.1, and the few symbols that the table implies or leaves open.
 
 use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::frame::MAX_FRAME;
 use photoncard_shared::layout::{Photon, Record};
 use photoncard_shared::message::PIXEL_BYTES;
 
@@ -70,6 +71,10 @@ pub struct Symbols {
     pub pixel_bytes: f64,
     /// `B_T`: bytes of a tile command on the host's link.
     pub command_bytes: f64,
+    /// `f`: links below a switch of the tree between host and chips.
+    pub fan_out: f64,
+    /// `S_F`: bytes that a switch holds before it forwards them.
+    pub frame_bytes: f64,
 }
 
 impl Symbols {
@@ -104,6 +109,8 @@ impl Symbols {
         table_cell: 12.0,
         pixel_bytes: PIXEL_BYTES as f64,
         command_bytes: 32.0,
+        fan_out: 4.0,
+        frame_bytes: MAX_FRAME as f64,
     };
 
     /// `R_FG = 1 - R_IC`: share of the pixels with a final gather of their own.
@@ -208,6 +215,8 @@ pub struct Symbol {
 const ANY: [f64; 2] = [0.0, 1e15];
 /// Range of a count that is at least one.
 const SOME: [f64; 2] = [1.0, 1e15];
+/// Range of the children of a node.
+const FAN_OUT: [f64; 2] = [2.0, 1e15];
 /// Range of a share of a whole.
 const RATIO: [f64; 2] = [0.0, 1.0];
 
@@ -241,7 +250,7 @@ const GATHERING_SHARE: Symbol = Symbol {
 };
 
 #[rustfmt::skip] // One symbol a line, as in the table.
-static SYMBOLS: [Symbol; 27] = [
+static SYMBOLS: [Symbol; 29] = [
     symbol!("P", tile_pixels, SOME, "pixels", "pixels in a tile, 16x16", Table, "chapter 3"),
     symbol!("T", tiles, SOME, "tiles", "tiles in a 512x512 picture", Table, "chapter 1"),
     symbol!("F", frames_per_second, ANY, "frames/s", "frames a second", Table, "chapter 1"),
@@ -269,6 +278,8 @@ static SYMBOLS: [Symbol; 27] = [
     symbol!("C_T2", table_cell, ANY, "FLOPs", "one cell of an importance table", Ours, "rounded count by hand of firmware::importance"),
     symbol!("B_P", pixel_bytes, ANY, "bytes", "pixel on the host link", Ours, "shared::message"),
     symbol!("B_T", command_bytes, ANY, "bytes", "tile command on the host link", Ours, "shared::message, in its frame"),
+    symbol!("f", fan_out, FAN_OUT, "links", "links below a switch of the host's tree", Ours, "figure 7.1 draws a tree, without a number"),
+    symbol!("S_F", frame_bytes, ANY, "bytes", "bytes that a switch holds before it forwards them", Ours, "shared::frame"),
 ];
 
 #[cfg(test)]

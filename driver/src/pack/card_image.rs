@@ -17,6 +17,12 @@ pub struct CardImage {
     pub(super) lines: Vec<Line>,
 }
 
+impl AsRef<[Line]> for CardImage {
+    fn as_ref(&self) -> &[Line] {
+        &self.lines
+    }
+}
+
 impl CardImage {
     /// All lines, the header's first.
     pub fn lines(&self) -> &[Line] {

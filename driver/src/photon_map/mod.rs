@@ -67,11 +67,47 @@ pub fn map_photons(
     settings: &PhotonSettings,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<MappedImage, PhotonError> {
-    let mut times = PhotonTimes::default();
     let start = Instant::now();
-    let PhotonPass { photons, paths, .. } = trace(&packed, settings.seed, settings.photons, progress)?;
-    let caustic = caustics(&packed, settings, progress)?;
-    times.tracing = start.elapsed();
+    let traced = TracedPhotons::new(&packed, settings, progress)?;
+    let tracing = start.elapsed();
+    let mut mapped = map_traced(packed, traced, settings, progress)?;
+    mapped.times.tracing = tracing;
+    Ok(mapped)
+}
+
+/// Photons of a scene, of both maps.
+pub(crate) struct TracedPhotons {
+    pub(crate) photons: Photons,
+    /// Number of paths traced from the lights.
+    pub(crate) paths: u64,
+    /// Caustic photons, if requested and if any are found.
+    pub(crate) caustic: Option<Photons>,
+}
+
+impl TracedPhotons {
+    /// Traces photons in a packed scene.
+    ///
+    /// # Errors
+    /// As [`map_photons`].
+    pub(crate) fn new(
+        packed: &PackedScene,
+        settings: &PhotonSettings,
+        progress: &(dyn Fn(usize) -> bool + Sync),
+    ) -> Result<Self, PhotonError> {
+        let PhotonPass { photons, paths, .. } = trace(packed, settings.seed, settings.photons, progress)?;
+        Ok(Self { photons, paths, caustic: caustics(packed, settings, progress)? })
+    }
+}
+
+/// Completes the image of a packed scene with its photons, as [`map_photons`].
+pub(crate) fn map_traced(
+    packed: PackedScene,
+    traced: TracedPhotons,
+    settings: &PhotonSettings,
+    progress: &(dyn Fn(usize) -> bool + Sync),
+) -> Result<MappedImage, PhotonError> {
+    let TracedPhotons { photons, paths, caustic } = traced;
+    let mut times = PhotonTimes::default();
     let start = Instant::now();
     let cell = photons.grid().cell;
     let mut image = store_photons(packed, photons, settings.neighbors)?;

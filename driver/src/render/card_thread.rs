@@ -7,65 +7,37 @@ use photoncard_shared::address::LINE_BYTES;
 use super::crew::{Crew, EndOthersOnPanic};
 use super::exchange::{WAIT, exchange};
 use super::greeting::GreetedCard;
-use super::open_card::OpenCard;
 use super::reopening::reopen;
 use super::{CardError, Phase, RenderError};
-use crate::emulator::memory_model::MemoryTraffic;
-use crate::emulator::trace::TraceFile;
 use crate::scheduler::{CardNumber, Standing};
-use crate::session::{Job, LinkBytes, Session, SessionError};
-
-/// Outcome of one card.
-#[derive(Default)]
-pub(super) struct CardOutcome {
-    pub(super) bytes: LinkBytes,
-    pub(super) traffic: Option<MemoryTraffic>,
-    pub(super) loaded: Duration,
-}
-
-impl CardOutcome {
-    pub(super) fn add(&mut self, other: &Self) {
-        self.bytes.add(&other.bytes);
-        if let Some(traffic) = &other.traffic {
-            self.traffic.get_or_insert(MemoryTraffic::ZERO).add(traffic);
-        }
-        self.loaded = self.loaded.max(other.loaded);
-    }
-}
+use crate::session::{Job, SessionError};
 
 /// Card at work.
 struct CardAtWork<'a> {
     number: CardNumber,
-    card: OpenCard,
-    session: Session<'a>,
+    greeted: &'a mut GreetedCard,
     /// True after the card's loss was reported, until it is loaded again.
     is_lost: bool,
     crew: &'a Crew<'a>,
 }
 
 /// Loads the image into a card and renders tiles on it until none is left. A lost card is retried as long as there are
-/// others; a card that answers wrongly, or fails repeatedly, is given up.
-pub(super) fn render_on<'a>(
+/// others; a card that answers wrongly, or fails repeatedly, is given up. Returns the time when the card was loaded, since the
+/// start of the crew; zero if it was not.
+pub(super) fn render_on(
     number: CardNumber,
-    greeted: GreetedCard,
-    job: Job<'a>,
-    crew: &'a Crew<'a>,
-) -> Result<CardOutcome, RenderError> {
+    greeted: &mut GreetedCard,
+    job: &Job,
+    crew: &Crew,
+) -> Result<Duration, RenderError> {
     let _guard = EndOthersOnPanic(&crew.failed);
-    let GreetedCard { card, mut session, .. } = greeted;
-    session.start(job, crew.start.elapsed());
-    let mut at_work = CardAtWork { number, card, session, is_lost: false, crew };
-    let mut outcome = CardOutcome::default();
-    while !crew.is_complete()? && !at_work.card.trace_has_failed() && at_work.go_on()? {
-        at_work.tell_progress(&mut outcome, job);
+    greeted.session.start(job.clone(), crew.start.elapsed());
+    let mut at_work = CardAtWork { number, greeted, is_lost: false, crew };
+    let mut loaded = Duration::ZERO;
+    while !crew.is_complete()? && !at_work.greeted.card.trace_has_failed() && at_work.go_on()? {
+        at_work.tell_progress(&mut loaded, job);
     }
-    let CardAtWork { card, session, .. } = at_work;
-    outcome.bytes = session.link_bytes();
-    if let Some(record) = card.finish() {
-        outcome.traffic = Some(record.traffic);
-        record.trace.map_or(Ok(()), TraceFile::finish)?;
-    }
-    Ok(outcome)
+    Ok(loaded)
 }
 
 impl CardAtWork<'_> {
@@ -73,23 +45,23 @@ impl CardAtWork<'_> {
     fn go_on(&mut self) -> Result<bool, RenderError> {
         let Self { number, crew, .. } = *self;
         let dispatcher = &crew.dispatcher;
-        dispatcher.supply(number, &mut self.session, crew.start.elapsed());
-        if self.session.is_idle() {
+        dispatcher.supply(number, &mut self.greeted.session, crew.start.elapsed());
+        if self.greeted.session.is_idle() {
             dispatcher.wait(WAIT);
         }
         let slowest = dispatcher.scheduler().slowest(number);
-        let exchanged = dispatcher
-            .check_card(number)
-            .and_then(|()| exchange(&mut self.session, &mut self.card, slowest, crew.start));
+        let GreetedCard { card, session, .. } = &mut *self.greeted;
+        let exchanged =
+            dispatcher.check_card(number).and_then(|()| exchange(session, card, slowest, crew.start));
         // Answers before the error count.
         self.collect()?;
-        self.is_lost &= !self.session.is_loaded();
+        self.is_lost &= !self.greeted.session.is_loaded();
         exchanged.map_or_else(|error| self.recover(error), |()| Ok(true))
     }
 
     fn collect(&mut self) -> Result<(), RenderError> {
         let collected =
-            self.crew.dispatcher.collect(self.number, &mut self.session, self.crew.start.elapsed());
+            self.crew.dispatcher.collect(self.number, &mut self.greeted.session, self.crew.start.elapsed());
         collected.map_err(|error| self.crew.end(error))
     }
 
@@ -100,13 +72,13 @@ impl CardAtWork<'_> {
             crew.dispatcher.distrust(number, tile);
         }
         if !error.may_pass() {
-            self.session.give_back();
+            self.greeted.session.give_back();
             self.collect()?;
             crew.lose(number, CardError::Session(error), Standing::GivenUp, self.is_lost)?;
             return Ok(false);
         }
         let is_closed = matches!(error, SessionError::Port(_));
-        self.session.greet_again(crew.start.elapsed());
+        self.greeted.session.greet_again(crew.start.elapsed());
         self.collect()?;
         if !std::mem::replace(&mut self.is_lost, true) {
             crew.lose(number, CardError::Session(error), Standing::Lost, false)?;
@@ -116,25 +88,26 @@ impl CardAtWork<'_> {
 
     /// Reconnects to a card whose link was closed. Returns false for an emulated card, which cannot be reached again.
     fn reopen(&mut self) -> Result<bool, RenderError> {
-        let Some(address) = self.card.close() else { return Ok(false) };
+        let Some(address) = self.greeted.card.close() else { return Ok(false) };
         if let Some(port) = reopen(&address, &|longest| self.crew.wait_for_end(longest))? {
-            self.card.go_on_with(port);
+            self.greeted.card.go_on_with(port);
         }
         Ok(true)
     }
 
-    fn tell_progress(&self, outcome: &mut CardOutcome, job: Job) {
-        let Self { session, crew, .. } = self;
+    fn tell_progress(&self, loaded: &mut Duration, job: &Job) {
+        let Self { greeted, crew, .. } = self;
+        let session = &greeted.session;
         if session.is_loaded() {
-            if outcome.loaded.is_zero() {
-                outcome.loaded = crew.start.elapsed();
+            if loaded.is_zero() {
+                *loaded = crew.start.elapsed();
             }
             let (done, total) = crew.dispatcher.scheduler().progress();
             crew.outputs.observer.progress(Phase::Tiles, done as u64, total as u64);
-        } else if outcome.loaded.is_zero() {
-            let [loaded, all] =
-                [session.loaded_lines(), job.image.len()].map(|lines| (lines * LINE_BYTES) as u64);
-            crew.outputs.observer.progress(Phase::Load, loaded, all);
+        } else if loaded.is_zero() {
+            let [sent, all] =
+                [session.loaded_lines(), job.upload.lines().len()].map(|lines| (lines * LINE_BYTES) as u64);
+            crew.outputs.observer.progress(Phase::Load, sent, all);
         }
     }
 }

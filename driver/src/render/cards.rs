@@ -1,48 +1,54 @@
-//! Executor of tiles on cards: connects to all cards, greets them, and renders on them in parallel.
+//! Executor of tiles on cards: connects to all cards, greets them, and renders on them in parallel. Cards stay open for the next
+//! picture.
 
 use std::panic::resume_unwind;
-use std::sync::PoisonError;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, PoisonError};
 use std::thread::ScopedJoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use photoncard_shared::budget::Budget;
-use photoncard_shared::checksum::image_checksum;
 
-use super::card_thread::{CardOutcome, render_on};
+use super::card_thread::render_on;
 use super::crew::Crew;
 use super::executor::{Executor, Outcome, Work};
 use super::greeting::{GreetedCard, GreetingError, card_name, greet};
 use super::open_card::OpenCard;
 use super::outputs::Outputs;
-use super::{CardError, CardSet, Observer, RenderError, RenderSettings};
+use super::{CardAddress, CardError, CardSet, Observer, RenderError, RenderSettings};
 use crate::dispatcher::Dispatcher;
+use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{MemoryModel, SharedImage};
+use crate::pack::CardImage;
 use crate::scheduler::{Scheduler, Standing};
-use crate::session::{Job, PixelLimits};
+use crate::session::{Job, PixelLimits, Upload};
 use crate::sink::TileSink;
 
+/// Maximum time without a render after which a card elsewhere is used without a new greeting: it may close a link that is silent.
+const MAX_REST: Duration = Duration::from_secs(5);
+
 /// Cards that have answered the greeting.
-pub(super) struct Cards<'a> {
-    settings: &'a RenderSettings,
+pub(super) struct Cards {
+    set: CardSet,
     cards: Vec<(String, GreetedCard)>,
     start: Instant,
     shared: SharedImage,
-    /// Number of cards that have not answered the greeting.
+    /// Image that the cards were last loaded with.
+    upload: Option<(Arc<CardImage>, Arc<Upload>)>,
+    /// Number of cards that have not answered the greeting, or were given up in an earlier render.
     lost: usize,
+    /// Time of the end of the last render, or of the greeting.
+    used: Instant,
 }
 
-impl<'a> Cards<'a> {
+impl Cards {
     /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it, the first card's with
     /// the trace. A card that does not answer counts as lost.
     ///
     /// # Errors
     /// If the trace cannot be written, or fewer cards are left than needed.
-    pub(super) fn connect(
-        settings: &'a RenderSettings,
-        observer: &dyn Observer,
-    ) -> Result<Self, RenderError> {
+    pub(super) fn connect(settings: &RenderSettings, observer: &dyn Observer) -> Result<Self, RenderError> {
         let mut trace = settings.cards.trace.as_ref().map(TraceFile::create).transpose()?;
         let start = Instant::now();
         let shared = SharedImage::default();
@@ -61,7 +67,8 @@ impl<'a> Cards<'a> {
             }
         });
         let results = on_threads(greetings);
-        let mut this = Self { settings, cards: Vec::new(), start, shared, lost: 0 };
+        let set = settings.cards.clone();
+        let mut this = Self { set, cards: Vec::new(), start, shared, upload: None, lost: 0, used: start };
         let mut errors = Vec::new();
         for (name, result) in results {
             match result {
@@ -71,8 +78,18 @@ impl<'a> Cards<'a> {
             }
         }
         this.lost = errors.len();
+        this.used = Instant::now();
         this.lose(errors, settings.needed_cards(), observer)?;
         Ok(this)
+    }
+
+    /// Returns whether the cards are those of the settings, as many as needed, and can be used without a new greeting.
+    pub(super) fn serve(&self, settings: &RenderSettings) -> bool {
+        let is_remote = |address: &CardAddress| matches!(address, CardAddress::Remote(_));
+        let is_fresh = !self.set.addresses.iter().any(is_remote) || self.used.elapsed() <= MAX_REST;
+        // Each record of a modelled memory is of one render.
+        let is_modelled = settings.modelled_caches().is_some();
+        self.set == settings.cards && !is_modelled && is_fresh && self.cards.len() >= settings.needed_cards()
     }
 
     /// Reports cards that have not answered the greeting to the observer.
@@ -90,48 +107,78 @@ impl<'a> Cards<'a> {
         last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
     }
 
+    /// The image as the cards receive it: those that hold the last one receive only its differences.
+    fn upload(&mut self, image: &Arc<CardImage>) -> Arc<Upload> {
+        let upload = match self.upload.take() {
+            Some((last, upload)) if Arc::ptr_eq(&last, image) => upload,
+            Some((_, last)) => Arc::new(Upload::new(image.clone()).after(&last)),
+            None => Arc::new(Upload::new(image.clone())),
+        };
+        self.upload = Some((image.clone(), upload.clone()));
+        upload
+    }
+
     /// Renders a scheduler's tiles on all cards, into sinks.
     fn render(
-        self,
-        job: Job,
+        &mut self,
+        job: &Job,
         scheduler: Scheduler,
         sinks: Vec<&dyn TileSink>,
         outputs: &Outputs,
     ) -> Result<Outcome, RenderError> {
         let begun = self.start.elapsed();
-        let (names, cards): (Vec<String>, Vec<GreetedCard>) = self.cards.into_iter().unzip();
-        let count = cards.len();
+        let count = self.cards.len();
         let crew = Crew {
             dispatcher: Dispatcher::new(scheduler, sinks),
             outputs,
             start: self.start,
-            names,
+            names: self.cards.iter().map(|(name, _)| name.clone()).collect(),
             failed: AtomicBool::new(false),
         };
         let crew_of_all = &crew;
         let results = on_threads(
-            (cards.into_iter().enumerate())
-                .map(|(number, card)| move || render_on(number, card, job, crew_of_all)),
+            (self.cards.iter_mut().enumerate())
+                .map(|(number, (_, card))| move || render_on(number, card, job, crew_of_all)),
         );
         let ended = self.start.elapsed();
-        let sum = sum_up(results)?;
-        let loaded = sum.loaded.max(begun);
+        let links = self.cards.iter_mut().map(|(_, card)| card.count_bytes()).collect();
+        let loaded = latest(results)?.max(begun);
         let scheduler = crew.dispatcher.scheduler();
-        let is_given_up = |&card: &usize| scheduler.standing(card) == Standing::GivenUp;
+        let is_given_up = |card: usize| scheduler.standing(card) == Standing::GivenUp;
+        let given_up: Vec<bool> = (0..count).map(is_given_up).collect();
+        let given_up_before = self.lost;
+        self.lost += given_up.iter().filter(|&&given_up| given_up).count();
+        let mut is_kept = given_up.iter().map(|given_up| !given_up);
+        self.cards.retain(|_| is_kept.next().unwrap_or(true));
         Ok(Outcome {
             counters: scheduler.counters(),
-            bytes: sum.bytes,
-            traffic: sum.traffic,
-            cards: count + self.lost,
-            cards_given_up: (0..count).filter(is_given_up).count() + self.lost,
+            links,
+            traffic: None,
+            cards: count + given_up_before,
+            cards_given_up: self.lost,
             tiles: scheduler.counts(),
             load_seconds: (loaded - begun).as_secs_f64(),
             render_seconds: (ended - loaded).as_secs_f64(),
         })
     }
+
+    /// Ends cards whose memory is modelled. Returns the sum of their traffic.
+    ///
+    /// # Errors
+    /// If the trace cannot be written.
+    fn finish_models(&mut self) -> Result<MemoryTraffic, RenderError> {
+        let mut sum = MemoryTraffic::ZERO;
+        for (_, card) in self.cards.drain(..) {
+            if let Some(record) = card.card.finish() {
+                sum.add(&record.traffic);
+                record.trace.map_or(Ok(()), TraceFile::finish)?;
+            }
+        }
+        Ok(sum)
+    }
 }
 
-impl Executor for Cards<'_> {
+impl Executor for Cards {
     fn budgets(&self) -> Vec<Budget> {
         self.cards.iter().map(|(_, card)| card.budget).collect()
     }
@@ -140,20 +187,22 @@ impl Executor for Cards<'_> {
         true
     }
 
-    fn run(self: Box<Self>, work: Work) -> Result<Outcome, RenderError> {
-        let Work { image, frame, tiles, film, sinks, outputs } = work;
+    fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
+        let Work { settings, image, frame, tiles, film, sinks, outputs } = work;
         // Emulated cards that receive the shared image store no copy of it.
         self.shared.give(image.clone());
         let (scene_image, _) = image.view();
-        let job = Job {
-            image: image.lines(),
-            checksum: image_checksum(image.lines()),
-            frame,
-            limits: PixelLimits::new(&scene_image.header, frame),
-        };
-        let scheduler = self.settings.scheduler(tiles, self.cards.len());
+        let limits = PixelLimits::new(&scene_image.header, frame);
+        let job = Job { upload: self.upload(image), frame: *frame, limits };
+        let scheduler = settings.scheduler(tiles, self.cards.len());
         let scheduler = scheduler.with_kept(&film.lock().unwrap_or_else(PoisonError::into_inner));
-        self.render(job, scheduler, sinks, outputs)
+        let outcome = self.render(&job, scheduler, sinks, outputs);
+        self.used = Instant::now();
+        if settings.modelled_caches().is_none() {
+            return outcome;
+        }
+        let traffic = self.finish_models();
+        Ok(Outcome { traffic: Some(traffic?), ..outcome? })
     }
 }
 
@@ -167,19 +216,19 @@ fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) 
     })
 }
 
-/// Sum of the outcomes of all cards.
+/// Latest time when a card was loaded.
 ///
 /// # Errors
 /// The first failure: it has stopped the other cards.
-fn sum_up(results: Vec<Result<CardOutcome, RenderError>>) -> Result<CardOutcome, RenderError> {
-    let mut sum = CardOutcome::default();
+fn latest(results: Vec<Result<Duration, RenderError>>) -> Result<Duration, RenderError> {
+    let mut latest = Duration::ZERO;
     let mut is_stopped = false;
     for result in results {
         match result {
-            Ok(outcome) => sum.add(&outcome),
+            Ok(loaded) => latest = latest.max(loaded),
             Err(RenderError::Stopped) => is_stopped = true,
             Err(error) => return Err(error),
         }
     }
-    if is_stopped { Err(RenderError::Stopped) } else { Ok(sum) }
+    if is_stopped { Err(RenderError::Stopped) } else { Ok(latest) }
 }

@@ -6,8 +6,8 @@ use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
 
-use super::RenderError;
 use super::outputs::Outputs;
+use super::{RenderError, RenderSettings};
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::film::Film;
 use crate::pack::CardImage;
@@ -27,11 +27,13 @@ pub(super) trait Executor {
     ///
     /// # Errors
     /// If the tiles cannot be rendered, or the observer stops the render.
-    fn run(self: Box<Self>, work: Work) -> Result<Outcome, RenderError>;
+    fn run(&mut self, work: Work) -> Result<Outcome, RenderError>;
 }
 
 /// Work of an executor.
 pub(super) struct Work<'a> {
+    /// The settings of the render.
+    pub(super) settings: &'a RenderSettings,
     /// The card image.
     pub(super) image: &'a Arc<CardImage>,
     /// The frame's parameters.
@@ -51,8 +53,8 @@ pub(super) struct Work<'a> {
 pub(super) struct Outcome {
     /// Counts of the work.
     pub(super) counters: Counters,
-    /// Bytes over all links.
-    pub(super) bytes: LinkBytes,
+    /// Bytes over the link of each card.
+    pub(super) links: Vec<LinkBytes>,
     /// Memory traffic; `None` if memory is not modelled.
     pub(super) traffic: Option<MemoryTraffic>,
     /// Number of cards.

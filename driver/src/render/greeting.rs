@@ -11,13 +11,24 @@ use super::exchange::exchange;
 use super::open_card::OpenCard;
 use super::{CardAddress, CardError, Observer, RenderError, Unobserved};
 use crate::emulator::SharedImage;
-use crate::session::{Session, SessionError};
+use crate::session::{LinkBytes, Session, SessionError};
 
 /// Card that has answered the greeting.
 pub(super) struct GreetedCard {
     pub(super) card: OpenCard,
-    pub(super) session: Session<'static>,
+    pub(super) session: Session,
     pub(super) budget: Budget,
+    /// Bytes of the link that statistics of earlier renders hold.
+    pub(super) counted: LinkBytes,
+}
+
+impl GreetedCard {
+    /// Bytes of the link since the last call.
+    pub(super) fn count_bytes(&mut self) -> LinkBytes {
+        let all = self.session.link_bytes();
+        let earlier = std::mem::replace(&mut self.counted, all);
+        all.since(&earlier)
+    }
 }
 
 /// Error of a greeting, or of the self-test after it.
@@ -104,7 +115,7 @@ pub(super) fn greet(
     observer: &dyn Observer,
 ) -> Result<GreetedCard, GreetingError> {
     let (session, budget) = greet_port(&mut card, start, observer)?;
-    Ok(GreetedCard { card, session, budget })
+    Ok(GreetedCard { card, session, budget, counted: LinkBytes::default() })
 }
 
 /// [`greet`], on any port.
@@ -112,7 +123,7 @@ pub(super) fn greet_port(
     port: &mut impl Port,
     start: Instant,
     observer: &dyn Observer,
-) -> Result<(Session<'static>, Budget), GreetingError> {
+) -> Result<(Session, Budget), GreetingError> {
     let mut session = Session::new(session_number(), start.elapsed());
     loop {
         if let Some(&budget) = session.budget() {

@@ -8,6 +8,7 @@ use super::preparation::Prepared;
 use super::times::Times;
 use super::{MemoryStatistics, Provenance, RenderSettings};
 use crate::cost_model::Flops;
+use crate::session::LinkBytes;
 
 /// Contents of the statistics file. The keys are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -133,15 +134,7 @@ impl Statistics {
             most_waiting: counters.most_waiting,
             flops: Flops::counted(counters, frame.gather_rays),
             image_bytes: prepared.image.bytes(),
-            link: LinkStatistics {
-                payload_bytes: outcome.bytes.payload,
-                wire_bytes: outcome.bytes.wire,
-                retransmitted_frames: outcome.bytes.line.repeated,
-                damaged_frames: outcome.bytes.line.damaged,
-                duplicate_frames: outcome.bytes.line.duplicates,
-                probes: outcome.bytes.line.probes,
-                resets: outcome.bytes.resets,
-            },
+            link: LinkStatistics::new(&outcome.links),
             memory: settings.modelled_caches().zip(outcome.traffic.as_ref()).map(MemoryStatistics::new),
             peak_memory_bytes: peak_memory_bytes(),
         }
@@ -164,8 +157,10 @@ pub struct Rays {
 }
 
 /// Bytes over all links.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LinkStatistics {
+    /// Bytes of image lines sent to each card: those that it lacked.
+    pub image_bytes: Vec<u64>,
     /// Bytes of image lines and pixels.
     pub payload_bytes: u64,
     /// All bytes in both directions.
@@ -180,6 +175,24 @@ pub struct LinkStatistics {
     pub probes: u64,
     /// Number of times that a card was greeted again.
     pub resets: u64,
+}
+
+impl LinkStatistics {
+    /// Statistics of the link of each card.
+    fn new(links: &[LinkBytes]) -> Self {
+        let mut sum = LinkBytes::default();
+        links.iter().for_each(|link| sum.add(link));
+        Self {
+            image_bytes: links.iter().map(|link| link.image).collect(),
+            payload_bytes: sum.payload,
+            wire_bytes: sum.wire,
+            retransmitted_frames: sum.line.repeated,
+            damaged_frames: sum.line.damaged,
+            duplicate_frames: sum.line.duplicates,
+            probes: sum.line.probes,
+            resets: sum.resets,
+        }
+    }
 }
 
 /// Peak resident memory of the process, bytes, from `/proc`.

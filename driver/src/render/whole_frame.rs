@@ -38,9 +38,9 @@ impl Executor for WholeFrame {
         false
     }
 
-    fn run(self: Box<Self>, work: Work) -> Result<Outcome, RenderError> {
+    fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
         let begun = Instant::now();
-        let Self { chips, caches } = *self;
+        let &mut Self { chips, caches } = self;
         let Work { image, frame, tiles, sinks, outputs, .. } = work;
         let progress = |done: u64, total: u64| {
             outputs.observer.progress(Phase::Tiles, done, total);

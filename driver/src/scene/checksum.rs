@@ -4,11 +4,20 @@ use std::fmt::Write;
 
 use photoncard_shared::checksum::Checksum;
 
-use super::Scene;
+use super::{Camera, Scene};
 
 impl Scene {
     /// CRC-32C of all contents of the scene that a render reads, as eight hexadecimal digits.
     pub fn checksum(&self) -> String {
+        self.checksum_with(&self.cameras)
+    }
+
+    /// [`Self::checksum`] of a scene without its cameras: everything that its card image depends on.
+    pub fn checksum_without_cameras(&self) -> String {
+        self.checksum_with(&[])
+    }
+
+    fn checksum_with(&self, cameras: &[Camera]) -> String {
         let mut sum = Checksum::default();
         for triangle in &self.triangles {
             triangle.vertices.iter().for_each(|vertex| add(&mut sum, &vertex.to_array()));
@@ -29,14 +38,14 @@ impl Scene {
         if let Some(environment) = &self.environment {
             add(&mut sum, environment.texels.as_flattened());
         }
-        sum.update(self.description().as_bytes());
+        sum.update(self.description(cameras).as_bytes());
         format!("{:08x}", sum.value())
     }
 
     /// Text of all contents except triangles, attributes and texels, with floating-point numbers that parse back exactly.
-    fn description(&self) -> String {
+    fn description(&self, cameras: &[Camera]) -> String {
         let mut text = String::new();
-        let _ = write!(text, "{:?}{:?}{:?}{:?}", self.materials, self.cameras, self.textures, self.lights);
+        let _ = write!(text, "{:?}{:?}{:?}{:?}", self.materials, cameras, self.textures, self.lights);
         for image in &self.images {
             let _ = write!(text, "{} {} {:?}", image.width, image.height, image.encoding);
         }

@@ -1,20 +1,19 @@
 //! Input and output of a session: jobs, tiles and events.
 
-use photoncard_shared::address::Line;
+use std::sync::Arc;
+
 use photoncard_shared::message::{FrameParameters, MemoryTest, Tile};
 
-use super::PixelLimits;
+use super::{PixelLimits, Upload};
 use crate::sink::FinishedTile;
 
 /// Work of all cards of a render.
-#[derive(Clone, Copy)]
-pub struct Job<'a> {
+#[derive(Clone)]
+pub struct Job {
     /// The card image.
-    pub image: &'a [Line],
-    /// [`photoncard_shared::checksum::image_checksum`] of the image.
-    pub checksum: u64,
+    pub upload: Arc<Upload>,
     /// Parameters of the frame.
-    pub frame: &'a FrameParameters,
+    pub frame: FrameParameters,
     /// Range of valid pixel values.
     pub limits: PixelLimits,
 }

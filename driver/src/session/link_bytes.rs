@@ -5,6 +5,8 @@ use photoncard_shared::transport::LineStatistics;
 /// Bytes that passed a link, and repairs on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkBytes {
+    /// Bytes of image lines.
+    pub image: u64,
     /// Bytes of image lines and pixels.
     pub payload: u64,
     /// All bytes in both directions.
@@ -18,6 +20,7 @@ pub struct LinkBytes {
 impl LinkBytes {
     /// Adds the statistics of another link.
     pub fn add(&mut self, other: &Self) {
+        self.image += other.image;
         self.payload += other.payload;
         self.wire += other.wire;
         self.line.damaged += other.line.damaged;
@@ -25,5 +28,22 @@ impl LinkBytes {
         self.line.duplicates += other.line.duplicates;
         self.line.probes += other.line.probes;
         self.resets += other.resets;
+    }
+
+    /// Statistics since an earlier time, of the same link.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self {
+            image: self.image - earlier.image,
+            payload: self.payload - earlier.payload,
+            wire: self.wire - earlier.wire,
+            line: LineStatistics {
+                damaged: self.line.damaged - earlier.line.damaged,
+                repeated: self.line.repeated - earlier.line.repeated,
+                duplicates: self.line.duplicates - earlier.line.duplicates,
+                probes: self.line.probes - earlier.line.probes,
+            },
+            resets: self.resets - earlier.resets,
+        }
     }
 }

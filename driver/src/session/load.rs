@@ -1,42 +1,38 @@
-//! Loading of the image: chunks that the card has already, by their checksums, are not sent.
+//! Loading of the image: only runs of lines that the card lacks are sent. They follow from the image that it holds or, if that is not
+//! known, from the checksums of its chunks.
 
-use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::checksum::image_checksum;
+use std::ops::Range;
+
+use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::message::{self, CHECKSUMS_PER_REPLY, CHUNK_LINES, Command, LINES_PER_WRITE};
 use photoncard_shared::transport::Transport;
 
 use super::SessionError;
+use super::upload::{Runs, Upload, add_run};
 
-/// Progress of loading.
+/// Comparison of the card's chunks with the image's, by their checksums.
 #[derive(Default)]
-pub(super) struct Load {
+pub(super) struct Comparison {
     /// Number of lines that the card has written, of any image.
     written: u32,
     /// Number of chunks whose checksums were requested.
     asked: u32,
     /// Number of chunks whose checksums were received.
     compared: u32,
-    /// Indices of chunks that the card has.
-    there: Vec<u32>,
-    /// Index of the next line.
-    next: usize,
+    /// Runs of compared lines that the card lacks.
+    lacking: Vec<Range<usize>>,
 }
 
-impl Load {
-    /// Start of loading; `written` is the number of lines that the card has written.
+impl Comparison {
+    /// Start of a comparison; `written` is the number of lines that the card has written.
     pub(super) fn new(written: u32) -> Self {
         Self { written, ..Self::default() }
     }
 
-    /// Number of lines that the card has or that were sent.
-    pub(super) fn done(&self) -> usize {
-        self.next
-    }
-
     /// Request for the next checksums; `None` after all chunks that the card has written.
-    pub(super) fn next_question(&mut self, image: &[Line]) -> Option<Command<'static>> {
+    pub(super) fn next_question(&mut self, upload: &Upload) -> Option<Command<'static>> {
         // An incomplete chunk, of the card or of the image, is not compared.
-        let chunks = (self.written.min(image.len() as u32)) / CHUNK_LINES;
+        let chunks = (self.written.min(upload.lines().len() as u32)) / CHUNK_LINES;
         let first = self.asked;
         let count = chunks.saturating_sub(first).min(CHECKSUMS_PER_REPLY);
         self.asked += count;
@@ -47,7 +43,7 @@ impl Load {
     ///
     /// # Errors
     /// If they are not the checksums that were last requested.
-    pub(super) fn compare(&mut self, image: &[Line], first: u32, data: &[u8]) -> Result<(), SessionError> {
+    pub(super) fn compare(&mut self, upload: &Upload, first: u32, data: &[u8]) -> Result<(), SessionError> {
         let (checksums, rest) = data.as_chunks::<8>();
         let end = first.checked_add(checksums.len() as u32);
         let begins_as_asked = first == self.compared;
@@ -55,30 +51,60 @@ impl Load {
             return Err(SessionError::Unexpected("checksums that were not asked for"));
         }
         self.compared = self.asked;
-        let mut chunks = image.chunks(CHUNK_LINES as usize).skip(first as usize);
-        for (number, found) in (first..).zip(checksums) {
-            if image_checksum(chunks.next().unwrap_or(&[])) == u64::from_le_bytes(*found) {
-                self.there.push(number);
+        for (chunk, found) in (first as usize..).zip(checksums) {
+            if upload.chunks().get(chunk) != Some(&u64::from_le_bytes(*found)) {
+                let lines = CHUNK_LINES as usize;
+                add_run(&mut self.lacking, chunk * lines..(chunk + 1) * lines);
             }
         }
         Ok(())
     }
 
-    /// Sends the next lines that the card lacks. Returns their size in bytes; 0 at the end of the image.
-    pub(super) fn next_lines(&mut self, image: &[Line], transport: &mut Transport) -> usize {
-        while self.there.binary_search(&(self.next as u32 / CHUNK_LINES)).is_ok() {
-            self.next = (self.next / CHUNK_LINES as usize + 1) * CHUNK_LINES as usize;
-        }
-        let end = (self.next + LINES_PER_WRITE).min(image.len());
-        let Some(lines) = image.get(self.next..end).filter(|lines| !lines.is_empty()) else { return 0 };
+    /// Runs of lines that the card lacks, after the comparison.
+    pub(super) fn finish(&mut self, upload: &Upload) -> Runs {
+        let compared = (self.compared * CHUNK_LINES) as usize;
+        add_run(&mut self.lacking, compared..upload.lines().len());
+        std::mem::take(&mut self.lacking).into()
+    }
+}
+
+/// Progress of the lines to a card.
+#[derive(Default)]
+pub(super) struct Load {
+    runs: Runs,
+    /// Number of runs that were sent.
+    run: usize,
+    /// Index of the next line, in or before the next run.
+    next: usize,
+    /// True if the runs follow from the image that the card held.
+    pub(super) is_change: bool,
+}
+
+impl Load {
+    pub(super) fn new(runs: Runs, is_change: bool) -> Self {
+        Self { runs, run: 0, next: 0, is_change }
+    }
+
+    /// Number of lines that the card has or that were sent.
+    pub(super) fn done(&self) -> usize {
+        self.next
+    }
+
+    /// Sends the next lines that the card lacks. Returns their size in bytes; 0 after the last.
+    pub(super) fn next_lines(&mut self, upload: &Upload, transport: &mut Transport) -> usize {
+        let Some(run) = self.runs.get(self.run) else { return 0 };
+        let first = self.next.max(run.start);
+        let end = (first + LINES_PER_WRITE).min(run.end);
+        let Some(lines) = upload.lines().get(first..end).filter(|lines| !lines.is_empty()) else { return 0 };
         let mut data = [0; LINE_BYTES * LINES_PER_WRITE];
         for (target, line) in data.as_chunks_mut().0.iter_mut().zip(lines) {
             *target = line.0;
         }
         let data = &data[..lines.len() * LINE_BYTES];
-        let command = Command::WriteLines { first: self.next as u32, data };
+        let command = Command::WriteLines { first: first as u32, data };
         transport.send(|bytes| message::encode(&command, bytes));
         self.next = end;
+        self.run += usize::from(end == run.end);
         data.len()
     }
 }

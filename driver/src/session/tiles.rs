@@ -101,6 +101,11 @@ impl TilesInFlight {
         }
     }
 
+    /// Maximum number of replies about the tiles: each holds a pixel at the least, or is the end of a tile.
+    pub(super) fn most_replies(&self) -> u64 {
+        self.0.iter().map(|in_flight| in_flight.assignment.tile.pixels() + 1).sum()
+    }
+
     /// Approximate number of rays of the `at_work` largest tiles, all of which may be done at the same time.
     pub(super) fn most_rays(&self, at_work: usize, frame: &FrameParameters) -> u64 {
         let mut pixels: Vec<u64> =

@@ -7,6 +7,7 @@
 
 mod axes;
 mod error;
+mod host;
 mod index;
 mod laboratory;
 pub mod load_balance;
@@ -24,6 +25,7 @@ use std::path::{Path, PathBuf};
 
 pub use self::axes::{Axis, AxisError, MAX_POINTS};
 pub use self::error::StudyError;
+pub use self::host::{Change, Changed, HostBench, HostFrame, LIGHT_STEP};
 pub use self::laboratory::{Laboratory, Outcome, Results, StudyObserver};
 pub use self::measure::{Bench, Measurement, ReadSums, TileMeasurement};
 pub use self::point::{ImageKey, Point, Task};
@@ -61,10 +63,12 @@ pub struct StudyOptions {
 /// If a scene is missing, a point cannot be measured, a file cannot be written, or the observer stops the study.
 pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
     let mut laboratory = Laboratory::new(&options.out, &options.scenes, options.threads, observer)?;
+    let mut bench = HostBench::new(&options.out, &options.scenes, options.threads, observer)?;
     let mut reports: Vec<(Study, Report)> = Vec::new();
     for &study in &options.studies {
         let results = laboratory.measure(study.name(), &study.points(&options.scale))?;
-        let mut report = study.report(&options.scale, &results);
+        let mut report =
+            study.report(&options.scale, &results, &study.host_frames(&options.scale, &mut bench)?);
         report.provenance = options.provenance.clone();
         report.provenance.settings = options.scale.rows();
         report::write(&folder(options, study), &report)?;

@@ -5,7 +5,9 @@
 //! `PHOTONCARD_SEEDS=1..10000` runs many.
 
 mod conditions;
+mod kept;
 mod liar;
+
 mod lies;
 mod line;
 mod run;
@@ -136,7 +138,7 @@ fn faults_end_in_the_same_picture_or_in_words() {
 }
 
 /// Steps a card on its own until the picture is complete. Returns its pixels.
-fn complete_alone<'a>(run: &Run<'a>, station: &mut Station<'a>, random: &mut Random) -> Vec<PixelValue> {
+fn complete_alone(run: &Run, station: &mut Station, random: &mut Random) -> Vec<PixelValue> {
     let film = Mutex::new(run.fixture.film());
     let dispatcher = Dispatcher::new(run.fixture.scheduler(1, None, 0), vec![&film]);
     let mut step = 0;

@@ -71,9 +71,9 @@ impl TileSink for Ledger {
     }
 }
 
-impl<'a> Run<'a> {
+impl Run<'_> {
     /// Cards of the run, just switched on.
-    fn stations(&self, random: &mut Random) -> Vec<Station<'a>> {
+    fn stations(&self, random: &mut Random) -> Vec<Station> {
         let station = |number| {
             let mut station = Station::new(number, self.fixture, random);
             station.voice.lie = self.liars.get(&number).copied();

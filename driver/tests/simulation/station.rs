@@ -31,10 +31,10 @@ pub(crate) enum Health {
 }
 
 /// Card with its link and its session.
-pub(crate) struct Station<'a> {
+pub(crate) struct Station {
     pub(crate) number: CardNumber,
     pub(crate) card: Box<Card<Several, Memory>>,
-    pub(crate) session: Session<'a>,
+    pub(crate) session: Session,
     /// True after the card was silent for too long, until it is loaded again.
     pub(crate) is_lost: bool,
     /// Error for which the card was given up.
@@ -56,7 +56,7 @@ pub(crate) struct Station<'a> {
     pub(crate) speed: usize,
 }
 
-impl<'a> Station<'a> {
+impl Station {
     pub(crate) fn new(number: CardNumber, fixture: &Fixture, random: &mut Random) -> Self {
         Self {
             number,
@@ -85,7 +85,7 @@ impl<'a> Station<'a> {
     /// One step of the host, of the card or of its chip, as the seed selects.
     pub(crate) fn step(
         &mut self,
-        run: &Run<'a>,
+        run: &Run,
         dispatcher: &Dispatcher,
         step: u64,
         random: &mut Random,
@@ -152,7 +152,9 @@ impl<'a> Station<'a> {
             let Some(Ok(Frame { payload, .. })) = frame else { continue };
             match message::decode::<Command>(payload) {
                 Some(Command::RenderTile(tile)) if !self.tiles.contains(&tile.id) => self.tiles.push(tile.id),
-                Some(Command::Hello { .. }) => self.tiles.clear(),
+                Some(Command::Hello { .. } | Command::BeginImage { .. } | Command::BeginFrame(_)) => {
+                    self.tiles.clear();
+                }
                 _ => {}
             }
         }
@@ -160,7 +162,7 @@ impl<'a> Station<'a> {
 
     fn step_of_host(
         &mut self,
-        run: &Run<'a>,
+        run: &Run,
         dispatcher: &Dispatcher,
         (now, bytes, what): (Duration, usize, usize),
         random: &mut Random,

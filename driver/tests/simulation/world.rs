@@ -1,22 +1,24 @@
 //! Shared state of all runs: a scene, its image, and cards that were just switched on.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::Vec3;
 use photoncard_driver::film::Film;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::photon_map::{MappedImage, map_photons};
+use photoncard_driver::photon_map::map_photons;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Schedule};
 use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
 use photoncard_driver::scheduler::{Scheduler, tiles};
-use photoncard_driver::session::{Job, PixelLimits};
+use photoncard_driver::session::{Job, PixelLimits, Upload};
 use photoncard_firmware::card::Card;
 use photoncard_firmware::kind::{ChipKind, Entries, MICRO, TechniqueMemory};
 use photoncard_firmware::memory::{CardMemory, MemoryPort, copy_lines};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::budget::{Budget, gather_candidates};
-use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters};
+
+use crate::line::Random;
 
 /// A corner of floor and wall under a lamp.
 fn scene() -> Scene {
@@ -60,9 +62,19 @@ fn settings() -> RenderSettings {
     }
 }
 
+/// Lines of a card's memory: room for the image of any frame.
+const DRAM_LINES: usize = 256;
+
 /// Card memory with a buffer of its own.
 pub(crate) struct Memory {
     lines: Vec<Line>,
+}
+
+impl Memory {
+    /// Inverts a bit of a line.
+    pub(crate) fn damage(&mut self, line: usize) {
+        self.lines[line].0[77] ^= 4;
+    }
 }
 
 impl MemoryPort for Memory {
@@ -104,36 +116,49 @@ impl ChipKind for Several {
 
 /// Shared state of all runs.
 pub(crate) struct Fixture {
+    scene: Scene,
     settings: RenderSettings,
-    pub(crate) mapped: MappedImage,
-    checksum: u64,
+    pub(crate) upload: Arc<Upload>,
+    limits: PixelLimits,
     frame: FrameParameters,
 }
 
 impl Fixture {
     pub(crate) fn new() -> Self {
-        let (scene, settings) = (scene(), settings());
-        let packed = PackedScene::new(&scene).unwrap();
-        let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).unwrap();
-        let frame = settings.frame(&scene.cameras[0], mapped.max_distance, mapped.caustics);
-        let checksum = image_checksum(mapped.image.lines());
-        Self { settings, mapped, checksum, frame }
+        Self::of(&scene(), settings())
     }
 
-    pub(crate) fn job(&self) -> Job<'_> {
-        let (scene, _) = self.mapped.image.view();
-        Job {
-            image: self.mapped.image.lines(),
-            checksum: self.checksum,
-            frame: &self.frame,
-            limits: PixelLimits::new(&scene.header, &self.frame),
+    /// Another frame of the scene after this one: another camera, and other photons, or a brighter lamp.
+    pub(crate) fn changed(&self, random: &mut Random) -> Self {
+        let (mut scene, mut settings) = (self.scene.clone(), self.settings.clone());
+        match random.below(4) {
+            0 => {}
+            1 => settings.integrator.seed += 1,
+            2 => settings.photons.count = 40 + random.below(40),
+            _ => scene.materials[1].emission = Vec3::splat(1.0 + random.below(8) as f32),
         }
+        scene.cameras[0].origin.x = 0.1 * random.below(8) as f32;
+        let changed = Self::of(&scene, settings);
+        let upload = Upload::new(Arc::new(changed.upload.lines().to_vec())).after(&self.upload);
+        Self { upload: Arc::new(upload), ..changed }
+    }
+
+    fn of(scene: &Scene, settings: RenderSettings) -> Self {
+        let packed = PackedScene::new(scene).unwrap();
+        let mapped = map_photons(packed, &settings.photon_settings(scene), &|_| true).unwrap();
+        let frame = settings.frame(&scene.cameras[0], mapped.max_distance, mapped.caustics);
+        let limits = PixelLimits::new(&mapped.image.view().0.header, &frame);
+        let upload = Arc::new(Upload::new(Arc::new(mapped.image)));
+        Self { scene: scene.clone(), settings, upload, limits, frame }
+    }
+
+    pub(crate) fn job(&self) -> Job {
+        Job { upload: self.upload.clone(), frame: self.frame, limits: self.limits }
     }
 
     /// Card that was just switched on.
     pub(crate) fn card(&self) -> Box<Card<Several, Memory>> {
-        let lines = self.mapped.image.lines().len();
-        Box::new(Card::new(Memory { lines: vec![Line::ZERO; lines] }))
+        Box::new(Card::new(Memory { lines: vec![Line::ZERO; DRAM_LINES] }))
     }
 
     pub(crate) fn film(&self) -> Film {

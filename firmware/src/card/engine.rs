@@ -109,8 +109,9 @@ impl<K: ChipKind> Engine<K> {
                 Ok(None)
             }
             Command::BeginFrame(frame) => {
-                let scene = self.image.scene().filter(|_| !self.is_at_work()).ok_or(OUT_OF_ORDER)?;
+                let scene = self.image.scene().filter(|_| self.checksums.is_none()).ok_or(OUT_OF_ORDER)?;
                 check_frame(&K::BUDGET, &scene.header, &frame)?;
+                self.drop_tiles();
                 self.frame = Some(frame);
                 Ok(Some(Reply::FrameAccepted))
             }
@@ -151,6 +152,11 @@ impl<K: ChipKind> Engine<K> {
         self.image = ImageState::None;
         self.checksums = None;
         self.frame = None;
+        self.drop_tiles();
+    }
+
+    /// Drops all tiles, those that the chip has not begun included.
+    fn drop_tiles(&mut self) {
         self.tiles.clear();
         self.drop_begun();
     }

@@ -1,12 +1,12 @@
 //! Fuzzing of a host's session by a hostile card: mutated replies in any order, without a request, and resets.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use photoncard_driver::dispatcher::Dispatcher;
 use photoncard_driver::film::{Film, PixelValue, Window};
 use photoncard_driver::scheduler::Scheduler;
-use photoncard_driver::session::{Job, PixelLimits, Session, SessionError};
+use photoncard_driver::session::{Job, PixelLimits, Session, SessionError, Upload};
 use photoncard_firmware::kind::MICRO;
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::Budget;
@@ -44,7 +44,7 @@ pub(super) struct Sessions {
     /// Replies of a valid session in order: without layers, and with layers.
     replies: [Vec<Vec<u8>>; 2],
     others: Vec<Vec<u8>>,
-    image: Vec<Line>,
+    upload: Arc<Upload>,
     frames: [FrameParameters; 2],
 }
 
@@ -88,7 +88,7 @@ impl Sessions {
         Self {
             replies: [false, true].map(|layers| sound_replies(hello(LINES), layers)),
             others: [messages::replies(), vec![encoded(&hello(0)), encoded(&hello(u32::MAX))]].concat(),
-            image: vec![Line::ZERO; LINES as usize],
+            upload: Arc::new(Upload::new(Arc::new(vec![Line::ZERO; LINES as usize]))),
             frames: [false, true].map(|layers| FrameParameters { layers, ..messages::frame() }),
         }
     }
@@ -126,7 +126,7 @@ fn next_record<'a>(input: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
 
 /// Both ends of the link.
 struct Ends<'a> {
-    session: Session<'a>,
+    session: Session,
     card: Transport,
     dispatcher: Dispatcher<'a>,
     now: Duration,
@@ -212,7 +212,7 @@ impl Target for Sessions {
         let frame = &self.frames[usize::from(layers)];
         let photon_grid = PhotonGrid { origin: [0; 3], cell: 1e-6 };
         let limits = PixelLimits::new(&Header { photon_grid, ..Header::EMPTY }, frame);
-        let job = Job { image: &self.image, checksum: 0, frame, limits };
+        let job = Job { upload: self.upload.clone(), frame: *frame, limits };
         ends.session.start(job, ends.now);
         let mut was_loaded = false;
         while let Some((what, reply)) = next_record(&mut input) {

@@ -11,7 +11,7 @@ use crate::session::{Event, Session};
 
 /// Card under test.
 pub(super) struct Bench<'a, P> {
-    pub(super) session: Session<'static>,
+    pub(super) session: Session,
     port: &'a mut P,
     start: Instant,
     /// Number of times that the card was greeted again before the test.
@@ -21,12 +21,7 @@ pub(super) struct Bench<'a, P> {
 
 impl<'a, P: Port> Bench<'a, P> {
     /// A card that has said hello in `session`.
-    pub(super) fn new(
-        session: Session<'static>,
-        port: &'a mut P,
-        start: Instant,
-        observer: &'a dyn Observer,
-    ) -> Self {
+    pub(super) fn new(session: Session, port: &'a mut P, start: Instant, observer: &'a dyn Observer) -> Self {
         let resets = session.link_bytes().resets;
         Self { session, port, start, resets, observer }
     }

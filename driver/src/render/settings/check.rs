@@ -36,6 +36,14 @@ impl RenderSettings {
         self.check_resume()
     }
 
+    /// Checks the settings against the budget of each card.
+    ///
+    /// # Errors
+    /// As [`Self::check_budget`].
+    pub fn check_budgets(&self, budgets: &[Budget]) -> Result<(), RenderError> {
+        budgets.iter().try_for_each(|budget| self.check_budget(budget))
+    }
+
     /// Checks the settings against what a card can hold.
     ///
     /// # Errors

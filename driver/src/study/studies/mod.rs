@@ -4,6 +4,7 @@ mod arithmetic;
 mod balance;
 mod flights;
 mod glossy_floor;
+mod interactive;
 mod machine;
 mod present;
 mod reordering;
@@ -15,6 +16,8 @@ mod times;
 mod workload;
 
 pub use self::sweep::Sweep;
+use super::error::StudyError;
+use super::host::{HostBench, HostFrame};
 use super::laboratory::Results;
 use super::point::Point;
 use super::report::Report;
@@ -34,6 +37,8 @@ pub enum Study {
     Techniques,
     /// Memory traffic over photons, tile sides and queue sizes; time over chips.
     Scaling,
+    /// Parts of a frame while camera and lights move.
+    Interactive,
 }
 
 choices!(Study {
@@ -42,6 +47,7 @@ choices!(Study {
     Table71 = "table-7.1": "Chips for a frame rate, by nominal and by measured counts",
     Techniques = "techniques": "Each technique alone and together, at as many rays and at equal quality",
     Scaling = "scaling": "Photons, tile sides, queues and chips",
+    Interactive = "interactive": "Parts of a frame while camera and lights move",
 });
 
 impl Study {
@@ -53,6 +59,18 @@ impl Study {
             Self::Table71 => machine::points(scale),
             Self::Techniques => techniques::points(scale),
             Self::Scaling => scaling::points(scale),
+            Self::Interactive => interactive::points(scale),
+        }
+    }
+
+    /// Measures the host's work that the report needs besides the points.
+    ///
+    /// # Errors
+    /// As [`HostBench::measure`].
+    pub fn host_frames(self, scale: &Scale, bench: &mut HostBench) -> Result<Vec<HostFrame>, StudyError> {
+        match self {
+            Self::Interactive => interactive::host_frames(scale, bench),
+            _ => Ok(Vec::new()),
         }
     }
 
@@ -61,13 +79,14 @@ impl Study {
     ///
     /// # Panics
     /// If `results` lack one of the [points](Self::points) of this scale.
-    pub fn report(self, scale: &Scale, results: &Results) -> Report {
+    pub fn report(self, scale: &Scale, results: &Results, host: &[HostFrame]) -> Report {
         let report = match self {
             Self::Reordering => reordering::report(scale, results),
             Self::Figure617 => glossy_floor::report(scale, results),
             Self::Table71 => machine::report(scale, results),
             Self::Techniques => techniques::report(scale, results),
             Self::Scaling => scaling::report(scale, results),
+            Self::Interactive => interactive::report(scale, results, host),
         };
         match scale.banner() {
             Some(banner) => report.marked(banner),
@@ -81,6 +100,7 @@ mod tests {
     use photoncard_shared::address::STRUCTURES;
     use photoncard_shared::counters::Counters;
 
+    use super::super::host::{Change, Changed};
     use super::super::laboratory::Outcome;
     use super::super::measure::{Measurement, ReadSums, TileMeasurement};
     use super::super::point::Task;
@@ -89,6 +109,34 @@ mod tests {
     use crate::choice::Choice;
     use crate::emulator::contents::Contents;
     use crate::photon_map::PhotonMapSize;
+
+    /// Host's work, made up.
+    fn host_frame() -> HostFrame {
+        let change = |change| Changed { change, bytes: 6_000_000, of: 8_000_000 };
+        HostFrame {
+            image_bytes: 8_000_000,
+            map: PhotonMapSize { photons: 500_000, bytes: 7_000_000 },
+            threads: 2,
+            tracing: 0.5,
+            building: 0.25,
+            measuring: 0.25,
+            changes: vec![
+                change(Change::Dimmed),
+                change(Change::Replaced(0.1)),
+                change(Change::Replaced(1.0)),
+            ],
+        }
+    }
+
+    #[test]
+    fn interactive_frames_take_the_threads_and_links_of_their_measurements() {
+        let page = page(Study::Interactive, &Scale::FULL);
+        // 30 frames of a second each on two threads.
+        assert!(page.contains(">60<"), "threads");
+        assert!(
+            page.contains("all lights dimmed to a half") && page.contains("10 % of the photons traced anew")
+        );
+    }
 
     /// Page of a study on made-up outcomes.
     fn page(study: Study, scale: &Scale) -> String {
@@ -105,7 +153,7 @@ mod tests {
         };
         let points = study.points(scale).into_iter();
         let results = Results::new(points.map(|point| (point.clone(), outcome(&point))).collect());
-        study.report(scale, &results).to_html()
+        study.report(scale, &results, &[(); 9].map(|()| host_frame())).to_html()
     }
 
     #[test]

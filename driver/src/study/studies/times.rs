@@ -51,6 +51,12 @@ fn parts(measured: &Measurement, symbols: &Symbols) -> [Part; 2] {
     ]
 }
 
+/// Seconds of one chip for a frame, with as many tasks in flight as [`HEADS`] has.
+pub(super) fn frame_seconds(measured: &Measurement, symbols: &Symbols) -> f64 {
+    let chip = chip(TASKS[TASKS.len() - 1]);
+    parts(measured, symbols).iter().map(|part| part.seconds(&chip, LINE_BYTES as f64)).sum()
+}
+
 /// Times of a frame, milliseconds.
 pub(super) fn cells(measured: &Measurement, symbols: &Symbols) -> Vec<Cell> {
     let parts = parts(measured, symbols);

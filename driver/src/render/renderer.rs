@@ -1,0 +1,229 @@
+//! Pictures one after another on the same cards.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use photoncard_shared::budget::Budget;
+
+use super::cards::Cards;
+use super::executor::{Executor, Work};
+use super::outputs::Outputs;
+use super::preparation::{Prepared, prepare};
+use super::times::Times;
+use super::whole_frame::WholeFrame;
+use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
+use crate::film::Film;
+use crate::pack::PackedScene;
+use crate::partial::PartialRender;
+use crate::photon_map::{PhotonSettings, check_image};
+use crate::scene::Scene;
+use crate::scheduler::tiles;
+
+/// Finished picture.
+pub struct Rendering {
+    /// Pixels of the picture.
+    pub film: Film,
+    /// Statistics of the work.
+    pub statistics: Statistics,
+    /// File of finished tiles, to be removed after the picture is written.
+    pub partial: Option<PartialRender>,
+}
+
+/// Photons and integrator that are chosen for a packed scene.
+pub type Chosen = Result<(PhotonMaps, Integrator), RenderError>;
+
+/// Choice of photons and integrator by the packed scene.
+type Choice<'a> = &'a dyn Fn(&PackedScene) -> Chosen;
+
+/// Renders pictures one after another on the same cards, which stay open between them.
+///
+/// A picture of another camera, of the same scene and photons, takes the host no photons and the cards no image: nothing but tiles is
+/// sent. After a change of the scene or its photons the host makes the image anew, and a card receives the lines that have changed; it
+/// checks the checksum of the whole image, and receives the image as a whole if that differs, or if it was reset or lost. A picture never
+/// depends on those before it.
+///
+/// Cards are connected again for settings with other cards, for each picture with modelled memory, after a render that has failed, and,
+/// if any are remote, after some seconds without a picture.
+#[derive(Default)]
+pub struct Renderer {
+    cards: Option<Cards>,
+    kept: Option<Kept>,
+}
+
+impl Renderer {
+    /// Renders a picture of a scene.
+    ///
+    /// # Errors
+    /// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
+    pub fn render(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_by(scene, settings, None, observer)
+    }
+
+    /// Renders a picture of a scene with photons and an integrator that are chosen when the cards have answered and the scene is packed.
+    ///
+    /// # Errors
+    /// As [`Self::render`], and those of `choose`.
+    pub fn render_chosen(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        choose: &dyn Fn(&PackedScene) -> Chosen,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_by(scene, settings, Some(choose), observer)
+    }
+
+    fn render_by(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        choose: Option<Choice>,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        let result = self.render_on_cards(scene, settings, choose, observer);
+        if matches!(&result, Err(error) if !error.is_input() && !matches!(error, RenderError::Stopped)) {
+            self.cards = None;
+        }
+        result
+    }
+
+    fn render_on_cards(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        choose: Option<Choice>,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        let start = Instant::now();
+        let camera = settings.camera(scene)?;
+        settings.check()?;
+        let Self { cards, kept } = self;
+        let mut whole_frame;
+        let executor: &mut dyn Executor = if settings.schedule.order.is_of_whole_frame() {
+            whole_frame = WholeFrame::new(settings)?;
+            &mut whole_frame
+        } else {
+            connected(cards, settings, observer)?
+        };
+        let budgets = executor.budgets();
+        settings.check_budgets(&budgets)?;
+        settings.outputs.partial.as_ref().map(PartialRender::check_free).transpose()?;
+        let mut times = Times::default();
+        let (settings, source) = Source::new(scene, settings, choose, kept, &mut times)?;
+        let tile = settings.tile_side(&budgets);
+        let settings = &settings.with(|s| s.schedule.tile = Some(tile));
+        settings.check()?;
+        settings.check_budgets(&budgets)?;
+        // A film may be large: it is allocated after the settings are checked.
+        let mut film = settings.film()?;
+        let tiles = tiles(settings.window(), tile, settings.schedule.order);
+        let outputs = Outputs::open(scene, settings, &tiles, &mut film, observer)?;
+        let made = source.prepare(scene, settings, &budgets, &mut times, observer)?;
+        let prepared = &kept.insert(made).prepared;
+        let frame = settings.frame(&camera, prepared.max_distance, prepared.caustics);
+        let film = Mutex::new(film);
+        let sinks = outputs.sinks(&film, executor.finishes_tiles_early());
+        let image = &prepared.image;
+        let work = Work { settings, image, frame: &frame, tiles, film: &film, sinks, outputs: &outputs };
+        let outcome = executor.run(work).inspect_err(|_| outputs.report_kept())?;
+        times.load = outcome.load_seconds;
+        times.render = outcome.render_seconds;
+        times.total = start.elapsed().as_secs_f64();
+        let provenance = Provenance::new(settings, scene, &camera, &frame, &budgets);
+        let statistics = Statistics::new(settings, &frame, prepared, &outcome, times, provenance);
+        let film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let partial = outputs.finish(&film);
+        Ok(Rendering { film, statistics, partial })
+    }
+}
+
+/// The open cards, if they are those of the settings, or newly connected ones.
+fn connected<'c>(
+    cards: &'c mut Option<Cards>,
+    settings: &RenderSettings,
+    observer: &dyn Observer,
+) -> Result<&'c mut Cards, RenderError> {
+    // Others are closed before: a card serves one host at a time.
+    let open = cards.take().filter(|cards| cards.serve(settings));
+    Ok(cards.insert(match open {
+        Some(open) => open,
+        None => Cards::connect(settings, observer)?,
+    }))
+}
+
+/// A card image, and what it was made of.
+struct Kept {
+    /// [`Scene::checksum_without_cameras`].
+    scene: String,
+    photons: PhotonSettings,
+    prepared: Prepared,
+}
+
+/// What the card image is made of.
+enum Source {
+    /// The image of an earlier picture.
+    Kept(Kept),
+    /// The packed scene; its photons are to be traced.
+    Packed(Box<PackedScene>),
+}
+
+impl Source {
+    /// Source of the image, with the settings that are stated or chosen.
+    fn new(
+        scene: &Scene,
+        settings: &RenderSettings,
+        choose: Option<Choice>,
+        kept: &mut Option<Kept>,
+        times: &mut Times,
+    ) -> Result<(RenderSettings, Self), RenderError> {
+        let photons = settings.photon_settings(scene);
+        let is_same = |kept: &mut Kept| {
+            choose.is_none() && kept.photons == photons && kept.scene == scene.checksum_without_cameras()
+        };
+        if let Some(kept) = kept.take_if(is_same) {
+            return Ok((settings.clone(), Self::Kept(kept)));
+        }
+        let packing = Instant::now();
+        let packed = PackedScene::new(scene)?;
+        times.hierarchy = packing.elapsed().as_secs_f64();
+        times.pack = times.hierarchy;
+        let Some(choose) = choose else { return Ok((settings.clone(), Self::Packed(Box::new(packed)))) };
+        let choosing = Instant::now();
+        let (photons, integrator) = choose(&packed)?;
+        times.pilot = choosing.elapsed().as_secs_f64();
+        Ok((RenderSettings { photons, integrator, ..settings.clone() }, Self::Packed(Box::new(packed))))
+    }
+
+    /// The card image.
+    ///
+    /// # Errors
+    /// If it does not fit a budget, the photons cannot be traced, or the observer stops the render.
+    fn prepare(
+        self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        budgets: &[Budget],
+        times: &mut Times,
+        observer: &dyn Observer,
+    ) -> Result<Kept, RenderError> {
+        let packed = match self {
+            Self::Packed(packed) => *packed,
+            Self::Kept(kept) => {
+                for budget in budgets {
+                    check_image(&kept.prepared.image, budget)?;
+                }
+                return Ok(kept);
+            }
+        };
+        Ok(Kept {
+            scene: scene.checksum_without_cameras(),
+            photons: settings.photon_settings(scene),
+            prepared: prepare(scene, packed, settings, budgets, times, observer)?,
+        })
+    }
+}

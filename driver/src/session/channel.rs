@@ -1,0 +1,76 @@
+//! A session's end of the link: the transport, commands that wait for its window, and counts of bytes.
+
+use std::collections::VecDeque;
+
+use photoncard_shared::frame::MAX_PAYLOAD;
+use photoncard_shared::image::LAYOUT_VERSION;
+use photoncard_shared::message::{self, Command, PROTOCOL_VERSION};
+use photoncard_shared::transport::Transport;
+
+use super::LinkBytes;
+
+/// A session's end of the link.
+pub(super) struct Channel {
+    pub(super) transport: Transport,
+    /// Encoded commands that wait for room in the send window.
+    commands: VecDeque<Vec<u8>>,
+    /// Number of the link's current session.
+    number: u32,
+    pub(super) bytes: LinkBytes,
+}
+
+impl Channel {
+    /// Channel whose first session has the number after `number`.
+    pub(super) fn before(number: u32) -> Self {
+        Self {
+            transport: Transport::host(),
+            commands: VecDeque::new(),
+            number: number.wrapping_sub(1),
+            bytes: LinkBytes::default(),
+        }
+    }
+
+    /// Begins the next session of the link with a greeting.
+    pub(super) fn greet(&mut self) {
+        self.number = self.number.wrapping_add(1);
+        self.commands.clear();
+        self.transport.open(self.number);
+        self.send(&Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION });
+    }
+
+    pub(super) fn send(&mut self, command: &Command) {
+        let mut bytes = vec![0; MAX_PAYLOAD];
+        // Every command fits a frame: tests cover the longest.
+        if let Some(length) = message::encode(command, &mut bytes) {
+            bytes.truncate(length);
+            self.commands.push_back(bytes);
+        }
+    }
+
+    /// Drops the commands that wait.
+    pub(super) fn drop_commands(&mut self) {
+        self.commands.clear();
+    }
+
+    /// Returns whether no command waits, and the window has room for one.
+    pub(super) fn is_free(&self) -> bool {
+        self.commands.is_empty() && self.transport.can_send()
+    }
+
+    /// Sends commands that wait, as far as the window has room.
+    pub(super) fn forward(&mut self) {
+        while self.transport.can_send()
+            && let Some(command) = self.commands.pop_front()
+        {
+            self.transport.send(|bytes| {
+                bytes.get_mut(..command.len())?.copy_from_slice(&command);
+                Some(command.len())
+            });
+        }
+    }
+
+    /// Statistics of the link so far.
+    pub(super) fn statistics(&self) -> LinkBytes {
+        LinkBytes { line: self.transport.statistics(), ..self.bytes }
+    }
+}

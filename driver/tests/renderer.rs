@@ -1,0 +1,142 @@
+//! Pictures one after another on the same cards are those of new cards, and cards receive the lines that have changed.
+
+use glam::Vec3;
+use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::photon_map::map_photons;
+use photoncard_driver::render::{
+    CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Renderer, Schedule, Unobserved, render,
+};
+use photoncard_driver::scene::{Scene, gltf};
+use photoncard_shared::address::{LINE_BYTES, Line};
+use proptest::prelude::*;
+
+/// Frame of a scene: everything that may change between two pictures.
+#[derive(Clone, Debug, PartialEq)]
+struct Frame {
+    /// Displacement of the camera, decimetres.
+    camera: u8,
+    seed: u32,
+    photons: usize,
+    /// Emission of the lamp, over the file's.
+    lamp: u8,
+    /// Green of the first wall, tenths.
+    wall: u8,
+}
+
+fn frames() -> impl Strategy<Value = Vec<Frame>> {
+    let frame = (0..3_u8, 0..2_u32, 200..203_usize, 1..3_u8, 1..3_u8);
+    let frame =
+        frame.prop_map(|(camera, seed, photons, lamp, wall)| Frame { camera, seed, photons, lamp, wall });
+    // Most frames change one thing alone.
+    proptest::collection::vec((frame, 0..6_u8), 2..5).prop_map(|frames| {
+        let mut all: Vec<Frame> = Vec::new();
+        for (frame, what) in frames {
+            let last = all.last().cloned().unwrap_or_else(|| frame.clone());
+            all.push(match what {
+                0 | 1 => Frame { camera: frame.camera, ..last },
+                2 => Frame { seed: frame.seed, ..last },
+                3 => Frame { photons: frame.photons, ..last },
+                4 => Frame { lamp: frame.lamp, ..last },
+                _ => frame,
+            });
+        }
+        all
+    })
+}
+
+impl Frame {
+    fn scene(&self, base: &Scene) -> Scene {
+        let mut scene = base.clone();
+        scene.cameras[0].origin += Vec3::X * (0.1 * f32::from(self.camera));
+        for material in &mut scene.materials {
+            material.emission *= f32::from(self.lamp);
+        }
+        scene
+            .apply(&format!("{}.diffuse=0.5,{},0.5", scene.materials[0].name, 0.1 * f32::from(self.wall)))
+            .unwrap();
+        scene
+    }
+
+    fn settings(&self) -> RenderSettings {
+        RenderSettings {
+            picture: Picture { width: 12, height: 8, ..Picture::default() },
+            photons: PhotonMaps { count: self.photons, neighbors: 10, ..PhotonMaps::default() },
+            integrator: Integrator {
+                gather_rays: 2,
+                shadow_rays: 1,
+                seed: self.seed,
+                ..Integrator::default()
+            },
+            schedule: Schedule { tile: 4, ..Schedule::default() },
+            cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
+            ..RenderSettings::default()
+        }
+    }
+
+    fn lines(&self, base: &Scene) -> Vec<Line> {
+        let scene = self.scene(base);
+        let packed = PackedScene::new(&scene).unwrap();
+        let mapped = map_photons(packed, &self.settings().photon_settings(&scene), &|_| true).unwrap();
+        mapped.image.lines().to_vec()
+    }
+}
+
+fn base() -> Scene {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
+    gltf::load(path.as_ref()).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(10))]
+    #[test]
+    fn a_picture_does_not_depend_on_those_before_and_sends_only_changed_lines(frames in frames()) {
+        let base = base();
+        let mut renderer = Renderer::default();
+        let mut held: Vec<Line> = Vec::new();
+        for frame in frames {
+            let (scene, settings) = (frame.scene(&base), frame.settings());
+            let kept = renderer.render(&scene, &settings, &Unobserved).unwrap();
+            let fresh = render(&scene, &settings, &Unobserved).unwrap();
+            prop_assert!(kept.film.pixels() == fresh.film.pixels(), "{frame:?}");
+            let lines = frame.lines(&base);
+            let changed = (0..lines.len()).filter(|&line| held.get(line) != lines.get(line)).count();
+            prop_assert_eq!(kept.statistics.link.image_bytes, vec![(changed * LINE_BYTES) as u64; 2]);
+            held = lines;
+        }
+    }
+}
+
+#[test]
+fn a_new_camera_sends_no_line_and_traces_no_photon() {
+    let base = base();
+    let frame = Frame { camera: 0, seed: 0, photons: 300, lamp: 1, wall: 1 };
+    let mut renderer = Renderer::default();
+    let first = renderer.render(&frame.scene(&base), &frame.settings(), &Unobserved).unwrap().statistics;
+    assert!(first.link.image_bytes.iter().all(|&bytes| bytes == first.image_bytes));
+    let moved = Frame { camera: 2, ..frame };
+    let second = renderer.render(&moved.scene(&base), &moved.settings(), &Unobserved).unwrap().statistics;
+    assert_eq!(second.link.image_bytes, [0, 0]);
+    assert_eq!((second.time_s.photons, second.photon_paths), (0.0, first.photon_paths));
+}
+
+#[test]
+fn other_cards_and_modelled_memory_are_connected_anew() {
+    let base = base();
+    let frame = Frame { camera: 0, seed: 0, photons: 300, lamp: 1, wall: 1 };
+    let scene = frame.scene(&base);
+    let mut renderer = Renderer::default();
+    for (addresses, is_modelled) in
+        [("emulated:2", false), ("emulated:1", false), ("emulated:1", true), ("emulated:1", true)]
+    {
+        let settings = frame.settings().with(|settings| {
+            settings.cards.addresses = vec![addresses.parse().unwrap()];
+            settings.cards.caches = is_modelled.then(CacheSettings::default);
+        });
+        let Ok(found) = renderer.render(&scene, &settings, &Unobserved) else { panic!("{addresses}") };
+        let fresh = render(&scene, &settings, &Unobserved).unwrap();
+        assert!(found.film.pixels() == fresh.film.pixels(), "{addresses}");
+        assert_eq!(found.statistics.memory, fresh.statistics.memory);
+        assert_eq!(found.statistics.link.image_bytes, fresh.statistics.link.image_bytes);
+    }
+}
