@@ -27,7 +27,7 @@ pub use self::error::StudyError;
 pub use self::laboratory::{Laboratory, Outcome, Results, StudyObserver};
 pub use self::measure::{Bench, Measurement, ReadSums, TileMeasurement};
 pub use self::point::{ImageKey, Point, Task};
-pub use self::quality::{Quality, Reference};
+pub use self::quality::{Quality, Reference, TileError};
 use self::report::{Provenance, Report};
 pub use self::sample::{Estimate, SampleRate, choose};
 pub use self::scale::Scale;

@@ -190,10 +190,11 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
             .to_owned(),
         how_it_counts(),
         format!(
-            "Quality is the root of the mean square error of pixels over all three channels, over their mean, against the \
-             same eye rays with {} gather rays by combined sampling and no irradiance cache, in {} tiles of 16x16 pixels; \
-             pixels that show an emitter or nothing are left out. Shadow rays are as many and go to the same places, so part \
-             of their noise is in both and does not count. Only sampling, rays, the irradiance cache and precomputed irradiance change pixels. The \
+            "Quality is the root of the mean square error of indirect light, the light that gather rays bring from the photon map, of pixels \
+             over all three channels, over its mean, against the same eye rays with {} gather rays by combined sampling and no irradiance \
+             cache, in {} tiles of 16x16 pixels; pixels that show an emitter or nothing are left out. Direct light is in none of the \
+             pictures that are compared: its noise is that of shadow rays. The reference's own noise is estimated and subtracted. Only \
+             sampling, rays, the irradiance cache and precomputed irradiance change pixels. The \
              bytes at equal quality lie on a line through the logarithms of error and bytes, between the numbers of rays \
              that were rendered.",
             scale.reference_rays, scale.quality_tiles
@@ -221,13 +222,13 @@ fn curve(scale: &Scale, results: &Results, scene: &'static str, technique: &Tech
     let on_curve = |rays| {
         let quality = results.quality(&technique.quality(scale, scene, rays));
         let bytes = results.traffic(&technique.traffic(scale, scene, rays)).dram_bytes();
-        [f64::from(rays), quality.rmse, bytes.value]
+        [f64::from(rays), quality.rmse(), bytes.value]
     };
     technique.sweep(scale).into_iter().map(on_curve).collect()
 }
 
 fn target(scale: &Scale, results: &Results, scene: &'static str) -> f64 {
-    results.quality(&NAIVE.quality(scale, scene, scale.gather_rays)).rmse
+    results.quality(&NAIVE.quality(scale, scene, scale.gather_rays)).rmse()
 }
 
 fn at_equal_rays(scale: &Scale, results: &Results, scene: &'static str, name: &str) -> Table {
@@ -253,8 +254,8 @@ fn at_equal_rays(scale: &Scale, results: &Results, scene: &'static str, name: &s
             cell(measured.total(|tile| tile.counters.gather_rays as f64), 1e6),
             cell(measured.gathers(), 1e6),
             (naive / measured.dram_bytes().value).into(),
-            quality.rmse.into(),
-            quality.mean.into(),
+            quality.rmse().into(),
+            quality.mean().into(),
         ]);
     }
     table
