@@ -45,6 +45,7 @@ pub(super) fn page(title: &str, introduction: Vec<String>, sections: Vec<Section
         introduction,
         sections,
         provenance: Provenance::default(),
+        figures: Vec::new(),
     }
 }
 
