@@ -4,6 +4,7 @@ mod arithmetic;
 mod balance;
 mod flights;
 mod glossy_floor;
+mod headlines;
 mod machine;
 mod present;
 mod reordering;
