@@ -31,6 +31,8 @@ struct Technique {
     in_flight: Option<Setup>,
 }
 
+/// Maximum number of gather rays with which bytes are measured.
+const MAX_TRAFFIC_RAYS: u32 = 200;
 /// Side of the dissertation's tiles, pixels.
 const TILE: u32 = 16;
 const NAIVE: Technique = Technique {
@@ -149,12 +151,15 @@ impl Technique {
         with_equal_rays(scale, scale.pick(&[6, 12, 25, 50, 100, 200, 400], &[6, 12, 25, 50, 100]))
     }
 
-    /// Numbers of gather rays that the technique's bytes are measured with, ascending: fewer for whole frames.
+    /// Numbers of gather rays that the technique's bytes are measured with, ascending: up to 200, as bytes hardly bend beyond, and fewer for
+    /// whole frames.
     fn traffic_sweep(&self, scale: &Scale) -> Vec<u32> {
-        match self.in_flight {
+        let mut rays = match self.in_flight {
             Some(_) => with_equal_rays(scale, scale.pick(&[25, 50, 100, 200], &[12, 50])),
             None => self.sweep(scale),
-        }
+        };
+        rays.retain(|rays| *rays <= MAX_TRAFFIC_RAYS);
+        rays
     }
 }
 
@@ -191,9 +196,10 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
              cache, in {} tiles of 16x16 pixels; pixels that show an emitter or nothing are left out. Direct light is in none of the \
              pictures that are compared: its noise is that of shadow rays. The reference's own noise is estimated and subtracted. Only \
              sampling, rays, the irradiance cache and precomputed irradiance change pixels. The \
-             bytes at equal quality lie on a line through the logarithms of error and bytes, between the numbers of rays \
-             that were rendered.",
-            scale.reference_rays, scale.quality_tiles
+             rays and bytes at equal quality lie on lines through the logarithms of error and rays, and of bytes and rays, the \
+             last of which goes on beyond {} rays. Factors have 95 % intervals, of the sampled tiles and by the jackknife over the tiles that \
+             are compared.",
+            scale.reference_rays, scale.quality_tiles, MAX_TRAFFIC_RAYS
         ),
     ];
     let scenes = SCENES.map(|(scene, name)| (Measured { scale, results, scene }, name));
@@ -314,7 +320,7 @@ fn curves(file: &str, measured: &Measured, name: &str) -> Block {
             let bytes = measured.traffic(technique, rays).dram_bytes();
             report::Point::new(bytes.value / GIGA, measured.quality(technique, rays).rmse())
         };
-        series(technique.name, technique.sweep(measured.scale).into_iter().map(on_curve).collect())
+        series(technique.name, technique.traffic_sweep(measured.scale).into_iter().map(on_curve).collect())
     };
     let sampled = TECHNIQUES.iter().filter(|technique| technique.in_flight.is_none());
     let axes = panel(
