@@ -84,9 +84,11 @@ fn verdict(scale: &Scale, results: &Results) -> String {
         if curves.is_empty() { "none".to_owned() } else { named.collect::<Vec<_>>().join(", ") }
     };
     let (first, last) = ends(scale);
+    let published =
+        if scale.is_nominal() { " The dissertation calls the reordered lines nearly flat." } else { "" };
     format!(
         "Bytes of the photon map at n = {last} over those at n = {first}, over the floor alone and without the irradiance cache: \
-         naive {}. The dissertation calls the reordered lines nearly flat. Within {} % from least to greatest: {}; not: {}.",
+         naive {}.{published} Within {} % from least to greatest: {}; not: {}.",
         say(change(&curves[0].1)),
         say(100.0 * (NEARLY_FLAT - 1.0)),
         list(&flat),
