@@ -213,7 +213,7 @@ impl Bench<'_> {
         let mut counters = Counters::ZERO;
         let mut stopped = (self.is_stopped)();
         self.pool.install(|| {
-            let mut chip = Box::new(Chip::<K>::new());
+            let mut chip = new_chip::<K>();
             let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
             render_tiles(&mut chip, job, tiles, |_, tile| {
                 counters.add(&tile.counters);
@@ -243,4 +243,10 @@ impl Bench<'_> {
         let whole = TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic);
         Ok(Measurement { tiles: vec![whole], map: PhotonMapSize::of(&self.mapped.image) })
     }
+}
+
+/// A new chip. It is built on the stack first: not in a caller's frame, which may be of a thread with a small stack.
+#[inline(never)]
+fn new_chip<K: ChipKind>() -> Box<Chip<K>> {
+    Box::new(Chip::new())
 }
