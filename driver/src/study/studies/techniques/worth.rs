@@ -7,7 +7,7 @@ use super::super::super::quality::Quality;
 use super::super::super::sample::{Estimate, Ratio, jackknife_half_width};
 use super::super::super::scale::Scale;
 use super::super::present::say;
-use super::{NAIVE, Technique};
+use super::technique::{NAIVE, Technique};
 
 /// Number of gather rays with which a technique reaches an error.
 #[derive(Clone, Copy, Debug, PartialEq)]
