@@ -68,7 +68,7 @@ impl Frame {
                 seed: self.seed,
                 ..Integrator::default()
             },
-            schedule: Schedule { tile: 4, ..Schedule::default() },
+            schedule: Schedule { tile: Some(4), ..Schedule::default() },
             cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
             ..RenderSettings::default()
         }

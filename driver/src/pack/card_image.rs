@@ -6,8 +6,16 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::image::{Header, Section, SectionKind};
-use photoncard_shared::layout::{BvhNode, NodeBox, WideNode};
+use photoncard_shared::image::{Header, Lights, Section, SectionKind};
+use photoncard_shared::layout::{BvhNode, Material, NodeBox, Record, WideNode};
+
+/// Sections of lights.
+const LIGHT_SECTIONS: [SectionKind; 4] = [
+    SectionKind::Emitters,
+    SectionKind::LightNodes,
+    SectionKind::DistantLights,
+    SectionKind::EnvironmentCells,
+];
 
 /// Card image.
 #[derive(Clone)]
@@ -55,6 +63,28 @@ impl CardImage {
         let Section { first_line, records } = self.header.section(kind);
         let first = first_line as usize;
         first..first + records.div_ceil(kind.records_per_line()) as usize
+    }
+
+    /// The image with its lights out: no surface and no environment emits, and there are no lights to sample. Photons stay, so that a
+    /// render of it shows the light of the photon map alone.
+    #[must_use]
+    pub fn without_emission(&self) -> Self {
+        let mut dark = self.clone();
+        dark.header.lights = Lights::NONE;
+        for kind in LIGHT_SECTIONS {
+            dark.header.sections[kind as usize] = Section::default();
+        }
+        let header = dark.header.to_lines();
+        dark.lines.iter_mut().zip(header).for_each(|(line, header)| *line = header);
+        let materials = dark.header.section(SectionKind::Materials).records as usize;
+        let lines = dark.section_mut(SectionKind::Materials);
+        for index in 0..materials {
+            let line = &mut lines[index / Material::PER_LINE];
+            if let Some(record) = line.record_mut(index % Material::PER_LINE) {
+                *record = Material { emission: [0.0; 3], ..Material::read(record) }.to_bytes();
+            }
+        }
+        dark
     }
 
     /// Bounding box of the scene, enlarged by the rounding of the root's 8-bit grid; `None` without triangles.

@@ -30,6 +30,7 @@ pub(super) fn write(
         ],
         sections: sections.collect(),
         provenance: provenance.clone(),
+        figures: Vec::new(),
     };
     Ok(report::write(folder, &index)?)
 }

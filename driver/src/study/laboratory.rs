@@ -67,9 +67,9 @@ impl Results {
     ///
     /// # Panics
     /// If the point was not measured, or its task is not [`Task::Quality`].
-    pub fn quality(&self, point: &Point) -> Quality {
+    pub fn quality(&self, point: &Point) -> &Quality {
         match self.find(point) {
-            Some(Outcome::Quality(quality)) => *quality,
+            Some(Outcome::Quality(quality)) => quality,
             _ => panic!("the quality of {} was not measured", point.name()),
         }
     }
@@ -88,6 +88,8 @@ pub struct Laboratory<'a> {
     loaded: HashMap<String, LoadedScene>,
     /// The last point's card image, which the next point may share.
     last: Option<LastImage>,
+    /// The last reference, which points of other images of the same photons may share.
+    reference: Option<SceneReference>,
 }
 
 struct LoadedScene {
@@ -100,7 +102,13 @@ struct LastImage {
     key: ImageKey,
     scene: Scene,
     mapped: MappedImage,
-    reference: Option<Reference>,
+}
+
+/// A reference, and what it depends on besides settings.
+struct SceneReference {
+    scene: String,
+    assignments: Vec<String>,
+    reference: Reference,
 }
 
 impl<'a> Laboratory<'a> {
@@ -118,7 +126,15 @@ impl<'a> Laboratory<'a> {
         let pool =
             ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).stack_size(THREAD_STACK).build()?;
         let store = PointStore::open(folder)?;
-        Ok(Self { scenes: scenes.to_owned(), store, pool, observer, loaded: HashMap::new(), last: None })
+        Ok(Self {
+            scenes: scenes.to_owned(),
+            store,
+            pool,
+            observer,
+            loaded: HashMap::new(),
+            last: None,
+            reference: None,
+        })
     }
 
     /// Measures the points that the store does not hold yet, and returns the outcomes of all.
@@ -197,7 +213,7 @@ impl<'a> Laboratory<'a> {
 
     fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {
         point.check()?;
-        let mut last = self.image(point)?;
+        let last = self.image(point)?;
         check_image(&last.mapped.image, &point.chip().budget()).map_err(RenderError::from)?;
         let is_stopped = || self.observer.is_stopped();
         let bench =
@@ -207,14 +223,13 @@ impl<'a> Laboratory<'a> {
                 Outcome::Traffic(bench.traffic(&point.settings, *chip, caches, *sample, *least_tiles)?)
             }
             &Task::Quality { tiles, reference_rays } => {
-                let known = last.reference.take();
-                let known = known.filter(|known| known.is_of(&point.settings, tiles, reference_rays));
+                let known = self.reference.take().filter(|known| known.is_of(point, tiles, reference_rays));
                 let reference = match known {
-                    Some(reference) => reference,
-                    None => Reference::new(&bench, &point.settings, tiles, reference_rays)?,
+                    Some(known) => known,
+                    None => SceneReference::new(&bench, point, tiles, reference_rays)?,
                 };
-                let quality = reference.compare(&bench, &point.settings)?;
-                last.reference = Some(reference);
+                let quality = reference.reference.compare(&bench, &point.settings)?;
+                self.reference = Some(reference);
                 Outcome::Quality(quality)
             }
         };
@@ -240,7 +255,24 @@ impl<'a> Laboratory<'a> {
         check_packed(&packed, &settings, &point.chip().budget()).map_err(RenderError::from)?;
         let go_on = |_| !self.observer.is_stopped();
         let mapped = self.pool.install(|| map_photons(packed, &settings, &go_on));
-        Ok(LastImage { key, scene, mapped: mapped.map_err(RenderError::from)?, reference: None })
+        Ok(LastImage { key, scene, mapped: mapped.map_err(RenderError::from)? })
+    }
+}
+
+impl SceneReference {
+    /// Renders the reference of a point.
+    fn new(bench: &Bench, point: &Point, tiles: usize, rays: u32) -> Result<Self, RenderError> {
+        Ok(Self {
+            scene: point.scene.clone(),
+            assignments: point.assignments.clone(),
+            reference: Reference::new(bench, &point.settings, tiles, rays)?,
+        })
+    }
+
+    fn is_of(&self, point: &Point, tiles: usize, rays: u32) -> bool {
+        self.scene == point.scene
+            && self.assignments == point.assignments
+            && self.reference.is_of(&point.settings, tiles, rays)
     }
 }
 

@@ -6,7 +6,7 @@ use photoncard_firmware::memory::Lines;
 use photoncard_firmware::render::RenderJob;
 use photoncard_shared::address::{STRUCTURES, Structure};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Fault, FrameParameters, Tile};
+use photoncard_shared::message::{FrameParameters, Tile};
 use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
@@ -212,15 +212,16 @@ impl Bench<'_> {
         let mut memory = caches.over(memory);
         let mut counters = Counters::ZERO;
         let mut stopped = (self.is_stopped)();
-        let rendered = self.pool.install(|| {
-            let mut job = RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
-            render_on_new_chip::<K, _>(&mut job, tiles, |tile| {
+        self.pool.install(|| {
+            let mut chip = new_chip::<K>();
+            let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
+            render_tiles(&mut chip, job, tiles, |_, tile| {
                 counters.add(&tile.counters);
                 stopped = (self.is_stopped)();
                 !stopped
             })
-        });
-        rendered.map_err(RenderError::Image)?;
+            .map_err(RenderError::Image)
+        })?;
         if stopped {
             return Err(RenderError::Stopped);
         }
@@ -244,15 +245,8 @@ impl Bench<'_> {
     }
 }
 
-/// Renders tiles on a chip of the kind `K` until `finished` returns `false`.
-///
-/// Never inlined: a chip is made on the stack, and only threads of the pool have room for one.
+/// A new chip. It is built on the stack first: not in a caller's frame, which may be of a thread with a small stack.
 #[inline(never)]
-fn render_on_new_chip<K: ChipKind, M: MeasuredMemory>(
-    job: &mut RenderJob<M>,
-    tiles: &[Tile],
-    mut finished: impl FnMut(&RenderedTile) -> bool,
-) -> Result<(), Fault> {
-    let mut chip = Box::new(Chip::<K>::new());
-    render_tiles(&mut chip, job, tiles, |_, tile| finished(&tile))
+fn new_chip<K: ChipKind>() -> Box<Chip<K>> {
+    Box::new(Chip::new())
 }

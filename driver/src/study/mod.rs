@@ -7,6 +7,7 @@
 
 mod axes;
 mod error;
+mod figures;
 mod host;
 mod index;
 mod laboratory;
@@ -25,11 +26,12 @@ use std::path::{Path, PathBuf};
 
 pub use self::axes::{Axis, AxisError, MAX_POINTS};
 pub use self::error::StudyError;
+pub use self::figures::check;
 pub use self::host::{Change, Changed, HostBench, HostFrame, LIGHT_STEP};
 pub use self::laboratory::{Laboratory, Outcome, Results, StudyObserver};
 pub use self::measure::{Bench, Measurement, ReadSums, TileMeasurement};
 pub use self::point::{ImageKey, Point, Task};
-pub use self::quality::{Quality, Reference};
+pub use self::quality::{Quality, Reference, TileError};
 use self::report::{Provenance, Report};
 pub use self::sample::{Estimate, SampleRate, choose};
 pub use self::scale::Scale;
@@ -56,7 +58,7 @@ pub struct StudyOptions {
     pub provenance: Provenance,
 }
 
-/// Measures and reports the studies. Finished points are kept in the folder `points` of [`StudyOptions::out`], where a
+/// Measures and reports the studies, and writes their key figures into [`FIGURES`](report::FIGURES). Finished points are kept in the folder `points` of [`StudyOptions::out`], where a
 /// later run finds them.
 ///
 /// # Errors
@@ -77,7 +79,9 @@ pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), S
     if options.is_collection {
         index::write(&options.out, options.scale.banner(), &reports, &options.provenance)?;
     }
-    Ok(())
+    let check = check(&mut laboratory)?;
+    let figures = reports.into_iter().flat_map(|(_, report)| report.figures);
+    figures::write(&options.out, &options.scale, check, figures)
 }
 
 /// Options of [`run_sweep`].

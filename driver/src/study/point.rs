@@ -39,7 +39,7 @@ pub enum Task {
         /// Minimum number of tiles, as far as the picture has that many.
         least_tiles: usize,
     },
-    /// Error of pixels against a reference with many more gather rays.
+    /// Error of indirect light against a reference with many more gather rays.
     Quality {
         /// Tiles of 16x16 pixels that are compared.
         tiles: usize,
@@ -107,7 +107,7 @@ impl Point {
                 json!({"traffic": {"caches": caches.to_string(), "sample": sample, "least_tiles": least_tiles}})
             }
             Task::Quality { tiles, reference_rays } => {
-                json!({"quality": {"tiles": tiles, "reference_rays": reference_rays}})
+                json!({"quality of indirect light": {"tiles": tiles, "reference_rays": reference_rays}})
             }
         };
         key

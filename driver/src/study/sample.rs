@@ -127,6 +127,43 @@ impl Estimate {
     }
 }
 
+/// Ratio of two estimates, with its 95 % confidence interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ratio {
+    /// The ratio.
+    pub value: f64,
+    /// Lower end of the interval.
+    pub lower: f64,
+    /// Upper end of the interval.
+    pub upper: f64,
+}
+
+impl Ratio {
+    /// The ratio of an estimate to itself.
+    pub(super) const ONE: Self = Self { value: 1.0, lower: 1.0, upper: 1.0 };
+
+    /// Ratio of two independent estimates. Its logarithm has the relative half-widths of both and a `further` one, all independent: the
+    /// root of the sum of their squares.
+    pub(super) fn new(numerator: Estimate, denominator: Estimate, further: f64) -> Self {
+        let relative = |estimate: Estimate| estimate.half_width / estimate.value;
+        let spread = relative(numerator).hypot(relative(denominator)).hypot(further).exp();
+        let value = numerator.value / denominator.value;
+        Self { value, lower: value / spread, upper: value * spread }
+    }
+}
+
+/// Half the width of the 95 % confidence interval of a statistic by the jackknife (Tukey 1958), from its values without each one of the
+/// observations; infinite for fewer than two.
+pub(super) fn jackknife_half_width(without_one: &[f64]) -> f64 {
+    if without_one.len() < 2 {
+        return f64::INFINITY;
+    }
+    let count = without_one.len() as f64;
+    let mean = without_one.iter().sum::<f64>() / count;
+    let squares: f64 = without_one.iter().map(|value| (value - mean).powi(2)).sum();
+    students_t(without_one.len() - 1) * (squares * (count - 1.0) / count).sqrt()
+}
+
 /// 97.5 % quantiles of Student's t-distribution of one to ten degrees of freedom.
 const FEW: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
 
@@ -214,6 +251,28 @@ mod tests {
             let share = covered.count() as f64 / 1000.0;
             assert!((0.91..0.985).contains(&share), "{count} of {total}: {share}");
         }
+    }
+
+    #[test]
+    fn the_jackknife_of_a_mean_is_its_students_interval() {
+        let values: [f64; 5] = [1.0, 4.0, 2.0, 8.0, 5.0];
+        let sum: f64 = values.iter().sum();
+        let without: Vec<f64> = values.iter().map(|value| (sum - value) / 4.0).collect();
+        let squares: f64 = values.iter().map(|value| (value - sum / 5.0).powi(2)).sum();
+        let expected = 2.776 * (squares / 4.0 / 5.0).sqrt();
+        assert!((jackknife_half_width(&without) - expected).abs() < 1e-12);
+        assert_eq!(jackknife_half_width(&without[..1]), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_ratio_is_as_uncertain_as_all_that_it_is_made_of() {
+        let estimate = |value, relative: f64| Estimate { value, half_width: relative * value };
+        let ratio = Ratio::new(estimate(6.0, 0.3), estimate(2.0, 0.4), 1.2);
+        assert_eq!(ratio.value, 3.0);
+        assert!(((ratio.upper / 3.0).ln() - 1.3).abs() < 1e-12);
+        assert!(((ratio.lower / 3.0).ln() + 1.3).abs() < 1e-12);
+        let exact = Ratio::new(estimate(6.0, 0.0), estimate(2.0, 0.0), 0.0);
+        assert_eq!([exact.lower, exact.upper], [3.0, 3.0]);
     }
 
     #[test]

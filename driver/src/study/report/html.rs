@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::figure::Figure;
 use super::markup::escape;
 use super::plot::Plot;
 use super::table::{Column, Table};
@@ -21,6 +22,8 @@ pub struct Report {
     pub sections: Vec<Section>,
     /// Provenance of the numbers.
     pub provenance: Provenance,
+    /// Key figures, which are on no page.
+    pub figures: Vec<Figure>,
 }
 
 /// A part of a report under one heading.

@@ -3,6 +3,7 @@
 //! [`write()`] puts a [`Report`] into a folder: `index.html`, which is self-contained, every table as CSV and every
 //! plot as SVG.
 
+mod figure;
 mod html;
 mod markup;
 pub(in crate::study) mod name;
@@ -17,7 +18,10 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+pub use self::figure::{FIGURES, Figure};
+pub(in crate::study) use self::figure::{figures_csv, slug};
 pub use self::html::{Block, Provenance, Report, Section};
+pub use self::number::human;
 pub use self::plot::{Panel, Plot, Point, Series, XAxis, XScale, YAxis, YScale};
 pub use self::table::{Cell, Column, Table};
 use crate::output::{self, OutputError};
@@ -129,6 +133,7 @@ mod tests {
                 command_line: "photoncard study --out 'a & b'".to_owned(),
                 settings: vec![("seed".to_owned(), "<0>".to_owned())],
             },
+            figures: Vec::new(),
         }
     }
 

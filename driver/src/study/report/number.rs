@@ -5,7 +5,7 @@ const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷',
 
 /// `value` with at most `digits` significant digits, thousands separators and a true minus sign. Values that would
 /// need many zeros are written with a power of ten.
-pub(in crate::study) fn human(value: f64, digits: usize) -> String {
+pub fn human(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "n/a".to_owned();
     }

@@ -68,7 +68,8 @@ impl Cell {
         matches!(self, Self::Text(_))
     }
 
-    fn csv(&self) -> String {
+    /// Text of the entry in CSV, before quoting: numbers in full precision.
+    pub fn csv(&self) -> String {
         match self {
             Self::Empty => String::new(),
             Self::Text(text) => text.clone(),

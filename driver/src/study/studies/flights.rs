@@ -11,31 +11,32 @@ use super::scenes::SCENES;
 use crate::choice::Choice;
 use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::{CacheSettings, CacheSpec};
+use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
 
 /// A chip, and the number of tiles that it has in flight.
 #[derive(Clone, Copy)]
-struct Setup {
+pub(super) struct Setup {
     chip: EmulatedKind,
     in_flight: u32,
     /// Bytes of the cache of the scene.
     scene_cache: u32,
 }
 
-const SETUPS: [Setup; 3] = [
-    Setup { chip: EmulatedKind::Reference, in_flight: 1, scene_cache: REFERENCE.scene_cache_bytes },
-    Setup {
-        chip: EmulatedKind::Reference,
-        in_flight: REFERENCE.in_flight,
-        scene_cache: REFERENCE.scene_cache_bytes,
-    },
-    Setup { chip: EmulatedKind::Large, in_flight: LARGE.in_flight, scene_cache: LARGE.scene_cache_bytes },
-];
+/// The reference chip, whose queue is drained at the end of a tile.
+const ON_REFERENCE: Setup =
+    Setup { chip: EmulatedKind::Reference, in_flight: 1, scene_cache: REFERENCE.scene_cache_bytes };
+/// The large chip with as many tiles in flight as it has room for.
+pub(super) const LARGE_IN_FLIGHT: Setup =
+    Setup { chip: EmulatedKind::Large, in_flight: LARGE.in_flight, scene_cache: LARGE.scene_cache_bytes };
+/// The large chip with one tile after another.
+const ON_LARGE: Setup = Setup { in_flight: 1, ..LARGE_IN_FLIGHT };
+const SETUPS: [Setup; 3] = [ON_REFERENCE, ON_LARGE, LARGE_IN_FLIGHT];
 
 impl Setup {
-    /// All techniques, by the whole frame on one chip.
-    fn point(self, scale: &Scale, scene: &str) -> Point {
-        let settings = scale.all_on().with(|s| s.schedule.in_flight = Some(self.in_flight));
+    /// The whole frame on one chip.
+    pub(super) fn point(self, scale: &Scale, scene: &str, settings: RenderSettings) -> Point {
+        let settings = settings.with(|s| s.schedule.in_flight = Some(self.in_flight));
         let scene_cache = CacheSpec { bytes: self.scene_cache, ..CacheSpec::SCENE };
         let caches = CacheSettings::Split { photon: CacheSpec::PHOTON, scene: scene_cache };
         scale.on_one_chip(scene, settings, self.chip, caches)
@@ -48,7 +49,7 @@ fn naive(scale: &Scale, scene: &str) -> Point {
 
 pub(super) fn points(scale: &Scale) -> Vec<Point> {
     let of_scene = |(scene, _): (&str, _)| {
-        let setups = SETUPS.map(|setup| setup.point(scale, scene));
+        let setups = SETUPS.map(|setup| setup.point(scale, scene, scale.all_on()));
         std::iter::once(naive(scale, scene)).chain(setups).collect::<Vec<_>>()
     };
     SCENES.into_iter().flat_map(of_scene).collect()
@@ -72,7 +73,7 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
     for (scene, name) in SCENES {
         let naive = results.traffic(&naive(scale, scene));
         for setup in SETUPS {
-            let measured = results.traffic(&setup.point(scale, scene));
+            let measured = results.traffic(&setup.point(scale, scene, scale.all_on()));
             let [map, of_scene, both] =
                 [measured.photon_map_bytes(), measured.scene_bytes(), measured.dram_bytes()]
                     .map(|estimate| estimate.value);

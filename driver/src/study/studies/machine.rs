@@ -3,11 +3,11 @@
 use super::super::laboratory::Results;
 use super::super::load_balance::Balance;
 use super::super::point::Point;
-use super::super::report::{self, Block, Report, Table, XScale, YScale};
+use super::super::report::{self, Block, Cell, Figure, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
 use super::arithmetic::{self, CountedFrame};
 use super::balance::{CREDITS, ORDERS, chip_counts, curves, deal};
-use super::present::{columns, how_it_counts, page, panel, plot, say, section, series, table, text};
+use super::present::{columns, how_it_counts, key, page, panel, plot, say, section, series, table, text};
 use super::scenes::SCENES;
 use super::workload::{self, cost, of_frame, tile_seconds};
 use crate::cost_model::arithmetic::Arithmetic;
@@ -156,7 +156,25 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         section("Chips", on_chips),
         section("Load balance", load_balance(scale, results)),
     ];
-    page("Table 7.1: chips for a frame rate", introduction, sections)
+    let figures = figures(&frames);
+    Report { figures, ..page("Table 7.1: chips for a frame rate", introduction, sections) }
+}
+
+/// Chips for 30 frames/s of the frames with measured counts: naive and all techniques of each scene.
+fn figures(frames: &[Frame]) -> Vec<Figure> {
+    let kinds = SCENES.iter().flat_map(|(scene, _)| ["naive", "all-techniques"].map(|kind| (*scene, kind)));
+    let measured = frames.iter().filter(|frame| frame.counted.is_some());
+    let of = |((scene, kind), frame): ((&str, &str), &Frame)| {
+        let [nominal, counted] =
+            [frame.nominal_prediction(), frame.prediction()].map(|p| p.chips_needed(30.0));
+        [
+            ("by-bandwidth", Cell::from(counted.bandwidth)),
+            ("by-table", nominal.overall.into()),
+            ("by-count", counted.overall.into()),
+        ]
+        .map(|(by, chips)| Figure::new(format!("table-7.1.chips-{by}.{kind}"), key(scene), chips, "chips"))
+    };
+    kinds.zip(measured).flat_map(of).collect()
 }
 
 fn symbol_table() -> Table {

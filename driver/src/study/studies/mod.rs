@@ -4,6 +4,7 @@ mod arithmetic;
 mod balance;
 mod flights;
 mod glossy_floor;
+mod headlines;
 mod interactive;
 mod machine;
 mod present;
@@ -104,7 +105,7 @@ mod tests {
     use super::super::laboratory::Outcome;
     use super::super::measure::{Measurement, ReadSums, TileMeasurement};
     use super::super::point::Task;
-    use super::super::quality::Quality;
+    use super::super::quality::{Quality, TileError};
     use super::*;
     use crate::choice::Choice;
     use crate::emulator::contents::Contents;
@@ -144,12 +145,13 @@ mod tests {
             Counters { gathers: 10, gather_rays: 20, eye_rays: 1, photons_found: 500, ..Counters::ZERO };
         let reads = [ReadSums { requests: 9, raw_bytes: 180, dram_bytes: 128 }; STRUCTURES];
         let tile = TileMeasurement { tile: 0, stands_for: 1, counters, reads, contents: Contents::ZERO };
+        let error = TileError { pixels: 256, squares: 7.0, noise: 0.5, sum: 760.0, reference: 768.0 };
         let outcome = |point: &Point| match point.task {
             Task::Traffic { .. } => Outcome::Traffic(Measurement {
                 tiles: vec![tile.clone()],
                 map: PhotonMapSize { photons: 500_000, bytes: 7_000_000 },
             }),
-            Task::Quality { .. } => Outcome::Quality(Quality { rmse: 0.1, mean: 1.0, pixels: 1 }),
+            Task::Quality { .. } => Outcome::Quality(Quality { tiles: vec![error; 3] }),
         };
         let points = study.points(scale).into_iter();
         let results = Results::new(points.map(|point| (point.clone(), outcome(&point))).collect());

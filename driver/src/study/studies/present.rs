@@ -15,6 +15,11 @@ pub(super) fn say(value: f64) -> String {
     human(value, 3)
 }
 
+/// A scene's name in figures: its file's without the extension.
+pub(super) fn key(scene: &str) -> &str {
+    scene.split('.').next().unwrap_or_default()
+}
+
 /// A count or an amount with its confidence interval, in units of `unit`.
 pub(super) fn cell(estimate: Estimate, unit: f64) -> Cell {
     let estimate = estimate.scaled(1.0 / unit);
@@ -45,6 +50,7 @@ pub(super) fn page(title: &str, introduction: Vec<String>, sections: Vec<Section
         introduction,
         sections,
         provenance: Provenance::default(),
+        figures: Vec::new(),
     }
 }
 

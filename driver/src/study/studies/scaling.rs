@@ -10,6 +10,7 @@ use super::super::report::{Block, Column, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
 use super::balance::{CREDITS, chip_counts, curves, deal};
 use super::flights;
+use super::headlines;
 use super::machine::symbols;
 use super::present::{
     columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table, text,
@@ -126,6 +127,7 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
     }
     points.push(chips_point(scale));
     points.extend(flights::points(scale));
+    points.extend(headlines::points(scale));
     points
 }
 
@@ -138,9 +140,10 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     ];
     let mut sections: Vec<_> =
         SWEEPS.iter().map(|sweep| section(sweep.heading, sweep.blocks(scale, results))).collect();
+    sections.push(section("Headlines by photons", headlines::blocks(scale, results)));
     sections.push(section("Tiles in flight", flights::blocks(scale, results)));
     sections.push(section("Chips", chips(scale, results)));
-    page("Scaling", introduction, sections)
+    Report { figures: headlines::figures(scale, results), ..page("Scaling", introduction, sections) }
 }
 
 /// Maximum number of chips in the plot.

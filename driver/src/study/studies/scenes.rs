@@ -2,6 +2,7 @@
 
 /// A simple, a glossy and a large scene: file and name in the reports.
 pub(super) const SCENES: [(&str, &str); 3] =
-    [(CORNELL, "Cornell box"), (GLOSSY, "glossy Cornell box"), ("atrium.glb", "atrium")];
+    [(CORNELL, "Cornell box"), (GLOSSY, "glossy Cornell box"), (ATRIUM, "atrium")];
 pub(super) const CORNELL: &str = "cornell.gltf";
 pub(super) const GLOSSY: &str = "cornell-glossy.gltf";
+pub(super) const ATRIUM: &str = "atrium.glb";

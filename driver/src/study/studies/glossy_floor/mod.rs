@@ -1,53 +1,27 @@
 //! Figure 6.17: memory traffic over the exponent of a glossy floor.
 
+mod line;
+mod strip;
+
+use self::line::{LINES, Line, change, curve, exponents, line_name, point, spread};
 use super::super::laboratory::Results;
 use super::super::measure::{Measurement, TileMeasurement};
 use super::super::point::Point;
-use super::super::report::{Panel, Report, Table, XScale, YScale};
+use super::super::report::{Figure, Panel, Report, Table, XScale, YScale, slug};
 use super::super::sample::Estimate;
 use super::super::scale::Scale;
 use super::present::{
-    columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section, series, table, text,
+    GIGA, columns, gigabyte_point, gigabytes, how_it_counts, key, page, panel, plot, say, section, series,
+    table, text,
 };
 use super::scenes::GLOSSY;
 use crate::choice::Choice;
 use crate::render::Sampling;
-use crate::scheduler::GatherOrder::{self, DirectionBins, Hash, Naive, Sort, Tiled};
+use crate::scheduler::GatherOrder::{DirectionBins, Hash, Sort};
 
-/// Lines of the figure: order of the gathers and sampling of the rays.
-const LINES: [(GatherOrder, Sampling); 7] = [
-    (Naive, Sampling::Reflection),
-    (Tiled, Sampling::Reflection),
-    (DirectionBins, Sampling::Reflection),
-    (Hash, Sampling::Reflection),
-    (Sort, Sampling::Reflection),
-    (DirectionBins, Sampling::Product),
-    (Hash, Sampling::Product),
-];
 /// Panels of the figure: without and with the irradiance cache.
 const PANELS: [(bool, &str); 2] =
     [(false, "without the irradiance cache"), (true, "with the irradiance cache")];
-
-fn exponents(scale: &Scale) -> Vec<u32> {
-    scale.pick(&[1, 2, 4, 8, 16, 32, 64, 128], &[1, 16, 128])
-}
-
-fn line_name((order, sampling): (GatherOrder, Sampling)) -> String {
-    match sampling {
-        Sampling::Product => format!("{}, combined", order.name()),
-        _ => order.name().to_owned(),
-    }
-}
-
-fn point(scale: &Scale, (order, sampling): (GatherOrder, Sampling), is_cached: bool, exponent: u32) -> Point {
-    let settings = scale.settings(order).with(|s| {
-        s.picture.camera = Some("floor".to_owned());
-        s.integrator.sampling = sampling;
-        s.integrator.irradiance_error = scale.all_on().integrator.irradiance_error.filter(|_| is_cached);
-    });
-    let assignments = vec![format!("floor.exponent={exponent}")];
-    Point { assignments, ..scale.traffic(GLOSSY, settings) }
-}
 
 pub(super) fn points(scale: &Scale) -> Vec<Point> {
     let mut points = Vec::new();
@@ -56,6 +30,7 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
             points.extend(LINES.map(|line| point(scale, line, is_cached, exponent)));
         }
     }
+    points.extend(strip::points(scale));
     points
 }
 
@@ -91,8 +66,28 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         section("Bytes from DRAM", vec![dram, table("traffic", traffic(scale, results))]),
         section("Raw bytes", vec![raw]),
         claims,
+        section("The floor alone", strip::blocks(scale, results)),
     ];
-    page("Figure 6.17: a glossy floor", introduction, sections)
+    let mut figures = strip::figures(scale, results);
+    for (is_cached, _) in PANELS {
+        figures.extend(LINES.iter().flat_map(|&line| picture_figures(scale, results, line, is_cached)));
+    }
+    Report { figures, ..page("Figure 6.17: a glossy floor", introduction, sections) }
+}
+
+/// Figures of a line in one of the panels.
+fn picture_figures(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> [Figure; 3] {
+    let curve = curve(scale, results, line, is_cached);
+    let mean = |curve: &[Estimate]| {
+        curve.iter().map(|estimate| estimate.value).sum::<f64>() / curve.len() as f64 / GIGA
+    };
+    let panel = if is_cached { "with-cache" } else { "without-cache" };
+    let name = |quantity: &str| format!("figure-6.17.{quantity}.{panel}.{}", slug(&line_name(line)));
+    [
+        Figure::new(name("last-over-first"), key(GLOSSY), change(&curve), ""),
+        Figure::new(name("greatest-over-least"), key(GLOSSY), spread(&curve), ""),
+        Figure::new(name("mean-gigabytes"), key(GLOSSY), mean(&curve), "GB"),
+    ]
 }
 
 fn panels(scale: &Scale, results: &Results, bytes: fn(&Measurement) -> Estimate) -> Vec<Panel> {
@@ -138,15 +133,9 @@ fn traffic(scale: &Scale, results: &Results) -> Table {
     table
 }
 
-/// Bytes of the photon map from DRAM at each exponent.
-fn curve(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cached: bool) -> Vec<Estimate> {
-    let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent)).photon_map_bytes();
-    exponents(scale).into_iter().map(of).collect()
-}
-
 /// Decrease of the bytes from DRAM from the first to the last exponent. Both renders have equal tiles, so it is estimated
 /// from the differences of each tile (paired samples): the variance between tiles cancels.
-fn fall(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cached: bool) -> Estimate {
+fn fall(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Estimate {
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
     let exponents = exponents(scale);
     let (first, last) = (of(exponents[0]), of(exponents[exponents.len() - 1]));
@@ -155,17 +144,6 @@ fn fall(scale: &Scale, results: &Results, line: (GatherOrder, Sampling), is_cach
     let differences: Vec<_> =
         pairs.map(|(first, last)| (bytes(first) - bytes(last), first.stands_for)).collect();
     Estimate::of_total(&differences)
-}
-
-/// Ratio of the last value of a curve to its first.
-fn change(curve: &[Estimate]) -> f64 {
-    curve.last().zip(curve.first()).map_or(f64::NAN, |(last, first)| last.value / first.value)
-}
-
-/// Ratio of the maximum of a curve to its minimum.
-fn spread(curve: &[Estimate]) -> f64 {
-    let greatest = curve.iter().map(|estimate| estimate.value).fold(0.0, f64::max);
-    greatest / curve.iter().map(|estimate| estimate.value).fold(f64::INFINITY, f64::min)
 }
 
 fn check(scale: &Scale, results: &Results, is_cached: bool, name: &str) -> String {

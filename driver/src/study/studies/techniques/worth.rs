@@ -1,0 +1,242 @@
+//! Worth of techniques at equal quality: rays and bytes that reach an error, factors between techniques with their intervals, and what
+//! follows from them.
+
+use super::super::super::laboratory::Results;
+use super::super::super::measure::Measurement;
+use super::super::super::quality::Quality;
+use super::super::super::sample::{Estimate, Ratio, jackknife_half_width};
+use super::super::super::scale::Scale;
+use super::super::present::say;
+use super::technique::{NAIVE, Technique};
+
+/// Number of gather rays with which a technique reaches an error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum AtQuality {
+    /// The error is reached with these rays.
+    Met(f64),
+    /// The error is already reached with the fewest rays that were measured: fewer may do.
+    AtMost(f64),
+    /// The error is not reached with the most rays that were measured.
+    Missed(f64),
+}
+
+impl AtQuality {
+    pub(super) fn rays(self) -> f64 {
+        let (Self::Met(rays) | Self::AtMost(rays) | Self::Missed(rays)) = self;
+        rays
+    }
+}
+
+/// First crossing of an error by a curve of rays and errors in ascending order of rays, interpolated linearly in the logarithms; `None` for
+/// an empty curve.
+fn at_quality(curve: &[[f64; 2]], rmse: f64) -> Option<AtQuality> {
+    let &[rays, first] = curve.first()?;
+    if first <= rmse {
+        return Some(if curve.len() == 1 { AtQuality::Met(rays) } else { AtQuality::AtMost(rays) });
+    }
+    for pair in curve.windows(2) {
+        let &[[rays, high], [more_rays, low]] = pair else { continue };
+        if low <= rmse {
+            let share = (high / rmse).ln() / (high / low).ln();
+            return Some(AtQuality::Met(rays * (more_rays / rays).powf(share)));
+        }
+    }
+    curve.last().map(|&[rays, _]| AtQuality::Missed(rays))
+}
+
+/// Bytes at a number of rays, linear in the logarithms between the numbers that were measured, and beyond them.
+fn bytes_at(curve: &[(f64, Estimate)], rays: f64) -> Estimate {
+    let after = curve.iter().position(|(more, _)| *more >= rays).unwrap_or(curve.len());
+    let after = after.clamp(1, curve.len().saturating_sub(1).max(1));
+    let (Some(&(fewer, below)), Some(&(more, above))) = (curve.get(after - 1), curve.get(after)) else {
+        return curve.first().map_or(Estimate::default(), |(_, bytes)| *bytes);
+    };
+    let share = (rays / fewer).ln() / (more / fewer).ln();
+    let value = below.value * (above.value / below.value).powf(share);
+    let relative = (below.half_width / below.value).max(above.half_width / above.value);
+    Estimate { value, half_width: relative * value }
+}
+
+/// What a technique takes to reach the error of the naive render.
+pub(super) struct Worth {
+    /// Gather rays.
+    pub(super) at: AtQuality,
+    /// Bytes from DRAM.
+    pub(super) bytes: Estimate,
+    /// Half the width of the 95 % interval of the bytes' logarithm, by the tiles in which errors were measured.
+    spread: f64,
+}
+
+/// Results of a scene.
+#[derive(Clone, Copy)]
+pub(super) struct Measured<'a> {
+    pub(super) scale: &'a Scale,
+    pub(super) results: &'a Results,
+    pub(super) scene: &'static str,
+}
+
+impl Measured<'_> {
+    pub(super) fn traffic(&self, technique: &Technique, rays: u32) -> &Measurement {
+        self.results.traffic(&technique.traffic(self.scale, self.scene, rays))
+    }
+
+    pub(super) fn quality(&self, technique: &Technique, rays: u32) -> &Quality {
+        self.results.quality(&technique.quality(self.scale, self.scene, rays))
+    }
+
+    /// Ratio of the naive render's bytes to those of a technique at equal rays.
+    pub(super) fn factor_at_equal_rays(&self, technique: &Technique) -> Ratio {
+        if technique.name == NAIVE.name {
+            return Ratio::ONE;
+        }
+        let bytes = |technique| self.traffic(technique, self.scale.gather_rays).dram_bytes();
+        Ratio::new(bytes(&NAIVE), bytes(technique), 0.0)
+    }
+
+    /// Rays with which a technique reaches the naive render's error, from all tiles or without one of them.
+    fn at_quality(&self, technique: &Technique, omitted: Option<usize>) -> AtQuality {
+        let rmse = |technique, rays| {
+            let quality = self.quality(technique, rays);
+            omitted.map_or_else(|| quality.rmse(), |tile| quality.without(tile).rmse())
+        };
+        let rays = technique.sweep(self.scale).into_iter();
+        let curve: Vec<_> = rays.map(|rays| [f64::from(rays), rmse(technique, rays)]).collect();
+        let gather_rays = self.scale.gather_rays;
+        at_quality(&curve, rmse(&NAIVE, gather_rays)).unwrap_or(AtQuality::Missed(f64::from(gather_rays)))
+    }
+
+    pub(super) fn worth(&self, technique: &Technique) -> Worth {
+        let bytes = |rays| (f64::from(rays), self.traffic(technique, rays).dram_bytes());
+        let curve: Vec<_> = technique.traffic_sweep(self.scale).into_iter().map(bytes).collect();
+        let at = self.at_quality(technique, None);
+        let tiles = 0..self.quality(technique, self.scale.gather_rays).tiles.len();
+        let without = |tile| bytes_at(&curve, self.at_quality(technique, Some(tile)).rays()).value.ln();
+        let spread = if technique.changes_pixels() {
+            jackknife_half_width(&tiles.map(without).collect::<Vec<_>>())
+        } else {
+            0.0
+        };
+        Worth { at, bytes: bytes_at(&curve, at.rays()), spread }
+    }
+
+    /// Ratio of the bytes of two techniques at the naive render's error.
+    fn factor(&self, base: &Technique, technique: &Technique) -> Ratio {
+        if technique.name == base.name {
+            return Ratio::ONE;
+        }
+        let [base, worth] = [base, technique].map(|technique| self.worth(technique));
+        Ratio::new(base.bytes, worth.bytes, base.spread.hypot(worth.spread))
+    }
+
+    /// Ratio of the naive render's bytes to those of a technique at the naive render's error; `None` if that is not reached.
+    pub(super) fn factor_at_quality(&self, technique: &Technique) -> Option<Ratio> {
+        let is_reached = !matches!(self.worth(technique).at, AtQuality::Missed(_));
+        is_reached.then(|| self.factor(&NAIVE, technique))
+    }
+
+    /// Sentence part on whether a technique reads less than another at the naive render's error.
+    pub(super) fn verdict(&self, base: &Technique, technique: &Technique) -> String {
+        let at = self.worth(technique).at;
+        let factor = self.factor(base, technique);
+        let rays = say(at.rays());
+        let amount = match at {
+            AtQuality::Met(_) => {
+                format!("with {rays} rays {} times less ({})", say(factor.value), range(factor))
+            }
+            AtQuality::AtMost(_) => {
+                format!(
+                    "with {rays} rays, more than it needs, {} times less ({})",
+                    say(factor.value),
+                    range(factor)
+                )
+            }
+            AtQuality::Missed(_) => {
+                format!(
+                    "the error is not reached with {rays} rays, which read 1/{} of the bytes",
+                    say(factor.value)
+                )
+            }
+        };
+        format!("{}: {amount}", Verdict::new(at, factor).word())
+    }
+}
+
+/// The interval of a ratio in words.
+fn range(ratio: Ratio) -> String {
+    format!("{} to {}", say(ratio.lower), say(ratio.upper))
+}
+
+/// Comparison of a technique with another at equal quality.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Verdict {
+    Pays,
+    Costs,
+    Open,
+}
+
+impl Verdict {
+    /// The verdict on a technique that reaches the error `at` some rays and reads `factor` times less there: with the fewest rays the factor
+    /// is a lower bound, with the most an upper one.
+    fn new(at: AtQuality, factor: Ratio) -> Self {
+        match at {
+            AtQuality::Met(_) | AtQuality::AtMost(_) if factor.lower > 1.0 => Self::Pays,
+            AtQuality::Met(_) | AtQuality::Missed(_) if factor.upper < 1.0 => Self::Costs,
+            _ => Self::Open,
+        }
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Pays => "pays",
+            Self::Costs => "does not pay",
+            Self::Open => "no difference is shown",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_quality_lies_between_the_points_of_a_curve() {
+        // The error of independent rays, and bytes in proportion to rays.
+        let curve = [25.0, 100.0, 400.0].map(|rays: f64| [rays, rays.powf(-0.5)]);
+        let Some(AtQuality::Met(rays)) = at_quality(&curve, 1.0 / 8.0) else { panic!() };
+        assert!((rays - 64.0).abs() < 1e-9, "{rays}");
+        assert_eq!(at_quality(&curve, 0.3), Some(AtQuality::AtMost(25.0)));
+        assert_eq!(at_quality(&curve, 0.01), Some(AtQuality::Missed(400.0)));
+        assert_eq!(at_quality(&curve[..1], 0.2), Some(AtQuality::Met(25.0)));
+        assert_eq!(at_quality(&[], 0.2), None);
+    }
+
+    #[test]
+    fn bytes_follow_rays_within_and_beyond_what_was_measured() {
+        let curve = [25.0, 100.0, 400.0]
+            .map(|rays: f64| (rays, Estimate { value: 7.0 * rays, half_width: 0.7 * rays }));
+        for rays in [10.0, 25.0, 64.0, 100.0, 300.0, 400.0, 500.0] {
+            let bytes = bytes_at(&curve, rays);
+            assert!((bytes.value / (7.0 * rays) - 1.0).abs() < 1e-12, "{rays}: {bytes:?}");
+            assert!((bytes.half_width / bytes.value - 0.1).abs() < 1e-12);
+        }
+        assert_eq!(bytes_at(&curve[..1], 60.0).value, 175.0);
+        assert_eq!(bytes_at(&[], 60.0), Estimate::default());
+    }
+
+    #[test]
+    fn a_verdict_needs_an_interval_beside_one_and_bounds_decide_one_way_only() {
+        let ratio = |lower, upper| Ratio { value: 1.0, lower, upper };
+        let (met, at_most, missed) = (AtQuality::Met(9.0), AtQuality::AtMost(9.0), AtQuality::Missed(9.0));
+        for (at, factor, verdict) in [
+            (met, ratio(1.1, 2.0), Verdict::Pays),
+            (met, ratio(0.9, 2.0), Verdict::Open),
+            (met, ratio(0.5, 0.9), Verdict::Costs),
+            (at_most, ratio(1.1, 2.0), Verdict::Pays),
+            (at_most, ratio(0.5, 0.9), Verdict::Open),
+            (missed, ratio(1.1, 2.0), Verdict::Open),
+            (missed, ratio(0.5, 0.9), Verdict::Costs),
+        ] {
+            assert_eq!(Verdict::new(at, factor), verdict, "{at:?} {factor:?}");
+        }
+    }
+}

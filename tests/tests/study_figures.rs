@@ -1,0 +1,152 @@
+//! Figures of studies in `docs/studies.md`: those of `docs/studies.csv`, the `figures.csv` of a run of `photoncard study all`, which is of this
+//! program. `UPDATE_DOCS=1 cargo test -p photoncard-tests --test study_figures` writes them into the document.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use photoncard_driver::study::report::{Figure, human};
+use photoncard_driver::study::{Laboratory, StudyObserver, check};
+use serde::Deserialize;
+
+/// A line of the CSV.
+#[derive(Debug, Deserialize, PartialEq)]
+struct Line {
+    name: String,
+    scene: String,
+    value: String,
+    unit: String,
+    lower: Option<f64>,
+    upper: Option<f64>,
+}
+
+/// Figures by name and scene.
+type Figures = BTreeMap<(String, String), Line>;
+
+fn figures(csv: &str) -> Figures {
+    let lines = csv::Reader::from_reader(csv.as_bytes()).into_deserialize();
+    let mut figures = Figures::new();
+    for line in lines {
+        let line: Line = line.expect("each line of the CSV is a figure");
+        let key = (line.name.clone(), line.scene.clone());
+        assert!(figures.insert(key.clone(), line).is_none(), "{key:?} is there once");
+    }
+    figures
+}
+
+/// Text of a figure for a kind of marker: `=` for its value, `~` for its confidence interval; numbers with three significant digits.
+fn text(figure: &Line, kind: char) -> String {
+    let number = |value: f64| human(value, 3);
+    match (kind, figure.lower, figure.upper) {
+        ('~', Some(lower), Some(upper)) => format!("{} to {}", number(lower), number(upper)),
+        ('~', ..) => NOT_MEASURED.to_owned(),
+        _ => figure.value.parse().map_or_else(|_| figure.value.clone(), number),
+    }
+}
+
+const END: &str = "<!--/-->";
+
+/// Text of a figure of a study that the run did not have, and of the interval of a figure without one.
+const NOT_MEASURED: &str = "–";
+
+/// True if some figure is of the same study: of a name with an equal part before the first dot.
+fn has_study(figures: &Figures, name: &str) -> bool {
+    let study = |name: &str| name.split('.').next().map(str::to_owned);
+    figures.keys().any(|(other, _)| study(other) == study(name))
+}
+
+/// The document with the text between each marker `<!--=NAME@SCENE-->` or `<!--~NAME@SCENE-->` and the next `<!--/-->` replaced by the figure.
+fn filled(document: &str, figures: &Figures) -> Result<String, String> {
+    let mut filled = String::new();
+    let mut rest = document;
+    while let Some(start) = rest.find("<!--=").into_iter().chain(rest.find("<!--~")).min() {
+        let length = rest[start..].find("-->").ok_or("a marker has no end")?;
+        let marker = &rest[start + 4..start + length];
+        let (name, scene) = marker[1..].split_once('@').unwrap_or((&marker[1..], ""));
+        let key = (name.to_owned(), scene.to_owned());
+        let text = match figures.get(&key) {
+            Some(figure) => text(figure, if marker.starts_with('~') { '~' } else { '=' }),
+            None if has_study(figures, name) => return Err(format!("{name} of {scene:?} is no figure")),
+            None => NOT_MEASURED.to_owned(),
+        };
+        filled.push_str(&rest[..start + length + 3]);
+        filled.push_str(&text);
+        let end = rest[start..].find(END).ok_or_else(|| format!("{marker} is not followed by {END}"))?;
+        rest = &rest[start + end..];
+    }
+    Ok(filled + rest)
+}
+
+fn documents() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
+}
+
+fn read(name: &str) -> String {
+    fs::read_to_string(documents().join(name)).expect("the document can be read")
+}
+
+#[test]
+fn the_figures_of_the_document_are_those_of_its_csv() {
+    let document = read("studies.md");
+    let expected = filled(&document, &figures(&read("studies.csv"))).expect("each marker names a figure");
+    if document == expected {
+        return;
+    }
+    let differing = document.lines().zip(expected.lines()).find(|(is, expected)| is != expected);
+    assert!(std::env::var_os("UPDATE_DOCS").is_some(), "{differing:?}");
+    fs::write(documents().join("studies.md"), expected).expect("written");
+}
+
+struct Silent;
+
+impl StudyObserver for Silent {
+    fn progress(&self, _: &str, _: usize, _: usize, _: bool) {}
+    fn notice(&self, _: &str) {}
+    fn is_stopped(&self) -> bool {
+        false
+    }
+}
+
+/// Program, card image layout and the bytes of two small renders: a change of any of them makes all other figures old.
+#[test]
+fn the_csv_is_of_this_program_and_no_trial() {
+    let committed = figures(&read("studies.csv"));
+    assert!(!committed.contains_key(&("trial".to_owned(), String::new())));
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let mut laboratory = Laboratory::new(folder.path(), &scenes, Some(2), &Silent).expect("threads start");
+    let measured = check(&mut laboratory).expect("measured");
+    assert!(
+        measured.len() >= 6 && measured.iter().any(|figure| figure.name == "check.bytes.photon-map.sort")
+    );
+    for Figure { name, scene, value, .. } in measured {
+        let line = committed.get(&(name.clone(), scene)).map(|line| line.value.clone());
+        let is = value.csv();
+        assert_eq!(
+            line,
+            Some(is),
+            "{name}: replace docs/studies.csv by figures.csv of `photoncard study all`"
+        );
+    }
+}
+
+#[test]
+fn markers_take_values_and_intervals_and_are_filled_again() {
+    let csv = "name,scene,value,unit,lower,upper\r\nfactor,atrium,12345.6,times,0.25,2\r\nword,,\"pays, much\",,,\r\n";
+    let figures = figures(csv);
+    let document =
+        "a <!--=factor@atrium-->1<!--/--> (<!--~factor@atrium--><!--/-->), <!--=word-->x<!--/-->.\n";
+    let expected = "a <!--=factor@atrium-->12,300<!--/--> (<!--~factor@atrium-->0.25 to 2<!--/-->), \
+                    <!--=word-->pays, much<!--/-->.\n";
+    assert_eq!(filled(document, &figures).unwrap(), expected);
+    assert_eq!(filled(expected, &figures).unwrap(), expected);
+    let other_study = "<!--=other.factor@atrium-->–<!--/-->";
+    assert_eq!(filled(other_study, &figures).unwrap(), other_study);
+    for (document, error) in [
+        ("<!--=factor-->1<!--/-->", "factor of \"\" is no figure"),
+        ("<!--=word-->1", "not followed"),
+        ("<!--=word", "no end"),
+    ] {
+        assert!(filled(document, &figures).unwrap_err().contains(error), "{document}");
+    }
+}
