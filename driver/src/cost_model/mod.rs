@@ -19,7 +19,7 @@ pub use prediction::{ChipsNeeded, Machine, Prediction, Resource};
 pub use symbols::{Origin, Symbol, SymbolError, Symbols};
 pub use workload::Workload;
 
-use self::arithmetic::{Arithmetic, Unit};
+use self::arithmetic::{Arithmetic, ChipPart};
 
 /// Colour channels: a reflection function is evaluated for each.
 const CHANNELS: f64 = 3.0;
@@ -72,18 +72,12 @@ impl Cost {
     /// Cost by counted arithmetic: rays against boxes and triangles, and surfaces, in the ray caster; searches and all reflection in the
     /// gather unit; directions, irradiance cache and pixels in the controller.
     pub fn counted(workload: &Workload, arithmetic: &Arithmetic) -> Self {
-        let flops = |units: &[Unit]| arithmetic.sum(|unit| units.contains(&unit)).flops();
+        let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();
         Self {
-            ray_caster: UnitCost {
-                flops: flops(&[Unit::Traversal, Unit::Triangles, Unit::Shading]),
-                dram_bytes: workload.scene_bytes,
-            },
-            controller: UnitCost {
-                flops: flops(&[Unit::Sampling, Unit::IrradianceCache, Unit::Pixels]),
-                dram_bytes: 0.0,
-            },
+            ray_caster: UnitCost { flops: flops(ChipPart::RayCaster), dram_bytes: workload.scene_bytes },
+            controller: UnitCost { flops: flops(ChipPart::Controller), dram_bytes: 0.0 },
             gather_unit: UnitCost {
-                flops: flops(&[Unit::Search, Unit::Selection, Unit::Reflection, Unit::Light]),
+                flops: flops(ChipPart::GatherUnit),
                 dram_bytes: workload.photon_map_bytes,
             },
         }

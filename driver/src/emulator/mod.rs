@@ -24,7 +24,7 @@ use photoncard_shared::link::Port;
 
 use self::dram::EmulatedDram;
 pub use self::dram::SharedImage;
-use self::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+use self::memory_model::{CacheSettings, CacheSpec, MeasuredMemory, MemoryTraffic};
 use self::trace::{TraceFile, Traced};
 use crate::choice::choices;
 use crate::link::{LoopbackPort, loopback};
@@ -85,6 +85,15 @@ impl EmulatedKind {
             Self::Reference => Reference::BUDGET,
             Self::Large => Large::BUDGET,
             Self::Micro => Micro::BUDGET,
+        }
+    }
+
+    /// Caches of the budget's sizes, of four ways.
+    pub fn caches(self) -> CacheSettings {
+        let budget = self.budget();
+        CacheSettings::Split {
+            photon: CacheSpec { bytes: budget.photon_cache_bytes, ..CacheSpec::PHOTON },
+            scene: CacheSpec { bytes: budget.scene_cache_bytes, ..CacheSpec::SCENE },
         }
     }
 

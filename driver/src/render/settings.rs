@@ -92,7 +92,7 @@ impl RenderSettings {
 
     /// Caches of the memory model; `None` if memory is not modelled.
     pub fn modelled_caches(&self) -> Option<CacheSettings> {
-        self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| CacheSettings::default()))
+        self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| self.cards.own_caches()))
     }
 
     /// Photons of a scene's caustic map; 0 for no map.

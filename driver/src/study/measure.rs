@@ -50,8 +50,10 @@ pub struct TileMeasurement {
 /// Work and memory traffic of a point.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// The rendered tiles, in the picture's order; a single one if the frame was rendered as a whole.
+    /// The measured tiles, in the picture's order; a single one for all tiles of a frame that was rendered as a whole.
     pub tiles: Vec<TileMeasurement>,
+    /// Number of rendered tiles.
+    pub rendered: usize,
     /// The photon map of the image.
     pub map: PhotonMapSize,
 }
@@ -197,7 +199,11 @@ impl Bench<'_> {
         let measured = chosen.iter().zip(&rendered).map(|(Chosen { tile, stands_for }, rendered)| {
             TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic)
         });
-        Ok(Measurement { tiles: measured.collect(), map: PhotonMapSize::of(&self.mapped.image) })
+        Ok(Measurement {
+            tiles: measured.collect(),
+            rendered: tiles.len(),
+            map: PhotonMapSize::of(&self.mapped.image),
+        })
     }
 
     /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows: what a tile reads depends
@@ -227,6 +233,7 @@ impl Bench<'_> {
         }
         Ok(Measurement {
             tiles: vec![TileMeasurement::new(0, 1, counters, &MeasuredMemory::traffic(&memory))],
+            rendered: tiles.len(),
             map: PhotonMapSize::of(&self.mapped.image),
         })
     }
@@ -241,7 +248,11 @@ impl Bench<'_> {
         let job = CurveJob { image: &self.mapped.image, frame, tiles, chips };
         let outcome = render_along_curve(job, Some(caches), &[], &|_, _| !(self.is_stopped)())?;
         let whole = TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic);
-        Ok(Measurement { tiles: vec![whole], map: PhotonMapSize::of(&self.mapped.image) })
+        Ok(Measurement {
+            tiles: vec![whole],
+            rendered: tiles.len(),
+            map: PhotonMapSize::of(&self.mapped.image),
+        })
     }
 }
 

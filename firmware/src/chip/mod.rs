@@ -117,8 +117,11 @@ impl<K: ChipKind> Chip<K> {
             return false;
         }
         let Some(number) = self.vacant(frame) else { return false };
+        let is_alone = self.find(|flight| flight.pass() != Pass::Vacant).is_none();
         let Some(flight) = self.flights.values_mut().get_mut(number) else { return false };
-        memory.begin_tile();
+        if is_alone {
+            memory.begin_tile();
+        }
         flight.begin(tile);
         true
     }

@@ -35,7 +35,7 @@ pub(crate) struct CardOptions {
     #[arg(long, hide_short_help = true)]
     counters: bool,
     /// Caches of the modelled memory, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=... [default:
-    /// photon=128K/128/4,scene=75K/128/4]
+    /// the sizes of the first card's kind, such as photon=128K/128/4,scene=75K/128/4]
     #[arg(long, value_name = "CACHES", hide_short_help = true)]
     cache: Option<CacheSettings>,
     /// Write every read of an emulated chip for a simulator of caches or of DRAM, compressed by gzip; a frame has billions: use
@@ -60,16 +60,18 @@ impl CardOptions {
     /// Settings of these options.
     pub(super) fn settings(&self) -> CardSet {
         let emulated = || vec![CardAddress::emulated(EmulatedKind::Reference)];
-        CardSet {
+        let cards = CardSet {
             addresses: if self.cards.is_empty() { emulated() } else { self.cards.clone() },
             faults: self.faults,
             verify: self.verify,
-            caches: self.cache.or_else(|| self.counters.then(CacheSettings::default)),
+            caches: self.cache,
             trace: self.trace.clone().map(|path| TraceSettings {
                 path,
                 format: self.trace_format,
                 has_labels: self.trace_labels,
             }),
-        }
+        };
+        let own = self.counters.then(|| cards.own_caches());
+        CardSet { caches: cards.caches.or(own), ..cards }
     }
 }

@@ -87,7 +87,7 @@ impl SweepArguments {
         let settings = settings.with(|s| s.schedule.in_flight = s.schedule.in_flight.or(Some(1)));
         let task = Task::Traffic {
             chip: *card,
-            caches: caches.first().copied().unwrap_or_default(),
+            caches: caches.first().copied().unwrap_or_else(|| card.caches()),
             sample: self.output.sample,
             least_tiles: Scale::FULL.least_tiles,
         };

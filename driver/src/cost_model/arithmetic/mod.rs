@@ -9,7 +9,7 @@ mod step;
 mod table;
 
 pub use operations::Operations;
-pub use step::{Step, Unit, Work};
+pub use step::{ChipPart, Step, Unit, Work};
 pub use table::OPERATIONS;
 
 use crate::choice::Choice;

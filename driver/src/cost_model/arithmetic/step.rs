@@ -43,6 +43,28 @@ choices!(Unit {
     Pixels = "pixels": "Eye rays and pixels",
 });
 
+/// Part of a chip in the cost model of Table 7.1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChipPart {
+    /// Rays and the surfaces where they end.
+    RayCaster,
+    /// Directions of gather rays, irradiance cache, pixels.
+    Controller,
+    /// Searches and all reflection, direct light included.
+    GatherUnit,
+}
+
+impl Unit {
+    /// The part of the chip that the unit is in.
+    pub fn part(self) -> ChipPart {
+        match self {
+            Self::Traversal | Self::Triangles | Self::Shading => ChipPart::RayCaster,
+            Self::Sampling | Self::IrradianceCache | Self::Pixels => ChipPart::Controller,
+            Self::Search | Self::Selection | Self::Reflection | Self::Light => ChipPart::GatherUnit,
+        }
+    }
+}
+
 /// Piece of work with a fixed or nearly fixed number of operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {

@@ -3,6 +3,7 @@
 use photoncard_shared::message::{Filter, Radiance, Sampling};
 
 use crate::display::DisplaySettings;
+use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::emulator::trace::TraceSettings;
 use crate::film::Window;
@@ -156,6 +157,15 @@ impl CardSet {
     /// Number of cards, one chip each.
     pub fn count(&self) -> usize {
         self.addresses.iter().map(|address| address.emulated_chips().max(1)).sum()
+    }
+
+    /// Caches of the kind of the first emulated card.
+    pub fn own_caches(&self) -> CacheSettings {
+        let kind = self.addresses.iter().find_map(|address| match address {
+            CardAddress::Emulated { kind, .. } => Some(*kind),
+            CardAddress::Remote(_) => None,
+        });
+        kind.unwrap_or(EmulatedKind::Reference).caches()
     }
 }
 

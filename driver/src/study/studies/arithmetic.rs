@@ -4,7 +4,7 @@ use super::super::measure::Measurement;
 use super::super::report::{Cell, Table};
 use super::present::columns;
 use crate::choice::Choice;
-use crate::cost_model::arithmetic::{Arithmetic, Operations, Unit, Work};
+use crate::cost_model::arithmetic::{Arithmetic, ChipPart, Operations, Unit, Work};
 use crate::cost_model::{Cost, Symbols, Workload};
 
 /// Arithmetic of one frame, estimated from its sample of tiles.
@@ -26,24 +26,8 @@ pub(super) struct CountedFrame<'a> {
     pub(super) arithmetic: &'a Arithmetic,
 }
 
-/// Units that work for rays, and those that work for gathers.
-const OF_RAYS: [Unit; 7] = [
-    Unit::Traversal,
-    Unit::Triangles,
-    Unit::Shading,
-    Unit::Light,
-    Unit::Sampling,
-    Unit::IrradianceCache,
-    Unit::Pixels,
-];
-const OF_GATHERS: [Unit; 3] = [Unit::Search, Unit::Selection, Unit::Reflection];
-
-/// True for units that work for gathers, false for those that work for rays.
-pub(super) fn is_of_gathers(unit: Unit) -> bool {
-    OF_GATHERS.contains(&unit)
-}
-
-/// Operations of each unit for one ray or one gather of each frame.
+/// Operations of each unit for one piece of work of each frame: a ray in the ray caster, a gather in the gather unit, a gather ray in the
+/// controller.
 pub(super) fn operations(frames: &[CountedFrame]) -> Table {
     let heads = [
         ("frame", ""),
@@ -57,14 +41,20 @@ pub(super) fn operations(frames: &[CountedFrame]) -> Table {
         ("FLOPs", ""),
         ("conversions", ""),
     ];
-    let mut table = Table::new("Operations of each unit for one ray and for one gather", columns(&heads));
+    let mut table = Table::new(
+        "Operations of each unit: of a ray, of a gather with the reflection of direct light, and of the controller for a gather ray",
+        columns(&heads),
+    );
     for frame in frames {
-        let pieces =
-            [("ray", frame.workload.rays(), &OF_RAYS[..]), ("gather", frame.workload.gathers(), &OF_GATHERS)];
-        for (piece, count, units) in pieces {
+        let pieces = [
+            ("ray", frame.workload.rays(), ChipPart::RayCaster),
+            ("gather", frame.workload.gathers(), ChipPart::GatherUnit),
+            ("gather ray", frame.workload.gather_rays, ChipPart::Controller),
+        ];
+        for (piece, count, part) in pieces {
             let mut sum = Operations::default();
-            for unit in units {
-                let operations = frame.arithmetic.unit(*unit).times(1.0 / count.max(1.0));
+            for &unit in Unit::ALL.iter().filter(|unit| unit.part() == part) {
+                let operations = frame.arithmetic.unit(unit).times(1.0 / count.max(1.0));
                 sum.add(&operations);
                 table.push(row(frame.name, piece, unit.name(), &operations));
             }
@@ -97,14 +87,15 @@ pub(super) fn comparison(frames: &[CountedFrame]) -> Table {
     for CountedFrame { name, workload, nominal, arithmetic } in frames {
         let of_ray = |flops: f64| flops / workload.rays().max(1.0);
         let of_gather = |flops: f64| flops / workload.gathers().max(1.0);
+        let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();
         let counted = arithmetic.sum(|_| true).flops();
         let assumed = nominal.total().flops;
         table.push(vec![
             (*name).into(),
             of_ray(nominal.ray_caster.flops).into(),
-            of_ray(arithmetic.sum(|unit| matches!(unit, Unit::Traversal | Unit::Triangles)).flops()).into(),
+            of_ray(flops(ChipPart::RayCaster)).into(),
             of_gather(nominal.gather_unit.flops).into(),
-            of_gather(arithmetic.sum(is_of_gathers).flops()).into(),
+            of_gather(flops(ChipPart::GatherUnit)).into(),
             (assumed / 1e9).into(),
             (counted / 1e9).into(),
             (counted / assumed).into(),

@@ -149,6 +149,7 @@ mod tests {
         let outcome = |point: &Point| match point.task {
             Task::Traffic { .. } => Outcome::Traffic(Measurement {
                 tiles: vec![tile.clone()],
+                rendered: 1,
                 map: PhotonMapSize { photons: 500_000, bytes: 7_000_000 },
             }),
             Task::Quality { .. } => Outcome::Quality(Quality { tiles: vec![error; 3] }),

@@ -4,9 +4,11 @@ use photoncard_shared::address::LINE_BYTES;
 
 use super::super::measure::{Measurement, TileMeasurement};
 use super::super::report::Cell;
-use super::arithmetic::{self, is_of_gathers};
+use super::arithmetic;
+use crate::cost_model::arithmetic::{ChipPart, Unit};
 use crate::cost_model::timing::{Part, TimedChip};
 use crate::cost_model::{Machine, Symbols};
+
 /// Latency of a read from DRAM, seconds.
 const LATENCY: f64 = 100e-9;
 /// Tasks in flight that are compared.
@@ -36,6 +38,7 @@ fn chip(tasks: u32) -> TimedChip {
 /// Rays and gathers of a frame: reads of the scene and of the photon map, and the arithmetic on them.
 fn parts(measured: &Measurement, symbols: &Symbols) -> [Part; 2] {
     let arithmetic = arithmetic::of_frame(measured, symbols);
+    let is_of_gathers = |unit: Unit| unit.part() == ChipPart::GatherUnit;
     let total = |count: &dyn Fn(&TileMeasurement) -> u64| measured.total(|tile| count(tile) as f64).value;
     [
         Part {

@@ -83,7 +83,7 @@ impl Swept<'_> {
             let [memory, arithmetic] = chip_seconds(point, measured);
             let mut row = self.values(&indices);
             row.extend([
-                measured.tiles.len().into(),
+                measured.rendered.into(),
                 cell(measured.total(|tile| tile.counters.gather_rays as f64), 1e6),
                 cell(gathers, 1e6),
                 gigabytes(measured.raw_bytes()),
