@@ -137,6 +137,39 @@ fn faults_end_in_the_same_picture_or_in_words() {
     });
 }
 
+/// Cards are lost with gathers of several tiles in their queues, before, amid and after drains.
+#[test]
+fn queues_that_fill_within_a_tile_end_in_the_same_picture() {
+    with_room_for_a_card(|| {
+        for (number, crowded) in Fixture::crowded().iter().enumerate() {
+            let expected = Run::new(&crowded.in_sequence(), 1, 0).go();
+            let (mut complete, mut lost, mut runs) = (0, 0, 0);
+            for seed in seeds(1..40) {
+                let faults = Faults::of(&mut Random(hash(seed ^ 0xc0de)));
+                let outcome = Run { faults, ..Run::new(crowded, 1 + seed as usize % 4, seed) }.go();
+                for (id, tile) in &outcome.tiles {
+                    assert!(
+                        tile.pixels().eq(expected.tiles[id].pixels()),
+                        "frame {number}, seed {seed}: tile {id}"
+                    );
+                }
+                let is_complete = outcome.end == End::Complete;
+                assert!(
+                    !is_complete || outcome.pixels == expected.pixels,
+                    "frame {number}, seed {seed}: pixels"
+                );
+                complete += u32::from(is_complete);
+                lost += u32::from(outcome.bytes.resets > 0);
+                runs += 1;
+            }
+            assert!(
+                2 * complete > runs && (lost > 0 || runs < 20),
+                "{complete} of {runs} complete, {lost} lost"
+            );
+        }
+    });
+}
+
 /// Steps a card on its own until the picture is complete. Returns its pixels.
 fn complete_alone(run: &Run, station: &mut Station, random: &mut Random) -> Vec<PixelValue> {
     let film = Mutex::new(run.fixture.film());

@@ -9,7 +9,7 @@ use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Schedule};
 use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
-use photoncard_driver::scheduler::{Scheduler, tiles};
+use photoncard_driver::scheduler::{GatherOrder, Scheduler, tiles};
 use photoncard_driver::session::{Job, PixelLimits, Upload};
 use photoncard_firmware::card::Card;
 use photoncard_firmware::kind::{ChipKind, Entries, MICRO, TechniqueMemory};
@@ -126,6 +126,31 @@ pub(crate) struct Fixture {
 impl Fixture {
     pub(crate) fn new() -> Self {
         Self::of(&scene(), settings())
+    }
+
+    /// Frames whose gather queues fill within a tile: of any order with a queue, with irradiance records, with layers.
+    pub(crate) fn crowded() -> [Self; 3] {
+        let frame = |order, queue, irradiance_error, layers: &str| {
+            let settings = settings().with(|s| {
+                s.integrator.irradiance_error = irradiance_error;
+                s.picture.layers = layers.parse().unwrap();
+                (s.schedule.order, s.schedule.queue) = (order, Some(queue));
+            });
+            Self::of(&scene(), settings)
+        };
+        [
+            frame(GatherOrder::Sort, 7, None, "none"),
+            frame(GatherOrder::Hash, 1, Some(0.2), "none"),
+            frame(GatherOrder::Sort, 20, Some(0.05), "all"),
+        ]
+    }
+
+    /// This frame without a queue, one tile after another.
+    pub(crate) fn in_sequence(&self) -> Self {
+        let settings = self.settings.clone().with(|s| {
+            (s.schedule.order, s.schedule.queue, s.schedule.in_flight) = (GatherOrder::Tiled, None, Some(1));
+        });
+        Self::of(&self.scene, settings)
     }
 
     /// Another frame of the scene after this one: another camera, and other photons, or a brighter lamp.

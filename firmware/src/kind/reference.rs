@@ -7,7 +7,7 @@ use super::chip_kind::{ChipKind, TechniqueMemory};
 use crate::photon::CandidateBuffer;
 
 /// Budget of the reference chip: a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB (section 7.3.2);
-/// tiles have up to 64x64 pixels (16x16 in the dissertation). Two tiles in flight leave room for the gather points of half a tile.
+/// tiles have up to 64x64 pixels (16x16 in the dissertation). One tile in flight leaves room for a long gather queue, and gather points for half a tile.
 pub const REFERENCE: Budget = Budget {
     sram_bytes: 1 << 20,
     dram_bytes: 512 << 20,
@@ -32,8 +32,8 @@ pub enum Reference {}
 impl ChipKind for Reference {
     const BUDGET: Budget = REFERENCE;
     const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
-        reordering: 560 << 10,
-        irradiance_cache: 320 << 10,
+        reordering: 408 << 10,
+        irradiance_cache: 159 << 10,
         importance_sampling: 136 << 10,
     };
     type TilePixels = Entries<{ REFERENCE.tile_pixels as usize }>;

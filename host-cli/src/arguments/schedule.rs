@@ -24,7 +24,7 @@ pub(crate) struct ScheduleOptions {
     #[arg(long, hide_short_help = true)]
     pub(super) queue: Option<u32>,
     /// Tiles in flight on a chip, whose gathers may wait in the queue together [default: the chip's capacity]
-    #[arg(long, hide_short_help = true)]
+    #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) in_flight: Option<u32>,
 }
 

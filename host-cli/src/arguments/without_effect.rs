@@ -40,21 +40,6 @@ impl RenderOptions {
                 "with --gather-rays 0".to_owned(),
             ),
             (
-                self.schedule.bins.is_some() && !order.has_bins(),
-                "--bins",
-                format!("with --order {name}, which has no direction bins"),
-            ),
-            (
-                self.schedule.queue.is_some() && !order.has_queue(),
-                "--queue",
-                format!("with --order {name}, by which no gathers wait on a chip"),
-            ),
-            (
-                self.schedule.in_flight.is_some() && !order.has_queue(),
-                "--in-flight",
-                format!("with --order {name}, by which no gathers wait on a chip"),
-            ),
-            (
                 self.photons.caustic_photons.is_some_and(|photons| photons > 0) && !has_map,
                 "--caustic-photons",
                 without_specular,
@@ -67,10 +52,26 @@ impl RenderOptions {
             ),
         ];
         let of_rays = self.integrator.without_effect(&self.quality.settings().integrator);
-        let said =
-            cases.into_iter().chain(of_rays).chain(self.of_pictures()).filter(|(is_idle, ..)| *is_idle);
+        let said = cases
+            .into_iter()
+            .chain(of_rays)
+            .chain(self.of_order())
+            .chain(self.of_pictures())
+            .filter(|(is_idle, ..)| *is_idle);
         said.map(|(_, option, why)| format!("{option} has no effect {why}")).collect()
     }
+    /// Options on the order of the work that the order does not have.
+    fn of_order(&self) -> [(bool, &'static str, String); 3] {
+        let order = self.schedule.order;
+        let no_bins = format!("with --order {}, which has no direction bins", order.name());
+        let no_queue = format!("with --order {}, by which no gathers wait on a chip", order.name());
+        [
+            (self.schedule.bins.is_some() && !order.has_bins(), "--bins", no_bins),
+            (self.schedule.queue.is_some() && !order.has_queue(), "--queue", no_queue.clone()),
+            (self.schedule.in_flight.is_some() && !order.has_queue(), "--in-flight", no_queue),
+        ]
+    }
+
     /// Options on a format of pictures that is not written.
     fn of_pictures(&self) -> [(bool, &'static str, String); 4] {
         let outputs = &self.outputs;

@@ -215,7 +215,8 @@ fn on_card(option: &'static str, value: u32, least: u32, most: u32) -> Result<()
         } else {
             format!("choose {most} or less; {info}")
         };
-        (format!("it must be {least} to {most} on this card"), remedy)
+        let range = if least == most { least.to_string() } else { format!("{least} to {most}") };
+        (format!("it must be {range} on this card"), remedy)
     };
     Err(RenderError::Setting { option, value: value.to_string(), reason, remedy })
 }
