@@ -78,7 +78,7 @@ fn options_with_effect_are_not() {
     let small = ["-o", "a.exr", "--caustic-photons=99"];
     for options in [
         &["--irradiance-cache=on", "--ic-error=0.1"][..],
-        &["--bins=9", "--queue=9", "--in-flight=2", "--order=hash"],
+        &["--bins=9", "--queue=9", "--in-flight=1", "--order=hash"],
         &["--bins=9", "--order=dirbin"],
         &["--caustic-neighbors=9"],
         &["--radiance=precomputed", "--faults=flips=1e-9"],

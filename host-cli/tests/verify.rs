@@ -20,7 +20,7 @@ fn honest_cards_of_any_kind_agree_and_the_picture_is_the_same() {
         assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
         (room.read("a.exr"), statistics(&room))
     };
-    let (expected, alone) = rendered(&["--card", "emulated:1"]);
+    let (expected, alone) = rendered(&["--card", "emulated:1", "--tile", "16"]);
     let cards = ["--card", "emulated:1", "--card", "emulated-micro:1"];
     for (share, verified) in [("1", 16..=16), ("0.000001", 1..=1)] {
         for technique in [&[][..], &["--irradiance-cache", "on"]] {

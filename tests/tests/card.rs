@@ -5,7 +5,7 @@ use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::trace;
 use photoncard_driver::photon_map::store_photons;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
-use photoncard_firmware::kind::{MICRO, Reference};
+use photoncard_firmware::kind::{Large, MICRO};
 use photoncard_shared::address::Line;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::image::{Header, SectionKind};
@@ -84,7 +84,7 @@ fn commands_out_of_order_are_faults_and_the_card_goes_on() {
 fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
     with_room_for_a_card(|| {
         let mut memory = vec![Line::ZERO; DRAM_LINES];
-        let mut wire = Wire::<Reference>::of_kind(&mut memory);
+        let mut wire = Wire::<Large>::of_kind(&mut memory);
         wire.hello();
         wire.load(image().lines());
         let done = |id| [Answer::Pixels(25), Answer::Pixels(25), Answer::Pixels(14), Answer::TileDone(id)];
