@@ -80,7 +80,7 @@ impl Part {
     }
 }
 
-/// What a task does next.
+/// Next step of a task.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Next {
     Compute,

@@ -164,7 +164,7 @@ struct Kept {
     prepared: Prepared,
 }
 
-/// What the card image is made of.
+/// Origin of the card image.
 enum Source {
     /// The image of an earlier picture.
     Kept(Kept),

@@ -57,7 +57,7 @@ fn bytes_at(curve: &[(f64, Estimate)], rays: f64) -> Estimate {
     Estimate { value, half_width: relative * value }
 }
 
-/// What a technique takes to reach the error of the naive render.
+/// Rays and bytes with which a technique reaches the error of the naive render.
 pub(super) struct Worth {
     /// Gather rays.
     pub(super) at: AtQuality,
