@@ -24,6 +24,7 @@ pub use job::{Assignment, Event, Job};
 pub use link_bytes::LinkBytes;
 pub use pixel_limits::PixelLimits;
 pub use upload::Upload;
+pub(crate) use upload::changed_runs;
 
 use std::collections::VecDeque;
 use std::time::Duration;

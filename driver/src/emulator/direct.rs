@@ -57,6 +57,12 @@ impl From<Fault> for TileError {
     }
 }
 
+/// A new chip. It is built on the stack first: in a frame of its own, as the caller's may be of a thread with a small stack.
+#[inline(never)]
+pub(crate) fn new_chip<K: ChipKind>() -> Box<Chip<K>> {
+    Box::new(Chip::new())
+}
+
 /// Renders tiles on chips of the kind `K`, one a thread of `pool`, whose stacks must hold a chip while it is built. Each tile has a new
 /// memory that `model` makes, so that it begins with empty caches. `is_stopped` is polled before each.
 ///
@@ -71,14 +77,13 @@ pub fn render_tiles_apart<'a, K: ChipKind, M: MeasuredMemory>(
     is_stopped: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<RenderedTile>, TileError> {
     let (scene, memory) = image.view();
-    let new_chip = || Box::new(Chip::<K>::new());
     let render_one = |chip: &mut Box<Chip<K>>, &tile: &Tile| {
         if is_stopped() {
             return Err(TileError::Stopped);
         }
         Ok(render_tile(chip, &scene, model(memory), frame, tile, None)?)
     };
-    pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
+    pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip::<K>, render_one).collect())
 }
 
 /// Renders a tile on a chip with a memory of its own. With an `outlet` the pixels' gathers are sent to it instead, and the

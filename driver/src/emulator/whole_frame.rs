@@ -20,7 +20,7 @@ use photoncard_shared::message::{Fault, FaultCode, FrameParameters, PixelRecord,
 use rayon::prelude::*;
 
 use super::THREAD_STACK;
-use super::direct::{RenderedTile, render_tile};
+use super::direct::{RenderedTile, new_chip, render_tile};
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::pack::CardImage;
 use crate::sink::{FinishedTile, TileSink};
@@ -242,7 +242,6 @@ fn cast_tiles<'a, M: MeasuredMemory>(
     tiles: &[Tile],
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<CastTile>, FrameError> {
-    let new_chip = || Box::new(ReferenceChip::new());
     let cast_one = |chip: &mut Box<ReferenceChip>, &tile: &Tile| {
         if !go_on() {
             return Err(FrameError::Stopped);

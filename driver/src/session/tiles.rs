@@ -34,7 +34,7 @@ impl TilesInFlight {
         self.0.push(TileInFlight { assignment, records: Vec::new(), is_received: Vec::new() });
     }
 
-    /// Returns whether cards have crashed before at the tile that the card has: one at which any has is dealt alone.
+    /// Returns whether cards have crashed before at the card's tile; such a tile is dealt alone.
     pub(super) fn is_at_suspect(&self) -> bool {
         self.0.first().is_some_and(|in_flight| in_flight.assignment.is_suspect)
     }

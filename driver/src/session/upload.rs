@@ -63,7 +63,7 @@ impl Upload {
 }
 
 /// Runs of the lines of `after` that `before` lacks or has otherwise.
-fn changed_runs(before: &[Line], after: &[Line]) -> Vec<Range<usize>> {
+pub(crate) fn changed_runs(before: &[Line], after: &[Line]) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     for (index, line) in after.iter().enumerate() {
         if before.get(index) != Some(line) {

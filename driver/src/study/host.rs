@@ -10,14 +10,15 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::error::StudyError;
-use super::laboratory::StudyObserver;
+use super::laboratory::{StudyObserver, load_scene};
 use super::store::PointStore;
 use crate::pack::{CardImage, PackedScene};
 use crate::photon_map::{
     MappedImage, PhotonMapSize, PhotonSettings, PhotonTimes, TracedPhotons, map_photons, map_traced,
 };
 use crate::render::{RenderError, RenderSettings};
-use crate::scene::{Scene, gltf};
+use crate::scene::Scene;
+use crate::session::changed_runs;
 
 /// Displacement of lights that move, as a share of the scene's diagonal.
 pub const LIGHT_STEP: f32 = 0.01;
@@ -39,6 +40,13 @@ pub struct HostFrame {
     pub measuring: f64,
     /// Lines that differ after changes.
     pub changes: Vec<Changed>,
+}
+
+impl HostFrame {
+    /// Seconds of all its work.
+    pub fn seconds(&self) -> f64 {
+        self.tracing + self.building + self.measuring
+    }
 }
 
 /// Change of a scene's light between two frames.
@@ -96,11 +104,7 @@ impl<'a> HostBench<'a> {
         settings: &RenderSettings,
         changes: &[Change],
     ) -> Result<HostFrame, StudyError> {
-        let path = self.scenes.join(file);
-        if !path.is_file() {
-            return Err(StudyError::NoScene { scene: file.to_owned(), folder: self.scenes.clone() });
-        }
-        let scene = gltf::load(&path)?;
+        let scene = load_scene(&self.scenes, file)?;
         let threads = self.pool.current_num_threads();
         let key = json!({
             "identity": settings.identity_with(&scene.checksum()), "scene": file, "threads": threads, "changes": changes,
@@ -195,7 +199,6 @@ fn move_lights(scene: &mut Scene) {
 
 /// Bytes of the lines of `after` that `before` lacks or has otherwise.
 fn differing_bytes(before: &CardImage, after: &CardImage) -> u64 {
-    let (before, after) = (before.lines(), after.lines());
-    let differ = (0..after.len()).filter(|&line| before.get(line) != after.get(line)).count();
+    let differ: usize = changed_runs(before.lines(), after.lines()).iter().map(ExactSizeIterator::len).sum();
     (differ * LINE_BYTES) as u64
 }

@@ -175,11 +175,7 @@ impl<'a> Laboratory<'a> {
     /// If the file is missing or cannot be read.
     fn load(&mut self, file: &str) -> Result<&LoadedScene, StudyError> {
         if !self.loaded.contains_key(file) {
-            let path = self.scenes.join(file);
-            if !path.is_file() {
-                return Err(StudyError::NoScene { scene: file.to_owned(), folder: self.scenes.clone() });
-            }
-            let scene = gltf::load(&path)?;
+            let scene = load_scene(&self.scenes, file)?;
             self.add(file, scene);
         }
         Ok(&self.loaded[file])
@@ -288,6 +284,18 @@ fn sharing_images(points: &[Point]) -> Vec<Point> {
         }
     }
     images.into_iter().flat_map(|(_, sharing)| sharing).collect()
+}
+
+/// Loads a scene of the folder `scenes`.
+///
+/// # Errors
+/// If the file is missing or cannot be read.
+pub(super) fn load_scene(scenes: &Path, file: &str) -> Result<Scene, StudyError> {
+    let path = scenes.join(file);
+    if !path.is_file() {
+        return Err(StudyError::NoScene { scene: file.to_owned(), folder: scenes.to_owned() });
+    }
+    Ok(gltf::load(&path)?)
 }
 
 #[cfg(test)]

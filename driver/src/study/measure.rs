@@ -1,6 +1,5 @@
 //! Measurement of a point: work and memory traffic of a sample of a picture's tiles.
 
-use photoncard_firmware::chip::Chip;
 use photoncard_firmware::kind::{ChipKind, Large, Micro, Reference};
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::render::RenderJob;
@@ -13,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::sample::{Chosen, Estimate, SampleRate, choose};
 use crate::emulator::EmulatedKind;
 use crate::emulator::contents::Contents;
-use crate::emulator::direct::{RenderedTile, render_tiles, render_tiles_apart};
+use crate::emulator::direct::{RenderedTile, new_chip, render_tiles, render_tiles_apart};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
 use crate::photon_map::{MappedImage, PhotonMapSize};
@@ -254,10 +253,4 @@ impl Bench<'_> {
             map: PhotonMapSize::of(&self.mapped.image),
         })
     }
-}
-
-/// A new chip. It is built on the stack first: not in a caller's frame, which may be of a thread with a small stack.
-#[inline(never)]
-fn new_chip<K: ChipKind>() -> Box<Chip<K>> {
-    Box::new(Chip::new())
 }

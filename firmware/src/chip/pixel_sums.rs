@@ -3,6 +3,8 @@
 //! Only such a pixel has light that waits: everything else is added when the pixel is completed. The sums lie in a ring,
 //! in runs of one tile each; a run grows while the tile's eye rays are cast, and ends with the tile.
 
+use core::num::NonZeroU32;
+
 use glam::Vec3;
 use photoncard_shared::budget::{MAX_IN_FLIGHT, sums_of_pixel};
 use photoncard_shared::message::FrameParameters;
@@ -30,8 +32,8 @@ impl Run {
     const EMPTY: Self = Self { first: 0, count: 0 };
 
     /// True if the run holds a place of a ring of `places`.
-    fn holds(&self, place: u32, places: u32) -> bool {
-        (place + places - self.first) % places < self.count
+    fn holds(&self, place: u32, places: NonZeroU32) -> bool {
+        (place + places.get() - self.first) % places < self.count
     }
 }
 
@@ -40,9 +42,9 @@ impl<C: Capacity> PixelSums<C> {
         Self { sums: Buffer::EMPTY, runs: [Run::EMPTY; MAX_IN_FLIGHT as usize], end: 0 }
     }
 
-    /// Number of pixels that the ring has room for; at least 1, so that division by it cannot panic.
-    fn places(frame: &FrameParameters) -> u32 {
-        (C::ENTRIES as u32 / sums_of_pixel(frame.layers)).max(1)
+    /// Number of pixels that the ring has room for; at least 1.
+    fn places(frame: &FrameParameters) -> NonZeroU32 {
+        NonZeroU32::new(C::ENTRIES as u32 / sums_of_pixel(frame.layers)).unwrap_or(NonZeroU32::MIN)
     }
 
     /// Begins the run of a tile in flight at the end of all others.
@@ -152,7 +154,7 @@ mod tests {
         for layers in [false, true] {
             let frame = &frame(layers);
             let mut sums = PixelSums::<Entries<24>>::new();
-            let places = PixelSums::<Entries<24>>::places(frame) as u16;
+            let places = PixelSums::<Entries<24>>::places(frame).get() as u16;
             let mut held: [Vec<f32>; 3] = Default::default();
             for step in 0..3000_u32 {
                 let flight = (crate::sampler::hash(step) % 3) as usize;

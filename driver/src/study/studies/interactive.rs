@@ -32,7 +32,7 @@ const SAMPLE: SampleRate = match SampleRate::new(1, 16) {
     None => SampleRate::ALL,
 };
 /// Minimum number of these tiles.
-const LEAST_TILES: usize = 4;
+const MIN_TILES: usize = 4;
 
 /// A frame of one scene and number of photons: its scale and its names.
 struct Frame {
@@ -51,7 +51,7 @@ impl Frame {
                 let scale = Scale {
                     photons: factor * scale.photons,
                     sample: SAMPLE,
-                    least_tiles: LEAST_TILES,
+                    least_tiles: MIN_TILES,
                     ..scale.clone()
                 };
                 Self { scale, file, scene, is_first: factor == PHOTONS[0] }
@@ -211,7 +211,7 @@ fn host_work(measured: &[(&Frame, &HostFrame)]) -> Table {
 
 /// Threads of this host for [`RATE`] frames a second, if its work is spread over them without loss.
 fn threads_needed(host: &HostFrame) -> u64 {
-    (RATE * host.threads as f64 * (host.tracing + host.building + host.measuring)).ceil() as u64
+    (RATE * host.threads as f64 * host.seconds()).ceil() as u64
 }
 
 fn uploads(measured: &[(&Frame, &HostFrame)]) -> Table {
@@ -364,8 +364,7 @@ fn demands(measured: &[(&Frame, &HostFrame)], results: &Results) -> Table {
         let demand = Demand::new(frame, results);
         let rate = |copies: u64| RATE * copies as f64 * host.map.bytes as f64 / 1e9;
         let threads = threads_needed(host);
-        let host_seconds =
-            host.threads as f64 * (host.tracing + host.building + host.measuring) / threads.max(1) as f64;
+        let host_seconds = host.threads as f64 * host.seconds() / threads.max(1) as f64;
         let sent = upload(Distribution::Tree, host.map.bytes, demand.chips);
         let latency = host_seconds + sent + demand.chip_seconds / demand.chips as f64 + demand.back;
         table.push(vec![
