@@ -198,3 +198,6 @@ def balustrades(surfaces):
     for name, low, high, half in (("rail", 0.68, 0.80, 0.10), ("foot", 0.0, 0.10, 0.08)):
         rail = box(name, (-1.35, -half, low), (1.35, half, high), surfaces["marble"], 0.02, 3)
         copies(rail, bays(UPPER), empty(f"{name}s"))
+
+
+PARTS = (shell, rings, columns, arcades, vaults, balustrades)

@@ -2,7 +2,8 @@
 
     courtyard.py SCENE.glb [--plain]
 
-With --plain no material but the leaves' has images. Prints the triangles of the file, which are between 250,000 and 280,000. See tests/peers/courtyard.sh.
+With --plain no material but the leaves' has images. Prints the triangles of the file, which are between 250,000 and 280,000. See
+tests/peers/courtyard.sh.
 """
 
 import argparse
@@ -38,9 +39,7 @@ def main():
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     bpy.ops.wm.read_factory_settings(use_empty=True)
     surfaces = textures.all_materials()
-    for part in (building.shell, building.rings, building.columns, building.arcades, building.vaults, building.balustrades):
-        part(surfaces)
-    for part in (furnishing.cloths, furnishing.vases, furnishing.ivy, furnishing.lanterns, furnishing.doors, furnishing.reliefs):
+    for part in (*building.PARTS, *furnishing.PARTS):
         part(surfaces)
     lights()
     if arguments.plain:

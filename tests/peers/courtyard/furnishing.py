@@ -162,3 +162,6 @@ def reliefs(surfaces):
     lion = grid("relief", np.dstack([1.15 * u, -0.55 * depth, 1.15 * v]), surfaces["marble"])
     lion.parent = empty("relief", (x, 0.0, 1.9), -HALF_TURN / 2)
     add("relief", lion.data).parent = empty("mirrored relief", (-x, 0.0, 1.9), -HALF_TURN / 2, (1.0, -1.0, 1.0))
+
+
+PARTS = (cloths, vases, ivy, lanterns, doors, reliefs)
