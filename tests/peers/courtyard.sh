@@ -25,9 +25,18 @@ folder=$target/peers/courtyard
 make_cycles_environment "$target/peers/cycles"
 python=$target/peers/cycles/bin/python
 mkdir -p "$folder"
-# Blender's exporter reports there too.
-"$python" tests/peers/courtyard/courtyard.py "$folder/courtyard.glb" 2>"$folder/courtyard.log"
-"$python" tests/peers/courtyard/courtyard.py "$folder/courtyard-plain.glb" --plain 2>"$folder/courtyard-plain.log"
+
+# Makes a scene. Blender's exporter reports on the standard error at length.
+model() {
+    local file=$folder/$1.glb log=$folder/$1.log
+    "$python" tests/peers/courtyard/courtyard.py "$file" "${@:2}" 2>"$log" || {
+        cat "$log" >&2
+        exit 1
+    }
+}
+
+model courtyard
+model courtyard-plain --plain
 sky="--environment 0.8,1.1,1.6"
 exec "$python" tests/peers/courtyard/measure.py --photoncard "$photoncard" --folder "$folder/sweeps" "$@" \
     --scenes "$folder/courtyard.glb,$sky" "$folder/courtyard-plain.glb,$sky" scenes/atrium.glb
