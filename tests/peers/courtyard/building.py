@@ -16,9 +16,9 @@ ARCH = 1.2
 HALF_TURN = math.pi
 
 
-def places(height, inset=0.0):
-    """Places of columns without the corners, and their angles; further inwards by an inset."""
-    x, y = COURT[0] - inset, COURT[1] - inset
+def places(height):
+    """Places of columns without the corners, and their angles."""
+    x, y = COURT
     along, across = np.arange(-7.5, 7.6, BAY), np.arange(-1.5, 1.6, BAY)
     return (
         [((a, -y, height), 0.0) for a in along]

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from building import COURT, GALLERY, HALF_TURN, OUTER, SPRING, UPPER, grid
+from building import COURT, GALLERY, HALF_TURN, OUTER, UPPER, grid
 from parts import add, bake, body, box, copies, empty, join, modify, project, rod, turned
 
 
