@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use photoncard_driver::choice::Choice;
+use photoncard_driver::cost_model::Machine;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::render::{Unobserved, render};
@@ -252,6 +253,7 @@ fn sweep_options(out: &Path) -> SweepOptions {
         scene: gltf::load(&scenes().join("cornell.gltf")).unwrap(),
         out: out.to_owned(),
         threads: Some(2),
+        machine: Machine::NOMINAL,
         provenance: Provenance::here("photoncard study sweep"),
     }
 }
@@ -297,6 +299,31 @@ fn a_sweep_is_measured_like_a_study_and_goes_on_where_it_stopped() {
     let again = Counting::up_to(usize::MAX);
     run_sweep(sweep_options(folder.path()), &again).unwrap();
     assert_eq!(again.measured(), 0);
+}
+
+/// Seconds of memory and of arithmetic, the last two columns of a sweep's points.
+fn seconds(path: &Path) -> [Vec<f64>; 2] {
+    [2, 1].map(|from_end| rows(path).iter().map(|row| row[row.len() - from_end].parse().unwrap()).collect())
+}
+
+#[test]
+fn another_machine_changes_times_of_the_points_that_are_measured_already() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("points.csv");
+    let run_on = |machine| {
+        let observer = Counting::up_to(usize::MAX);
+        run_sweep(SweepOptions { machine, ..sweep_options(folder.path()) }, &observer).unwrap();
+        (observer.measured(), seconds(&path))
+    };
+    let Machine { bandwidth, flops, .. } = Machine::NOMINAL;
+    let (measured, [memory, arithmetic]) = run_on(Machine::NOMINAL);
+    let (again, [half_memory, double_arithmetic]) =
+        run_on(Machine { bandwidth: 2.0 * bandwidth, flops: 0.5 * flops, ..Machine::NOMINAL });
+    assert_eq!((measured, again), (4, 0));
+    assert_eq!(memory, half_memory.iter().map(|seconds| 2.0 * seconds).collect::<Vec<_>>());
+    assert_eq!(arithmetic, double_arithmetic.iter().map(|seconds| 0.5 * seconds).collect::<Vec<_>>());
+    let page = fs::read_to_string(folder.path().join("index.html")).unwrap();
+    assert!(page.contains("180 GB/s and 250 GFLOPS, reads of 100 ns, 128 tasks in flight"), "the provenance");
 }
 
 #[test]

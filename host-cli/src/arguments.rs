@@ -5,6 +5,7 @@ mod choice;
 mod files;
 mod integrator;
 mod lights;
+mod machine;
 mod outputs;
 mod photons;
 mod picture;

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use photoncard_driver::cost_model::Machine;
 use photoncard_driver::study::report::Provenance;
 use photoncard_driver::study::{Scale, StudyError, StudyObserver, StudyOptions, run as study, run_sweep};
 
@@ -28,17 +29,23 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
             let options = sweep::options(sweep, Provenance::here(&command_line()))?;
             observed(sweep.output.quiet, |progress| run_sweep(options, progress).map_err(failure))
         }
-        StudyArguments { own: None, name: Some(name), output: Some(output), quick, scenes } => {
-            run_shipped(*name, output, *quick, scenes)
+        StudyArguments { own: None, name: Some(name), output: Some(output), quick, scenes, machine } => {
+            run_shipped(*name, output, *quick, scenes, machine.machine())
         }
         _ => unreachable!("name and output are required without a command"),
     }
 }
 
-fn run_shipped(name: Selection, output: &StudyOutput, quick: bool, scenes: &Path) -> Result<(), Failure> {
+fn run_shipped(
+    name: Selection,
+    output: &StudyOutput,
+    quick: bool,
+    scenes: &Path,
+    machine: Machine,
+) -> Result<(), Failure> {
     let options = StudyOptions {
         studies: name.studies(),
-        scale: if quick { Scale::QUICK } else { Scale::FULL }.with_sample(output.sample),
+        scale: if quick { Scale::QUICK } else { Scale::FULL }.with_sample(output.sample).on(machine),
         scenes: scenes.to_owned(),
         out: output.out.clone(),
         is_collection: name.is_collection(),

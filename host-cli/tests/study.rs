@@ -23,6 +23,9 @@ fn wrong_arguments_are_told_with_a_remedy() {
         refused(&["scaling", "--out", "out", "--sample", sample], &[sample, "1/17"]);
     }
     refused(&["scaling", "--out", "out", "--threads", "0"], &["threads"]);
+    for (option, value) in [("--bandwidth", "0"), ("--flops", "x"), ("--latency", "-1"), ("--tasks", "0")] {
+        refused(&["interactive", "--out", "out", option, value], &[option, value, "use a number from"]);
+    }
     refused(&["scaling", "--out", "out"], &["cornell.gltf", "scenes", "--scenes"]);
     refused(&["scaling", "--out", "out", "--scenes", "nowhere"], &["cornell.gltf", "nowhere", "--scenes"]);
     refused(&["scaling", "--out", "taken"], &["taken", "--out"]);
@@ -104,9 +107,12 @@ fn a_sweep_measures_every_combination_of_a_scene_of_ones_own() {
     // Two orders and materials of four are finished.
     let more = ["--cache", "photon=1K/128/4", "--cache", "unified=2K/128/4", "--vary", "order=sort"];
     let set = ["--vary", "set=floor.diffuse=0.2"];
-    let outcome = room.run(&[&["study"], &SWEEP[..], &more, &set].concat());
+    let machine = ["--bandwidth", "12.5", "--flops", "80"];
+    let outcome = room.run(&[&["study"], &SWEEP[..], &more, &set, &machine].concat());
     assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
     assert_eq!(points(), 5);
+    let page = String::from_utf8(room.read("out/index.html")).unwrap();
+    assert!(page.contains("12.5 GB/s and 80 GFLOPS, reads of 100 ns, 128 tasks in flight"), "the provenance");
 }
 
 /// Requests of a sweep of all tiles are those of a render with counters.

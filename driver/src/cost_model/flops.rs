@@ -1,11 +1,12 @@
-//! Floating-point operations of a frame whose work was counted.
+//! Floating-point operations of a frame by Table 7.1: counted work at the table's constants.
 
 use photoncard_shared::counters::Counters;
 use serde::Serialize;
 
 use super::{Cost, Symbols, Workload};
 
-/// Floating-point operations of each unit of the chip, on all chips together.
+/// Floating-point operations of each unit of the chip, on all chips together, by the constants of Table 7.1. Those that the firmware does are
+/// [`Arithmetic`](super::arithmetic::Arithmetic).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Flops {
     /// All rays.
@@ -17,8 +18,8 @@ pub struct Flops {
 }
 
 impl Flops {
-    /// Operations of counted work with `gather_rays` gather rays a sample, each piece at its nominal cost.
-    pub fn counted(counters: &Counters, gather_rays: u32) -> Self {
+    /// Operations of counted work with `gather_rays` gather rays a sample, each piece at the table's cost.
+    pub fn by_table(counters: &Counters, gather_rays: u32) -> Self {
         let symbols = Symbols { gather_rays: f64::from(gather_rays), ..Symbols::NOMINAL };
         let cost = Cost::new(&Workload::counted(counters), &symbols);
         Self {

@@ -1,5 +1,7 @@
 //! Predicted speed of a machine: tiles and frames a second, and chips for a frame rate, from a frame's cost.
 
+use std::fmt;
+
 use super::{Cost, Workload};
 
 /// Capacity of one chip, and of the host's link that all chips share.
@@ -11,12 +13,30 @@ pub struct Machine {
     pub flops: f64,
     /// Bandwidth of the host's link, bytes/s each way.
     pub link: f64,
+    /// Latency of a read from DRAM, seconds, without the line's time on the bus.
+    pub latency: f64,
+    /// Maximum number of tasks in flight of each unit of a chip, rays or gathers.
+    pub tasks: u32,
 }
 
 impl Machine {
     /// The chip that section 7.1 expects of 2010: 90 GB/s and 500 GFLOPS. The link is this project's choice: 4 GB/s each
-    /// way, the sixteen lanes of PCI Express 1.x in a workstation of 2007.
-    pub const NOMINAL: Self = Self { bandwidth: 90e9, flops: 500e9, link: 4e9 };
+    /// way, the sixteen lanes of PCI Express 1.x in a workstation of 2007. So are 100 ns, a read from DRAM of any year, and 128 tasks.
+    pub const NOMINAL: Self = Self { bandwidth: 90e9, flops: 500e9, link: 4e9, latency: 100e-9, tasks: 128 };
+}
+
+impl Machine {
+    /// Latency of a read in nanoseconds, to a thousandth of one.
+    pub fn latency_ns(&self) -> f64 {
+        (self.latency * 1e12).round() / 1e3
+    }
+}
+
+/// Bandwidth and arithmetic of a chip, in words.
+impl fmt::Display for Machine {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{} GB/s and {} GFLOPS", self.bandwidth / 1e9, self.flops / 1e9)
+    }
 }
 
 /// Resource that limits a machine's frame rate.
@@ -160,8 +180,9 @@ mod tests {
     fn the_binding_resource_is_the_scarcest() {
         let workload = Workload { tiles: 10.0, bytes_to_host: 100.0, ..Workload::default() };
         let cost = Cost { gather_unit: UnitCost { flops: 1000.0, dram_bytes: 50.0 }, ..Cost::default() };
-        let on =
-            |bandwidth, flops, link| Prediction::new(&workload, &cost, &Machine { bandwidth, flops, link });
+        let on = |bandwidth, flops, link| {
+            Prediction::new(&workload, &cost, &Machine { bandwidth, flops, link, ..Machine::NOMINAL })
+        };
         let prediction = on(50.0, 2000.0, 450.0);
         assert_eq!(
             [prediction.bandwidth_tiles_per_second, prediction.computation_tiles_per_second],

@@ -71,7 +71,7 @@ pub struct Statistics {
     pub drains: u64,
     /// Maximum number of gathers that waited at once on any chip.
     pub most_waiting: u64,
-    /// Floating-point operations of the work by the cost model of `docs/scaling.md`, without lookups of irradiance.
+    /// Floating-point operations of the counted work by the constants of Table 7.1 (`docs/scaling.md`), without lookups of irradiance.
     pub flops: Flops,
     /// Bytes of the card image.
     pub image_bytes: u64,
@@ -132,7 +132,7 @@ impl Statistics {
             points_tested: counters.points_tested,
             drains: counters.drains,
             most_waiting: counters.most_waiting,
-            flops: Flops::counted(counters, frame.gather_rays),
+            flops: Flops::by_table(counters, frame.gather_rays),
             image_bytes: prepared.image.bytes(),
             link: LinkStatistics::new(&outcome.links),
             memory: settings.modelled_caches().zip(outcome.traffic.as_ref()).map(MemoryStatistics::new),

@@ -35,8 +35,10 @@ pub use self::quality::{Quality, Reference, TileError};
 use self::report::{Provenance, Report};
 pub use self::sample::{Estimate, SampleRate, choose};
 pub use self::scale::Scale;
+use self::scale::machine_row;
 pub use self::studies::{Study, Sweep};
 use crate::choice::Choice;
+use crate::cost_model::Machine;
 use crate::scene::Scene;
 
 /// Options of [`run`]: the studies, their scale, and the folders they read and write.
@@ -96,6 +98,8 @@ pub struct SweepOptions {
     pub out: PathBuf,
     /// Number of threads; `None` for one per core.
     pub threads: Option<usize>,
+    /// The machine of the report's times.
+    pub machine: Machine,
     /// Provenance of the numbers; the report adds its settings.
     pub provenance: Provenance,
 }
@@ -105,7 +109,7 @@ pub struct SweepOptions {
 /// # Errors
 /// If a point is not possible or cannot be measured, a file cannot be written, or the observer stops the sweep.
 pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
-    let SweepOptions { sweep, name, scene, out, threads, mut provenance } = options;
+    let SweepOptions { sweep, name, scene, out, threads, machine, mut provenance } = options;
     for point in sweep.points() {
         point.check()?;
         point.settings.camera(&scene)?;
@@ -116,7 +120,8 @@ pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<
     laboratory.add(&name, scene);
     let results = laboratory.measure("sweep", sweep.points())?;
     provenance.settings.extend(sweep.rows());
-    Ok(report::write(&out, &Report { provenance, ..sweep.report(&name, &results) })?)
+    provenance.settings.push(machine_row(&machine));
+    Ok(report::write(&out, &Report { provenance, ..sweep.report(&name, &results, &machine) })?)
 }
 
 fn folder(options: &StudyOptions, study: Study) -> PathBuf {

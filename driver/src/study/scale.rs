@@ -5,6 +5,7 @@ use photoncard_firmware::kind::REFERENCE;
 use super::point::{Point, Task};
 use super::sample::SampleRate;
 use crate::choice::Choice;
+use crate::cost_model::Machine;
 use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::photon_map::PhotonLayout;
@@ -39,6 +40,8 @@ pub struct Scale {
     pub reference_rays: u32,
     /// True if studies vary their settings over fewer values: [`Self::pick`].
     pub is_quick: bool,
+    /// The machine of times and numbers of chips.
+    pub machine: Machine,
 }
 
 impl Scale {
@@ -54,6 +57,7 @@ impl Scale {
         quality_tiles: 48,
         reference_rays: 1600,
         is_quick: false,
+        machine: Machine::NOMINAL,
     };
     /// A small picture and fewer values, as a trial of the whole.
     pub const QUICK: Self = Self {
@@ -67,6 +71,7 @@ impl Scale {
         quality_tiles: 8,
         reference_rays: 400,
         is_quick: true,
+        machine: Machine::NOMINAL,
     };
 
     /// True if all points share the settings of the dissertation's nominal frame. Only figures of such a scale may stand beside
@@ -93,6 +98,11 @@ impl Scale {
     /// This scale with another share of the tiles.
     pub fn with_sample(self, sample: SampleRate) -> Self {
         Self { sample, ..self }
+    }
+
+    /// This scale with times and numbers of chips by another machine. No point depends on it.
+    pub fn on(self, machine: Machine) -> Self {
+        Self { machine, ..self }
     }
 
     /// The values that a study varies a setting over: `quick` if [`Self::is_quick`], else `full`.
@@ -175,7 +185,7 @@ impl Scale {
     /// Settings that all points share, as names and values for a report's provenance.
     pub fn rows(&self) -> Vec<(String, String)> {
         let settings = self.settings(GatherOrder::Sort);
-        [
+        let rows = [
             (
                 "picture",
                 format!("{0}x{0} pixels, 1 sample each, seed {1}", self.side, settings.integrator.seed),
@@ -193,8 +203,8 @@ impl Scale {
             ("caches at a tile's begin", "empty".to_owned()),
             ("tiles in flight, unless said otherwise", "1".to_owned()),
         ]
-        .map(|(name, value)| (name.to_owned(), value))
-        .to_vec()
+        .map(|(name, value)| (name.to_owned(), value));
+        rows.into_iter().chain([machine_row(&self.machine)]).collect()
     }
 
     /// Gathers of a frame in which every gather ray of every pixel ends in one, `side^2 N_FG`: 26.2 million at the
@@ -202,6 +212,17 @@ impl Scale {
     pub fn nominal_gathers(&self) -> f64 {
         f64::from(self.side) * f64::from(self.side) * f64::from(self.gather_rays)
     }
+}
+
+/// Machine of a report's times and numbers of chips, as a name and a value for its provenance.
+pub(super) fn machine_row(machine: &Machine) -> (String, String) {
+    let Machine { link, tasks, .. } = machine;
+    let value = format!(
+        "{machine}, reads of {} ns, {tasks} tasks in flight of each unit; host link of {} GB/s each way",
+        machine.latency_ns(),
+        link / 1e9
+    );
+    ("chip that times are of".to_owned(), value)
 }
 
 /// The dissertation's error bound of the irradiance cache, as figure 6.17 seems to state it.

@@ -8,6 +8,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::study::Study;
 
 use super::choice::possible_value;
+use super::machine::MachineOptions;
 use super::study_output::StudyOutput;
 use super::sweep::SweepArguments;
 
@@ -29,6 +30,9 @@ pub(crate) struct StudyArguments {
     pub(crate) scenes: PathBuf,
     #[command(flatten)]
     pub(crate) output: Option<StudyOutput>,
+    // Not in the output: an optional group cannot hold another.
+    #[command(flatten)]
+    pub(crate) machine: MachineOptions,
 }
 
 #[derive(Subcommand)]

@@ -10,6 +10,7 @@ use photoncard_driver::study::{Axis, MAX_POINTS, Point, Scale, Task};
 
 use super::choice::choice;
 use super::integrator::IntegratorOptions;
+use super::machine::MachineOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
 use super::scene::SceneOptions;
@@ -32,6 +33,8 @@ pub(crate) struct SweepArguments {
     pub(crate) vary: Vec<Axis>,
     #[command(flatten)]
     pub(crate) output: StudyOutput,
+    #[command(flatten)]
+    pub(crate) machine: MachineOptions,
     #[command(flatten)]
     settings: SweepSettings,
 }

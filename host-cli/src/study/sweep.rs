@@ -10,7 +10,9 @@ use photoncard_driver::scene::Scene;
 use photoncard_driver::study::report::Provenance;
 use photoncard_driver::study::{AxisError, Point, Sweep, SweepOptions, Task};
 
-use crate::arguments::{Arguments, CACHE, Command, StudyArguments, StudyCommand, SweepArguments};
+use crate::arguments::{
+    Arguments, CACHE, Command, StudyArguments, StudyCommand, StudyOutput, SweepArguments,
+};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::input;
@@ -36,8 +38,9 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     let mut settings: Vec<_> = inputs.map(|(name, value)| (name, value.to_string())).collect();
     settings.push(("scene-checksum".to_owned(), scene.checksum()));
     let provenance = Provenance { settings, ..provenance };
-    let (out, threads) = (arguments.output.out.clone(), arguments.output.threads);
-    Ok(SweepOptions { sweep, name, scene, out, threads, provenance })
+    let StudyOutput { out, threads, .. } = &arguments.output;
+    let (out, threads, machine) = (out.clone(), *threads, arguments.machine.machine());
+    Ok(SweepOptions { sweep, name, scene, out, threads, machine, provenance })
 }
 
 /// Point of the arguments with values replaced. The picture has the camera's aspect ratio, if no size is given.

@@ -8,6 +8,10 @@ use super::number;
 /// Significant digits of a measured value, and of its half-width, in HTML.
 const DIGITS: usize = 4;
 const HALF_WIDTH_DIGITS: usize = 2;
+/// Maximum number of characters of a text that stays on one line in HTML.
+const MAX_NAME: usize = 40;
+/// Class of numbers in HTML.
+const NUMBER: &str = "number";
 
 /// A titled table with one unit per column.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,6 +70,15 @@ impl Cell {
 
     fn is_text(&self) -> bool {
         matches!(self, Self::Text(_))
+    }
+
+    /// Class of the entry in HTML: numbers and names stay on one line.
+    fn class(&self) -> &'static str {
+        match self {
+            Self::Text(text) if text.chars().count() > MAX_NAME => "text",
+            Self::Text(_) => "name",
+            _ => NUMBER,
+        }
     }
 
     /// Text of the entry in CSV, before quoting: numbers in full precision.
@@ -196,14 +209,14 @@ impl Table {
                 "" => String::new(),
                 unit => format!(" <span class=\"unit\">({})</span>", escape(unit)),
             };
-            let class = class(self.is_numeric(index));
+            let class = if self.is_numeric(index) { format!(" class=\"{NUMBER}\"") } else { String::new() };
             let _ = write!(html, "<th scope=\"col\"{class}>{}{unit}</th>", escape(&column.name));
         }
         html.push_str("</tr></thead>\n<tbody>\n");
         for row in &self.rows {
             html.push_str("<tr>");
             for cell in row {
-                let _ = write!(html, "<td{}>{}</td>", class(!cell.is_text()), cell.html());
+                let _ = write!(html, "<td class=\"{}\">{}</td>", cell.class(), cell.html());
             }
             html.push_str("</tr>\n");
         }
@@ -218,10 +231,6 @@ impl Table {
     fn is_numeric(&self, column: usize) -> bool {
         !self.rows.is_empty() && self.rows.iter().all(|row| !row[column].is_text())
     }
-}
-
-fn class(is_number: bool) -> &'static str {
-    if is_number { " class=\"number\"" } else { "" }
 }
 
 fn csv_record(fields: &[String]) -> String {
@@ -306,6 +315,7 @@ mod tests {
         let cells: Vec<_> = elements.iter().filter(|element| element.tag == "td").collect();
         assert_eq!(cells[0].text, "a\r\nb \"c\", <d> & 'e'");
         assert_eq!((cells[1].text.as_str(), cells[1].get("class")), ("0.3333 ± 0.013", Some("number")));
+        assert_eq!(cells[0].get("class"), Some("name"));
         assert_eq!(cells[2].text, "12,345,678");
         assert_eq!(cells[4].text, "n/a");
         assert_eq!(cells[5].text, "−7");

@@ -9,9 +9,9 @@ use super::super::sample::SampleRate;
 use super::super::scale::Scale;
 use super::arithmetic;
 use super::balance::chip_counts;
-use super::present::{columns, how_it_counts, page, panel, plot, section, series, table, text};
+use super::present::{columns, how_it_counts, page, panel, plot, say, section, series, table, text};
 use super::scenes::SCENES;
-use super::times::frame_seconds;
+use super::times;
 use super::workload::{self, of_frame};
 use crate::cost_model::{Cost, Distribution, Machine, Prediction, Symbols};
 use crate::render::RenderSettings;
@@ -70,7 +70,7 @@ impl Frame {
     }
 
     fn name(&self) -> String {
-        format!("{}, {} photons", self.scene, self.scale.photons)
+        format!("{}, {} million photons", self.scene, say(self.scale.photons as f64 / 1e6))
     }
 
     /// Changes that are measured.
@@ -111,34 +111,40 @@ impl Demand {
         let symbols = workload::symbols_of(&frame.settings(), measured);
         let workload = of_frame(measured, symbols.pixels(), &symbols);
         let cost = Cost::counted(&workload, &arithmetic::of_frame(measured, &symbols));
-        let needed = Prediction::new(&workload, &cost, &Machine::NOMINAL).chips_needed(RATE);
+        let machine = &frame.scale.machine;
+        let needed = Prediction::new(&workload, &cost, machine).chips_needed(RATE);
         Self {
-            chip_seconds: frame_seconds(measured, &symbols),
+            chip_seconds: times::frame_seconds(&frame.point(), measured, machine),
             chips: needed.bandwidth.max(needed.computation),
-            back: frame.picture_bytes() / Machine::NOMINAL.link,
+            back: frame.picture_bytes() / machine.link,
         }
     }
 }
 
 /// Seconds of an upload of `bytes` to all chips.
-fn upload(way: Distribution, bytes: u64, chips: u64) -> f64 {
-    way.seconds(bytes as f64, chips, &Symbols::NOMINAL, &Machine::NOMINAL)
+fn upload(way: Distribution, bytes: u64, chips: u64, machine: &Machine) -> f64 {
+    way.seconds(bytes as f64, chips, &Symbols::NOMINAL, machine)
 }
 
 pub(super) fn report(scale: &Scale, results: &Results, host: &[HostFrame]) -> Report {
     let frames = Frame::all(scale);
+    let machine = scale.machine;
     let measured: Vec<(&Frame, &HostFrame)> = frames.iter().zip(host).collect();
     let introduction = vec![
         "What a frame takes of host, host link and chips while the camera moves, while all photons are traced anew, and while a \
          share of them is. All techniques on."
             .to_owned(),
         how_it_counts(),
-        "Sources of the times. Measured on this host: tracing photons, building the map (with hierarchy and image) and measuring \
-         (maximum distance of gathers, disc fractions), on the threads stated. By the cost model: uploads over a host link of 4 GB/s \
-         each way, a copy to each chip or once through a tree of switches that broadcast; pixels back to the host; chips of 90 GB/s \
-         and 500 GFLOPS by counted arithmetic, and one chip's time with reads of 100 ns, 128 in flight. Parts overlap from frame to \
-         frame: the slowest one sets the rate, their sum the latency."
-            .to_owned(),
+        format!(
+            "Sources of the times. Measured on this host: tracing photons, building the map (with hierarchy and image) and measuring \
+             (maximum distance of gathers, disc fractions), on the threads stated. By the cost model: uploads over a host link of {} \
+             GB/s each way, a copy to each chip or once through a tree of switches that broadcast; pixels back to the host; chips of \
+             {machine} by counted arithmetic, and one chip's time with reads of {} ns, {} in flight, nothing cast while the queue of \
+             gathers drains. Parts overlap from frame to frame: the slowest one sets the rate, their sum the latency.",
+            machine.link / 1e9,
+            machine.latency_ns(),
+            machine.tasks,
+        ),
     ];
     let sections = vec![
         section(
@@ -153,7 +159,7 @@ pub(super) fn report(scale: &Scale, results: &Results, host: &[HostFrame]) -> Re
             vec![table("host", host_work(&measured)), table("upload", uploads(&measured))],
         ),
         section("Lines that change", changed_lines(&measured)),
-        section("Photons that fit in a frame", fitting(&measured)),
+        section("Photons that fit in a frame", fitting(&measured, &machine)),
         section("What 30 frames/s take with both moving", vec![table("demand", demands(&measured, results))]),
     ];
     page("Interactive frames", introduction, sections)
@@ -228,8 +234,8 @@ fn uploads(measured: &[(&Frame, &HostFrame)]) -> Table {
                 (bytes as f64 / 1e6).into(),
                 chips.into(),
                 (chips as f64 * bytes as f64 / 1e6).into(),
-                (1e3 * upload(Distribution::Separate, bytes, chips)).into(),
-                (1e3 * upload(Distribution::Tree, bytes, chips)).into(),
+                (1e3 * upload(Distribution::Separate, bytes, chips, &frame.scale.machine)).into(),
+                (1e3 * upload(Distribution::Tree, bytes, chips, &frame.scale.machine)).into(),
                 (RATE * chips as f64 * bytes as f64 / 1e9).into(),
                 (RATE * bytes as f64 / 1e9).into(),
             ]);
@@ -285,14 +291,14 @@ fn changed_lines(measured: &[(&Frame, &HostFrame)]) -> Vec<Block> {
 }
 
 /// Share of the photons whose lines all chips receive in a frame, if as large a share of the map's lines changes.
-fn fitting_share(way: Distribution, host: &HostFrame, chips: u64) -> f64 {
-    let bytes = way.bytes_within(1.0 / RATE, chips, &Symbols::NOMINAL, &Machine::NOMINAL);
+fn fitting_share(way: Distribution, host: &HostFrame, chips: u64, machine: &Machine) -> f64 {
+    let bytes = way.bytes_within(1.0 / RATE, chips, &Symbols::NOMINAL, machine);
     (bytes / host.map.bytes.max(1) as f64).min(1.0)
 }
 
 /// Maximum measured share of the photons whose changed lines all chips receive in a frame; 0 if none fits.
-fn fitting_measured(way: Distribution, host: &HostFrame, chips: u64) -> f64 {
-    let fits = |bytes| upload(way, bytes, chips) <= 1.0 / RATE;
+fn fitting_measured(way: Distribution, host: &HostFrame, chips: u64, machine: &Machine) -> f64 {
+    let fits = |bytes| upload(way, bytes, chips, machine) <= 1.0 / RATE;
     let shares = host.changes.iter().filter_map(|changed| match changed.change {
         Change::Replaced(share) if fits(changed.bytes) => Some(share),
         _ => None,
@@ -300,7 +306,8 @@ fn fitting_measured(way: Distribution, host: &HostFrame, chips: u64) -> f64 {
     shares.fold(0.0, f64::max)
 }
 
-fn fitting(measured: &[(&Frame, &HostFrame)]) -> Vec<Block> {
+fn fitting(measured: &[(&Frame, &HostFrame)], machine: &Machine) -> Vec<Block> {
+    let over = format!("at 30 frames/s over {} GB/s", machine.link / 1e9);
     let heads = [
         ("frame", ""),
         ("chips", ""),
@@ -309,21 +316,22 @@ fn fitting(measured: &[(&Frame, &HostFrame)]) -> Vec<Block> {
         ("separately, by counted lines", "%"),
         ("by the tree, by counted lines", "%"),
     ];
-    let mut rows =
-        Table::new("Photons that can be replaced in a frame at 30 frames/s over 4 GB/s", columns(&heads));
+    let title = format!("Photons that can be replaced in a frame {over}");
+    let mut rows = Table::new(title, columns(&heads));
     let mut panels = Vec::new();
     for (frame, host) in measured {
         for chips in CHIPS {
             let mut row = vec![frame.name().into(), chips.into()];
             let ways = [Distribution::Separate, Distribution::Tree];
-            row.extend(ways.map(|way| (100.0 * fitting_share(way, host, chips)).into()));
-            let counted = ways.map(|way| frame.is_first.then(|| 100.0 * fitting_measured(way, host, chips)));
+            row.extend(ways.map(|way| (100.0 * fitting_share(way, host, chips, machine)).into()));
+            let counted =
+                ways.map(|way| frame.is_first.then(|| 100.0 * fitting_measured(way, host, chips, machine)));
             row.extend(counted.map(report::Cell::from));
             rows.push(row);
         }
         let line = |(name, way)| {
             let points = chip_counts(MAX_CHIPS).into_iter().map(|chips| {
-                report::Point::new(chips as f64, 100.0 * fitting_share(way, host, chips as u64))
+                report::Point::new(chips as f64, 100.0 * fitting_share(way, host, chips as u64, machine))
             });
             series(name, points.collect())
         };
@@ -341,7 +349,7 @@ fn fitting(measured: &[(&Frame, &HostFrame)]) -> Vec<Block> {
         plot(
             "replaced-photons",
             "Photons that can be replaced in a frame",
-            "At 30 frames/s over 4 GB/s, lines in proportion.",
+            &format!("Lines in proportion, {over}."),
             panels,
         ),
         table("replaced-photons", rows),
@@ -365,7 +373,7 @@ fn demands(measured: &[(&Frame, &HostFrame)], results: &Results) -> Table {
         let rate = |copies: u64| RATE * copies as f64 * host.map.bytes as f64 / 1e9;
         let threads = threads_needed(host);
         let host_seconds = host.threads as f64 * host.seconds() / threads.max(1) as f64;
-        let sent = upload(Distribution::Tree, host.map.bytes, demand.chips);
+        let sent = upload(Distribution::Tree, host.map.bytes, demand.chips, &frame.scale.machine);
         let latency = host_seconds + sent + demand.chip_seconds / demand.chips as f64 + demand.back;
         table.push(vec![
             frame.name().into(),

@@ -28,18 +28,20 @@ struct Frame {
     counted: Option<(Arithmetic, Cost)>,
     /// The photon map.
     map: PhotonMapSize,
+    /// The machine that renders it.
+    machine: Machine,
 }
 
 impl Frame {
     /// Prediction by Table 7.1's constants.
     fn nominal_prediction(&self) -> Prediction {
-        Prediction::new(&self.workload, &self.cost, &Machine::NOMINAL)
+        Prediction::new(&self.workload, &self.cost, &self.machine)
     }
 
     /// Prediction by counted arithmetic, or by the constants of the table's own frames.
     fn prediction(&self) -> Prediction {
         let cost = self.counted.as_ref().map_or(&self.cost, |(_, cost)| cost);
-        Prediction::new(&self.workload, cost, &Machine::NOMINAL)
+        Prediction::new(&self.workload, cost, &self.machine)
     }
 
     fn counted(&self) -> Option<CountedFrame<'_>> {
@@ -74,7 +76,7 @@ pub(super) fn symbols(scale: &Scale) -> Symbols {
 }
 
 /// Frames of the table's own counts.
-fn table_frames() -> [Frame; 2] {
+fn table_frames(machine: Machine) -> [Frame; 2] {
     let nominal = Symbols::NOMINAL;
     let (naive_workload, all_workload) = (Workload::naive(&nominal), Workload::nominal(&nominal));
     let map = PhotonMapSize { photons: nominal.photons as u64, bytes: nominal.photon_map_bytes() as u64 };
@@ -85,6 +87,7 @@ fn table_frames() -> [Frame; 2] {
             workload: naive_workload,
             counted: None,
             map,
+            machine,
         },
         Frame {
             name: "table, all techniques".to_owned(),
@@ -92,6 +95,7 @@ fn table_frames() -> [Frame; 2] {
             workload: all_workload,
             counted: None,
             map,
+            machine,
         },
     ]
 }
@@ -100,7 +104,7 @@ fn table_frames() -> [Frame; 2] {
 fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
     let mut frames = Vec::new();
     if scale.is_nominal() {
-        frames.extend(table_frames());
+        frames.extend(table_frames(scale.machine));
     }
     for (scene, name) in SCENES {
         let kinds = [("naive", naive(scale, scene)), ("all techniques", all_on(scale, scene))];
@@ -111,7 +115,14 @@ fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
             let cost = cost(&workload, &symbols, point.settings.schedule.order);
             let arithmetic = arithmetic::of_frame(measured, &symbols);
             let counted = Some((arithmetic, Cost::counted(&workload, &arithmetic)));
-            Frame { name: format!("{name}, {kind}"), workload, cost, counted, map: measured.map }
+            Frame {
+                name: format!("{name}, {kind}"),
+                workload,
+                cost,
+                counted,
+                map: measured.map,
+                machine: scale.machine,
+            }
         }));
     }
     frames
@@ -126,12 +137,15 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
              fill a line)."
         ),
         how_it_counts(),
-        "A chip has 90 GB/s of memory bandwidth and 500 GFLOPS; memory, arithmetic and the host's link (4 GB/s each way) work \
-         at the same time. FLOPs stand in two columns: by the table's constants times measured counts (C_G, the FLOPs of a \
-         gather, is for 100 neighbours); and counted, every addition, multiplication, division, square root and comparison \
-         that the firmware does in one lane of its vectors, lanes without work left out. Additions of photons' power in fixed \
-         point and arithmetic of addresses are not floating point, and not counted."
-            .to_owned(),
+        format!(
+            "A chip has {}; memory, arithmetic and the host's link ({} GB/s each way) work at the same time. FLOPs stand in two \
+             columns: by the table's constants times measured counts (C_G, the FLOPs of a gather, is for 100 neighbours); and \
+             counted, every addition, multiplication, division, square root and comparison that the firmware does in one lane of \
+             its vectors, lanes without work left out. Additions of photons' power in fixed point and arithmetic of addresses \
+             are not floating point, and not counted.",
+            scale.machine,
+            scale.machine.link / 1e9,
+        ),
     ];
     let frames = frames(scale, results);
     let counted: Vec<_> = frames.iter().filter_map(Frame::counted).collect();
@@ -348,7 +362,7 @@ fn discussion(frames: &[Frame]) -> String {
         let [flops, bytes] = [total.flops, total.dram_bytes].map(|amount| say(30.0 * amount / 1e12));
         format!("{} TFLOPS and {} TB/s ({})", flops, bytes, frame.name)
     };
-    let all: Vec<_> = frames.iter().skip(table_frames().len()).map(demand).collect();
+    let all: Vec<_> = frames.iter().filter(|frame| frame.counted.is_some()).map(demand).collect();
     format!(
         "The dissertation gives 7.4 TFLOPS and 11 TB/s for naive photon mapping at 30 frames/s, and almost two orders of \
          magnitude less bandwidth with its techniques. The table's own row meets the figures because a formula was chosen \
@@ -362,14 +376,17 @@ fn discussion(frames: &[Frame]) -> String {
 }
 
 fn load_balance(scale: &Scale, results: &Results) -> Vec<Block> {
-    let mut blocks = vec![text(
-        "Each tile of 16x16 pixels of a whole frame with all techniques takes max(bytes from DRAM / 90 GB/s, counted FLOPs / 500 GFLOPS). The \
+    let Machine { bandwidth, flops, .. } = scale.machine;
+    let mut blocks = vec![text(format!(
+        "Each tile of 16x16 pixels of a whole frame with all techniques takes max(bytes from DRAM / {} GB/s, counted FLOPs / {} GFLOPS). The \
          scheduler deals these tiles to chips whose links take no time. Speed-up is over one chip; the idle share is the \
          chips' time without work until the last is done. Longest first needs the times in advance: a bound.",
-    )];
+        bandwidth / 1e9,
+        flops / 1e9,
+    ))];
     let scenes = SCENES.map(|(scene, name)| {
         let measured = results.traffic(&dealt(scale, scene));
-        (name, tile_seconds(measured, &symbols(scale), &Machine::NOMINAL))
+        (name, tile_seconds(measured, &symbols(scale), &scale.machine))
     });
     let mut add = |file: &str, title: &str, dealings: &[_], value: (&str, YScale, fn(&Balance) -> f64)| {
         let panels = scenes.iter().map(|(name, seconds)| curves(name, seconds, MAX_CHIPS, dealings, value));

@@ -7,6 +7,7 @@ mod glossy_floor;
 mod headlines;
 mod interactive;
 mod machine;
+mod overlap;
 mod present;
 mod reordering;
 mod scaling;

@@ -8,13 +8,13 @@ use super::super::point::Point;
 use super::super::report::{Block, Cell, Column, Report, Series, Table, XScale, YScale};
 use super::super::sample::Estimate;
 use super::super::scale::{Scale, WIDEST_TILE};
+use super::overlap;
 use super::present::{
     GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section, series,
     table, text,
 };
 use super::scenes::CORNELL;
-use super::times;
-use super::workload::symbols;
+use super::times::{self, TimedFrame};
 use crate::choice::Choice;
 use crate::emulator::memory_model::{CacheSettings, CacheSpec};
 use crate::photon_map::PhotonLayout;
@@ -34,6 +34,11 @@ const TILES: [u32; 3] = [16, 32, WIDEST_TILE];
 /// Published bytes of a frame (Graphics Interface 2005): raw in the naive order, from DRAM in the practical orders, and
 /// from DRAM along a Hilbert curve.
 const PUBLISHED: [f64; 3] = [196e9, 24e9, 15e6];
+
+/// Orders that a chip can keep, with both layouts.
+fn lines() -> Vec<(GatherOrder, PhotonLayout)> {
+    LAYOUTS.into_iter().flat_map(|layout| ORDERS.map(|order| (order, layout))).collect()
+}
 
 fn sizes(scale: &Scale) -> Vec<u32> {
     scale.pick(&[32, 64, 128, 256, 512], &[32, 128, 512])
@@ -81,6 +86,7 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
         points.push(point(scale, order, PhotonLayout::Lines, CacheSettings::default()));
     }
     points.extend(LAYOUTS.into_iter().flat_map(|layout| TILES.map(|tile| sorted(scale, layout, tile))));
+    points.extend(overlap::points(scale, &lines()));
     points.extend(LAYOUTS.map(|layout| point(scale, GatherOrder::Hilbert, layout, CacheSettings::default())));
     points
 }
@@ -104,13 +110,14 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         table("gathers", by_gather(scale, &nominal)),
         text(share_of_gathers(scale, &nominal)),
         table("times", by_time(scale, &nominal)),
-        text(times::ASSUMPTIONS),
+        text(times::assumptions(&scale.machine)),
     ];
     if scale.is_nominal() {
         by_order.extend([text(comparison(scale)), table("published", published(scale, &nominal))]);
     }
     let sections = vec![
         section("Orders", by_order),
+        section("Rays cast while the queue drains", overlap::blocks(scale, results, &lines())),
         section("Larger tiles", vec![table("tiles", by_tile(scale, results, &nominal))]),
         section("Size of the photon cache", by_size(scale, results)),
         section("Associativity and index", by_associativity(scale, results)),
@@ -123,13 +130,13 @@ fn by_order<'a>(
     title: &str,
     heads: &[(&str, &str)],
     nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement,
-    cells: impl Fn(&Measurement) -> Vec<Cell>,
+    cells: impl Fn(GatherOrder, PhotonLayout, &Measurement) -> Vec<Cell>,
 ) -> Table {
     let mut table = Table::new(title, columns(&[&[("order", ""), ("photon map", "")], heads].concat()));
     for order in ORDERS.into_iter().chain([GatherOrder::Hilbert]) {
         for layout in LAYOUTS {
             let mut row = vec![order.name().into(), layout.name().into()];
-            row.extend(cells(nominal(order, layout)));
+            row.extend(cells(order, layout, nominal(order, layout)));
             table.push(row);
         }
     }
@@ -141,7 +148,7 @@ fn orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -
     let heads =
         [("gathers", "million"), ("raw", "GB"), ("from DRAM", "GB"), ("less than naive, jensen", "times")];
     let title = "Photon map traffic of a frame, cache 128 KB, lines of 128 bytes, 4 ways";
-    by_order(title, &heads, nominal, |measured| {
+    by_order(title, &heads, nominal, |_, _, measured| {
         let dram = measured.photon_map_bytes();
         let factor = naive / dram.value;
         vec![cell(measured.gathers(), 1e6), gigabytes(measured.raw_bytes()), gigabytes(dram), factor.into()]
@@ -180,9 +187,11 @@ fn by_tile<'a>(
 }
 
 fn by_time<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {
-    let symbols = symbols(&scale.settings(GatherOrder::Naive));
-    by_order("Time of one chip for the frame", &times::HEADS, nominal, |measured| {
-        times::cells(measured, &symbols)
+    let heads = times::heads(&scale.machine);
+    let heads: Vec<_> = heads.iter().map(|(name, unit)| (name.as_str(), *unit)).collect();
+    by_order("Time of one chip for the frame", &heads, nominal, |order, layout, measured| {
+        let point = point(scale, order, layout, CacheSettings::default());
+        times::cells(&TimedFrame::new(&point, measured, &scale.machine))
     })
 }
 
@@ -193,7 +202,7 @@ fn by_gather<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> 
         ("raw at all rays' gathers", "GB"),
         ("from DRAM at all rays' gathers", "GB"),
     ];
-    by_order("The same for each gather", &heads, nominal, |measured| {
+    by_order("The same for each gather", &heads, nominal, |_, _, measured| {
         let gathers = measured.gathers().value;
         let of_gather =
             [measured.raw_bytes(), measured.photon_map_bytes()].map(|bytes| bytes.value / gathers);

@@ -17,7 +17,6 @@ use super::present::{
 };
 use super::scenes::CORNELL;
 use super::workload::tile_seconds;
-use crate::cost_model::Machine;
 use crate::photon_map::PhotonLayout;
 use crate::render::RenderSettings;
 use crate::scheduler::GatherOrder;
@@ -151,7 +150,7 @@ const MAX_CHIPS: usize = 64;
 
 fn chips(scale: &Scale, results: &Results) -> Vec<Block> {
     let measured = results.traffic(&chips_point(scale));
-    let seconds = tile_seconds(measured, &symbols(scale), &Machine::NOMINAL);
+    let seconds = tile_seconds(measured, &symbols(scale), &scale.machine);
     let speedup = ("speed-up", YScale::Log10, Balance::speedup as fn(&Balance) -> f64);
     let axes = curves("", &seconds, MAX_CHIPS, &CREDITS, speedup);
     let heads =
@@ -167,12 +166,13 @@ fn chips(scale: &Scale, results: &Results) -> Vec<Block> {
         ]);
     }
     vec![
-        text(
+        text(format!(
             "What a tile takes does not depend on the chip that renders it: a tile begins with empty caches, and no chip needs \
              another. So the traffic of all chips together is the same, to the byte, for any number of them, and only the time \
              changes. Every tile of a frame with all techniques was measured and takes as long as its bytes or its arithmetic \
-             take a chip of 90 GB/s and 500 GFLOPS.",
-        ),
+             take a chip of {}.",
+            scale.machine,
+        )),
         plot(
             "chips",
             "Speed-up by the number of chips",

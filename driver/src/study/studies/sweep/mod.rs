@@ -11,6 +11,7 @@ use super::super::laboratory::Results;
 use super::super::point::{Point, Task};
 use super::super::report::Report;
 use crate::choice::Choice;
+use crate::cost_model::Machine;
 
 /// Points that differ in the settings of some axes.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,12 +41,12 @@ impl Sweep {
         &self.points
     }
 
-    /// Report on the results, without provenance.
+    /// Report on the results, without provenance. Times are of one chip of `machine`.
     ///
     /// # Panics
     /// If `results` lack one of the points.
-    pub(in crate::study) fn report(&self, scene: &str, results: &Results) -> Report {
-        report::report(scene, &self.axes, &self.points, results)
+    pub(in crate::study) fn report(&self, scene: &str, results: &Results, machine: &Machine) -> Report {
+        report::report(scene, &self.axes, &self.points, results, machine)
     }
 
     /// Settings of the points by name, for a report's provenance; those in which points differ are marked.

@@ -24,16 +24,24 @@ struct Swept<'a> {
     axes: &'a Axes,
     points: &'a [Point],
     results: &'a Results,
+    machine: &'a Machine,
 }
 
-pub(super) fn report(scene: &str, axes: &Axes, points: &[Point], results: &Results) -> Report {
-    let swept = Swept { axes, points, results };
+pub(super) fn report(
+    scene: &str,
+    axes: &Axes,
+    points: &[Point],
+    results: &Results,
+    machine: &Machine,
+) -> Report {
+    let swept = Swept { axes, points, results, machine };
     let introduction = vec![
         format!("Work and memory traffic of {scene} in frames that differ in the settings below."),
         how_it_counts(),
-        "The time of a chip is that of 90 GB/s of memory bandwidth and 500 GFLOPS, at the FLOPs of table 7.1 for each operation, \
-         whose gathers are of 100 photons. Memory and arithmetic work at once, so that a frame takes the longer of both."
-            .to_owned(),
+        format!(
+            "The time of a chip is that of {machine}, at its counted arithmetic. Memory and arithmetic work at once, so that a frame \
+             takes the longer of both."
+        ),
     ];
     let mut sections = vec![section("Points", vec![table("points", swept.totals())])];
     for (index, axis) in axes.list().iter().enumerate().filter(|(_, axis)| axis.values.len() > 1) {
@@ -80,7 +88,7 @@ impl Swept<'_> {
         for (indices, point) in self.axes.combinations().zip(self.points) {
             let measured = self.results.traffic(point);
             let gathers = measured.gathers();
-            let [memory, arithmetic] = chip_seconds(point, measured);
+            let [memory, arithmetic] = chip_seconds(point, measured, self.machine);
             let mut row = self.values(&indices);
             row.extend([
                 measured.rendered.into(),
@@ -249,9 +257,9 @@ fn numbers(axis: &Axis) -> Option<Vec<f64>> {
 }
 
 /// Seconds that the memory and the arithmetic of one chip take for a frame.
-fn chip_seconds(point: &Point, measured: &Measurement) -> [f64; 2] {
+fn chip_seconds(point: &Point, measured: &Measurement, machine: &Machine) -> [f64; 2] {
     let symbols = symbols(&point.settings);
     let workload = of_frame(measured, symbols.pixels(), &symbols);
     let total = Cost::counted(&workload, &arithmetic::of_frame(measured, &symbols)).total();
-    [total.dram_bytes / Machine::NOMINAL.bandwidth, total.flops / Machine::NOMINAL.flops]
+    [total.dram_bytes / machine.bandwidth, total.flops / machine.flops]
 }

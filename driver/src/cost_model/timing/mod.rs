@@ -1,0 +1,188 @@
+//! Time of a chip whose reads take their time: three units, the queue of gathers between two of them, and the DRAM that they share.
+//!
+//! A task, a ray or a gather, is a chain of steps: a read of a line and the arithmetic on it. Each unit has as many tasks in flight as the
+//! [`Machine`] states, each at one step. A read that misses the cache waits for the DRAM's bus, then for its latency; arithmetic waits for the
+//! unit. Both serve in the order of arrival. A ray passes from the ray caster to the controller; if it hits, its gather enters the queue, where
+//! a place was kept for it when the ray began. A [`Policy`] says when the queue is drained. What a DRAM does with rows and banks is left to its
+//! simulators (`tests/peers/dram.sh`).
+
+mod simulation;
+#[cfg(test)]
+mod tests;
+
+use self::simulation::{Plan, Task, run};
+use super::{Cost, Machine};
+
+/// Policy by which a chip casts rays while its queue drains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Policy {
+    /// Nothing is cast while the queue drains: each unit has all of the chip's arithmetic while it works.
+    Alternate,
+    /// The ray caster fills one half of the queue while the gather unit drains the other, each with its share of the arithmetic. A queue
+    /// of one entry has no halves: it is filled and drained in turn.
+    Overlapped(Shares),
+}
+
+/// Shares of the chip's arithmetic that its units have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shares {
+    /// The ray caster's.
+    pub ray_caster: f64,
+    /// The controller's.
+    pub controller: f64,
+    /// The gather unit's.
+    pub gather_unit: f64,
+}
+
+impl Shares {
+    /// Shares in proportion to a cost's arithmetic; equal ones if it has none.
+    pub fn of(cost: &Cost) -> Self {
+        let total = cost.total().flops;
+        let share = |flops: f64| if total > 0.0 { flops / total } else { 1.0 / 3.0 };
+        Self {
+            ray_caster: share(cost.ray_caster.flops),
+            controller: share(cost.controller.flops),
+            gather_unit: share(cost.gather_unit.flops),
+        }
+    }
+}
+
+/// A chip, as its time depends on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedChip {
+    /// DRAM, arithmetic and tasks in flight.
+    pub machine: Machine,
+    /// Entries of the queue of gathers, at least 1; of both halves together.
+    pub queue: u64,
+    /// When the queue is drained.
+    pub policy: Policy,
+}
+
+/// Equal tasks of a frame in one unit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    /// Number of tasks: rays, or gathers.
+    pub tasks: f64,
+    /// Reads of lines, hits and misses.
+    pub requests: f64,
+    /// Bytes fetched from DRAM.
+    pub dram_bytes: f64,
+    /// Floating-point operations.
+    pub flops: f64,
+}
+
+/// Work of a frame, as its time depends on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameLoad {
+    /// Rays in the ray caster, with their reads of the scene.
+    pub rays: Load,
+    /// Floating-point operations of the controller, spread over all rays.
+    pub controller_flops: f64,
+    /// Gathers, with their reads of the photon map, spread over all rays.
+    pub gathers: Load,
+}
+
+/// Seconds of a unit. The rest of the frame it waits for other units, or has ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UnitTimes {
+    /// Arithmetic.
+    pub busy: f64,
+    /// All of its tasks in flight wait for reads.
+    pub memory: f64,
+    /// The ray caster waits for places in the queue, the gather unit for gathers to drain.
+    pub queue: f64,
+}
+
+/// Seconds of a frame on a chip.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameTimes {
+    /// The whole frame.
+    pub seconds: f64,
+    /// Part of it in which the queue is drained.
+    pub draining: f64,
+    /// The ray caster.
+    pub ray_caster: UnitTimes,
+    /// Arithmetic of the controller.
+    pub controller: f64,
+    /// The gather unit.
+    pub gather_unit: UnitTimes,
+    /// Transfers on the DRAM's bus.
+    pub dram: f64,
+}
+
+/// Minimum number of drains that are simulated. The frame's time is linear in its number of drains, from the first on.
+const MIN_DRAINS: f64 = 4.0;
+/// Number of steps that are simulated as far as drains are short: each drain more takes a few.
+const STEPS: f64 = 65_536.0;
+/// Maximum number of entries of a queue that is simulated: what a longer one saves a gather is less than the tasks in flight over it.
+const MAX_QUEUE: u64 = 32_768;
+
+impl FrameLoad {
+    /// Seconds of the frame if nothing waits for anything else: the longer of arithmetic and DRAM.
+    pub fn bound(&self, machine: &Machine) -> f64 {
+        let bytes = self.rays.dram_bytes + self.gathers.dram_bytes;
+        let flops = self.rays.flops + self.controller_flops + self.gathers.flops;
+        (bytes / machine.bandwidth).max(flops / machine.flops)
+    }
+
+    /// Seconds of the frame on a chip, in reads of `line_bytes`. Simulated are as many drains as make a sample; the rest takes what the
+    /// second half of these does, drain by drain.
+    pub fn times(&self, chip: &TimedChip, line_bytes: f64) -> FrameTimes {
+        // Pieces of the rays' work, of which each leads to one gather or none.
+        let pieces = self.rays.tasks.max(self.gathers.tasks);
+        if pieces < 1.0 {
+            return FrameTimes::default();
+        }
+        let plan = self.plan(chip, pieces, line_bytes);
+        let of_drain = plan.entries() as f64 * (pieces / self.gathers.tasks.max(1.0)).max(1.0);
+        let steps = of_drain * plan.rays.steps.mean() + plan.entries() as f64 * plan.gathers.steps.mean();
+        let drains = 2.0 * (STEPS / steps).max(MIN_DRAINS).div_euclid(2.0);
+        let [half, all] = [0.5, 1.0].map(|share| (share * drains * of_drain).ceil());
+        if pieces <= all {
+            return run(&plan, pieces.round() as u64);
+        }
+        let [half_times, all_times] = [half, all].map(|pieces| run(&plan, pieces as u64));
+        half_times.extrapolated(&all_times, (pieces - half) / (all - half))
+    }
+
+    fn plan(&self, chip: &TimedChip, pieces: f64, line_bytes: f64) -> Plan {
+        let TimedChip { machine, queue, policy } = chip;
+        let shares = match policy {
+            Policy::Alternate => Shares { ray_caster: 1.0, controller: 1.0, gather_unit: 1.0 },
+            Policy::Overlapped(shares) => *shares,
+        };
+        let task = |load: &Load, share| Task::new(load, machine, share, line_bytes);
+        let controller = Load { tasks: pieces, flops: self.controller_flops, ..Load::default() };
+        Plan {
+            rays: task(&Load { tasks: pieces, ..self.rays }, shares.ray_caster),
+            controller: task(&controller, shares.controller).arithmetic,
+            gathers: task(&self.gathers, shares.gather_unit),
+            hits: self.gathers.tasks / pieces,
+            in_flight: u64::from(machine.tasks.max(1)),
+            queue: (*queue).clamp(1, MAX_QUEUE),
+            is_shared: *policy == Policy::Alternate,
+        }
+    }
+}
+
+impl FrameTimes {
+    /// Times that grow linearly: `factor` times the way from these to `later`.
+    fn extrapolated(&self, later: &Self, factor: f64) -> Self {
+        let time = |of: fn(&Self) -> f64| of(self) + (of(later) - of(self)) * factor;
+        let unit = |of: fn(&Self) -> &UnitTimes| {
+            let time = |time: fn(&UnitTimes) -> f64| {
+                let [now, later] = [of(self), of(later)].map(time);
+                now + (later - now) * factor
+            };
+            UnitTimes { busy: time(|t| t.busy), memory: time(|t| t.memory), queue: time(|t| t.queue) }
+        };
+        Self {
+            seconds: time(|t| t.seconds),
+            draining: time(|t| t.draining),
+            ray_caster: unit(|t| &t.ray_caster),
+            controller: time(|t| t.controller),
+            gather_unit: unit(|t| &t.gather_unit),
+            dram: time(|t| t.dram),
+        }
+    }
+}

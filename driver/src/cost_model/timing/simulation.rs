@@ -1,0 +1,361 @@
+//! Simulation of a frame by discrete events: the ends of reads, of arithmetic, and of the controller's work on a ray.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::super::Machine;
+use super::{FrameTimes, Load, UnitTimes};
+
+/// Ticks of the simulation in a second.
+const TICKS: f64 = 1e14;
+/// Maximum number of steps of a task. A task of more is simulated in as many, each with the arithmetic, the bus and the latencies of several:
+/// what a task waits, and what it takes of each resource, stay the same.
+const MAX_STEPS: f64 = 4.0;
+
+/// Whole numbers with a real number as their mean, as evenly spread as they can be.
+#[derive(Clone, Copy)]
+pub(super) struct Spread {
+    each: u64,
+    owed: u64,
+}
+
+impl Spread {
+    const ONE: u64 = 1_000_000_000;
+
+    fn new(mean: f64) -> Self {
+        Self { each: (mean * Self::ONE as f64).round() as u64, owed: 0 }
+    }
+
+    /// The mean.
+    pub(super) fn mean(&self) -> f64 {
+        self.each as f64 / Self::ONE as f64
+    }
+
+    fn next(&mut self) -> u64 {
+        self.owed += self.each;
+        let whole = self.owed / Self::ONE;
+        self.owed %= Self::ONE;
+        whole
+    }
+}
+
+/// Steps of the tasks of a unit, in ticks.
+#[derive(Clone, Copy)]
+pub(super) struct Task {
+    /// Steps of a task.
+    pub(super) steps: Spread,
+    /// Misses of a step.
+    misses: Spread,
+    /// Arithmetic of a step.
+    pub(super) arithmetic: u64,
+    /// The DRAM's bus, for a miss.
+    bus: u64,
+    /// Latency of a miss.
+    latency: u64,
+}
+
+fn ticks(seconds: f64) -> u64 {
+    (seconds * TICKS).round() as u64
+}
+
+fn seconds(ticks: u64) -> f64 {
+    ticks as f64 / TICKS
+}
+
+/// A ratio that is 0 where there is nothing to divide.
+fn ratio(amount: f64, by: f64) -> f64 {
+    if amount > 0.0 { amount / by } else { 0.0 }
+}
+
+impl Task {
+    /// Tasks of a load in a unit with a share of the machine's arithmetic.
+    pub(super) fn new(load: &Load, machine: &Machine, share: f64, line_bytes: f64) -> Self {
+        let tasks = load.tasks.max(1.0);
+        let requests = load.requests.max(tasks);
+        let steps = (requests / tasks).min(MAX_STEPS);
+        let misses = (load.dram_bytes / line_bytes).min(requests);
+        Self {
+            steps: Spread::new(steps),
+            misses: Spread::new(misses / (tasks * steps)),
+            arithmetic: ticks(ratio(load.flops / (tasks * steps), share * machine.flops)),
+            bus: ticks(ratio(load.dram_bytes, misses) / machine.bandwidth),
+            latency: ticks(machine.latency),
+        }
+    }
+}
+
+/// A frame and a chip in ticks.
+pub(super) struct Plan {
+    pub(super) rays: Task,
+    /// Arithmetic of the controller for a ray.
+    pub(super) controller: u64,
+    pub(super) gathers: Task,
+    /// Share of the rays that lead to a gather.
+    pub(super) hits: f64,
+    /// Maximum number of tasks in flight of a unit.
+    pub(super) in_flight: u64,
+    /// Entries of the queue.
+    pub(super) queue: u64,
+    /// True if all units have one arithmetic unit, and nothing is cast while the queue drains.
+    pub(super) is_shared: bool,
+}
+
+impl Plan {
+    fn alternates(&self) -> bool {
+        self.is_shared || self.queue < 2
+    }
+
+    /// Entries that a drain begins with.
+    pub(super) fn entries(&self) -> u64 {
+        if self.alternates() { self.queue } else { self.queue / 2 }
+    }
+
+    /// Entries that rays can fill.
+    fn room(&self, is_draining: bool) -> u64 {
+        match (self.alternates(), is_draining) {
+            (true, true) => 0,
+            (true, false) | (false, true) => self.entries(),
+            (false, false) => 2 * self.entries(),
+        }
+    }
+}
+
+/// Resource that serves one at a time, in the order of arrival.
+#[derive(Clone, Copy, Default)]
+struct Server {
+    is_free: u64,
+    busy: u64,
+}
+
+impl Server {
+    /// Serves for a time. Returns its end. No time is no wait either.
+    fn serve(&mut self, now: u64, time: u64) -> u64 {
+        if time == 0 {
+            return now;
+        }
+        self.busy += time;
+        self.is_free = now.max(self.is_free) + time;
+        self.is_free
+    }
+}
+
+/// A unit with tasks.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Unit {
+    RayCaster,
+    GatherUnit,
+}
+
+/// End of a task's wait.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Event {
+    /// Data are there; as many steps are left, this one included.
+    Read(Unit, u64),
+    /// Arithmetic is done; as many steps are left after this one.
+    Computed(Unit, u64),
+    /// The controller is done with a ray.
+    Controlled,
+}
+
+/// A unit's tasks, and the times in which none of them computes.
+struct UnitState {
+    task: Task,
+    busy: u64,
+    /// Tasks that wait for reads, and tasks that compute or wait for it.
+    reading: u64,
+    computing: u64,
+    memory_wait: u64,
+    queue_wait: u64,
+}
+
+impl UnitState {
+    fn new(task: Task) -> Self {
+        Self { task, busy: 0, reading: 0, computing: 0, memory_wait: 0, queue_wait: 0 }
+    }
+
+    /// Accounts for a time without events.
+    fn pass(&mut self, time: u64, waits_for_queue: bool) {
+        if self.computing > 0 {
+            return;
+        }
+        if self.reading > 0 {
+            self.memory_wait += time;
+        } else if waits_for_queue {
+            self.queue_wait += time;
+        }
+    }
+
+    fn times(&self) -> UnitTimes {
+        UnitTimes {
+            busy: seconds(self.busy),
+            memory: seconds(self.memory_wait),
+            queue: seconds(self.queue_wait),
+        }
+    }
+}
+
+struct Simulation<'a> {
+    plan: &'a Plan,
+    now: u64,
+    /// Events by time, then in the order in which they were foreseen.
+    events: BinaryHeap<Reverse<(u64, u64, Event)>>,
+    foreseen: u64,
+    /// Arithmetic of ray caster, gather unit and controller; the first serves all if it is shared.
+    arithmetic: [Server; 3],
+    bus: Server,
+    units: [UnitState; 2],
+    controller_busy: u64,
+    hits: Spread,
+    /// Rays that have not begun.
+    rays: u64,
+    /// Rays in flight, each with a place in the queue.
+    casting: u64,
+    /// Gathers in the half that is being filled.
+    filling: u64,
+    /// Gathers of the drain that have not begun, and those that have not ended.
+    ready: u64,
+    draining: u64,
+    drain_time: u64,
+}
+
+/// Times of as many rays, and of the gathers that they lead to.
+pub(super) fn run(plan: &Plan, rays: u64) -> FrameTimes {
+    let mut simulation = Simulation::new(plan, rays);
+    simulation.begin_tasks();
+    while let Some(Reverse((time, _, event))) = simulation.events.pop() {
+        simulation.pass_to(time);
+        simulation.end(event);
+        simulation.begin_tasks();
+    }
+    simulation.times()
+}
+
+impl<'a> Simulation<'a> {
+    fn new(plan: &'a Plan, rays: u64) -> Self {
+        Self {
+            plan,
+            now: 0,
+            events: BinaryHeap::new(),
+            foreseen: 0,
+            arithmetic: [Server::default(); 3],
+            bus: Server::default(),
+            units: [UnitState::new(plan.rays), UnitState::new(plan.gathers)],
+            controller_busy: 0,
+            hits: Spread::new(plan.hits),
+            rays,
+            casting: 0,
+            filling: 0,
+            ready: 0,
+            draining: 0,
+            drain_time: 0,
+        }
+    }
+
+    fn times(&self) -> FrameTimes {
+        let [ray_caster, gather_unit] = [0, 1].map(|unit: usize| self.units[unit].times());
+        FrameTimes {
+            seconds: seconds(self.now),
+            draining: seconds(self.drain_time),
+            ray_caster,
+            controller: seconds(self.controller_busy),
+            gather_unit,
+            dram: seconds(self.bus.busy),
+        }
+    }
+
+    fn pass_to(&mut self, time: u64) {
+        let passed = time - self.now;
+        self.now = time;
+        if self.draining > 0 {
+            self.drain_time += passed;
+        }
+        let has_rays = self.rays > 0;
+        let waits_for_rays = self.draining == 0 && (has_rays || self.casting > 0 || self.filling > 0);
+        self.units[0].pass(passed, has_rays && self.casting == 0);
+        self.units[1].pass(passed, waits_for_rays);
+    }
+
+    fn foresee(&mut self, time: u64, event: Event) {
+        self.foreseen += 1;
+        self.events.push(Reverse((time, self.foreseen, event)));
+    }
+
+    /// Begins a drain if one is due, and as many tasks as there is room for.
+    fn begin_tasks(&mut self) {
+        let is_full = self.filling >= self.plan.entries();
+        let is_last = self.rays == 0 && self.casting == 0;
+        if self.draining == 0 && self.filling > 0 && (is_full || is_last) {
+            self.ready = self.filling;
+            self.draining = self.filling;
+            self.filling = 0;
+        }
+        let room = self.plan.room(self.draining > 0);
+        while self.rays > 0 && self.casting < self.plan.in_flight && self.casting + self.filling < room {
+            self.rays -= 1;
+            self.casting += 1;
+            self.begin(Unit::RayCaster);
+        }
+        while self.ready > 0 && self.draining - self.ready < self.plan.in_flight {
+            self.ready -= 1;
+            self.begin(Unit::GatherUnit);
+        }
+    }
+
+    fn begin(&mut self, unit: Unit) {
+        let steps = self.units[unit as usize].task.steps.next();
+        self.read(unit, steps);
+    }
+
+    fn read(&mut self, unit: Unit, steps: u64) {
+        let state = &mut self.units[unit as usize];
+        let misses = state.task.misses.next();
+        if misses == 0 {
+            return self.compute(unit, steps);
+        }
+        state.reading += 1;
+        let latency = misses * state.task.latency;
+        let arrival = self.bus.serve(self.now, misses * state.task.bus) + latency;
+        self.foresee(arrival, Event::Read(unit, steps));
+    }
+
+    fn compute(&mut self, unit: Unit, steps: u64) {
+        let state = &mut self.units[unit as usize];
+        state.computing += 1;
+        let time = state.task.arithmetic;
+        state.busy += time;
+        let end = self.serve(unit as usize, time);
+        self.foresee(end, Event::Computed(unit, steps - 1));
+    }
+
+    /// Arithmetic of a unit, or of the controller, which is behind all units. Returns its end.
+    fn serve(&mut self, unit: usize, time: u64) -> u64 {
+        let server = if self.plan.is_shared { 0 } else { unit };
+        self.arithmetic[server].serve(self.now, time)
+    }
+
+    fn end(&mut self, event: Event) {
+        match event {
+            Event::Read(unit, steps) => {
+                self.units[unit as usize].reading -= 1;
+                self.compute(unit, steps);
+            }
+            Event::Computed(unit, steps) => {
+                self.units[unit as usize].computing -= 1;
+                match unit {
+                    _ if steps > 0 => self.read(unit, steps),
+                    Unit::RayCaster => {
+                        let time = self.plan.controller;
+                        self.controller_busy += time;
+                        let end = self.serve(self.units.len(), time);
+                        self.foresee(end, Event::Controlled);
+                    }
+                    Unit::GatherUnit => self.draining -= 1,
+                }
+            }
+            Event::Controlled => {
+                self.casting -= 1;
+                self.filling += self.hits.next();
+            }
+        }
+    }
+}

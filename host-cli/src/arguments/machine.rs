@@ -1,0 +1,116 @@
+//! Arguments of the machine that a study's times are of.
+
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+use clap::Args;
+use photoncard_driver::cost_model::Machine;
+
+/// Machine of a study's times and numbers of chips. What is measured does not depend on it.
+#[derive(Args)]
+#[command(next_help_heading = "Chip of the report's times")]
+pub(crate) struct MachineOptions {
+    /// Bandwidth of a chip's DRAM, GB/s
+    #[arg(long, value_name = "GB/S", default_value = "90", value_parser = giga, allow_negative_numbers = true)]
+    bandwidth: f64,
+    /// Arithmetic of a chip, GFLOPS
+    #[arg(long, value_name = "GFLOPS", default_value = "500", value_parser = giga, allow_negative_numbers = true)]
+    flops: f64,
+    /// Latency of a read from DRAM, nanoseconds
+    #[arg(long, value_name = "NS", default_value = "100", value_parser = latency, allow_negative_numbers = true)]
+    latency: f64,
+    /// Tasks in flight of each unit of a chip: rays, or gathers
+    #[arg(long, value_name = "N", default_value = "128", value_parser = tasks, allow_negative_numbers = true)]
+    tasks: u32,
+}
+
+/// Bandwidths and arithmetic, in thousand millions a second.
+const GIGA: RangeInclusive<f64> = 0.1..=1e6;
+/// Latencies, nanoseconds; those of no read are allowed.
+const LATENCY: RangeInclusive<f64> = 0.0..=10_000.0;
+/// Tasks in flight.
+const TASKS: RangeInclusive<u32> = 1..=65_536;
+
+impl MachineOptions {
+    /// The machine.
+    pub(crate) fn machine(&self) -> Machine {
+        Machine {
+            bandwidth: 1e9 * self.bandwidth,
+            flops: 1e9 * self.flops,
+            latency: self.latency / 1e9,
+            tasks: self.tasks,
+            ..Machine::NOMINAL
+        }
+    }
+}
+
+fn giga(text: &str) -> Result<f64, String> {
+    within(text, &GIGA)
+}
+
+fn latency(text: &str) -> Result<f64, String> {
+    within(text, &LATENCY)
+}
+
+fn tasks(text: &str) -> Result<u32, String> {
+    within(text, &TASKS)
+}
+
+/// Number of a range.
+fn within<T: FromStr + PartialOrd + std::fmt::Display>(
+    text: &str,
+    range: &RangeInclusive<T>,
+) -> Result<T, String> {
+    let number = text.parse().ok().filter(|number| range.contains(number));
+    number.ok_or_else(|| format!("use a number from {} to {}", range.start(), range.end()))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        machine: MachineOptions,
+    }
+
+    fn parsed(arguments: &[&str]) -> Result<Machine, clap::Error> {
+        let words = ["study"].iter().chain(arguments);
+        Command::try_parse_from(words).map(|command| command.machine.machine())
+    }
+
+    #[test]
+    fn the_machine_without_options_is_the_nominal_one() {
+        assert_eq!(parsed(&[]).unwrap(), Machine::NOMINAL);
+    }
+
+    #[test]
+    fn options_are_in_the_units_that_they_name() {
+        let machine =
+            parsed(&["--bandwidth", "12.8", "--flops=40", "--latency", "0", "--tasks", "7"]).unwrap();
+        assert_eq!(
+            machine,
+            Machine { bandwidth: 12.8e9, flops: 40e9, latency: 0.0, tasks: 7, ..Machine::NOMINAL }
+        );
+    }
+
+    #[test]
+    fn what_no_machine_has_is_refused() {
+        for arguments in [
+            ["--bandwidth", "0"],
+            ["--bandwidth", "nan"],
+            ["--flops", "-1"],
+            ["--flops", "inf"],
+            ["--latency", "-0.5"],
+            ["--latency", "1e9"],
+            ["--tasks", "0"],
+            ["--tasks", "1.5"],
+        ] {
+            let error = parsed(&arguments).unwrap_err().to_string();
+            assert!(error.contains("use a number from"), "{arguments:?}: {error}");
+        }
+    }
+}
