@@ -6,10 +6,12 @@
 //! a place was kept for it when the ray began. A [`Policy`] says when the queue is drained. What a DRAM does with rows and banks is left to its
 //! simulators (`tests/peers/dram.sh`).
 
+mod quantities;
 mod simulation;
 #[cfg(test)]
 mod tests;
 
+pub use self::quantities::{FrameTimes, Load, UnitTimes};
 use self::simulation::{Plan, Task, run};
 use super::{Cost, Machine};
 
@@ -58,19 +60,6 @@ pub struct TimedChip {
     pub policy: Policy,
 }
 
-/// Equal tasks of a frame in one unit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Load {
-    /// Number of tasks: rays, or gathers.
-    pub tasks: f64,
-    /// Reads of lines, hits and misses.
-    pub requests: f64,
-    /// Bytes fetched from DRAM.
-    pub dram_bytes: f64,
-    /// Floating-point operations.
-    pub flops: f64,
-}
-
 /// Work of a frame, as its time depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameLoad {
@@ -80,34 +69,6 @@ pub struct FrameLoad {
     pub controller_flops: f64,
     /// Gathers, with their reads of the photon map, spread over all rays.
     pub gathers: Load,
-}
-
-/// Seconds of a unit. The rest of the frame it waits for other units, or has ended.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct UnitTimes {
-    /// Arithmetic.
-    pub busy: f64,
-    /// All of its tasks in flight wait for reads.
-    pub memory: f64,
-    /// The ray caster waits for places in the queue, the gather unit for gathers to drain.
-    pub queue: f64,
-}
-
-/// Seconds of a frame on a chip.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FrameTimes {
-    /// The whole frame.
-    pub seconds: f64,
-    /// Part of it in which the queue is drained.
-    pub draining: f64,
-    /// The ray caster.
-    pub ray_caster: UnitTimes,
-    /// Arithmetic of the controller.
-    pub controller: f64,
-    /// The gather unit.
-    pub gather_unit: UnitTimes,
-    /// Transfers on the DRAM's bus.
-    pub dram: f64,
 }
 
 /// Minimum number of drains that are simulated. The frame's time is linear in its number of drains, from the first on.
@@ -161,28 +122,6 @@ impl FrameLoad {
             in_flight: u64::from(machine.tasks.max(1)),
             queue: (*queue).clamp(1, MAX_QUEUE),
             is_shared: *policy == Policy::Alternate,
-        }
-    }
-}
-
-impl FrameTimes {
-    /// Times that grow linearly: `factor` times the way from these to `later`.
-    fn extrapolated(&self, later: &Self, factor: f64) -> Self {
-        let time = |of: fn(&Self) -> f64| of(self) + (of(later) - of(self)) * factor;
-        let unit = |of: fn(&Self) -> &UnitTimes| {
-            let time = |time: fn(&UnitTimes) -> f64| {
-                let [now, later] = [of(self), of(later)].map(time);
-                now + (later - now) * factor
-            };
-            UnitTimes { busy: time(|t| t.busy), memory: time(|t| t.memory), queue: time(|t| t.queue) }
-        };
-        Self {
-            seconds: time(|t| t.seconds),
-            draining: time(|t| t.draining),
-            ray_caster: unit(|t| &t.ray_caster),
-            controller: time(|t| t.controller),
-            gather_unit: unit(|t| &t.gather_unit),
-            dram: time(|t| t.dram),
         }
     }
 }

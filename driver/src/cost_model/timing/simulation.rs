@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::super::Machine;
-use super::{FrameTimes, Load, UnitTimes};
+use super::quantities::{FrameTimes, Load, UnitTimes};
 
 /// Ticks of the simulation in a second.
 const TICKS: f64 = 1e14;
