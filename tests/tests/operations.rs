@@ -46,10 +46,10 @@ fn check(name: &str, run: &Run) {
     Unit::ALL.iter().for_each(|&unit| total.add(&run.counted(unit)));
     let of_all = modelled.sum(|_| true).flops();
     assert!(difference(of_all, total.flops()) < 0.05, "{name}: {of_all} instead of {}", total.flops());
-    // A quarter of the unit, as directions depend on the few surfaces of the tiles; what is less than a few thousandths of all is no part.
+    // A quarter of the unit, as directions depend on the few surfaces of the tiles, and a fiftieth of all: the model of shading and of pixels is by their mean.
     for &unit in Unit::ALL {
         let (counted, modelled) = (run.counted(unit).flops(), modelled.unit(unit).flops());
-        let allowed = 0.25 * counted + 0.002 * total.flops();
+        let allowed = 0.25 * counted + 0.02 * total.flops();
         let name = format!("{name}: {}", unit.name());
         assert!((modelled - counted).abs() < allowed, "{name}: {modelled} instead of {counted}");
     }
