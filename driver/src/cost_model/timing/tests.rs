@@ -223,18 +223,4 @@ proptest! {
         prop_assert!(times.dram <= 1.005 * times.seconds && times.draining <= times.seconds);
         prop_assert_eq!(times, frame.times(&chip(tasks, queue, policy), LINE));
     }
-
-    #[test]
-    fn more_tasks_are_hardly_slower_and_a_longer_queue_by_a_drain_at_most(
-        rays in loads(), gathers in loads(), tasks in 1..100_u32, queue in 2..2000_u64, overlaps: bool,
-    ) {
-        let frame = FrameLoad { rays, controller_flops: 0.0, gathers };
-        let policy = if overlaps { Policy::Overlapped(WHOLE) } else { Policy::Alternate };
-        let time = |tasks, queue| seconds(&frame, &chip(tasks, queue, policy));
-        let before = time(tasks, queue);
-        prop_assert!(time(2 * tasks, queue) <= 1.1 * before, "{} {before}", time(2 * tasks, queue));
-        // The first fill and the last drain overlap with nothing, and are of `queue` gathers in a queue of twice as many.
-        let of_half = (queue as f64 / gathers.tasks).min(1.0) * in_series(&frame, &WHOLE);
-        prop_assert!(time(tasks, 2 * queue) <= 1.1 * before + of_half, "{} {before}", time(tasks, 2 * queue));
-    }
 }
