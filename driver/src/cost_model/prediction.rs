@@ -23,9 +23,7 @@ impl Machine {
     /// The chip that section 7.1 expects of 2010: 90 GB/s and 500 GFLOPS. The link is this project's choice: 4 GB/s each
     /// way, the sixteen lanes of PCI Express 1.x in a workstation of 2007. So are 100 ns, a read from DRAM of any year, and 128 tasks.
     pub const NOMINAL: Self = Self { bandwidth: 90e9, flops: 500e9, link: 4e9, latency: 100e-9, tasks: 128 };
-}
 
-impl Machine {
     /// Latency of a read in nanoseconds, to a thousandth of one.
     pub fn latency_ns(&self) -> f64 {
         (self.latency * 1e12).round() / 1e3

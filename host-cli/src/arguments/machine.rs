@@ -16,17 +16,17 @@ pub(crate) struct MachineOptions {
     /// Arithmetic of a chip, GFLOPS
     #[arg(long, value_name = "GFLOPS", default_value = "500", value_parser = giga, allow_negative_numbers = true)]
     flops: f64,
-    /// Latency of a read from DRAM, nanoseconds
+    /// Latency of a read from DRAM, nanoseconds, in the times of reordering and interactive
     #[arg(long, value_name = "NS", default_value = "100", value_parser = latency, allow_negative_numbers = true)]
     latency: f64,
-    /// Tasks in flight of each unit of a chip: rays, or gathers
+    /// Tasks in flight of each unit of a chip, rays or gathers, in the times of reordering and interactive
     #[arg(long, value_name = "N", default_value = "128", value_parser = tasks, allow_negative_numbers = true)]
     tasks: u32,
 }
 
 /// Bandwidths and arithmetic, in thousand millions a second.
 const GIGA: RangeInclusive<f64> = 0.1..=1e6;
-/// Latencies, nanoseconds; those of no read are allowed.
+/// Latencies, nanoseconds; 0 is allowed.
 const LATENCY: RangeInclusive<f64> = 0.0..=10_000.0;
 /// Tasks in flight.
 const TASKS: RangeInclusive<u32> = 1..=65_536;

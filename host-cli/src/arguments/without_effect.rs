@@ -60,6 +60,7 @@ impl RenderOptions {
             .filter(|(is_idle, ..)| *is_idle);
         said.map(|(_, option, why)| format!("{option} has no effect {why}")).collect()
     }
+
     /// Options on the order of the work that the order does not have.
     fn of_order(&self) -> [(bool, &'static str, String); 3] {
         let order = self.schedule.order;

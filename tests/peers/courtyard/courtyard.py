@@ -22,7 +22,7 @@ import furnishing
 import textures
 from parts import add
 
-LEAST, GREATEST = 250_000, 280_000
+MIN_TRIANGLES, MAX_TRIANGLES = 250_000, 280_000
 TRIANGLES = 4
 
 
@@ -51,8 +51,8 @@ def main():
     )
     count = triangles(path)
     print(f"{path}: {count} triangles", file=report)
-    if not LEAST <= count <= GREATEST:
-        sys.exit(f"{path}: {count} triangles are not between {LEAST} and {GREATEST}")
+    if not MIN_TRIANGLES <= count <= MAX_TRIANGLES:
+        sys.exit(f"{path}: {count} triangles are not between {MIN_TRIANGLES} and {MAX_TRIANGLES}")
 
 
 def lights():

@@ -9,7 +9,7 @@ use super::quantities::{FrameTimes, Load, UnitTimes};
 /// Ticks of the simulation in a second.
 const TICKS: f64 = 1e14;
 /// Maximum number of steps of a task. A task of more is simulated in as many, each with the arithmetic, the bus and the latencies of several:
-/// what a task waits, and what it takes of each resource, stay the same.
+/// neither its waits nor its use of each resource change in sum.
 const MAX_STEPS: f64 = 4.0;
 
 /// Whole numbers with a real number as their mean, as evenly spread as they can be.
