@@ -1,9 +1,10 @@
 //! Random numbers as functions of (seed, pixel, sample, dimension), independent of chip, thread and order of execution.
 //!
-//! Points in a pixel and on emitters are correlated multi-jittered (Kensler 2013, *Correlated multi-jittered
-//! sampling*): `count` points of the unit square in as many cells of equal area, in about sqrt(count) rows, stratified
-//! in both dimensions. Kensler's grid is rectangular; here, if `count` is no multiple of the number of rows, some rows
-//! have one cell more, so that all cells have equal area and the expectation is exact.
+//! Points in a pixel, on emitters and of choices are the first points of a sequence, not a set of a stated size: samples can be added to
+//! a picture, and any number of them is stratified. The sequence is the first two dimensions of Sobol' (1967) with Owen's (1995) nested
+//! uniform scrambling, and in an order that is scrambled likewise, so that patterns of different dimensions are independent
+//! (Burley 2020, *Practical hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned run of 2^m points has one in every
+//! box of area 2^-m with sides of powers of two.
 //!
 //! The two coordinates of a final gather ray are a jittered one ([`Pattern::jitter`]), which selects a cell of the
 //! direction table ([`crate::importance::DirectionTable`]), and a radical inverse: any run of consecutive rays, such as
@@ -69,76 +70,34 @@ impl Pattern {
         hash(self.0.wrapping_add(salt) ^ index.wrapping_mul(0x9e37_79b9))
     }
 
-    /// Index, among the `count * samples` points of a pixel, of point `index` of `count` of one sample. Each sample
-    /// takes one point from every run of `samples` consecutive points, by a random permutation of each run, so that all
-    /// samples together take every point once; `index` itself with one sample.
+    /// Point `index` of the sequence, in [0, 1) x [0, 1).
     #[inline(always)]
-    pub fn index_in_all(self, index: u32, sample: u32, samples: u32) -> u32 {
-        let samples = samples.max(1);
-        index * samples + permute(sample, samples, self.bits(index, 0x7a3d_95e7))
-    }
-
-    /// Point `index` of `count`, in [0, 1) x [0, 1); `index` below `count`, `count` at most 2^20.
-    #[inline(always)]
-    pub fn point(self, index: u32, count: u32) -> [f32; 2] {
-        let cell = Cell::new(index, count);
-        let sub_column = permute(cell.row, cell.rows, self.0 ^ 0x5163_3e2d);
-        let sub_row = permute(cell.column, cell.columns, self.0 ^ 0x68bc_21eb);
-        let jitter = |salt: u32| unit_interval(self.bits(index, salt));
-        let x_in_cell = (sub_column as f32 + jitter(0x967a_889b)) / cell.rows as f32;
-        let x = (cell.column as f32 + x_in_cell) / cell.columns as f32;
-        let y = ((cell.first + sub_row) as f32 + jitter(0x368c_c8b7)) / count as f32;
-        [below_one(x), below_one(y)]
+    pub fn point(self, index: u32) -> [f32; 2] {
+        let seed = |salt: u32| hash(self.0.wrapping_add(salt));
+        let index = scramble(index.reverse_bits(), seed(0x7a3d_95e7)).reverse_bits();
+        let x = scramble(index, seed(0x5163_3e2d)).reverse_bits();
+        let y = scramble(second_dimension(index), seed(0x68bc_21eb)).reverse_bits();
+        [unit_interval(x), unit_interval(y)]
     }
 }
 
-/// Cell of one point: the square is divided into rows of a height in proportion to their points, each row into equal
-/// columns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Cell {
-    /// Number of rows of the square.
-    rows: u32,
-    row: u32,
-    /// Number of columns of this row.
-    columns: u32,
-    column: u32,
-    /// Number of points in the rows before.
-    first: u32,
-}
-
-impl Cell {
-    /// The cell of point `index` of `count`.
-    #[inline(always)]
-    fn new(index: u32, count: u32) -> Self {
-        let count = count.max(1);
-        let rows = (libm::sqrtf(count as f32) as u32).max(1);
-        // The first point of row r is floor(r count / rows).
-        let row = (index * rows + rows - 1) / count;
-        let first = row * count / rows;
-        let columns = ((row + 1) * count / rows - first).max(1);
-        Self { rows, row, columns, column: index - first, first }
-    }
-}
-
-/// Image of `index` under the permutation of `0..length` with this key.
-///
-/// Cycle walking: a bijection on the next power of two is iterated until the image is below `length`; then it is
-/// rotated.
+/// Digits of the second dimension of Sobol' at `index`, least significant bit first: bit `i` is the sum of bits `j` of the index with an odd
+/// binomial coefficient (j, i), where `i` is a subset of `j` bit by bit (Lucas).
 #[inline(always)]
-fn permute(index: u32, length: u32, key: u32) -> u32 {
-    let mask = length.next_power_of_two() - 1;
-    let shift = mask.count_ones() / 2 + 1;
-    let [a, b] = [hash(key), hash(key ^ 0xa3d8_5c1f)];
-    let mut image = index;
-    loop {
-        image = ((image ^ a) & mask).wrapping_mul(b | 1) & mask;
-        image ^= image >> shift;
-        image = image.wrapping_mul(a | 1) & mask;
-        image ^= image >> shift;
-        if image < length {
-            return (image + key % length) % length;
-        }
-    }
+fn second_dimension(index: u32) -> u32 {
+    let steps = [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)];
+    steps.into_iter().fold(index, |digits, (distance, mask)| digits ^ (digits >> distance & mask))
+}
+
+/// Nested uniform scrambling of digits, least significant bit first: a bijection in which each bit depends on itself and those below alone
+/// (Laine, Karras 2011, with Vegdahl's constants of 2021).
+#[inline(always)]
+fn scramble(mut digits: u32, seed: u32) -> u32 {
+    digits ^= digits.wrapping_mul(0x3d20_adea);
+    digits = digits.wrapping_add(seed);
+    digits = digits.wrapping_mul(seed >> 16 | 1);
+    digits ^= digits.wrapping_mul(0x0552_6c56);
+    digits ^ digits.wrapping_mul(0x53a2_2864)
 }
 
 /// 32-bit integer hash (Wellons, `lowbias32`).
@@ -163,58 +122,42 @@ pub(crate) fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-#[inline(always)]
-fn below_one(x: f32) -> f32 {
-    crate::vector::min(x, 0.999_999_94)
-}
-
 #[cfg(test)]
 mod tests {
     use std::vec;
 
     use super::*;
 
-    const COUNTS: [u32; 9] = [1, 2, 3, 7, 8, 16, 100, 200, 211];
-
     #[test]
-    fn points_are_stratified_in_columns_of_y_and_stay_in_the_square() {
-        for count in COUNTS {
-            for seed in 0..20 {
-                let pattern = Pattern::new(seed, 3, 4, 5, Dimension::Gather);
-                let mut rows = [false; 256];
-                for index in 0..count {
-                    let [x, y] = pattern.point(index, count);
-                    assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y));
-                    let row = &mut rows[(y * count as f32) as usize];
-                    assert!(!*row, "{count} {index}");
-                    *row = true;
+    fn every_aligned_run_has_a_point_in_each_box_of_its_area() {
+        for seed in 0..20 {
+            let pattern = Pattern::new(seed, 3, 4, 5, Dimension::Emitter);
+            for size in 0..8 {
+                for run in 0..5_u32 {
+                    for columns in 0..=size {
+                        let mut boxes = vec![false; 1 << size];
+                        for index in run << size..(run + 1) << size {
+                            let [x, y] = pattern.point(index);
+                            assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y));
+                            let column = (x * (1 << columns) as f32) as usize;
+                            let row = (y * (1 << (size - columns)) as f32) as usize;
+                            let met = &mut boxes[row << columns | column];
+                            assert!(!*met, "{seed} {size} {run} {columns}");
+                            *met = true;
+                        }
+                    }
                 }
             }
         }
     }
 
     #[test]
-    fn a_point_of_one_index_is_in_the_same_cell_for_every_pixel() {
-        for count in COUNTS {
-            for index in 0..count {
-                let cell = Cell::new(index, count);
-                for x in 0..10 {
-                    let [u, v] = Pattern::new(0, x, 0, 0, Dimension::Gather).point(index, count);
-                    assert_eq!((u * cell.columns as f32) as u32, cell.column);
-                    let v = v * count as f32;
-                    assert!(v >= cell.first as f32 && v < (cell.first + cell.columns) as f32);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_mean_over_pixels_of_any_point_set_is_uniform() {
-        for count in COUNTS {
+    fn the_mean_over_pixels_of_any_points_is_uniform() {
+        for count in [1, 2, 3, 7, 16, 100] {
             let mut moments = [0.0_f64; 4];
             for x in 0..2000 {
                 for index in 0..count {
-                    let [u, v] = Pattern::new(9, x, 1, 0, Dimension::Gather).point(index, count);
+                    let [u, v] = Pattern::new(9, x, 1, 0, Dimension::Pixel).point(index);
                     let [u, v] = [u as f64 - 0.5, v as f64 - 0.5];
                     for (moment, value) in moments.iter_mut().zip([u, v, u * v, u * u]) {
                         *moment += value / (2000.0 * count as f64);
@@ -228,32 +171,21 @@ mod tests {
         }
     }
 
+    /// Of points of equal index in two dimensions, strata are paired at random: each pair of halves has a fourth of the pixels' points.
     #[test]
-    fn the_samples_of_a_pixel_share_its_points() {
-        for (count, samples) in [(1, 16), (3, 5), (8, 1), (64, 4)] {
-            let pattern = Pattern::new(7, 1, 2, 0, Dimension::Emitter);
-            let mut takers = vec![None; (count * samples) as usize];
-            for sample in 0..samples {
-                for index in 0..count {
-                    let point = pattern.index_in_all(index, sample, samples);
-                    assert_eq!(point / samples, index, "one of each run");
-                    assert_eq!(takers[point as usize].replace(sample), None);
-                }
+    fn patterns_of_two_dimensions_are_independent() {
+        let half = |x, index, dimension| {
+            let [u, v] = Pattern::new(5, x, 7, 0, dimension).point(index);
+            [u >= 0.5, v >= 0.5]
+        };
+        for (index, first, second) in [(0, 0, 0), (1, 0, 1), (5, 1, 1)] {
+            let mut pairs = [0; 4];
+            for x in 0..4000 {
+                let one = half(x, index, Dimension::Pixel)[first];
+                let other = half(x, index, Dimension::Emitter)[second];
+                pairs[2 * usize::from(one) + usize::from(other)] += 1;
             }
-            assert!(takers.iter().all(Option::is_some));
-        }
-        let first = |index| Pattern::new(7, 1, 2, 0, Dimension::Emitter).index_in_all(index, 0, 16) % 16;
-        assert!((1..64).any(|index| first(index) != first(0)), "the runs are not taken alike");
-    }
-
-    #[test]
-    fn permutations_are_permutations() {
-        for length in 1..70 {
-            for key in 0..50 {
-                let mut seen = [false; 70];
-                (0..length).for_each(|i| seen[permute(i, length, key) as usize] = true);
-                assert!(seen[..length as usize].iter().all(|&s| s));
-            }
+            assert!(pairs.iter().all(|pairs| (850..1150).contains(pairs)), "{pairs:?}");
         }
     }
 }

@@ -44,12 +44,11 @@ pub fn reflected<M: MemoryPort>(
     context.memory.enter(Stage::Shadow);
     let frame = context.frame;
     let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, 0, Dimension::Emitter);
-    let points = frame.shadow_rays * frame.samples.max(1);
     let receiver = Receiver::new(&point.surface);
     let mut sum = Vec3::ZERO;
     for index in 0..frame.shadow_rays {
-        let index = pattern.index_in_all(index, pixel.sample, frame.samples);
-        let (place, dither) = (pattern.point(index, points), pattern.dither(index));
+        let index = pixel.sample.wrapping_mul(frame.shadow_rays).wrapping_add(index);
+        let (place, dither) = (pattern.point(index), pattern.dither(index));
         let light = sample_light(context.scene, context.memory, &receiver, place, dither)?;
         if let Some(light) = light {
             sum += from_light(context, point, receiver.origin, &light)?;

@@ -17,7 +17,7 @@ use crate::vector::unit;
 pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     let PixelSample { x, y, sample } = pixel;
     let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Pixel);
-    let [jitter_x, jitter_y] = pattern.point(sample, context.frame.samples);
+    let [jitter_x, jitter_y] = pattern.point(sample);
     let filter = context.frame.filter;
     [x as f32 + place(filter, jitter_x), y as f32 + place(filter, jitter_y)]
 }
@@ -64,10 +64,9 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     context.counters.eye_rays += 1;
     let ray = eye_ray(context, film_position(context, pixel));
     let PixelSample { x, y, sample } = pixel;
-    let samples = context.frame.samples;
     let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Specular);
     // The first choices are stratified over all samples of a pixel.
-    let first = || pattern.point(pattern.index_in_all(0, sample, samples), samples);
+    let first = || pattern.point(sample);
     let first_layer = surface_choice(0, 0);
     let random = |choice| match choice {
         0 => first()[0],
