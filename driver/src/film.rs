@@ -1,11 +1,12 @@
 //! Film: the pixels of a picture's crop window, as far as they are rendered.
 //!
 //! ```
-//! use photoncard_driver::film::{Film, PixelValue, Window};
+//! use photoncard_driver::film::{Film, PixelSums, SumFormat, Window};
 //!
 //! # fn main() -> Result<(), photoncard_driver::film::FilmError> {
-//! let mut film = Film::new(640, 480, Window { x0: 0, x1: 2, y0: 0, y1: 1 })?;
-//! film.write(1, 0, PixelValue { radiance: [0.5; 3], ..PixelValue::default() })?;
+//! let format = SumFormat { samples: 2, ..SumFormat::ONE };
+//! let mut film = Film::new(640, 480, Window { x0: 0, x1: 2, y0: 0, y1: 1 }, format)?;
+//! film.write(1, 0, &PixelSums { light: [1 << 40; 3], ..PixelSums::default() })?;
 //! assert_eq!((film.missing(), film.is_complete()), (1, false));
 //! assert_eq!(film.pixel(1, 0).map(|pixel| pixel.radiance), Some([0.5; 3]));
 //! assert_eq!(film.pixel(2, 0), None);
@@ -16,12 +17,13 @@
 use std::sync::{Mutex, PoisonError};
 
 use photoncard_shared::message::Tile;
-pub use photoncard_shared::message::{Pixel as PixelValue, PixelLayers, PixelRecord};
+pub use photoncard_shared::message::{Pixel as PixelValue, PixelLayers, PixelSums, SumScale};
 use thiserror::Error;
 
 use crate::sink::{FinishedTile, TileSink, pixel_positions};
+pub use crate::sums::{FilmPixel, SumFormat};
 
-/// Maximum number of pixels of a film: 2^28, about 10 GiB, or 20 GiB with layers.
+/// Maximum number of pixels of a film: 2^28, 15 GiB, or 28 GiB with layers.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Maximum width and height of a picture, pixels.
@@ -97,6 +99,11 @@ pub enum FilmError {
         /// Rows of the crop window.
         height: u32,
     },
+    /// The films are of other windows, layers or units.
+    #[error(
+        "the samples of a film of another window, other layers or other units cannot be added; render all with equal settings"
+    )]
+    Other,
     /// The pixel lies outside the crop window.
     #[error("pixel ({x}, {y}) lies outside the crop window {},{},{},{}", window.x0, window.x1, window.y0, window.y1)]
     Outside {
@@ -109,49 +116,35 @@ pub enum FilmError {
     },
 }
 
-/// A film's pixel with its layers.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FilmPixel {
-    /// Radiance, albedo, normal and depth.
-    pub pixel: PixelValue,
-    /// Layers; zero in a film without layers.
-    pub layers: PixelLayers,
-}
-
-impl From<PixelRecord> for FilmPixel {
-    fn from(PixelRecord { pixel, layers }: PixelRecord) -> Self {
-        Self { pixel, layers: layers.unwrap_or_default() }
-    }
-}
-
-/// The pixels of a crop window of a picture.
+/// The pixels of a crop window of a picture: sums of samples, and the values that they stand for.
 #[derive(Clone, Debug)]
 pub struct Film {
     width: u32,
     height: u32,
     window: Window,
-    pixels: Vec<PixelValue>,
-    /// Layers of each pixel; empty in a film without layers.
-    layers: Vec<PixelLayers>,
+    format: SumFormat,
+    /// Records of the pixels' sums, row by row.
+    records: Vec<u8>,
     written: Vec<bool>,
     missing: usize,
 }
 
 impl Film {
-    /// An empty film for the crop window `window` of a picture of `width` x `height` pixels, without layers.
+    /// An empty film for the crop window `window` of a picture of `width` x `height` pixels.
     ///
     /// # Errors
     /// If the picture or the window has no pixels or too many, or the window leaves the picture.
-    pub fn new(width: u32, height: u32, window: Window) -> Result<Self, FilmError> {
+    pub fn new(width: u32, height: u32, window: Window, format: SumFormat) -> Result<Self, FilmError> {
         let count = Self::check(width, height, window)?;
         let too_large = FilmError::Memory { width: window.width(), height: window.height() };
-        let mut pixels = Vec::new();
+        let bytes = count.checked_mul(format.record_bytes()).ok_or(too_large)?;
+        let mut records = Vec::new();
         let mut written = Vec::new();
-        pixels.try_reserve_exact(count).map_err(|_| too_large)?;
+        records.try_reserve_exact(bytes).map_err(|_| too_large)?;
         written.try_reserve_exact(count).map_err(|_| too_large)?;
-        pixels.resize(count, PixelValue::default());
+        records.resize(bytes, 0);
         written.resize(count, false);
-        Ok(Self { width, height, window, pixels, layers: Vec::new(), written, missing: count })
+        Ok(Self { width, height, window, format, records, written, missing: count })
     }
 
     /// Checks that a film can be made, as far as that is known before its memory is asked for. Returns its pixels.
@@ -168,22 +161,22 @@ impl Film {
         count.ok_or(FilmError::Memory { width: columns, height: rows })
     }
 
-    /// [`Self::new`] with layers.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn with_layers(width: u32, height: u32, window: Window) -> Result<Self, FilmError> {
-        let mut film = Self::new(width, height, window)?;
-        let count = film.pixels.len();
-        let too_large = FilmError::Memory { width: window.width(), height: window.height() };
-        film.layers.try_reserve_exact(count).map_err(|_| too_large)?;
-        film.layers.resize(count, PixelLayers::default());
-        Ok(film)
+    /// Format of the sums.
+    pub fn format(&self) -> &SumFormat {
+        &self.format
     }
 
-    /// Returns whether the film has layers.
-    pub fn has_layers(&self) -> bool {
-        !self.layers.is_empty()
+    /// An empty film of the window, with sums of `samples` samples.
+    ///
+    /// # Errors
+    /// [`FilmError::Memory`].
+    pub(crate) fn empty_with(&self, samples: u32) -> Result<Self, FilmError> {
+        Self::new(self.width, self.height, self.window, SumFormat { samples, ..self.format })
+    }
+
+    /// States the number of samples of an empty film.
+    pub(crate) fn set_samples(&mut self, samples: u32) {
+        self.format.samples = samples;
     }
 
     /// Width of the full picture, pixels.
@@ -201,57 +194,95 @@ impl Film {
         self.window
     }
 
-    /// The pixels of the crop window, row by row from the top.
-    pub fn pixels(&self) -> &[PixelValue] {
-        &self.pixels
+    /// Sums of the pixels of the crop window, row by row from the top.
+    pub fn sums(&self) -> impl ExactSizeIterator<Item = PixelSums> + Clone {
+        let records = self.records.chunks_exact(self.format.record_bytes());
+        records.map(|record| PixelSums::read(record).unwrap_or_default())
     }
 
-    /// The pixel at `(x, y)` of the full picture, or `None` outside the crop window.
-    pub fn pixel(&self, x: u32, y: u32) -> Option<&PixelValue> {
-        self.index(x, y).map(|index| &self.pixels[index])
+    /// Values of the pixels of the crop window, row by row from the top.
+    pub fn pixels(&self) -> impl ExactSizeIterator<Item = PixelValue> + Clone {
+        self.all().map(|all| all.pixel)
     }
 
-    /// The pixels of the crop window with their layers, row by row from the top.
-    pub fn all(&self) -> impl Iterator<Item = FilmPixel> {
-        (0..self.pixels.len()).map(|index| self.all_of(index))
+    /// Values of the pixels of the crop window with their layers, row by row from the top.
+    pub fn all(&self) -> impl ExactSizeIterator<Item = FilmPixel> + Clone {
+        self.sums().map(|sums| self.format.values(&sums))
     }
 
-    /// The pixel at `(x, y)` of the full picture with its layers, or `None` outside the crop window.
+    /// Values of the pixel at `(x, y)` of the full picture, or `None` outside the crop window.
+    pub fn pixel(&self, x: u32, y: u32) -> Option<PixelValue> {
+        self.all_at(x, y).map(|all| all.pixel)
+    }
+
+    /// Values of the pixel at `(x, y)` of the full picture with its layers, or `None` outside the crop window.
     pub fn all_at(&self, x: u32, y: u32) -> Option<FilmPixel> {
-        self.index(x, y).map(|index| self.all_of(index))
+        self.sums_at(x, y).map(|sums| self.format.values(&sums))
     }
 
-    fn all_of(&self, index: usize) -> FilmPixel {
-        let layers = self.layers.get(index).copied().unwrap_or_default();
-        FilmPixel { pixel: self.pixels[index], layers }
+    /// Sums of the pixel at `(x, y)` of the full picture, or `None` outside the crop window.
+    pub fn sums_at(&self, x: u32, y: u32) -> Option<PixelSums> {
+        let bytes = self.format.record_bytes();
+        let index = self.index(x, y)?;
+        PixelSums::read(&self.records[index * bytes..(index + 1) * bytes])
     }
 
-    /// Writes the pixel at `(x, y)` of the full picture from a chip's record. Layers that the record or the film lacks
-    /// are left out.
-    ///
-    /// # Errors
-    /// As [`Self::write`].
-    pub fn write_record(&mut self, x: u32, y: u32, record: &PixelRecord) -> Result<(), FilmError> {
-        self.write(x, y, record.pixel)?;
-        if let (Some(index), Some(layers)) = (self.index(x, y), record.layers)
-            && let Some(slot) = self.layers.get_mut(index)
-        {
-            *slot = layers;
-        }
-        Ok(())
-    }
-
-    /// Writes the pixel at `(x, y)` of the full picture; writing one again replaces it.
+    /// Writes the sums of the pixel at `(x, y)` of the full picture; writing them again replaces them. Layers that the film lacks are
+    /// left out, and those that the sums lack are zero.
     ///
     /// # Errors
     /// [`FilmError::Outside`] if the pixel is not in the crop window; the film stays as it was.
-    pub fn write(&mut self, x: u32, y: u32, value: PixelValue) -> Result<(), FilmError> {
+    pub fn write(&mut self, x: u32, y: u32, sums: &PixelSums) -> Result<(), FilmError> {
         let index = self.index(x, y).ok_or(FilmError::Outside { x, y, window: self.window })?;
-        self.pixels[index] = value;
+        let sums = match (self.format.layers, sums.layers) {
+            (true, layers) => sums.with_layers(layers.unwrap_or_default()),
+            (false, _) => sums.with_light(sums.light),
+        };
+        let mut at = index * self.format.record_bytes();
+        sums.write(&mut |bytes| {
+            self.records[at..at + bytes.len()].copy_from_slice(bytes);
+            at += bytes.len();
+        });
         if !std::mem::replace(&mut self.written[index], true) {
             self.missing -= 1;
         }
         Ok(())
+    }
+
+    /// Adds the sums of the samples of a film of equal window, layers and units. Pixels that either lacks are missing.
+    ///
+    /// # Errors
+    /// [`FilmError::Other`] if the films differ in these; the film stays as it was.
+    pub fn add(&mut self, more: &Self) -> Result<(), FilmError> {
+        let format = self.format.plus(&more.format).filter(|_| self.window == more.window);
+        self.format = format.ok_or(FilmError::Other)?;
+        let bytes = self.format.record_bytes();
+        let records = self.records.chunks_exact_mut(bytes).zip(more.sums());
+        for ((record, more_sums), (written, more_written)) in
+            records.zip(self.written.iter_mut().zip(&more.written))
+        {
+            let sums = PixelSums::read(record).unwrap_or_default().plus(&more_sums);
+            let mut rest = record;
+            sums.write(&mut |bytes| {
+                let (head, tail) = std::mem::take(&mut rest).split_at_mut(bytes.len());
+                head.copy_from_slice(bytes);
+                rest = tail;
+            });
+            self.missing += usize::from(*written && !more_written);
+            *written &= more_written;
+        }
+        Ok(())
+    }
+
+    /// A tile of further samples with the samples of the film added; `None` if the film lacks one of its pixels, or its units or
+    /// layers differ.
+    pub fn added_to(&self, tile: &FinishedTile) -> Option<FinishedTile> {
+        let format = self.format.plus(tile.format())?;
+        if !self.has(tile.tile()) {
+            return None;
+        }
+        let sums = tile.sums().filter_map(|((x, y), sums)| Some(self.sums_at(x, y)?.plus(&sums)));
+        FinishedTile::of_pixels(*tile.tile(), sums, format)
     }
 
     /// Number of pixels of the crop window that were never written.
@@ -277,9 +308,8 @@ impl Film {
         if !self.has(tile) {
             return None;
         }
-        let pixels = pixel_positions(tile).filter_map(|(x, y)| self.all_at(x, y));
-        let records = pixels.map(|FilmPixel { pixel, layers }| PixelRecord { pixel, layers: Some(layers) });
-        FinishedTile::of_pixels(*tile, records, self.has_layers())
+        let sums = pixel_positions(tile).filter_map(|(x, y)| self.sums_at(x, y));
+        FinishedTile::of_pixels(*tile, sums, self.format)
     }
 
     /// Marks a tile's pixels as not written.
@@ -301,9 +331,9 @@ impl TileSink for Mutex<Film> {
     fn put(&self, tile: &FinishedTile) {
         // A thread that panicked holding the lock has left whole pixels.
         let mut film = self.lock().unwrap_or_else(PoisonError::into_inner);
-        for ((x, y), record) in tile.pixels() {
+        for ((x, y), sums) in tile.sums() {
             // The tiles of a render lie in its film's window.
-            let _ = film.write_record(x, y, &record);
+            let _ = film.write(x, y, &sums);
         }
     }
 
@@ -316,31 +346,31 @@ impl TileSink for Mutex<Film> {
 mod tests {
     use super::*;
 
-    fn value(radiance: f32) -> PixelValue {
-        PixelValue { radiance: [radiance; 3], ..PixelValue::default() }
+    fn sums(light: u32) -> PixelSums {
+        PixelSums { light: [i64::from(light) << 40; 3], ..PixelSums::default() }
     }
 
     #[test]
     fn a_film_is_complete_once_each_pixel_of_the_window_was_written() {
-        let mut film = Film::new(8, 6, Window { x0: 2, x1: 5, y0: 1, y1: 3 }).unwrap();
+        let mut film = Film::new(8, 6, Window { x0: 2, x1: 5, y0: 1, y1: 3 }, SumFormat::ONE).unwrap();
         for y in 1..3 {
             for x in 2..5 {
                 assert!(!film.is_complete());
-                film.write(x, y, value(0.0)).unwrap();
-                film.write(x, y, value((10 * y + x) as f32)).unwrap();
+                film.write(x, y, &sums(0)).unwrap();
+                film.write(x, y, &sums(10 * y + x)).unwrap();
             }
         }
         assert!(film.is_complete());
-        assert_eq!(film.pixel(4, 2), Some(&value(24.0)));
-        assert_eq!(film.pixels()[0], value(12.0));
+        assert_eq!(film.pixel(4, 2).unwrap().radiance, [24.0; 3]);
+        assert_eq!(film.pixels().next().unwrap().radiance, [12.0; 3]);
     }
 
     #[test]
     fn pixels_outside_the_window_are_refused() {
         let window = Window { x0: 2, x1: 5, y0: 1, y1: 3 };
-        let mut film = Film::new(8, 6, window).unwrap();
+        let mut film = Film::new(8, 6, window, SumFormat::ONE).unwrap();
         for (x, y) in [(1, 1), (5, 1), (2, 0), (2, 3), (u32::MAX, u32::MAX)] {
-            assert_eq!(film.write(x, y, value(1.0)), Err(FilmError::Outside { x, y, window }));
+            assert_eq!(film.write(x, y, &sums(1)), Err(FilmError::Outside { x, y, window }));
             assert_eq!(film.pixel(x, y), None);
         }
         assert_eq!(film.missing(), 6);
@@ -348,17 +378,45 @@ mod tests {
 
     #[test]
     fn impossible_films_are_refused() {
-        assert!(matches!(Film::new(0, 4, Window::full(0, 4)), Err(FilmError::Size { .. })));
-        assert!(matches!(Film::new(u32::MAX, 4, Window::full(1, 1)), Err(FilmError::Size { .. })));
+        assert!(matches!(Film::new(0, 4, Window::full(0, 4), SumFormat::ONE), Err(FilmError::Size { .. })));
+        assert!(matches!(
+            Film::new(u32::MAX, 4, Window::full(1, 1), SumFormat::ONE),
+            Err(FilmError::Size { .. })
+        ));
         for window in [
             Window { x0: 3, x1: 3, y0: 0, y1: 4 },
             Window { x0: 3, x1: 2, y0: 0, y1: 4 },
             Window { x0: 0, x1: 5, y0: 0, y1: 4 },
             Window { x0: 0, x1: 4, y0: 0, y1: 5 },
         ] {
-            assert!(matches!(Film::new(4, 4, window), Err(FilmError::Window { .. })), "{window:?}");
+            assert!(
+                matches!(Film::new(4, 4, window, SumFormat::ONE), Err(FilmError::Window { .. })),
+                "{window:?}"
+            );
         }
         let side = MAX_SIDE;
-        assert!(matches!(Film::new(side, side, Window::full(side, side)), Err(FilmError::Memory { .. })));
+        let film = Film::new(side, side, Window::full(side, side), SumFormat::ONE);
+        assert!(matches!(film, Err(FilmError::Memory { .. })));
+    }
+
+    #[test]
+    fn sums_of_films_are_those_of_all_samples_where_both_have_pixels() {
+        let window = Window::full(3, 1);
+        let film = |samples, lights: &[u32]| {
+            let mut film = Film::new(3, 1, window, SumFormat { samples, ..SumFormat::ONE }).unwrap();
+            (0..).zip(lights).for_each(|(x, &light)| film.write(x, 0, &sums(light)).unwrap());
+            film
+        };
+        let mut all = film(1, &[1, 2, 3]);
+        let more = film(3, &[7, 6]);
+        let tile = |width| Tile { id: 4, x: 0, y: 0, width, height: 1 };
+        let added = all.added_to(&more.finished(&tile(2)).unwrap()).unwrap();
+        all.add(&more).unwrap();
+        assert_eq!((all.format().samples, all.missing()), (4, 1));
+        assert_eq!(all.pixel(0, 0).unwrap().radiance, [2.0; 3]);
+        assert_eq!(all.finished(&tile(2)).as_ref(), Some(&added));
+        assert_eq!(all.finished(&tile(3)), None);
+        let mut other = Film::new(3, 1, window, SumFormat { layers: true, ..SumFormat::ONE }).unwrap();
+        assert_eq!(other.add(&all), Err(FilmError::Other));
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::film::FilmPixel;
+use crate::sums::FilmPixel;
 
 /// One channel of a picture.
 #[derive(Clone, Copy, Debug)]

@@ -100,7 +100,7 @@
 //! | layer | modules | contents |
 //! |---|---|---|
 //! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic |
-//! | tiles | [`sink`] | a finished tile, and [`TileSink`](sink::TileSink), the trait of every output |
+//! | tiles | [`sums`], [`sink`] | format of pixels' sums, and their values; a finished tile, and [`TileSink`](sink::TileSink), the trait of every output |
 //! | pictures | [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`] | pixels of a picture; its layers; files; comparison |
 //! | scenes | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
 //! | trees | [`bvh`], `fold`, `light` | bounding volume hierarchy; folding of binary trees into wide nodes; light tree and environment |
@@ -160,5 +160,6 @@ pub mod scheduler;
 pub mod session;
 pub mod sink;
 pub mod study;
+pub mod sums;
 pub mod tone_mapping;
 pub mod viewer;

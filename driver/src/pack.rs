@@ -10,6 +10,7 @@ use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{
     self, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, power_of_two_above,
 };
+use photoncard_shared::message::SumScale;
 
 use crate::allocation::{self, OutOfMemory};
 use crate::bvh::{self, LeafTriangles};
@@ -86,6 +87,11 @@ impl PackedScene {
             .map_or(PhotonGrid::UNIT, |NodeBox { lower, upper }| PhotonGrid::around(lower, upper))
     }
 
+    /// Units of the sums of pixels.
+    pub fn sum_scale(&self) -> SumScale {
+        SumScale { depth: self.photon_grid().cell, ..self.view().0.header.sum_scale() }
+    }
+
     /// The sources of photons.
     pub(crate) fn sources(&self) -> &Sources {
         &self.sources
@@ -160,13 +166,14 @@ fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
 
 /// Unit of the chips' fixed-point sums of radiance, which hold 23 bits above the unit and 40 below.
 ///
-/// The unit is a typical radiance: that of all surfaces if the emitted power were spread over them and reflected once by
-/// white. A much brighter emitter or texel of the environment raises it, so that its own radiance is within 2^12 units:
-/// shadow rays next to an emitter may contribute a thousand times as much.
+/// The unit is 2^4 times a typical radiance: that of all surfaces if the emitted power were spread over them and reflected once by
+/// white. A much brighter emitter or texel of the environment raises it, so that its own radiance is within 2^7 units. The sums of
+/// 2^12 samples, the maximum of a pixel, then hold 2^15 times the typical radiance and 2^4 times the brightest one on average: shadow
+/// rays next to an emitter may contribute a thousand times as much.
 fn radiance_unit(scene: &Scene, lights: &Lights) -> f32 {
     let area: f64 = scene.triangles.iter().map(|triangle| triangle.area() as f64).sum();
     let typical = lights.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));
     let environment = lights.environment().map_or(0.0, |environment| environment.brightest);
     let brightest = scene.materials.iter().map(|m| m.emission.max_element()).fold(environment, f32::max);
-    power_of_two_above(typical.max(f64::from(brightest) / f64::from(1 << 12)))
+    power_of_two_above((16.0 * typical).max(f64::from(brightest) / 128.0))
 }

@@ -1,22 +1,24 @@
 //! Partial renders: finished tiles are appended to a file beside the picture, so that `--resume` can continue from them.
 //!
 //! ```text
-//! photoncard partial render 2\n
+//! photoncard partial render 3\n
 //! { settings as JSON }\n
-//! record: 89 54 49 4c 45 0d 0a 1a | x, y, width, height: u32 each | pixels, 40 bytes each, with layers 80 | CRC-32C: u32
+//! record: 89 54 49 4c 45 0d 0a 1a | x, y, width, height, first sample, samples: u32 each | pixels, 60 bytes each, with layers 112 | CRC-32C: u32
 //! ...
 //! ```
 //!
 //! Numbers are little-endian; the checksum covers all preceding bytes of the record. An incomplete last record, left when
 //! the process ended during a write, is cut off. A damaged record is skipped: the reader searches for the magic number that
 //! begins the next one. If two records contain a pixel, the later one holds. The settings are those that pixels depend on:
-//! a resumed render may use other tiles, another order and other cards.
+//! a resumed render may use other tiles, another order and other cards. They do not hold the number of samples: a picture of more
+//! samples takes over complete ranges of samples from the first on, and renders the others.
 //!
 //! The render that writes the file locks it. A file of this name that is no partial render is refused and left unchanged.
 
 mod error;
 mod file;
 mod records;
+mod samples;
 #[cfg(test)]
 mod tests;
 
@@ -33,6 +35,7 @@ pub use self::error::PartialError;
 use self::error::VERSION;
 use self::file::{FAMILY, Title, read_title};
 use self::records::{HEAD_BYTES, read_tiles, record};
+use self::samples::KeptSamples;
 use crate::film::Film;
 use crate::sink::{FinishedTile, TileSink};
 
@@ -52,6 +55,8 @@ pub struct PartialSettings {
 pub struct PartialRender {
     path: PathBuf,
     settings: Value,
+    /// The first sample of the tiles that are appended.
+    first_sample: u32,
     kept: Mutex<KeptTiles>,
 }
 
@@ -80,8 +85,9 @@ impl PartialRender {
         file::open(&partial.path, false).map(drop)
     }
 
-    /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on. With
-    /// [`PartialSettings::resume`] the tiles of the file are written into the film.
+    /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on but the number of samples,
+    /// which `film` states. With [`PartialSettings::resume`] the file's tiles are written into the film. If it has all tiles of fewer
+    /// samples, these are the second result, and the film is of the others.
     ///
     /// # Errors
     /// If the file is no partial render, in use by another render or unreadable, or if it is to be resumed and has other
@@ -90,17 +96,14 @@ impl PartialRender {
         partial: &PartialSettings,
         settings: Value,
         film: &mut Film,
-    ) -> Result<Self, PartialError> {
+    ) -> Result<(Self, Option<Film>), PartialError> {
         let path = partial.path.clone();
-        let this = Self { path, settings, kept: Mutex::default() };
-        if let Some(file) = file::open(&this.path, false)? {
-            let mut kept = this.lock();
-            if partial.resume {
-                this.resume(&mut kept, &file, film)?;
-            }
-            kept.file = Some(file);
-        }
-        Ok(this)
+        let mut this = Self { path, settings, first_sample: 0, kept: Mutex::default() };
+        let Some(file) = file::open(&this.path, false)? else { return Ok((this, None)) };
+        let base = if partial.resume { this.resume(&file, film)? } else { None };
+        this.lock().file = Some(file);
+        this.first_sample = base.as_ref().map_or(0, |base| base.format().samples);
+        Ok((this, base))
     }
 
     fn lock(&self) -> MutexGuard<'_, KeptTiles> {
@@ -111,19 +114,27 @@ impl PartialRender {
         PartialError::File { path: self.path.clone(), source }
     }
 
-    /// Writes the valid tiles of the file into the film, and truncates the file after the last one.
-    fn resume(&self, kept: &mut KeptTiles, mut file: &File, film: &mut Film) -> Result<(), PartialError> {
+    /// Writes the valid tiles of the file into the film, and truncates the file after the last one. Returns the film of the first
+    /// samples if the file has all of their tiles.
+    fn resume(&self, mut file: &File, film: &mut Film) -> Result<Option<Film>, PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let mut reader = BufReader::new(file);
-        let Some(head) = self.read_head(&mut reader)? else { return Ok(()) };
-        let sound = read_tiles(&mut reader, head, film).and_then(|sound| {
-            file.set_len(sound)?;
-            file.seek(SeekFrom::End(0))
-        });
-        kept.holds_earlier = sound.map_err(|error| self.error(error))? > head;
+        let Some(head) = self.read_head(&mut reader)? else { return Ok(None) };
+        let asked = film.format().samples;
+        let too_large = |error| self.error(io::Error::new(io::ErrorKind::OutOfMemory, error));
+        let mut found = KeptSamples::new(film.empty_with(asked).map_err(too_large)?);
+        let sound = read_tiles(&mut reader, head, &mut found).map_err(|error| self.error(error))?;
+        let (base, rest) = found.split().map_err(|samples| PartialError::Differs {
+            path: self.path.clone(),
+            differences: vec![format!("spp was {samples}, and not all of them are finished, and is {asked}")],
+        })?;
+        *film = rest;
+        file.set_len(sound).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|error| self.error(error))?;
+        let mut kept = self.lock();
+        kept.holds_earlier = sound > head;
         kept.holds_tiles = kept.holds_earlier;
         kept.is_begun = true;
-        Ok(())
+        Ok(base)
     }
 
     /// Checks title and settings. Returns their size in bytes; `None` if the file ends before they do.
@@ -160,7 +171,7 @@ impl PartialRender {
         let mut write = || {
             let start = file.stream_position()?;
             // A single call: another process sees the tile whole or truncated.
-            file.write_all(&record(tile))?;
+            file.write_all(&record(tile, self.first_sample))?;
             Ok(start)
         };
         let start = write().map_err(|error| self.error(error))?;

@@ -1,41 +1,37 @@
 //! Finished tiles, and the trait of their destinations: film, partial file, display server.
 
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{PixelRecord, Tile, record_bytes};
+use photoncard_shared::message::{PixelSums, Tile};
+
+use crate::sums::{FilmPixel, SumFormat};
 
 /// Tile with all its pixels.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FinishedTile {
     tile: Tile,
-    /// [`PixelRecord`]s in the format of the wire, row by row: equal bytes are equal pixels, bit for bit.
+    /// [`PixelSums`] in the format of the wire, row by row: equal bytes are equal pixels, bit for bit.
     records: Vec<u8>,
-    has_layers: bool,
+    format: SumFormat,
     /// Work counters of the chip.
     pub counters: Counters,
 }
 
 impl FinishedTile {
-    /// Tile from encoded records; `None` unless there is one for each pixel.
-    pub fn new(tile: Tile, records: Vec<u8>, has_layers: bool, counters: Counters) -> Option<Self> {
-        let bytes = tile.pixels().checked_mul(record_bytes(has_layers) as u64)?;
-        (records.len() as u64 == bytes).then_some(Self { tile, records, has_layers, counters })
+    /// Tile from encoded sums; `None` unless there are those of each pixel.
+    pub fn new(tile: Tile, records: Vec<u8>, format: SumFormat, counters: Counters) -> Option<Self> {
+        let bytes = tile.pixels().checked_mul(format.record_bytes() as u64)?;
+        (records.len() as u64 == bytes).then_some(Self { tile, records, format, counters })
     }
 
-    /// Tile from pixels, row by row, with zero counters; `None` unless there is one for each pixel. Missing layers of a
-    /// pixel are zero.
+    /// Tile from the sums of its pixels, row by row, with zero counters; `None` unless there are those of each pixel.
     pub fn of_pixels(
         tile: Tile,
-        pixels: impl IntoIterator<Item = PixelRecord>,
-        has_layers: bool,
+        pixels: impl IntoIterator<Item = PixelSums>,
+        format: SumFormat,
     ) -> Option<Self> {
         let mut records = Vec::new();
-        for PixelRecord { pixel, layers } in pixels {
-            records.extend(pixel.to_bytes());
-            if has_layers {
-                records.extend(layers.unwrap_or_default().to_bytes());
-            }
-        }
-        Self::new(tile, records, has_layers, Counters::ZERO)
+        pixels.into_iter().for_each(|sums| sums.write(&mut |bytes| records.extend(bytes)));
+        Self::new(tile, records, format, Counters::ZERO)
     }
 
     /// Rectangle of the tile in the picture.
@@ -43,15 +39,25 @@ impl FinishedTile {
         &self.tile
     }
 
-    /// Encoded records of the pixels, row by row.
+    /// Encoded sums of the pixels, row by row.
     pub fn records(&self) -> &[u8] {
         &self.records
     }
 
-    /// Column, row and record of each pixel.
-    pub fn pixels(&self) -> impl Iterator<Item = ((u32, u32), PixelRecord)> {
-        let records = self.records.chunks_exact(record_bytes(self.has_layers));
-        pixel_positions(&self.tile).zip(records.map(|record| PixelRecord::read(record).unwrap_or_default()))
+    /// Format of the sums.
+    pub fn format(&self) -> &SumFormat {
+        &self.format
+    }
+
+    /// Column, row and sums of each pixel.
+    pub fn sums(&self) -> impl Iterator<Item = ((u32, u32), PixelSums)> {
+        let records = self.records.chunks_exact(self.format.record_bytes());
+        pixel_positions(&self.tile).zip(records.map(|record| PixelSums::read(record).unwrap_or_default()))
+    }
+
+    /// Column, row and values of each pixel.
+    pub fn pixels(&self) -> impl Iterator<Item = ((u32, u32), FilmPixel)> {
+        self.sums().map(|(place, sums)| (place, self.format.values(&sums)))
     }
 }
 

@@ -112,6 +112,12 @@ impl ColourSum {
         }
     }
 
+    /// The sum of each channel, 2^-40 units.
+    #[inline(always)]
+    pub fn bits(&self) -> [i64; 3] {
+        self.0.map(|Sum(sum)| sum.to_bits())
+    }
+
     /// Value of the sum, in units.
     #[inline(always)]
     pub fn value(&self) -> Vec3 {

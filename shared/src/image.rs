@@ -12,6 +12,7 @@ use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
 use crate::layout::{
     Attributes, DistantLight, Emitter, Layers, Material, Photon, PhotonGrid, Record, Texture,
 };
+use crate::message::SumScale;
 
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
@@ -339,6 +340,11 @@ impl Header {
             texture: (texture != NO_ENVIRONMENT).then_some(texture),
             cells: [cells as u16, (cells >> 16) as u16].map(|cells| cells.max(1)),
         }
+    }
+
+    /// Units of the sums of pixels: the radiance unit, and for depths a cell of the photon grid.
+    pub fn sum_scale(&self) -> SumScale {
+        SumScale { radiance: self.radiance_unit, depth: self.photon_grid.cell }
     }
 
     fn check(&self) -> Result<(), HeaderError> {

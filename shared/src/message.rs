@@ -23,7 +23,8 @@ mod self_test;
 
 pub use self::fault::{Fault, FaultCode, Parameter};
 pub use self::pixel::{
-    LAYER_BYTES, PIXEL_BYTES, PIXELS_BYTES, Pixel, PixelLayers, PixelRecord, record_bytes,
+    ALBEDO_STEPS, DEPTH_STEPS, LAYERED_PIXEL_BYTES, LayerSums, NORMAL_STEPS, PIXEL_BYTES, PIXELS_BYTES,
+    Pixel, PixelLayers, PixelSums, SumScale, record_bytes,
 };
 pub use self::self_test::{
     CASES_PER_COMMAND, MemoryPattern, MemoryTest, OPERAND_BYTES, RESULT_BYTES, RESULTS, WORDS_PER_LINE,
@@ -36,7 +37,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 12;
+pub const PROTOCOL_VERSION: u16 = 13;
 
 /// Maximum number of lines of one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
@@ -83,8 +84,12 @@ pub struct FrameParameters {
     pub camera: Camera,
     /// Seed of all random numbers.
     pub seed: u32,
-    /// Samples a pixel.
+    /// Number of the first sample of a pixel: 0, or the number of those that other frames of the picture have.
+    pub first_sample: u32,
+    /// Samples a pixel, from the first on.
     pub samples: u32,
+    /// Samples a pixel of the whole picture as planned: with the irradiance cache, rays are divided among so many.
+    pub planned_samples: u32,
     /// Final gather rays a sample.
     pub gather_rays: u32,
     /// Shadow rays a sample.
@@ -108,7 +113,7 @@ pub struct FrameParameters {
     pub radiance: Radiance,
     /// Gathers in the caustic map; with `None`, emission that gather rays meet through specular surfaces counts.
     pub caustics: Option<CausticGather>,
-    /// `true` for pixels with [`PixelLayers`]. Their [`Pixel`]s do not change; tiles have fewer pixels
+    /// `true` for pixels with [`LayerSums`]. Their light does not change; tiles have fewer pixels
     /// ([`Budget::pixels_of_tile`]).
     pub layers: bool,
     /// Pixel filter.
@@ -290,7 +295,7 @@ pub enum Reply<'a> {
         tile: u32,
         /// Index of the first of these pixels, row-major.
         first: u32,
-        /// [`PixelRecord`]s.
+        /// [`PixelSums`].
         #[serde(borrow)]
         data: &'a [u8],
     },

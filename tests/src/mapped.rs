@@ -130,7 +130,7 @@ impl<'a> IndirectLight<'a> {
             let mut sum = Vec3::ZERO;
             let target = GatherTarget::new(0, PointIndex::Pixel(0));
             for ray in 0..rays {
-                let end = cast(&mut context, &point, target, 1.0, ray).expect("sound");
+                let end = cast(&mut context, &point, target, ray).expect("sound");
                 if let Some(request) = end.and_then(|end| end.request) {
                     sum += gathered(&mut context, &request, candidates.view()).expect("sound");
                 }

@@ -11,7 +11,7 @@ use photoncard_shared::message::Tile;
 use super::packet::{create_image, update_image};
 use super::queue::{PacketQueue, SharedQueue};
 use super::{DisplayAddress, DisplayError};
-use crate::film::{Film, FilmPixel, Window};
+use crate::film::{Film, Window};
 use crate::layer::Channel;
 use crate::sink::{FinishedTile, TileSink};
 use crate::viewer::Viewer;
@@ -85,7 +85,7 @@ impl Display {
     }
 
     pub(super) fn packet(&self, finished: &FinishedTile) -> Vec<u8> {
-        let pixels = finished.pixels().map(|(_, record)| FilmPixel::from(record));
+        let pixels = finished.pixels().map(|(_, pixel)| pixel);
         let values =
             pixels.flat_map(|pixel| self.channels.iter().map(move |channel| (channel.value)(&pixel)));
         let tile = finished.tile();

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use crate::pack::CardImage;
+use crate::sums::{FilmPixel, SumFormat};
 
 /// A rendered tile, with its work and memory traffic.
 pub struct RenderedTile {
@@ -37,6 +38,12 @@ impl RenderedTile {
         pixels.iter().for_each(|pixel| sums.extend_from_slice(pixel.light.sums(frame)));
         let views = pixels.into_iter().map(|pixel| pixel.view).collect();
         Self { sums, views, counters, traffic: MemoryTraffic::ZERO }
+    }
+
+    /// Values of the pixels, row by row, in a format of the frame.
+    pub fn pixels(&self, format: SumFormat) -> impl Iterator<Item = FilmPixel> {
+        let sums = self.sums.chunks(sums_of_pixel(format.layers) as usize);
+        self.views.iter().zip(sums).map(move |(view, light)| format.values(&view.sums(light)))
     }
 }
 

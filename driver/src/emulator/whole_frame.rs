@@ -16,7 +16,7 @@ use photoncard_firmware::render::final_gather::gathered;
 use photoncard_firmware::render::{Context, GatherOutlet};
 use photoncard_shared::budget::sums_of_pixel;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Fault, FaultCode, FrameParameters, PixelRecord, Tile};
+use photoncard_shared::message::{Fault, FaultCode, FrameParameters, PixelSums, Tile};
 use rayon::prelude::*;
 
 use super::THREAD_STACK;
@@ -24,6 +24,7 @@ use super::direct::{RenderedTile, new_chip, render_tile};
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::pack::CardImage;
 use crate::sink::{FinishedTile, TileSink};
+use crate::sums::SumFormat;
 
 /// Maximum number of gathers that are kept at once, 32 bytes each: 4.3 GB.
 const MAX_GATHERS: u64 = 1 << 27;
@@ -187,7 +188,7 @@ fn rays_of_pixel(frame: &FrameParameters) -> u64 {
     let samples = frame.samples as u64;
     match frame.irradiance_error {
         None => samples * frame.gather_rays as u64,
-        Some(_) => samples * (frame.gather_rays as u64).div_ceil(samples.max(1)),
+        Some(_) => samples * u64::from(frame.gather_rays.div_ceil(frame.planned_samples.max(1))),
     }
 }
 
@@ -257,13 +258,13 @@ fn cast_tiles<'a, M: MeasuredMemory>(
 /// Puts the tiles into sinks.
 fn complete(job: CurveJob, all: &Frame, sinks: &[&dyn TileSink]) -> Result<(), FrameError> {
     let (scene, _) = job.image.view();
+    let format = SumFormat::new(&scene.header, job.frame);
     let sums_of_pixel = sums_of_pixel(job.frame.layers) as usize;
     let mut pixels = all.views.iter().zip(all.sums.chunks_exact(sums_of_pixel));
     for tile in job.tiles {
         let of_tile = pixels.by_ref().take(tile.pixels() as usize);
-        let records: Vec<PixelRecord> =
-            of_tile.map(|(view, sums)| view.record(&scene, job.frame, sums)).collect();
-        let finished = FinishedTile::of_pixels(*tile, records, job.frame.layers)
+        let sums: Vec<PixelSums> = of_tile.map(|(view, light)| view.sums(light)).collect();
+        let finished = FinishedTile::of_pixels(*tile, sums, format)
             .ok_or(Fault { code: FaultCode::Tile, detail: tile.id })?;
         sinks.iter().for_each(|sink| sink.put(&finished));
     }

@@ -4,7 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 /// Version of the file's format, in its first line.
-pub(super) const VERSION: u32 = 2;
+pub(super) const VERSION: u32 = 3;
 
 /// Error of a partial render that cannot be resumed or written.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]

@@ -1,19 +1,20 @@
-//! Records of finished tiles in a partial render: `magic number | x, y, width, height | pixels | CRC-32C`.
+//! Records of finished tiles in a partial render: `magic number | x, y, width, height | first sample, samples | pixels | CRC-32C`.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
 
 use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::checksum::checksum;
-use photoncard_shared::message::{PixelRecord, Tile, record_bytes};
+use photoncard_shared::message::{PixelSums, Tile};
 
-use crate::film::Film;
+use super::samples::{KeptSamples, SampleRange};
+use crate::film::Window;
 use crate::sink::{FinishedTile, pixel_positions};
 
 /// Magic number of a record. As in PNG, a transfer that alters line ends or eighth bits destroys it.
 pub(super) const MAGIC: [u8; 8] = *b"\x89TILE\r\n\x1a";
-/// Size of magic number, position and size of the tile, bytes.
-pub(super) const HEAD_BYTES: usize = MAGIC.len() + 16;
+/// Size of magic number, position and size of the tile, and range of samples, bytes.
+pub(super) const HEAD_BYTES: usize = MAGIC.len() + 24;
 pub(super) const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of pixels of a tile: the largest budget of a chip.
 const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
@@ -21,25 +22,30 @@ const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
 /// tiles. Without a limit, a hostile file would take hours.
 const MAX_IN_VAIN: u64 = 32 << 20;
 
-/// Encodes the record of a finished tile.
-pub(super) fn record(finished: &FinishedTile) -> Vec<u8> {
+/// Encodes the record of a finished tile, whose samples begin with `first_sample`.
+pub(super) fn record(finished: &FinishedTile, first_sample: u32) -> Vec<u8> {
     let Tile { x, y, width, height, .. } = *finished.tile();
     let mut bytes = MAGIC.to_vec();
-    bytes.extend([x, y, width, height].map(u32::to_le_bytes).as_flattened());
+    let samples = finished.format().samples;
+    bytes.extend([x, y, width, height, first_sample, samples].map(u32::to_le_bytes).as_flattened());
     bytes.extend(finished.records());
     bytes.extend(checksum(&bytes).to_le_bytes());
     bytes
 }
 
-/// Reads all valid tiles from offset `start` on into the film. Returns the end of the last one. After invalid bytes the
+/// Reads all valid tiles from offset `start` on. Returns the end of the last one. After invalid bytes the
 /// search continues at the next magic number. It stops when the invalid tiles exceed the file's size plus [`MAX_IN_VAIN`].
-pub(super) fn read_tiles(reader: &mut BufReader<&File>, start: u64, film: &mut Film) -> io::Result<u64> {
+pub(super) fn read_tiles(
+    reader: &mut BufReader<&File>,
+    start: u64,
+    kept: &mut KeptSamples,
+) -> io::Result<u64> {
     let end = reader.get_ref().metadata()?.len();
     let (mut at, mut sound) = (start, start);
     let mut in_vain = end + MAX_IN_VAIN;
     while let Some(skipped) = skip_magic(reader)? {
         at += skipped;
-        match read_tile(reader, end.saturating_sub(at), film)? {
+        match read_tile(reader, end.saturating_sub(at), kept)? {
             Some(bytes) => {
                 at += bytes;
                 sound = at;
@@ -79,16 +85,16 @@ fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     }
 }
 
-/// Reads a tile after its magic number into the film, at most `available` bytes. Returns their number; `None` if it is
+/// Reads a tile after its magic number, at most `available` bytes. Returns their number; `None` if it is
 /// invalid.
-fn read_tile(reader: &mut impl Read, available: u64, film: &mut Film) -> io::Result<Option<u64>> {
+fn read_tile(reader: &mut impl Read, available: u64, kept: &mut KeptSamples) -> io::Result<Option<u64>> {
     let mut bytes = MAGIC.to_vec();
     bytes.resize(HEAD_BYTES, 0);
     if !read_all(reader, &mut bytes[MAGIC.len()..])? {
         return Ok(None);
     }
-    let pixel_bytes = record_bytes(film.has_layers());
-    let Some(tile) = tile_at(&bytes[MAGIC.len()..], film) else { return Ok(None) };
+    let pixel_bytes = kept.format().record_bytes();
+    let Some((tile, samples)) = tile_at(&bytes[MAGIC.len()..], kept.window()) else { return Ok(None) };
     let length = (HEAD_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * pixel_bytes as u64;
     let behind_magic = length - MAGIC.len() as u64;
     if behind_magic > available {
@@ -102,24 +108,28 @@ fn read_tile(reader: &mut impl Read, available: u64, film: &mut Film) -> io::Res
     if checksum(bytes).to_le_bytes() != sum {
         return Ok(None);
     }
-    for ((x, y), record) in pixel_positions(&tile).zip(bytes[HEAD_BYTES..].chunks_exact(pixel_bytes)) {
-        // Cannot fail: the tile lies inside the window, and records have their full length.
-        let _ = PixelRecord::read(record).map(|record| film.write_record(x, y, &record));
+    if let Some(film) = kept.film_of(samples) {
+        for ((x, y), record) in pixel_positions(&tile).zip(bytes[HEAD_BYTES..].chunks_exact(pixel_bytes)) {
+            // Cannot fail: the tile lies inside the window, and records have their full length.
+            let _ = PixelSums::read(record).map(|sums| film.write(x, y, &sums));
+        }
     }
     Ok(Some(behind_magic))
 }
 
-/// Decodes position and size of a tile; `None` unless it lies in the film's window and within a chip's budget.
-fn tile_at(bytes: &[u8], film: &Film) -> Option<Tile> {
+/// Decodes position and size of a tile, and its range of samples; `None` unless the tile lies in the window and within a chip's
+/// budget, and the range is not empty.
+fn tile_at(bytes: &[u8], window: Window) -> Option<(Tile, SampleRange)> {
     let number = |index: usize| bytes.as_chunks().0.get(index).map(|bytes| u32::from_le_bytes(*bytes));
     let tile = Tile { id: 0, x: number(0)?, y: number(1)?, width: number(2)?, height: number(3)? };
-    let window = film.window();
+    let samples = SampleRange { first: number(4)?, count: number(5)? };
     let fits = |first: u32, count: u32, [low, high]: [u32; 2]| {
         count > 0 && first >= low && first.checked_add(count).is_some_and(|end| end <= high)
     };
     let is_inside =
         fits(tile.x, tile.width, [window.x0, window.x1]) && fits(tile.y, tile.height, [window.y0, window.y1]);
-    (is_inside && tile.pixels() <= MAX_PIXELS).then_some(tile)
+    let is_range = fits(samples.first, samples.count, [0, u32::MAX]);
+    (is_inside && is_range && tile.pixels() <= MAX_PIXELS).then_some((tile, samples))
 }
 
 /// Fills a buffer. Returns false at the end of the file.

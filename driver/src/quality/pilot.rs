@@ -1,10 +1,8 @@
 //! Pilot renders: pixels spread over the picture, rendered on emulated chips of this process.
 
 use glam::Vec3;
-use photoncard_firmware::chip::light_of;
 use photoncard_firmware::kind::Reference;
 use photoncard_firmware::sampler::hash;
-use photoncard_shared::budget::SUMS_WITH_LAYERS;
 use photoncard_shared::message::{CausticGather, FrameParameters, PixelLayers, Tile};
 use rayon::ThreadPool;
 
@@ -16,6 +14,7 @@ use crate::pack::PackedScene;
 use crate::photon_map::{MappedImage, PhotonSettings, map_photons};
 use crate::render::{Observer, Phase, RenderError, RenderSettings, Sampling};
 use crate::scene::Scene;
+use crate::sums::SumFormat;
 
 /// Tiles in a grid of cells, for the noise: each at a place in its cell by a hash.
 const SPREAD: Grid = Grid { cells: 8, side: 4 };
@@ -182,7 +181,8 @@ impl<'a> Pilot<'a> {
     /// Number of gather rays of tiles with the irradiance cache, for each ray of a pixel.
     fn gather_rays_per_ray(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<f64, RenderError> {
         let mut frame = self.frame(settings)?;
-        (frame.samples, frame.shadow_rays, frame.gather_rays, frame.seed) = (1, 0, 1, SEEDS[0]);
+        (frame.samples, frame.planned_samples, frame.shadow_rays, frame.gather_rays, frame.seed) =
+            (1, 1, 0, 1, SEEDS[0]);
         let rendered = self.render(&frame, tiles)?;
         let rays: u64 = rendered.iter().map(|tile| tile.counters.gather_rays).sum();
         let pixels: usize = tiles.iter().map(|tile| tile.pixels() as usize).sum();
@@ -192,9 +192,9 @@ impl<'a> Pilot<'a> {
     /// Renders one sample of each pixel of the tiles, without the irradiance cache.
     fn render_pixels(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<Pixels, RenderError> {
         let mut frame = self.frame(settings)?;
-        (frame.samples, frame.irradiance_error, frame.layers) = (1, None, true);
+        (frame.samples, frame.planned_samples, frame.irradiance_error, frame.layers) = (1, 1, None, true);
         let rendered = self.render(&frame, tiles)?;
-        Ok(Pixels::new(&rendered, self.mapped.image.view().0.header.radiance_unit))
+        Ok(Pixels::new(&rendered, SumFormat::new(&self.mapped.image.view().0.header, &frame)))
     }
 
     fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
@@ -223,13 +223,10 @@ struct Pixels {
 }
 
 impl Pixels {
-    fn new(tiles: &[RenderedTile], unit: f32) -> Self {
-        let mean = |light: [f32; 3]| f64::from((Vec3::from(light) * unit).element_sum()) / 3.0;
-        let layers: Vec<PixelLayers> = tiles
-            .iter()
-            .flat_map(|tile| tile.sums.chunks(SUMS_WITH_LAYERS as usize))
-            .map(|sums| light_of(sums).1.unwrap_or_default())
-            .collect();
+    fn new(tiles: &[RenderedTile], format: SumFormat) -> Self {
+        let mean = |light: [f32; 3]| f64::from(Vec3::from(light).element_sum()) / 3.0;
+        let layers: Vec<PixelLayers> =
+            tiles.iter().flat_map(|tile| tile.pixels(format).map(|pixel| pixel.layers)).collect();
         let direct = layers.iter().map(|layers| mean(layers.direct)).collect();
         let indirect = layers.iter().map(|layers| mean(layers.indirect)).collect();
         let is_seen: Vec<bool> = layers.iter().map(|layers| layers.gathers > 0.0).collect();

@@ -1,6 +1,6 @@
 //! Outputs of a render while it runs: the file of finished tiles, the viewers and the observer.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use photoncard_shared::message::Tile;
 
@@ -9,18 +9,21 @@ use crate::display::Display;
 use crate::film::Film;
 use crate::partial::{PartialError, PartialRender};
 use crate::scene::Scene;
-use crate::sink::TileSink;
+use crate::sink::{FinishedTile, TileSink};
 use crate::viewer::Viewer;
 
 /// Outputs of a render while it runs, as far as the settings ask for them.
 pub(super) struct Outputs<'a> {
     partial: Option<PartialRender>,
-    viewers: Vec<Box<dyn Viewer>>,
+    /// Samples that the render adds to: all that are shown have them.
+    pub(super) base: Option<Arc<Film>>,
+    viewers: Vec<OnBase<Box<dyn Viewer>>>,
     pub(super) observer: &'a dyn Observer,
 }
 
 impl<'a> Outputs<'a> {
-    /// Opens the outputs. Tiles of the render that is resumed are written into the film, and shown.
+    /// Opens the outputs. Tiles of the render that is resumed are written into the film, and shown. Samples that are complete in
+    /// the render that is resumed take the place of `base`, and the film is of the others.
     ///
     /// # Errors
     /// If the file of finished tiles cannot be read or is not the file of this picture.
@@ -28,12 +31,20 @@ impl<'a> Outputs<'a> {
         scene: &Scene,
         settings: &RenderSettings,
         tiles: &[Tile],
-        film: &mut Film,
+        (film, base): (&mut Film, Option<Arc<Film>>),
         observer: &'a dyn Observer,
     ) -> Result<Self, PartialError> {
-        let begin = |partial| PartialRender::begin(partial, settings.identity(scene).into(), film);
-        let partial = settings.outputs.partial.as_ref().map(begin).transpose()?;
-        let outputs = Self { partial, viewers: viewers(settings, film), observer };
+        let begin = |partial| {
+            let mut identity = settings.identity(scene);
+            identity.remove("spp");
+            PartialRender::begin(partial, identity.into(), film)
+        };
+        let begun = settings.outputs.partial.as_ref().map(begin).transpose()?;
+        let (partial, kept) = begun.map_or((None, None), |(partial, kept)| (Some(partial), kept));
+        let base = kept.map(Arc::new).or(base);
+        let viewers =
+            viewers(settings, film).into_iter().map(|viewer| OnBase { base: base.clone(), sink: viewer });
+        let outputs = Self { partial, viewers: viewers.collect(), base, observer };
         outputs.report_kept();
         let resumed: Vec<&Tile> = tiles.iter().filter(|tile| film.has(tile)).collect();
         for tile in resumed.iter().filter_map(|tile| film.finished(tile)) {
@@ -50,7 +61,7 @@ impl<'a> Outputs<'a> {
         let mut sinks: Vec<&dyn TileSink> = vec![film];
         let partial = self.partial.as_ref().filter(|_| finished_early);
         sinks.extend(partial.map(|partial| partial as &dyn TileSink));
-        sinks.extend(self.viewers.iter().map(|viewer| viewer.as_ref() as &dyn TileSink));
+        sinks.extend(self.viewers.iter().map(|viewer| viewer as &dyn TileSink));
         sinks
     }
 
@@ -71,16 +82,33 @@ impl<'a> Outputs<'a> {
 
     /// Reports to the observer, once for each viewer that has failed, why the picture is not shown.
     pub(super) fn report_failed_viewers(&self) {
-        for error in self.viewers.iter().filter_map(|viewer| viewer.failure()) {
+        for error in self.viewers.iter().filter_map(|viewer| viewer.sink.failure()) {
             self.observer.not_shown(error.as_ref());
         }
     }
 
     /// Shows the rest of the picture. Returns the file of finished tiles.
     pub(super) fn finish(self, film: &Film) -> Option<PartialRender> {
-        self.viewers.iter().for_each(|viewer| viewer.finish(film));
+        self.viewers.iter().for_each(|viewer| viewer.sink.finish(film));
         self.report_failed_viewers();
         self.partial
+    }
+}
+
+/// Sink of tiles with the samples of a base added, as a picture shows them.
+struct OnBase<S> {
+    base: Option<Arc<Film>>,
+    sink: S,
+}
+
+impl TileSink for OnBase<Box<dyn Viewer>> {
+    fn put(&self, tile: &FinishedTile) {
+        let added = self.base.as_ref().and_then(|base| base.added_to(tile));
+        self.sink.put(added.as_ref().unwrap_or(tile));
+    }
+
+    fn revoke(&self, tile: &Tile) {
+        self.sink.revoke(tile);
     }
 }
 

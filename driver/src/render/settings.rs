@@ -9,7 +9,7 @@ use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::Budget;
-use photoncard_shared::message::{self, CausticGather, FrameParameters};
+use photoncard_shared::message::{self, CausticGather, FrameParameters, SumScale};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
@@ -17,6 +17,7 @@ use crate::emulator::memory_model::CacheSettings;
 use crate::film::{Film, FilmError, Window};
 use crate::photon_map::PhotonSettings;
 use crate::scene::{Camera, Scene};
+use crate::sums::SumFormat;
 
 /// Settings of a render: each field is an option of the command line, in groups.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -81,13 +82,14 @@ impl RenderSettings {
         std::iter::successors(Some(widest), narrower).last().unwrap_or(widest)
     }
 
-    /// Empty film for the picture.
+    /// Empty film for the picture, with sums in units of `scale`.
     ///
     /// # Errors
     /// If its size or its crop window is not possible.
-    pub fn film(&self) -> Result<Film, FilmError> {
-        let new = if self.picture.layers.are_of_chip() { Film::with_layers } else { Film::new };
-        new(self.picture.width, self.picture.height, self.window())
+    pub fn film(&self, scale: SumScale) -> Result<Film, FilmError> {
+        let layers = self.picture.layers.are_of_chip();
+        let format = SumFormat { layers, samples: self.integrator.samples, scale };
+        Film::new(self.picture.width, self.picture.height, self.window(), format)
     }
 
     /// Caches of the memory model; `None` if memory is not modelled.
@@ -140,7 +142,9 @@ impl RenderSettings {
             height: self.picture.height,
             camera: self.pinhole(camera),
             seed: self.integrator.seed,
+            first_sample: 0,
             samples: self.integrator.samples,
+            planned_samples: self.integrator.planned(),
             gather_rays: self.integrator.gather_rays,
             shadow_rays: self.integrator.shadow_rays,
             neighbors: self.photons.neighbors,

@@ -89,7 +89,7 @@ pub enum SessionError {
         /// Name of the channel.
         channel: &'static str,
         /// Wrong value.
-        value: f32,
+        value: f64,
     },
     /// Error of a tile that two other cards render differently.
     #[error(

@@ -28,7 +28,7 @@ pub struct Assignment {
 }
 
 /// Event of a session.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// The card has received image and frame.
     Ready,

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{FrameParameters, PixelRecord};
+use photoncard_shared::message::{FrameParameters, PixelSums};
 
 use super::pixel_limits::{BadValue, PixelLimits};
 use super::{Assignment, Event, SessionError};
@@ -50,7 +50,7 @@ impl TilesInFlight {
         let in_flight = self.0.iter_mut().find(|in_flight| in_flight.assignment.tile.id == id);
         let in_flight = in_flight.ok_or(SessionError::Unexpected("pixels of another tile"))?;
         let tile = in_flight.assignment.tile;
-        let bytes = limits.record_bytes();
+        let bytes = limits.format().record_bytes();
         let pixels = data.chunks_exact(bytes);
         let range = first as usize..first as usize + pixels.len();
         if range.is_empty() || !pixels.remainder().is_empty() || range.end as u64 > tile.pixels() {
@@ -63,8 +63,8 @@ impl TilesInFlight {
             return Err(SessionError::Unexpected("pixels that it has sent before"));
         }
         for (index, pixel) in (first..).zip(pixels) {
-            let record = PixelRecord::read(pixel).unwrap_or_default();
-            if let Some(BadValue { channel, value }) = limits.find_bad(&record) {
+            let sums = PixelSums::read(pixel).unwrap_or_default();
+            if let Some(BadValue { channel, value }) = limits.find_bad(&sums) {
                 let (x, y) = (tile.x + index % tile.width, tile.y + index / tile.width);
                 return Err(SessionError::Value { tile, x, y, channel, value });
             }
@@ -90,7 +90,7 @@ impl TilesInFlight {
             return Err(not_complete);
         }
         let TileInFlight { records, .. } = self.0.remove(index);
-        FinishedTile::new(tile, records, limits.has_layers(), counters).ok_or(not_complete)
+        FinishedTile::new(tile, records, *limits.format(), counters).ok_or(not_complete)
     }
 
     /// Returns all tiles as events, in reverse order. The card was working on the oldest `at_work`.
@@ -134,7 +134,9 @@ mod tests {
             height: 2,
             camera,
             seed: 0,
+            first_sample: 0,
             samples: 1,
+            planned_samples: 1,
             gather_rays: 1,
             shadow_rays: 1,
             neighbors: 2,
@@ -163,12 +165,11 @@ mod tests {
         in_flight
     }
 
-    /// Records of pixels whose red is their index in the tile.
+    /// Records of pixels that see nothing, whose red is their index in the tile.
     fn pixels(indices: std::ops::Range<u32>) -> Vec<u8> {
         let of_pixel = |index: u32| {
             let mut bytes = [0; PIXEL_BYTES];
-            bytes[..4].copy_from_slice(&(index as f32 * 1e-3).to_le_bytes());
-            bytes[36..].copy_from_slice(&f32::INFINITY.to_le_bytes());
+            bytes[36..40].copy_from_slice(&index.to_le_bytes());
             bytes
         };
         indices.flat_map(of_pixel).collect()

@@ -12,10 +12,7 @@
 //! noise of its own, that of shadow rays. Gather rays and records of the irradiance cache bring shares of it that depend on the number of
 //! rays, so all lights are put out in the card image: its layer of indirect light is then `L_indirect` by any technique.
 
-use photoncard_firmware::chip::light_of;
-use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::kind;
-use photoncard_shared::budget::sums_of_pixel;
 use photoncard_shared::message::{Radiance, Sampling, Tile};
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +22,7 @@ use crate::emulator::direct::RenderedTile;
 use crate::photon_map::MappedImage;
 use crate::render::{RenderError, RenderSettings, Schedule};
 use crate::scheduler::{GatherOrder, tiles};
+use crate::sums::{FilmPixel, SumFormat};
 
 /// Error of indirect light in the pixels of one tile, sums over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -232,32 +230,30 @@ fn indirect(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<Ti
     let image = image.without_emission();
     let dark = MappedImage { image, max_distance, caustics, paths: *paths, times: *times };
     let bench = Bench { mapped: &dark, ..*bench };
-    pixels(&bench, settings, true, count, |sums| light_of(sums).1.unwrap_or_default().indirect)
+    pixels(&bench, settings, true, count, |pixel| pixel.layers.indirect)
 }
 
 /// Visible emission in `count` tiles, by settings without gather rays and shadow rays.
 fn emitted(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<TilePixels, RenderError> {
-    pixels(bench, settings, false, count, |sums| light_of(sums).0.to_array())
+    pixels(bench, settings, false, count, |pixel| pixel.pixel.radiance)
 }
 
-/// Pixels of `count` tiles, by a function of their sums in a frame without or with layers.
+/// Pixels of `count` tiles, by a function of their values in a frame without or with layers.
 fn pixels(
     bench: &Bench,
     settings: &RenderSettings,
     layers: bool,
     count: usize,
-    light: impl Fn(&[ColourSum]) -> [f32; 3],
+    light: impl Fn(&FilmPixel) -> [f32; 3],
 ) -> Result<TilePixels, RenderError> {
     let mut frame = bench.frame(settings)?;
     frame.layers = layers;
     let chosen = choose(&tiles(settings.window(), TILE, settings.schedule.order), count);
     let chosen: Vec<Tile> = chosen.into_iter().map(|chosen| chosen.tile).collect();
-    let unit = f64::from(bench.mapped.image.view().0.header.radiance_unit);
+    let format = SumFormat::new(&bench.mapped.image.view().0.header, &frame);
     let rendered = bench.render::<kind::Reference, _>(&frame, &chosen, &|memory| memory)?;
-    let of_tile = |tile: &RenderedTile| {
-        let sums = tile.sums.chunks(sums_of_pixel(layers) as usize);
-        sums.map(|sums| light(sums).map(|channel| f64::from(channel) * unit)).collect()
-    };
+    let of_tile =
+        |tile: &RenderedTile| tile.pixels(format).map(|pixel| light(&pixel).map(f64::from)).collect();
     Ok(rendered.iter().map(of_tile).collect())
 }
 
@@ -305,7 +301,7 @@ mod tests {
     #[test]
     fn indirect_light_is_the_layer_of_the_lit_scene_where_no_record_mixes_in_direct_light() {
         let room = Room::new();
-        let layer = |sums: &[ColourSum]| light_of(sums).1.unwrap_or_default().indirect;
+        let layer = |pixel: &FilmPixel| pixel.layers.indirect;
         let lit = pixels(&room.bench(), &room.settings, true, 4, layer).unwrap();
         let dark = indirect(&room.bench(), &comparable(&room.settings), 4).unwrap();
         assert!(dark.iter().flatten().any(|pixel| pixel.iter().all(|channel| *channel > 0.0)));

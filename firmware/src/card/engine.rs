@@ -6,7 +6,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
     self, CASES_PER_COMMAND, Command, Fault, FaultCode, FrameParameters, MemoryUse, OPERAND_BYTES,
-    PIXELS_BYTES, PROTOCOL_VERSION, PixelRecord, RESULT_BYTES, Reply, Tile, record_bytes,
+    PIXELS_BYTES, PROTOCOL_VERSION, PixelSums, RESULT_BYTES, Reply, Tile, record_bytes,
 };
 use photoncard_shared::transport::Transport;
 
@@ -285,8 +285,8 @@ impl<K: ChipKind> Engine<K> {
         match self.chip.step(&mut RenderJob { scene, memory, frame, outlet: None })? {
             Progress::Busy => {}
             Progress::Pixel(pixel) => {
-                let record = pixel.record(scene, frame);
-                self.add_pixel((pixel.tile, pixel.index), &record, transport);
+                let sums = pixel.sums(frame);
+                self.add_pixel((pixel.tile, pixel.index), &sums, transport);
             }
             Progress::Tile(tile, counters) => {
                 self.send_pixels(transport);
@@ -304,8 +304,8 @@ impl<K: ChipKind> Engine<K> {
     }
 
     /// Adds a pixel, by tile and index, to those to be sent, which are sent if it is not the next of them or no other fits.
-    fn add_pixel(&mut self, (tile, index): (u32, u32), record: &PixelRecord, transport: &mut Transport) {
-        let bytes = record_bytes(record.layers.is_some());
+    fn add_pixel(&mut self, (tile, index): (u32, u32), sums: &PixelSums, transport: &mut Transport) {
+        let bytes = record_bytes(sums.layers.is_some());
         let (first_tile, first) = self.first;
         let next = first + (self.data.len() / bytes) as u32;
         if (tile, index) != (first_tile, next) {
@@ -315,10 +315,9 @@ impl<K: ChipKind> Engine<K> {
             self.first = (tile, index);
         }
         // There is room: what is full is sent.
-        let _ = self.data.extend_from_slice(&record.pixel.to_bytes());
-        if let Some(layers) = &record.layers {
-            let _ = self.data.extend_from_slice(&layers.to_bytes());
-        }
+        sums.write(&mut |bytes| {
+            let _ = self.data.extend_from_slice(bytes);
+        });
         // A reply has room for several pixels: the first of a new one does not fill it, so that one reply is sent at most.
         if self.data.len() + bytes > self.data.capacity() {
             self.send_pixels(transport);

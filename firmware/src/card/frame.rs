@@ -14,11 +14,14 @@ pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParamet
     let within = |value: u32, most: u32| (1..=most).contains(&value);
     let is_length = |distance: f32| distance.is_finite() && distance > 0.0;
     let neighbors = |count: u32| count >= 2 && within(count, budget.neighbors);
+    let last_sample = frame.first_sample.saturating_add(frame.samples);
+    let samples =
+        frame.samples > 0 && [last_sample, frame.planned_samples].iter().all(|&n| within(n, budget.samples));
     let checks = [
         (Parameter::Width, within(frame.width, MAX_PICTURE_SIDE)),
         (Parameter::Height, within(frame.height, MAX_PICTURE_SIDE)),
         (Parameter::Camera, camera.as_flattened().iter().all(|component| component.is_finite())),
-        (Parameter::Samples, within(frame.samples, budget.samples)),
+        (Parameter::Samples, samples),
         (Parameter::GatherRays, frame.gather_rays <= budget.gather_rays),
         (Parameter::ShadowRays, frame.shadow_rays <= budget.shadow_rays),
         (Parameter::Neighbors, neighbors(frame.neighbors)),

@@ -8,7 +8,7 @@ use super::buffers::Shared;
 use super::finished_pixel::{Completion, FinishedPixel, PixelView};
 use super::flight::Flight;
 use super::light::{Component, PixelLight};
-use super::pixels::{allowed_error_at, direct_light, pixel_point, sample_share, seen_sample};
+use super::pixels::{allowed_error_at, direct_light, per_unit, pixel_point, seen_sample};
 use crate::irradiance_cache::IrradianceCache;
 use crate::kind::ChipKind;
 use crate::memory::{MemoryPort, Stage};
@@ -33,14 +33,14 @@ impl<K: ChipKind> Flight<K> {
             view: PixelView::NOTHING,
             sample: 0,
         });
-        let at = self.sample(pixel, completion.sample);
+        let at = self.sample(job.frame, pixel, completion.sample);
         let context = &mut job.context(&mut self.counters);
         match eye::view(context, at)? {
             Sight::Background(radiance) => {
-                completion.light.add(context.frame, Component::Direct, radiance * sample_share(context));
+                completion.light.add(context.frame, Component::Direct, radiance * per_unit(context));
             }
             Sight::Surface(view) => {
-                completion.view.add(&view);
+                completion.view.add(&context.scene.header, &view);
                 light_sample(context, &self.cache, shared, (at, &view), &mut completion.light)?;
             }
         }
@@ -63,15 +63,15 @@ fn light_sample<K: ChipKind, M: MemoryPort>(
     light: &mut PixelLight,
 ) -> Result<(), Fault> {
     let frame = context.frame;
-    let share = sample_share(context);
+    let per_unit = per_unit(context);
     let surface = &view.surface;
-    light.add(frame, Component::Direct, surface.emission * share);
+    light.add(frame, Component::Direct, surface.emission * per_unit);
     let allowed = allowed_error_at(frame, view);
     let interpolated =
         allowed.and_then(|allowed| cache.interpolate(&seen_sample(context, at, view), allowed));
     if let Some(irradiance) = interpolated {
         let reflected = surface.reflector().lambertian_albedo() * irradiance;
-        light.add(frame, Component::Indirect, reflected * share);
+        light.add(frame, Component::Indirect, reflected * per_unit);
     }
     let purpose = if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample };
     let mut point = pixel_point(frame, at, view, purpose);

@@ -1,12 +1,14 @@
 //! A complete pixel, and its sums while it is completed.
 
 use glam::Vec3;
-use photoncard_shared::message::{FrameParameters, Pixel, PixelLayers, PixelRecord};
+use photoncard_shared::image::Header;
+use photoncard_shared::message::{
+    ALBEDO_STEPS, DEPTH_STEPS, FrameParameters, LayerSums, NORMAL_STEPS, PixelSums,
+};
 
-use super::light::{PixelLight, light_of};
+use super::light::PixelLight;
 use crate::fixed_point::ColourSum;
 use crate::render::eye::View;
-use crate::scene::SceneImage;
 
 /// A complete pixel.
 #[derive(Clone, Copy, Debug)]
@@ -22,52 +24,47 @@ pub struct FinishedPixel {
 }
 
 impl FinishedPixel {
-    /// The record of the pixel.
-    pub fn record(&self, scene: &SceneImage, frame: &FrameParameters) -> PixelRecord {
-        self.view.record(scene, frame, self.light.sums(frame))
+    /// Sums of the pixel.
+    pub fn sums(&self, frame: &FrameParameters) -> PixelSums {
+        self.view.sums(self.light.sums(frame))
     }
 }
 
 /// Sums of albedo, normal and depth over the samples of a pixel.
 #[derive(Clone, Copy, Debug)]
-pub struct PixelView {
-    albedo: Vec3,
-    normal: Vec3,
-    depth: f32,
-    /// Samples that see a surface.
-    surfaces: u32,
-}
+pub struct PixelView(PixelSums);
 
 impl PixelView {
-    pub(super) const NOTHING: Self = Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, depth: 0.0, surfaces: 0 };
+    pub(super) const NOTHING: Self = Self(PixelSums::NOTHING);
 
-    pub(super) fn add(&mut self, view: &View) {
-        self.albedo += view.surface.reflector().albedo();
-        self.normal += view.surface.normal;
-        self.depth += view.depth;
-        self.surfaces += 1;
+    pub(super) fn add(&mut self, header: &Header, view: &View) {
+        let Self(sums) = self;
+        let albedo = view.surface.reflector().albedo().clamp(Vec3::ZERO, Vec3::ONE) * ALBEDO_STEPS as f32;
+        let normal = view.surface.normal * NORMAL_STEPS as f32;
+        // Conversions are towards zero and saturate; no number of samples of a budget overflows the first two.
+        for (axis, (albedo, normal)) in albedo.to_array().into_iter().zip(normal.to_array()).enumerate() {
+            let (Some(albedo_sum), Some(normal_sum)) = (sums.albedo.get_mut(axis), sums.normal.get_mut(axis))
+            else {
+                continue;
+            };
+            *albedo_sum = albedo_sum.saturating_add(albedo as u32);
+            *normal_sum = normal_sum.saturating_add(normal as i32);
+        }
+        let depth = view.depth * (DEPTH_STEPS as f32 / header.sum_scale().depth);
+        sums.depth = sums.depth.saturating_add(depth as i64);
+        sums.surfaces = sums.surfaces.saturating_add(1);
     }
 
-    /// The record of the pixel with its sums of light.
-    pub fn record(&self, scene: &SceneImage, frame: &FrameParameters, sums: &[ColourSum]) -> PixelRecord {
-        let per_sample = 1.0 / frame.samples.max(1) as f32;
-        let per_surface = 1.0 / self.surfaces as f32;
-        let unit = scene.header.radiance_unit;
-        let (radiance, layers) = light_of(sums);
-        let pixel = Pixel {
-            radiance: (radiance * unit).to_array(),
-            albedo: (self.albedo * per_sample).clamp(Vec3::ZERO, Vec3::ONE).to_array(),
-            normal: (self.normal * per_sample).to_array(),
-            depth: if self.surfaces > 0 { self.depth * per_surface } else { f32::INFINITY },
-        };
-        let scaled = |light: [f32; 3]| light.map(|component| component * unit);
-        let layers = layers.map(|PixelLayers { direct, indirect, caustic, gathers }| PixelLayers {
-            direct: scaled(direct),
-            indirect: scaled(indirect),
-            caustic: scaled(caustic),
-            gathers,
-        });
-        PixelRecord { pixel, layers }
+    /// Sums of the pixel with its sums of light: one, or with layers one for each component and the count of gathers.
+    pub fn sums(&self, light: &[ColourSum]) -> PixelSums {
+        match light {
+            [direct, indirect, caustic, gathers] => {
+                let [direct, indirect, caustic] = [direct, indirect, caustic].map(ColourSum::bits);
+                let gathers = gathers.value().x as u32;
+                self.0.with_layers(LayerSums { direct, indirect, caustic, gathers })
+            }
+            _ => self.0.with_light(light.first().map_or([0; 3], ColourSum::bits)),
+        }
     }
 }
 

@@ -122,9 +122,10 @@ impl<K: ChipKind> Flight<K> {
         Window { x0, x1: x0 + self.block.width, y0, y1: y0 + self.block.height }
     }
 
-    /// A sample of pixel `index` of the block.
-    pub(super) fn sample(&self, index: u32, sample: u32) -> PixelSample {
+    /// Sample `sample` of the frame's, of pixel `index` of the block.
+    pub(super) fn sample(&self, frame: &FrameParameters, index: u32, sample: u32) -> PixelSample {
         let [column, row] = self.block.pixel(index);
+        let sample = frame.first_sample.wrapping_add(sample);
         PixelSample { x: self.tile.x + column, y: self.tile.y + row, sample }
     }
 

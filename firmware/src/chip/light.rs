@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 use photoncard_shared::budget::{SUMS_WITH_LAYERS, sums_of_pixel};
-use photoncard_shared::message::{FrameParameters, PixelLayers};
+use photoncard_shared::message::FrameParameters;
 
 use crate::fixed_point::ColourSum;
 
@@ -67,19 +67,5 @@ impl PixelLight {
     /// The sums: one, or in a frame with layers [`SUMS_WITH_LAYERS`].
     pub fn sums(&self, frame: &FrameParameters) -> &[ColourSum] {
         self.0.get(..sums_of_pixel(frame.layers) as usize).unwrap_or_default()
-    }
-}
-
-/// Radiance of a pixel, and its layers if the frame has any, from its sums; in the image's radiance units.
-pub fn light_of(sums: &[ColourSum]) -> (Vec3, Option<PixelLayers>) {
-    match sums {
-        [direct, indirect, caustic, gathers] => {
-            let mut all = *direct;
-            all.add_sum(indirect);
-            all.add_sum(caustic);
-            let [direct, indirect, caustic] = [direct, indirect, caustic].map(|sum| sum.value().to_array());
-            (all.value(), Some(PixelLayers { direct, indirect, caustic, gathers: gathers.value().x }))
-        }
-        _ => (sums.first().map_or(Vec3::ZERO, ColourSum::value), None),
     }
 }

@@ -31,7 +31,7 @@ use photoncard_shared::message::{Fault, FrameParameters, Tile};
 use self::buffers::Shared;
 pub use self::finished_pixel::{FinishedPixel, PixelView};
 use self::flight::{Flight, allowed_error};
-pub use self::light::{Component, PixelLight, light_of};
+pub use self::light::{Component, PixelLight};
 use self::position::{Pass, Position};
 use crate::gather::{GatherQueue, PointIndex};
 use crate::importance::DirectionTable;

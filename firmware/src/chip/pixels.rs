@@ -28,7 +28,11 @@ pub(super) fn pixel_point(
     let pattern = pattern(frame, at);
     // With the cache, gather rays are a pixel's in number, without it a sample's.
     let is_of_pixel = allowed_error(frame).is_some();
-    let rays = if is_of_pixel { frame.gather_rays.div_ceil(frame.samples.max(1)) } else { frame.gather_rays };
+    let rays = if is_of_pixel {
+        frame.gather_rays.div_ceil(frame.planned_samples.max(1))
+    } else {
+        frame.gather_rays
+    };
     if purpose == Purpose::Lobe {
         GatherPoint::lobe(view.surface, pattern, rays)
     } else {
@@ -83,7 +87,7 @@ impl<K: ChipKind> Flight<K> {
             shared.points.clear();
         }
         let pixel = self.position.first + self.position.index;
-        let at = self.sample(pixel, self.position.sample);
+        let at = self.sample(job.frame, pixel, self.position.sample);
         let frame = job.frame;
         let context = &mut job.context(&mut self.counters);
         if let Some(view) = eye::view(context, at)?.surface() {
@@ -125,7 +129,7 @@ impl<K: ChipKind> Flight<K> {
         if let Some((pixel, stored)) = present
             && let Some(number) = self.sum(pixel.into())
         {
-            let at = self.sample(pixel.into(), self.position.sample);
+            let at = self.sample(job.frame, pixel.into(), self.position.sample);
             let context = &mut job.context(&mut self.counters);
             context.memory.enter(Stage::Shadow);
             let mut point = stored.point(context.frame, at);
@@ -153,18 +157,17 @@ impl<K: ChipKind> Flight<K> {
         if let Some((pixel, stored)) = present
             && let Some(number) = self.sum(pixel.into())
         {
-            let at = self.sample(pixel.into(), self.position.sample);
+            let at = self.sample(job.frame, pixel.into(), self.position.sample);
             let index_in_tile = self.index_in_tile(pixel.into());
             let of_bin = stored.rays_of_bin(job.frame, at, self.position.bin);
             let (context, outlet) = &mut job.context_and_outlet(&mut self.counters);
             context.memory.enter(Stage::GatherRay);
             let mut point = stored.point(context.frame, at);
             if !of_bin.is_empty() && stored.read_surface(context, at, &mut point.surface)? {
-                let share = 1.0 / context.frame.samples as f32;
                 let (rays, is_last) = self.position.next_rays(of_bin);
                 let target = GatherTarget::new(flight, PointIndex::Pixel(number));
                 for ray in rays {
-                    let Some(end) = final_gather::cast(context, &point, target, share, ray)? else {
+                    let Some(end) = final_gather::cast(context, &point, target, ray)? else {
                         continue;
                     };
                     shared.sums.add(context.frame, (flight, number), Component::Direct, end.direct);
@@ -216,14 +219,13 @@ pub(super) fn direct_light<K: ChipKind, M: MemoryPort>(
     shared: &mut Shared<K>,
 ) -> Result<[(Component, glam::Vec3); 2], Fault> {
     let reflected = direct::reflected(context, at, point)?;
-    let direct = reflected * sample_share(context);
-    let focused = caustic::reflected(context, point, shared.gathers.candidates())?;
-    let caustic = focused / context.frame.samples.max(1) as f32;
+    let direct = reflected * per_unit(context);
+    let caustic = caustic::reflected(context, point, shared.gathers.candidates())?;
     Ok([(Component::Direct, direct), (Component::Caustic, caustic)])
 }
 
-/// The factor from a sample's radiance, W/(sr m^2), to its term in the pixel's sum.
+/// The factor from radiance, W/(sr m^2), to the radiance units of a pixel's sum.
 #[inline(always)]
-pub(super) fn sample_share<M>(context: &Context<M>) -> f32 {
-    1.0 / (context.frame.samples.max(1) as f32 * context.scene.header.radiance_unit)
+pub(super) fn per_unit<M>(context: &Context<M>) -> f32 {
+    1.0 / context.scene.header.radiance_unit
 }

@@ -81,7 +81,7 @@ impl<K: ChipKind> Flight<K> {
             let (rays, is_last) = position.next_rays(of_bin);
             let target = GatherTarget::new(flight, PointIndex::Record(record));
             for ray in rays {
-                let Some(end) = final_gather::cast(context, point, target, 1.0, ray)? else { continue };
+                let Some(end) = final_gather::cast(context, point, target, ray)? else { continue };
                 cache.add(record, end.cell, end.direct);
                 if let Some(request) = end.request {
                     match gathers.submit(context, request)? {

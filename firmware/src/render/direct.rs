@@ -7,7 +7,7 @@
 //!
 //! The emission that rays of an irradiance record meet is interpolated for the samples around it, whose shadow rays bring the rest.
 //! Both sides must compute equal weights. So the record's density is replaced by `cos(theta) / pi`, as samples do not know its
-//! direction table; the number of shadow rays is that of all samples of a pixel; and the power heuristic leaves small emitters, which
+//! direction table; the number of shadow rays is that of all planned samples of a pixel; and the power heuristic leaves small emitters, which
 //! would make a record noisy, to shadow rays, and a sky to records.
 //!
 //! Points, spots and distant lights are met by no gather ray: shadow rays alone bring their light.
@@ -166,7 +166,7 @@ fn rays_of_record<M>(context: &Context<M>, cosine: f32) -> (u32, f32) {
 /// Number of shadow rays that share direct light with the rays of a record, and the density of one, 1/sr.
 #[inline(always)]
 fn shadow_rays_for_records<M>(context: &Context<M>, density: f32) -> (u32, f32) {
-    (context.frame.shadow_rays * context.frame.samples, density)
+    (context.frame.shadow_rays * context.frame.planned_samples, density)
 }
 
 /// Balance heuristic: weight of the first of two sampling techniques, each with its number of rays and density.

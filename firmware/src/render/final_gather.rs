@@ -27,7 +27,7 @@ pub struct GatherRayEnd {
 }
 
 /// Casts ray `index` of a gather point; `None` if it meets neither a surface nor the environment. The contribution is one term of
-/// the mean over the point's rays, times `share`; the gather's result goes to the sum `target`.
+/// the mean over the point's rays; the gather's result goes to the sum `target`.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -35,7 +35,6 @@ pub fn cast<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
     target: GatherTarget,
-    share: f32,
     index: u32,
 ) -> Result<Option<GatherRayEnd>, Fault> {
     context.memory.enter(Stage::GatherRay);
@@ -47,7 +46,7 @@ pub fn cast<M: MemoryPort>(
     context.counters.gather_rays += 1;
     let mut path = SpecularPath::new(ray, Carried::Radiance, Passes::NarrowLobes);
     // The division by the number of rays is done here: sums stay within the fixed-point range.
-    let weight = sampled.weight * (share / point.rays as f32);
+    let weight = sampled.weight * (1.0 / point.rays as f32);
     let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
         return escaped(context, point, &path, &sampled, weight);
     };

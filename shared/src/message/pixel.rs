@@ -1,6 +1,17 @@
-//! Pixels of a tile in the wire format.
+//! Pixels: sums over samples, in which chips send them, and the values that they stand for.
+//!
+//! Sums are integers: those of several renders of a pixel, of different samples, add up to the sums of all samples, to the bit.
 
-/// A pixel of a tile: ten `f32`, little-endian.
+/// 2^40: fractions of a radiance unit in a sum of light.
+const LIGHT_STEPS: f64 = (1_u64 << 40) as f64;
+/// Fractions of 1 in a sum of albedo.
+pub const ALBEDO_STEPS: u32 = 1 << 19;
+/// Fractions of 1 in a sum of normals.
+pub const NORMAL_STEPS: u32 = 1 << 18;
+/// Fractions of the depth unit in a sum of depths.
+pub const DEPTH_STEPS: u32 = 1 << 16;
+
+/// Values of a pixel: means over its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pixel {
     /// Radiance towards the eye, W/(sr m^2).
@@ -14,7 +25,7 @@ pub struct Pixel {
     pub depth: f32,
 }
 
-/// Layers of a pixel: the components of its radiance, and its number of final gathers; ten `f32`, little-endian.
+/// Layers of a pixel: the components of its radiance, and its number of final gathers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelLayers {
     /// Direct light, W/(sr m^2): visible emission, and light of emitters by shadow rays and by the pixel's own gather
@@ -29,75 +40,278 @@ pub struct PixelLayers {
     pub gathers: f32,
 }
 
-/// A pixel in the wire format: [`Pixel`], followed by [`PixelLayers`] if the frame has layers.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PixelRecord {
-    /// Radiance, albedo, normal and depth.
-    pub pixel: Pixel,
-    /// Layers; `None` in a picture without layers.
-    pub layers: Option<PixelLayers>,
+/// Units of the sums of an image's pixels; the header's [`Header::sum_scale`](crate::image::Header::sum_scale).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SumScale {
+    /// Unit of light, W/(sr m^2), a power of two.
+    pub radiance: f32,
+    /// Unit of depth, metres, a power of two.
+    pub depth: f32,
 }
 
-/// Bytes of one [`Pixel`].
-pub const PIXEL_BYTES: usize = 40;
-/// Bytes of one [`PixelLayers`].
-pub const LAYER_BYTES: usize = 40;
+/// Sums of a pixel over its samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PixelSums {
+    /// Radiance, 2^-40 radiance units; at least 0, saturating. With layers it is the sum of the three components.
+    pub light: [i64; 3],
+    /// Albedo, multiples of 1 / [`ALBEDO_STEPS`].
+    pub albedo: [u32; 3],
+    /// Normals, multiples of 1 / [`NORMAL_STEPS`].
+    pub normal: [i32; 3],
+    /// Depth, multiples of 1 / [`DEPTH_STEPS`] depth units.
+    pub depth: i64,
+    /// Samples that see a surface.
+    pub surfaces: u32,
+    /// Components of the light; `None` in a frame without layers.
+    pub layers: Option<LayerSums>,
+}
+
+/// Sums of the components of a pixel's light, in the units of [`PixelSums::light`], and its number of final gathers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LayerSums {
+    /// [`PixelLayers::direct`].
+    pub direct: [i64; 3],
+    /// [`PixelLayers::indirect`].
+    pub indirect: [i64; 3],
+    /// [`PixelLayers::caustic`].
+    pub caustic: [i64; 3],
+    /// [`PixelLayers::gathers`].
+    pub gathers: u32,
+}
+
+/// Bytes of albedo, normal, depth and number of surfaces.
+const VIEW_BYTES: usize = 12 + 12 + 8 + 4;
+/// Bytes of a sum of light.
+const LIGHT_BYTES: usize = 24;
+/// Bytes of a pixel without layers: view and light.
+pub const PIXEL_BYTES: usize = VIEW_BYTES + LIGHT_BYTES;
+/// Bytes of a pixel with layers: view, the components of light, and the number of gathers.
+pub const LAYERED_PIXEL_BYTES: usize = VIEW_BYTES + 3 * LIGHT_BYTES + 4;
 /// Maximum length of the pixels in one [`super::Reply::Pixels`], bytes.
-pub const PIXELS_BYTES: usize = 25 * PIXEL_BYTES;
+pub const PIXELS_BYTES: usize = 16 * PIXEL_BYTES;
 
-/// Bytes of one [`PixelRecord`] without or with layers.
+/// Bytes of a pixel without or with layers.
 pub const fn record_bytes(layers: bool) -> usize {
-    if layers { PIXEL_BYTES + LAYER_BYTES } else { PIXEL_BYTES }
+    if layers { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES }
 }
 
-/// Reads ten numbers.
-fn read_numbers(bytes: &[u8; 40]) -> ([[f32; 3]; 3], f32) {
-    let word = |index: usize| bytes.as_chunks().0.get(index).map_or(0.0, |w| f32::from_le_bytes(*w));
-    let vector = |first: usize| [word(first), word(first + 1), word(first + 2)];
-    ([vector(0), vector(3), vector(6)], word(9))
-}
+/// Reader of little-endian numbers; zeros after the end.
+struct Numbers<'a>(&'a [u8]);
 
-/// The bytes of ten numbers.
-fn number_bytes(vectors: [[f32; 3]; 3], last: f32) -> [u8; 40] {
-    let mut bytes = [0; 40];
-    let values = vectors.into_iter().flatten().chain([last]);
-    for (word, value) in bytes.as_chunks_mut().0.iter_mut().zip(values) {
-        *word = value.to_le_bytes();
-    }
-    bytes
-}
-
-impl Pixel {
-    /// Reads a record.
-    pub fn read(bytes: &[u8; PIXEL_BYTES]) -> Self {
-        let ([radiance, albedo, normal], depth) = read_numbers(bytes);
-        Self { radiance, albedo, normal, depth }
+impl Numbers<'_> {
+    fn next<const N: usize>(&mut self) -> [u8; N] {
+        let (number, rest) = self.0.split_first_chunk().unwrap_or((&[0; N], &[]));
+        self.0 = rest;
+        *number
     }
 
-    /// The record's bytes.
-    pub fn to_bytes(&self) -> [u8; PIXEL_BYTES] {
-        number_bytes([self.radiance, self.albedo, self.normal], self.depth)
+    fn vector<const N: usize, T>(&mut self, read: fn([u8; N]) -> T) -> [T; 3] {
+        core::array::from_fn(|_| read(self.next()))
     }
 }
 
-impl PixelLayers {
-    /// Reads a record.
-    pub fn read(bytes: &[u8; LAYER_BYTES]) -> Self {
-        let ([direct, indirect, caustic], gathers) = read_numbers(bytes);
-        Self { direct, indirect, caustic, gathers }
-    }
+fn added(sums: [i64; 3], more: [i64; 3]) -> [i64; 3] {
+    core::array::from_fn(|channel| sums[channel].saturating_add(more[channel]))
+}
 
-    /// The record's bytes.
-    pub fn to_bytes(&self) -> [u8; LAYER_BYTES] {
-        number_bytes([self.direct, self.indirect, self.caustic], self.gathers)
+impl LayerSums {
+    fn light(&self) -> [i64; 3] {
+        added(added(self.direct, self.indirect), self.caustic)
     }
 }
 
-impl PixelRecord {
-    /// Reads a record; `None` if `bytes` is not [`record_bytes`] long.
+impl PixelSums {
+    /// Sums of no sample.
+    pub const NOTHING: Self =
+        Self { light: [0; 3], albedo: [0; 3], normal: [0; 3], depth: 0, surfaces: 0, layers: None };
+
+    /// Sums without layers.
+    pub fn with_light(self, light: [i64; 3]) -> Self {
+        Self { light, layers: None, ..self }
+    }
+
+    /// Sums with layers, whose sum is the light.
+    pub fn with_layers(self, layers: LayerSums) -> Self {
+        Self { light: layers.light(), layers: Some(layers), ..self }
+    }
+
+    /// Reads sums; `None` if `bytes` is not of a length of [`record_bytes`].
     pub fn read(bytes: &[u8]) -> Option<Self> {
-        let (pixel, rest) = bytes.split_first_chunk()?;
-        let layers = if rest.is_empty() { None } else { Some(PixelLayers::read(rest.try_into().ok()?)) };
-        Some(Self { pixel: Pixel::read(pixel), layers })
+        let has_layers = bytes.len() == LAYERED_PIXEL_BYTES;
+        if bytes.len() != record_bytes(has_layers) {
+            return None;
+        }
+        let mut numbers = Numbers(bytes);
+        let view = Self {
+            albedo: numbers.vector(u32::from_le_bytes),
+            normal: numbers.vector(i32::from_le_bytes),
+            depth: i64::from_le_bytes(numbers.next()),
+            surfaces: u32::from_le_bytes(numbers.next()),
+            ..Self::default()
+        };
+        let mut light = || numbers.vector(i64::from_le_bytes);
+        Some(if has_layers {
+            let [direct, indirect, caustic] = [light(), light(), light()];
+            let gathers = u32::from_le_bytes(numbers.next());
+            view.with_layers(LayerSums { direct, indirect, caustic, gathers })
+        } else {
+            view.with_light(light())
+        })
+    }
+
+    /// Appends the bytes of the sums by `append`, [`record_bytes`] in all.
+    pub fn write(&self, append: &mut impl FnMut(&[u8])) {
+        let Self { light, albedo, normal, depth, surfaces, layers } = self;
+        append(albedo.map(u32::to_le_bytes).as_flattened());
+        append(normal.map(i32::to_le_bytes).as_flattened());
+        append(&depth.to_le_bytes());
+        append(&surfaces.to_le_bytes());
+        let mut append_light = |light: &[i64; 3]| append(light.map(i64::to_le_bytes).as_flattened());
+        match layers {
+            None => append_light(light),
+            Some(LayerSums { direct, indirect, caustic, gathers }) => {
+                [direct, indirect, caustic].into_iter().for_each(append_light);
+                append(&gathers.to_le_bytes());
+            }
+        }
+    }
+
+    /// Sums of the samples of both. Layers that one of the two lacks are left out.
+    #[must_use]
+    pub fn plus(&self, more: &Self) -> Self {
+        let view = Self {
+            albedo: core::array::from_fn(|i| self.albedo[i].saturating_add(more.albedo[i])),
+            normal: core::array::from_fn(|i| self.normal[i].saturating_add(more.normal[i])),
+            depth: self.depth.saturating_add(more.depth),
+            surfaces: self.surfaces.saturating_add(more.surfaces),
+            ..Self::default()
+        };
+        match (&self.layers, &more.layers) {
+            (Some(layers), Some(more)) => view.with_layers(LayerSums {
+                direct: added(layers.direct, more.direct),
+                indirect: added(layers.indirect, more.indirect),
+                caustic: added(layers.caustic, more.caustic),
+                gathers: layers.gathers.saturating_add(more.gathers),
+            }),
+            _ => view.with_light(added(self.light, more.light)),
+        }
+    }
+
+    /// Sums without layers that stand for values nearest to those of a pixel.
+    pub fn nearest(pixel: &Pixel, samples: u32, scale: &SumScale) -> Self {
+        let Pixel { radiance, albedo, normal, depth } = *pixel;
+        let sees = depth.is_finite();
+        let of_all = |value: f32, steps: u32| f64::from(value) * f64::from(samples) * f64::from(steps);
+        let depth = of_all(depth, DEPTH_STEPS) / f64::from(scale.depth);
+        Self {
+            light: light_of(radiance, samples, scale),
+            albedo: albedo.map(|value| (of_all(value, ALBEDO_STEPS) + 0.5) as u32),
+            normal: normal.map(|value| rounded(of_all(value, NORMAL_STEPS)) as i32),
+            depth: if sees { rounded(depth) } else { 0 },
+            surfaces: if sees { samples } else { 0 },
+            layers: None,
+        }
+    }
+
+    /// The sums with layers that stand for values nearest to `layers`; the light is the layers' sum.
+    #[must_use]
+    pub fn with_nearest_layers(self, layers: &PixelLayers, samples: u32, scale: &SumScale) -> Self {
+        let [direct, indirect, caustic] =
+            [layers.direct, layers.indirect, layers.caustic].map(|light| light_of(light, samples, scale));
+        self.with_layers(LayerSums { direct, indirect, caustic, gathers: layers.gathers as u32 })
+    }
+
+    /// Values of the pixel, means over `samples`.
+    pub fn pixel(&self, samples: u32, scale: &SumScale) -> Pixel {
+        let per_sample = 1.0 / f64::from(samples.max(1));
+        let normal = per_sample / f64::from(NORMAL_STEPS);
+        let albedo = per_sample / f64::from(ALBEDO_STEPS);
+        let depth = f64::from(scale.depth) / f64::from(DEPTH_STEPS) / f64::from(self.surfaces);
+        Pixel {
+            radiance: radiance(self.light, samples, scale),
+            albedo: self.albedo.map(|sum| (f64::from(sum) * albedo) as f32),
+            normal: self.normal.map(|sum| (f64::from(sum) * normal) as f32),
+            depth: if self.surfaces > 0 { (self.depth as f64 * depth) as f32 } else { f32::INFINITY },
+        }
+    }
+
+    /// Values of the layers, means over `samples`; `None` in a frame without layers.
+    pub fn pixel_layers(&self, samples: u32, scale: &SumScale) -> Option<PixelLayers> {
+        let LayerSums { direct, indirect, caustic, gathers } = self.layers?;
+        let [direct, indirect, caustic] =
+            [direct, indirect, caustic].map(|sum| radiance(sum, samples, scale));
+        Some(PixelLayers { direct, indirect, caustic, gathers: gathers as f32 })
+    }
+}
+
+/// Sum of light whose mean is nearest to a radiance.
+fn light_of(radiance: [f32; 3], samples: u32, scale: &SumScale) -> [i64; 3] {
+    let steps = LIGHT_STEPS / f64::from(scale.radiance) * f64::from(samples);
+    radiance.map(|value| rounded(f64::from(value) * steps).max(0))
+}
+
+/// The nearest integer, away from zero in the middle.
+fn rounded(value: f64) -> i64 {
+    (if value < 0.0 { value - 0.5 } else { value + 0.5 }) as i64
+}
+
+/// Mean radiance of a sum of light.
+fn radiance(light: [i64; 3], samples: u32, scale: &SumScale) -> [f32; 3] {
+    let unit = f64::from(scale.radiance) / LIGHT_STEPS;
+    light.map(|sum| (sum as f64 * unit / f64::from(samples.max(1))) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sums(number: i64, has_layers: bool) -> PixelSums {
+        let vector = |first: i64| [0, 1, 2].map(|axis| number * (first + axis));
+        let view = PixelSums {
+            albedo: vector(1).map(|value| value as u32),
+            normal: vector(4).map(|value| -value as i32),
+            depth: number * 7,
+            surfaces: number as u32,
+            ..PixelSums::default()
+        };
+        if has_layers {
+            let [direct, indirect, caustic] = [vector(10), vector(20), vector(30)];
+            view.with_layers(LayerSums { direct, indirect, caustic, gathers: number as u32 })
+        } else {
+            view.with_light(vector(60))
+        }
+    }
+
+    #[test]
+    fn sums_of_parts_are_those_of_the_whole_in_any_order() {
+        for layers in [false, true] {
+            let [one, two, three] = [1, 2, 3].map(|number| sums(number, layers));
+            assert_eq!(one.plus(&two), three);
+            assert_eq!(three.plus(&one).plus(&two), one.plus(&two.plus(&three)));
+        }
+        let greatest = PixelSums { light: [i64::MAX; 3], depth: i64::MAX, ..sums(1, false) };
+        assert_eq!(greatest.plus(&greatest).light, [i64::MAX; 3]);
+        assert_eq!(greatest.plus(&greatest).depth, i64::MAX);
+    }
+
+    #[test]
+    fn values_are_means_in_the_units_of_the_scale() {
+        let scale = SumScale { radiance: 4.0, depth: 0.5 };
+        let layers = LayerSums { direct: [1 << 40; 3], indirect: [0; 3], caustic: [2 << 40; 3], gathers: 3 };
+        let view = PixelSums {
+            albedo: [ALBEDO_STEPS, 0, 2 * ALBEDO_STEPS],
+            normal: [0, -(NORMAL_STEPS as i32), 0],
+            depth: 3 * i64::from(DEPTH_STEPS),
+            surfaces: 2,
+            ..PixelSums::default()
+        };
+        let sums = view.with_layers(layers);
+        let pixel = sums.pixel(4, &scale);
+        assert_eq!((pixel.radiance, pixel.albedo), ([3.0; 3], [0.25, 0.0, 0.5]));
+        assert_eq!((pixel.normal, pixel.depth), ([0.0, -0.25, 0.0], 0.75));
+        let layers = sums.pixel_layers(4, &scale).unwrap();
+        assert_eq!((layers.direct, layers.caustic, layers.gathers), ([1.0; 3], [2.0; 3], 3.0));
+        let nothing = PixelSums::default().pixel(4, &scale);
+        assert_eq!(nothing, Pixel { depth: f32::INFINITY, ..Pixel::default() });
     }
 }

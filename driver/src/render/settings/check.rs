@@ -57,6 +57,7 @@ impl RenderSettings {
         on_card("--gather-rays", self.integrator.gather_rays, 0, budget.gather_rays)?;
         on_card("--shadow-rays", self.integrator.shadow_rays, 0, budget.shadow_rays)?;
         on_card("--spp", self.integrator.samples, 1, budget.samples)?;
+        on_card("--planned-spp", self.integrator.planned(), 1, budget.samples)?;
         if self.schedule.queue.is_some() || self.schedule.order.has_queue() {
             on_card("--queue", self.schedule.queue.unwrap_or(1), 1, budget.gather_queue)?;
         }

@@ -31,7 +31,15 @@ impl RenderSettings {
             caustic_neighbors,
             radiance,
         } = photons;
-        let Integrator { seed, samples, gather_rays, shadow_rays, sampling, irradiance_error } = integrator;
+        let Integrator {
+            seed,
+            samples,
+            planned_samples: _,
+            gather_rays,
+            shadow_rays,
+            sampling,
+            irradiance_error,
+        } = integrator;
         let window = self.window();
         named([
             ("size", json!([width, height])),
@@ -50,6 +58,7 @@ impl RenderSettings {
             ("radiance", json!(radiance.name())),
             ("seed", json!(seed)),
             ("spp", json!(samples)),
+            ("planned-spp", json!(irradiance_error.map(|_| integrator.planned()))),
             ("gather-rays", json!(gather_rays)),
             ("shadow-rays", json!(shadow_rays)),
             ("sampling", json!(sampling.name())),

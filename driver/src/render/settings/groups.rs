@@ -94,6 +94,9 @@ pub struct Integrator {
     pub seed: u32,
     /// Number of samples per pixel.
     pub samples: u32,
+    /// Number of samples per pixel among which the irradiance cache divides the gather rays of a pixel; `None` for `samples`. It is
+    /// equal in all passes of a picture.
+    pub planned_samples: Option<u32>,
     /// Number of final gather rays per sample; with an irradiance cache per record, and per pixel of other samples.
     pub gather_rays: u32,
     /// Number of shadow rays per sample.
@@ -104,11 +107,19 @@ pub struct Integrator {
     pub irradiance_error: Option<f32>,
 }
 
+impl Integrator {
+    /// Number of samples per pixel that rays are divided among.
+    pub fn planned(&self) -> u32 {
+        self.planned_samples.unwrap_or(self.samples)
+    }
+}
+
 impl Default for Integrator {
     fn default() -> Self {
         Self {
             seed: 0,
             samples: 1,
+            planned_samples: None,
             gather_rays: 100,
             shadow_rays: 8,
             sampling: Sampling::Product,

@@ -20,6 +20,7 @@ use photoncard_shared::message::PIXEL_BYTES;
 pub use self::order::TileOrder;
 use crate::scheduler::Scheduler;
 use crate::sink::FinishedTile;
+use crate::sums::SumFormat;
 
 /// Model of the chips' links, all served by one host, one message at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -189,7 +190,7 @@ impl Simulation {
     /// Handles the arrival of a result. The scheduler's clock matters only for lost or late cards, of which there are none
     /// here.
     fn receive(&mut self, chip: usize, id: u32) {
-        let finished = FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], false, Counters::ZERO);
+        let finished = FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);
         if let Some(tile) = finished {
             self.scheduler.answer(chip, tile, Duration::ZERO);
             self.scheduler.complete(id);
