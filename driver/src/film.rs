@@ -104,6 +104,14 @@ pub enum FilmError {
         "the samples of a film of another window, other layers or other units cannot be added; render all with equal settings"
     )]
     Other,
+    /// The film has as many samples as the picture, or is not complete.
+    #[error("a complete film of {samples} samples a pixel is no part of a picture of {asked}")]
+    NoMore {
+        /// Samples of the film.
+        samples: u32,
+        /// Samples of the picture.
+        asked: u32,
+    },
     /// The pixel lies outside the crop window.
     #[error("pixel ({x}, {y}) lies outside the crop window {},{},{},{}", window.x0, window.x1, window.y0, window.y1)]
     Outside {
@@ -164,6 +172,23 @@ impl Film {
     /// Format of the sums.
     pub fn format(&self) -> &SumFormat {
         &self.format
+    }
+
+    /// Leaves the samples of `base` out of an empty film: the others are to be rendered.
+    ///
+    /// # Errors
+    /// [`FilmError::Other`] if windows, layers or units differ, [`FilmError::NoMore`] if there are no others.
+    pub(crate) fn begin_after(&mut self, base: &Self) -> Result<(), FilmError> {
+        let more = self.format.samples.saturating_sub(base.format.samples);
+        let all = SumFormat { samples: more, ..self.format }.plus(&base.format);
+        if self.window != base.window || all.is_none() {
+            return Err(FilmError::Other);
+        }
+        if more == 0 || !base.is_complete() {
+            return Err(FilmError::NoMore { samples: base.format.samples, asked: self.format.samples });
+        }
+        self.format.samples = more;
+        Ok(())
     }
 
     /// An empty film of the window, with sums of `samples` samples.

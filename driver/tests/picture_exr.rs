@@ -9,7 +9,7 @@ use exr::prelude::{
     Vec2, WritableImage,
 };
 use photoncard_driver::exr::{ExrError, SampleFormat, read_rgb, write};
-use photoncard_driver::film::{Film, PixelLayers, PixelRecord, PixelValue, Window};
+use photoncard_driver::film::{Film, FilmPixel, PixelLayers, PixelValue, SumFormat, SumScale, Window};
 use photoncard_driver::layer::Layers;
 use proptest::prelude::{ProptestConfig, any, proptest};
 
@@ -25,11 +25,20 @@ fn value(x: u32, y: u32) -> PixelValue {
     }
 }
 
+/// Units in which the values of these tests have sums, with room for a dazzling light.
+const FORMAT: SumFormat =
+    SumFormat { samples: 1, layers: false, scale: SumScale { radiance: 1.0, depth: 1.0 / 1024.0 } };
+
+fn write_pixel(film: &mut Film, x: u32, y: u32, pixel: PixelValue, layers: PixelLayers) {
+    let sums = film.format().sums(&FilmPixel { pixel, layers });
+    film.write(x, y, &sums).unwrap();
+}
+
 fn film() -> Film {
-    let mut film = Film::new(64, 48, WINDOW).unwrap();
+    let mut film = Film::new(64, 48, WINDOW, FORMAT).unwrap();
     for y in WINDOW.y0..WINDOW.y1 {
         for x in WINDOW.x0..WINDOW.x1 {
-            film.write(x, y, value(x, y)).unwrap();
+            write_pixel(&mut film, x, y, value(x, y), PixelLayers::default());
         }
     }
     film
@@ -49,7 +58,8 @@ fn radiance_is_read_back_to_the_format_s_precision() {
         let image = read_rgb(&path).unwrap();
         assert_eq!((image.width, image.height, image.data_window_origin), (17, 40, [3, 5]));
         for (index, pixel) in image.pixels.iter().enumerate() {
-            let expected = value(3 + index as u32 % 17, 5 + index as u32 / 17).radiance;
+            let pixel = film().pixel(3 + index as u32 % 17, 5 + index as u32 / 17).unwrap();
+            let expected = pixel.radiance;
             for (read, expected) in pixel.iter().zip(expected) {
                 assert!((read - expected).abs() <= precision * expected, "{format:?}: {read} {expected}");
             }
@@ -128,8 +138,9 @@ fn the_layers_that_are_asked_for_are_in_the_file() {
         caustic: [3.5, 4.0, 4.5],
         gathers: 2049.0,
     };
-    let mut film = Film::with_layers(1, 1, Window::full(1, 1)).unwrap();
-    film.write_record(0, 0, &PixelRecord { pixel: value(3, 5), layers: Some(layers) }).unwrap();
+    let format = SumFormat { layers: true, samples: 2100, ..FORMAT };
+    let mut film = Film::new(1, 1, Window::full(1, 1), format).unwrap();
+    write_pixel(&mut film, 0, 0, value(3, 5), layers);
     let written = |list: &str, format| {
         write(&path, &film, &list.parse().unwrap(), "{}", format).unwrap();
         channels(&path)
@@ -173,13 +184,15 @@ fn two_writes_give_the_same_bytes() {
 fn a_bright_light_stays_finite_in_halves() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bright.exr");
-    let mut film = Film::new(2, 1, Window::full(2, 1)).unwrap();
-    for (x, radiance) in [[1e6, 65504.0, 65530.0], [f32::INFINITY, -1e6, 1e-9]].into_iter().enumerate() {
-        film.write(x as u32, 0, PixelValue { radiance, ..PixelValue::default() }).unwrap();
+    let scale = SumScale { radiance: 256.0, ..FORMAT.scale };
+    let mut film = Film::new(2, 1, Window::full(2, 1), SumFormat { scale, ..FORMAT }).unwrap();
+    for (x, radiance) in [[1e6, 65504.0, 65530.0], [1e9, 0.0, 1e-9]].into_iter().enumerate() {
+        let pixel = PixelValue { radiance, ..PixelValue::default() };
+        write_pixel(&mut film, x as u32, 0, pixel, PixelLayers::default());
     }
     write(&path, &film, &Layers::default(), "{}", SampleFormat::Half).unwrap();
     let image = read_rgb(&path).unwrap();
-    assert_eq!(image.pixels, [[65504.0; 3], [f32::INFINITY, -65504.0, 0.0]]);
+    assert_eq!(image.pixels, [[65504.0; 3], [65504.0, 0.0, 0.0]]);
 }
 
 #[test]
@@ -246,8 +259,8 @@ proptest! {
     ) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("picture.exr");
-        let mut film = Film::new(12, 20, Window::full(12, 20)).unwrap();
-        film.write(1, 1, value(1, 1)).unwrap();
+        let mut film = Film::new(12, 20, Window::full(12, 20), FORMAT).unwrap();
+        write_pixel(&mut film, 1, 1, value(1, 1), PixelLayers::default());
         write(&path, &film, &Layers::default(), "{}", SampleFormat::Half).unwrap();
         let mut bytes = fs::read(&path).unwrap();
         for (at, value, in_header) in flips {

@@ -275,7 +275,9 @@ fn golden_structures() {
         height: 2,
         camera,
         seed: 3,
+        first_sample: 0,
         samples: 4,
+        planned_samples: 4,
         gather_rays: 5,
         shadow_rays: 6,
         neighbors: 7,
@@ -394,22 +396,27 @@ fn the_versions_of_a_hello_are_read_whatever_follows() {
 }
 
 #[test]
-fn a_pixel_survives_its_record() {
-    let pixel =
-        Pixel { radiance: [1., 2., 3.], albedo: [4., 5., 6.], normal: [7., 8., 9.], depth: f32::INFINITY };
-    assert_eq!(Pixel::read(&pixel.to_bytes()), pixel);
+fn sums_of_a_pixel_survive_their_record() {
+    let view = PixelSums {
+        albedo: [1, 2, u32::MAX],
+        normal: [4, -5, i32::MIN],
+        depth: -7,
+        surfaces: 8,
+        ..PixelSums::default()
+    };
     let layers =
-        PixelLayers { direct: [1., 2., 3.], indirect: [4., 5., 6.], caustic: [7., 8., 9.], gathers: 4096. };
-    let bytes = [pixel.to_bytes(), layers.to_bytes()].concat();
-    let numbers: Vec<u8> = (1..10).chain([4096]).flat_map(|number| (number as f32).to_le_bytes()).collect();
-    assert_eq!(bytes[PIXEL_BYTES..], numbers);
-    for (has_layers, layers) in [(false, None), (true, Some(layers))] {
-        let length = record_bytes(has_layers);
-        assert_eq!(PixelRecord::read(&bytes[..length]), Some(PixelRecord { pixel, layers }));
-        assert_eq!(PixelRecord::read(&bytes[..length - 1]), None);
-        assert!(PIXELS_BYTES >= 12 * length);
+        LayerSums { direct: [1, 2, 3], indirect: [4, 5, 6], caustic: [7, 8, i64::MAX], gathers: 4096 };
+    for (has_layers, sums) in [(false, view.with_light([9, 10, 11])), (true, view.with_layers(layers))] {
+        let mut bytes = Vec::new();
+        sums.write(&mut |part| bytes.extend_from_slice(part));
+        assert_eq!(bytes.len(), record_bytes(has_layers));
+        assert_eq!(PixelSums::read(&bytes), Some(sums));
+        assert_eq!(bytes[8..12], [0xff; 4]);
+        assert_eq!(bytes[24..36], [[0xf9, 0xff, 0xff, 0xff], [0xff; 4], [8, 0, 0, 0]].concat());
+        assert_eq!(PixelSums::read(&bytes[1..]), None);
+        assert!(PIXELS_BYTES >= 8 * bytes.len());
     }
-    assert_eq!(PixelRecord::read(&[bytes, vec![0]].concat()), None);
+    assert_eq!(view.with_layers(layers).light, [12, 15, i64::MAX]);
 }
 
 #[test]

@@ -71,7 +71,7 @@ pub fn render_or_panic(scene: &Scene, settings: &RenderSettings) -> Rendering {
 
 /// Radiances of a film's pixels, row by row, W/(sr m^2).
 pub fn radiances(film: &Film) -> Vec<[f32; 3]> {
-    film.pixels().iter().map(|pixel| pixel.radiance).collect()
+    film.pixels().map(|pixel| pixel.radiance).collect()
 }
 
 /// Mean of radiances over pixels and channels.

@@ -1,8 +1,8 @@
 //! Scenes with one photon map for several frames, so that frames differ in the gather alone.
 
 use glam::Vec3;
-use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
-use photoncard_driver::film::Window;
+use photoncard_driver::emulator::direct::render_tile;
+use photoncard_driver::film::{SumFormat, Window};
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon_map::{MappedImage, map_photons};
 use photoncard_driver::render::RenderSettings;
@@ -73,11 +73,10 @@ impl MappedScene {
         tile: Tile,
     ) -> (Tile, Vec<Vec3>, Counters) {
         let (scene, memory) = self.image.view();
-        let RenderedTile { sums, counters, .. } =
-            render_tile(chip, &scene, memory, frame, tile, None).expect("sound");
-        let unit = scene.header.radiance_unit;
-        let radiance = sums.iter().map(|sum| sum.value() * unit).collect();
-        (tile, radiance, counters)
+        let rendered = render_tile(chip, &scene, memory, frame, tile, None).expect("sound");
+        let pixels = rendered.pixels(SumFormat::new(&scene.header, frame));
+        let radiance = pixels.map(|pixel| Vec3::from(pixel.pixel.radiance)).collect();
+        (tile, radiance, rendered.counters)
     }
 }
 

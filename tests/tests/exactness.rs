@@ -35,14 +35,9 @@ fn card(text: &str) -> CardAddress {
     text.parse().unwrap()
 }
 
-/// Bits of a film: unlike floats they distinguish 0 from -0, and NaN equals itself.
-fn bits(film: &Film) -> Vec<[u32; 10]> {
-    film.pixels().iter().map(pixel_bits).collect()
-}
-
-fn pixel_bits(pixel: &PixelValue) -> [u32; 10] {
-    let [[r, g, b], [p, q, s], [x, y, z]] = [pixel.radiance, pixel.albedo, pixel.normal];
-    [r, g, b, p, q, s, x, y, z, pixel.depth].map(f32::to_bits)
+/// Sums of a film without its layers.
+fn sums(film: &Film) -> Vec<PixelSums> {
+    film.sums().map(|sums| PixelSums { layers: None, ..sums }).collect()
 }
 
 /// Settings that no pixel may depend on.
@@ -64,7 +59,7 @@ fn variants() -> Vec<RenderSettings> {
         (tile, Hilbert, None, None),
     ];
     let scheduled = schedules.map(|(tile, order, bins, queue)| RenderSettings {
-        schedule: Schedule { tile: Some(tile), order, bins, queue, in_flight: None },
+        schedule: Schedule { tile: Some(tile), order, bins, queue, in_flight: None, focus: None },
         ..settings()
     });
     let cards = [
@@ -80,7 +75,7 @@ fn variants() -> Vec<RenderSettings> {
         (&["emulated:3"], 7, Hilbert, None),
     ];
     let dealt = cards.map(|(cards, tile, order, queue)| RenderSettings {
-        schedule: Schedule { tile: Some(tile), order, bins: None, queue, in_flight: None },
+        schedule: Schedule { tile: Some(tile), order, bins: None, queue, in_flight: None, focus: None },
         cards: CardSet { addresses: cards.iter().copied().map(card).collect(), ..CardSet::default() },
         ..settings()
     });
@@ -114,23 +109,18 @@ fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
                 s.integrator.samples = samples;
             })
         };
-        let expected = bits(&render_or_panic(scene, &with(settings())).film);
+        let expected = sums(&render_or_panic(scene, &with(settings())).film);
         for variant in variants() {
             let variant = with(variant);
             let film = render_or_panic(scene, &variant).film;
-            assert!(bits(&film) == expected, "{variant:?} changes the picture");
+            assert!(sums(&film) == expected, "{variant:?} changes the picture");
         }
     }
 }
 
-/// Bits of a film's layers; zero in a film without layers.
-fn layer_bits(film: &Film) -> Vec<[u32; 10]> {
-    let of_pixel = |pixel: FilmPixel| {
-        let PixelLayers { direct, indirect, caustic, gathers } = pixel.layers;
-        let [[a, b, c], [d, e, f], [g, h, i]] = [direct, indirect, caustic];
-        [a, b, c, d, e, f, g, h, i, gathers].map(f32::to_bits)
-    };
-    film.all().map(of_pixel).collect()
+/// Sums of a film's layers; zero in a film without layers.
+fn layer_sums(film: &Film) -> Vec<LayerSums> {
+    film.sums().map(|sums| sums.layers.unwrap_or_default()).collect()
 }
 
 /// Orders of chips; `hilbert` is the host's.
@@ -152,7 +142,7 @@ fn tiles_with_more_pixels_than_gather_points_are_the_same() {
                 (s.schedule.tile, s.schedule.order) = (Some(tile), order);
                 s.cards.addresses = vec![card(cards)];
             });
-            bits(&render_or_panic(&glossy(), &settings).film)
+            sums(&render_or_panic(&glossy(), &settings).film)
         };
         let expected = picture(16, GatherOrder::Tiled, "emulated-micro:2");
         for (order, cards) in [
@@ -193,12 +183,12 @@ proptest! {
         let changed = base.with(|s| {
             let has_room = cards.starts_with("emulated-large");
             let in_flight = in_flight.filter(|_| has_room);
-            s.schedule = Schedule { tile: Some(tile), order, bins: None, queue, in_flight };
+            s.schedule = Schedule { tile: Some(tile), order, bins: None, queue, in_flight, focus: None };
             s.cards.addresses = vec![card(cards)];
         });
         let film = render_or_panic(&scene, &changed).film;
-        prop_assert!(bits(&film) == bits(&expected));
-        prop_assert!(layer_bits(&film) == layer_bits(&expected));
+        prop_assert!(sums(&film) == sums(&expected));
+        prop_assert!(layer_sums(&film) == layer_sums(&expected));
     }
 }
 
@@ -250,14 +240,14 @@ fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
             s.cards.addresses = vec![card(cards)];
         })
     };
-    let expected = bits(&render_or_panic(&scene, &settings(4, GatherOrder::Sort, "emulated:2")).film);
+    let expected = sums(&render_or_panic(&scene, &settings(4, GatherOrder::Sort, "emulated:2")).film);
     for (tile, order, cards) in [
         (64, GatherOrder::Sort, "emulated:1"),
         (61, GatherOrder::DirectionBins, "emulated:2"),
         (16, GatherOrder::Naive, "emulated-micro:2"),
     ] {
         let rendering = render_or_panic(&scene, &settings(tile, order, cards));
-        assert!(bits(&rendering.film) == expected, "tiles of {tile} on {cards} change the picture");
+        assert!(sums(&rendering.film) == expected, "tiles of {tile} on {cards} change the picture");
     }
 }
 
@@ -276,9 +266,9 @@ fn nor_do_they_where_samples_are_rounded_to_the_next_pixel() {
             s.schedule.tile = Some(tile);
         })
     };
-    let expected = bits(&render_or_panic(&scene, &settings(16)).film);
+    let expected = sums(&render_or_panic(&scene, &settings(16)).film);
     for tile in [32, 1] {
-        assert!(bits(&render_or_panic(&scene, &settings(tile)).film) == expected, "tiles of {tile}");
+        assert!(sums(&render_or_panic(&scene, &settings(tile)).film) == expected, "tiles of {tile}");
     }
 }
 
@@ -295,11 +285,11 @@ fn a_frame_along_one_curve_is_for_emulated_reference_chips_alone() {
 #[test]
 fn the_threads_of_the_host_do_not_change_a_bit() {
     let scene = glossy();
-    let expected = bits(&render_or_panic(&scene, &settings()).film);
+    let expected = sums(&render_or_panic(&scene, &settings()).film);
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let film = pool.install(|| render_or_panic(&scene, &settings())).film;
-        assert!(bits(&film) == expected, "{threads} threads change the picture");
+        assert!(sums(&film) == expected, "{threads} threads change the picture");
     }
 }
 
@@ -339,7 +329,7 @@ fn the_work_counted_does_not_depend_on_how_tiles_are_dealt() {
 #[test]
 fn another_seed_is_another_picture() {
     let scene = glossy();
-    let first = bits(&render_or_panic(&scene, &settings()).film);
-    let second = bits(&render_or_panic(&scene, &settings().with(|s| s.integrator.seed = 1)).film);
+    let first = sums(&render_or_panic(&scene, &settings()).film);
+    let second = sums(&render_or_panic(&scene, &settings().with(|s| s.integrator.seed = 1)).film);
     assert!(first != second);
 }

@@ -26,7 +26,7 @@ fn render(faults: Option<&str>) -> (Vec<PixelValue>, Statistics) {
     let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
     let faults = faults.map(|faults| faults.parse().expect("faults"));
     let rendering = render_or_panic(&scene, &settings().with(|s| s.cards.faults = faults));
-    (rendering.film.pixels().to_vec(), rendering.statistics)
+    (rendering.film.pixels().collect(), rendering.statistics)
 }
 
 #[test]

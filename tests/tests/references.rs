@@ -39,7 +39,7 @@ fn blocks(pixels: &[[f32; 3]], width: usize, block: usize) -> Vec<(f64, f32)> {
 
 /// Checks the mean of the picture, and the median and 95th percentile of the blocks' errors.
 fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
-    let image: Vec<[f32; 3]> = film.pixels().iter().map(|pixel| pixel.radiance).collect();
+    let image: Vec<[f32; 3]> = film.pixels().map(|pixel| pixel.radiance).collect();
     let pairs: Vec<(f64, f64)> = blocks(&image, film.width() as usize, BLOCK / SHRUNK)
         .into_iter()
         .zip(blocks(&reference.pixels, reference.width, BLOCK))

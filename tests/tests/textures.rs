@@ -64,7 +64,7 @@ fn an_emissive_texture_glows_texel_by_texel() {
     let nearest = Texture { nearest: true, ..Texture::new(0) };
     let scene = with_texture(canvas(glowing(0)), image(2, Encoding::Srgb, texels), nearest);
     let film = film(&scene);
-    let at = |x: usize, y: usize| film.pixels()[y * 48 + x].radiance;
+    let at = |x: u32, y: u32| film.pixel(x, y).unwrap().radiance;
     let near = |found: [f32; 3], expected: [f32; 3]| {
         assert!(found.into_iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3), "{found:?} {expected:?}");
     };
@@ -81,7 +81,7 @@ fn between_two_texels_there_is_their_mean_of_light() {
     let clamped = Texture { wrap: [Wrap::Clamp; 2], ..Texture::new(0) };
     let scene = with_texture(canvas(glowing(0)), image(2, Encoding::Srgb, texels), clamped);
     let film = film(&scene);
-    let row: Vec<f32> = (0..48).map(|x| film.pixels()[24 * 48 + x].radiance[0]).collect();
+    let row: Vec<f32> = (0..48).map(|x| film.pixel(x, 24).unwrap().radiance[0]).collect();
     for (x, &found) in row.iter().enumerate() {
         let expected = 2.0 * ((x as f32 + 0.5) / 24.0 - 0.5).clamp(0.0, 1.0);
         assert!((found - expected).abs() < 0.03, "{x}: {found} {expected}");
@@ -146,7 +146,7 @@ fn roughness_and_metalness_follow_their_texture() {
     let corner = |x: f32, y: f32| Vec3::new(-x, y, 3.0);
     scene.triangles.extend(quad([corner(-9., -9.), corner(9., -9.), corner(9., 9.), corner(-9., 9.)], 1));
     let film = film(&scene);
-    let albedo = |x: usize| Vec3::from(film.pixels()[24 * 48 + x].albedo);
+    let albedo = |x: u32| Vec3::from(film.pixel(x, 24).unwrap().albedo);
     // Integrals of the GGX lobe at a cosine of 0.95, by quadrature.
     let metal = Vec3::new(0.792, 0.396, 0.198);
     assert!((albedo(10) - metal).abs().max_element() < 0.005, "{}", albedo(10));
@@ -307,7 +307,7 @@ fn smooth_normals_are_interpolated_between_corners() {
     add_ball(&mut ball, Vec3::ZERO, 1.0, 12, 0);
     let mut worst = 0.0_f32;
     let mut places = 0;
-    for (index, pixel) in film(&ball).pixels().iter().enumerate() {
+    for (index, pixel) in film(&ball).pixels().enumerate() {
         let [x, y] = [index % 48, index / 48].map(|i| (i as f32 + 0.5) / 24.0 - 1.0);
         // Near the silhouette of the ball facets lie far behind it.
         if x * x + y * y > 0.4 {

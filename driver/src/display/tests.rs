@@ -8,7 +8,7 @@ use rustix::net::sockopt;
 
 use super::packet::create_image;
 use super::*;
-use crate::film::{Film, PixelValue, Window};
+use crate::film::{Film, FilmPixel, PixelValue, SumFormat, Window};
 use crate::layer::Layers;
 use crate::sink::TileSink;
 use crate::viewer::Viewer;
@@ -16,9 +16,11 @@ use crate::viewer::Viewer;
 /// A film of `tiles` tiles of 64 x 64 in a column, cropped out of a larger picture.
 fn film(tiles: u32) -> (Film, Vec<Tile>) {
     let window = Window { x0: 3, x1: 67, y0: 5, y1: 5 + 64 * tiles };
-    let mut film = Film::new(100, 100 + 64 * tiles, window).unwrap();
+    let mut film = Film::new(100, 100 + 64 * tiles, window, SumFormat::ONE).unwrap();
     for (x, y) in (window.y0..window.y1).flat_map(|y| (3..67).map(move |x| (x, y))) {
-        film.write(x, y, PixelValue { radiance: [x as f32, y as f32, 0.5], ..Default::default() }).unwrap();
+        let pixel = PixelValue { radiance: [x as f32, y as f32, 0.5], ..Default::default() };
+        let sums = SumFormat::ONE.sums(&FilmPixel { pixel, ..FilmPixel::default() });
+        film.write(x, y, &sums).unwrap();
     }
     let tile = |id| Tile { id, x: 3, y: 5 + 64 * id, width: 64, height: 64 };
     (film, (0..tiles).map(tile).collect())

@@ -2,21 +2,27 @@ use std::fs::{self, TryLockError};
 use std::path::Path;
 
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{PIXEL_BYTES, Pixel, PixelLayers, PixelRecord, Tile};
+use photoncard_shared::message::{LayerSums, PIXEL_BYTES, PixelSums, Tile};
 use serde_json::json;
 
 use super::file::{check_lock, is_at};
 use super::records::{CHECKSUM_BYTES, HEAD_BYTES, MAGIC};
 use super::*;
-use crate::film::Window;
+use crate::film::{SumFormat, Window};
 use crate::sink::pixel_positions;
 
 const TILES: u32 = 6;
 /// Size of a tile's record, bytes.
 const RECORD_BYTES: usize = HEAD_BYTES + 12 * PIXEL_BYTES + CHECKSUM_BYTES;
 
+/// A film of `samples` samples.
+fn film_of(samples: u32) -> Film {
+    let format = SumFormat { samples, ..SumFormat::ONE };
+    Film::new(4 * TILES, 3, Window::full(4 * TILES, 3), format).unwrap()
+}
+
 fn film() -> Film {
-    Film::new(4 * TILES, 3, Window::full(4 * TILES, 3)).unwrap()
+    film_of(1)
 }
 
 fn tile(id: u32) -> Tile {
@@ -26,7 +32,18 @@ fn tile(id: u32) -> Tile {
 /// A tile of black pixels.
 fn blank(tile: &Tile) -> FinishedTile {
     let records = vec![0; PIXEL_BYTES * tile.pixels() as usize];
-    FinishedTile::new(*tile, records, false, Counters::ZERO).unwrap()
+    FinishedTile::new(*tile, records, SumFormat::ONE, Counters::ZERO).unwrap()
+}
+
+/// Begins a render without samples of an earlier one.
+fn begin_render(
+    settings: &PartialSettings,
+    identity: Value,
+    film: &mut Film,
+) -> Result<PartialRender, PartialError> {
+    let (partial, base) = PartialRender::begin(settings, identity, film)?;
+    assert!(base.is_none());
+    Ok(partial)
 }
 
 /// Settings of a partial render in a folder.
@@ -40,10 +57,10 @@ fn written(folder: &tempfile::TempDir) -> Vec<u8> {
     for (number, (x, y)) in
         pixel_positions(&Tile { id: 0, x: 0, y: 0, width: 4 * TILES, height: 3 }).enumerate()
     {
-        film.write(x, y, Pixel { depth: number as f32, ..Pixel::default() }).unwrap();
+        film.write(x, y, &PixelSums { depth: number as i64, ..PixelSums::default() }).unwrap();
     }
     let settings = partial(folder, false);
-    let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
+    let partial = begin_render(&settings, json!({ "seed": 1 }), &mut film).unwrap();
     (0..TILES).for_each(|id| partial.put(&film.finished(&tile(id)).unwrap()));
     partial.check().unwrap();
     fs::read(settings.path).unwrap()
@@ -54,7 +71,7 @@ fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
     let settings = partial(folder, true);
     fs::write(&settings.path, bytes).unwrap();
     let mut film = film();
-    let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
+    let partial = begin_render(&settings, json!({ "seed": 1 }), &mut film).unwrap();
     let taken: Vec<u32> = (0..TILES).filter(|&id| film.has(&tile(id))).collect();
     // Missing tiles are appended.
     for id in (0..TILES).filter(|id| !taken.contains(id)) {
@@ -62,7 +79,7 @@ fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
     }
     drop(partial);
     let mut again = self::film();
-    PartialRender::begin(&settings, json!({ "seed": 1 }), &mut again).unwrap();
+    begin_render(&settings, json!({ "seed": 1 }), &mut again).unwrap();
     assert!((0..TILES).all(|id| again.has(&tile(id))));
     taken
 }
@@ -96,24 +113,24 @@ fn damage_loses_the_tile_that_it_hits_alone() {
 fn revoked_tiles_are_struck_out_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let settings = partial(&folder, true);
-    let begin = |film: &mut Film| PartialRender::begin(&settings, json!({ "seed": 1 }), film).unwrap();
-    let of_depth = |id: u32, depth: f32| {
+    let begin = |film: &mut Film| begin_render(&settings, json!({ "seed": 1 }), film).unwrap();
+    let of_depth = |id: u32, depth: i64| {
         let mut film = film();
         pixel_positions(&tile(id))
-            .for_each(|(x, y)| film.write(x, y, Pixel { depth, ..Pixel::default() }).unwrap());
+            .for_each(|(x, y)| film.write(x, y, &PixelSums { depth, ..PixelSums::default() }).unwrap());
         film.finished(&tile(id)).unwrap()
     };
     let render = begin(&mut film());
-    (0..TILES).for_each(|id| render.put(&of_depth(id, 1.0)));
+    (0..TILES).for_each(|id| render.put(&of_depth(id, 1)));
     [1, 4].iter().for_each(|&id| render.revoke(&tile(id)));
-    render.put(&of_depth(4, 2.0));
+    render.put(&of_depth(4, 2));
     render.check().unwrap();
     drop(render);
     let mut again = film();
     let render = begin(&mut again);
     assert_eq!((0..TILES).filter(|&id| !again.has(&tile(id))).collect::<Vec<_>>(), [1]);
-    let depth = |id: u32| again.pixel(4 * id, 0).unwrap().depth;
-    assert_eq!([depth(3), depth(4), depth(5)], [1.0, 2.0, 1.0]);
+    let depth = |id: u32| again.sums_at(4 * id, 0).unwrap().depth;
+    assert_eq!([depth(3), depth(4), depth(5)], [1, 2, 1]);
     // Tiles of the earlier render are not struck out.
     render.revoke(&tile(0));
     render.check().unwrap();
@@ -123,7 +140,7 @@ fn revoked_tiles_are_struck_out_and_replaced() {
 #[test]
 fn a_file_of_revoked_tiles_holds_none() {
     let folder = tempfile::tempdir().unwrap();
-    let render = PartialRender::begin(&partial(&folder, false), json!({}), &mut film()).unwrap();
+    let render = begin_render(&partial(&folder, false), json!({}), &mut film()).unwrap();
     render.put(&blank(&tile(0)));
     assert!(render.holds_tiles());
     render.revoke(&tile(0));
@@ -136,48 +153,49 @@ fn the_later_record_of_a_tile_holds() {
     let mut bytes = written(&folder);
     let mut film = film();
     for (x, y) in pixel_positions(&tile(1)) {
-        film.write(x, y, Pixel { depth: -1.0, ..Pixel::default() }).unwrap();
+        film.write(x, y, &PixelSums { depth: -1, ..PixelSums::default() }).unwrap();
     }
-    bytes.extend(record(&film.finished(&tile(1)).unwrap()));
+    bytes.extend(record(&film.finished(&tile(1)).unwrap(), 0));
     let depth = |bytes: &[u8]| {
         let settings = partial(&folder, true);
         fs::write(&settings.path, bytes).unwrap();
         let mut film = self::film();
-        PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
+        begin_render(&settings, json!({ "seed": 1 }), &mut film).unwrap();
         assert!(film.is_complete());
-        film.pixel(5, 1).unwrap().depth
+        film.sums_at(5, 1).unwrap().depth
     };
-    assert_eq!(depth(&bytes).to_bits(), (-1.0_f32).to_bits());
+    assert_eq!(depth(&bytes), -1);
     // A damaged tile is rendered again.
     *bytes.last_mut().unwrap() ^= 1;
-    assert_eq!(depth(&bytes).to_bits(), (4.0 * TILES as f32 + 5.0).to_bits());
+    assert_eq!(depth(&bytes), 4 * i64::from(TILES) + 5);
 }
 
 #[test]
 fn layers_are_kept() {
     let folder = tempfile::tempdir().unwrap();
     let settings = partial(&folder, true);
-    let with_layers = || Film::with_layers(4, 3, Window::full(4, 3)).unwrap();
+    let with_layers =
+        || Film::new(4, 3, Window::full(4, 3), SumFormat { layers: true, ..SumFormat::ONE }).unwrap();
     let mut film = with_layers();
     for (number, (x, y)) in pixel_positions(&tile(0)).enumerate() {
-        let pixel = Pixel { depth: number as f32, ..Pixel::default() };
-        let layers = Some(PixelLayers { gathers: 0.5 * number as f32, ..PixelLayers::default() });
-        film.write_record(x, y, &PixelRecord { pixel, layers }).unwrap();
+        let view = PixelSums { depth: number as i64, ..PixelSums::default() };
+        let layers = LayerSums { gathers: 2 * number as u32, ..LayerSums::default() };
+        film.write(x, y, &view.with_layers(layers)).unwrap();
     }
-    let partial = PartialRender::begin(&settings, json!({}), &mut film).unwrap();
+    let partial = begin_render(&settings, json!({}), &mut film).unwrap();
     partial.put(&film.finished(&tile(0)).unwrap());
     drop(partial);
     let mut again = with_layers();
-    PartialRender::begin(&settings, json!({}), &mut again).unwrap();
+    begin_render(&settings, json!({}), &mut again).unwrap();
     assert!(again.is_complete());
-    assert_eq!(again.all().collect::<Vec<_>>(), film.all().collect::<Vec<_>>());
+    assert!(again.sums().eq(film.sums()));
 }
 
 #[test]
 fn a_file_has_one_render() {
     let folder = tempfile::tempdir().unwrap();
     let [mut one, mut two, mut three] = [film(), film(), film()];
-    let begin = |resume, film: &mut Film| PartialRender::begin(&partial(&folder, resume), json!({}), film);
+    let begin = |resume, film: &mut Film| begin_render(&partial(&folder, resume), json!({}), film);
     // Neither render has created the file yet.
     let (first, second) = (begin(false, &mut one).unwrap(), begin(false, &mut two).unwrap());
     for partial in [&first, &second] {
@@ -202,13 +220,14 @@ fn a_hostile_file_does_not_take_hours() {
     let mut bytes = written(&folder);
     let settings = partial(&folder, true);
     let side = 64_u32;
-    let wide = || Film::new(4 * TILES + side, 2 * side, Window::full(4 * TILES + side, 2 * side)).unwrap();
+    let (width, height) = (4 * TILES + side, 2 * side);
+    let wide = || Film::new(width, height, Window::full(width, height), SumFormat::ONE).unwrap();
     let sound = bytes.len() as u64;
-    let place = [4 * TILES, side, side, side].map(u32::to_le_bytes).concat();
+    let place = [4 * TILES, side, side, side, 0, 1].map(u32::to_le_bytes).concat();
     bytes.extend([&MAGIC[..], &place].concat().repeat(3 << 16));
     fs::write(&settings.path, bytes).unwrap();
     let mut film = wide();
-    let partial = PartialRender::begin(&settings, json!({ "seed": 1 }), &mut film).unwrap();
+    let partial = begin_render(&settings, json!({ "seed": 1 }), &mut film).unwrap();
     assert!((0..TILES).all(|id| film.has(&tile(id))) && partial.holds_tiles());
     assert_eq!(fs::metadata(&settings.path).unwrap().len(), sound);
 }
@@ -229,7 +248,7 @@ fn a_file_that_cannot_be_begun_is_not_left() {
     let folder = tempfile::tempdir().unwrap();
     let path = partial(&folder, false).path;
     let mut film = film();
-    let partial = PartialRender::begin(&partial(&folder, false), json!({}), &mut film).unwrap();
+    let partial = begin_render(&partial(&folder, false), json!({}), &mut film).unwrap();
     fs::write(&path, b"").unwrap();
     // A file opened for reading only fails on writes, like a full disk.
     partial.lock().file = Some(File::open(&path).unwrap());
@@ -278,7 +297,7 @@ fn a_foreign_file_is_refused_and_stays() {
     ] {
         fs::write(&path, foreign).unwrap();
         for resume in [false, true] {
-            let begun = PartialRender::begin(&partial(&folder, resume), json!({}), &mut film());
+            let begun = begin_render(&partial(&folder, resume), json!({}), &mut film());
             assert!(matches!(begun, Err(PartialError::Foreign { .. })), "{foreign}");
         }
         assert_eq!(fs::read(&path).unwrap(), foreign.as_bytes());
@@ -286,7 +305,7 @@ fn a_foreign_file_is_refused_and_stays() {
     // Neither written nor removed, if it appears later.
     fs::remove_file(&path).unwrap();
     let film = &mut film();
-    let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
+    let begun = begin_render(&partial(&folder, false), json!({}), film).unwrap();
     fs::write(&path, "notes").unwrap();
     begun.put(&blank(&tile(0)));
     assert!(matches!(begun.check(), Err(PartialError::Foreign { .. })));
@@ -294,7 +313,7 @@ fn a_foreign_file_is_refused_and_stays() {
     assert_eq!(fs::read(&path).unwrap(), b"notes");
     // Nor if it replaces a file that was begun.
     fs::remove_file(&path).unwrap();
-    let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
+    let begun = begin_render(&partial(&folder, false), json!({}), film).unwrap();
     begun.put(&blank(&tile(0)));
     begun.check().unwrap();
     #[cfg(unix)]
@@ -313,10 +332,10 @@ fn another_version_is_told_and_begun_anew_without_resume() {
     let old = b"photoncard partial render 1\n{}\nsomething";
     fs::write(&path, old).unwrap();
     let film = &mut film();
-    let begun = PartialRender::begin(&partial(&folder, true), json!({}), film);
+    let begun = begin_render(&partial(&folder, true), json!({}), film);
     assert!(matches!(begun, Err(PartialError::Version { found: 1, .. })));
     assert_eq!(fs::read(&path).unwrap(), old);
-    let begun = PartialRender::begin(&partial(&folder, false), json!({}), film).unwrap();
+    let begun = begin_render(&partial(&folder, false), json!({}), film).unwrap();
     begun.put(&blank(&tile(0)));
     begun.check().unwrap();
     assert!(fs::read(&path).unwrap().starts_with(b"photoncard partial render 2\n{}\n\x89TILE"));
@@ -344,7 +363,7 @@ fn what_is_no_file_of_its_own_is_refused_and_stays() {
     for (expected, make) in cases {
         make().unwrap();
         for resume in [false, true] {
-            let begun = PartialRender::begin(&partial(&folder, resume), json!({ "seed": 1 }), &mut film());
+            let begun = begin_render(&partial(&folder, resume), json!({ "seed": 1 }), &mut film());
             assert!(
                 matches!(begun, Err(PartialError::NotAFile { kind, .. }) if kind == expected),
                 "{expected}"

@@ -8,7 +8,7 @@ use super::{Observer, RenderSettings};
 use crate::display::Display;
 use crate::film::Film;
 use crate::partial::{PartialError, PartialRender};
-use crate::scene::Scene;
+use crate::scene::FixedScene;
 use crate::sink::{FinishedTile, TileSink};
 use crate::viewer::Viewer;
 
@@ -17,7 +17,7 @@ pub(super) struct Outputs<'a> {
     partial: Option<PartialRender>,
     /// Samples that the render adds to: all that are shown have them.
     pub(super) base: Option<Arc<Film>>,
-    viewers: Vec<OnBase<Box<dyn Viewer>>>,
+    viewers: Vec<Box<dyn Viewer>>,
     pub(super) observer: &'a dyn Observer,
 }
 
@@ -28,40 +28,35 @@ impl<'a> Outputs<'a> {
     /// # Errors
     /// If the file of finished tiles cannot be read or is not the file of this picture.
     pub(super) fn open(
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         tiles: &[Tile],
         (film, base): (&mut Film, Option<Arc<Film>>),
         observer: &'a dyn Observer,
     ) -> Result<Self, PartialError> {
         let begin = |partial| {
-            let mut identity = settings.identity(scene);
+            let mut identity = settings.identity_of(scene);
             identity.remove("spp");
             PartialRender::begin(partial, identity.into(), film)
         };
         let begun = settings.outputs.partial.as_ref().map(begin).transpose()?;
         let (partial, kept) = begun.map_or((None, None), |(partial, kept)| (Some(partial), kept));
         let base = kept.map(Arc::new).or(base);
-        let viewers =
-            viewers(settings, film).into_iter().map(|viewer| OnBase { base: base.clone(), sink: viewer });
-        let outputs = Self { partial, viewers: viewers.collect(), base, observer };
+        let outputs = Self { partial, viewers: viewers(settings, film), base, observer };
         outputs.report_kept();
         let resumed: Vec<&Tile> = tiles.iter().filter(|tile| film.has(tile)).collect();
-        for tile in resumed.iter().filter_map(|tile| film.finished(tile)) {
-            outputs.viewers.iter().for_each(|viewer| viewer.put(&tile));
-        }
+        resumed.iter().filter_map(|tile| film.finished(tile)).for_each(|tile| outputs.put(&tile));
         if !resumed.is_empty() {
             observer.resumed(resumed.len(), tiles.len());
         }
         Ok(outputs)
     }
 
-    /// Sinks of finished tiles: the film, the viewers, and the file if tiles are finished early.
+    /// Sinks of finished tiles: the film, the outputs that show them, and the file if tiles are finished early.
     pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>, finished_early: bool) -> Vec<&'s dyn TileSink> {
-        let mut sinks: Vec<&dyn TileSink> = vec![film];
+        let mut sinks: Vec<&dyn TileSink> = vec![film, self];
         let partial = self.partial.as_ref().filter(|_| finished_early);
         sinks.extend(partial.map(|partial| partial as &dyn TileSink));
-        sinks.extend(self.viewers.iter().map(|viewer| viewer as &dyn TileSink));
         sinks
     }
 
@@ -82,33 +77,31 @@ impl<'a> Outputs<'a> {
 
     /// Reports to the observer, once for each viewer that has failed, why the picture is not shown.
     pub(super) fn report_failed_viewers(&self) {
-        for error in self.viewers.iter().filter_map(|viewer| viewer.sink.failure()) {
+        for error in self.viewers.iter().filter_map(|viewer| viewer.failure()) {
             self.observer.not_shown(error.as_ref());
         }
     }
 
     /// Shows the rest of the picture. Returns the file of finished tiles.
     pub(super) fn finish(self, film: &Film) -> Option<PartialRender> {
-        self.viewers.iter().for_each(|viewer| viewer.sink.finish(film));
+        self.viewers.iter().for_each(|viewer| viewer.finish(film));
         self.report_failed_viewers();
         self.partial
     }
 }
 
-/// Sink of tiles with the samples of a base added, as a picture shows them.
-struct OnBase<S> {
-    base: Option<Arc<Film>>,
-    sink: S,
-}
-
-impl TileSink for OnBase<Box<dyn Viewer>> {
+/// Shows tiles by the viewers and the observer, with the samples of the base added.
+impl TileSink for Outputs<'_> {
     fn put(&self, tile: &FinishedTile) {
         let added = self.base.as_ref().and_then(|base| base.added_to(tile));
-        self.sink.put(added.as_ref().unwrap_or(tile));
+        let tile = added.as_ref().unwrap_or(tile);
+        self.viewers.iter().for_each(|viewer| viewer.put(tile));
+        self.observer.tiles().into_iter().for_each(|sink| sink.put(tile));
     }
 
     fn revoke(&self, tile: &Tile) {
-        self.sink.revoke(tile);
+        self.viewers.iter().for_each(|viewer| viewer.revoke(tile));
+        self.observer.tiles().into_iter().for_each(|sink| sink.revoke(tile));
     }
 }
 

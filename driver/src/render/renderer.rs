@@ -1,9 +1,10 @@
 //! Pictures one after another on the same cards.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use photoncard_shared::budget::Budget;
+use photoncard_shared::message::{FrameParameters, SumScale};
 
 use super::cards::Cards;
 use super::executor::{Executor, Work};
@@ -12,11 +13,11 @@ use super::preparation::{Prepared, prepare};
 use super::times::Times;
 use super::whole_frame::WholeFrame;
 use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
-use crate::film::Film;
+use crate::film::{Film, FilmError};
 use crate::pack::PackedScene;
 use crate::partial::PartialRender;
 use crate::photon_map::{PhotonSettings, check_image};
-use crate::scene::Scene;
+use crate::scene::{FixedScene, Scene};
 use crate::scheduler::tiles;
 
 /// Finished picture.
@@ -61,7 +62,41 @@ impl Renderer {
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(scene, settings, None, observer)
+        self.render_fixed(&scene.into(), settings, observer)
+    }
+
+    /// Renders a picture of a scene that stays as it is between pictures: for another camera neither triangles nor texels are read.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    pub fn render_fixed(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_by(scene, settings, None, None, observer)
+    }
+
+    /// Adds samples to a picture: renders those from the `base`'s on, and returns the picture of all samples of the settings. It is, to
+    /// the bit, the picture of one render of as many. [`Integrator::planned_samples`] and all else that pixels depend on must be those of
+    /// the base.
+    ///
+    /// # Errors
+    /// As [`Self::render`]; if the base does not have fewer samples, or is of another size, crop window or other layers.
+    pub fn refine(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        base: Arc<Film>,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_by(scene, settings, None, Some(base), observer)
+    }
+
+    /// Closes the cards: the next picture connects to them again, and to those that were lost.
+    pub fn close_cards(&mut self) {
+        self.cards = None;
     }
 
     /// Renders a picture of a scene with photons and an integrator that are chosen when the cards have answered and the scene is packed.
@@ -75,17 +110,18 @@ impl Renderer {
         choose: &dyn Fn(&PackedScene) -> Chosen,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(scene, settings, Some(choose), observer)
+        self.render_by(&scene.into(), settings, Some(choose), None, observer)
     }
 
     fn render_by(
         &mut self,
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         choose: Option<Choice>,
+        base: Option<Arc<Film>>,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        let result = self.render_on_cards(scene, settings, choose, observer);
+        let result = self.render_on_cards(scene, settings, choose, base, observer);
         if matches!(&result, Err(error) if !error.is_input() && !matches!(error, RenderError::Stopped)) {
             self.cards = None;
         }
@@ -94,9 +130,10 @@ impl Renderer {
 
     fn render_on_cards(
         &mut self,
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         choose: Option<Choice>,
+        base: Option<Arc<Film>>,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
         let start = Instant::now();
@@ -120,12 +157,17 @@ impl Renderer {
         settings.check()?;
         settings.check_budgets(&budgets)?;
         // A film may be large: it is allocated after the settings are checked.
-        let mut film = settings.film()?;
+        let mut film = settings.film(source.sum_scale())?;
+        base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
         let tiles = tiles(settings.window(), tile, settings.schedule.order);
-        let outputs = Outputs::open(scene, settings, &tiles, &mut film, observer)?;
+        let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
         let made = source.prepare(scene, settings, &budgets, &mut times, observer)?;
         let prepared = &kept.insert(made).prepared;
-        let frame = settings.frame(&camera, prepared.max_distance, prepared.caustics);
+        let frame = FrameParameters {
+            first_sample: outputs.base.as_ref().map_or(0, |base| base.format().samples),
+            samples: film.format().samples,
+            ..settings.frame(&camera, prepared.max_distance, prepared.caustics)
+        };
         let film = Mutex::new(film);
         let sinks = outputs.sinks(&film, executor.finishes_tiles_early());
         let image = &prepared.image;
@@ -136,9 +178,21 @@ impl Renderer {
         times.total = start.elapsed().as_secs_f64();
         let provenance = Provenance::new(settings, scene, &camera, &frame, &budgets);
         let statistics = Statistics::new(settings, &frame, prepared, &outcome, times, provenance);
-        let film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
+        outputs.base.as_ref().map_or(Ok(()), |base| film.add(base)).map_err(not_more(settings))?;
         let partial = outputs.finish(&film);
         Ok(Rendering { film, statistics, partial })
+    }
+}
+
+/// Error of a picture whose samples cannot be added to those of another.
+fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
+    let samples = settings.integrator.samples;
+    move |error| RenderError::Setting {
+        option: "--spp",
+        value: samples.to_string(),
+        reason: error.to_string(),
+        remedy: "go on from a finished picture of fewer samples and of equal settings".into(),
     }
 }
 
@@ -175,13 +229,13 @@ enum Source {
 impl Source {
     /// Source of the image, with the settings that are stated or chosen.
     fn new(
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         kept: &mut Option<Kept>,
         times: &mut Times,
     ) -> Result<(RenderSettings, Self), RenderError> {
-        let photons = settings.photon_settings(scene);
+        let photons = settings.photon_settings_if(scene.is_specular());
         let is_same = |kept: &mut Kept| {
             choose.is_none() && kept.photons == photons && kept.scene == scene.checksum_without_cameras()
         };
@@ -199,13 +253,21 @@ impl Source {
         Ok((RenderSettings { photons, integrator, ..settings.clone() }, Self::Packed(Box::new(packed))))
     }
 
+    /// Units of the sums of pixels.
+    fn sum_scale(&self) -> SumScale {
+        match self {
+            Self::Kept(kept) => kept.prepared.image.view().0.header.sum_scale(),
+            Self::Packed(packed) => packed.sum_scale(),
+        }
+    }
+
     /// The card image.
     ///
     /// # Errors
     /// If it does not fit a budget, the photons cannot be traced, or the observer stops the render.
     fn prepare(
         self,
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         budgets: &[Budget],
         times: &mut Times,
@@ -221,8 +283,8 @@ impl Source {
             }
         };
         Ok(Kept {
-            scene: scene.checksum_without_cameras(),
-            photons: settings.photon_settings(scene),
+            scene: scene.checksum_without_cameras().to_owned(),
+            photons: settings.photon_settings_if(scene.is_specular()),
             prepared: prepare(scene, packed, settings, budgets, times, observer)?,
         })
     }

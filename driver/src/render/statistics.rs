@@ -100,7 +100,7 @@ impl Statistics {
             provenance,
             width: frame.width,
             height: frame.height,
-            samples: frame.samples,
+            samples: settings.integrator.samples,
             photons: settings.photons.count as u64,
             photon_paths: prepared.paths,
             max_distance: frame.max_distance,

@@ -1,5 +1,7 @@
 use photoncard_shared::message::PIXEL_BYTES;
 
+use crate::sums::SumFormat;
+
 use super::*;
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -15,7 +17,7 @@ fn tile(id: u32) -> Tile {
 
 fn finished(id: u32, value: u8) -> FinishedTile {
     let counters = Counters { eye_rays: 10, drains: u64::from(value), ..Counters::ZERO };
-    FinishedTile::new(tile(id), vec![value; PIXEL_BYTES], false, counters).unwrap()
+    FinishedTile::new(tile(id), vec![value; PIXEL_BYTES], SumFormat::ONE, counters).unwrap()
 }
 
 /// Assigns the next tile to a card.
@@ -221,9 +223,9 @@ fn a_tile_that_has_taken_two_cards_waits_until_all_others_are_done() {
 #[test]
 fn kept_tiles_are_verified_by_one_card() {
     let window = crate::film::Window::full(2, 1);
-    let mut film = Film::new(2, 1, window).unwrap();
-    film.write(0, 0, crate::film::PixelValue::default()).unwrap();
-    film.write(1, 0, crate::film::PixelValue::default()).unwrap();
+    let mut film = Film::new(2, 1, window, SumFormat::ONE).unwrap();
+    film.write(0, 0, &crate::film::PixelSums::default()).unwrap();
+    film.write(1, 0, &crate::film::PixelSums::default()).unwrap();
     assert!(scheduler(2, 1).with_kept(&film).is_complete());
     for (values, end) in [([0, 0], None), ([1, 1], Some(SchedulerError::KeptDiffers { tile: tile(0) }))] {
         let mut scheduler = Scheduler::new(vec![tile(0)], 2).verifying(1.0, 0).with_kept(&film);

@@ -50,7 +50,7 @@ impl PixelLimits {
     }
 
     /// Format of the sums.
-    pub(super) fn format(&self) -> &SumFormat {
+    pub fn format(&self) -> &SumFormat {
         &self.format
     }
 

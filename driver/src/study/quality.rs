@@ -213,6 +213,7 @@ fn comparable(settings: &RenderSettings) -> RenderSettings {
             bins: None,
             queue: None,
             in_flight: None,
+            focus: None,
         },
         ..settings.clone()
     };

@@ -2,49 +2,52 @@
 
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::frame::{Frame, FrameReader, MAX_FRAME, MAX_PAYLOAD, write_frame};
-use photoncard_shared::message::{self, PIXEL_BYTES, Reply};
+use photoncard_shared::message::{self, ALBEDO_STEPS, NORMAL_STEPS, PIXEL_BYTES, PixelSums, Reply};
 
 use crate::line::Random;
 
 /// Falsification of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Lie {
-    /// An impossible value of one number in a pixel's record.
-    Impossible { number: usize, value: f32 },
-    /// Red multiplied by a factor.
+    /// An impossible sum in a pixel.
+    Impossible(fn(&mut PixelSums)),
+    /// Red increased by a factor.
     Brighter(f32),
 }
 
 impl Lie {
     /// Falsification that the pixel itself reveals.
     pub(crate) fn impossible(random: &mut Random) -> Self {
-        const LIES: [(usize, f32); 10] = [
-            (0, f32::NAN),
-            (1, f32::INFINITY),
-            (2, -1e-6),
-            (3, 1.000_001),
-            (4, -0.5),
-            (5, f32::NAN),
-            (6, 1.001),
-            (8, f32::NEG_INFINITY),
-            (9, f32::NAN),
-            (9, -1.0),
+        const LIES: [fn(&mut PixelSums); 9] = [
+            |sums| sums.light[1] = -1,
+            |sums| sums.light[2] = i64::MIN,
+            |sums| sums.albedo[0] = u32::MAX,
+            |sums| sums.albedo[2] = sums.surfaces * ALBEDO_STEPS + 1,
+            |sums| sums.normal[0] = i32::MIN,
+            |sums| sums.normal = [sums.surfaces as i32 * NORMAL_STEPS as i32 * 7 / 10; 3],
+            |sums| (sums.surfaces, sums.depth) = (0, 1),
+            |sums| sums.depth = i64::MIN,
+            |sums| sums.surfaces = u32::MAX,
         ];
-        let (number, value) = LIES[random.below(LIES.len())];
-        Self::Impossible { number, value }
+        Self::Impossible(LIES[random.below(LIES.len())])
     }
 
     fn apply(self, pixel: &mut [u8]) {
-        let word = |number: usize| 4 * number..4 * number + 4;
-        let (number, value) = match self {
-            Self::Impossible { number, value } => (number, value),
-            Self::Brighter(factor) => {
-                let red = f32::from_le_bytes(pixel[word(0)].try_into().unwrap());
-                // A factor would not change a black pixel.
-                (0, (red + 1e-3) * factor)
+        let mut sums = PixelSums::read(pixel).unwrap();
+        match self {
+            // Nothing is impossible about the normals of no surface.
+            Self::Impossible(lie) => {
+                lie(&mut sums);
+                sums.surfaces += u32::from(sums.surfaces == 0 && sums.depth == 0) * u32::MAX;
             }
-        };
-        pixel[word(number)].copy_from_slice(&value.to_le_bytes());
+            Self::Brighter(factor) => {
+                // A factor would not change a black pixel.
+                sums.light[0] = ((sums.light[0] as f64 + 1e9) * f64::from(factor)) as i64;
+            }
+        }
+        let mut bytes = Vec::new();
+        sums.write(&mut |part| bytes.extend_from_slice(part));
+        pixel.copy_from_slice(&bytes);
     }
 }
 

@@ -185,7 +185,7 @@ fn complete_alone(run: &Run, station: &mut Station, random: &mut Random) -> Vec<
         );
     }
     drop(dispatcher);
-    film.into_inner().unwrap().pixels().to_vec()
+    film.into_inner().unwrap().pixels().collect()
 }
 
 /// The card is reset while the host is busy with something else, before there is a job.

@@ -112,7 +112,7 @@ impl Run<'_> {
         let mut bytes = LinkBytes::default();
         stations.iter().for_each(|station| bytes.add(&station.session.link_bytes()));
         Outcome {
-            pixels: (end == End::Complete).then(|| film.pixels().to_vec()),
+            pixels: (end == End::Complete).then(|| film.pixels().collect()),
             end,
             tiles: ledger.0.lock().unwrap().clone(),
             counters: work(scheduler.counters()),

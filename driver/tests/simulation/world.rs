@@ -187,7 +187,7 @@ impl Fixture {
     }
 
     pub(crate) fn film(&self) -> Film {
-        self.settings.film().unwrap()
+        self.settings.film(self.limits.format().scale).unwrap()
     }
 
     /// Scheduler of the picture's tiles, a share of which is verified.

@@ -22,6 +22,11 @@ pub(crate) struct IntegratorOptions {
     /// Samples per pixel [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true)]
     spp: Option<u32>,
+    /// Samples per pixel of the finished picture, by which the irradiance cache divides the gather rays of a pixel [default: --spp]
+    ///
+    /// A picture that --resume goes on with has the number of its first render.
+    #[arg(long, value_name = "SPP", allow_negative_numbers = true, hide_short_help = true)]
+    planned_spp: Option<u32>,
     /// Sampling density of the directions of gather rays; it never changes the picture's expected value
     #[arg(long, default_value = Integrator::default().sampling.name(), value_parser = choice::<Sampling>(), hide_short_help = true)]
     pub(super) sampling: Sampling,
@@ -44,6 +49,7 @@ impl IntegratorOptions {
         Integrator {
             seed: self.seed,
             samples: self.spp.unwrap_or(base.samples),
+            planned_samples: self.planned_spp,
             gather_rays,
             shadow_rays: self.shadow_rays.unwrap_or(base.shadow_rays),
             sampling: self.sampling,
@@ -67,11 +73,13 @@ impl IntegratorOptions {
     }
 
     /// For each option, whether it has no effect, its name, and the reason.
-    pub(super) fn without_effect(&self, base: &Integrator) -> [(bool, &'static str, String); 2] {
+    pub(super) fn without_effect(&self, base: &Integrator) -> [(bool, &'static str, String); 3] {
         let is_cached = self.is_cached(base);
         let has_no_rays = self.gather_rays == Some(0);
+        let not_cached = "without --irradiance-cache on".to_owned();
         [
-            (self.ic_error.is_some() && !is_cached, "--ic-error", "without --irradiance-cache on".to_owned()),
+            (self.planned_spp.is_some() && !is_cached, "--planned-spp", not_cached.clone()),
+            (self.ic_error.is_some() && !is_cached, "--ic-error", not_cached),
             (
                 self.irradiance_cache == Some(true) && has_no_rays,
                 "--irradiance-cache on",

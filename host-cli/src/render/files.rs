@@ -51,7 +51,7 @@ fn write_picture(
         }
         PictureFormat::Png => {
             let size = [film.window().width(), film.window().height()];
-            let radiance = film.pixels().iter().map(|pixel| pixel.radiance);
+            let radiance = film.pixels().map(|pixel| pixel.radiance);
             write_png(path, size, radiance, options.outputs.tone.mapping(), Some(provenance))
                 .map_err(|error| Failure::work_error(&error))
         }

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use photoncard_driver::dispatcher::Dispatcher;
-use photoncard_driver::film::{Film, PixelValue, Window};
+use photoncard_driver::film::{Film, PixelValue, SumFormat, Window};
 use photoncard_driver::scheduler::Scheduler;
 use photoncard_driver::session::{Job, PixelLimits, Session, SessionError, Upload};
 use photoncard_firmware::kind::MICRO;
@@ -200,8 +200,8 @@ impl Target for Sessions {
     fn read(&self, mut input: &[u8]) -> bool {
         let tiles = [0, 1].map(|id| Tile { id, x: SIDE * id, y: 0, width: SIDE, height: SIDE });
         let layers = input.split_off_first().is_some_and(|first| first & 1 != 0);
-        let new = if layers { Film::with_layers } else { Film::new };
-        let film = new(2 * SIDE, SIDE, Window::full(2 * SIDE, SIDE)).expect("a small film");
+        let format = SumFormat { layers, ..SumFormat::ONE };
+        let film = Film::new(2 * SIDE, SIDE, Window::full(2 * SIDE, SIDE), format).expect("a small film");
         let film = Mutex::new(film);
         let mut ends = Ends {
             session: Session::new(1, Duration::ZERO),
@@ -241,8 +241,8 @@ impl Target for Sessions {
         let film = film.lock().expect("no thread has panicked");
         assert!(!is_complete || film.is_complete(), "a tile is done without its pixels");
         let is_finite =
-            |pixel: &PixelValue| pixel.radiance.iter().all(|value| value.is_finite() && *value >= 0.0);
-        assert!(film.pixels().iter().all(is_finite), "an impossible value has come into the film");
+            |pixel: PixelValue| pixel.radiance.iter().all(|value| value.is_finite() && *value >= 0.0);
+        assert!(film.pixels().all(is_finite), "an impossible value has come into the film");
         drop(film);
         let ended = (0..MAX_STEPS).any(|_| ends.step(true).is_err());
         assert!(ended || is_complete, "a silent card is waited for without end");

@@ -170,7 +170,7 @@ fn a_bumpy_plate_leaks_no_light_from_behind() {
             .map(|behind| directional(behind.normalize(), 3.0))
             .to_vec();
         let dark = film(&scene, &settings(16, 1));
-        assert!(dark.pixels().iter().all(|pixel| pixel.radiance == [0.0; 3]));
+        assert!(dark.pixels().all(|pixel| pixel.radiance == [0.0; 3]));
     }
 }
 
@@ -402,7 +402,7 @@ fn glossy_bumpy_balls_have_neither_black_nor_bright_fringes() {
                 s.picture.height = 32;
             });
             let film = film(&scene, &settings);
-            let ball: Vec<f32> = film.pixels().iter().map(|pixel| pixel.radiance[0]).collect();
+            let ball: Vec<f32> = film.pixels().map(|pixel| pixel.radiance[0]).collect();
             let least = ball.iter().copied().fold(f32::INFINITY, f32::min);
             let most = ball.iter().copied().fold(0.0, f32::max);
             let mean = ball.iter().sum::<f32>() / ball.len() as f32;

@@ -190,7 +190,8 @@ impl Simulation {
     /// Handles the arrival of a result. The scheduler's clock matters only for lost or late cards, of which there are none
     /// here.
     fn receive(&mut self, chip: usize, id: u32) {
-        let finished = FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);
+        let finished =
+            FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);
         if let Some(tile) = finished {
             self.scheduler.answer(chip, tile, Duration::ZERO);
             self.scheduler.complete(id);
