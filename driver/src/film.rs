@@ -17,7 +17,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use photoncard_shared::message::Tile;
-pub use photoncard_shared::message::{Pixel as PixelValue, PixelLayers, PixelSums, SumScale};
+pub use photoncard_shared::message::{LayerSums, Pixel as PixelValue, PixelLayers, PixelSums, SumScale};
 use thiserror::Error;
 
 use crate::sink::{FinishedTile, TileSink, pixel_positions};

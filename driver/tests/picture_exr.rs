@@ -58,8 +58,8 @@ fn radiance_is_read_back_to_the_format_s_precision() {
         let image = read_rgb(&path).unwrap();
         assert_eq!((image.width, image.height, image.data_window_origin), (17, 40, [3, 5]));
         for (index, pixel) in image.pixels.iter().enumerate() {
-            let pixel = film().pixel(3 + index as u32 % 17, 5 + index as u32 / 17).unwrap();
-            let expected = pixel.radiance;
+            let written = film().pixel(3 + index as u32 % 17, 5 + index as u32 / 17).unwrap();
+            let expected = written.radiance;
             for (read, expected) in pixel.iter().zip(expected) {
                 assert!((read - expected).abs() <= precision * expected, "{format:?}: {read} {expected}");
             }

@@ -10,6 +10,7 @@ mod outputs;
 mod photons;
 mod picture;
 mod render;
+mod samples;
 mod scene;
 mod schedule;
 mod study;

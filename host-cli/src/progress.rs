@@ -112,7 +112,9 @@ impl Observer for Progress {
 
 impl Display {
     fn show(&mut self, phase: Phase, done: u64, total: u64) {
-        if self.phase.is_none_or(|shown| (shown as u8) < phase as u8) {
+        // A picture by passes has its tiles again; without a terminal the first pass alone is told.
+        let is_next_pass = phase == Phase::Tiles && done == 0 && self.bar.position() > 0 && self.on_terminal;
+        if self.phase.is_none_or(|shown| (shown as u8) < phase as u8) || is_next_pass {
             self.begin(phase, total);
         }
         // A card that is still loading reports it while another one renders already.

@@ -9,8 +9,10 @@ use std::time::Instant;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::quality::{Fit, Stated};
-use photoncard_driver::render::{CardAddress, Integrator, PhotonMaps, RenderSettings, render_chosen};
-use photoncard_driver::scene::Scene;
+use photoncard_driver::render::{
+    CardAddress, Integrator, Passes, PhotonMaps, RenderError, RenderSettings, Renderer, render_chosen,
+};
+use photoncard_driver::scene::{FixedScene, Scene};
 use serde_json::json;
 
 use crate::arguments::RenderOptions;
@@ -38,9 +40,17 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
         };
         Ok(chosen(options, &settings, found.get_or_init(|| fit).as_ref(), &progress))
     };
-    let result = on_threads(options.threads, || render_chosen(&scene, &settings, &choose, &progress))?;
+    let result = on_threads(options.threads, || {
+        let Some(aim) = options.samples.aim() else {
+            return Ok((render_chosen(&scene, &settings, &choose, &progress)?, None));
+        };
+        let scene = FixedScene::from(&scene);
+        let passes = Renderer::default().render_until(&scene, &settings, &choose, aim, &progress)?;
+        let Passes { rendering, noise, count, ended_by } = passes;
+        Ok((rendering, Some(messages::End { noise, passes: count, ended_by })))
+    })?;
     progress.finish();
-    let mut rendering = result.inspect_err(|error| {
+    let (mut rendering, end) = result.inspect_err(|error: &RenderError| {
         if !error.is_input() && progress.has_kept() {
             let path = options.outputs.partial_path();
             say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
@@ -55,13 +65,21 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let pilot = found.into_inner().flatten().map(|fit| fit.measured);
     provenance.work.insert("pilot".to_owned(), json!(pilot));
     files::write(options, &rendering)?;
-    if let Some(partial) = rendering.partial.take() {
+    if let Some(partial) = rendering.partial.take().filter(|_| !options.samples.keep_samples) {
         partial.remove().map_err(Failure::work)?;
     }
     if !options.quiet {
         messages::say_done(options, &rendering);
     }
-    Ok(())
+    let Some(end) = end else { return Ok(()) };
+    if !options.quiet {
+        messages::say_end(&end);
+    }
+    match end.ended_by {
+        // The picture that was asked for until then is written.
+        None | Some(RenderError::Stopped) => Ok(()),
+        Some(error) => Err(error.into()),
+    }
 }
 
 /// Photons and integrator of the options, with what the quality has found for this scene where nothing is stated.

@@ -137,6 +137,7 @@ fn numbers_out_of_range() {
         ("--neighbors", "257", ["2 to 256", "256 or less"]),
         ("--spp", "0", ["1 to 4096", "choose 1 or more"]),
         ("--spp", "4294967295", ["1 to 4096", "4096 or less"]),
+        ("--planned-spp", "0", ["1 to 4096", "choose 1 or more"]),
         ("--gather-rays", "4294967295", ["0 to", "or less"]),
         ("--max-distance", "-1", ["positive number", "auto"]),
         ("--max-distance", "nan", ["positive number", "auto"]),

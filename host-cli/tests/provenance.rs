@@ -40,7 +40,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
 }
 
 /// Options that no pixel depends on.
-const OTHERS: [&[&str]; 20] = [
+const OTHERS: [&[&str]; 22] = [
     &["--photon-map", "jensen"],
     &["--tile", "3"],
     &["--order", "naive"],
@@ -51,6 +51,9 @@ const OTHERS: [&[&str]; 20] = [
     &["--verify", "0.5", "--card", "emulated:2"],
     &["--faults", "flips=1e-6"],
     &["--resume"],
+    &["--keep-samples"],
+    // Without the irradiance cache.
+    &["--planned-spp", "7"],
     &["--counters"],
     &["--cache", "unified=8K/128/2"],
     &["--trace", "a.din.gz", "--card", "emulated:1"],
@@ -68,6 +71,9 @@ const OF_THE_FILE: [&str; 4] = ["--output", "--sample-type", "--quiet", "--help"
 
 /// Option that pixels depend on, and that no shipped scene takes.
 const OF_SCENES_WITH_VARIANTS: &str = "--variant";
+
+/// Options that state the number of samples by an aim.
+const OF_SAMPLES: [&str; 2] = ["--noise", "--time"];
 
 /// Provenance in an EXR file: the text of the attribute `photoncard`.
 fn provenance(file: &[u8]) -> Value {
@@ -226,6 +232,7 @@ fn every_option_is_known_to_change_pixels_or_not_to() {
     let offered: BTreeSet<_> = options.collect();
     let of_pixels = options_of_pixels();
     let known = of_pixels.iter().map(|(options, ..)| options[0]).chain(OTHERS.map(|options| options[0]));
-    let known: BTreeSet<_> = known.chain(OF_THE_FILE).chain([OF_SCENES_WITH_VARIANTS]).collect();
+    let known: BTreeSet<_> =
+        known.chain(OF_THE_FILE).chain(OF_SAMPLES).chain([OF_SCENES_WITH_VARIANTS]).collect();
     assert_eq!(offered, known);
 }

@@ -12,7 +12,7 @@ use support::{Emulator, Room, shipped};
 /// A picture of 64 tiles that takes a second or two.
 const PICTURE: [&str; 6] = ["--size", "128x128", "--photons", "2000", "--gather-rays", "50"];
 /// Size of a tile in the file of finished tiles, bytes.
-const TILE_BYTES: u64 = 8 + 16 + 40 * 256 + 4;
+const TILE_BYTES: u64 = 8 + 24 + 60 * 256 + 4;
 /// Time limit of every wait.
 const PATIENCE: Duration = Duration::from_secs(120);
 

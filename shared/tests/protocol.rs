@@ -241,7 +241,7 @@ fn the_page_is_of_this_version() {
 /// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
 #[test]
 fn golden_structures() {
-    assert_eq!(PROTOCOL_VERSION, 12);
+    assert_eq!(PROTOCOL_VERSION, 13);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,
@@ -275,9 +275,9 @@ fn golden_structures() {
         height: 2,
         camera,
         seed: 3,
-        first_sample: 0,
+        first_sample: 10,
         samples: 4,
-        planned_samples: 4,
+        planned_samples: 11,
         gather_rays: 5,
         shadow_rays: 6,
         neighbors: 7,
@@ -298,7 +298,7 @@ fn golden_structures() {
     let bytes = [
         &[5, 1, 2][..],
         &camera,
-        &[3, 4, 5, 6, 7],
+        &[3, 10, 4, 11, 5, 6, 7],
         &one,
         &[2, 1],
         &one,

@@ -91,6 +91,8 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
         integrator: Integrator {
             seed: Image = 1,
             samples: Pixels = 2,
+            // There is no irradiance cache.
+            planned_samples: Nothing = Some(5),
             gather_rays: Pixels = 9,
             shadow_rays: Pixels = 3,
             sampling: Pixels = Sampling::Reflection,

@@ -338,7 +338,7 @@ fn another_version_is_told_and_begun_anew_without_resume() {
     let begun = begin_render(&partial(&folder, false), json!({}), film).unwrap();
     begun.put(&blank(&tile(0)));
     begun.check().unwrap();
-    assert!(fs::read(&path).unwrap().starts_with(b"photoncard partial render 2\n{}\n\x89TILE"));
+    assert!(fs::read(&path).unwrap().starts_with(b"photoncard partial render 3\n{}\n\x89TILE"));
 }
 
 /// Links lead to others' files, and a pipe would block: neither is opened.

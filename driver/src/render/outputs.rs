@@ -36,7 +36,11 @@ impl<'a> Outputs<'a> {
     ) -> Result<Self, PartialError> {
         let begin = |partial| {
             let mut identity = settings.identity_of(scene);
+            // The file is of any number of samples, and states those that rays are divided among.
             identity.remove("spp");
+            if settings.integrator.irradiance_error.is_some() {
+                identity.insert("planned-spp".to_owned(), settings.integrator.planned().into());
+            }
             PartialRender::begin(partial, identity.into(), film)
         };
         let begun = settings.outputs.partial.as_ref().map(begin).transpose()?;

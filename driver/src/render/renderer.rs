@@ -110,7 +110,21 @@ impl Renderer {
         choose: &dyn Fn(&PackedScene) -> Chosen,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(&scene.into(), settings, Some(choose), None, observer)
+        self.render_chosen_fixed(&scene.into(), settings, choose, observer)
+    }
+
+    /// [`Self::render_chosen`] of a scene that stays as it is between pictures.
+    ///
+    /// # Errors
+    /// As [`Self::render_chosen`].
+    pub fn render_chosen_fixed(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        choose: &dyn Fn(&PackedScene) -> Chosen,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_by(scene, settings, Some(choose), None, observer)
     }
 
     fn render_by(

@@ -7,7 +7,7 @@ use photoncard_shared::message::{self, ALBEDO_STEPS, NORMAL_STEPS, PIXEL_BYTES, 
 use crate::line::Random;
 
 /// Falsification of a pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Lie {
     /// An impossible sum in a pixel.
     Impossible(fn(&mut PixelSums)),

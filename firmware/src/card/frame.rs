@@ -15,13 +15,13 @@ pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParamet
     let is_length = |distance: f32| distance.is_finite() && distance > 0.0;
     let neighbors = |count: u32| count >= 2 && within(count, budget.neighbors);
     let last_sample = frame.first_sample.saturating_add(frame.samples);
-    let samples =
-        frame.samples > 0 && [last_sample, frame.planned_samples].iter().all(|&n| within(n, budget.samples));
     let checks = [
         (Parameter::Width, within(frame.width, MAX_PICTURE_SIDE)),
         (Parameter::Height, within(frame.height, MAX_PICTURE_SIDE)),
         (Parameter::Camera, camera.as_flattened().iter().all(|component| component.is_finite())),
-        (Parameter::Samples, samples),
+        (Parameter::FirstSample, frame.first_sample < budget.samples),
+        (Parameter::Samples, frame.samples > 0 && last_sample <= budget.samples),
+        (Parameter::PlannedSamples, within(frame.planned_samples, budget.samples)),
         (Parameter::GatherRays, frame.gather_rays <= budget.gather_rays),
         (Parameter::ShadowRays, frame.shadow_rays <= budget.shadow_rays),
         (Parameter::Neighbors, neighbors(frame.neighbors)),

@@ -6,7 +6,6 @@ use clap::Args;
 use photoncard_driver::display::{DisplayAddress, DisplaySettings};
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::partial::PartialSettings;
-use photoncard_driver::render::TileOutputs;
 
 use super::choice::choice;
 use super::files::{PictureFormat, PictureOutput, TextOutput, picture, text};
@@ -39,12 +38,9 @@ pub(crate) struct OutputOptions {
 }
 
 impl OutputOptions {
-    /// Settings of these options.
-    pub(super) fn settings(&self) -> TileOutputs {
-        TileOutputs {
-            partial: Some(PartialSettings { path: self.partial_path(), resume: self.resume }),
-            display: self.display(),
-        }
+    /// File of finished tiles.
+    pub(super) fn partial(&self) -> Option<PartialSettings> {
+        Some(PartialSettings { path: self.partial_path(), resume: self.resume })
     }
 
     /// Path of the file in which finished tiles are kept until the picture is written.
@@ -71,7 +67,7 @@ impl OutputOptions {
     }
 
     /// Display server, and the picture's name on it: that of its file.
-    fn display(&self) -> Option<DisplaySettings> {
+    pub(super) fn display(&self) -> Option<DisplaySettings> {
         let address = self.display_server.clone()?;
         let path = self.main_path();
         let image = path.file_name().unwrap_or(path.as_os_str());

@@ -3,7 +3,7 @@
 use clap::Args;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::{Quality, Stated};
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{RenderSettings, TileOutputs};
 
 use super::cards::CardOptions;
 use super::choice::choice;
@@ -11,6 +11,7 @@ use super::integrator::IntegratorOptions;
 use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
+use super::samples::SampleOptions;
 use super::scene::SceneOptions;
 use super::schedule::ScheduleOptions;
 use super::threads::threads;
@@ -28,6 +29,8 @@ pub(crate) struct RenderOptions {
     pub(super) photons: PhotonOptions,
     #[command(flatten)]
     pub(super) integrator: IntegratorOptions,
+    #[command(flatten)]
+    pub(crate) samples: SampleOptions,
     #[command(flatten)]
     pub(super) schedule: ScheduleOptions,
     #[command(flatten)]
@@ -52,13 +55,18 @@ impl RenderOptions {
     pub(crate) fn settings(&self) -> RenderSettings {
         let cards = self.cards.settings();
         let base = self.quality.settings();
+        let outputs = TileOutputs {
+            // Finished passes are no tiles that a render could go on with.
+            partial: self.outputs.partial().filter(|_| self.samples.aim().is_none()),
+            display: self.outputs.display(),
+        };
         RenderSettings {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),
             integrator: self.integrator.settings(&base.integrator),
             schedule: self.schedule.settings(),
             cards,
-            outputs: self.outputs.settings(),
+            outputs,
         }
     }
 }

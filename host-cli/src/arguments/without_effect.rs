@@ -62,11 +62,13 @@ impl RenderOptions {
     }
 
     /// Options on the order of the work that the order does not have.
-    fn of_order(&self) -> [(bool, &'static str, String); 3] {
+    fn of_order(&self) -> [(bool, &'static str, String); 4] {
         let order = self.schedule.order;
         let no_bins = format!("with --order {}, which has no direction bins", order.name());
         let no_queue = format!("with --order {}, by which no gathers wait on a chip", order.name());
+        let at_once = format!("with --order {}, whose tiles are finished together", order.name());
         [
+            (self.samples.keep_samples && order.is_of_whole_frame(), "--keep-samples", at_once),
             (self.schedule.bins.is_some() && !order.has_bins(), "--bins", no_bins),
             (self.schedule.queue.is_some() && !order.has_queue(), "--queue", no_queue.clone()),
             (self.schedule.in_flight.is_some() && !order.has_queue(), "--in-flight", no_queue),

@@ -5,7 +5,7 @@ use std::path::Path;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{
-    MemoryStatistics, Picture, ReadStatistics, RenderSettings, Rendering, Statistics, Times,
+    MemoryStatistics, Picture, ReadStatistics, RenderError, RenderSettings, Rendering, Statistics, Times,
 };
 use photoncard_driver::scene::{Camera, Scene};
 
@@ -101,6 +101,27 @@ pub(super) fn say_done(options: &RenderOptions, rendering: &Rendering) {
     let pictures = options.outputs.pictures.iter().map(|picture| picture.path.display().to_string());
     let pictures = pictures.collect::<Vec<_>>().join(", ");
     say(format_args!("photoncard: {pictures}: {}", summary(statistics, rendering.film.pixels().len())));
+}
+
+/// End of a picture by passes.
+pub(super) struct End {
+    pub(super) noise: Option<f64>,
+    pub(super) passes: u32,
+    pub(super) ended_by: Option<RenderError>,
+}
+
+/// Prints the end of a picture by passes.
+pub(super) fn say_end(end: &End) {
+    let passes = if end.passes == 1 { "1 pass".to_owned() } else { format!("{} passes", end.passes) };
+    let noise = end.noise.map_or("noise is known after two passes".to_owned(), |noise| {
+        format!("estimated noise {:.2} % of the mean", 100.0 * noise)
+    });
+    let ended = if end.ended_by.is_some() {
+        "; ended before the aim: the picture has the samples of complete passes"
+    } else {
+        ""
+    };
+    say(format_args!("photoncard: {passes}, {noise}{ended}"));
 }
 
 /// Time, samples, and what the picture was limited by as far as the statistics know.

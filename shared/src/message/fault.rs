@@ -59,8 +59,12 @@ pub enum Parameter {
     Camera,
     /// Seed of the random numbers.
     Seed,
+    /// Number of the first sample of a pixel.
+    FirstSample,
     /// Samples a pixel.
     Samples,
+    /// Samples a pixel of the whole picture.
+    PlannedSamples,
     /// Final gather rays a sample.
     GatherRays,
     /// Shadow rays a sample.
@@ -93,12 +97,14 @@ pub enum Parameter {
 
 impl Parameter {
     /// All parameters, in the order of their numbers.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 21] = [
         Self::Width,
         Self::Height,
         Self::Camera,
         Self::Seed,
+        Self::FirstSample,
         Self::Samples,
+        Self::PlannedSamples,
         Self::GatherRays,
         Self::ShadowRays,
         Self::Neighbors,
@@ -127,7 +133,9 @@ impl Parameter {
             Self::Height => "height",
             Self::Camera => "camera",
             Self::Seed => "seed",
+            Self::FirstSample => "first sample of a pixel",
             Self::Samples => "samples a pixel",
+            Self::PlannedSamples => "planned samples a pixel",
             Self::GatherRays => "gather rays a sample",
             Self::ShadowRays => "shadow rays a sample",
             Self::Neighbors => "neighbors of a gather",

@@ -41,7 +41,7 @@ impl RenderSettings {
             irradiance_error,
         } = integrator;
         let window = self.window();
-        named([
+        let mut settings = named([
             ("size", json!([width, height])),
             ("crop", json!([window.x0, window.x1, window.y0, window.y1])),
             ("camera", json!(camera)),
@@ -58,12 +58,16 @@ impl RenderSettings {
             ("radiance", json!(radiance.name())),
             ("seed", json!(seed)),
             ("spp", json!(samples)),
-            ("planned-spp", json!(irradiance_error.map(|_| integrator.planned()))),
             ("gather-rays", json!(gather_rays)),
             ("shadow-rays", json!(shadow_rays)),
             ("sampling", json!(sampling.name())),
             ("ic-error", json!(irradiance_error)),
-        ])
+        ]);
+        // Rays are divided among the planned samples with the irradiance cache alone.
+        if irradiance_error.is_some() && integrator.planned() != *samples {
+            settings.insert("planned-spp".to_owned(), json!(integrator.planned()));
+        }
+        settings
     }
 
     /// Every setting that a chip's work and memory traffic depend on besides the kind of chip and its caches, and no pixel.

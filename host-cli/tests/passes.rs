@@ -1,0 +1,109 @@
+//! Pictures by passes: `--time`, `--noise`, and more samples of a finished picture.
+#![cfg(unix)]
+
+mod support;
+
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+
+use support::{Outcome, Room, shipped};
+
+/// Options without which a pilot would choose samples and rays.
+const STATED: [&str; 10] = [
+    "--size",
+    "24x20",
+    "--photons",
+    "2000",
+    "--gather-rays",
+    "4",
+    "--shadow-rays",
+    "1",
+    "--irradiance-cache",
+    "off",
+];
+
+fn render(room: &Room, picture: &str, options: &[&str]) -> Outcome {
+    room.run(&[&["render", &shipped("cornell.gltf"), "-o", picture][..], &STATED, options].concat())
+}
+
+fn render_or_panic(room: &Room, picture: &str, options: &[&str]) -> Outcome {
+    let outcome = render(room, picture, options);
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    outcome
+}
+
+/// Number of samples a pixel that a render reports.
+fn samples(outcome: &Outcome) -> String {
+    let (before, _) = outcome.stderr.split_once(" samples a pixel").expect("the number of samples");
+    before.rsplit(' ').next().unwrap().to_owned()
+}
+
+#[test]
+fn a_picture_of_a_stated_noise_or_time_is_the_render_of_its_samples() {
+    let room = Room::new();
+    for (options, said) in [(["--noise", "0.2"], "estimated noise"), (["--time", "0.3s"], "pass")] {
+        let outcome = render_or_panic(&room, "passes.exr", &options);
+        assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
+        render_or_panic(&room, "once.exr", &["--spp", &samples(&outcome)]);
+        assert!(room.read("passes.exr") == room.read("once.exr"), "{options:?}");
+        assert_eq!(room.names(), ["once.exr", "passes.exr"]);
+    }
+}
+
+#[test]
+fn kept_samples_are_added_to_and_the_picture_is_that_of_one_render() {
+    let room = Room::new();
+    render_or_panic(&room, "a.exr", &["--spp", "3", "--keep-samples"]);
+    assert_eq!(room.names(), ["a.exr", "a.exr.partial"]);
+    let kept = room.read("a.exr.partial");
+    render_or_panic(&room, "a.exr", &["--spp", "5", "--resume"]);
+    assert_eq!(room.names(), ["a.exr"]);
+    render_or_panic(&room, "once.exr", &["--spp", "5"]);
+    assert!(room.read("a.exr") == room.read("once.exr"));
+    // Fewer samples than are kept, and other settings.
+    room.write("a.exr.partial", &kept);
+    for (options, word) in [(["--spp", "2"], "spp was 3"), (["--seed", "9"], "seed was 0 and is 9")] {
+        let outcome = render(&room, "a.exr", &[&["--resume"], &options[..]].concat());
+        assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains(word), "{}", outcome.stderr);
+    }
+    assert!(room.read("a.exr.partial") == kept);
+}
+
+#[test]
+fn an_interrupt_writes_the_picture_of_the_complete_passes() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    let mut command = room.command();
+    command.args(["render", &cornell, "-o", "a.exr", "--noise", "0.000001"]).args(STATED);
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    // The first pass is over.
+    assert!(lines.any(|line| line.starts_with("photoncard: tiles ")));
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let rest: Vec<String> = lines.collect();
+    assert_eq!(child.wait().unwrap().code(), Some(0), "{rest:?}");
+    assert!(rest.last().is_some_and(|line| line.contains("ended before the aim")), "{rest:?}");
+    let outcome = Outcome { status: Some(0), stdout: String::new(), stderr: rest.join("\n") };
+    render_or_panic(&room, "once.exr", &["--spp", &samples(&outcome)]);
+    assert!(room.read("a.exr") == room.read("once.exr"));
+}
+
+#[test]
+fn aims_that_are_none_and_options_that_passes_lack_are_refused() {
+    let room = Room::new();
+    for (options, word) in [
+        (&["--time", "0"][..], "a time is a number of seconds"),
+        (&["--noise", "0"], "noise is a share"),
+        (&["--noise", "0.1", "--spp", "4"], "cannot be used with"),
+        (&["--time", "1s", "--resume"], "cannot be used with"),
+        (&["--time", "1s", "--trace", "a.gz"], "cannot be used with"),
+        (&["--noise", "0.1", "--keep-samples"], "cannot be used with"),
+    ] {
+        let outcome = render(&room, "a.exr", options);
+        assert_eq!(outcome.status, Some(2), "{options:?}: {}", outcome.stderr);
+        assert!(outcome.stderr.contains(word), "{options:?}: {}", outcome.stderr);
+        assert!(room.names().is_empty());
+    }
+}

@@ -1,0 +1,195 @@
+//! Passes: the samples of a picture rendered in any division, each pass on other cards and in another order, are to the bit those of one
+//! render.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use photoncard_driver::layer::Layers;
+use photoncard_driver::partial::PartialSettings;
+use photoncard_driver::render::{Aim, CardAddress, RenderSettings, Renderer, Rendering, Unobserved};
+use photoncard_driver::scene::FixedScene;
+use photoncard_driver::scheduler::GatherOrder;
+use photoncard_shared::message::Radiance;
+use photoncard_tests::everything::everything;
+use photoncard_tests::render_or_panic;
+use proptest::prelude::*;
+
+fn settings() -> RenderSettings {
+    RenderSettings::default().with(|s| {
+        (s.picture.width, s.picture.height) = (15, 12);
+        s.photons.count = 2000;
+        s.photons.neighbors = 20;
+        s.photons.caustic_photons = Some(500);
+        s.photons.caustic_neighbors = 20;
+        s.integrator.gather_rays = 4;
+        s.integrator.shadow_rays = 2;
+        s.schedule.tile = Some(8);
+    })
+}
+
+fn cards(text: &str) -> Vec<CardAddress> {
+    text.split('+').map(|card| card.parse().expect("a card")).collect()
+}
+
+/// Renders up to `samples` samples, by adding to a picture if there is one.
+fn pass(
+    renderer: &mut Renderer,
+    scene: &FixedScene,
+    settings: &RenderSettings,
+    (samples, before): (u32, Option<Rendering>),
+) -> Rendering {
+    let settings = settings.clone().with(|s| s.integrator.samples = samples);
+    let result = match before {
+        Some(Rendering { film, .. }) => renderer.refine(scene, &settings, Arc::new(film), &Unobserved),
+        None => renderer.render_fixed(scene, &settings, &Unobserved),
+    };
+    let Ok(rendering) = result else { panic!("{}", result.err().unwrap()) };
+    rendering
+}
+
+fn technique() -> impl Strategy<Value = RenderSettings> {
+    let radiance = prop_oneof![Just(Radiance::Density), Just(Radiance::Precomputed)];
+    (any::<bool>(), any::<bool>(), radiance).prop_map(|(is_cached, has_layers, radiance)| {
+        settings().with(|s| {
+            s.integrator.irradiance_error = is_cached.then_some(0.1);
+            s.integrator.planned_samples = Some(3);
+            s.photons.radiance = radiance;
+            s.picture.layers = if has_layers { Layers::all() } else { Layers::default() };
+        })
+    })
+}
+
+/// Number of samples, order of gathers and cards of a pass.
+fn passes() -> impl Strategy<Value = Vec<(u32, GatherOrder, &'static str)>> {
+    use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
+    let order = prop::sample::select(vec![Naive, Tiled, DirectionBins, Hash, Sort]);
+    let cards = prop::sample::select(vec![
+        "emulated:1",
+        "emulated:2",
+        "emulated-micro:2",
+        "emulated:1+emulated-micro:1",
+    ]);
+    prop::collection::vec((1..4_u32, order, cards), 1..4)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn passes_of_any_division_are_one_render(technique in technique(), passes in passes()) {
+        let scene = FixedScene::from(&everything());
+        let mut renderer = Renderer::default();
+        let mut picture = None;
+        let mut samples = 0;
+        for &(more, order, on) in &passes {
+            samples += more;
+            let settings = technique.clone().with(|s| {
+                s.schedule.order = order;
+                s.cards.addresses = cards(on);
+            });
+            picture = Some(pass(&mut renderer, &scene, &settings, (samples, picture)));
+        }
+        let at_once = technique.with(|s| s.integrator.samples = samples);
+        let expected = render_or_panic(&everything(), &at_once).film;
+        let found = picture.expect("a pass").film;
+        prop_assert_eq!(found.format(), expected.format());
+        prop_assert!(found.sums().eq(expected.sums()), "{:?}", passes);
+    }
+}
+
+#[test]
+fn gathers_of_a_whole_frame_are_of_the_pass() {
+    let scene = FixedScene::from(&everything());
+    let along_curve = settings().with(|s| s.schedule.order = GatherOrder::Hilbert);
+    let mut renderer = Renderer::default();
+    let first = pass(&mut renderer, &scene, &settings(), (2, None));
+    let all = pass(&mut renderer, &scene, &along_curve, (3, Some(first)));
+    let expected = render_or_panic(&everything(), &settings().with(|s| s.integrator.samples = 3)).film;
+    assert!(all.film.sums().eq(expected.sums()));
+}
+
+#[test]
+fn a_picture_with_kept_samples_goes_on_to_more_even_after_a_stop() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.exr.partial");
+    let with = |samples: u32, resume: bool| {
+        settings().with(|s| {
+            s.integrator.samples = samples;
+            s.outputs.partial = Some(PartialSettings { path: path.clone(), resume });
+        })
+    };
+    let scene = everything();
+    let expected =
+        |samples| render_or_panic(&scene, &settings().with(|s| s.integrator.samples = samples)).film;
+    // The file stays, as the pictures' partial renders are not removed.
+    drop(render_or_panic(&scene, &with(2, false)));
+    let bytes = std::fs::read(&path).expect("kept");
+    let more = render_or_panic(&scene, &with(5, true));
+    assert!(more.film.sums().eq(expected(5).sums()));
+    assert_eq!(more.statistics.rays.eye, 3 * 15 * 12, "two samples are taken over");
+    drop(more);
+    // A render that ended within the first record of the further samples, and one that has all of them.
+    let all = std::fs::read(&path).expect("kept");
+    for length in [bytes.len() + 9, all.len()] {
+        std::fs::write(&path, &all[..length]).expect("written");
+        let again = render_or_panic(&scene, &with(5, true));
+        assert!(again.film.sums().eq(expected(5).sums()));
+        assert_eq!(again.statistics.samples, 5);
+    }
+    // A picture of more goes on from both.
+    assert!(render_or_panic(&scene, &with(6, true)).film.sums().eq(expected(6).sums()));
+    // Fewer samples, or an unfinished number of other samples, are another picture.
+    std::fs::write(&path, &bytes[..bytes.len() - 1]).expect("written");
+    for samples in [1, 3] {
+        let error = photoncard_driver::render::render(&scene, &with(samples, true), &Unobserved).err();
+        let said = error.expect("another picture").to_string();
+        assert!(said.contains("spp was 2") && said.contains(&format!("is {samples}")), "{said}");
+    }
+}
+
+#[test]
+fn a_picture_is_refined_by_more_of_its_own_samples_alone() {
+    let scene = FixedScene::from(&everything());
+    let mut renderer = Renderer::default();
+    let two = settings().with(|s| s.integrator.samples = 2);
+    let film = Arc::new(pass(&mut renderer, &scene, &two, (2, None)).film);
+    for (changed, reason) in [
+        (two.clone(), "2 samples a pixel is no part of a picture of 2"),
+        (two.clone().with(|s| (s.integrator.samples, s.picture.width) = (3, 16)), "another window"),
+        (two.with(|s| (s.integrator.samples, s.picture.layers) = (3, Layers::all())), "other layers"),
+    ] {
+        let error = renderer.refine(&scene, &changed, film.clone(), &Unobserved).err().expect("refused");
+        assert!(error.is_input() && error.to_string().contains(reason), "{error}");
+    }
+}
+
+#[test]
+fn passes_until_an_aim_are_the_render_of_their_samples() {
+    let scene = FixedScene::from(&everything());
+    for (aim, is_cached) in [
+        (Aim { noise: Some(0.2), time: None }, false),
+        (Aim { noise: None, time: Some(Duration::from_millis(1)) }, true),
+        (Aim { noise: Some(1e-6), time: Some(Duration::from_millis(600)) }, false),
+    ] {
+        let settings = settings().with(|s| {
+            s.integrator.irradiance_error = is_cached.then_some(0.1);
+            s.integrator.samples = 4;
+        });
+        let choose = |_: &_| Ok((settings.photons.clone(), settings.integrator.clone()));
+        let passes = Renderer::default().render_until(&scene, &settings, &choose, aim, &Unobserved);
+        let Ok(passes) = passes else { panic!("no passes") };
+        assert!(passes.ended_by.is_none());
+        let samples = passes.rendering.film.format().samples;
+        let at_once =
+            settings.with(|s| (s.integrator.samples, s.integrator.planned_samples) = (samples, Some(4)));
+        let expected = render_or_panic(&everything(), &at_once).film;
+        assert!(passes.rendering.film.sums().eq(expected.sums()), "{samples}");
+        if aim.time.is_none() {
+            assert!(
+                samples >= 16 && passes.noise.is_some_and(|noise| noise <= 0.2),
+                "{samples} {:?}",
+                passes.noise
+            );
+        }
+    }
+}
