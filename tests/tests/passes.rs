@@ -77,7 +77,8 @@ proptest! {
 
     #[test]
     fn passes_of_any_division_are_one_render(technique in technique(), passes in passes()) {
-        let scene = FixedScene::from(&everything());
+        let scene = everything();
+        let scene = FixedScene::from(&scene);
         let mut renderer = Renderer::default();
         let mut picture = None;
         let mut samples = 0;
@@ -99,7 +100,8 @@ proptest! {
 
 #[test]
 fn gathers_of_a_whole_frame_are_of_the_pass() {
-    let scene = FixedScene::from(&everything());
+    let scene = everything();
+    let scene = FixedScene::from(&scene);
     let along_curve = settings().with(|s| s.schedule.order = GatherOrder::Hilbert);
     let mut renderer = Renderer::default();
     let first = pass(&mut renderer, &scene, &settings(), (2, None));
@@ -149,7 +151,8 @@ fn a_picture_with_kept_samples_goes_on_to_more_even_after_a_stop() {
 
 #[test]
 fn a_picture_is_refined_by_more_of_its_own_samples_alone() {
-    let scene = FixedScene::from(&everything());
+    let scene = everything();
+    let scene = FixedScene::from(&scene);
     let mut renderer = Renderer::default();
     let two = settings().with(|s| s.integrator.samples = 2);
     let film = Arc::new(pass(&mut renderer, &scene, &two, (2, None)).film);
@@ -165,7 +168,8 @@ fn a_picture_is_refined_by_more_of_its_own_samples_alone() {
 
 #[test]
 fn passes_until_an_aim_are_the_render_of_their_samples() {
-    let scene = FixedScene::from(&everything());
+    let scene = everything();
+    let scene = FixedScene::from(&scene);
     for (aim, is_cached) in [
         (Aim { noise: Some(0.2), time: None }, false),
         (Aim { noise: None, time: Some(Duration::from_millis(1)) }, true),

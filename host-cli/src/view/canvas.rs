@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use photoncard_driver::film::{FilmPixel, PixelRecord};
+use photoncard_driver::film::FilmPixel;
 use photoncard_driver::sink::FinishedTile;
 
 /// What a page shows.
@@ -56,31 +56,32 @@ impl Patch {
         let Origin { version, step, samples } = self.origin;
         let tile = self.tile.tile();
         let mut bytes = Vec::with_capacity(self.bytes());
-        let header = [version, step, tile.x * step, tile.y * step, tile.width, tile.height, samples, self.card];
+        let header =
+            [version, step, tile.x * step, tile.y * step, tile.width, tile.height, samples, self.card];
         header.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
-        for (_, record) in self.tile.pixels() {
-            values(record, shown).iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        for (_, pixel) in self.tile.pixels() {
+            values(&pixel, shown).iter().for_each(|value| bytes.extend(value.to_le_bytes()));
         }
         bytes
     }
 
-    /// Record of the pixel at `(x, y)` of the full picture.
-    fn pixel(&self, [x, y]: [u32; 2]) -> Option<PixelRecord> {
+    /// The pixel at `(x, y)` of the full picture.
+    fn pixel(&self, [x, y]: [u32; 2]) -> Option<FilmPixel> {
         let [x, y] = [x, y].map(|at| at / self.origin.step);
         let tile = self.tile.tile();
-        let is_inside = (tile.x..tile.x + tile.width).contains(&x) && (tile.y..tile.y + tile.height).contains(&y);
+        let is_inside =
+            (tile.x..tile.x + tile.width).contains(&x) && (tile.y..tile.y + tile.height).contains(&y);
         let index = || (y - tile.y) as usize * tile.width as usize + (x - tile.x) as usize;
-        if is_inside { self.tile.pixels().nth(index()).map(|(_, record)| record) } else { None }
+        if is_inside { self.tile.pixels().nth(index()).map(|(_, pixel)| pixel) } else { None }
     }
 }
 
 /// Values of a pixel as a page shows them; a scalar is repeated.
-fn values(record: PixelRecord, shown: Shown) -> [f32; 3] {
-    let pixel = FilmPixel::from(record);
+fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     let Shown::Layer(layer) = shown else { return pixel.pixel.radiance };
     match layer.channels() {
-        [red, green, blue] => [red, green, blue].map(|channel| (channel.value)(&pixel)),
-        [channel, ..] => [(channel.value)(&pixel); 3],
+        [red, green, blue] => [red, green, blue].map(|channel| (channel.value)(pixel)),
+        [channel, ..] => [(channel.value)(pixel); 3],
         [] => [0.0; 3],
     }
 }
@@ -123,8 +124,8 @@ impl Canvas {
 
     /// Depth of the newest pixel that shows `at`, metres; `None` where nothing is seen.
     pub(super) fn depth(&self, at: [u32; 2]) -> Option<f32> {
-        let record = self.patches.iter().rev().find_map(|(_, patch)| patch.pixel(at))?;
-        Some(record.pixel.depth).filter(|depth| depth.is_finite() && *depth > 0.0)
+        let seen = self.patches.iter().rev().find_map(|(_, patch)| patch.pixel(at))?;
+        Some(seen.pixel.depth).filter(|depth| depth.is_finite() && *depth > 0.0)
     }
 
     /// Number of tiles.
