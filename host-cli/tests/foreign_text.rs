@@ -113,7 +113,7 @@ fn settings_of_a_kept_file_are_shown_escaped() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     let settings = json!({HOSTILE: HOSTILE});
-    room.write("a.exr.partial", format!("photoncard partial render 2\n{settings}\n"));
+    room.write("a.exr.partial", format!("photoncard partial render 3\n{settings}\n"));
     // Within JSON a part of the text is escaped before.
     check_shown(&room.render("scene.gltf", &["-o", "a.exr", "--resume"]), 2, SHOWN, 1);
 }

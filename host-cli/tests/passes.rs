@@ -34,7 +34,7 @@ fn render_or_panic(room: &Room, picture: &str, options: &[&str]) -> Outcome {
 
 /// Number of samples a pixel that a render reports.
 fn samples(outcome: &Outcome) -> String {
-    let (before, _) = outcome.stderr.split_once(" samples a pixel").expect("the number of samples");
+    let (before, _) = outcome.stderr.rsplit_once(" samples a pixel").expect("the number of samples");
     before.rsplit(' ').next().unwrap().to_owned()
 }
 
