@@ -1,0 +1,68 @@
+// Times as the page sees them, by its own clock: from a change's message to pictures on the screen. Milliseconds.
+
+const KEPT = 200;
+
+export class Times {
+    #sent = new Map();
+    #running = null;
+    // Instants at which a new picture was first whole, coarse or not.
+    #wholes = [];
+    // Finished and running measurements, newest last: {what, version, first, coarse, full, settled}.
+    measured = [];
+
+    // A message that makes a new picture was sent.
+    sent(id, what) {
+        if (id === 0) return;
+        this.#sent.set(id, { what, at: performance.now() });
+        if (this.#sent.size > KEPT) this.#sent.delete(this.#sent.keys().next().value);
+    }
+
+    // The first picture of this page, measured since the page was asked for.
+    opened(version) {
+        this.#begin({ what: "opening", at: 0 }, version);
+    }
+
+    // `state` names the version that holds the message `id`, and with it all that were sent before.
+    known(id, version) {
+        const held = [...this.#sent].filter(([sent]) => sent <= id);
+        if (held.length === 0) return;
+        const [, found] = held.at(-1);
+        for (const [sent] of held) this.#sent.delete(sent);
+        this.#begin(found, version);
+    }
+
+    #begin({ what, at }, version) {
+        this.#running = { what, at, version };
+        this.measured.push(this.#running);
+        if (this.measured.length > KEPT) this.measured.shift();
+    }
+
+    // The picture was drawn.
+    drawn(picture, isNew) {
+        const now = performance.now();
+        if (picture.isWhole && isNew) this.#wholes.push(now);
+        while (this.#wholes[0] < now - 1000) this.#wholes.shift();
+        const run = this.#running;
+        if (!run || picture.version < run.version) return;
+        run.first ??= now - run.at;
+        if (picture.isWhole) run.coarse ??= now - run.at;
+        if (picture.isWhole && picture.step === 1) run.full ??= now - run.at;
+    }
+
+    settled(version) {
+        if (this.#running?.version === version) this.#running.settled ??= performance.now() - this.#running.at;
+    }
+
+    // Whole pictures in the last second.
+    get rate() {
+        return this.#wholes.filter(at => at > performance.now() - 1000).length;
+    }
+
+    get text() {
+        const run = this.measured.at(-1);
+        if (!run) return "";
+        const parts = ["first", "coarse", "full", "settled"].filter(part => run[part] !== undefined);
+        const told = parts.map(part => `${part} ${Math.round(run[part])} ms`);
+        return [run.what, ...told, `${this.rate} pictures/s`].join(" · ");
+    }
+}
