@@ -229,4 +229,13 @@ new ResizeObserver(() => {
 requestAnimationFrame(frame);
 
 // For tests and for whoever looks in the browser's console.
-window.photoncard = { times, picture, view, connection, display, get state() { return state; }, get scene() { return scene; } };
+window.photoncard = {
+    times, picture, view, connection, display,
+    get scene() { return scene; },
+    get state() { return state; },
+    // Whether the picture is finished and nothing that changes it is on its way. A change that the command refuses has no answer.
+    get isSettled() {
+        const isQuiet = !toSend && asked.edits.size === 0 && (times.waiting === 0 || times.silence > 1500);
+        return isOpen && isQuiet && Boolean(state?.settled) && picture.version === state.version && !isStale;
+    },
+};

@@ -4,6 +4,7 @@ const KEPT = 200;
 
 export class Times {
     #sent = new Map();
+    #lastSent = -Infinity;
     #running = null;
     // Instants at which a new picture was first whole, coarse or not.
     #wholes = [];
@@ -13,7 +14,8 @@ export class Times {
     // A message that makes a new picture was sent.
     sent(id, what) {
         if (id === 0) return;
-        this.#sent.set(id, { what, at: performance.now() });
+        this.#lastSent = performance.now();
+        this.#sent.set(id, { what, at: this.#lastSent });
         if (this.#sent.size > KEPT) this.#sent.delete(this.#sent.keys().next().value);
     }
 
@@ -51,6 +53,15 @@ export class Times {
 
     settled(version) {
         if (this.#running?.version === version) this.#running.settled ??= performance.now() - this.#running.at;
+    }
+
+    // Messages that no picture holds yet, and time since the last one.
+    get waiting() {
+        return this.#sent.size;
+    }
+
+    get silence() {
+        return performance.now() - this.#lastSent;
     }
 
     // Whole pictures in the last second.
