@@ -35,7 +35,9 @@ export class Exposure {
         const { exposure, automatic, stops, curve, overlay } = this.#inputs;
         const mode = modeOf(layer);
         if (mode === MODES.amount) {
-            return { mode, scale: 1 / (greatest(picture.data) || 1), curve: "none", byCard: overlay.value === "card" };
+            // Distances have no useful maximum under the sky.
+            const scale = layer === "Z" ? 2 * automaticScale(picture.data) : 1 / (greatest(picture.data) || 1);
+            return { mode, scale, curve: "none", byCard: overlay.value === "card" };
         }
         if (!automatic.checked) {
             this.#scale = Math.fround(2 ** Number(exposure.value));

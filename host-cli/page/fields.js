@@ -34,11 +34,11 @@ export class Fields {
         this.edit = edit;
     }
 
-    // Shows values by name; those without one are the file's.
-    show(values) {
+    // Shows values by name; those without one are the file's. After a refused change a field that is being used shows its own too.
+    show(values, isRefused = false) {
         for (const [name, own] of this.#own) {
             this.#values.set(name, values.get(name) ?? own);
-            for (const show of this.#shows.get(name)) show();
+            for (const show of this.#shows.get(name)) show(isRefused);
         }
     }
 
@@ -52,7 +52,9 @@ export class Fields {
         control.addEventListener("focusout", () => current() !== null && show(current()));
         this.#own.set(name, own);
         this.#values.set(name, own);
-        this.#shows.set(name, [...this.#shows.get(name) ?? [], () => isUsed() || show(current())]);
+        this.#shows.set(name, [...this.#shows.get(name) ?? [], isRefused => {
+            if (current() !== null && (isRefused || !isUsed())) show(current());
+        }]);
         if (own !== null) show(own);
         return control;
     }

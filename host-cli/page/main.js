@@ -21,7 +21,7 @@ const times = new Times();
 // What the command last said, and what this page asks for.
 let scene = null, state = null, isOpen = false, steers = false;
 let camera = null, isCameraOwn = false, toSend = null;
-const asked = { layer: "radiance", side: "512", size: null, started: null, edits: new Map() };
+const asked = { layer: "radiance", side: "512", size: null, started: null, cursor: undefined, edits: new Map() };
 // What the canvas shows is not what it should: drawn in the next frame.
 let isStale = true, isNewPicture = false;
 
@@ -59,7 +59,7 @@ const view = {
     },
     pick: at => scene && send("", { type: "pick", at }),
     cursor(at) {
-        send("", { type: "cursor", at });
+        asked.cursor = at;
         showValue(at);
     },
 };
@@ -72,7 +72,10 @@ function take(message) {
         saved: ({ path }) => byId("saved").textContent = `saved ${path}`,
         picked: ({ point }) => { controls.centre = point; isStale = true; },
         steers: ({ value }) => setSteers(value),
-        error: ({ text }) => tell(text),
+        error({ text }) {
+            tell(text);
+            if (state) panel.update(state, true);
+        },
     }[message.type];
     act?.(message);
 }
@@ -172,6 +175,10 @@ function sendMoves() {
     if (toSend && steers) {
         send("camera", { type: "camera", ...rounded(camera), moving: toSend.isMoving });
         toSend = null;
+    }
+    if (asked.cursor !== undefined) {
+        send("", { type: "cursor", at: asked.cursor });
+        asked.cursor = undefined;
     }
     for (const [name, value] of asked.edits) send(name, { type: "set", name, value });
     asked.edits.clear();

@@ -32,6 +32,7 @@ export class Panel {
     #costs = new Map();
     #last = null;
     #told = new Map();
+    #shown = "";
 
     // `edit(name, value)` changes the scene, `set(name, value)` a technique.
     constructor(edit, set) {
@@ -44,8 +45,12 @@ export class Panel {
         }));
     }
 
-    // The scene of a new connection.
-    show({ lights, materials, environment }) {
+    // The scene of a new connection; the same one stays as it is.
+    show(scene) {
+        const text = JSON.stringify(scene);
+        if (text === this.#shown) return;
+        this.#shown = text;
+        const { lights, materials, environment } = scene;
         const fields = this.scene = new Fields(this.edits);
         const ofName = [...new Map([...materials].reverse().map(material => [material.name, material])).values()].reverse();
         const isLamp = ({ properties }) => [properties.emission ?? 0].flat().some(value => value > 0);
@@ -84,10 +89,10 @@ export class Panel {
         return element("details", {}, element("summary", {}, swatch, name), ...rows);
     }
 
-    // The state of the picture.
-    update({ changes = [], settings = {}, cost, settled }) {
-        this.scene?.show(new Map(changes.map(({ name, value }) => [name, value])));
-        this.techniques.show(new Map(Object.entries(settings)));
+    // The state of the picture; the last change may have been refused.
+    update({ changes = [], settings = {}, cost, settled }, isRefused = false) {
+        this.scene?.show(new Map(changes.map(({ name, value }) => [name, value])), isRefused);
+        this.techniques.show(new Map(Object.entries(settings)), isRefused);
         if (cost) this.#showCost(cost);
         if (cost && settled) this.#remember(settings, cost);
     }
