@@ -140,6 +140,29 @@ fn a_light_that_is_switched_off_darkens_the_picture() {
     }
 }
 
+#[test]
+fn two_pages_look_and_one_steers() {
+    let Some(mut browser) = Browser::start() else { return };
+    let room = Room::new();
+    let view = View::start(&room, &shipped("cornell.gltf"), &SMALL);
+    let mut first = opened(&mut browser, &view);
+    let mut second = opened(&mut browser, &view);
+    let camera = "JSON.stringify(photoncard.state.camera)";
+    let before = first.value(camera);
+    second.drag("left", [100.0, 100.0], [60.0, 20.0]);
+    first.drag("left", [100.0, 100.0], [-30.0, 10.0]);
+    first.wait(&format!("{camera} !== '{}'", before.as_str().unwrap()), LIMIT);
+    first.wait(SETTLED, LIMIT);
+    let after = first.value(camera);
+    second.wait(&format!("{camera} === '{}' && {SETTLED}", after.as_str().unwrap()), LIMIT);
+    assert_eq!(first.shown(), second.shown());
+
+    second.take_over();
+    first.wait("!document.getElementById('spectator').hidden", LIMIT);
+    second.drag("left", [100.0, 100.0], [60.0, 20.0]);
+    first.wait(&format!("{camera} !== '{}'", after.as_str().unwrap()), LIMIT);
+}
+
 /// Even if the page knows the token.
 #[test]
 fn a_page_of_another_origin_is_refused() {
