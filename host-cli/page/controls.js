@@ -39,11 +39,11 @@ export class Controls {
         listen(window, "blur", () => this.#held.clear());
     }
 
-    // Place of an event in the picture, pixels.
+    // Pixel of the picture at an event.
     #place(event) {
         const box = this.canvas.getBoundingClientRect();
-        const [width, height] = this.view.size;
-        return [(event.clientX - box.left) * width / box.width, (event.clientY - box.top) * height / box.height];
+        const shares = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+        return this.view.size.map((side, axis) => Math.min(Math.max(Math.floor(shares[axis] * side), 0), side - 1));
     }
 
     // Centre of a turn: the chosen one as long as it is in the picture.
@@ -65,7 +65,7 @@ export class Controls {
     #drag(event) {
         const last = this.#pointers.get(event.pointerId);
         if (!last) {
-            this.view.cursor(this.#place(event).map(Math.floor));
+            this.view.cursor(this.#place(event));
             return;
         }
         const place = [event.clientX, event.clientY];
@@ -99,7 +99,7 @@ export class Controls {
     #up(event) {
         if (!this.#pointers.delete(event.pointerId) || this.#pointers.size > 0) return;
         if (this.#moved >= CLICK) this.view.move(this.view.camera, false);
-        else if (event.type === "pointerup" && event.button === 0) this.view.pick(this.#place(event).map(Math.floor));
+        else if (event.type === "pointerup" && event.button === 0) this.view.pick(this.#place(event));
     }
 
     #wheel(event) {

@@ -33,7 +33,7 @@ const exposure = new Exposure(show);
 // Shows the status, and the picture in the next frame.
 function show() {
     isStale = true;
-    showStatus(isOpen, state, exposure.options);
+    showStatus(isOpen, state, outputs());
 }
 
 const send = (what, message) => {
@@ -94,7 +94,8 @@ function hello(message) {
     byId("side").value = asked.side;
     byId("saved").textContent = message.out === null ? "Start the command with --out DIR to save files." : `to ${message.out}`;
     for (const id of ["save-exr", "save-png", "name"]) byId(id).disabled = message.out === null;
-    [picture.version, picture.step, state] = [0, Infinity, null];
+    picture.restart(0);
+    state = null;
     setSteers(message.steers);
     if (asked.layer !== "radiance") send("", { type: "layer", name: asked.layer });
     if (isCameraOwn && steers) toSend = { isMoving: false };
@@ -198,14 +199,21 @@ function showValue(at) {
     byId("value").textContent = value ? `${at.join(", ")}: ${value.map(part => part.toPrecision(4)).join("  ")}` : "\u00a0";
 }
 
-function save(ending) {
-    const name = `${byId("name").value.trim().replace(/\.(exr|png)$/i, "")}.${ending}`;
-    send("", { type: "save", name, ...exposure.asked });
+const stem = () => byId("name").value.trim().replace(/\.(exr|png)$/i, "");
+
+// Options of the command line that write the picture: as PNG if it is shown otherwise than by default.
+function outputs() {
+    const quoted = name => /^[\w.-]+$/.test(name) ? name : `'${name.replaceAll("'", "'\\''")}'`;
+    const tone = exposure.options;
+    return ` -o ${quoted(`${stem()}.exr`)}${tone && ` -o ${quoted(`${stem()}.png`)}${tone}`}`;
 }
+
+const save = ending => send("", { type: "save", name: `${stem()}.${ending}`, ...exposure.asked });
 
 const on = (id, type, act) => byId(id).addEventListener(type, act);
 on("layer", "change", ({ target }) => {
     asked.layer = target.value;
+    picture.restart(picture.version);
     send("layer", { type: "layer", name: asked.layer });
     isStale = true;
 });
@@ -218,6 +226,7 @@ on("fov", "input", ({ target }) => target.validity.valid && target.value !== "" 
     view.move({ ...camera, fov: Number(target.value) }, false));
 on("reset", "click", () => send("reset", { type: "reset" }));
 on("steer", "click", () => send("", { type: "steer" }));
+on("name", "input", show);
 on("save-exr", "click", () => save("exr"));
 on("save-png", "click", () => save("png"));
 on("copy-command", "click", ({ target }) => copy(byId("command").textContent, target));
@@ -243,6 +252,7 @@ window.photoncard = {
     // Whether the picture is finished and nothing that changes it is on its way. A change that the command refuses has no answer.
     get isSettled() {
         const isQuiet = !toSend && asked.edits.size === 0 && (times.waiting === 0 || times.silence > 1500);
-        return isOpen && isQuiet && Boolean(state?.settled) && picture.version === state.version && !isStale;
+        return isOpen && isQuiet && Boolean(state?.settled) && picture.isWhole && picture.step === 1 &&
+            picture.version === state.version && !isStale;
     },
 };

@@ -14,6 +14,11 @@ export class Picture {
         this.dirty = [0, size[1]];
     }
 
+    // All tiles come again, from a version on.
+    restart(version) {
+        Object.assign(this, { version, step: Infinity, samples: 0, filled: 0 });
+    }
+
     // Another size. The old picture is stretched over the new one until tiles come.
     resize([width, height]) {
         const [oldWidth, oldHeight] = this.size;
@@ -75,7 +80,7 @@ export class Picture {
     // Whether every pixel of the newest coarseness and number of samples has come.
     get isWhole() {
         const [columns, rows] = this.size.map(side => Math.ceil(side / this.step));
-        return this.filled >= columns * rows;
+        return this.step < Infinity && this.filled >= columns * rows;
     }
 
     // Rows `[from, to]` that have changed, null for none; they count as drawn from now on.

@@ -76,14 +76,15 @@ impl Person for Tab {
     }
 
     fn save(&mut self, name: &str, ending: &str) -> String {
-        let line = self.value("document.getElementById('command').textContent");
         self.value(&format!(
-            "document.getElementById('name').value = '{name}'; document.getElementById('save-{ending}').click()"
+            "(field => {{ field.value = '{name}'; field.dispatchEvent(new Event('input')); }})\
+             (document.getElementById('name')); document.getElementById('save-{ending}').click()"
         ));
         self.wait(
             &format!("document.getElementById('saved').textContent.endsWith('{name}.{ending}')"),
             LIMIT,
         );
+        let line = self.value("document.getElementById('command').textContent");
         line.as_str().unwrap().to_owned()
     }
 
