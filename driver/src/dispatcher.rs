@@ -15,6 +15,8 @@ pub struct Dispatcher<'a> {
     /// Notified when a tile waits again, a card is given up, or all tiles are done.
     changed: Condvar,
     sinks: Vec<&'a dyn TileSink>,
+    /// Called before the sinks receive a card's tile.
+    rendered: &'a (dyn Fn(CardNumber, &Tile) + Sync),
     /// Held shared while a tile is put into the sinks, exclusively while sinks revoke tiles.
     order: RwLock<()>,
 }
@@ -22,7 +24,19 @@ pub struct Dispatcher<'a> {
 impl<'a> Dispatcher<'a> {
     /// Dispatcher between the scheduler's cards and all sinks.
     pub fn new(scheduler: Scheduler, sinks: Vec<&'a dyn TileSink>) -> Self {
-        Self { scheduler: Mutex::new(scheduler), changed: Condvar::new(), sinks, order: RwLock::default() }
+        Self {
+            scheduler: Mutex::new(scheduler),
+            changed: Condvar::new(),
+            sinks,
+            rendered: &|_, _| {},
+            order: RwLock::default(),
+        }
+    }
+
+    /// Dispatcher that calls a function before the sinks receive a card's tile.
+    #[must_use]
+    pub fn telling(self, rendered: &'a (dyn Fn(CardNumber, &Tile) + Sync)) -> Self {
+        Self { rendered, ..self }
     }
 
     /// The scheduler, which holds the tiles that are left.
@@ -90,6 +104,7 @@ impl<'a> Dispatcher<'a> {
             self.order.read().unwrap_or_else(PoisonError::into_inner)
         };
         if let Some(tile) = found {
+            (self.rendered)(card, &rectangle);
             self.sinks.iter().for_each(|sink| sink.put(&tile));
             self.scheduler().complete(rectangle.id);
         }

@@ -324,7 +324,7 @@ pub enum SceneError {
         nearest: String,
     },
 
-    /// Error of an assignment that is not of the form `MATERIAL.PROPERTY=VALUE`, or whose value is not possible.
+    /// Error of an assignment that is not of the form `NAME.PROPERTY=VALUE`, or whose value is not possible.
     #[error("`{assignment}`: {reason}")]
     #[diagnostic(code(setting::invalid), help("{remedy}"))]
     Setting {

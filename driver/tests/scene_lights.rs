@@ -218,7 +218,8 @@ fn exr(path: &Path, texels: &[[f32; 3]]) {
 #[test]
 fn environments_are_read_from_hdr_and_exr() {
     let folder = tempfile::tempdir().unwrap();
-    let expected = Environment { width: 2, height: 1, texels: vec![[1.0, 0.5, 0.25], [0.0, 0.0, 4.0]] };
+    let expected =
+        Environment { width: 2, height: 1, texels: vec![[1.0, 0.5, 0.25], [0.0, 0.0, 4.0]], strength: 1.0 };
     assert_eq!(Environment::load(&write(folder.path(), "sky.hdr", HDR)).unwrap(), expected);
     // The first bytes count, not the name.
     let path = folder.path().join("sky.bin");
@@ -263,7 +264,7 @@ fn the_unit_of_radiance_is_not_far_below_the_brightest_texel_of_the_environment(
     let brightest = 1e6;
     let mut texels = vec![[0.0; 3]; 1024 * 512];
     texels[100 * 1024 + 7] = [0.0, brightest, 0.0];
-    let environment = Some(Environment { width: 1024, height: 512, texels });
+    let environment = Some(Environment { width: 1024, height: 512, texels, strength: 1.0 });
     let scene = Scene { environment, ..lit(&json!({"type": "point"})).unwrap() };
     let unit = PackedScene::new(&scene).unwrap().view().0.header.radiance_unit;
     assert!(unit >= brightest / 4096.0, "{unit}");

@@ -192,5 +192,5 @@ fn add_lights(scene: &mut Scene) {
     .map(|kind| PunctualLight { name: "light".into(), kind, intensity: Vec3::new(0.9, 1.0, 0.8) })
     .to_vec();
     let texels = (0..32).map(|i| [0.2 + (i % 7) as f32 * 0.3, 0.5, (i % 3) as f32]).collect();
-    scene.environment = Some(Environment { width: 8, height: 4, texels });
+    scene.environment = Some(Environment { width: 8, height: 4, texels, strength: 1.0 });
 }

@@ -105,7 +105,7 @@ fn an_environment_brings_its_radiance_to_all_sides() {
     for row in 5..9 {
         texels[row * 96 + 20..][..6].fill([300.0, 200.0, 100.0]);
     }
-    cube.environment = Some(Environment { width: 96, height: 48, texels });
+    cube.environment = Some(Environment { width: 96, height: 48, texels, strength: 1.0 });
     check(&cube, received(&cube), "map");
 }
 

@@ -189,7 +189,7 @@ fn ten_thousand_emitters_are_less_noisy_than_by_power_at_a_cost_of_the_trees_dep
 fn the_environments_samples_have_the_density_that_it_tells() {
     let mut texels = vec![[0.1; 3]; 64 * 32];
     texels[5 * 64 + 7] = [500.0; 3];
-    let environment = Some(Environment { width: 64, height: 32, texels });
+    let environment = Some(Environment { width: 64, height: 32, texels, strength: 1.0 });
     let scene = Scene { environment, lights: Vec::new(), ..hall(3) };
     let packed = PackedScene::new(&scene).unwrap();
     let (image, mut memory) = packed.view();

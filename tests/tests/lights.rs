@@ -122,7 +122,7 @@ fn a_floor_under_a_constant_environment_shows_its_albedo_of_it() {
 fn sky() -> Environment {
     let mut texels = vec![[0.25, 0.5, 1.0]; 32];
     texels[9..11].fill([30.0, 20.0, 10.0]);
-    Environment { width: 8, height: 4, texels }
+    Environment { width: 8, height: 4, texels, strength: 1.0 }
 }
 
 #[test]

@@ -102,6 +102,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             bins: Work = Some(7),
             queue: Work = Some(9),
             in_flight: Work = Some(1),
+            focus: Nothing = Some([3, 4]),
         }
         cards: CardSet {
             addresses: Nothing = cards("emulated-micro:2"),

@@ -46,6 +46,16 @@ pub(crate) struct Cells {
 impl EnvironmentMap {
     /// The map of an environment; `None` if the environment is black or not finite.
     pub(super) fn new(environment: &Environment) -> Option<Self> {
+        let scaled;
+        let environment = match environment.strength {
+            1.0 => environment,
+            strength => {
+                let texels =
+                    environment.texels.par_iter().map(|texel| texel.map(|channel| channel * strength));
+                scaled = Environment { texels: texels.collect(), strength: 1.0, ..*environment };
+                &scaled
+            }
+        };
         let brightest = environment.texels.as_flattened().iter().copied().fold(0.0, f32::max);
         if !(brightest > 0.0 && brightest.is_finite()) {
             return None;
@@ -216,7 +226,7 @@ mod tests {
         // A bright texel at the border of the map, whose light is spread over both sides.
         let mut texels = vec![[0.0; 3]; 512 * 256];
         texels[100 * 512] = [3.0, 6.0, 9.0];
-        let environment = Environment { width: 512, height: 256, texels };
+        let environment = Environment { width: 512, height: 256, texels, strength: 1.0 };
         let cells = Cells::new(&environment);
         assert_eq!([cells.columns, cells.rows], [128, 64]);
         let total: f64 = cells.weights.iter().sum();

@@ -89,6 +89,14 @@ impl CardAddress {
         }
     }
 
+    /// Name of a card at the address in errors: its number, and the address if it is not emulated.
+    pub(super) fn name_of(&self, index: usize) -> String {
+        match self {
+            Self::Emulated { .. } => format!("card {index}"),
+            Self::Remote(address) => format!("card {index} ({address})"),
+        }
+    }
+
     /// Size of each card's memory at the address, bytes; for remote cards the maximum that a card can report.
     pub fn dram_bytes(&self) -> u32 {
         match self {

@@ -8,11 +8,12 @@ use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 use photoncard_shared::budget::Budget;
+use photoncard_shared::message::Tile;
 
 use super::card_thread::render_on;
 use super::crew::Crew;
 use super::executor::{Executor, Outcome, Work};
-use super::greeting::{GreetedCard, GreetingError, card_name, greet};
+use super::greeting::{GreetedCard, GreetingError, greet};
 use super::open_card::OpenCard;
 use super::outputs::Outputs;
 use super::{CardAddress, CardError, CardSet, Observer, RenderError, RenderSettings};
@@ -63,7 +64,7 @@ impl Cards {
             move || {
                 let card = OpenCard::open(index, address, model, shared_image, *faults);
                 let greeted = card.map_err(GreetingError::from).and_then(|card| greet(card, start, observer));
-                (card_name(index, address), greeted)
+                (address.name_of(index), greeted)
             }
         });
         let results = on_threads(greetings);
@@ -128,11 +129,13 @@ impl Cards {
     ) -> Result<Outcome, RenderError> {
         let begun = self.start.elapsed();
         let count = self.cards.len();
+        let names: Vec<String> = self.cards.iter().map(|(name, _)| name.clone()).collect();
+        let rendered = |card: usize, tile: &Tile| outputs.observer.rendered(&names[card], tile);
         let crew = Crew {
-            dispatcher: Dispatcher::new(scheduler, sinks),
+            dispatcher: Dispatcher::new(scheduler, sinks).telling(&rendered),
             outputs,
             start: self.start,
-            names: self.cards.iter().map(|(name, _)| name.clone()).collect(),
+            names: &names,
             failed: AtomicBool::new(false),
         };
         let crew_of_all = &crew;

@@ -15,7 +15,7 @@ pub(super) struct Crew<'a> {
     pub(super) outputs: &'a Outputs<'a>,
     pub(super) start: Instant,
     /// Name of each card in errors.
-    pub(super) names: Vec<String>,
+    pub(super) names: &'a [String],
     pub(super) failed: AtomicBool,
 }
 

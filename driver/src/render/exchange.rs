@@ -6,8 +6,8 @@ use photoncard_shared::link::Port;
 
 use crate::session::{Session, SessionError};
 
-/// Maximum wait of a port for a byte.
-pub(super) const WAIT: Duration = Duration::from_millis(20);
+/// Maximum wait of a port for a byte, and so the time until a card's thread notices that the render is stopped.
+pub(super) const WAIT: Duration = Duration::from_millis(4);
 
 /// Moves bytes once in each direction; waits at most [`WAIT`] if there are none. `slowest` is an argument of
 /// [`Session::tick`].

@@ -93,19 +93,11 @@ pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, R
 /// Starts or connects to the first card at an address.
 pub(super) fn open(address: &CardAddress) -> Result<OpenCard, RenderError> {
     let card = OpenCard::open(0, address, None, &SharedImage::default(), None);
-    card.map_err(|source| RenderError::Card { card: card_name(0, address), source })
+    card.map_err(|source| RenderError::Card { card: address.name_of(0), source })
 }
 
 fn greet_alone(address: &CardAddress, card: OpenCard, start: Instant) -> Result<GreetedCard, RenderError> {
-    greet(card, start, &Unobserved).map_err(|error| error.of_card(card_name(0, address)))
-}
-
-/// Name of a card in errors: its number, and its address if it is not emulated.
-pub(super) fn card_name(index: usize, address: &CardAddress) -> String {
-    match address {
-        CardAddress::Emulated { .. } => format!("card {index}"),
-        CardAddress::Remote(address) => format!("card {index} ({address})"),
-    }
+    greet(card, start, &Unobserved).map_err(|error| error.of_card(address.name_of(0)))
 }
 
 /// Sends the greeting and waits for the reply.

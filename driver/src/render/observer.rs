@@ -2,7 +2,10 @@
 
 use std::error::Error;
 
+use photoncard_shared::message::Tile;
+
 use super::error::CardError;
+use crate::sink::TileSink;
 
 /// Phase of a render, or of a card's self-test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +40,14 @@ pub trait Observer: Sync {
 
     /// Reports that a card was lost or given up; the others render its tiles.
     fn lost(&self, _card: &str, _error: &CardError) {}
+
+    /// Reports that a card has rendered a tile, before the sinks have it.
+    fn rendered(&self, _card: &str, _tile: &Tile) {}
+
+    /// Sink of the observer's own for finished tiles.
+    fn tiles(&self) -> Option<&dyn TileSink> {
+        None
+    }
 
     /// Tells that a viewer does not show the picture, or no more; the render goes on.
     fn not_shown(&self, _error: &dyn Error) {}

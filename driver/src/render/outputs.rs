@@ -8,7 +8,7 @@ use super::{Observer, RenderSettings};
 use crate::display::Display;
 use crate::film::Film;
 use crate::partial::{PartialError, PartialRender};
-use crate::scene::Scene;
+use crate::scene::FixedScene;
 use crate::sink::TileSink;
 use crate::viewer::Viewer;
 
@@ -25,13 +25,13 @@ impl<'a> Outputs<'a> {
     /// # Errors
     /// If the file of finished tiles cannot be read or is not the file of this picture.
     pub(super) fn open(
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         tiles: &[Tile],
         film: &mut Film,
         observer: &'a dyn Observer,
     ) -> Result<Self, PartialError> {
-        let begin = |partial| PartialRender::begin(partial, settings.identity(scene).into(), film);
+        let begin = |partial| PartialRender::begin(partial, settings.identity_of(scene).into(), film);
         let partial = settings.outputs.partial.as_ref().map(begin).transpose()?;
         let outputs = Self { partial, viewers: viewers(settings, film), observer };
         outputs.report_kept();
@@ -45,12 +45,13 @@ impl<'a> Outputs<'a> {
         Ok(outputs)
     }
 
-    /// Sinks of finished tiles: the film, the viewers, and the file if tiles are finished early.
+    /// Sinks of finished tiles: the film, the viewers, the observer's, and the file if tiles are finished early.
     pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>, finished_early: bool) -> Vec<&'s dyn TileSink> {
         let mut sinks: Vec<&dyn TileSink> = vec![film];
         let partial = self.partial.as_ref().filter(|_| finished_early);
         sinks.extend(partial.map(|partial| partial as &dyn TileSink));
         sinks.extend(self.viewers.iter().map(|viewer| viewer.as_ref() as &dyn TileSink));
+        sinks.extend(self.observer.tiles());
         sinks
     }
 

@@ -10,7 +10,7 @@ use super::times::Times;
 use super::{Observer, Phase, RenderError, RenderSettings};
 use crate::pack::{CardImage, PackedScene};
 use crate::photon_map::{self, MappedImage, PhotonTimes, map_photons};
-use crate::scene::Scene;
+use crate::scene::FixedScene;
 
 /// Card image with the parameters that a frame derives from it.
 pub(super) struct Prepared {
@@ -28,7 +28,7 @@ pub(super) struct Prepared {
 /// # Errors
 /// If the image does not fit a budget, the photons cannot be traced, or the observer stops the render.
 pub(super) fn prepare(
-    scene: &Scene,
+    scene: &FixedScene,
     packed: PackedScene,
     settings: &RenderSettings,
     budgets: &[Budget],
@@ -36,7 +36,7 @@ pub(super) fn prepare(
     observer: &dyn Observer,
 ) -> Result<Prepared, RenderError> {
     let start = Instant::now();
-    let photon_settings = settings.photon_settings(scene);
+    let photon_settings = settings.photon_settings_if(scene.is_specular());
     for budget in budgets {
         photon_map::check_packed(&packed, &photon_settings, budget)?;
     }

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::{NamedSettings, RenderSettings};
 use crate::emulator::EmulatedKind;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, FixedScene};
 
 /// Provenance of a render. The caller of a render adds the names of its inputs, which the library does not know.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -25,12 +25,12 @@ impl Provenance {
     /// Provenance of a render of `scene`, seen by `camera`, on chips with `budgets`.
     pub(super) fn new(
         settings: &RenderSettings,
-        scene: &Scene,
+        scene: &FixedScene,
         camera: &Camera,
         frame: &FrameParameters,
         budgets: &[Budget],
     ) -> Self {
-        let mut pixels = settings.identity(scene);
+        let mut pixels = settings.identity_of(scene);
         // The automatic distance, if none is given.
         pixels.insert("max-distance".to_owned(), json!(frame.max_distance));
         pixels.insert("view".to_owned(), view(camera));

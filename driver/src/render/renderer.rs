@@ -16,7 +16,7 @@ use crate::film::Film;
 use crate::pack::PackedScene;
 use crate::partial::PartialRender;
 use crate::photon_map::{PhotonSettings, check_image};
-use crate::scene::Scene;
+use crate::scene::{FixedScene, Scene};
 use crate::scheduler::tiles;
 
 /// Finished picture.
@@ -61,7 +61,25 @@ impl Renderer {
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
+        self.render_fixed(&scene.into(), settings, observer)
+    }
+
+    /// Renders a picture of a scene that stays as it is between pictures: for another camera neither triangles nor texels are read.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    pub fn render_fixed(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
         self.render_by(scene, settings, None, observer)
+    }
+
+    /// Closes the cards: the next picture connects to them again, and to those that were lost.
+    pub fn close_cards(&mut self) {
+        self.cards = None;
     }
 
     /// Renders a picture of a scene with photons and an integrator that are chosen when the cards have answered and the scene is packed.
@@ -75,12 +93,12 @@ impl Renderer {
         choose: &dyn Fn(&PackedScene) -> Chosen,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(scene, settings, Some(choose), observer)
+        self.render_by(&scene.into(), settings, Some(choose), observer)
     }
 
     fn render_by(
         &mut self,
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         observer: &dyn Observer,
@@ -94,7 +112,7 @@ impl Renderer {
 
     fn render_on_cards(
         &mut self,
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         observer: &dyn Observer,
@@ -175,13 +193,13 @@ enum Source {
 impl Source {
     /// Source of the image, with the settings that are stated or chosen.
     fn new(
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         kept: &mut Option<Kept>,
         times: &mut Times,
     ) -> Result<(RenderSettings, Self), RenderError> {
-        let photons = settings.photon_settings(scene);
+        let photons = settings.photon_settings_if(scene.is_specular());
         let is_same = |kept: &mut Kept| {
             choose.is_none() && kept.photons == photons && kept.scene == scene.checksum_without_cameras()
         };
@@ -205,7 +223,7 @@ impl Source {
     /// If it does not fit a budget, the photons cannot be traced, or the observer stops the render.
     fn prepare(
         self,
-        scene: &Scene,
+        scene: &FixedScene,
         settings: &RenderSettings,
         budgets: &[Budget],
         times: &mut Times,
@@ -221,8 +239,8 @@ impl Source {
             }
         };
         Ok(Kept {
-            scene: scene.checksum_without_cameras(),
-            photons: settings.photon_settings(scene),
+            scene: scene.checksum_without_cameras().to_owned(),
+            photons: settings.photon_settings_if(scene.is_specular()),
             prepared: prepare(scene, packed, settings, budgets, times, observer)?,
         })
     }

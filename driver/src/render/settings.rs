@@ -95,17 +95,22 @@ impl RenderSettings {
         self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| self.cards.own_caches()))
     }
 
-    /// Photons of a scene's caustic map; 0 for no map.
-    fn caustic_photons(&self, scene: &Scene) -> usize {
+    /// Photons of the caustic map of a scene that is specular or not; 0 for no map.
+    fn caustic_photons(&self, is_specular: bool) -> usize {
         let asked = self.photons.caustic_photons.unwrap_or(DEFAULT_CAUSTIC_PHOTONS);
-        if scene.is_specular() { asked } else { 0 }
+        if is_specular { asked } else { 0 }
     }
 
     /// Canonical settings, equal for all settings that give the scene equal pixels: the number of caustic photons is the
     /// scene's, and without a caustic map the neighbours of its gathers are the default's.
     #[must_use]
     pub fn resolved(&self, scene: &Scene) -> Self {
-        let caustic_photons = self.caustic_photons(scene);
+        self.resolved_if(scene.is_specular())
+    }
+
+    /// [`Self::resolved`] for a scene that is specular or not.
+    pub(super) fn resolved_if(&self, is_specular: bool) -> Self {
+        let caustic_photons = self.caustic_photons(is_specular);
         self.clone().with(|settings| {
             settings.photons.caustic_photons = Some(caustic_photons);
             if caustic_photons == 0 {
@@ -116,8 +121,13 @@ impl RenderSettings {
 
     /// Parameters of the photon maps of a scene.
     pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
+        self.photon_settings_if(scene.is_specular())
+    }
+
+    /// [`Self::photon_settings`] for a scene that is specular or not.
+    pub(super) fn photon_settings_if(&self, is_specular: bool) -> PhotonSettings {
         PhotonSettings {
-            caustic_photons: self.caustic_photons(scene),
+            caustic_photons: self.caustic_photons(is_specular),
             caustic_neighbors: self.photons.caustic_neighbors,
             seed: self.integrator.seed,
             photons: self.photons.count,

@@ -3,7 +3,7 @@
 use photoncard_shared::message::Tile;
 
 use super::{RenderError, RenderSettings};
-use crate::scheduler::{Scheduler, spread};
+use crate::scheduler::{Scheduler, near, spread};
 
 impl RenderSettings {
     /// Checks that tiles can be verified, if requested.
@@ -38,7 +38,11 @@ impl RenderSettings {
         if self.modelled_caches().is_some() {
             return Scheduler::new(tiles, cards);
         }
-        let scheduler = Scheduler::new(spread(tiles), cards).with_helpers();
+        let ordered = match self.schedule.focus {
+            Some(focus) => near(tiles, focus),
+            None => spread(tiles),
+        };
+        let scheduler = Scheduler::new(ordered, cards).with_helpers();
         match self.cards.verify {
             Some(share) => scheduler.verifying(share, self.integrator.seed),
             None => scheduler,

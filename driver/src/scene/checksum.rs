@@ -50,6 +50,9 @@ impl Scene {
             let _ = write!(text, "{} {} {:?}", image.width, image.height, image.encoding);
         }
         let _ = write!(text, "{:?}", self.environment.as_ref().map(|map| (map.width, map.height)));
+        if let Some(map) = self.environment.as_ref().filter(|map| map.strength != 1.0) {
+            let _ = write!(text, "{:?}", map.strength);
+        }
         text
     }
 }

@@ -31,12 +31,14 @@ pub struct Environment {
     pub height: u32,
     /// Texels, rows from the top; finite, and 0 or more.
     pub texels: Vec<[f32; 3]>,
+    /// Factor of the texels, 0 or more; 1 shows them as they are.
+    pub strength: f32,
 }
 
 impl Environment {
     /// Environment of equal radiance in all directions.
     pub fn constant(radiance: Vec3) -> Self {
-        Self { width: 1, height: 1, texels: vec![radiance.to_array()] }
+        Self { width: 1, height: 1, texels: vec![radiance.to_array()], strength: 1.0 }
     }
 
     /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that has the
@@ -69,7 +71,7 @@ impl Environment {
     }
 
     fn of([width, height]: [u32; 2], texels: Vec<[f32; 3]>) -> Self {
-        Self { width, height, texels }
+        Self { width, height, texels, strength: 1.0 }
     }
 
     fn checked(self) -> Result<Self, Fault> {
@@ -85,7 +87,7 @@ impl Environment {
 
     /// Returns whether any texel emits light.
     pub fn is_lit(&self) -> bool {
-        self.texels.iter().flatten().any(|radiance| *radiance > 0.0)
+        self.strength > 0.0 && self.texels.iter().flatten().any(|radiance| *radiance > 0.0)
     }
 }
 

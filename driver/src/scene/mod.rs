@@ -6,6 +6,7 @@ mod blender;
 mod camera;
 mod checksum;
 mod environment;
+mod fixed;
 pub mod gltf;
 mod layers;
 mod light;
@@ -25,6 +26,7 @@ use glam::Vec3;
 
 pub use self::camera::Camera;
 pub use self::environment::Environment;
+pub use self::fixed::FixedScene;
 pub use self::layers::{Coat, DiffuseTransmission, Layers, NormalMap, Sheen};
 pub use self::light::{PunctualKind, PunctualLight};
 pub use self::light_units::LightUnits;

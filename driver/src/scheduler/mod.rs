@@ -24,7 +24,7 @@ mod tiles;
 pub use self::card::{CardNumber, Standing};
 pub(crate) use self::error::rectangles;
 pub use self::error::{SchedulerError, Source};
-pub use self::tiles::{GatherOrder, spread, tiles};
+pub use self::tiles::{GatherOrder, near, spread, tiles};
 
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;

@@ -92,9 +92,32 @@ pub fn spread(mut tiles: Vec<Tile>) -> Vec<Tile> {
     tiles
 }
 
+/// Tiles by the distance of their middles from a pixel, the nearest first.
+pub fn near(mut tiles: Vec<Tile>, [x, y]: [u32; 2]) -> Vec<Tile> {
+    // Twice the distance of the middle, which may lie between pixels.
+    let along = |start: u32, length: u32, at: u32| {
+        (2 * u64::from(start) + u64::from(length)).abs_diff(2 * u64::from(at)).pow(2)
+    };
+    tiles.sort_by_key(|tile| along(tile.x, tile.width, x) + along(tile.y, tile.height, y));
+    tiles
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_tile_of_a_pixel_is_the_first_near_it() {
+        let window = Window { x0: 0, x1: 100, y0: 0, y1: 70 };
+        let all = tiles(window, 16, GatherOrder::Sort);
+        for (x, y) in [(0, 0), (40, 24), (99, 69), (8, 60)] {
+            let sorted = near(all.clone(), [x, y]);
+            let Tile { x: left, y: top, width, height, .. } = sorted[0];
+            assert!((left..left + width).contains(&x) && (top..top + height).contains(&y), "{x} {y}");
+            assert_eq!(sorted.len(), all.len());
+        }
+        assert_eq!(near(all, [u32::MAX; 2]).len(), 35);
+    }
 
     /// All tiles are there once; between the first ones of any number there are no large gaps.
     #[test]

@@ -215,6 +215,7 @@ fn comparable(settings: &RenderSettings) -> RenderSettings {
             bins: None,
             queue: None,
             in_flight: None,
+            focus: None,
         },
         ..settings.clone()
     };

@@ -37,6 +37,7 @@ impl ScheduleOptions {
             bins: self.bins,
             queue: self.queue,
             in_flight: self.in_flight,
+            focus: None,
         }
     }
 }

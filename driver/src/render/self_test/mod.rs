@@ -13,7 +13,7 @@ use photoncard_shared::link::Port;
 pub use self::arithmetic::{ArithmeticTest, WrongResult, WrongResults};
 use self::bench::Bench;
 pub use self::memory::PatternTest;
-use super::greeting::{GreetingError, card_name, greet_port, open};
+use super::greeting::{GreetingError, greet_port, open};
 use super::{CardAddress, Observer, RenderError};
 
 /// Outcome of a card's self-test.
@@ -54,7 +54,7 @@ impl SelfTest {
 /// # Errors
 /// If the card cannot be started or reached, its reply is invalid, it is reset, or the observer stops the test.
 pub fn card_self_test(address: &CardAddress, observer: &dyn Observer) -> Result<SelfTest, RenderError> {
-    self_test_on(&mut open(address)?, &card_name(0, address), observer)
+    self_test_on(&mut open(address)?, &address.name_of(0), observer)
 }
 
 /// Tests the card at the other end of a port, like [`card_self_test`]; `card` is its name in errors.

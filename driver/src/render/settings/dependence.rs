@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::RenderSettings;
 use super::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
 use crate::choice::Choice;
-use crate::scene::Scene;
+use crate::scene::{FixedScene, Scene};
 
 /// Values by the names of their options.
 pub type NamedSettings = Map<String, Value>;
@@ -18,7 +18,7 @@ impl RenderSettings {
     /// All settings that pixels depend on.
     pub fn of_pixels(&self) -> NamedSettings {
         let Self { picture, photons, integrator, schedule, cards, outputs } = self;
-        let Schedule { tile: _, order: _, bins: _, queue: _, in_flight: _ } = schedule;
+        let Schedule { tile: _, order: _, bins: _, queue: _, in_flight: _, focus: _ } = schedule;
         let CardSet { addresses: _, faults: _, verify: _, caches: _, trace: _ } = cards;
         let TileOutputs { partial: _, display: _ } = outputs;
         let Picture { width, height, crop: _, camera, camera_at, look_at, fov, layers, filter } = picture;
@@ -69,7 +69,7 @@ impl RenderSettings {
             caustic_neighbors: _,
             radiance: _,
         } = photons;
-        let Schedule { tile, order, bins, queue, in_flight } = schedule;
+        let Schedule { tile, order, bins, queue, in_flight, focus: _ } = schedule;
         named([
             ("photon-map", json!(layout.name())),
             ("tile", json!(tile)),
@@ -94,7 +94,12 @@ impl RenderSettings {
 
     /// Everything that the pixels of a scene depend on: program, scene and settings.
     pub fn identity(&self, scene: &Scene) -> NamedSettings {
-        self.resolved(scene).identity_with(&scene.checksum())
+        self.identity_of(&scene.into())
+    }
+
+    /// [`Self::identity`] for a scene that stays as it is.
+    pub(in crate::render) fn identity_of(&self, scene: &FixedScene) -> NamedSettings {
+        self.resolved_if(scene.is_specular()).identity_with(scene.checksum())
     }
 
     /// [`Self::identity`] of settings that are [`Self::resolved`], and of a scene of this checksum.

@@ -130,11 +130,13 @@ pub struct Schedule {
     pub queue: Option<u32>,
     /// Maximum number of tiles in flight on a chip; `None` for the chip's own.
     pub in_flight: Option<u32>,
+    /// Pixel near which tiles are rendered first; `None` to spread them over the picture. With modelled memory it has no effect.
+    pub focus: Option<[u32; 2]>,
 }
 
 impl Default for Schedule {
     fn default() -> Self {
-        Self { tile: None, order: GatherOrder::Sort, bins: None, queue: None, in_flight: None }
+        Self { tile: None, order: GatherOrder::Sort, bins: None, queue: None, in_flight: None, focus: None }
     }
 }
 
@@ -157,6 +159,15 @@ impl CardSet {
     /// Number of cards, one chip each.
     pub fn count(&self) -> usize {
         self.addresses.iter().map(|address| address.emulated_chips().max(1)).sum()
+    }
+
+    /// Names of the cards in the reports of a render.
+    pub fn names(&self) -> Vec<String> {
+        let each_card = self
+            .addresses
+            .iter()
+            .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)));
+        each_card.enumerate().map(|(index, address)| address.name_of(index)).collect()
     }
 
     /// Caches of the kind of the first emulated card.

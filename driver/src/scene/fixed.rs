@@ -1,0 +1,64 @@
+//! A scene that stays as it is between pictures, with what renders derive from all of it.
+
+use std::borrow::Cow;
+use std::ops::Deref;
+use std::sync::OnceLock;
+
+use super::Scene;
+
+/// A scene that stays as it is between pictures. What a render derives from all triangles and texels is computed once.
+#[derive(Debug)]
+pub struct FixedScene<'a> {
+    scene: Cow<'a, Scene>,
+    checksum: OnceLock<String>,
+    without_cameras: OnceLock<String>,
+    is_specular: OnceLock<bool>,
+}
+
+impl FixedScene<'_> {
+    /// [`Scene::checksum`].
+    pub fn checksum(&self) -> &str {
+        self.checksum.get_or_init(|| self.scene.checksum())
+    }
+
+    /// [`Scene::checksum_without_cameras`].
+    pub fn checksum_without_cameras(&self) -> &str {
+        self.without_cameras.get_or_init(|| self.scene.checksum_without_cameras())
+    }
+
+    /// [`Scene::is_specular`].
+    pub fn is_specular(&self) -> bool {
+        *self.is_specular.get_or_init(|| self.scene.is_specular())
+    }
+}
+
+impl Deref for FixedScene<'_> {
+    type Target = Scene;
+
+    fn deref(&self) -> &Scene {
+        &self.scene
+    }
+}
+
+impl From<Scene> for FixedScene<'static> {
+    fn from(scene: Scene) -> Self {
+        Self::of(Cow::Owned(scene))
+    }
+}
+
+impl<'a> From<&'a Scene> for FixedScene<'a> {
+    fn from(scene: &'a Scene) -> Self {
+        Self::of(Cow::Borrowed(scene))
+    }
+}
+
+impl<'a> FixedScene<'a> {
+    fn of(scene: Cow<'a, Scene>) -> Self {
+        Self {
+            scene,
+            checksum: OnceLock::new(),
+            without_cameras: OnceLock::new(),
+            is_specular: OnceLock::new(),
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Options of `photoncard view`.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Args;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::quality::{Quality, Stated};
+use photoncard_driver::render::RenderSettings;
+
+use super::cards::CardOptions;
+use super::choice::choice;
+use super::integrator::IntegratorOptions;
+use super::photons::PhotonOptions;
+use super::picture::PictureOptions;
+use super::scene::SceneOptions;
+use super::schedule::ScheduleOptions;
+use super::threads::threads;
+
+#[derive(Args)]
+pub(crate) struct ViewOptions {
+    #[command(flatten)]
+    pub(crate) scene: SceneOptions,
+    /// Address of the page; other machines reach it only if it is not one of 127.0.0.0/8 or ::1, and port 0 is any free one
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080", help_heading = "Page")]
+    pub(crate) listen: SocketAddr,
+    /// Open the page in the browser of this machine
+    #[arg(long, help_heading = "Page")]
+    pub(crate) open: bool,
+    /// Folder in which the page may save pictures; without it, it may save none
+    #[arg(long, value_name = "DIR", help_heading = "Page")]
+    pub(crate) out: Option<PathBuf>,
+    /// Quality of the settled picture, by which the options that are not stated are chosen
+    #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
+    pub(crate) quality: Quality,
+    #[command(flatten)]
+    pub(crate) picture: PictureOptions,
+    #[command(flatten)]
+    photons: PhotonOptions,
+    #[command(flatten)]
+    integrator: IntegratorOptions,
+    #[command(flatten)]
+    schedule: ScheduleOptions,
+    #[command(flatten)]
+    pub(crate) cards: CardOptions,
+    /// Threads for the host's own work [default: one per core]
+    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
+    pub(crate) threads: Option<usize>,
+    /// Print nothing but the page's address
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl ViewOptions {
+    /// Options that are stated, of those that a quality chooses for a scene.
+    pub(crate) fn stated(&self) -> Stated {
+        Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
+    }
+
+    /// Settings of the settled picture, with those of the quality for a scene that is not known.
+    pub(crate) fn settings(&self) -> RenderSettings {
+        let base = self.quality.settings();
+        RenderSettings {
+            picture: self.picture.settings(&base.picture),
+            photons: self.photons.settings(&base.photons),
+            integrator: self.integrator.settings(&base.integrator),
+            schedule: self.schedule.settings(),
+            cards: self.cards.settings(),
+            ..RenderSettings::default()
+        }
+    }
+}

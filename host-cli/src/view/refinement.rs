@@ -1,0 +1,338 @@
+//! Order of a view's pictures: from the coarsest one of a new camera to the picture of `photoncard render`. A state machine without
+//! thread, clock or picture.
+//!
+//! The newest wish wins: it stops what is rendered for an older one. The first pass of a wish is spared if the one before it was
+//! stopped, so that there is always a picture, however fast wishes follow each other; and photons that serve the newest wish as well
+//! are traced to their end.
+
+use std::time::Duration;
+
+/// Time without a camera message after which a camera that moves counts as resting.
+pub(super) const REST: Duration = Duration::from_millis(150);
+
+/// Pause after the first failure of all cards; it doubles with each one.
+const FIRST_PAUSE: Duration = Duration::from_millis(500);
+/// Maximum of that pause.
+const MAX_PAUSE: Duration = Duration::from_secs(8);
+
+/// Side of the squares of the first pass, pixels.
+pub(super) const COARSEST: u32 = 8;
+
+/// One picture on the way to the settled one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pass {
+    /// A pixel for each square of this side, by cheap settings.
+    Coarse(u32),
+    /// Pilot renders, by which a quality finds its settings.
+    Fit,
+    /// The picture of `photoncard render`.
+    Full,
+}
+
+impl Pass {
+    /// First pass of each wish.
+    pub(super) const FIRST: Self = Self::Coarse(COARSEST);
+}
+
+/// The pass after another one; `None` after the last. Passes of more and more samples go here.
+fn next_pass(pass: Pass, is_fitted: bool) -> Option<Pass> {
+    match pass {
+        Pass::Coarse(step) if step > 1 => Some(Pass::Coarse(step / 2)),
+        Pass::Coarse(_) if !is_fitted => Some(Pass::Fit),
+        Pass::Coarse(_) | Pass::Fit => Some(Pass::Full),
+        Pass::Full => None,
+    }
+}
+
+/// Work on a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Work {
+    /// Number of the wish.
+    pub(super) version: u32,
+    /// Number of the wish's scene and photons.
+    pub(super) edition: u32,
+    pub(super) pass: Pass,
+}
+
+/// End of work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// The pass is done.
+    Done,
+    /// Settings were found by pilot renders.
+    Fitted {
+        /// True if the number of photons is another one.
+        has_other_photons: bool,
+    },
+    /// A newer wish has stopped it.
+    Stopped,
+    /// No card is left.
+    NoCard,
+    /// The wish is not possible.
+    Refused,
+}
+
+/// Next thing to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Next {
+    Work(Work),
+    /// Nothing until a change, or at the latest until this time.
+    Wait(Option<Duration>),
+}
+
+/// Progress of the newest wish.
+#[derive(Debug)]
+pub(super) struct Refinement {
+    version: u32,
+    edition: u32,
+    /// Next pass of the wish; `None` once its picture is settled.
+    pass: Option<Pass>,
+    is_fitted: bool,
+    is_refused: bool,
+    running: Option<Work>,
+    /// True while the running work traces photons and builds the card image.
+    is_preparing: bool,
+    /// False if the last first pass was stopped: the next one is done.
+    may_stop_first: bool,
+    moving_until: Duration,
+    retry_at: Duration,
+    pause: Duration,
+}
+
+impl Refinement {
+    /// Refinement of a first wish; `is_fitted` if pilot renders would find nothing.
+    pub(super) fn new(is_fitted: bool) -> Self {
+        Self {
+            version: 1,
+            edition: 1,
+            pass: Some(Pass::FIRST),
+            is_fitted,
+            is_refused: false,
+            running: None,
+            is_preparing: false,
+            may_stop_first: true,
+            moving_until: Duration::ZERO,
+            retry_at: Duration::ZERO,
+            pause: FIRST_PAUSE,
+        }
+    }
+
+    /// Number of the newest wish, from 1.
+    pub(super) fn version(&self) -> u32 {
+        self.version
+    }
+
+    /// Returns whether the picture is that of `photoncard render`.
+    pub(super) fn is_settled(&self) -> bool {
+        self.pass.is_none()
+    }
+
+    /// Returns whether pilot renders have found their settings.
+    #[cfg(test)]
+    pub(super) fn is_fitted(&self) -> bool {
+        self.is_fitted
+    }
+
+    /// Takes a new wish; `is_edit` if scene or photons are others.
+    pub(super) fn wish(&mut self, is_edit: bool) {
+        self.version += 1;
+        self.edition += u32::from(is_edit);
+        self.pass = Some(Pass::FIRST);
+        self.is_refused = false;
+    }
+
+    /// Tells whether the camera goes on moving.
+    pub(super) fn moves(&mut self, is_moving: bool, now: Duration) {
+        self.moving_until = if is_moving { now + REST } else { Duration::ZERO };
+    }
+
+    /// Tells that the running work has begun or ended to trace photons and to build the card image.
+    pub(super) fn prepares(&mut self, is_preparing: bool) {
+        self.is_preparing = is_preparing;
+    }
+
+    /// Tells that a card can be reached again.
+    pub(super) fn card_returns(&mut self) {
+        (self.retry_at, self.pause) = (Duration::ZERO, FIRST_PAUSE);
+    }
+
+    /// Returns whether the running work should stop.
+    pub(super) fn must_stop(&self) -> bool {
+        let Some(work) = self.running.filter(|work| work.version != self.version) else { return false };
+        if work.edition == self.edition && self.is_preparing {
+            return false;
+        }
+        work.pass != Pass::FIRST || self.may_stop_first
+    }
+
+    /// Next thing to do.
+    pub(super) fn next(&mut self, now: Duration) -> Next {
+        let Some(pass) = self.pass.filter(|_| self.running.is_none() && !self.is_refused) else {
+            return Next::Wait(None);
+        };
+        let is_costly = !matches!(pass, Pass::Coarse(_));
+        let begin = if is_costly { self.retry_at.max(self.moving_until) } else { self.retry_at };
+        if now < begin {
+            return Next::Wait(Some(begin));
+        }
+        let work = Work { version: self.version, edition: self.edition, pass };
+        (self.running, self.is_preparing) = (Some(work), false);
+        Next::Work(work)
+    }
+
+    /// Takes the end of the running work.
+    pub(super) fn finish(&mut self, outcome: Outcome, now: Duration) {
+        let Some(work) = self.running.take() else { return };
+        let is_newest = work.version == self.version;
+        match outcome {
+            Outcome::Done => {
+                self.may_stop_first |= work.pass == Pass::FIRST;
+                self.card_returns();
+                if is_newest {
+                    self.pass = next_pass(work.pass, self.is_fitted);
+                }
+            }
+            Outcome::Fitted { has_other_photons } => {
+                self.is_fitted = true;
+                if has_other_photons {
+                    self.wish(true);
+                } else if is_newest {
+                    self.pass = next_pass(work.pass, true);
+                }
+            }
+            Outcome::Stopped => self.may_stop_first &= work.pass != Pass::FIRST,
+            Outcome::NoCard => {
+                self.retry_at = now + self.pause;
+                self.pause = MAX_PAUSE.min(2 * self.pause);
+            }
+            Outcome::Refused => self.is_refused = is_newest,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOW: Duration = Duration::from_secs(100);
+
+    fn work(refinement: &mut Refinement, now: Duration) -> Work {
+        match refinement.next(now) {
+            Next::Work(work) => work,
+            Next::Wait(until) => panic!("waits until {until:?}"),
+        }
+    }
+
+    /// Does all work until the picture settles. Returns the passes.
+    fn settle(refinement: &mut Refinement) -> Vec<Pass> {
+        let mut passes = Vec::new();
+        while !refinement.is_settled() {
+            let pass = work(refinement, NOW).pass;
+            passes.push(pass);
+            let found = Outcome::Fitted { has_other_photons: false };
+            refinement.finish(if pass == Pass::Fit { found } else { Outcome::Done }, NOW);
+        }
+        passes
+    }
+
+    #[test]
+    fn a_wish_is_refined_from_coarse_to_full() {
+        let mut refinement = Refinement::new(false);
+        let coarse = [8, 4, 2, 1].map(Pass::Coarse);
+        assert_eq!(settle(&mut refinement), [&coarse[..], &[Pass::Fit, Pass::Full]].concat());
+        refinement.wish(false);
+        assert_eq!(settle(&mut refinement), [&coarse[..], &[Pass::Full]].concat());
+        assert_eq!(refinement.next(NOW), Next::Wait(None));
+    }
+
+    #[test]
+    fn a_new_wish_stops_the_running_pass() {
+        let mut refinement = Refinement::new(true);
+        let first = work(&mut refinement, NOW);
+        assert!(!refinement.must_stop());
+        refinement.wish(false);
+        assert!(refinement.must_stop());
+        refinement.finish(Outcome::Stopped, NOW);
+        // The second first pass is spared.
+        assert_eq!(work(&mut refinement, NOW), Work { version: first.version + 1, ..first });
+        refinement.wish(true);
+        assert!(!refinement.must_stop());
+        refinement.finish(Outcome::Done, NOW);
+        assert_eq!(work(&mut refinement, NOW).version, 3);
+    }
+
+    #[test]
+    fn photons_of_the_same_scene_are_traced_to_their_end() {
+        let mut refinement = Refinement::new(true);
+        work(&mut refinement, NOW);
+        refinement.prepares(true);
+        refinement.wish(false);
+        assert!(!refinement.must_stop());
+        refinement.prepares(false);
+        assert!(refinement.must_stop());
+        refinement.prepares(true);
+        refinement.wish(true);
+        assert!(refinement.must_stop());
+    }
+
+    #[test]
+    fn costly_passes_wait_for_rest() {
+        let mut refinement = Refinement::new(true);
+        refinement.moves(true, NOW);
+        for _ in 0..4 {
+            work(&mut refinement, NOW);
+            refinement.finish(Outcome::Done, NOW);
+        }
+        assert_eq!(refinement.next(NOW), Next::Wait(Some(NOW + REST)));
+        assert_eq!(work(&mut refinement, NOW + REST).pass, Pass::Full);
+        refinement.finish(Outcome::Stopped, NOW);
+        refinement.moves(true, NOW);
+        refinement.moves(false, NOW);
+        assert_eq!(work(&mut refinement, NOW).pass, Pass::Full);
+    }
+
+    #[test]
+    fn without_cards_the_same_pass_is_tried_again_later() {
+        let mut refinement = Refinement::new(true);
+        let mut pauses = Vec::new();
+        let mut now = NOW;
+        for _ in 0..8 {
+            work(&mut refinement, now);
+            refinement.finish(Outcome::NoCard, now);
+            let Next::Wait(Some(until)) = refinement.next(now) else { panic!("no pause") };
+            pauses.push((until - now).as_millis());
+            refinement.wish(false);
+            assert_eq!(refinement.next(now), Next::Wait(Some(until)), "a wish brings no card");
+            now = until;
+        }
+        assert_eq!(pauses, [500, 1000, 2000, 4000, 8000, 8000, 8000, 8000]);
+        work(&mut refinement, now);
+        refinement.finish(Outcome::NoCard, now);
+        refinement.card_returns();
+        work(&mut refinement, now);
+    }
+
+    #[test]
+    fn a_wish_that_is_not_possible_waits_for_another() {
+        let mut refinement = Refinement::new(true);
+        work(&mut refinement, NOW);
+        refinement.finish(Outcome::Refused, NOW);
+        assert_eq!(refinement.next(NOW), Next::Wait(None));
+        refinement.wish(false);
+        settle(&mut refinement);
+    }
+
+    #[test]
+    fn other_photons_of_a_fit_are_a_new_edition() {
+        let mut refinement = Refinement::new(false);
+        for _ in 0..4 {
+            work(&mut refinement, NOW);
+            refinement.finish(Outcome::Done, NOW);
+        }
+        let fit = work(&mut refinement, NOW);
+        refinement.finish(Outcome::Fitted { has_other_photons: true }, NOW);
+        let work = work(&mut refinement, NOW);
+        assert_eq!((work.version, work.edition, work.pass), (fit.version + 1, fit.edition + 1, Pass::FIRST));
+        assert!(refinement.is_fitted());
+    }
+}
