@@ -1,15 +1,20 @@
 //! Pictures one after another on the same cards are those of new cards, and cards receive the lines that have changed.
 
+use std::collections::HashMap;
+use std::sync::Mutex;
+
 use glam::Vec3;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
 use photoncard_driver::render::{
-    CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Renderer, Schedule, Statistics, Unobserved,
-    render,
+    CardSet, Integrator, Observer, Phase, PhotonMaps, Picture, RenderSettings, Renderer, Schedule,
+    Statistics, Unobserved, render,
 };
-use photoncard_driver::scene::{Scene, gltf};
+use photoncard_driver::scene::{FixedScene, Scene, gltf};
+use photoncard_driver::sink::{FinishedTile, TileSink};
 use photoncard_shared::address::{LINE_BYTES, Line};
+use photoncard_shared::message::Tile;
 use proptest::prelude::*;
 
 /// Frame of a scene: everything that may change between two pictures.
@@ -122,6 +127,66 @@ fn a_new_camera_sends_no_line_and_traces_no_photon() {
     let second = renderer.render(&moved.scene(&base), &moved.settings(), &Unobserved).unwrap().statistics;
     assert_eq!(second.link.image_bytes, [0]);
     assert_eq!((second.time_s.photons, second.photon_paths), (0.0, first.photon_paths));
+}
+
+/// Pictures of a scene that stays as it is are those of a scene that is read anew, provenance included.
+#[test]
+fn a_fixed_scene_gives_the_pictures_of_any_scene() {
+    let base = base();
+    let frame = Frame { camera: 0, seed: 0, photons: 300, lamp: 1, wall: 1 };
+    let fixed = FixedScene::from(&base);
+    let mut renderer = Renderer::default();
+    for (x, focus) in [(0.0, None), (0.2, Some([11, 7])), (0.3, Some([0, 0]))] {
+        let settings = frame.settings().with(|settings| {
+            settings.picture.camera_at = Some([x, 1.0, 3.0]);
+            settings.schedule.focus = focus;
+        });
+        let kept = renderer.render_fixed(&fixed, &settings, &Unobserved).unwrap();
+        let fresh = render(&base, &settings, &Unobserved).unwrap();
+        assert!(kept.film.pixels() == fresh.film.pixels(), "{x}");
+        assert_eq!(kept.statistics.provenance, fresh.statistics.provenance);
+    }
+}
+
+/// The observer learns of each tile, first its card and then its pixels.
+#[test]
+fn an_observer_receives_every_tile_with_its_card() {
+    #[derive(Default)]
+    struct Watcher(Mutex<(HashMap<u32, String>, u64)>);
+
+    impl Observer for Watcher {
+        fn progress(&self, _: Phase, _: u64, _: u64) {}
+
+        fn is_stopped(&self) -> bool {
+            false
+        }
+
+        fn rendered(&self, card: &str, tile: &Tile) {
+            self.0.lock().unwrap().0.insert(tile.id, card.to_owned());
+        }
+
+        fn tiles(&self) -> Option<&dyn TileSink> {
+            Some(self)
+        }
+    }
+
+    impl TileSink for Watcher {
+        fn put(&self, tile: &FinishedTile) {
+            let (cards, pixels) = &mut *self.0.lock().unwrap();
+            assert!(cards.contains_key(&tile.tile().id));
+            *pixels += tile.tile().pixels();
+        }
+
+        fn revoke(&self, _: &Tile) {}
+    }
+
+    let frame = Frame { camera: 0, seed: 0, photons: 300, lamp: 1, wall: 1 };
+    let settings = frame.settings().with(|s| s.cards.addresses = vec!["emulated:2".parse().unwrap()]);
+    let watcher = Watcher::default();
+    render(&frame.scene(&base()), &settings, &watcher).unwrap();
+    let (cards, pixels) = watcher.0.into_inner().unwrap();
+    assert_eq!((cards.len(), pixels), (6, 12 * 8));
+    assert!(cards.values().all(|card| settings.cards.names().contains(card)), "{cards:?}");
 }
 
 #[test]

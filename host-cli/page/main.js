@@ -21,7 +21,7 @@ const times = new Times();
 // What the command last said, and what this page asks for.
 let scene = null, state = null, isOpen = false, steers = false;
 let camera = null, isCameraOwn = false, toSend = null;
-const asked = { layer: "radiance", side: "512", size: null, started: null, cursor: undefined, edits: new Map() };
+const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cursor: undefined, edits: new Map() };
 // What the canvas shows is not what it should: drawn in the next frame.
 let isStale = true, isNewPicture = false;
 
@@ -174,7 +174,10 @@ function frame() {
 function sendMoves() {
     if (!isOpen || !scene || connection.isBusy) return;
     if (toSend && steers) {
-        send("camera", { type: "camera", ...rounded(camera), moving: toSend.isMoving });
+        const view = rounded(camera), text = JSON.stringify(view);
+        // A camera that comes to rest makes no new picture.
+        send(text === asked.camera ? "" : "camera", { type: "camera", ...view, moving: toSend.isMoving });
+        asked.camera = text;
         toSend = null;
     }
     if (asked.cursor !== undefined) {

@@ -18,6 +18,7 @@ mod sweep;
 mod threads;
 mod tone;
 mod tonemap;
+mod view;
 mod without_effect;
 
 use std::path::PathBuf;
@@ -42,6 +43,7 @@ pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};
 pub(crate) use self::study_output::StudyOutput;
 pub(crate) use self::sweep::{CACHE, SweepArguments};
 pub(crate) use self::tonemap::TonemapOptions;
+pub(crate) use self::view::ViewOptions;
 
 /// Global illumination by photon mapping on small rendering chips.
 #[derive(Parser)]
@@ -77,6 +79,8 @@ impl Arguments {
 pub(crate) enum Command {
     /// Render a glTF scene to a picture, EXR or PNG
     Render(Box<RenderOptions>),
+    /// Walk through a scene: a page of the browser shows it while it is rendered
+    View(Box<ViewOptions>),
     /// Tone-map an EXR picture to a PNG, as a render does
     Tonemap(TonemapOptions),
     /// Print information on a scene

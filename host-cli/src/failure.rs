@@ -51,6 +51,14 @@ impl Failure {
         Self::Input(Report::new(MietteDiagnostic::new(text).with_help("choose another folder")))
     }
 
+    /// Failure of a folder that is to be there.
+    pub(crate) fn no_folder(path: &Path, error: &std::io::Error) -> Self {
+        let text = format!("cannot use the folder {}: {error}", path.display());
+        Self::Input(Report::new(
+            MietteDiagnostic::new(text).with_help("make the folder first, or choose another"),
+        ))
+    }
+
     /// Exit status.
     pub(crate) fn status(&self) -> ExitCode {
         match self {

@@ -11,7 +11,7 @@
 //! | `input` | scene and environment of a render |
 //! | `outputs` | checks of output files before any work |
 //! | `progress` | progress of a render |
-//! | `render`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
+//! | `render`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render from Rust, use
 //! `photoncard_driver` directly.
@@ -35,6 +35,7 @@ mod report;
 mod scene;
 mod study;
 mod tonemap;
+mod view;
 
 use std::process::ExitCode;
 
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
     report::lay_out_errors();
     let result = match &arguments.command {
         Command::Render(options) => render::run(options),
+        Command::View(options) => view::run(options),
         Command::Tonemap(options) => tonemap::run(options),
         Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),
         Command::Card(CardCommand::List) => card_list::run(),

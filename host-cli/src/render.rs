@@ -1,6 +1,6 @@
 //! `photoncard render`.
 
-mod files;
+pub(crate) mod files;
 mod messages;
 
 use std::sync::OnceLock;
@@ -99,7 +99,10 @@ fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<
 }
 
 /// Runs `work` on a pool of `threads` threads.
-fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+pub(crate) fn on_threads<T: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> T + Send,
+) -> Result<T, Failure> {
     let Some(threads) = threads else { return Ok(work()) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     Ok(pool.map_err(|error| Failure::work_error(&error))?.install(work))

@@ -164,7 +164,7 @@ fn names_that_do_not_exist() {
         ("--camera", "absent", ["no camera 'absent'", "'eye'"]),
         ("--variant", "night", ["no variant 'night'", "leave the option out"]),
         ("--light-units", "candela", ["radiometric", "photometric"]),
-        ("--set", "floor", ["`floor`", "MATERIAL.PROPERTY=VALUE"]),
+        ("--set", "floor", ["`floor`", "NAME.PROPERTY=VALUE"]),
         ("--set", "flor.diffuse=0", ["'flor'", "'floor'"]),
         ("--set", "floor.gloss=1", ["'gloss'", "the properties are"]),
         ("--set", "floor.diffuse=2", ["albedo", "0 to 1"]),

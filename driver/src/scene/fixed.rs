@@ -40,6 +40,13 @@ impl Deref for FixedScene<'_> {
     }
 }
 
+impl FixedScene<'_> {
+    /// The scene.
+    pub fn into_scene(self) -> Scene {
+        self.scene.into_owned()
+    }
+}
+
 impl From<Scene> for FixedScene<'static> {
     fn from(scene: Scene) -> Self {
         Self::of(Cow::Owned(scene))

@@ -6,7 +6,7 @@ use photoncard_driver::scene::LightUnits;
 
 use super::choice::choice;
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct LightOptions {
     /// Units of the file's point, spot and directional lights, beside emission in W/(sr m^2)
     #[arg(

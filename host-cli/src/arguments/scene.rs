@@ -7,14 +7,15 @@ use clap::Args;
 use super::lights::LightOptions;
 use crate::environment::EnvironmentOption;
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct SceneOptions {
     /// A glTF 2.0 file, .gltf or .glb
     #[arg(value_name = "SCENE")]
     pub(crate) path: PathBuf,
-    /// Change a material: MATERIAL.PROPERTY=VALUE; may be repeated
+    /// Change a material, a light or the environment: NAME.PROPERTY=VALUE; may be repeated
     ///
-    /// Properties are diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha and emission.
+    /// Properties of a material are diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha and emission;
+    /// those of a point, spot or directional light are colour, intensity and position. environment.strength is a factor of the environment.
     #[arg(long = "set", value_name = "ASSIGNMENT", help_heading = "Scene", hide_short_help = true)]
     pub(crate) assignments: Vec<String>,
     /// Add the light that rough metals and coats reflect several times between their microfacets

@@ -21,7 +21,7 @@ use super::threads::threads;
 pub(crate) struct ViewOptions {
     #[command(flatten)]
     pub(crate) scene: SceneOptions,
-    /// Address of the page; other machines reach it only if it is not one of 127.0.0.0/8 or ::1, and port 0 is any free one
+    /// Address of the page, this machine's own alone by default; port 0 is any free one
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080", help_heading = "Page")]
     pub(crate) listen: SocketAddr,
     /// Open the page in the browser of this machine

@@ -2,9 +2,12 @@
 
 use std::path::Path;
 
+use photoncard_driver::exr::{self, SampleFormat};
+use photoncard_driver::film::Film;
+use photoncard_driver::layer::Layers;
+use photoncard_driver::output;
 use photoncard_driver::render::Rendering;
-use photoncard_driver::tone_mapping::write_png;
-use photoncard_driver::{exr, output};
+use photoncard_driver::tone_mapping::{ToneMapping, write_png};
 
 use crate::arguments::{PictureFormat, PictureOutput, RenderOptions, TextOutput};
 use crate::console::{print_json, printable_json};
@@ -23,8 +26,13 @@ pub(super) fn check(options: &RenderOptions) -> Result<(), Failure> {
 pub(super) fn write(options: &RenderOptions, rendering: &Rendering) -> Result<(), Failure> {
     let provenance = serde_json::to_string(&rendering.statistics.provenance.pixels);
     let provenance = printable_json(&provenance.map_err(|error| Failure::work_error(&error))?);
+    let form = Form {
+        layers: options.picture.layers(),
+        sample_type: options.outputs.sample_type(),
+        tone: options.outputs.tone.mapping(),
+    };
     for picture in &options.outputs.pictures {
-        write_picture(picture, options, rendering, &provenance)?;
+        write_picture(picture, &rendering.film, &provenance, &form)?;
     }
     let Some(stats) = &options.outputs.stats else { return Ok(()) };
     let text = serde_json::to_string_pretty(&rendering.statistics);
@@ -36,23 +44,31 @@ pub(super) fn write(options: &RenderOptions, rendering: &Rendering) -> Result<()
     }
 }
 
-fn write_picture(
+/// Form of pictures, beside the format of their files.
+pub(crate) struct Form {
+    /// Layers of an EXR.
+    pub(crate) layers: Layers,
+    /// Type of an EXR's samples.
+    pub(crate) sample_type: SampleFormat,
+    /// Tone mapping of a PNG.
+    pub(crate) tone: ToneMapping,
+}
+
+/// Writes a picture with its provenance, whole or not at all.
+pub(crate) fn write_picture(
     picture: &PictureOutput,
-    options: &RenderOptions,
-    rendering: &Rendering,
+    film: &Film,
     provenance: &str,
+    form: &Form,
 ) -> Result<(), Failure> {
     let PictureOutput { path, format } = picture;
-    let film = &rendering.film;
     match format {
-        PictureFormat::Exr => {
-            exr::write(path, film, &options.picture.layers(), provenance, options.outputs.sample_type())
-                .map_err(|error| Failure::work_error(&error))
-        }
+        PictureFormat::Exr => exr::write(path, film, &form.layers, provenance, form.sample_type)
+            .map_err(|error| Failure::work_error(&error)),
         PictureFormat::Png => {
             let size = [film.window().width(), film.window().height()];
             let radiance = film.pixels().iter().map(|pixel| pixel.radiance);
-            write_png(path, size, radiance, options.outputs.tone.mapping(), Some(provenance))
+            write_png(path, size, radiance, form.tone, Some(provenance))
                 .map_err(|error| Failure::work_error(&error))
         }
     }

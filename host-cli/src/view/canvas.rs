@@ -56,7 +56,8 @@ impl Patch {
         let Origin { version, step, samples } = self.origin;
         let tile = self.tile.tile();
         let mut bytes = Vec::with_capacity(self.bytes());
-        let header = [version, step, tile.x * step, tile.y * step, tile.width, tile.height, samples, self.card];
+        let header =
+            [version, step, tile.x * step, tile.y * step, tile.width, tile.height, samples, self.card];
         header.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
         for (_, record) in self.tile.pixels() {
             values(record, shown).iter().for_each(|value| bytes.extend(value.to_le_bytes()));
@@ -68,7 +69,8 @@ impl Patch {
     fn pixel(&self, [x, y]: [u32; 2]) -> Option<PixelRecord> {
         let [x, y] = [x, y].map(|at| at / self.origin.step);
         let tile = self.tile.tile();
-        let is_inside = (tile.x..tile.x + tile.width).contains(&x) && (tile.y..tile.y + tile.height).contains(&y);
+        let is_inside =
+            (tile.x..tile.x + tile.width).contains(&x) && (tile.y..tile.y + tile.height).contains(&y);
         let index = || (y - tile.y) as usize * tile.width as usize + (x - tile.x) as usize;
         if is_inside { self.tile.pixels().nth(index()).map(|(_, record)| record) } else { None }
     }

@@ -1,0 +1,169 @@
+//! `photoncard view`: a page of the browser that shows a scene while it is rendered.
+//!
+//! | module | contents |
+//! |---|---|
+//! | `refinement` | order of the pictures: a state machine |
+//! | `wish`, `passes`, `command_line` | what is to be seen: settings, those of coarse pictures, and the command that renders the same |
+//! | `canvas`, `pages`, `cards` | tiles of the newest wish; what each page is sent next; states of the cards |
+//! | `request`, `describe` | messages of a page, and messages to it |
+//! | `state` | all of these as one state, without threads, clock, input or output |
+//! | `hub`, `painter`, `returning` | the state under a lock, the thread that renders, and the one that looks for lost cards |
+//! | `http`, `gate`, `page_files`, `socket`, `server` | requests, who may have what, the page's files, WebSockets |
+//! | `saving`, `browser` | pictures that a page saves, and the browser that shows it |
+
+mod browser;
+mod canvas;
+mod cards;
+mod command_line;
+mod describe;
+mod gate;
+mod http;
+mod hub;
+mod page_files;
+mod pages;
+mod painter;
+mod passes;
+mod refinement;
+mod request;
+mod returning;
+mod saving;
+mod server;
+mod socket;
+mod state;
+#[cfg(test)]
+mod tests;
+mod wish;
+
+use std::fmt::Write;
+use std::io::ErrorKind;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::time::Duration;
+
+use miette::{MietteDiagnostic, Report};
+use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::scene::Scene;
+
+use self::describe::SceneFacts;
+use self::gate::Gate;
+use self::hub::Hub;
+use self::painter::Painter;
+use self::saving::Folder;
+use self::state::{Start, View};
+use self::wish::{Sketch, Wish};
+use crate::arguments::ViewOptions;
+use crate::console::{print, say};
+use crate::failure::Failure;
+use crate::input;
+use crate::progress::stop_on_signals;
+use crate::render::on_threads;
+
+/// Time in which the end of the view is noticed.
+const ATTENTION: Duration = Duration::from_millis(50);
+
+/// Shows a scene until an interrupt.
+pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
+    let mut settings = options.settings();
+    check(&settings)?;
+    let folder = options
+        .out
+        .as_deref()
+        .map(|path| Folder::new(path).map_err(|error| Failure::no_folder(path, &error)));
+    let folder = folder.transpose()?;
+    let is_over = stop_on_signals().map_err(|error| Failure::work_error(&error))?;
+    let listener = listen(options.listen)?;
+    let address = listener.local_addr().map_err(|error| Failure::work_error(&error))?;
+    let scene = load(options, &mut settings)?;
+    let start = Start {
+        options: options.scene.clone(),
+        quality: options.quality,
+        stated: options.stated(),
+        wish: Wish::new(settings, options.scene.assignments.clone()),
+        sketch: Sketch::new(&scene),
+        facts: SceneFacts::new(input::name(&options.scene), &scene),
+        is_size_stated: options.picture.states_size(),
+        out: folder.as_ref().map(|folder| folder.path().display().to_string()),
+    };
+    let hub = Arc::new(Hub::new(View::new(start)?, folder, is_over));
+    let gate = Arc::new(Gate::new(address, token()?));
+    announce(options, address, &gate)?;
+    let (served, gate) = (hub.clone(), gate.clone());
+    // The threads of pages end with the process.
+    std::thread::spawn(move || server::serve(&listener, &gate, &served));
+    std::thread::scope(|scope| {
+        scope.spawn(|| returning::look_for_cards(&hub));
+        let painter = Painter::new(&hub, scene, &options.scene, options.quality);
+        let painted = scope.spawn(|| on_threads(options.threads, || painter.run()));
+        while !hub.is_over() {
+            std::thread::sleep(ATTENTION);
+        }
+        hub.end();
+        painted.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })?;
+    hub.finish_saving();
+    Err(Failure::Stopped("stopped; the view is over"))
+}
+
+/// Checks that the settings are those of a view.
+fn check(settings: &RenderSettings) -> Result<(), Failure> {
+    let [option, reason] = if settings.picture.crop.is_some() {
+        ["--crop", "a view shows the whole picture"]
+    } else if settings.modelled_caches().is_some() {
+        ["--counters, --cache or --trace", "they are of one render, and a view has many"]
+    } else {
+        settings.check()?;
+        return Ok(());
+    };
+    let report = MietteDiagnostic::new(format!("photoncard view has no {option}: {reason}"));
+    Err(Failure::Input(Report::new(report.with_help("leave it out, or use photoncard render"))))
+}
+
+/// Loads the scene, before its assignments.
+fn load(options: &ViewOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
+    let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
+    let scene = input::load(&options.scene, dram_bytes)?;
+    let camera = settings.camera(&scene)?;
+    let misfit = options.picture.fit(&camera, &mut settings.picture);
+    if let Some(notice) = misfit.filter(|_| !options.quiet) {
+        say(format_args!("photoncard: {notice}"));
+    }
+    Ok(scene)
+}
+
+fn listen(address: SocketAddr) -> Result<TcpListener, Failure> {
+    TcpListener::bind(address).map_err(|error| {
+        let remedy = match error.kind() {
+            ErrorKind::AddrInUse => "another program listens there, perhaps another view: use --listen 127.0.0.1:0 for any free port",
+            ErrorKind::PermissionDenied => "use a port of 1024 or more",
+            _ => "use an address of this machine, such as 127.0.0.1:8080",
+        };
+        let report = MietteDiagnostic::new(format!("cannot listen at {address}: {error}"));
+        Failure::Work(Report::new(report.with_help(remedy)))
+    })
+}
+
+/// Random token of 128 bits.
+fn token() -> Result<String, Failure> {
+    let mut bytes = [0_u8; 16];
+    getrandom::fill(&mut bytes).map_err(|error| Failure::work_error(&error))?;
+    Ok(bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    }))
+}
+
+/// Prints the page's address, and opens it.
+fn announce(options: &ViewOptions, address: SocketAddr, gate: &Gate) -> Result<(), Failure> {
+    if !address.ip().is_loopback() {
+        say(format_args!(
+            "photoncard: warning: other machines can reach {address}, and who has the address of the page can steer the view"
+        ));
+    }
+    print(&[gate.url()])?;
+    if options.open
+        && let Err(error) = browser::open(&gate.url())
+    {
+        say(format_args!("photoncard: no browser could be opened: {error}; open the address yourself"));
+    }
+    Ok(())
+}

@@ -1,0 +1,174 @@
+//! Scene and state of a view as messages to pages.
+
+use glam::Vec3;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::layer::Layer;
+use photoncard_driver::render::{RenderSettings, Statistics};
+use photoncard_driver::scene::{
+    Camera, Environment, Material, PunctualKind, PunctualLight, Reflection, Scene,
+};
+use serde_json::{Map, Value, json};
+
+use super::wish::Wish;
+
+/// What pages are told of a scene once.
+pub(super) struct SceneFacts {
+    name: String,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl SceneFacts {
+    pub(super) fn new(name: String, scene: &Scene) -> Self {
+        let (low, high) = scene.bounds();
+        Self { name, low, high }
+    }
+
+    /// Greeting of a page; `scene` has materials and lights before edits.
+    pub(super) fn hello(&self, scene: &Scene, out: Option<&str>, steers: bool) -> Value {
+        let layers = ["radiance"].into_iter().chain(Layer::ALL.map(Layer::name));
+        let cameras = scene.cameras.iter().map(|camera| {
+            let mut described = self.camera(camera);
+            described["name"] = json!(camera.name);
+            described
+        });
+        json!({
+            "type": "hello",
+            "scene": {
+                "name": self.name,
+                "low": self.low.to_array(),
+                "high": self.high.to_array(),
+                "cameras": cameras.collect::<Vec<_>>(),
+                "lights": scene.lights.iter().map(light).collect::<Vec<_>>(),
+                "materials": materials(scene),
+                "environment": scene.environment.as_ref().map(|Environment { strength, .. }| json!({"strength": strength})),
+            },
+            "layers": layers.collect::<Vec<_>>(),
+            "out": out,
+            "steers": steers,
+        })
+    }
+
+    /// A camera, and a place in its direction at about the distance of the scene's middle.
+    pub(super) fn camera(&self, camera: &Camera) -> Value {
+        let middle = 0.5 * (self.low + self.high);
+        let size = (self.high - self.low).length().max(1e-3);
+        let distance = (middle - camera.origin).dot(camera.forward).max(0.1 * size);
+        json!({
+            "position": camera.origin.to_array(),
+            "look_at": (camera.origin + distance * camera.forward).to_array(),
+            "fov": camera.vertical_fov.to_degrees(),
+        })
+    }
+}
+
+fn light(light: &PunctualLight) -> Value {
+    let (colour, strength) = light.colour();
+    let (kind, position) = match light.kind {
+        PunctualKind::Point { position } => ("point", Some(position.to_array())),
+        PunctualKind::Spot { position, .. } => ("spot", Some(position.to_array())),
+        PunctualKind::Directional { .. } => ("directional", None),
+    };
+    let unit = if position.is_some() { "W/sr" } else { "W/m^2" };
+    json!({
+        "name": light.name,
+        "kind": kind,
+        "colour": colour.to_array(),
+        "strength": strength,
+        "unit": unit,
+        "position": position,
+    })
+}
+
+/// Each material, once for its name, with the properties that can be set.
+fn materials(scene: &Scene) -> Vec<Value> {
+    let is_first = |index: usize, material: &Material| {
+        !scene.materials[..index].iter().any(|other| other.name == material.name)
+    };
+    let named = scene.materials.iter().enumerate().filter(|(index, material)| is_first(*index, material));
+    named.map(|(_, material)| json!({"name": material.name, "properties": properties(material)})).collect()
+}
+
+fn properties(material: &Material) -> Map<String, Value> {
+    let mut properties = Map::new();
+    let mut add = |name: &str, value: Value| {
+        properties.insert(name.to_owned(), value);
+    };
+    add("emission", json!(material.emission.to_array()));
+    add("alpha", json!(material.alpha));
+    match &material.reflection {
+        Reflection::Phong { diffuse, specular, exponent } => {
+            add("diffuse", json!(diffuse.to_array()));
+            add("specular", json!(specular.to_array()));
+            add("exponent", json!(exponent));
+        }
+        Reflection::MetallicRoughness { base_colour, metallic, roughness, transmission, .. } => {
+            add("diffuse", json!(base_colour.to_array()));
+            add("metallic", json!(metallic));
+            add("roughness", json!(roughness));
+            if let Some(transmission) = transmission {
+                add("transmission", json!(transmission.factor));
+                add("ior", json!(transmission.ior));
+            }
+        }
+    }
+    properties
+}
+
+/// Changes of the scene by pages.
+pub(super) fn changes(wish: &Wish) -> Value {
+    let change = |(name, value): &(String, Vec<f32>)| match value[..] {
+        [value] => json!({"name": name, "value": value}),
+        _ => json!({"name": name, "value": value}),
+    };
+    wish.edits().iter().map(change).collect()
+}
+
+/// Settings of the settled picture that pages can change, and others of interest.
+pub(super) fn settings(settings: &RenderSettings) -> Value {
+    let RenderSettings { photons, integrator, schedule, picture, .. } = settings;
+    json!({
+        "photons": photons.count,
+        "neighbors": photons.neighbors,
+        "spp": integrator.samples,
+        "gather_rays": integrator.gather_rays,
+        "shadow_rays": integrator.shadow_rays,
+        "sampling": integrator.sampling.name(),
+        "cache": integrator.irradiance_error.is_some(),
+        "order": schedule.order.name(),
+        "layers": picture.layers.to_string(),
+    })
+}
+
+/// Cost of the newest image and of the newest pass.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Cost {
+    /// Seconds of photons, of the rest of the image, of loading it and of rendering.
+    photons: f64,
+    pack: f64,
+    load: f64,
+    render: f64,
+    image_bytes: u64,
+    sent_bytes: u64,
+}
+
+impl Cost {
+    /// Adds a finished pass. Those of the image are those of the pass for which it was made.
+    pub(super) fn add(&mut self, statistics: &Statistics) {
+        let times = &statistics.time_s;
+        if times.photons > 0.0 {
+            (self.photons, self.pack, self.load) = (times.photons, times.pack, times.load);
+            self.sent_bytes = statistics.link.image_bytes.iter().sum();
+        }
+        self.render = times.render;
+        self.image_bytes = statistics.image_bytes;
+    }
+
+    pub(super) fn describe(&self) -> Value {
+        json!({
+            "seconds": {"photons": self.photons, "pack": self.pack, "load": self.load, "render": self.render},
+            "bytes": {"image": self.image_bytes},
+            "sent": self.sent_bytes,
+        })
+    }
+}

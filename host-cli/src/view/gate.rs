@@ -1,0 +1,204 @@
+//! Who may have what: checks of a request's address, its origin and its token.
+//!
+//! A page of another site must not reach the view. A browser states in `Host` which name it has looked up, so that a foreign name that
+//! leads here is refused (DNS rebinding); in `Origin` it states whose script asks for a connection; and only who has seen the printed
+//! address knows the token.
+
+use std::net::{IpAddr, SocketAddr};
+
+use super::http::{Head, Refusal};
+use super::page_files::{PageFile, page_file};
+
+/// Path of the page.
+const PAGE: &str = "/";
+/// Path of the WebSocket.
+const SOCKET: &str = "/socket";
+
+/// What a request may have.
+#[derive(Debug, PartialEq)]
+pub(super) enum Resource {
+    /// A file of the page.
+    File(&'static PageFile),
+    /// A WebSocket, by this key of the request.
+    Socket(String),
+}
+
+/// Checks of requests.
+pub(super) struct Gate {
+    address: SocketAddr,
+    token: String,
+}
+
+impl Gate {
+    /// Gate of a server at `address`, whose port is known.
+    pub(super) fn new(address: SocketAddr, token: String) -> Self {
+        Self { address, token }
+    }
+
+    /// Address of the page, with the token.
+    pub(super) fn url(&self) -> String {
+        let Self { address, token } = self;
+        format!("http://{address}{PAGE}?token={token}")
+    }
+
+    /// What a request may have.
+    ///
+    /// # Errors
+    /// If it may have nothing.
+    pub(super) fn check(&self, head: &Head) -> Result<Resource, Refusal> {
+        if head.method != "GET" {
+            return Err(Refusal::new(405, "Method Not Allowed", "only GET is answered"));
+        }
+        let host = head.one("host").filter(|host| self.is_own(host));
+        let host = host.ok_or(Refusal::forbidden("the request is for another host"))?;
+        let own_origin = format!("http://{host}");
+        let origins = head.all("origin");
+        if origins.iter().any(|origin| *origin != own_origin) {
+            return Err(Refusal::forbidden("the request comes from another site"));
+        }
+        let (path, query) = head.target.split_once('?').unwrap_or((&head.target, ""));
+        match path {
+            PAGE => {
+                self.check_token(query)?;
+                page_file("index.html").map(Resource::File)
+            }
+            SOCKET => {
+                self.check_token(query)?;
+                if origins.is_empty() {
+                    return Err(Refusal::forbidden("the request states no origin"));
+                }
+                head.socket_key().map(Resource::Socket)
+            }
+            // Files of the page hold nothing of the scene.
+            _ => page_file(&path[1.min(path.len())..]).map(Resource::File),
+        }
+        .ok_or(Refusal::new(404, "Not Found", "there is nothing at this address"))
+    }
+
+    /// Returns whether a name of a host is one of this server's: the address that it listens at, `localhost` on this machine, or
+    /// any address, but no name, if it listens at all of them.
+    fn is_own(&self, host: &str) -> bool {
+        let Self { address, .. } = self;
+        let name = match host.strip_suffix(&format!(":{}", address.port())) {
+            Some(name) => name,
+            None if address.port() == 80 => host,
+            None => return false,
+        };
+        let bare = name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
+        match bare.parse::<IpAddr>() {
+            Ok(named) => named == address.ip() || address.ip().is_unspecified(),
+            Err(_) => {
+                name.eq_ignore_ascii_case("localhost")
+                    && (address.ip().is_loopback() || address.ip().is_unspecified())
+            }
+        }
+    }
+
+    fn check_token(&self, query: &str) -> Result<(), Refusal> {
+        let given = query.split('&').find_map(|pair| pair.strip_prefix("token=")).unwrap_or_default();
+        let (given, token) = (given.as_bytes(), self.token.as_bytes());
+        // All bytes are compared, so that the time tells nothing of the token.
+        let differing = given.iter().zip(token).fold(0, |differing, (a, b)| differing | (a ^ b));
+        if given.len() == token.len() && differing == 0 {
+            return Ok(());
+        }
+        Err(Refusal::forbidden("the token is not that of this view: open the address that it has printed"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TOKEN: &str = "0123456789abcdef0123456789abcdef";
+
+    fn gate(address: &str) -> Gate {
+        Gate::new(address.parse().unwrap(), TOKEN.into())
+    }
+
+    /// Status of a request; 101 for a WebSocket.
+    fn status(gate: &Gate, target: &str, headers: &str) -> u16 {
+        let text = format!("GET {target} HTTP/1.1\r\n{headers}\r\n");
+        match Head::parse(text.as_bytes()).map(|head| gate.check(&head.unwrap())) {
+            Ok(Ok(Resource::File(_))) => 200,
+            Ok(Ok(Resource::Socket(_))) => 101,
+            Ok(Err(refusal)) | Err(refusal) => refusal.status,
+        }
+    }
+
+    #[test]
+    fn the_page_takes_its_host_and_the_token() {
+        let gate = gate("127.0.0.1:8080");
+        assert_eq!(gate.url(), format!("http://127.0.0.1:8080/?token={TOKEN}"));
+        let page = format!("/?token={TOKEN}");
+        for (target, headers, expected) in [
+            (&*page, "Host: 127.0.0.1:8080\r\n", 200),
+            (&*page, "host: LOCALHOST:8080\r\n", 200),
+            (&*page, "Host: 127.0.0.1:8080\r\nOrigin: http://127.0.0.1:8080\r\n", 200),
+            ("/main.js", "Host: 127.0.0.1:8080\r\n", 200),
+            ("/view.css?x", "Host: localhost:8080\r\n", 200),
+            (&*page, "", 403),
+            (&*page, "Host: 127.0.0.1\r\n", 403),
+            (&*page, "Host: 127.0.0.1:80\r\n", 403),
+            (&*page, "Host: 127.0.0.2:8080\r\n", 403),
+            (&*page, "Host: evil.example:8080\r\n", 403),
+            (&*page, "Host: 127.0.0.1.evil.example:8080\r\n", 403),
+            (&*page, "Host: 127.0.0.1:8080\r\nHost: evil.example\r\n", 403),
+            (&*page, "Host: 127.0.0.1:8080\r\nOrigin: http://evil.example\r\n", 403),
+            (&*page, "Host: 127.0.0.1:8080\r\nOrigin: null\r\n", 403),
+            ("/", "Host: 127.0.0.1:8080\r\n", 403),
+            ("/?token=", "Host: 127.0.0.1:8080\r\n", 403),
+            ("/?token=0123456789abcdef0123456789abcdee", "Host: 127.0.0.1:8080\r\n", 403),
+            ("/?token=0123456789abcdef0123456789abcdef0", "Host: 127.0.0.1:8080\r\n", 403),
+            ("/main.js", "Host: evil.example:8080\r\n", 403),
+            ("/absent.js", "Host: 127.0.0.1:8080\r\n", 404),
+            ("/../Cargo.toml", "Host: 127.0.0.1:8080\r\n", 404),
+            ("//", "Host: 127.0.0.1:8080\r\n", 404),
+            ("é", "Host: 127.0.0.1:8080\r\n", 400),
+            ("*", "Host: 127.0.0.1:8080\r\n", 404),
+        ] {
+            assert_eq!(status(&gate, target, headers), expected, "{target} {headers}");
+        }
+    }
+
+    #[test]
+    fn the_socket_takes_the_pages_own_origin_and_the_token() {
+        let gate = gate("127.0.0.1:8080");
+        let socket = format!("/socket?token={TOKEN}");
+        let upgrade = "Connection: keep-alive, Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
+                       Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+        let host = "Host: 127.0.0.1:8080\r\n";
+        for (target, headers, expected) in [
+            (&*socket, format!("{host}Origin: http://127.0.0.1:8080\r\n{upgrade}"), 101),
+            (&*socket, format!("Host: localhost:8080\r\nOrigin: http://localhost:8080\r\n{upgrade}"), 101),
+            (&*socket, format!("{host}{upgrade}"), 403),
+            (&*socket, format!("{host}Origin: http://evil.example\r\n{upgrade}"), 403),
+            (&*socket, format!("{host}Origin: http://localhost:8080\r\n{upgrade}"), 403),
+            (&*socket, format!("{host}Origin: http://127.0.0.1:8081\r\n{upgrade}"), 403),
+            (&*socket, format!("{host}Origin: https://127.0.0.1:8080\r\n{upgrade}"), 403),
+            (
+                &*socket,
+                format!("{host}Origin: http://127.0.0.1:8080\r\nOrigin: http://evil.example\r\n{upgrade}"),
+                403,
+            ),
+            ("/socket", format!("{host}Origin: http://127.0.0.1:8080\r\n{upgrade}"), 403),
+            (&*socket, format!("{host}Origin: http://127.0.0.1:8080\r\n"), 404),
+        ] {
+            assert_eq!(status(&gate, target, &headers), expected, "{target} {headers}");
+        }
+    }
+
+    #[test]
+    fn a_server_of_all_addresses_is_reached_by_addresses_and_not_by_names() {
+        let gate = gate("0.0.0.0:80");
+        for (host, is_own) in [
+            ("192.168.1.7", true),
+            ("[::1]:80", true),
+            ("localhost", true),
+            ("evil.example", false),
+            ("", false),
+        ] {
+            assert_eq!(gate.is_own(host), is_own, "{host}");
+        }
+    }
+}

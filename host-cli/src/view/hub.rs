@@ -1,0 +1,188 @@
+//! Where the threads of a view meet: its state under one lock, and a bell that rings at each change.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use photoncard_driver::exr::SampleFormat;
+use photoncard_driver::render::{NamedSettings, Rendering};
+use photoncard_driver::tone_mapping::ToneMapping;
+use serde_json::json;
+
+use super::pages::Outgoing;
+use super::request::Saving;
+use super::saving::Folder;
+use super::state::{Effect, PageNumber, Task, View};
+use crate::arguments::{PictureFormat, PictureOutput};
+use crate::console::printable_json;
+use crate::render::files::{Form, write_picture};
+
+/// The settled picture.
+pub(super) struct Settled {
+    pub(super) version: u32,
+    pub(super) rendering: Rendering,
+    pub(super) wish: super::wish::Wish,
+    /// Provenance of its pixels, with the names of the inputs.
+    pub(super) provenance: NamedSettings,
+}
+
+/// State of a view, for all threads.
+pub(super) struct Hub {
+    view: Mutex<View>,
+    /// Rings at each change.
+    changed: Condvar,
+    must_stop: AtomicBool,
+    /// Set by signals, and when no picture is rendered any more.
+    is_over: Arc<AtomicBool>,
+    is_card_back: AtomicBool,
+    settled: Mutex<Option<Arc<Settled>>>,
+    /// Held while a picture is saved.
+    folder: Mutex<Option<Folder>>,
+    start: Instant,
+}
+
+impl Hub {
+    pub(super) fn new(view: View, folder: Option<Folder>, is_over: Arc<AtomicBool>) -> Self {
+        Self {
+            view: Mutex::new(view),
+            changed: Condvar::new(),
+            must_stop: AtomicBool::new(false),
+            is_over,
+            is_card_back: AtomicBool::new(false),
+            settled: Mutex::new(None),
+            folder: Mutex::new(folder),
+            start: Instant::now(),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, View> {
+        self.view.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Changes the state, and tells all threads.
+    pub(super) fn change<T>(&self, act: impl FnOnce(&mut View, Duration) -> T) -> T {
+        let mut view = self.lock();
+        let result = act(&mut view, self.start.elapsed());
+        self.must_stop.store(view.must_stop(), Ordering::Relaxed);
+        drop(view);
+        self.changed.notify_all();
+        result
+    }
+
+    /// Returns whether the running work should stop.
+    pub(super) fn must_stop(&self) -> bool {
+        self.must_stop.load(Ordering::Relaxed) || self.is_over()
+    }
+
+    /// Returns whether the view is over.
+    pub(super) fn is_over(&self) -> bool {
+        self.is_over.load(Ordering::Relaxed)
+    }
+
+    /// Ends the view.
+    pub(super) fn end(&self) {
+        self.is_over.store(true, Ordering::Relaxed);
+        self.changed.notify_all();
+    }
+
+    /// Waits for the next work; `None` when the view is over.
+    pub(super) fn next_task(&self) -> Option<Task> {
+        /// Time in which the end of the view is noticed: a signal rings no bell.
+        const ATTENTION: Duration = Duration::from_millis(100);
+        let mut view = self.lock();
+        while !self.is_over() {
+            let now = self.start.elapsed();
+            let wait = match view.next(now) {
+                Ok(task) => {
+                    self.must_stop.store(false, Ordering::Relaxed);
+                    return Some(task);
+                }
+                Err(until) => until.map_or(ATTENTION, |until| until.saturating_sub(now).min(ATTENTION)),
+            };
+            view = self.changed.wait_timeout(view, wait).unwrap_or_else(PoisonError::into_inner).0;
+        }
+        None
+    }
+
+    /// Keeps a settled picture for saving.
+    pub(super) fn keep(&self, settled: Settled) {
+        *self.settled.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(settled));
+    }
+
+    /// Takes a message of a page. Returns whether its connection stays.
+    pub(super) fn receive(&self, page: PageNumber, text: &str) -> bool {
+        match self.change(|view, now| view.receive(page, text, now)) {
+            Effect::Nothing => true,
+            Effect::Close => false,
+            Effect::Save(saving) => {
+                let message = match self.save(&saving) {
+                    Ok(path) => json!({"type": "saved", "path": path.display().to_string()}),
+                    Err(text) => json!({"type": "error", "text": text}),
+                };
+                self.change(|view, _| view.reply(page, &message));
+                true
+            }
+        }
+    }
+
+    /// Saves the settled picture.
+    fn save(&self, saving: &Saving) -> Result<PathBuf, String> {
+        let version = self.lock().version();
+        let settled = self.settled.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let settled = settled.filter(|settled| settled.version == version);
+        let settled = settled.ok_or("the picture is not settled yet: save it when it is")?;
+        let mut folder = self.folder.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_over() {
+            return Err("the view is over".into());
+        }
+        let folder = folder.as_mut().ok_or("pictures are saved only by a view with --out DIR")?;
+        folder.save(&saving.name, |path, format| write(path, format, &settled, saving.tone))
+    }
+
+    /// Waits until no picture is being saved; none is from then on, as the view is over.
+    pub(super) fn finish_saving(&self) {
+        drop(self.folder.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// Waits for the next message to a page, at most for `longest`.
+    pub(super) fn next_message(
+        &self,
+        page: PageNumber,
+        longest: Duration,
+    ) -> Option<Result<String, Outgoing>> {
+        let begin = Instant::now();
+        let mut view = self.lock();
+        loop {
+            if let Some(message) = view.take(page) {
+                return Some(message);
+            }
+            let left = longest.saturating_sub(begin.elapsed());
+            if left.is_zero() || self.is_over() {
+                return None;
+            }
+            view = self.changed.wait_timeout(view, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Notes that a card elsewhere answers again.
+    pub(super) fn card_returns(&self, number: usize) {
+        self.is_card_back.store(true, Ordering::Relaxed);
+        self.change(|view, _| view.card_returns(number));
+    }
+
+    /// Returns whether a card has come back since the last call.
+    pub(super) fn take_card_back(&self) -> bool {
+        self.is_card_back.swap(false, Ordering::Relaxed)
+    }
+}
+
+/// Writes a picture as `photoncard render` does.
+fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMapping) -> Result<(), String> {
+    let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
+    let form =
+        Form { layers: settled.wish.settings.picture.layers.clone(), sample_type: SampleFormat::Float, tone };
+    let picture = PictureOutput { path: path.to_owned(), format };
+    let film = &settled.rendering.film;
+    write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.to_string())
+}

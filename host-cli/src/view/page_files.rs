@@ -1,0 +1,60 @@
+//! Files of the page, which the program holds.
+
+/// A file of the page.
+#[derive(Debug, PartialEq)]
+pub(super) struct PageFile {
+    name: &'static str,
+    /// Type of its contents.
+    pub(super) kind: &'static str,
+    pub(super) text: &'static str,
+}
+
+const HTML: &str = "text/html; charset=utf-8";
+const STYLE: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const DRAWING: &str = "image/svg+xml";
+
+macro_rules! files {
+    ($($kind:ident $name:literal),+ $(,)?) => {
+        [$(PageFile { name: $name, kind: $kind, text: include_str!(concat!("../../page/", $name)) }),+]
+    };
+}
+
+static FILES: &[PageFile] = &files![
+    HTML "index.html",
+    STYLE "view.css",
+    DRAWING "icon.svg",
+    SCRIPT "camera.js",
+    SCRIPT "connection.js",
+    SCRIPT "controls.js",
+    SCRIPT "display.js",
+    SCRIPT "exposure.js",
+    SCRIPT "fields.js",
+    SCRIPT "main.js",
+    SCRIPT "panel.js",
+    SCRIPT "picture.js",
+    SCRIPT "status.js",
+    SCRIPT "tiles.js",
+    SCRIPT "times.js",
+    SCRIPT "tone.js",
+];
+
+/// The file of a name.
+pub(super) fn page_file(name: &str) -> Option<&'static PageFile> {
+    FILES.iter().find(|file| file.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file of the folder that the table lacks would be missed by the page alone.
+    #[test]
+    fn the_table_has_every_file_of_the_page() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/page");
+        let names = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
+        for name in names {
+            assert!(page_file(name.to_str().unwrap()).is_some(), "{name:?}");
+        }
+    }
+}

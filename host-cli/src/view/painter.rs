@@ -1,0 +1,182 @@
+//! The thread that renders a view's pictures, one after another on the same cards.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::quality::Quality;
+use photoncard_driver::render::{CardError, Observer, Phase, RenderError, Renderer};
+use photoncard_driver::scene::{FixedScene, Scene};
+use photoncard_driver::sink::{FinishedTile, TileSink};
+use photoncard_shared::message::Tile;
+
+use super::canvas::Origin;
+use super::hub::{Hub, Settled};
+use super::refinement::{Outcome, Pass};
+use super::state::{Task, with_remedy};
+use crate::arguments::SceneOptions;
+use crate::input;
+
+/// Renders what pages wish for, until the view is over.
+pub(super) struct Painter<'a> {
+    hub: &'a Hub,
+    options: &'a SceneOptions,
+    quality: Quality,
+    renderer: Renderer,
+    scene: FixedScene<'static>,
+    /// Assignments that the scene has; `None` before the first picture.
+    assigned: Option<Vec<String>>,
+}
+
+impl<'a> Painter<'a> {
+    /// Painter of a scene before its assignments.
+    pub(super) fn new(hub: &'a Hub, scene: Scene, options: &'a SceneOptions, quality: Quality) -> Self {
+        Self { hub, options, quality, renderer: Renderer::default(), scene: scene.into(), assigned: None }
+    }
+
+    /// Renders until the view is over. A panic ends the view.
+    pub(super) fn run(mut self) {
+        let _end = EndOnDrop(self.hub);
+        while let Some(task) = self.hub.next_task() {
+            if self.hub.take_card_back() {
+                self.renderer.close_cards();
+            }
+            let done = self.assign(&task).and_then(|()| match task.work.pass {
+                Pass::Fit => self.fit(&task),
+                Pass::Coarse(_) | Pass::Full => self.render(&task),
+            });
+            if let Err(error) = done {
+                self.fail(&task, &error);
+            }
+        }
+    }
+
+    /// Gives the scene the materials and lights of a task.
+    fn assign(&mut self, task: &Task) -> Result<(), RenderError> {
+        let assignments = task.wish.assignments();
+        if self.assigned.as_ref() == Some(&assignments) {
+            return Ok(());
+        }
+        self.assigned = None;
+        let mut scene = std::mem::replace(&mut self.scene, Scene::default().into()).into_scene();
+        let applied = self.hub.change(|view, _| view.apply(&task.wish, &mut scene));
+        self.scene = scene.into();
+        applied?;
+        self.assigned = Some(assignments);
+        Ok(())
+    }
+
+    fn fit(&self, task: &Task) -> Result<(), RenderError> {
+        let easel = Easel::new(self.hub, task);
+        let packed = PackedScene::new(&self.scene)?;
+        let fit = self.quality.fit(&self.scene, &packed, &task.settings, &easel)?;
+        self.hub.change(|view, now| view.fit(task, fit.as_ref(), now));
+        Ok(())
+    }
+
+    fn render(&mut self, task: &Task) -> Result<(), RenderError> {
+        let easel = Easel::new(self.hub, task);
+        let rendering = self.renderer.render_fixed(&self.scene, &task.settings, &easel)?;
+        let statistics = rendering.statistics.clone();
+        if task.work.pass == Pass::Full {
+            let mut provenance = statistics.provenance.pixels.clone();
+            let assignments = task.wish.assignments();
+            provenance.extend(input::provenance(&SceneOptions { assignments, ..self.options.clone() }));
+            let wish = task.wish.clone();
+            self.hub.keep(Settled { version: task.work.version, rendering, wish, provenance });
+        }
+        self.hub.change(|view, now| view.finish(task, Outcome::Done, Some(&statistics), now));
+        Ok(())
+    }
+
+    fn fail(&self, task: &Task, error: &RenderError) {
+        self.hub.change(|view, now| {
+            let outcome = match error {
+                RenderError::Stopped => Outcome::Stopped,
+                error if error.is_input() => {
+                    view.tell_error(&with_remedy(error));
+                    Outcome::Refused
+                }
+                RenderError::Card { card, source } => {
+                    view.lose_card(card, source.to_string(), now);
+                    view.tell_error(&format!("no card is left: {error}; the view goes on when one returns"));
+                    Outcome::NoCard
+                }
+                error => {
+                    view.tell_error(&with_remedy(error));
+                    Outcome::NoCard
+                }
+            };
+            view.finish(task, outcome, None, now);
+        });
+    }
+}
+
+/// Guard that ends the view when its painter does.
+struct EndOnDrop<'a>(&'a Hub);
+
+impl Drop for EndOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.end();
+    }
+}
+
+/// Observer of one pass, which shows its tiles.
+struct Easel<'a> {
+    hub: &'a Hub,
+    origin: Origin,
+    is_fit: bool,
+    is_preparing: AtomicBool,
+    /// Name of the card of each tile between its report and its pixels.
+    cards: Mutex<HashMap<u32, String>>,
+}
+
+impl<'a> Easel<'a> {
+    fn new(hub: &'a Hub, task: &Task) -> Self {
+        Self {
+            hub,
+            origin: task.origin,
+            is_fit: task.work.pass == Pass::Fit,
+            is_preparing: AtomicBool::new(false),
+            cards: Mutex::default(),
+        }
+    }
+}
+
+impl Observer for Easel<'_> {
+    fn progress(&self, phase: Phase, _: u64, _: u64) {
+        let is_preparing = matches!(phase, Phase::Photons | Phase::Pack) && !self.is_fit;
+        if self.is_preparing.swap(is_preparing, Ordering::Relaxed) != is_preparing {
+            self.hub.change(|view, _| view.prepares(is_preparing));
+        }
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.hub.must_stop()
+    }
+
+    fn lost(&self, card: &str, error: &CardError) {
+        self.hub.change(|view, now| view.lose_card(card, error.to_string(), now));
+    }
+
+    fn rendered(&self, card: &str, tile: &Tile) {
+        self.cards.lock().unwrap_or_else(PoisonError::into_inner).insert(tile.id, card.to_owned());
+    }
+
+    fn tiles(&self) -> Option<&dyn TileSink> {
+        Some(self)
+    }
+}
+
+impl TileSink for Easel<'_> {
+    fn put(&self, tile: &FinishedTile) {
+        let id = tile.tile().id;
+        let card = self.cards.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        self.hub.change(|view, _| view.put(self.origin, card.as_deref().unwrap_or_default(), tile));
+    }
+
+    fn revoke(&self, tile: &Tile) {
+        self.hub.change(|view, _| view.revoke(self.origin, tile.id));
+    }
+}

@@ -1,0 +1,41 @@
+//! Settings of each pass.
+
+use photoncard_driver::render::{Filter, Integrator, RenderSettings, Sampling};
+
+/// Number of pixels up to which a coarse picture gathers for each of them; beyond, interpolating irradiance is faster.
+const FEW_PIXELS: u64 = 1 << 12;
+/// Gather rays of a pixel, and of an irradiance record.
+const RAYS: [u32; 2] = [6, 32];
+/// Relative error of interpolated irradiance.
+const IRRADIANCE_ERROR: f32 = 0.5;
+
+/// Settings of a coarse picture, a pixel for each square of `step` x `step`. The photon maps are those of the settled picture: none is
+/// traced anew. Few rays are best sent by the reflection alone, which takes no search of photons for a table of directions.
+pub(super) fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
+    settings.clone().with(|settings| {
+        let picture = &mut settings.picture;
+        let Integrator { gather_rays, shadow_rays, irradiance_error, .. } = settings.integrator;
+        [picture.width, picture.height] = [picture.width, picture.height].map(|side| side.div_ceil(step));
+        let is_small = u64::from(picture.width) * u64::from(picture.height) <= FEW_PIXELS;
+        picture.filter = Filter::Box;
+        let [of_pixel, of_record] = RAYS.map(|rays| rays.min(gather_rays));
+        let error = irradiance_error.unwrap_or(IRRADIANCE_ERROR).max(IRRADIANCE_ERROR);
+        settings.integrator = Integrator {
+            samples: 1,
+            gather_rays: if is_small { of_pixel } else { of_record },
+            shadow_rays: shadow_rays.min(1),
+            sampling: Sampling::Reflection,
+            irradiance_error: (!is_small && gather_rays > 0).then_some(error),
+            ..settings.integrator
+        };
+        settings.cards.verify = None;
+    })
+}
+
+/// Settings of the settled picture, with tiles near `focus` first.
+pub(super) fn full(settings: &RenderSettings, focus: Option<[u32; 2]>) -> RenderSettings {
+    settings.clone().with(|settings| {
+        let middle = [settings.picture.width / 2, settings.picture.height / 2];
+        settings.schedule.focus = Some(focus.unwrap_or(middle));
+    })
+}

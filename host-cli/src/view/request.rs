@@ -1,0 +1,303 @@
+//! Messages of a page: JSON, of which every name and number is checked.
+
+use photoncard_driver::choice::Choice;
+use photoncard_driver::layer::Layer;
+use photoncard_driver::render::Sampling;
+use photoncard_driver::scheduler::GatherOrder;
+use photoncard_driver::tone_mapping::{ToneCurve, ToneMapping};
+use serde_json::{Map, Value};
+
+use super::canvas::Shown;
+
+/// Maximum side of a picture, pixels.
+pub(super) const MAX_SIDE: u64 = 4096;
+/// Maximum number of pixels of a picture: the tiles of two pictures are held at most.
+pub(super) const MAX_PIXELS: u64 = 1 << 22;
+/// Maximum distance of a place from the origin along each axis, metres.
+const MAX_PLACE: f64 = 1e15;
+/// Maximum of an exposure and of its negative, stops.
+const MAX_STOPS: f64 = 120.0;
+/// Maximum length of a name, bytes.
+const MAX_NAME: usize = 1024;
+
+/// A page's message.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Request {
+    Camera {
+        position: [f32; 3],
+        look_at: [f32; 3],
+        fov: f32,
+        is_moving: bool,
+    },
+    Set {
+        name: String,
+        value: Vec<f32>,
+    },
+    Setting(Setting),
+    Reset,
+    Layer(Shown),
+    Size([u32; 2]),
+    Cursor(Option<[u32; 2]>),
+    Pick([u32; 2]),
+    Save(Saving),
+    /// Bytes of tiles that the page has received since it connected.
+    Shown(u64),
+    Steer,
+}
+
+/// A picture that is to be saved.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Saving {
+    pub(super) name: String,
+    /// Tone mapping of a PNG.
+    pub(super) tone: ToneMapping,
+}
+
+/// A setting of the render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Setting {
+    Photons(usize),
+    Samples(u32),
+    GatherRays(u32),
+    Order(GatherOrder),
+    Cache(bool),
+    Sampling(Sampling),
+}
+
+/// A message that cannot be used.
+#[derive(Debug, PartialEq)]
+pub(super) enum Fault {
+    /// It is not of the protocol: the connection is to be closed.
+    Foreign,
+    /// The reason, for the page.
+    Refused(String),
+}
+
+impl From<String> for Fault {
+    fn from(reason: String) -> Self {
+        Self::Refused(reason)
+    }
+}
+
+/// Reads a message, and its number if it has one.
+pub(super) fn parse(text: &str) -> Result<(Request, Option<u64>), Fault> {
+    let Ok(Value::Object(message)) = serde_json::from_str(text) else { return Err(Fault::Foreign) };
+    let number = message.get("id").and_then(Value::as_u64);
+    Ok((request(&Fields(&message))?, number))
+}
+
+fn request(fields: &Fields) -> Result<Request, Fault> {
+    Ok(match fields.text("type")?.as_str() {
+        "camera" => Request::Camera {
+            position: fields.place("position")?,
+            look_at: fields.place("look_at")?,
+            fov: fields.number("fov", 1e-3, 179.999)? as f32,
+            is_moving: fields.switch("moving")?,
+        },
+        "set" => Request::Set { name: fields.text("name")?, value: fields.values("value")? },
+        "setting" => Request::Setting(setting(fields)?),
+        "reset" => Request::Reset,
+        "layer" => Request::Layer(layer(&fields.text("name")?)?),
+        "size" => Request::Size(fields.size()?),
+        "cursor" if fields.0.get("at") == Some(&Value::Null) => Request::Cursor(None),
+        "cursor" => Request::Cursor(Some(fields.pixel("at")?)),
+        "pick" => Request::Pick(fields.pixel("at")?),
+        "save" => Request::Save(Saving { name: fields.text("name")?, tone: fields.tone()? }),
+        "shown" => Request::Shown(fields.whole("bytes", u64::MAX)?),
+        "steer" => Request::Steer,
+        other => return Err(Fault::Refused(format!("there is no message of the type {other:?}"))),
+    })
+}
+
+fn layer(name: &str) -> Result<Shown, String> {
+    let known = Layer::ALL.into_iter().find(|layer| layer.name() == name).map(Shown::Layer);
+    let known = known.or((name == "radiance").then_some(Shown::Radiance));
+    known.ok_or_else(|| format!("there is no layer {name:?}"))
+}
+
+fn setting(fields: &Fields) -> Result<Setting, String> {
+    let whole = || fields.whole("value", u64::from(u32::MAX));
+    let name = fields.text("name")?;
+    Ok(match name.as_str() {
+        "photons" => Setting::Photons(whole()? as usize),
+        "spp" => Setting::Samples(whole()? as u32),
+        "gather_rays" => Setting::GatherRays(whole()? as u32),
+        "order" => Setting::Order(Choice::of_name(&fields.text("value")?)?),
+        "cache" => Setting::Cache(fields.switch("value")?),
+        "sampling" => Setting::Sampling(Choice::of_name(&fields.text("value")?)?),
+        _ => return Err(format!("there is no setting {name:?}")),
+    })
+}
+
+/// Fields of a message.
+struct Fields<'a>(&'a Map<String, Value>);
+
+impl Fields<'_> {
+    fn field(&self, name: &str) -> Result<&Value, String> {
+        self.0.get(name).ok_or_else(|| format!("the message lacks {name:?}"))
+    }
+
+    fn text(&self, name: &str) -> Result<String, String> {
+        let text = self.field(name)?.as_str().filter(|text| text.len() <= MAX_NAME);
+        text.map(str::to_owned).ok_or_else(|| format!("{name:?} is a text of at most {MAX_NAME} bytes"))
+    }
+
+    fn switch(&self, name: &str) -> Result<bool, String> {
+        self.field(name)?.as_bool().ok_or_else(|| format!("{name:?} is true or false"))
+    }
+
+    fn number(&self, name: &str, least: f64, most: f64) -> Result<f64, String> {
+        let number = self.field(name)?.as_f64().filter(|number| (least..=most).contains(number));
+        number.ok_or_else(|| format!("{name:?} is a number from {least} to {most}"))
+    }
+
+    fn whole(&self, name: &str, most: u64) -> Result<u64, String> {
+        let number = self.field(name)?.as_u64().filter(|number| *number <= most);
+        number.ok_or_else(|| format!("{name:?} is a whole number from 0 to {most}"))
+    }
+
+    /// Finite numbers of single precision: one, or those of a list.
+    fn values(&self, name: &str) -> Result<Vec<f32>, String> {
+        let number =
+            |value: &Value| value.as_f64().map(|number| number as f32).filter(|number| number.is_finite());
+        let values = match self.field(name)? {
+            Value::Array(list) if list.len() == 3 => list.iter().map(number).collect(),
+            value => number(value).map(|number| vec![number]),
+        };
+        values.ok_or_else(|| format!("{name:?} is a number, or a list of three"))
+    }
+
+    /// Tone mapping; what is not stated is the default.
+    fn tone(&self) -> Result<ToneMapping, String> {
+        let is_stated = |name: &str| self.0.get(name).is_some_and(|value| !value.is_null());
+        let stops = || self.number("exposure", -MAX_STOPS, MAX_STOPS);
+        let exposure = is_stated("exposure").then(stops).transpose()?.map(|stops| stops as f32);
+        let curve = is_stated("tonemap").then(|| ToneCurve::of_name(&self.text("tonemap")?)).transpose()?;
+        Ok(ToneMapping { exposure, curve: curve.unwrap_or_default() })
+    }
+
+    fn place(&self, name: &str) -> Result<[f32; 3], String> {
+        let list = self.field(name)?.as_array().filter(|list| list.len() == 3);
+        let number = |value: &Value| {
+            value.as_f64().filter(|number| number.abs() <= MAX_PLACE).map(|number| number as f32)
+        };
+        let numbers: Option<Vec<f32>> = list.and_then(|list| list.iter().map(number).collect());
+        let place = numbers.and_then(|numbers| numbers.try_into().ok());
+        place.ok_or_else(|| format!("{name:?} is a place: a list of three numbers of metres"))
+    }
+
+    fn pixel(&self, name: &str) -> Result<[u32; 2], String> {
+        let list = self.field(name)?.as_array().filter(|list| list.len() == 2);
+        let number =
+            |value: &Value| value.as_u64().filter(|number| *number < MAX_SIDE).map(|number| number as u32);
+        let numbers: Option<Vec<u32>> = list.and_then(|list| list.iter().map(number).collect());
+        let pixel = numbers.and_then(|numbers| numbers.try_into().ok());
+        pixel.ok_or_else(|| format!("{name:?} is a pixel: a list of two whole numbers below {MAX_SIDE}"))
+    }
+
+    fn size(&self) -> Result<[u32; 2], String> {
+        let list = self.field("size")?.as_array().filter(|list| list.len() == 2);
+        let number = |value: &Value| value.as_u64().filter(|side| (1..=MAX_SIDE).contains(side));
+        let sides: Option<Vec<u64>> = list.and_then(|list| list.iter().map(number).collect());
+        match sides.as_deref() {
+            Some(&[width, height]) if width * height <= MAX_PIXELS => Ok([width as u32, height as u32]),
+            _ => Err(format!(
+                "a size is a list of two whole numbers from 1 to {MAX_SIDE}, {MAX_PIXELS} pixels in all"
+            )),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_read() {
+        for (text, request) in [
+            (
+                r#"{"type":"camera","position":[1,2.5,-3],"look_at":[0,0,0],"fov":40,"moving":true}"#,
+                Request::Camera { position: [1.0, 2.5, -3.0], look_at: [0.0; 3], fov: 40.0, is_moving: true },
+            ),
+            (
+                r#"{"type":"set","name":"a.b","value":2}"#,
+                Request::Set { name: "a.b".into(), value: vec![2.0] },
+            ),
+            (r#"{"type":"setting","name":"cache","value":false}"#, Request::Setting(Setting::Cache(false))),
+            (
+                r#"{"type":"setting","name":"order","value":"hash"}"#,
+                Request::Setting(Setting::Order(GatherOrder::Hash)),
+            ),
+            (r#"{"type":"layer","name":"radiance"}"#, Request::Layer(Shown::Radiance)),
+            (r#"{"type":"layer","name":"N"}"#, Request::Layer(Shown::Layer(Layer::Normal))),
+            (r#"{"type":"size","size":[640,480]}"#, Request::Size([640, 480])),
+            (r#"{"type":"cursor","at":null}"#, Request::Cursor(None)),
+            (r#"{"type":"pick","at":[3,4]}"#, Request::Pick([3, 4])),
+            (r#"{"type":"shown","version":3,"bytes":77}"#, Request::Shown(77)),
+        ] {
+            assert_eq!(parse(text), Ok((request, None)), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_picture_is_saved_as_it_is_shown() {
+        let saved = |exposure, curve| {
+            let tone = ToneMapping { exposure, curve };
+            Ok((Request::Save(Saving { name: "a.png".into(), tone }), Some(7)))
+        };
+        for (more, saving) in [
+            ("", saved(None, ToneCurve::Reinhard)),
+            (r#","exposure":null,"tonemap":"none""#, saved(None, ToneCurve::None)),
+            (r#","exposure":-1.5,"tonemap":"aces""#, saved(Some(-1.5), ToneCurve::Aces)),
+        ] {
+            assert_eq!(parse(&format!(r#"{{"type":"save","id":7,"name":"a.png"{more}}}"#)), saving, "{more}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_message_is_foreign() {
+        for text in ["", "hello", "[1]", "3", "null", "{", &"[".repeat(10_000)] {
+            assert_eq!(parse(text), Err(Fault::Foreign), "{text:.20}");
+        }
+    }
+
+    #[test]
+    fn messages_that_cannot_be_used_are_refused_with_a_reason() {
+        let camera = |position: &str, fov: &str| {
+            format!(
+                r#"{{"type":"camera","position":{position},"look_at":[0,0,0],"fov":{fov},"moving":false}}"#
+            )
+        };
+        for (text, said) in [
+            ("{}".to_owned(), "type"),
+            (r#"{"type":"run"}"#.into(), "run"),
+            (camera("[0,0]", "40"), "position"),
+            (camera("[0,0,1e30]", "40"), "position"),
+            (camera("[0,0,\"1\"]", "40"), "position"),
+            (camera("[0,0,1]", "0"), "fov"),
+            (camera("[0,0,1]", "180"), "fov"),
+            (camera("[0,0,1]", "null"), "fov"),
+            (r#"{"type":"set","name":"a.b","value":1e39}"#.into(), "value"),
+            (r#"{"type":"set","name":"a.b","value":[1,2]}"#.into(), "value"),
+            (format!(r#"{{"type":"set","name":"{}","value":1}}"#, "a".repeat(2000)), "name"),
+            (r#"{"type":"setting","name":"spp","value":-1}"#.into(), "value"),
+            (r#"{"type":"setting","name":"spp","value":1.5}"#.into(), "value"),
+            (r#"{"type":"setting","name":"order","value":"best"}"#.into(), "best"),
+            (r#"{"type":"setting","name":"cards","value":9}"#.into(), "cards"),
+            (r#"{"type":"layer","name":"beauty"}"#.into(), "beauty"),
+            (r#"{"type":"size","size":[0,5]}"#.into(), "size"),
+            (r#"{"type":"size","size":[4096,4096]}"#.into(), "size"),
+            (r#"{"type":"size","size":[5000,1]}"#.into(), "size"),
+            (r#"{"type":"pick","at":[-1,0]}"#.into(), "at"),
+            (r#"{"type":"pick","at":[4096,0]}"#.into(), "at"),
+            (r#"{"type":"shown","bytes":-3}"#.into(), "bytes"),
+            (r#"{"type":"save","name":"a.png","exposure":1e9}"#.into(), "exposure"),
+            (r#"{"type":"save","name":"a.png","tonemap":"best"}"#.into(), "best"),
+        ] {
+            match parse(&text) {
+                Err(Fault::Refused(reason)) => assert!(reason.contains(said), "{text}: {reason}"),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+    }
+}

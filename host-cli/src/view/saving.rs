@@ -1,0 +1,157 @@
+//! Pictures that pages save: plain names in one folder, and never in place of a file that the view has not written.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::arguments::PictureFormat;
+
+/// Maximum length of a name, bytes.
+const MAX_NAME: usize = 100;
+/// Names that devices have on Windows, with any ending.
+const DEVICES: [&str; 6] = ["aux", "con", "nul", "prn", "conin$", "conout$"];
+
+/// The folder of saved pictures.
+pub(super) struct Folder {
+    path: PathBuf,
+    /// Names of pictures that were saved, in lower case.
+    saved: BTreeSet<String>,
+}
+
+impl Folder {
+    /// A folder that exists.
+    pub(super) fn new(path: &Path) -> std::io::Result<Self> {
+        let path = fs::canonicalize(path)?;
+        if !path.is_dir() {
+            return Err(std::io::Error::new(std::io::ErrorKind::NotADirectory, "it is no folder"));
+        }
+        Ok(Self { path, saved: BTreeSet::new() })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Saves a picture by `write`, which writes it whole or not at all. Returns its path.
+    ///
+    /// # Errors
+    /// If the name is no plain name, there is another file of the name, or the picture cannot be written.
+    pub(super) fn save(
+        &mut self,
+        name: &str,
+        write: impl FnOnce(&Path, PictureFormat) -> Result<(), String>,
+    ) -> Result<PathBuf, String> {
+        let format = format_of(name)?;
+        let path = self.path.join(name);
+        let is_own = self.saved.contains(&name.to_ascii_lowercase());
+        match fs::symlink_metadata(&path) {
+            Ok(found) if !found.is_file() || !is_own => {
+                return Err(format!("{name} is there already, and not of this view: choose another name"));
+            }
+            _ => {}
+        }
+        write(&path, format)?;
+        self.saved.insert(name.to_ascii_lowercase());
+        Ok(path)
+    }
+}
+
+/// Format of a picture by its name, which must be plain.
+fn format_of(name: &str) -> Result<PictureFormat, String> {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-. ".contains(&byte);
+    let begins_plainly =
+        name.bytes().next().is_some_and(|first| first.is_ascii_alphanumeric() || first == b'_');
+    if !begins_plainly || name.len() > MAX_NAME || !name.bytes().all(is_plain) {
+        return Err(format!(
+            "a name has letters, digits, spaces and _-. alone, begins with a letter or a digit, and is at most {MAX_NAME} bytes long"
+        ));
+    }
+    let lower = name.to_ascii_lowercase();
+    let stem = lower.split('.').next().unwrap_or_default().trim_end();
+    let is_port = (stem.len() == 4) && ["com", "lpt"].iter().any(|port| stem.starts_with(port));
+    if is_port || DEVICES.contains(&stem) {
+        return Err(format!("{stem} is a name of a device: choose another name"));
+    }
+    match lower.rsplit_once('.') {
+        Some((_, "exr")) => Ok(PictureFormat::Exr),
+        Some((_, "png")) => Ok(PictureFormat::Png),
+        _ => Err("a picture ends in .exr, linear radiance, or .png, tone-mapped".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn write(path: &Path, _: PictureFormat) -> Result<(), String> {
+        fs::write(path, b"picture").map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn plain_names_are_saved_in_the_folder_and_again() {
+        let room = tempfile::tempdir().unwrap();
+        let mut folder = Folder::new(room.path()).unwrap();
+        for name in ["picture.exr", "A view 2.PNG", "picture.exr"] {
+            assert_eq!(folder.save(name, write), Ok(folder.path().join(name)));
+        }
+    }
+
+    #[test]
+    fn other_names_are_refused() {
+        let room = tempfile::tempdir().unwrap();
+        let mut folder = Folder::new(room.path()).unwrap();
+        let long = format!("{}.exr", "a".repeat(100));
+        for name in [
+            "",
+            ".exr",
+            "../a.exr",
+            "/tmp/a.exr",
+            "a/b.exr",
+            "a\\b.exr",
+            "C:a.exr",
+            "a.exr\0",
+            "a\n.exr",
+            "-o.exr",
+            "a",
+            "a.jpg",
+            "a.exr/",
+            "con.png",
+            "LPT1.exr",
+            "ä.exr",
+            " a.exr",
+            &long,
+        ] {
+            assert!(folder.save(name, |_, _| panic!("{name} is written")).is_err(), "{name}");
+        }
+        assert_eq!(fs::read_dir(room.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn files_of_others_stay() {
+        let room = tempfile::tempdir().unwrap();
+        let mut folder = Folder::new(room.path()).unwrap();
+        fs::write(room.path().join("own.exr"), b"mine").unwrap();
+        fs::create_dir(room.path().join("folder.exr")).unwrap();
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(room.path().join("elsewhere"), room.path().join("link.exr")).unwrap();
+        for name in ["own.exr", "folder.exr", "link.exr"] {
+            let is_there = fs::symlink_metadata(room.path().join(name)).is_ok();
+            assert_eq!(folder.save(name, write).is_err(), is_there, "{name}");
+        }
+        assert_eq!(fs::read(room.path().join("own.exr")).unwrap(), b"mine");
+        assert!(!room.path().join("elsewhere").exists());
+    }
+
+    #[test]
+    fn a_saved_picture_that_became_a_link_is_not_followed() {
+        let room = tempfile::tempdir().unwrap();
+        let mut folder = Folder::new(room.path()).unwrap();
+        folder.save("a.exr", write).unwrap();
+        fs::remove_file(room.path().join("a.exr")).unwrap();
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(room.path().join("other"), room.path().join("a.exr")).unwrap();
+            assert!(folder.save("a.exr", write).is_err());
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! A page's WebSocket: a thread that reads, and one that writes. Frames of either are written whole, under one lock.
+
+use std::io::{Read, Write};
+use std::net::{Shutdown, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::{Error, Message, WebSocket};
+
+use super::hub::Hub;
+use super::pages::Outgoing;
+use super::state::PageNumber;
+
+/// Maximum size of a page's message, bytes.
+const MAX_MESSAGE: usize = 64 << 10;
+/// Time without a message after which a page is pinged.
+const PING: Duration = Duration::from_secs(10);
+/// Time without a byte after which a page is gone: it answers pings.
+const SILENCE: Duration = Duration::from_secs(40);
+/// Time without progress after which a page that does not read is gone.
+const STALLED: Duration = Duration::from_secs(20);
+
+/// Attends to a page until its connection ends.
+pub(super) fn attend(stream: TcpStream, hub: &Arc<Hub>) -> std::io::Result<()> {
+    stream.set_read_timeout(Some(SILENCE))?;
+    stream.set_write_timeout(Some(STALLED))?;
+    let pipe = Pipe { stream: Arc::new(stream), lock: Arc::default() };
+    let writing = pipe.clone();
+    let page = hub.change(|view, _| view.connect());
+    let is_open = AtomicBool::new(true);
+    std::thread::scope(|scope| {
+        let writer = || {
+            // A page that is gone ends both threads.
+            let _ = write(writing, page, hub, &is_open);
+            let _ = pipe.stream.shutdown(Shutdown::Both);
+        };
+        let spawned = std::thread::Builder::new().name("page writer".into()).spawn_scoped(scope, writer);
+        if spawned.is_ok() {
+            let _ = read(pipe.clone(), page, hub);
+        }
+        is_open.store(false, Ordering::Relaxed);
+        let _ = pipe.stream.shutdown(Shutdown::Both);
+        hub.change(|view, _| view.disconnect(page));
+    });
+    Ok(())
+}
+
+fn read(pipe: Pipe, page: PageNumber, hub: &Hub) -> Result<(), Error> {
+    let config = WebSocketConfig::default()
+        .max_message_size(Some(MAX_MESSAGE))
+        .max_frame_size(Some(MAX_MESSAGE))
+        .read_buffer_size(MAX_MESSAGE);
+    let mut socket = WebSocket::from_raw_socket(pipe, Role::Server, Some(config));
+    while !hub.is_over() {
+        let stays = match socket.read()? {
+            Message::Text(text) => hub.receive(page, &text),
+            Message::Binary(_) => false,
+            _ => true,
+        };
+        if !stays {
+            socket.close(None)?;
+            socket.flush()?;
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn write(pipe: Pipe, page: PageNumber, hub: &Hub, is_open: &AtomicBool) -> Result<(), Error> {
+    let mut socket = WebSocket::from_raw_socket(pipe, Role::Server, None);
+    while is_open.load(Ordering::Relaxed) && !hub.is_over() {
+        socket.send(match hub.next_message(page, PING) {
+            None => Message::Ping(tungstenite::Bytes::new()),
+            Some(Ok(text)) => Message::text(text),
+            Some(Err(Outgoing::Tile(patch, shown))) => Message::binary(patch.message(shown)),
+            Some(Err(_)) => continue,
+        })?;
+    }
+    Ok(())
+}
+
+/// One end of a connection for two threads: each write is done as a whole.
+#[derive(Clone)]
+struct Pipe {
+    stream: Arc<TcpStream>,
+    lock: Arc<Mutex<()>>,
+}
+
+impl Read for Pipe {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        (&*self.stream).read(buffer)
+    }
+}
+
+impl Write for Pipe {
+    /// Writes all bytes: the frames that are written at once.
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let _whole = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        (&*self.stream).write_all(bytes)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        (&*self.stream).flush()
+    }
+}

@@ -1,0 +1,472 @@
+//! State of a view: wishes, their pictures, and pages. Without threads, clock or input and output, which are in [`super::hub`].
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use glam::Vec3;
+use photoncard_driver::layer::Layers;
+use photoncard_driver::quality::{Fit, Quality, Stated};
+use photoncard_driver::render::{RenderError, RenderSettings, Statistics};
+use photoncard_driver::scene::Scene;
+use photoncard_driver::sink::FinishedTile;
+use serde_json::{Value, json};
+
+use super::canvas::{Canvas, Origin, Patch, Shown};
+use super::cards::CardBoard;
+use super::command_line;
+use super::describe::{self, Cost, SceneFacts};
+use super::pages::{Outgoing, Page, Revisions};
+use super::passes;
+use super::refinement::{COARSEST, Next, Outcome, Pass, Refinement, Work};
+use super::request::{Fault, Request, Saving, parse};
+use super::wish::{Sketch, Wish};
+use crate::arguments::SceneOptions;
+
+/// Number of a page.
+pub(super) type PageNumber = u64;
+
+/// What a view is made of.
+pub(super) struct Start {
+    pub(super) options: SceneOptions,
+    pub(super) quality: Quality,
+    pub(super) stated: Stated,
+    pub(super) wish: Wish,
+    pub(super) sketch: Sketch,
+    pub(super) facts: SceneFacts,
+    /// Returns whether the size of the picture is stated, rather than left to the page's window.
+    pub(super) is_size_stated: bool,
+    /// Folder in which pages may save pictures.
+    pub(super) out: Option<String>,
+}
+
+/// Work with all that it needs.
+pub(super) struct Task {
+    pub(super) work: Work,
+    pub(super) wish: Wish,
+    /// Settings of the pass; of [`Pass::Fit`] those of the wish.
+    pub(super) settings: RenderSettings,
+    pub(super) origin: Origin,
+}
+
+/// What a page's message asks of the caller.
+#[derive(Debug, PartialEq)]
+pub(super) enum Effect {
+    Nothing,
+    /// The settled picture is to be saved by this name.
+    Save(Saving),
+    /// The connection is to be closed.
+    Close,
+}
+
+/// State of a view.
+pub(super) struct View {
+    start: Start,
+    wish: Wish,
+    /// Materials and lights of the wish, and the file's cameras.
+    scene: Scene,
+    /// The same of the first wish, to which `reset` returns.
+    first: Scene,
+    refinement: Refinement,
+    canvas: Canvas,
+    /// Pass of the newest wish that was finished last.
+    done: Option<Origin>,
+    cost: Cost,
+    /// Pixel that tiles near to are rendered first.
+    cursor: Option<[u32; 2]>,
+    pub(super) cards: CardBoard,
+    pages: BTreeMap<PageNumber, Page>,
+    next_page: PageNumber,
+    steering: Option<PageNumber>,
+    /// Number of the last message of the page that steers.
+    message: u64,
+    revisions: Revisions,
+}
+
+impl View {
+    /// A view without pages.
+    ///
+    /// # Errors
+    /// If the first wish is not possible.
+    pub(super) fn new(start: Start) -> Result<Self, RenderError> {
+        let wish = start.wish.clone();
+        let is_fitted = start.stated == Stated::ALL || start.quality == Quality::Paper;
+        Ok(Self {
+            first: start.sketch.with(&wish)?,
+            scene: start.sketch.with(&wish)?,
+            cards: CardBoard::new(&wish.settings.cards),
+            wish,
+            start,
+            refinement: Refinement::new(is_fitted),
+            canvas: Canvas::default(),
+            done: None,
+            cost: Cost::default(),
+            cursor: None,
+            pages: BTreeMap::new(),
+            next_page: 0,
+            steering: None,
+            message: 0,
+            revisions: Revisions { state: 1, cards: 1 },
+        })
+    }
+
+    /// Takes a page in, which steers if no other does.
+    pub(super) fn connect(&mut self) -> PageNumber {
+        let number = self.next_page;
+        self.next_page += 1;
+        self.steering.get_or_insert(number);
+        let out = self.start.out.as_deref();
+        let mut page = Page::new();
+        let mut hello = self.start.facts.hello(&self.first, out, self.steering == Some(number));
+        hello["size_stated"] = json!(self.start.is_size_stated);
+        page.reply(hello.to_string());
+        self.pages.insert(number, page);
+        number
+    }
+
+    /// Lets a page go. If it steered, the one that has been there for the longest time does.
+    pub(super) fn disconnect(&mut self, number: PageNumber) {
+        self.pages.remove(&number);
+        if self.steering == Some(number) {
+            self.steering = None;
+            if let Some(next) = self.pages.keys().next().copied() {
+                self.steer(next);
+            }
+        }
+    }
+
+    fn steer(&mut self, number: PageNumber) {
+        (self.steering, self.message) = (Some(number), 0);
+        for (page, state) in &mut self.pages {
+            state.reply(json!({"type": "steers", "value": *page == number}).to_string());
+        }
+    }
+
+    /// Answers a page, if it is still there.
+    pub(super) fn reply(&mut self, number: PageNumber, message: &Value) {
+        if let Some(page) = self.pages.get_mut(&number) {
+            page.reply(message.to_string());
+        }
+    }
+
+    fn reply_error(&mut self, number: PageNumber, text: &str) {
+        self.reply(number, &json!({"type": "error", "text": text}));
+    }
+
+    /// Tells all pages of an error.
+    pub(super) fn tell_error(&mut self, text: &str) {
+        let message = json!({"type": "error", "text": text}).to_string();
+        self.pages.values_mut().for_each(|page| page.reply(message.clone()));
+    }
+
+    /// Takes a message of a page.
+    pub(super) fn receive(&mut self, number: PageNumber, text: &str, now: Duration) -> Effect {
+        let acted = parse(text).and_then(|(request, id)| Ok((self.act(number, request, now)?, id)));
+        match acted {
+            Ok((effect, id)) => {
+                self.note(number, id);
+                effect
+            }
+            Err(Fault::Foreign) => Effect::Close,
+            Err(Fault::Refused(reason)) => {
+                self.reply_error(number, &reason);
+                Effect::Nothing
+            }
+        }
+    }
+
+    /// Notes the number of a message of the page that steers, which `state` tells.
+    fn note(&mut self, number: PageNumber, id: Option<u64>) {
+        if let Some(id) = id.filter(|_| self.steering == Some(number)) {
+            self.message = id;
+        }
+    }
+
+    fn act(&mut self, number: PageNumber, request: Request, now: Duration) -> Result<Effect, String> {
+        match request {
+            Request::Shown(bytes) => self.of_page(number, |page| page.acknowledge(bytes)),
+            Request::Steer => self.steer(number),
+            Request::Pick(at) => self.pick(number, at)?,
+            Request::Layer(shown) => self.show(number, shown)?,
+            Request::Save(_) if self.start.out.is_none() => {
+                return Err("pictures are saved only by a view with --out DIR".into());
+            }
+            Request::Save(_) if !self.refinement.is_settled() => {
+                return Err("the picture is not settled yet: save it when it is".into());
+            }
+            Request::Save(saving) => return Ok(Effect::Save(saving)),
+            steering => {
+                if self.steering != Some(number) {
+                    return Err("another page steers: take over first".into());
+                }
+                self.turn(steering, now)?;
+            }
+        }
+        Ok(Effect::Nothing)
+    }
+
+    /// Follows the page that steers.
+    fn turn(&mut self, request: Request, now: Duration) -> Result<(), String> {
+        let mut wish = self.wish.clone();
+        let mut moves = None;
+        match request {
+            Request::Camera { position, look_at, fov, is_moving } => {
+                wish.look(position, look_at, fov);
+                moves = Some(is_moving);
+            }
+            Request::Set { name, value } => wish.set(name, value),
+            Request::Setting(setting) => wish.change(setting),
+            Request::Size([width, height]) => {
+                (wish.settings.picture.width, wish.settings.picture.height) = (width, height);
+            }
+            Request::Reset => {
+                let picture = &self.wish.settings.picture;
+                wish = self.start.wish.clone();
+                (wish.settings.picture.width, wish.settings.picture.height) = (picture.width, picture.height);
+            }
+            Request::Cursor(at) => {
+                self.cursor = at;
+                return Ok(());
+            }
+            _ => return Ok(()),
+        }
+        self.wish_for(wish).map_err(|error| with_remedy(&error))?;
+        if let Some(is_moving) = moves {
+            self.refinement.moves(is_moving, now);
+        }
+        Ok(())
+    }
+
+    /// Takes a new wish, if it is one.
+    fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
+        if wish == self.wish {
+            // The page is told that its message was heard.
+            self.revisions.state += 1;
+            return Ok(());
+        }
+        self.scene = self.start.sketch.with(&wish)?;
+        self.refinement.wish(wish.is_other_edition(&self.wish));
+        self.wish = wish;
+        self.begin_picture();
+        Ok(())
+    }
+
+    fn begin_picture(&mut self) {
+        self.canvas.clear();
+        self.done = None;
+        self.revisions.state += 1;
+    }
+
+    fn of_page(&mut self, number: PageNumber, act: impl FnOnce(&mut Page)) {
+        if let Some(page) = self.pages.get_mut(&number) {
+            act(page);
+        }
+    }
+
+    /// Shows a page another layer; the chips' own take a picture with layers.
+    fn show(&mut self, number: PageNumber, shown: Shown) -> Result<(), String> {
+        let is_of_chip = match shown {
+            Shown::Radiance => false,
+            Shown::Layer(layer) => layer.name().parse::<Layers>().is_ok_and(|layers| layers.are_of_chip()),
+        };
+        let mut wish = self.wish.clone();
+        if is_of_chip && wish.add_layers() {
+            if self.steering != Some(number) {
+                return Err("this layer is not rendered, and another page steers: take over first".into());
+            }
+            self.wish_for(wish).map_err(|error| with_remedy(&error))?;
+        }
+        self.of_page(number, |page| page.show(shown));
+        self.revisions.state += 1;
+        Ok(())
+    }
+
+    /// Tells a page the place that a pixel shows.
+    fn pick(&mut self, number: PageNumber, at: [u32; 2]) -> Result<(), String> {
+        let camera = self.wish.settings.camera(&self.scene).map_err(|error| error.to_string())?;
+        let message = match self.canvas.depth(at) {
+            None => json!({"type": "picked", "point": null}),
+            Some(depth) => {
+                let size = [self.wish.settings.picture.width, self.wish.settings.picture.height];
+                let [width, height] = size.map(|side| side as f32);
+                let half = (0.5 * camera.vertical_fov).tan();
+                let right = (2.0 * (at[0] as f32 + 0.5) / width - 1.0) * half * width / height;
+                let up = (1.0 - 2.0 * (at[1] as f32 + 0.5) / height) * half;
+                let direction: Vec3 = camera.forward + right * camera.right + up * camera.up;
+                let point = camera.origin + depth * direction;
+                json!({"type": "picked", "point": point.to_array(), "depth": depth})
+            }
+        };
+        self.reply(number, &message);
+        Ok(())
+    }
+
+    /// Next thing to do.
+    pub(super) fn next(&mut self, now: Duration) -> Result<Task, Option<Duration>> {
+        let work = match self.refinement.next(now) {
+            Next::Work(work) => work,
+            Next::Wait(until) => return Err(until),
+        };
+        let (settings, step) = match work.pass {
+            Pass::Coarse(step) => (passes::coarse(&self.wish.settings, step), step),
+            Pass::Fit => (self.wish.settings.clone(), 1),
+            Pass::Full => (passes::full(&self.wish.settings, self.cursor), 1),
+        };
+        let origin = Origin { version: work.version, step, samples: settings.integrator.samples };
+        Ok(Task { work, wish: self.wish.clone(), settings, origin })
+    }
+
+    /// Returns whether the running work should stop.
+    pub(super) fn must_stop(&self) -> bool {
+        self.refinement.must_stop()
+    }
+
+    /// Tells that the running work has begun or ended to trace photons and to build the card image.
+    pub(super) fn prepares(&mut self, is_preparing: bool) {
+        self.refinement.prepares(is_preparing);
+    }
+
+    /// Takes a tile of the running work, which `card` has rendered.
+    pub(super) fn put(&mut self, origin: Origin, card: &str, tile: &FinishedTile) {
+        let (number, is_new) = self.cards.rendered(card);
+        if is_new {
+            self.revisions.cards += 1;
+        }
+        if origin.version == self.refinement.version() {
+            self.canvas.put(Patch::new(origin, number, tile.clone()));
+        }
+    }
+
+    /// Takes a tile back.
+    pub(super) fn revoke(&mut self, origin: Origin, id: u32) {
+        self.canvas.revoke(origin, id);
+    }
+
+    /// Takes the end of the running work. Its picture was that of `statistics`.
+    pub(super) fn finish(
+        &mut self,
+        task: &Task,
+        outcome: Outcome,
+        statistics: Option<&Statistics>,
+        now: Duration,
+    ) {
+        if let Some(statistics) = statistics {
+            self.cost.add(statistics);
+        }
+        self.refinement.finish(outcome, now);
+        if outcome == Outcome::Done && task.work.version == self.refinement.version() {
+            self.done = Some(task.origin);
+            self.canvas.keep(task.origin);
+        }
+        self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
+    }
+
+    /// Takes the settings that pilot renders have found.
+    pub(super) fn fit(&mut self, task: &Task, fit: Option<&Fit>, now: Duration) {
+        let photons = self.wish.settings.photons.count;
+        if let Some(fit) = fit {
+            let stated = self.start.stated;
+            self.wish.fit(fit, stated);
+            self.start.wish.fit(fit, stated);
+        }
+        let has_other_photons = self.wish.settings.photons.count != photons;
+        if has_other_photons {
+            self.begin_picture();
+        }
+        self.finish(task, Outcome::Fitted { has_other_photons }, None, now);
+    }
+
+    /// Notes that a card is lost.
+    pub(super) fn lose_card(&mut self, name: &str, error: String, now: Duration) {
+        self.cards.lose(name, error, now);
+        self.revisions.cards += 1;
+    }
+
+    /// Notes that a lost card has answered.
+    pub(super) fn card_returns(&mut self, number: usize) {
+        self.cards.returns(number);
+        self.refinement.card_returns();
+        self.revisions.cards += 1;
+    }
+
+    /// The next message to a page, as text or a tile.
+    pub(super) fn take(&mut self, number: PageNumber) -> Option<Result<String, Outgoing>> {
+        let is_settled = self.refinement.is_settled();
+        let outgoing = self.pages.get_mut(&number)?.take(&self.canvas, self.revisions, is_settled)?;
+        Some(match outgoing {
+            Outgoing::Reply(text) => Ok(text),
+            Outgoing::State => Ok(self.describe().to_string()),
+            Outgoing::Cards => Ok(self.cards.describe().to_string()),
+            tile @ Outgoing::Tile(..) => Err(tile),
+        })
+    }
+
+    /// Materials and lights of a wish for a scene.
+    ///
+    /// # Errors
+    /// If an assignment is not possible, or no light is left.
+    pub(super) fn apply(&self, wish: &Wish, scene: &mut Scene) -> Result<(), RenderError> {
+        self.start.sketch.apply(wish, scene)
+    }
+
+    /// The command line that renders the settled picture.
+    pub(super) fn command(&self) -> Vec<String> {
+        command_line::words(&self.start.options, self.start.quality, &self.wish)
+    }
+
+    fn describe(&self) -> Value {
+        let settings = &self.wish.settings;
+        // The camera was checked when it was wished for.
+        let camera = settings.camera(&self.scene).map(|camera| {
+            let mut described = self.start.facts.camera(&camera);
+            if let Some(look_at) = settings.picture.look_at {
+                described["look_at"] = json!(look_at);
+            }
+            described
+        });
+        let done = self.done.unwrap_or(Origin { version: 0, step: COARSEST, samples: 0 });
+        json!({
+            "type": "state",
+            "size": [settings.picture.width, settings.picture.height],
+            "camera": camera.unwrap_or_default(),
+            "step": done.step,
+            "samples": done.samples,
+            "spp": settings.integrator.samples,
+            "settled": self.refinement.is_settled(),
+            "version": self.refinement.version(),
+            "id": self.message,
+            "command": command_line::quoted(&self.command()),
+            "changes": describe::changes(&self.wish),
+            "settings": describe::settings(settings),
+            "cost": self.cost.describe(),
+        })
+    }
+
+    /// The newest wish.
+    #[cfg(test)]
+    pub(super) fn wish(&self) -> &Wish {
+        &self.wish
+    }
+
+    /// Returns whether the picture of the newest wish is settled.
+    #[cfg(test)]
+    pub(super) fn is_settled(&self) -> bool {
+        self.refinement.is_settled()
+    }
+
+    /// Number of tiles that are held.
+    #[cfg(test)]
+    pub(super) fn tiles_held(&self) -> usize {
+        self.canvas.len()
+    }
+
+    /// Number of the newest wish.
+    pub(super) fn version(&self) -> u32 {
+        self.refinement.version()
+    }
+}
+
+/// Text of an error with its remedy.
+pub(super) fn with_remedy(error: &RenderError) -> String {
+    let remedy = miette::Diagnostic::help(error).map_or(String::new(), |help| format!("; {help}"));
+    format!("{error}{remedy}")
+}

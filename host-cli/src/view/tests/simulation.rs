@@ -1,0 +1,141 @@
+//! Random actions of pages and cards: the view is never stuck, holds bounded memory, and settles to the picture that was wished for last.
+
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use super::random::Random;
+use super::world::World;
+
+const ACTIONS: usize = 10_000;
+
+/// A message of a page, sensible or not.
+fn message(random: &mut Random) -> Value {
+    let place = |random: &mut Random| json!([(); 3].map(|()| random.number(2.0)));
+    match random.below(16) {
+        0..=5 => json!({
+            "type": "camera", "position": place(random), "look_at": place(random), "fov": 20 + random.below(60),
+            "moving": random.below(4) > 0,
+        }),
+        6 => json!({"type": "set", "name": "floor.diffuse", "value": [0.5, random.number(0.4).abs(), 0.5]}),
+        7 => json!({"type": "set", "name": "lamp.emission", "value": random.below(4)}),
+        8 => json!({"type": "set", "name": random.one(&["flor.diffuse", "floor", "sun.colour"]), "value": 1}),
+        9 => json!({
+            "type": "setting", "name": random.one(&["spp", "gather_rays", "photons"]), "value": random.below(40)
+        }),
+        10 => json!({"type": "setting", "name": "cache", "value": random.below(2) == 0}),
+        11 => json!({"type": "size", "size": [1 + random.below(90), 1 + random.below(90)]}),
+        12 => json!({"type": "pick", "at": [random.below(100), random.below(100)]}),
+        13 => json!({"type": "cursor", "at": [random.below(100), random.below(100)]}),
+        14 => json!({"type": random.one(&["reset", "steer", "dance"])}),
+        _ => json!({"type": "shown", "version": 0, "bytes": random.below(1 << 40)}),
+    }
+}
+
+fn act(world: &mut World, random: &mut Random) {
+    let pages: Vec<_> = world.pages.keys().copied().collect();
+    match random.below(20) {
+        0 if pages.len() < 5 => world.connect(),
+        1 if pages.len() > 1 => world.disconnect(random.one(&pages)),
+        2 => world.has_card = random.below(3) > 0,
+        3 => {
+            if let Some((number, _)) = world.view.cards.next_to_try(world.now)
+                && world.has_card
+            {
+                world.view.card_returns(number);
+            }
+        }
+        4 => world.now += Duration::from_millis(random.below(400)),
+        5..=9 if !pages.is_empty() => {
+            let page = random.one(&pages);
+            world.send(page, &message(random));
+        }
+        10..=12 if !pages.is_empty() => {
+            let page = random.one(&pages);
+            for _ in 0..random.below(30) {
+                world.read(page);
+            }
+            if random.below(2) == 0 {
+                world.acknowledge(page);
+            }
+        }
+        _ => (0..random.below(12)).for_each(|_| world.paint()),
+    }
+}
+
+#[test]
+fn ten_thousand_random_actions_end_in_the_picture_that_was_wished_for_last() {
+    let mut random = Random(7);
+    let mut world = World::new();
+    world.connect();
+    for number in 1..=ACTIONS {
+        act(&mut world, &mut random);
+        assert!(world.view.tiles_held() <= world.most_tiles(), "after {number} actions");
+        if number % 250 == 0 {
+            world.settle();
+            world.check_pictures();
+        }
+    }
+    assert!(world.firsts > 100, "{} pictures", world.firsts);
+}
+
+/// Wishes that follow each other faster than a picture is rendered do not starve it.
+#[test]
+fn a_camera_that_never_rests_is_shown_and_settles_when_it_does() {
+    for is_edit in [false, true] {
+        let mut world = World::new();
+        world.connect();
+        for number in 0..1000 {
+            let x = 0.001 * f64::from(number);
+            let message = if is_edit {
+                json!({"type": "set", "name": "lamp.emission", "value": 1.0 + x})
+            } else {
+                json!({"type": "camera", "position": [x, 0.5, 3], "look_at": [0, 0, 0], "fov": 40, "moving": true})
+            };
+            world.send(0, &message);
+            world.paint();
+        }
+        assert!(world.firsts > 20, "{} first pictures", world.firsts);
+        world.settle();
+        world.check_pictures();
+    }
+}
+
+/// A page that does not read takes no memory, and gets the newest picture when it does.
+#[test]
+fn a_slow_page_gets_fewer_and_newer_tiles() {
+    let mut world = World::new();
+    world.connect();
+    world.connect();
+    for number in 0..200 {
+        let camera = json!({"type": "camera", "position": [number, 0.5, 3], "look_at": [0, 0, 0], "fov": 40, "moving": false});
+        world.send(0, &camera);
+        for _ in 0..60 {
+            world.paint();
+            while world.read(0) {
+                world.acknowledge(0);
+            }
+        }
+    }
+    world.settle();
+    world.check_pictures();
+    let [quick, slow] = [0, 1].map(|page| world.pages[&page].received);
+    assert!(10 * slow < quick, "{slow} of {quick} bytes");
+}
+
+/// Tiles wait for acknowledgement beyond some megabytes.
+#[test]
+fn a_page_that_acknowledges_nothing_is_not_flooded() {
+    let mut world = World::new();
+    world.connect();
+    world.send(0, &json!({"type": "size", "size": [1024, 1024]}));
+    for _ in 0..40_000 {
+        world.paint();
+        while world.read(0) {}
+    }
+    let received = world.pages[&0].received;
+    assert!((3 << 20..=5 << 20).contains(&received), "{received}");
+    world.acknowledge(0);
+    world.settle();
+    world.check_pictures();
+}

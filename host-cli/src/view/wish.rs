@@ -1,0 +1,161 @@
+//! What is to be seen: settings, camera and changes of the scene, as pages have asked for them.
+
+use std::collections::BTreeSet;
+
+use photoncard_driver::layer::Layers;
+use photoncard_driver::quality::{Fit, Stated};
+use photoncard_driver::render::{RenderError, RenderSettings};
+use photoncard_driver::scene::{Environment, Scene};
+
+use super::request::Setting;
+
+/// Error of interpolated irradiance where a quality states none.
+const IRRADIANCE_ERROR: f32 = 0.1;
+
+/// What is to be seen.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Wish {
+    /// Settings of the settled picture.
+    pub(super) settings: RenderSettings,
+    /// Settings that the quality leaves as they are.
+    stated: Vec<Setting>,
+    /// Assignments of the command line.
+    given: Vec<String>,
+    /// Names of properties with their values: changes by pages.
+    edits: Vec<(String, Vec<f32>)>,
+}
+
+impl Wish {
+    pub(super) fn new(settings: RenderSettings, given: Vec<String>) -> Self {
+        Self { settings, stated: Vec::new(), given, edits: Vec::new() }
+    }
+
+    /// All assignments, in the order in which they are applied.
+    pub(super) fn assignments(&self) -> Vec<String> {
+        let edits = self.edits.iter().map(|(name, value)| format!("{name}={}", numbers(value)));
+        self.given.iter().cloned().chain(edits).collect()
+    }
+
+    /// Changes by pages.
+    pub(super) fn edits(&self) -> &[(String, Vec<f32>)] {
+        &self.edits
+    }
+
+    /// Places the camera.
+    pub(super) fn look(&mut self, position: [f32; 3], look_at: [f32; 3], fov: f32) {
+        let picture = &mut self.settings.picture;
+        (picture.camera_at, picture.look_at, picture.fov) = (Some(position), Some(look_at), Some(fov));
+    }
+
+    /// Sets a property, in place of an earlier value of it.
+    pub(super) fn set(&mut self, name: String, value: Vec<f32>) {
+        self.edits.retain(|(edited, _)| *edited != name);
+        self.edits.push((name, value));
+    }
+
+    /// Changes a setting.
+    pub(super) fn change(&mut self, setting: Setting) {
+        self.stated.push(setting);
+        let RenderSettings { photons, integrator, schedule, .. } = &mut self.settings;
+        match setting {
+            Setting::Photons(count) => photons.count = count,
+            Setting::Samples(samples) => integrator.samples = samples,
+            Setting::GatherRays(rays) => integrator.gather_rays = rays,
+            Setting::Order(order) => schedule.order = order,
+            Setting::Cache(false) => integrator.irradiance_error = None,
+            Setting::Cache(true) => {
+                integrator.irradiance_error.get_or_insert(IRRADIANCE_ERROR);
+            }
+            Setting::Sampling(sampling) => integrator.sampling = sampling,
+        }
+        // Without gather rays nothing is interpolated: the command line knows no such settings.
+        if integrator.gather_rays == 0 {
+            integrator.irradiance_error = None;
+        }
+    }
+
+    /// Asks for all layers that chips can render. Returns whether they were not.
+    pub(super) fn add_layers(&mut self) -> bool {
+        let layers = &mut self.settings.picture.layers;
+        !layers.are_of_chip() && {
+            *layers = Layers::all();
+            true
+        }
+    }
+
+    /// Takes over what pilot renders have found, except what is stated on the command line or by a page.
+    pub(super) fn fit(&mut self, fit: &Fit, mut stated: Stated) {
+        for setting in &self.stated {
+            match setting {
+                Setting::Photons(_) => stated.photons = true,
+                Setting::Samples(_) => stated.samples = true,
+                Setting::GatherRays(_) => stated.gather_rays = true,
+                Setting::Cache(_) => stated.cache = true,
+                Setting::Order(_) | Setting::Sampling(_) => {}
+            }
+        }
+        fit.apply(&mut self.settings, stated);
+    }
+
+    /// Returns whether photons or scene are others than those of another wish.
+    pub(super) fn is_other_edition(&self, other: &Self) -> bool {
+        let photons = |wish: &Self| (wish.settings.photons.clone(), wish.settings.integrator.seed);
+        self.given != other.given || self.edits != other.edits || photons(self) != photons(other)
+    }
+}
+
+/// Numbers as an option takes them; they parse to the same bits.
+pub(super) fn numbers(values: &[f32]) -> String {
+    values.iter().map(f32::to_string).collect::<Vec<_>>().join(",")
+}
+
+/// A scene without its surfaces, against which wishes are checked at once.
+pub(super) struct Sketch(Scene);
+
+impl Sketch {
+    /// Sketch of a scene before assignments: a triangle of each material that any triangle has, and the brightest texel of
+    /// the environment.
+    pub(super) fn new(scene: &Scene) -> Self {
+        let mut materials = BTreeSet::new();
+        let triangles = scene.triangles.iter().filter(|triangle| materials.insert(triangle.material));
+        let environment = scene.environment.as_ref().map(|map| {
+            let brightest = map.texels.as_flattened().iter().copied().fold(0.0, f32::max);
+            Environment { width: 1, height: 1, texels: vec![[brightest; 3]], strength: map.strength }
+        });
+        Self(Scene {
+            triangles: triangles.copied().collect(),
+            materials: scene.materials.clone(),
+            lights: scene.lights.clone(),
+            cameras: scene.cameras.clone(),
+            generator: scene.generator.clone(),
+            environment,
+            ..Scene::default()
+        })
+    }
+
+    /// The sketch after the assignments of a wish.
+    ///
+    /// # Errors
+    /// If one is not possible, no light is left, or a setting or the camera is not possible.
+    pub(super) fn with(&self, wish: &Wish) -> Result<Scene, RenderError> {
+        let mut scene = self.0.clone();
+        self.apply(wish, &mut scene)?;
+        wish.settings.check()?;
+        wish.settings.camera(&scene)?;
+        Ok(scene)
+    }
+
+    /// Gives a scene the materials and lights of a wish, whatever it had before.
+    ///
+    /// # Errors
+    /// If an assignment is not possible, or no light is left.
+    pub(super) fn apply(&self, wish: &Wish, scene: &mut Scene) -> Result<(), RenderError> {
+        scene.materials.clone_from(&self.0.materials);
+        scene.lights.clone_from(&self.0.lights);
+        if let (Some(environment), Some(sketched)) = (&mut scene.environment, &self.0.environment) {
+            environment.strength = sketched.strength;
+        }
+        wish.assignments().iter().try_for_each(|assignment| scene.apply(assignment))?;
+        Ok(scene.check_light()?)
+    }
+}

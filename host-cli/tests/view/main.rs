@@ -1,0 +1,344 @@
+//! `photoncard view`: what its page can see and do, and what others cannot.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod page;
+
+use std::process::Command;
+use std::time::Duration;
+
+use page::{View, camera};
+use serde_json::{Value, json};
+use support::{Emulator, Room, scene, shipped};
+use tungstenite::Message;
+
+/// Options of a small picture.
+const SMALL: [&str; 14] = [
+    "--quality",
+    "paper",
+    "--size",
+    "20x12",
+    "--photons",
+    "200",
+    "--gather-rays",
+    "4",
+    "--neighbors",
+    "5",
+    "--shadow-rays",
+    "1",
+    "--card",
+    "emulated:1",
+];
+
+fn small_view(room: &Room, more: &[&str]) -> View {
+    room.write_scene("scene.gltf", &scene());
+    View::start(room, "scene.gltf", &[&SMALL, more].concat())
+}
+
+/// Runs the command that a page shows, into `picture`.
+fn run_shown(room: &Room, state: &Value, picture: &str) {
+    let shown = state["command"].as_str().unwrap();
+    let line =
+        shown.replacen("photoncard", env!("CARGO_BIN_EXE_photoncard"), 1).replace("picture.exr", picture);
+    let output = Command::new("sh").arg("-c").arg(&line).current_dir(room.path(".")).output().unwrap();
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn a_page_is_greeted_with_the_scene() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let hello = view.connect().wait_for("hello");
+    assert_eq!(
+        (&hello["scene"]["name"], &hello["steers"], &hello["out"]),
+        (&json!("scene.gltf"), &json!(true), &json!(null))
+    );
+    assert_eq!(hello["scene"]["cameras"][0]["name"], "eye");
+    assert_eq!(hello["scene"]["materials"][1]["properties"]["emission"], json!([1.0, 1.0, 1.0]));
+    assert_eq!(hello["scene"]["low"], json!([-1.0, 0.0, -1.0]));
+}
+
+#[test]
+#[cfg(unix)]
+fn the_settled_picture_is_that_of_the_command_shown() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("out")).unwrap();
+    let view = small_view(&room, &["--out", "out"]);
+    let mut page = view.connect();
+    for number in 0..4 {
+        match number {
+            0 => {}
+            1 => (0..20).for_each(|step| page.send(&camera(0.01 * f64::from(step), step < 19))),
+            2 => page.send(&json!({"type": "set", "name": "floor.diffuse", "value": [0.7, 0.2, 0.1]})),
+            _ => {
+                page.send(&json!({"type": "size", "size": [33, 17]}));
+                page.send(&json!({"type": "setting", "name": "cache", "value": true}));
+                page.send(&json!({"type": "layer", "name": "direct"}));
+            }
+        }
+        // A picture of some of the messages may settle before all have arrived.
+        let state = page.wait("state", |state| {
+            let is_last = match number {
+                0 => true,
+                1 => state["camera"]["position"][0].as_f64().is_some_and(|x| x > 0.185),
+                2 => state["changes"] != json!([]),
+                _ => state["settings"]["layers"] != "albedo,N,Z",
+            };
+            is_last && state["settled"] == true
+        });
+        let [exr, png] = ["exr", "png"].map(|ending| format!("{number}.{ending}"));
+        for name in [&exr, &png] {
+            page.send(&json!({"type": "save", "name": name}));
+            let saved = page.wait_for("saved");
+            assert!(saved["path"].as_str().unwrap().ends_with(name), "{saved}");
+        }
+        run_shown(&room, &state, &exr);
+        run_shown(&room, &state, &png);
+        for name in [&exr, &png] {
+            assert!(room.read(&format!("out/{name}")) == room.read(name), "{name}: {}", state["command"]);
+        }
+    }
+}
+
+/// The shown command of a view whose quality finds its settings by pilot renders states all that they have found.
+#[test]
+#[cfg(unix)]
+fn a_quality_finds_the_settings_of_the_settled_picture() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("out")).unwrap();
+    let options = ["--size", "12x12", "--quality", "draft", "--out", "out", "--card", "emulated:2"];
+    let view = View::start(&room, &shipped("cornell.gltf"), &options);
+    let mut page = view.connect();
+    let state = page.settle();
+    page.send(&json!({"type": "save", "name": "a.exr"}));
+    page.wait_for("saved");
+    run_shown(&room, &state, "a.exr");
+    assert!(room.read("out/a.exr") == room.read("a.exr"), "{}", state["command"]);
+    let plain = ["render", &shipped("cornell.gltf"), "--size", "12x12", "--quality", "draft", "-o", "b.exr"];
+    assert_eq!(room.run(&plain).status, Some(0));
+    assert!(room.read("b.exr") == room.read("a.exr"), "{}", state["command"]);
+}
+
+#[test]
+fn pictures_are_refined_from_coarse_to_fine_and_follow_edits() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    page.settle();
+    let lit = page.mean([20, 12]);
+    page.steps.clear();
+    page.send(&json!({"type": "set", "name": "lamp.emission", "value": 0.25}));
+    let state = page.settle();
+    let dark = page.mean([20, 12]);
+    assert!((0.2..0.3).contains(&(dark / lit)), "{dark} of {lit}");
+    let mut steps: Vec<u32> = page
+        .steps
+        .iter()
+        .filter(|(version, _)| *version == state["version"])
+        .map(|(_, step)| *step)
+        .collect();
+    steps.dedup();
+    assert_eq!(steps, [8, 4, 2, 1]);
+    assert_eq!(state["changes"], json!([{"name": "lamp.emission", "value": 0.25}]));
+    page.send(&json!({"type": "pick", "at": [10, 11]}));
+    let picked = page.wait_for("picked");
+    assert!(
+        picked["point"][1].as_f64().unwrap().abs() < 0.1 && picked["depth"].as_f64().unwrap() > 1.0,
+        "{picked}"
+    );
+    page.send(&json!({"type": "reset"}));
+    assert_eq!(page.settle()["changes"], json!([]));
+    assert!((page.mean([20, 12]) - lit).abs() < 1e-6);
+}
+
+#[test]
+fn a_scene_stays_lit() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    let version = page.settle()["version"].clone();
+    page.send(&json!({"type": "set", "name": "lamp.emission", "value": 0}));
+    let error = page.wait_for("error");
+    assert!(error["text"].as_str().unwrap().contains("light"), "{error}");
+    page.send(&camera(0.5, false));
+    assert_eq!(page.settle()["version"], version.as_u64().unwrap() + 1);
+}
+
+#[test]
+fn other_sites_are_refused() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let View { host, token, .. } = &view;
+    let socket = format!("/socket?token={token}");
+    let own = format!("http://{host}");
+    for (target, host, origin) in [
+        (&*socket, host.as_str(), Some("http://evil.example")),
+        (&*socket, host, Some("null")),
+        (&*socket, host, None),
+        (&*socket, "evil.example", Some("http://evil.example")),
+        (&*socket, "evil.example", Some(own.as_str())),
+        ("/socket?token=00000000000000000000000000000000", host, Some(&own)),
+        ("/socket", host, Some(&own)),
+    ] {
+        assert_eq!(view.try_connect(target, host, origin).err(), Some(403), "{target} {host} {origin:?}");
+    }
+    let page = format!("/?token={token}");
+    assert_eq!(view.get(&page, "evil.example").0, 403);
+    assert_eq!(view.get("/", host).0, 403);
+    let (status, text) = view.get(&page, host);
+    assert!(status == 200 && text.contains("main.js"), "{text}");
+    for header in [
+        "Content-Security-Policy: default-src 'self'",
+        "Referrer-Policy: no-referrer",
+        "Cache-Control: no-store",
+    ] {
+        assert!(text.contains(header), "{header}: {text}");
+    }
+    assert_eq!(view.get("/main.js", host).0, 200);
+    assert_eq!(view.get("/../../Cargo.toml", host).0, 404);
+    view.connect().wait_for("hello");
+}
+
+#[test]
+fn hostile_messages_are_answered_or_end_their_connection_alone() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("out")).unwrap();
+    room.write("secret.exr", "secret");
+    let view = small_view(&room, &["--out", "out"]);
+    let mut page = view.connect();
+    page.settle();
+    for message in [
+        json!({}),
+        json!({"type": "camera", "position": [0, 0, 1e300], "look_at": [0, 0, 0], "fov": 40, "moving": false}),
+        json!({"type": "camera", "position": [1, 1, 1], "look_at": [1, 1, 1], "fov": 40, "moving": false}),
+        json!({"type": "set", "name": "floor.diffuse", "value": 1e30}),
+        json!({"type": "set", "name": "floor.diffuse=1;rm -rf", "value": 1}),
+        json!({"type": "setting", "name": "photons", "value": 0}),
+        json!({"type": "setting", "name": "photons", "value": 4_000_000_000_u64}),
+        json!({"type": "size", "size": [1_000_000, 1_000_000]}),
+        json!({"type": "save", "name": "../secret.exr"}),
+        json!({"type": "save", "name": "/tmp/a.exr"}),
+        json!({"type": "save", "name": "a.sh"}),
+    ] {
+        page.send(&message);
+        let error = page.wait_for("error");
+        assert!(error["text"].as_str().is_some_and(|text| !text.is_empty()), "{message}: {error}");
+    }
+    for raw in [
+        Message::text("no JSON"),
+        Message::text("[".repeat(60_000)),
+        Message::text(json!({"type": "save", "name": "a".repeat(80_000)}).to_string()),
+        Message::binary(vec![0; 100]),
+    ] {
+        let mut foe = view.connect();
+        foe.wait_for("hello");
+        foe.send_raw(raw);
+        foe.wait_for_end();
+    }
+    page.send(&camera(0.2, false));
+    page.settle();
+    assert_eq!(room.names(), ["out", "scene.gltf", "secret.exr"]);
+    assert_eq!(room.read("secret.exr"), b"secret");
+    assert_eq!(std::fs::read_dir(room.path("out")).unwrap().count(), 0);
+}
+
+/// A setting that a card refuses is named, and the next one is rendered.
+#[test]
+fn a_wish_that_no_card_can_fulfil_is_named() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    page.settle();
+    page.send(&json!({"type": "setting", "name": "gather_rays", "value": 4_000_000}));
+    let error = page.wait_for("error");
+    assert!(error["text"].as_str().unwrap().contains("--gather-rays"), "{error}");
+    page.send(&json!({"type": "setting", "name": "gather_rays", "value": 3}));
+    assert_eq!(page.settle()["settings"]["gather_rays"], 3);
+}
+
+#[test]
+fn of_two_pages_one_steers() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let (mut first, mut second) = (view.connect(), view.connect());
+    assert_eq!([&mut first, &mut second].map(|page| page.wait_for("hello")["steers"].clone()), [true, false]);
+    first.settle();
+    second.settle();
+    second.send(&camera(0.3, false));
+    assert!(second.wait_for("error")["text"].as_str().unwrap().contains("take over"));
+    second.send(&json!({"type": "steer"}));
+    assert_eq!([&mut first, &mut second].map(|page| page.wait_for("steers")["value"].clone()), [false, true]);
+    second.send(&camera(0.3, false));
+    let states = [first.settle(), second.settle()];
+    assert_eq!(states[0], states[1]);
+    assert_eq!(first.pixels, second.pixels);
+    drop(second);
+    assert_eq!(first.wait_for("steers")["value"], true);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_card_that_dies_and_comes_back_is_shown_and_used() {
+    let room = Room::new();
+    let card = Emulator::start(&room, "unix:card", &[]);
+    room.write_scene("scene.gltf", &scene());
+    let options: Vec<&str> =
+        SMALL.iter().copied().filter(|word| !["--card", "emulated:1"].contains(word)).collect();
+    let view = View::start(&room, "scene.gltf", &[&options, &["--card", card.address.as_str()][..]].concat());
+    let mut page = view.connect();
+    page.settle();
+    let before = page.mean([20, 12]);
+    drop(card);
+    let is = |state: &'static str| move |message: &Value| message["cards"][0]["state"] == state;
+    page.send(&camera(0.4, false));
+    page.wait("cards", is("lost"));
+    assert!(page.wait_for("error")["text"].as_str().unwrap().contains("no card is left"));
+    page.send(&json!({"type": "reset"}));
+    let _ = std::fs::remove_file(room.path("card"));
+    let _card = Emulator::start(&room, "unix:card", &[]);
+    page.wait("cards", is("ready"));
+    page.settle();
+    assert!((page.mean([20, 12]) - before).abs() < 1e-6);
+}
+
+#[test]
+fn what_a_view_cannot_be_is_said_at_once() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    for (options, said) in [
+        (&["--listen", view.host.as_str()][..], "--listen 127.0.0.1:0"),
+        (&["--listen", "127.0.0.1"], "--listen"),
+        (&["--listen", "127.0.0.1:0", "--crop", "0,1,0,1"], "--crop"),
+        (&["--listen", "127.0.0.1:0", "--counters"], "--counters"),
+        (&["--listen", "127.0.0.1:0", "--out", "absent"], "absent"),
+        (&["--listen", "127.0.0.1:0", "--set", "flor.alpha=1"], "'floor'"),
+    ] {
+        let outcome = room.run(&[&["view", "scene.gltf"], options].concat());
+        assert!(
+            matches!(outcome.status, Some(1 | 2)) && outcome.stderr.contains(said),
+            "{options:?}: {}",
+            outcome.stderr
+        );
+    }
+}
+
+/// A signal ends the view soon, whatever it does.
+#[test]
+#[cfg(unix)]
+fn an_interrupt_ends_the_view() {
+    let room = Room::new();
+    let mut view = small_view(&room, &[]);
+    let mut page = view.connect();
+    page.wait_for("hello");
+    let id = view.process.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    for _ in 0..500 {
+        if let Some(status) = view.process.try_wait().unwrap() {
+            assert_eq!(status.code(), Some(130));
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    panic!("the view goes on");
+}
