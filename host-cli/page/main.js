@@ -33,7 +33,7 @@ const exposure = new Exposure(show);
 // Shows the status, and the picture in the next frame.
 function show() {
     isStale = true;
-    showStatus(isOpen, state, outputs());
+    showStatus(isOpen, state, png());
 }
 
 const send = (what, message) => {
@@ -202,16 +202,16 @@ function showValue(at) {
     byId("value").textContent = value ? `${at.join(", ")}: ${value.map(part => part.toPrecision(4)).join("  ")}` : "\u00a0";
 }
 
-const stem = () => byId("name").value.trim().replace(/\.(exr|png)$/i, "");
-
-// Options of the command line that write the picture: as PNG if it is shown otherwise than by default.
-function outputs() {
-    const quoted = name => /^[\w.-]+$/.test(name) ? name : `'${name.replaceAll("'", "'\\''")}'`;
+// Options of the command line that write a PNG, if the picture is shown otherwise than by default.
+function png() {
     const tone = exposure.options;
-    return ` -o ${quoted(`${stem()}.exr`)}${tone && ` -o ${quoted(`${stem()}.png`)}${tone}`}`;
+    return tone && ` -o picture.png${tone}`;
 }
 
-const save = ending => send("", { type: "save", name: `${stem()}.${ending}`, ...exposure.asked });
+function save(ending) {
+    const name = `${byId("name").value.trim().replace(/\.(exr|png)$/i, "")}.${ending}`;
+    send("", { type: "save", name, ...exposure.asked });
+}
 
 const on = (id, type, act) => byId(id).addEventListener(type, act);
 on("layer", "change", ({ target }) => {
@@ -229,7 +229,6 @@ on("fov", "input", ({ target }) => target.validity.valid && target.value !== "" 
     view.move({ ...camera, fov: Number(target.value) }, false));
 on("reset", "click", () => send("reset", { type: "reset" }));
 on("steer", "click", () => send("", { type: "steer" }));
-on("name", "input", show);
 on("save-exr", "click", () => save("exr"));
 on("save-png", "click", () => save("png"));
 on("copy-command", "click", ({ target }) => copy(byId("command").textContent, target));

@@ -12,11 +12,11 @@ const progress = {
             : `Refining: ${state.samples} of ${state.spp} samples a pixel.`,
 };
 
-export function showStatus(isOpen, state, outputs) {
+export function showStatus(isOpen, state, more) {
     const name = !isOpen ? "lost" : state?.settled ? "settled" : "working";
     byId("status").dataset.state = name;
     setText("progress", progress[name](state));
-    if (state) setText("command", state.command + outputs);
+    if (state) setText("command", state.command + more);
 }
 
 // Leaves a text that is as it should be, so that a selection stays.

@@ -391,7 +391,9 @@ impl View {
     /// The next message to a page, as text or a tile.
     pub(super) fn take(&mut self, number: PageNumber) -> Option<Result<String, Outgoing>> {
         let is_settled = self.refinement.is_settled();
-        let outgoing = self.pages.get_mut(&number)?.take(&self.canvas, self.revisions, is_settled)?;
+        let version = self.refinement.version();
+        let outgoing =
+            self.pages.get_mut(&number)?.take(&self.canvas, self.revisions, version, is_settled)?;
         Some(match outgoing {
             Outgoing::Reply(text) => Ok(text),
             Outgoing::State => Ok(self.describe().to_string()),

@@ -77,8 +77,7 @@ impl Person for Tab {
 
     fn save(&mut self, name: &str, ending: &str) -> String {
         self.value(&format!(
-            "(field => {{ field.value = '{name}'; field.dispatchEvent(new Event('input')); }})\
-             (document.getElementById('name')); document.getElementById('save-{ending}').click()"
+            "document.getElementById('name').value = '{name}'; document.getElementById('save-{ending}').click()"
         ));
         self.wait(
             &format!("document.getElementById('saved').textContent.endsWith('{name}.{ending}')"),
@@ -97,7 +96,7 @@ impl Person for Tab {
     }
 
     fn check_walls(&mut self) {
-        let [left, right] = [0.06, 0.94].map(|share| {
+        let [left, right] = [0.08, 0.92].map(|share| {
             let at = format!("photoncard.picture.at([{share} * photoncard.picture.size[0], photoncard.picture.size[1] / 2])");
             serde_json::from_value::<[f64; 3]>(self.value(&at)).unwrap()
         });
@@ -121,10 +120,10 @@ pub(crate) fn two_lights() -> Value {
         list.push(entry);
         list.len() - 1
     };
-    let bulb = json!({"name": "bulb", "type": "point", "intensity": 2.0});
+    let bulb = json!({"name": "bulb", "type": "point", "intensity": 0.5});
     scene["extensions"] = json!({"KHR_lights_punctual": {"lights": [bulb]}});
     add(&mut scene["extensionsUsed"], json!("KHR_lights_punctual"));
-    let node = json!({"translation": [2.8, 3.0, -2.8], "extensions": {"KHR_lights_punctual": {"light": 0}}});
+    let node = json!({"translation": [0.0, 0.4, 0.7], "extensions": {"KHR_lights_punctual": {"light": 0}}});
     let node = add(&mut scene["nodes"], node);
     add(&mut scene["scenes"][0]["nodes"], json!(node));
     scene
