@@ -39,9 +39,10 @@ export class Exposure {
             const scale = layer === "Z" ? 2 * automaticScale(picture.data) : 1 / (greatest(picture.data) || 1);
             return { mode, scale, curve: "none", byCard: overlay.value === "card" };
         }
+        const age = performance.now() - this.#measuredAt;
         if (!automatic.checked) {
             this.#scale = Math.fround(2 ** Number(exposure.value));
-        } else if (mode === MODES.light && performance.now() > this.#measuredAt + (isSettled ? Infinity : WAIT)) {
+        } else if (mode === MODES.light && (isSettled ? age === Infinity : age > WAIT)) {
             const stride = isSettled ? 1 : Math.ceil(picture.data.length / 4 / PIXELS);
             this.#scale = Math.fround(automaticScale(picture.data, stride));
             this.#measuredAt = performance.now();

@@ -42,9 +42,10 @@ impl Browser {
         Some(Self { process, address, control, _profile: profile })
     }
 
-    /// A new tab with a window of a size, in which nothing is loaded.
+    /// A new tab with a window of its own, of a size, in which nothing is loaded: one behind another would stand still.
     pub(crate) fn tab(&mut self, size: [u32; 2]) -> Tab {
-        let target = self.control.call("Target.createTarget", &json!({"url": "about:blank"}));
+        let target =
+            self.control.call("Target.createTarget", &json!({"url": "about:blank", "newWindow": true}));
         let target = target["targetId"].as_str().unwrap();
         let mut tab = Tab::connect(&format!("{}/devtools/page/{target}", self.address));
         for domain in ["Runtime.enable", "Log.enable", "Page.enable"] {
@@ -176,8 +177,8 @@ impl Tab {
         self.call("Input.dispatchMouseEvent", &parameters);
     }
 
-    /// Drags with a button (`left`, `middle` or `right`); without a shift it is a click.
-    pub(crate) fn drag(&mut self, button: &str, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) {
+    /// Drags by `[dx, dy]` pixels with a button (`left`, `middle` or `right`); without a shift it is a click.
+    pub(crate) fn press(&mut self, button: &str, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) {
         let buttons = match button {
             "left" => 1,
             "right" => 2,

@@ -79,7 +79,7 @@ fn the_settled_picture_is_that_of_the_command_shown() {
     // A drag turns the camera, and the view settles at a picture of its own.
     let [before, place] =
         ["photoncard.state.version", "photoncard.state.camera.position"].map(|of| tab.value(of));
-    tab.drag("left", [100.0, 100.0], [60.0, 20.0]);
+    tab.drag("left", [0.5, 0.5], [60.0, 20.0]);
     tab.wait(&format!("photoncard.state.version > {before}"), LIMIT);
     tab.wait(SETTLED, LIMIT);
     assert_ne!(tab.value("photoncard.state.camera.position"), place);
@@ -121,6 +121,7 @@ fn the_screen_has_the_codes_of_the_png() {
             assert!(differences.clone().all(|difference| difference <= 1), "{name}: {:?}", differences.max());
         }
         assert_eq!(tab.faults, [""; 0]);
+        tab.call("Page.close", &json!({}));
     }
 }
 
@@ -131,14 +132,14 @@ fn a_light_that_is_switched_off_darkens_the_picture() {
     room.write_scene("two-lights.gltf", &person::two_lights());
     let view = View::start(&room, "two-lights.gltf", &SMALL);
     let mut tab = opened(&mut browser, &view);
-    tab.expose(Some(-3.0));
+    tab.expose(Some(0.0));
     let lit = darkness(&tab.shown());
     // Both the lamp's emission and the bulb's intensity have a switch.
-    for (light, least) in [("light", 1.3), ("bulb", 1.02)] {
+    for light in ["light", "bulb"] {
         tab.switch(light);
         tab.wait(SETTLED, LIMIT);
         let dark = darkness(&tab.shown());
-        assert!(dark > least * lit, "{light}: {dark} {lit}");
+        assert!(dark > lit + 5.0, "{light}: {dark} {lit}");
         check_saved(&room, &mut tab, light);
         tab.switch(light);
         tab.wait(SETTLED, LIMIT);
@@ -155,17 +156,18 @@ fn two_pages_look_and_one_steers() {
     let mut second = opened(&mut browser, &view);
     let camera = "JSON.stringify(photoncard.state.camera)";
     let before = first.value(camera);
-    second.drag("left", [100.0, 100.0], [60.0, 20.0]);
-    first.drag("left", [100.0, 100.0], [-30.0, 10.0]);
+    second.drag("left", [0.5, 0.5], [60.0, 20.0]);
+    first.drag("left", [0.5, 0.5], [-30.0, 10.0]);
     first.wait(&format!("{camera} !== '{}'", before.as_str().unwrap()), LIMIT);
     first.wait(SETTLED, LIMIT);
     let after = first.value(camera);
     second.wait(&format!("{camera} === '{}' && {SETTLED}", after.as_str().unwrap()), LIMIT);
-    assert_eq!(first.shown(), second.shown());
+    let pixels = "photoncard.picture.data.filter((_, part) => part % 4 < 3).join()";
+    assert!(first.value(pixels) == second.value(pixels), "the pages show different pictures");
 
     second.take_over();
     first.wait("!document.getElementById('spectator').hidden", LIMIT);
-    second.drag("left", [100.0, 100.0], [60.0, 20.0]);
+    second.drag("left", [0.5, 0.5], [60.0, 20.0]);
     first.wait(&format!("{camera} !== '{}'", after.as_str().unwrap()), LIMIT);
 }
 

@@ -17,6 +17,10 @@ pub(crate) trait Person {
     fn choose(&mut self, list: &str, value: &str);
     /// States an exposure in stops; `None` is the automatic one.
     fn expose(&mut self, stops: Option<f64>);
+    /// Drags on the picture by pixels, from a place in shares of its sides; without a shift it is a click.
+    fn drag(&mut self, button: &str, from: [f64; 2], shift: [f64; 2]);
+    /// Place `[x, y, width, height]` of the picture on the screen, pixels.
+    fn picture(&mut self) -> [f64; 4];
     /// Lets the picture have the window's pixels, one to one, without the panel.
     fn fill_window(&mut self);
     /// Turns the switch of a light.
@@ -52,7 +56,18 @@ impl Person for Tab {
         self.value("new Promise(act => requestAnimationFrame(() => requestAnimationFrame(act)))");
     }
 
+    fn drag(&mut self, button: &str, [across, down]: [f64; 2], shift: [f64; 2]) {
+        let [x, y, width, height] = self.picture();
+        self.press(button, [x + across * width, y + down * height], shift);
+    }
+
+    fn picture(&mut self) -> [f64; 4] {
+        let place = "(({x, y, width, height}) => [x, y, width, height])(picture.getBoundingClientRect())";
+        serde_json::from_value(self.value(place)).unwrap()
+    }
+
     fn fill_window(&mut self) {
+        self.resize([160, 260]);
         self.value("document.getElementById('panel').hidden || document.getElementById('toggle').click()");
         self.choose("side", "window");
         self.wait("photoncard.picture.size.join() === [stage.clientWidth, stage.clientHeight].join()", LIMIT);
@@ -90,8 +105,7 @@ impl Person for Tab {
     fn shown(&mut self) -> Vec<[u8; 3]> {
         self.value("document.activeElement.blur()");
         self.value("for (const id of ['times', 'toggle', 'centre']) document.getElementById(id).style.visibility = 'hidden'");
-        let place = "(({x, y, width, height}) => [x, y, width, height])(picture.getBoundingClientRect())";
-        let place: [f64; 4] = serde_json::from_value(self.value(place)).unwrap();
+        let place = self.picture();
         self.pixels(place)
     }
 
@@ -120,7 +134,7 @@ pub(crate) fn two_lights() -> Value {
         list.push(entry);
         list.len() - 1
     };
-    let bulb = json!({"name": "bulb", "type": "point", "intensity": 0.5});
+    let bulb = json!({"name": "bulb", "type": "point", "intensity": 2.0});
     scene["extensions"] = json!({"KHR_lights_punctual": {"lights": [bulb]}});
     add(&mut scene["extensionsUsed"], json!("KHR_lights_punctual"));
     let node = json!({"translation": [0.0, 0.4, 0.7], "extensions": {"KHR_lights_punctual": {"light": 0}}});

@@ -61,14 +61,17 @@ impl Card {
 pub(crate) fn act(room: &Room, tab: &mut Tab, card: &mut Card, actions: usize) {
     let mut numbers = Numbers(21);
     for _ in 0..actions {
-        let place = [numbers.of(5.0, 300.0), numbers.of(5.0, 100.0)];
+        let place = [numbers.next(), numbers.next()];
         match (numbers.next() * 100.0) as u32 {
             0..30 => {
                 let shift = [numbers.of(-40.0, 40.0), numbers.of(-40.0, 40.0)];
                 tab.drag(numbers.one(&["left", "left", "right", "middle"]), place, shift);
             }
             30..40 => tab.drag("left", place, [0.0, 0.0]),
-            40..52 => tab.wheel(place, numbers.of(-300.0, 300.0)),
+            40..52 => {
+                let [x, y, width, height] = tab.picture();
+                tab.wheel([x + place[0] * width, y + place[1] * height], numbers.of(-300.0, 300.0));
+            }
             52..62 => {
                 let key = numbers.one(&[
                     "KeyW",
