@@ -142,7 +142,7 @@ function fit() {
     if (!state || !steers || box.width < 1 || box.height < 1) return;
     const longer = asked.side === "window" ? 1 : Number(asked.side) / Math.max(box.width, box.height);
     const size = asked.side === "" ? asked.started
-        : [box.width, box.height].map(side => Math.max(Math.round(side * longer), 1));
+        : [box.width, box.height].map(side => Math.max(Math.floor(side * longer), 1));
     if ((asked.size ?? state.size).join() !== size.join()) send("size", { type: "size", size });
     asked.size = size;
 }
@@ -151,9 +151,11 @@ function fit() {
 function layOut() {
     const box = byId("stage").getBoundingClientRect();
     const [width, height] = picture.size;
-    const factor = Math.min(box.width / width, box.height / height);
-    canvas.style.width = `${Math.min(width * factor, box.width)}px`;
-    canvas.style.height = `${Math.min(height * factor, box.height)}px`;
+    const fitting = Math.min(box.width / width, box.height / height);
+    // A picture of the window's size is shown pixel by pixel.
+    const factor = Math.floor(box.width) === width && Math.floor(box.height) === height ? 1 : fitting;
+    canvas.style.width = `${width * factor}px`;
+    canvas.style.height = `${height * factor}px`;
     isStale = true;
 }
 

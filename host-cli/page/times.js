@@ -5,10 +5,10 @@ const KEPT = 200;
 export class Times {
     #sent = new Map();
     #lastSent = -Infinity;
-    #running = null;
-    // Instants at which a new picture was first whole, coarse or not.
+    // Instants at which pictures were first whole, coarse or not, and the version of the last one.
     #wholes = [];
-    // Finished and running measurements, newest last: {what, version, first, coarse, full, settled}.
+    #counted = 0;
+    // Measurements, newest last: {what, version, first, coarse, full, settled}.
     measured = [];
 
     // A message that makes a new picture was sent.
@@ -34,25 +34,28 @@ export class Times {
     }
 
     #begin({ what, at }, version) {
-        this.#running = { what, at, version };
-        this.measured.push(this.#running);
+        this.measured.push({ what, at, version });
         if (this.measured.length > KEPT) this.measured.shift();
     }
 
-    // The picture was drawn.
+    // The picture was drawn. It answers all changes that it holds, even if it is newer.
     drawn(picture, isNew) {
         const now = performance.now();
-        if (picture.isWhole && isNew) this.#wholes.push(now);
+        if (picture.isWhole && isNew && picture.version !== this.#counted) {
+            this.#counted = picture.version;
+            this.#wholes.push(now);
+        }
         while (this.#wholes[0] < now - 1000) this.#wholes.shift();
-        const run = this.#running;
-        if (!run || picture.version < run.version) return;
-        run.first ??= now - run.at;
-        if (picture.isWhole) run.coarse ??= now - run.at;
-        if (picture.isWhole && picture.step === 1) run.full ??= now - run.at;
+        for (const run of this.measured.filter(({ version }) => version <= picture.version)) {
+            run.first ??= now - run.at;
+            if (picture.isWhole) run.coarse ??= now - run.at;
+            if (picture.isWhole && picture.step === 1) run.full ??= now - run.at;
+        }
     }
 
     settled(version) {
-        if (this.#running?.version === version) this.#running.settled ??= performance.now() - this.#running.at;
+        const now = performance.now();
+        for (const run of this.measured.filter(run => run.version <= version)) run.settled ??= now - run.at;
     }
 
     // Messages that no picture holds yet, and time since the last one.
