@@ -15,8 +15,8 @@ const MAX_REPLIES: usize = 64;
 pub(super) enum Outgoing {
     /// An answer.
     Reply(String),
-    /// The newest state.
-    State,
+    /// The newest state; for a page that has all tiles, if it is true.
+    State(bool),
     /// The newest states of the cards.
     Cards,
     /// A tile, as the page shows it.
@@ -78,8 +78,8 @@ impl Page {
         self.received = self.received.max(bytes.min(self.sent));
     }
 
-    /// What to send next; `None` if there is nothing, or the page is behind. A state comes before the first tile of its wish, and a
-    /// settled one once more after the last tile.
+    /// What to send next; `None` if there is nothing, or the page is behind. A state comes before the first tile of its wish, and the
+    /// settled one after the last tile.
     pub(super) fn take(
         &mut self,
         canvas: &Canvas,
@@ -102,7 +102,7 @@ impl Page {
                 self.seen.state = newest.state;
             }
             self.told = version;
-            return Some(Outgoing::State);
+            return Some(Outgoing::State(!is_behind));
         }
         let (number, patch) = patch?;
         let bytes = patch.bytes() as u64;

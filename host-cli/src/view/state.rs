@@ -396,7 +396,7 @@ impl View {
             self.pages.get_mut(&number)?.take(&self.canvas, self.revisions, version, is_settled)?;
         Some(match outgoing {
             Outgoing::Reply(text) => Ok(text),
-            Outgoing::State => Ok(self.describe().to_string()),
+            Outgoing::State(has_all) => Ok(self.describe(has_all).to_string()),
             Outgoing::Cards => Ok(self.cards.describe().to_string()),
             tile @ Outgoing::Tile(..) => Err(tile),
         })
@@ -415,7 +415,8 @@ impl View {
         command_line::words(&self.start.options, self.start.quality, &self.wish)
     }
 
-    fn describe(&self) -> Value {
+    /// State for a page, to which the picture is settled once it has all tiles.
+    fn describe(&self, has_all: bool) -> Value {
         let settings = &self.wish.settings;
         // The camera was checked when it was wished for.
         let camera = settings.camera(&self.scene).map(|camera| {
@@ -433,7 +434,7 @@ impl View {
             "step": done.step,
             "samples": done.samples,
             "spp": settings.integrator.samples,
-            "settled": self.refinement.is_settled(),
+            "settled": has_all && self.refinement.is_settled(),
             "version": self.refinement.version(),
             "id": self.message,
             "command": command_line::quoted(&self.command()),
