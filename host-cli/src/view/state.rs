@@ -71,6 +71,8 @@ pub(super) struct View {
     /// Pass of the newest wish that was finished last.
     done: Option<Origin>,
     cost: Cost,
+    /// Number of the first wish of the picture's size.
+    of_size: u32,
     /// Pixel that tiles near to are rendered first.
     cursor: Option<[u32; 2]>,
     pub(super) cards: CardBoard,
@@ -100,6 +102,7 @@ impl View {
             canvas: Canvas::default(),
             done: None,
             cost: Cost::default(),
+            of_size: 0,
             cursor: None,
             pages: BTreeMap::new(),
             next_page: 0,
@@ -245,15 +248,28 @@ impl View {
         }
         self.scene = self.start.sketch.with(&wish)?;
         self.refinement.wish(wish.is_other_edition(&self.wish));
+        let size = |wish: &Wish| [wish.settings.picture.width, wish.settings.picture.height];
+        if size(&wish) != size(&self.wish) {
+            self.of_size = self.refinement.version();
+        }
         self.wish = wish;
         self.begin_picture();
         Ok(())
     }
 
+    /// Drops what no page should see any more. A first pass that is spared is seen until the newest wish has a tile.
     fn begin_picture(&mut self) {
-        self.canvas.clear();
+        match self.spared() {
+            Some(version) => self.canvas.keep_version(version),
+            None => self.canvas.clear(),
+        }
         self.done = None;
         self.revisions.state += 1;
+    }
+
+    /// Number of the wish whose tiles are shown as they come.
+    fn spared(&self) -> Option<u32> {
+        self.refinement.spares().filter(|version| *version >= self.of_size)
     }
 
     fn of_page(&mut self, number: PageNumber, act: impl FnOnce(&mut Page)) {
@@ -283,7 +299,7 @@ impl View {
     /// Tells a page the place that a pixel shows.
     fn pick(&mut self, number: PageNumber, at: [u32; 2]) -> Result<(), String> {
         let camera = self.wish.settings.camera(&self.scene).map_err(|error| error.to_string())?;
-        let message = match self.canvas.depth(at) {
+        let message = match self.canvas.depth(self.refinement.version(), at) {
             None => json!({"type": "picked", "point": null}),
             Some(depth) => {
                 let size = [self.wish.settings.picture.width, self.wish.settings.picture.height];
@@ -331,7 +347,7 @@ impl View {
         if is_new {
             self.revisions.cards += 1;
         }
-        if origin.version == self.refinement.version() {
+        if self.spared() == Some(origin.version) {
             self.canvas.put(Patch::new(origin, number, tile.clone()));
         }
     }
