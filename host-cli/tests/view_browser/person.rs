@@ -70,7 +70,8 @@ impl Person for Tab {
         self.resize([160, 260]);
         self.value("document.getElementById('panel').hidden || document.getElementById('toggle').click()");
         self.choose("side", "window");
-        self.wait("photoncard.picture.size.join() === [stage.clientWidth, stage.clientHeight].join()", LIMIT);
+        let sides = "(({width, height}) => [width, height].map(Math.floor))(stage.getBoundingClientRect())";
+        self.wait(&format!("photoncard.picture.size.join() === {sides}.join()"), LIMIT);
         self.wait(SETTLED, LIMIT);
     }
 
