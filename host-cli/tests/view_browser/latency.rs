@@ -9,7 +9,7 @@ use crate::server::View;
 use crate::support::{Room, shipped};
 
 /// A time in which any picture is there.
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = Duration::from_secs(120);
 /// Moves that a median is taken of.
 const MOVES: usize = 7;
 
@@ -49,7 +49,7 @@ fn latency() {
     }
 }
 
-/// A tab in which the picture has the size that the command was started with.
+/// A tab in which the first picture is shown.
 fn shown(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = browser.tab([1100, 760]);
     tab.open(&view.address);
@@ -59,6 +59,13 @@ fn shown(browser: &mut Browser, view: &View) -> Tab {
 
 fn start(room: &Room, file: &str, size: &str) -> View {
     View::start(room, &shipped(file), &["--size", size])
+}
+
+/// A tab in which the settled picture has begun: pilot renders have found its settings, and its photons are traced.
+fn refined(browser: &mut Browser, view: &View) -> Tab {
+    let mut tab = shown(browser, view);
+    tab.wait("photoncard.state.settled || photoncard.picture.samples === photoncard.state.spp", LIMIT);
+    tab
 }
 
 /// Milliseconds from the start of the command to the first coarse picture, with all defaults.
@@ -80,8 +87,7 @@ fn moved<const N: usize>(
     parts: [&str; N],
 ) -> [f64; N] {
     let view = start(room, file, size);
-    let mut tab = shown(browser, &view);
-    std::thread::sleep(Duration::from_secs(2));
+    let mut tab = refined(browser, &view);
     let mut times: [Vec<f64>; N] = std::array::from_fn(|_| Vec::new());
     for number in 0..MOVES {
         let turn = if number % 2 == 0 { 0.05 } else { -0.05 };
@@ -104,8 +110,7 @@ fn moved<const N: usize>(
 /// Whole pictures a second in the last one of four seconds of turning.
 fn turned(browser: &mut Browser, room: &Room, file: &str) -> f64 {
     let view = start(room, file, "256x256");
-    let mut tab = shown(browser, &view);
-    std::thread::sleep(Duration::from_secs(2));
+    let mut tab = refined(browser, &view);
     tab.key("keyDown", "ArrowLeft");
     let start = Instant::now();
     let mut rates = Vec::new();
@@ -120,7 +125,7 @@ fn turned(browser: &mut Browser, room: &Room, file: &str) -> f64 {
 /// Median of the milliseconds from another strength of the lamp to the first coarse picture.
 fn relit(browser: &mut Browser, room: &Room, file: &str) -> f64 {
     let view = start(room, file, "512x512");
-    let mut tab = shown(browser, &view);
+    let mut tab = refined(browser, &view);
     let mut times = Vec::new();
     for number in 0..MOVES {
         std::thread::sleep(Duration::from_secs(1));
