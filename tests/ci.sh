@@ -55,6 +55,29 @@ if ! has_qemu && ! { install_qemu && has_qemu; }; then
     echo "ci: SKIPPED: the images are built, but not run: $PHOTONCARD_SKIP_QEMU" >&2
 fi
 
+# The browser that shows the page of `photoncard view`. Without it all else is tested, and the end says what is not.
+has_browser() {
+    local program
+    for program in chromium chromium-browser google-chrome google-chrome-stable; do
+        command -v "$program" >/dev/null && return
+    done
+    return 1
+}
+install_browser() {
+    if [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then
+        echo "ci: Chromium is missing; run: sudo apt-get install chromium" >&2
+        return 1
+    fi
+    export DEBIAN_FRONTEND=noninteractive
+    apt-get update -qq
+    apt-get install -y -qq --no-install-recommends chromium >/dev/null
+}
+unset PHOTONCARD_SKIP_BROWSER
+if ! has_browser && ! { install_browser && has_browser; }; then
+    export PHOTONCARD_SKIP_BROWSER="Chromium is missing and could not be installed"
+    echo "ci: SKIPPED: the page of the live view is not tested: $PHOTONCARD_SKIP_BROWSER" >&2
+fi
+
 # The firmware's operations are counted where it runs without floating-point instructions: tests/src/operations.
 uncounted=""
 if rustup target add x86_64-unknown-none; then
@@ -145,5 +168,6 @@ fi
 [ -z "$unpublished" ] || echo "ci: SKIPPED: the rehearsal of 'cargo publish': $unpublished" >&2
 [ -z "$uncounted" ] || echo "ci: SKIPPED: the count of operations: $uncounted" >&2
 [ ${#unchecked[@]} = 0 ] || echo "ci: SKIPPED: checks for ${unchecked[*]}: rustup cannot add them" >&2
+[ -z "${PHOTONCARD_SKIP_BROWSER:-}" ] || echo "ci: SKIPPED: the page of the live view: $PHOTONCARD_SKIP_BROWSER" >&2
 [ -z "${PHOTONCARD_SKIP_QEMU:-}" ] || echo "ci: SKIPPED: images on QEMU: $PHOTONCARD_SKIP_QEMU" >&2
 step "done"

@@ -7,7 +7,7 @@
 //! | `canvas`, `pages`, `cards` | tiles of the newest wish; what each page is sent next; states of the cards |
 //! | `request`, `describe` | messages of a page, and messages to it |
 //! | `state` | all of these as one state, without threads, clock, input or output |
-//! | `hub`, `painter`, `returning` | the state under a lock, the thread that renders, and the one that looks for lost cards |
+//! | `hub`, `painter`, `fitting`, `returning` | the state under a lock, the threads that render and that run pilot renders, and the one that looks for lost cards |
 //! | `http`, `gate`, `page_files`, `socket`, `server` | requests, who may have what, the page's files, WebSockets |
 //! | `saving`, `browser` | pictures that a page saves, and the browser that shows it |
 
@@ -16,6 +16,7 @@ mod canvas;
 mod cards;
 mod command_line;
 mod describe;
+mod fitting;
 mod gate;
 mod http;
 mod hub;
@@ -81,6 +82,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
         wish: Wish::new(settings, options.scene.assignments.clone()),
         sketch: Sketch::new(&scene),
         facts: SceneFacts::new(input::name(&options.scene), &scene),
+        is_size_stated: options.picture.states_size(),
         out: folder.as_ref().map(|folder| folder.path().display().to_string()),
     };
     let hub = Arc::new(Hub::new(View::new(start)?, folder, is_over));
@@ -91,7 +93,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     std::thread::spawn(move || server::serve(&listener, &gate, &served));
     std::thread::scope(|scope| {
         scope.spawn(|| returning::look_for_cards(&hub));
-        let painter = Painter::new(&hub, scene, &options.scene, options.quality);
+        let painter = Painter::new(&hub, scene, options);
         let painted = scope.spawn(|| on_threads(options.threads, || painter.run()));
         while !hub.is_over() {
             std::thread::sleep(ATTENTION);

@@ -167,7 +167,7 @@ fn names_that_do_not_exist() {
         ("--light-units", "candela", ["radiometric", "photometric"]),
         ("--set", "floor", ["`floor`", "NAME.PROPERTY=VALUE"]),
         ("--set", "flor.diffuse=0", ["'flor'", "'floor'"]),
-        ("--set", "floor.gloss=1", ["'gloss'", "the properties are"]),
+        ("--set", "floor.gloss=1", ["'gloss'", "the properties of a material are"]),
         ("--set", "floor.diffuse=2", ["albedo", "0 to 1"]),
         ("--ic-error", "nan", ["--ic-error", "0.025"]),
         ("--card", "serial:", ["serial port", "serial:PATH[@BAUD]"]),

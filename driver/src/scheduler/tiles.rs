@@ -96,7 +96,7 @@ pub fn spread(mut tiles: Vec<Tile>) -> Vec<Tile> {
 pub fn near(mut tiles: Vec<Tile>, [x, y]: [u32; 2]) -> Vec<Tile> {
     // Twice the distance of the middle, which may lie between pixels.
     let along = |start: u32, length: u32, at: u32| {
-        (2 * u64::from(start) + u64::from(length)).abs_diff(2 * u64::from(at)).pow(2)
+        u128::from((2 * u64::from(start) + u64::from(length)).abs_diff(2 * u64::from(at))).pow(2)
     };
     tiles.sort_by_key(|tile| along(tile.x, tile.width, x) + along(tile.y, tile.height, y));
     tiles

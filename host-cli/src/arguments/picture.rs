@@ -70,6 +70,11 @@ impl PictureOptions {
         }
     }
 
+    /// Returns whether the size of the picture is stated.
+    pub(crate) fn states_size(&self) -> bool {
+        self.size.is_some()
+    }
+
     /// Layers of the picture.
     pub(crate) fn layers(&self) -> Layers {
         self.aov.clone().unwrap_or_default()

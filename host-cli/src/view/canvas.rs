@@ -1,4 +1,4 @@
-//! The tiles that pages are shown: those of the newest wish, numbered in the order in which they were finished.
+//! The tiles that pages are shown: those of the newest wish that has any, numbered in the order in which they were finished.
 //!
 //! A page needs to remember one number alone, that of the next tile: tiles that are outdated are gone when it asks. So a slow page gets
 //! fewer and newer tiles, and takes no memory.
@@ -86,7 +86,7 @@ fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     }
 }
 
-/// The tiles of the newest wish.
+/// The tiles of the newest wish that has any.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     patches: VecDeque<(u64, Arc<Patch>)>,
@@ -95,15 +95,24 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// Adds a tile.
+    /// Adds a tile, and drops those of older wishes.
     pub(super) fn put(&mut self, patch: Patch) {
+        let version = patch.origin.version;
+        if self.patches.front().is_some_and(|(_, oldest)| oldest.origin.version < version) {
+            self.keep_version(version);
+        }
         self.patches.push_back((self.next, Arc::new(patch)));
         self.next += 1;
     }
 
-    /// Drops all tiles, for a new wish.
+    /// Drops all tiles.
     pub(super) fn clear(&mut self) {
         self.patches.clear();
+    }
+
+    /// Drops the tiles of other wishes.
+    pub(super) fn keep_version(&mut self, version: u32) {
+        self.patches.retain(|(_, patch)| patch.origin.version == version);
     }
 
     /// Drops the tiles of other passes, once the picture of a pass is complete.
@@ -122,9 +131,10 @@ impl Canvas {
         self.patches.get(index).cloned()
     }
 
-    /// Depth of the newest pixel that shows `at`, metres; `None` where nothing is seen.
-    pub(super) fn depth(&self, at: [u32; 2]) -> Option<f32> {
-        let seen = self.patches.iter().rev().find_map(|(_, patch)| patch.pixel(at))?;
+    /// Depth of the newest pixel of a wish that shows `at`, metres; `None` where nothing is seen.
+    pub(super) fn depth(&self, version: u32, at: [u32; 2]) -> Option<f32> {
+        let mut of_wish = self.patches.iter().rev().filter(|(_, patch)| patch.origin.version == version);
+        let seen = of_wish.find_map(|(_, patch)| patch.pixel(at))?;
         Some(seen.pixel.depth).filter(|depth| depth.is_finite() && *depth > 0.0)
     }
 

@@ -24,7 +24,7 @@ impl SceneFacts {
         Self { name, low, high }
     }
 
-    /// Greeting of a page; `scene` has materials and lights as they are.
+    /// Greeting of a page; `scene` has materials and lights before edits.
     pub(super) fn hello(&self, scene: &Scene, out: Option<&str>, steers: bool) -> Value {
         let layers = ["radiance"].into_iter().chain(Layer::ALL.map(Layer::name));
         let cameras = scene.cameras.iter().map(|camera| {

@@ -11,6 +11,7 @@ use photoncard_driver::tone_mapping::ToneMapping;
 use serde_json::json;
 
 use super::pages::Outgoing;
+use super::request::Saving;
 use super::saving::Folder;
 use super::state::{Effect, PageNumber, Task, View};
 use crate::arguments::{PictureFormat, PictureOutput};
@@ -114,8 +115,8 @@ impl Hub {
         match self.change(|view, now| view.receive(page, text, now)) {
             Effect::Nothing => true,
             Effect::Close => false,
-            Effect::Save(name) => {
-                let message = match self.save(&name) {
+            Effect::Save(saving) => {
+                let message = match self.save(&saving) {
                     Ok(path) => json!({"type": "saved", "path": path.display().to_string()}),
                     Err(text) => json!({"type": "error", "text": text}),
                 };
@@ -126,7 +127,7 @@ impl Hub {
     }
 
     /// Saves the settled picture.
-    fn save(&self, name: &str) -> Result<PathBuf, String> {
+    fn save(&self, saving: &Saving) -> Result<PathBuf, String> {
         let version = self.lock().version();
         let settled = self.settled.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let settled = settled.filter(|settled| settled.version == version);
@@ -136,7 +137,7 @@ impl Hub {
             return Err("the view is over".into());
         }
         let folder = folder.as_mut().ok_or("pictures are saved only by a view with --out DIR")?;
-        folder.save(name, |path, format| write(path, format, &settled))
+        folder.save(&saving.name, |path, format| write(path, format, &settled, saving.tone))
     }
 
     /// Waits until no picture is being saved; none is from then on, as the view is over.
@@ -177,13 +178,10 @@ impl Hub {
 }
 
 /// Writes a picture as `photoncard render` does.
-fn write(path: &Path, format: PictureFormat, settled: &Settled) -> Result<(), String> {
+fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMapping) -> Result<(), String> {
     let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
-    let form = Form {
-        layers: settled.wish.settings.picture.layers.clone(),
-        sample_type: SampleFormat::Float,
-        tone: ToneMapping::default(),
-    };
+    let form =
+        Form { layers: settled.wish.settings.picture.layers.clone(), sample_type: SampleFormat::Float, tone };
     let picture = PictureOutput { path: path.to_owned(), format };
     let film = &settled.rendering.film;
     write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.to_string())

@@ -12,6 +12,7 @@ pub(super) struct PageFile {
 const HTML: &str = "text/html; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
+const DRAWING: &str = "image/svg+xml";
 
 macro_rules! files {
     ($($kind:ident $name:literal),+ $(,)?) => {
@@ -22,7 +23,20 @@ macro_rules! files {
 static FILES: &[PageFile] = &files![
     HTML "index.html",
     STYLE "view.css",
+    DRAWING "icon.svg",
+    SCRIPT "camera.js",
+    SCRIPT "connection.js",
+    SCRIPT "controls.js",
+    SCRIPT "display.js",
+    SCRIPT "exposure.js",
+    SCRIPT "fields.js",
     SCRIPT "main.js",
+    SCRIPT "panel.js",
+    SCRIPT "picture.js",
+    SCRIPT "status.js",
+    SCRIPT "tiles.js",
+    SCRIPT "times.js",
+    SCRIPT "tone.js",
 ];
 
 /// The file of a name.

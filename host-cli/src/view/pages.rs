@@ -15,8 +15,8 @@ const MAX_REPLIES: usize = 64;
 pub(super) enum Outgoing {
     /// An answer.
     Reply(String),
-    /// The newest state.
-    State,
+    /// The newest state; for a page that has all tiles, if it is true.
+    State(bool),
     /// The newest states of the cards.
     Cards,
     /// A tile, as the page shows it.
@@ -35,6 +35,8 @@ pub(super) struct Revisions {
 pub(super) struct Page {
     replies: VecDeque<String>,
     seen: Revisions,
+    /// Number of the wish of the last state that was sent: a page must know a picture's size before its tiles.
+    told: u32,
     shown: Shown,
     /// Number of the next tile.
     next: u64,
@@ -49,6 +51,7 @@ impl Page {
         Self {
             replies: VecDeque::new(),
             seen: Revisions::default(),
+            told: 0,
             shown: Shown::Radiance,
             next: 0,
             sent: 0,
@@ -75,8 +78,15 @@ impl Page {
         self.received = self.received.max(bytes.min(self.sent));
     }
 
-    /// What to send next; `None` if there is nothing, or the page is behind. A settled state follows the last tile.
-    pub(super) fn take(&mut self, canvas: &Canvas, newest: Revisions, is_settled: bool) -> Option<Outgoing> {
+    /// What to send next; `None` if there is nothing, or the page is behind. A state comes before the first tile of its wish, and the
+    /// settled one after the last tile.
+    pub(super) fn take(
+        &mut self,
+        canvas: &Canvas,
+        newest: Revisions,
+        version: u32,
+        is_settled: bool,
+    ) -> Option<Outgoing> {
         if let Some(text) = self.replies.pop_front() {
             return Some(Outgoing::Reply(text));
         }
@@ -85,9 +95,14 @@ impl Page {
             return Some(Outgoing::Cards);
         }
         let patch = canvas.after(self.next);
-        if self.seen.state != newest.state && !(is_settled && patch.is_some()) {
-            self.seen.state = newest.state;
-            return Some(Outgoing::State);
+        let is_behind = is_settled && patch.is_some();
+        let is_first = patch.is_some() && self.told != version;
+        if is_first || (self.seen.state != newest.state && !is_behind) {
+            if !is_behind {
+                self.seen.state = newest.state;
+            }
+            self.told = version;
+            return Some(Outgoing::State(!is_behind));
         }
         let (number, patch) = patch?;
         let bytes = patch.bytes() as u64;

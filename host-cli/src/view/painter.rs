@@ -2,9 +2,8 @@
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use photoncard_driver::pack::PackedScene;
 use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{CardError, Observer, Phase, RenderError, Renderer};
 use photoncard_driver::scene::{FixedScene, Scene};
@@ -12,10 +11,11 @@ use photoncard_driver::sink::{FinishedTile, TileSink};
 use photoncard_shared::message::Tile;
 
 use super::canvas::Origin;
+use super::fitting::Fitting;
 use super::hub::{Hub, Settled};
 use super::refinement::{Outcome, Pass};
 use super::state::{Task, with_remedy};
-use crate::arguments::SceneOptions;
+use crate::arguments::{SceneOptions, ViewOptions};
 use crate::input;
 
 /// Renders what pages wish for, until the view is over.
@@ -24,15 +24,28 @@ pub(super) struct Painter<'a> {
     options: &'a SceneOptions,
     quality: Quality,
     renderer: Renderer,
-    scene: FixedScene<'static>,
+    threads: Option<usize>,
+    scene: Arc<FixedScene<'static>>,
+    /// Pilot renders of the scene, which go on beside pictures.
+    fitting: Option<Fitting>,
     /// Assignments that the scene has; `None` before the first picture.
     assigned: Option<Vec<String>>,
 }
 
 impl<'a> Painter<'a> {
     /// Painter of a scene before its assignments.
-    pub(super) fn new(hub: &'a Hub, scene: Scene, options: &'a SceneOptions, quality: Quality) -> Self {
-        Self { hub, options, quality, renderer: Renderer::default(), scene: scene.into(), assigned: None }
+    pub(super) fn new(hub: &'a Hub, scene: Scene, options: &'a ViewOptions) -> Self {
+        let ViewOptions { scene: scene_options, quality, threads, .. } = options;
+        Self {
+            hub,
+            options: scene_options,
+            quality: *quality,
+            threads: *threads,
+            renderer: Renderer::default(),
+            scene: Arc::new(scene.into()),
+            fitting: None,
+            assigned: None,
+        }
     }
 
     /// Renders until the view is over. A panic ends the view.
@@ -50,6 +63,7 @@ impl<'a> Painter<'a> {
                 self.fail(&task, &error);
             }
         }
+        self.fitting.take().into_iter().for_each(Fitting::stop);
     }
 
     /// Gives the scene the materials and lights of a task.
@@ -59,20 +73,39 @@ impl<'a> Painter<'a> {
             return Ok(());
         }
         self.assigned = None;
-        let mut scene = std::mem::replace(&mut self.scene, Scene::default().into()).into_scene();
+        self.fitting.take().into_iter().for_each(Fitting::stop);
+        // No pilot renders share the scene any more.
+        let scene = std::mem::replace(&mut self.scene, Arc::new(Scene::default().into()));
+        let mut scene =
+            Arc::try_unwrap(scene).map_or_else(|scene| Scene::clone(&scene), FixedScene::into_scene);
         let applied = self.hub.change(|view, _| view.apply(&task.wish, &mut scene));
-        self.scene = scene.into();
+        self.scene = Arc::new(scene.into());
         applied?;
         self.assigned = Some(assignments);
         Ok(())
     }
 
-    fn fit(&self, task: &Task) -> Result<(), RenderError> {
-        let easel = Easel::new(self.hub, task);
-        let packed = PackedScene::new(&self.scene)?;
-        let fit = self.quality.fit(&self.scene, &packed, &task.settings, &easel)?;
-        self.hub.change(|view, now| view.fit(task, fit.as_ref(), now));
-        Ok(())
+    /// Waits for what pilot renders find. Those that a new wish has interrupted go on, and are of the view in which they began.
+    fn fit(&mut self, task: &Task) -> Result<(), RenderError> {
+        let begin = || Fitting::start(self.scene.clone(), self.quality, task.settings.clone(), self.threads);
+        let fitting = match self.fitting.take() {
+            Some(fitting) => fitting,
+            None => begin().map_err(|source| RenderError::Card {
+                card: "the pilot".into(),
+                source: CardError::Start(source),
+            })?,
+        };
+        match fitting.wait(&|| self.hub.must_stop()) {
+            Ok(found) => {
+                let found = found?;
+                self.hub.change(|view, now| view.fit(task, found.as_ref(), now));
+                Ok(())
+            }
+            Err(fitting) => {
+                self.fitting = Some(fitting);
+                Err(RenderError::Stopped)
+            }
+        }
     }
 
     fn render(&mut self, task: &Task) -> Result<(), RenderError> {
@@ -126,7 +159,6 @@ impl Drop for EndOnDrop<'_> {
 struct Easel<'a> {
     hub: &'a Hub,
     origin: Origin,
-    is_fit: bool,
     is_preparing: AtomicBool,
     /// Name of the card of each tile between its report and its pixels.
     cards: Mutex<HashMap<u32, String>>,
@@ -134,19 +166,13 @@ struct Easel<'a> {
 
 impl<'a> Easel<'a> {
     fn new(hub: &'a Hub, task: &Task) -> Self {
-        Self {
-            hub,
-            origin: task.origin,
-            is_fit: task.work.pass == Pass::Fit,
-            is_preparing: AtomicBool::new(false),
-            cards: Mutex::default(),
-        }
+        Self { hub, origin: task.origin, is_preparing: AtomicBool::new(false), cards: Mutex::default() }
     }
 }
 
 impl Observer for Easel<'_> {
     fn progress(&self, phase: Phase, _: u64, _: u64) {
-        let is_preparing = matches!(phase, Phase::Photons | Phase::Pack) && !self.is_fit;
+        let is_preparing = matches!(phase, Phase::Photons | Phase::Pack);
         if self.is_preparing.swap(is_preparing, Ordering::Relaxed) != is_preparing {
             self.hub.change(|view, _| view.prepares(is_preparing));
         }

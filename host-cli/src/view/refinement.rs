@@ -165,6 +165,11 @@ impl Refinement {
         work.pass != Pass::FIRST || self.may_stop_first
     }
 
+    /// Number of the wish whose work is running and need not stop: the newest one, or an older one that is spared.
+    pub(super) fn spares(&self) -> Option<u32> {
+        self.running.filter(|_| !self.must_stop()).map(|work| work.version)
+    }
+
     /// Next thing to do.
     pub(super) fn next(&mut self, now: Duration) -> Next {
         let Some(pass) = self.pass.filter(|_| self.running.is_none() && !self.is_refused) else {

@@ -4,6 +4,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::layer::Layer;
 use photoncard_driver::render::Sampling;
 use photoncard_driver::scheduler::GatherOrder;
+use photoncard_driver::tone_mapping::{ToneCurve, ToneMapping};
 use serde_json::{Map, Value};
 
 use super::canvas::Shown;
@@ -14,6 +15,8 @@ pub(super) const MAX_SIDE: u64 = 4096;
 pub(super) const MAX_PIXELS: u64 = 1 << 22;
 /// Maximum distance of a place from the origin along each axis, metres.
 const MAX_PLACE: f64 = 1e15;
+/// Maximum of an exposure and of its negative, stops.
+const MAX_STOPS: f64 = 120.0;
 /// Maximum length of a name, bytes.
 const MAX_NAME: usize = 1024;
 
@@ -36,10 +39,18 @@ pub(super) enum Request {
     Size([u32; 2]),
     Cursor(Option<[u32; 2]>),
     Pick([u32; 2]),
-    Save(String),
+    Save(Saving),
     /// Bytes of tiles that the page has received since it connected.
     Shown(u64),
     Steer,
+}
+
+/// A picture that is to be saved.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Saving {
+    pub(super) name: String,
+    /// Tone mapping of a PNG.
+    pub(super) tone: ToneMapping,
 }
 
 /// A setting of the render.
@@ -68,10 +79,14 @@ impl From<String> for Fault {
     }
 }
 
-/// Reads a message.
-pub(super) fn parse(text: &str) -> Result<Request, Fault> {
+/// Reads a message, and its number if it has one.
+pub(super) fn parse(text: &str) -> Result<(Request, Option<u64>), Fault> {
     let Ok(Value::Object(message)) = serde_json::from_str(text) else { return Err(Fault::Foreign) };
-    let fields = Fields(&message);
+    let number = message.get("id").and_then(Value::as_u64);
+    Ok((request(&Fields(&message))?, number))
+}
+
+fn request(fields: &Fields) -> Result<Request, Fault> {
     Ok(match fields.text("type")?.as_str() {
         "camera" => Request::Camera {
             position: fields.place("position")?,
@@ -80,14 +95,14 @@ pub(super) fn parse(text: &str) -> Result<Request, Fault> {
             is_moving: fields.switch("moving")?,
         },
         "set" => Request::Set { name: fields.text("name")?, value: fields.values("value")? },
-        "setting" => Request::Setting(setting(&fields)?),
+        "setting" => Request::Setting(setting(fields)?),
         "reset" => Request::Reset,
         "layer" => Request::Layer(layer(&fields.text("name")?)?),
         "size" => Request::Size(fields.size()?),
         "cursor" if fields.0.get("at") == Some(&Value::Null) => Request::Cursor(None),
         "cursor" => Request::Cursor(Some(fields.pixel("at")?)),
         "pick" => Request::Pick(fields.pixel("at")?),
-        "save" => Request::Save(fields.text("name")?),
+        "save" => Request::Save(Saving { name: fields.text("name")?, tone: fields.tone()? }),
         "shown" => Request::Shown(fields.whole("bytes", u64::MAX)?),
         "steer" => Request::Steer,
         other => return Err(Fault::Refused(format!("there is no message of the type {other:?}"))),
@@ -152,6 +167,15 @@ impl Fields<'_> {
         values.ok_or_else(|| format!("{name:?} is a number, or a list of three"))
     }
 
+    /// Tone mapping; what is not stated is the default.
+    fn tone(&self) -> Result<ToneMapping, String> {
+        let is_stated = |name: &str| self.0.get(name).is_some_and(|value| !value.is_null());
+        let stops = || self.number("exposure", -MAX_STOPS, MAX_STOPS);
+        let exposure = is_stated("exposure").then(stops).transpose()?.map(|stops| stops as f32);
+        let curve = is_stated("tonemap").then(|| ToneCurve::of_name(&self.text("tonemap")?)).transpose()?;
+        Ok(ToneMapping { exposure, curve: curve.unwrap_or_default() })
+    }
+
     fn place(&self, name: &str) -> Result<[f32; 3], String> {
         let list = self.field(name)?.as_array().filter(|list| list.len() == 3);
         let number = |value: &Value| {
@@ -211,7 +235,22 @@ mod tests {
             (r#"{"type":"pick","at":[3,4]}"#, Request::Pick([3, 4])),
             (r#"{"type":"shown","version":3,"bytes":77}"#, Request::Shown(77)),
         ] {
-            assert_eq!(parse(text), Ok(request), "{text}");
+            assert_eq!(parse(text), Ok((request, None)), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_picture_is_saved_as_it_is_shown() {
+        let saved = |exposure, curve| {
+            let tone = ToneMapping { exposure, curve };
+            Ok((Request::Save(Saving { name: "a.png".into(), tone }), Some(7)))
+        };
+        for (more, saving) in [
+            ("", saved(None, ToneCurve::Reinhard)),
+            (r#","exposure":null,"tonemap":"none""#, saved(None, ToneCurve::None)),
+            (r#","exposure":-1.5,"tonemap":"aces""#, saved(Some(-1.5), ToneCurve::Aces)),
+        ] {
+            assert_eq!(parse(&format!(r#"{{"type":"save","id":7,"name":"a.png"{more}}}"#)), saving, "{more}");
         }
     }
 
@@ -252,6 +291,8 @@ mod tests {
             (r#"{"type":"pick","at":[-1,0]}"#.into(), "at"),
             (r#"{"type":"pick","at":[4096,0]}"#.into(), "at"),
             (r#"{"type":"shown","bytes":-3}"#.into(), "bytes"),
+            (r#"{"type":"save","name":"a.png","exposure":1e9}"#.into(), "exposure"),
+            (r#"{"type":"save","name":"a.png","tonemap":"best"}"#.into(), "best"),
         ] {
             match parse(&text) {
                 Err(Fault::Refused(reason)) => assert!(reason.contains(said), "{text}: {reason}"),

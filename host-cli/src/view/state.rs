@@ -18,7 +18,7 @@ use super::describe::{self, Cost, SceneFacts};
 use super::pages::{Outgoing, Page, Revisions};
 use super::passes;
 use super::refinement::{COARSEST, Next, Outcome, Pass, Refinement, Work};
-use super::request::{Fault, Request, parse};
+use super::request::{Fault, Request, Saving, parse};
 use super::wish::{Sketch, Wish};
 use crate::arguments::SceneOptions;
 
@@ -33,6 +33,8 @@ pub(super) struct Start {
     pub(super) wish: Wish,
     pub(super) sketch: Sketch,
     pub(super) facts: SceneFacts,
+    /// Returns whether the size of the picture is stated, rather than left to the page's window.
+    pub(super) is_size_stated: bool,
     /// Folder in which pages may save pictures.
     pub(super) out: Option<String>,
 }
@@ -51,7 +53,7 @@ pub(super) struct Task {
 pub(super) enum Effect {
     Nothing,
     /// The settled picture is to be saved by this name.
-    Save(String),
+    Save(Saving),
     /// The connection is to be closed.
     Close,
 }
@@ -62,17 +64,23 @@ pub(super) struct View {
     wish: Wish,
     /// Materials and lights of the wish, and the file's cameras.
     scene: Scene,
+    /// The same of the first wish, to which `reset` returns.
+    first: Scene,
     refinement: Refinement,
     canvas: Canvas,
     /// Pass of the newest wish that was finished last.
     done: Option<Origin>,
     cost: Cost,
+    /// Number of the first wish of the picture's size.
+    of_size: u32,
     /// Pixel that tiles near to are rendered first.
     cursor: Option<[u32; 2]>,
     pub(super) cards: CardBoard,
     pages: BTreeMap<PageNumber, Page>,
     next_page: PageNumber,
     steering: Option<PageNumber>,
+    /// Number of the last message of the page that steers.
+    message: u64,
     revisions: Revisions,
 }
 
@@ -85,6 +93,7 @@ impl View {
         let wish = start.wish.clone();
         let is_fitted = start.stated == Stated::ALL || start.quality == Quality::Paper;
         Ok(Self {
+            first: start.sketch.with(&wish)?,
             scene: start.sketch.with(&wish)?,
             cards: CardBoard::new(&wish.settings.cards),
             wish,
@@ -93,10 +102,12 @@ impl View {
             canvas: Canvas::default(),
             done: None,
             cost: Cost::default(),
+            of_size: 0,
             cursor: None,
             pages: BTreeMap::new(),
             next_page: 0,
             steering: None,
+            message: 0,
             revisions: Revisions { state: 1, cards: 1 },
         })
     }
@@ -108,7 +119,9 @@ impl View {
         self.steering.get_or_insert(number);
         let out = self.start.out.as_deref();
         let mut page = Page::new();
-        page.reply(self.start.facts.hello(&self.scene, out, self.steering == Some(number)).to_string());
+        let mut hello = self.start.facts.hello(&self.first, out, self.steering == Some(number));
+        hello["size_stated"] = json!(self.start.is_size_stated);
+        page.reply(hello.to_string());
         self.pages.insert(number, page);
         number
     }
@@ -125,7 +138,7 @@ impl View {
     }
 
     fn steer(&mut self, number: PageNumber) {
-        self.steering = Some(number);
+        (self.steering, self.message) = (Some(number), 0);
         for (page, state) in &mut self.pages {
             state.reply(json!({"type": "steers", "value": *page == number}).to_string());
         }
@@ -150,13 +163,24 @@ impl View {
 
     /// Takes a message of a page.
     pub(super) fn receive(&mut self, number: PageNumber, text: &str, now: Duration) -> Effect {
-        match parse(text).and_then(|request| Ok(self.act(number, request, now)?)) {
-            Ok(effect) => effect,
+        let acted = parse(text).and_then(|(request, id)| Ok((self.act(number, request, now)?, id)));
+        match acted {
+            Ok((effect, id)) => {
+                self.note(number, id);
+                effect
+            }
             Err(Fault::Foreign) => Effect::Close,
             Err(Fault::Refused(reason)) => {
                 self.reply_error(number, &reason);
                 Effect::Nothing
             }
+        }
+    }
+
+    /// Notes the number of a message of the page that steers, which `state` tells.
+    fn note(&mut self, number: PageNumber, id: Option<u64>) {
+        if let Some(id) = id.filter(|_| self.steering == Some(number)) {
+            self.message = id;
         }
     }
 
@@ -172,7 +196,7 @@ impl View {
             Request::Save(_) if !self.refinement.is_settled() => {
                 return Err("the picture is not settled yet: save it when it is".into());
             }
-            Request::Save(name) => return Ok(Effect::Save(name)),
+            Request::Save(saving) => return Ok(Effect::Save(saving)),
             steering => {
                 if self.steering != Some(number) {
                     return Err("another page steers: take over first".into());
@@ -218,19 +242,34 @@ impl View {
     /// Takes a new wish, if it is one.
     fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
         if wish == self.wish {
+            // The page is told that its message was heard.
+            self.revisions.state += 1;
             return Ok(());
         }
         self.scene = self.start.sketch.with(&wish)?;
         self.refinement.wish(wish.is_other_edition(&self.wish));
+        let size = |wish: &Wish| [wish.settings.picture.width, wish.settings.picture.height];
+        if size(&wish) != size(&self.wish) {
+            self.of_size = self.refinement.version();
+        }
         self.wish = wish;
         self.begin_picture();
         Ok(())
     }
 
+    /// Drops what no page should see any more. A first pass that is spared is seen until the newest wish has a tile.
     fn begin_picture(&mut self) {
-        self.canvas.clear();
+        match self.spared() {
+            Some(version) => self.canvas.keep_version(version),
+            None => self.canvas.clear(),
+        }
         self.done = None;
         self.revisions.state += 1;
+    }
+
+    /// Number of the wish whose tiles are shown as they come.
+    fn spared(&self) -> Option<u32> {
+        self.refinement.spares().filter(|version| *version >= self.of_size)
     }
 
     fn of_page(&mut self, number: PageNumber, act: impl FnOnce(&mut Page)) {
@@ -253,13 +292,14 @@ impl View {
             self.wish_for(wish).map_err(|error| with_remedy(&error))?;
         }
         self.of_page(number, |page| page.show(shown));
+        self.revisions.state += 1;
         Ok(())
     }
 
     /// Tells a page the place that a pixel shows.
     fn pick(&mut self, number: PageNumber, at: [u32; 2]) -> Result<(), String> {
         let camera = self.wish.settings.camera(&self.scene).map_err(|error| error.to_string())?;
-        let message = match self.canvas.depth(at) {
+        let message = match self.canvas.depth(self.refinement.version(), at) {
             None => json!({"type": "picked", "point": null}),
             Some(depth) => {
                 let size = [self.wish.settings.picture.width, self.wish.settings.picture.height];
@@ -307,7 +347,7 @@ impl View {
         if is_new {
             self.revisions.cards += 1;
         }
-        if origin.version == self.refinement.version() {
+        if self.spared() == Some(origin.version) {
             self.canvas.put(Patch::new(origin, number, tile.clone()));
         }
     }
@@ -367,10 +407,12 @@ impl View {
     /// The next message to a page, as text or a tile.
     pub(super) fn take(&mut self, number: PageNumber) -> Option<Result<String, Outgoing>> {
         let is_settled = self.refinement.is_settled();
-        let outgoing = self.pages.get_mut(&number)?.take(&self.canvas, self.revisions, is_settled)?;
+        let version = self.refinement.version();
+        let outgoing =
+            self.pages.get_mut(&number)?.take(&self.canvas, self.revisions, version, is_settled)?;
         Some(match outgoing {
             Outgoing::Reply(text) => Ok(text),
-            Outgoing::State => Ok(self.describe().to_string()),
+            Outgoing::State(has_all) => Ok(self.describe(has_all).to_string()),
             Outgoing::Cards => Ok(self.cards.describe().to_string()),
             tile @ Outgoing::Tile(..) => Err(tile),
         })
@@ -389,7 +431,8 @@ impl View {
         command_line::words(&self.start.options, self.start.quality, &self.wish)
     }
 
-    fn describe(&self) -> Value {
+    /// State for a page, to which the picture is settled once it has all tiles.
+    fn describe(&self, has_all: bool) -> Value {
         let settings = &self.wish.settings;
         // The camera was checked when it was wished for.
         let camera = settings.camera(&self.scene).map(|camera| {
@@ -407,8 +450,9 @@ impl View {
             "step": done.step,
             "samples": done.samples,
             "spp": settings.integrator.samples,
-            "settled": self.refinement.is_settled(),
+            "settled": has_all && self.refinement.is_settled(),
             "version": self.refinement.version(),
+            "id": self.message,
             "command": command_line::quoted(&self.command()),
             "changes": describe::changes(&self.wish),
             "settings": describe::settings(settings),

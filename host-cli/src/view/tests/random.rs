@@ -1,6 +1,6 @@
 //! Random numbers of a seed.
 
-/// SplitMix64 (Steele, Lea, Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
+/// `SplitMix64` (Steele, Lea, Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
 pub(super) struct Random(pub(super) u64);
 
 impl Random {

@@ -94,8 +94,11 @@ fn a_camera_that_never_rests_is_shown_and_settles_when_it_does() {
             };
             world.send(0, &message);
             world.paint();
+            while world.read(0) {}
         }
         assert!(world.firsts > 20, "{} first pictures", world.firsts);
+        let seen = world.pages[&0].versions;
+        assert!(seen > 20, "{seen} pictures seen");
         world.settle();
         world.check_pictures();
     }

@@ -31,6 +31,8 @@ pub(super) struct ModelPage {
     pub(super) state: Option<Value>,
     pub(super) errors: u64,
     version: u32,
+    /// Number of wishes of which the page has seen a tile.
+    pub(super) versions: u64,
 }
 
 /// A pass at work.
@@ -96,6 +98,7 @@ impl World {
             wish: Wish::new(options.settings(), Vec::new()),
             sketch: Sketch::new(&scene),
             facts: SceneFacts::new("scene.gltf".into(), &scene),
+            is_size_stated: true,
             out: Some("out".into()),
             options: options.scene,
         };
@@ -151,7 +154,7 @@ impl World {
                 let origin = job.task.origin;
                 self.view.put(origin, "card 0 (tcp:card:7000)", &tile);
                 // Now and then a card has lied.
-                if self.now.as_millis() % 64 == 0 {
+                if self.now.as_millis().is_multiple_of(64) {
                     self.view.revoke(origin, tile.tile().id);
                     self.view.put(origin, "card 0 (tcp:card:7000)", &tile);
                 }
@@ -266,6 +269,7 @@ impl ModelPage {
         let words: Vec<u32> = words.iter().map(|word| u32::from_le_bytes(*word)).collect();
         let [version, step, x, y, columns, rows, ..] = words[..] else { panic!("no header") };
         assert!(version >= self.version, "a tile of an older wish");
+        self.versions += u64::from(version != self.version);
         self.version = version;
         assert_eq!(words.len(), 8 + 3 * (columns * rows) as usize);
         for index in 0..columns * rows {

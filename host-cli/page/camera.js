@@ -1,0 +1,103 @@
+// Cameras and their moves: pure functions. A camera is {position, look_at, fov}: metres, and vertical degrees; the top of its
+// picture is towards +y.
+
+export const add = (a, b) => a.map((value, axis) => value + b[axis]);
+export const sub = (a, b) => a.map((value, axis) => value - b[axis]);
+export const scaled = (a, factor) => a.map(value => value * factor);
+export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+export const length = a => Math.hypot(...a);
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const clamped = (value, low, high) => Math.min(Math.max(value, low), high);
+
+// Elevation that a turn does not pass: at 90 degrees the top of the picture would jump.
+const STEEPEST = 89.5 * Math.PI / 180;
+// Sine of the angle to the vertical below which a direction counts as vertical, as in the renderer.
+const VERTICAL = 1e-6;
+
+// Unit vectors of the picture: right, up, forward.
+export function axes({ position, look_at }) {
+    const view = sub(look_at, position);
+    const forward = scaled(view, 1 / length(view));
+    const side = cross(forward, [0, 1, 0]);
+    const right = length(side) < VERTICAL ? [1, 0, 0] : scaled(side, 1 / length(side));
+    return { right, up: cross(right, forward), forward };
+}
+
+function rotated(vector, axis, angle) {
+    const [sine, cosine] = [Math.sin(angle), Math.cos(angle)];
+    const along = scaled(axis, dot(axis, vector) * (1 - cosine));
+    return add(add(scaled(vector, cosine), scaled(cross(axis, vector), sine)), along);
+}
+
+const moved = (camera, shift) =>
+    ({ ...camera, position: add(camera.position, shift), look_at: add(camera.look_at, shift) });
+
+// Turn about a point: `yaw` about the vertical, `pitch` about the picture's right, radians. About the camera's own position it
+// looks around; about another point, that point stays where it is in the picture.
+export function turned(camera, centre, yaw, pitch) {
+    const { right, forward } = axes(camera);
+    const elevation = Math.asin(clamped(forward[1], -1, 1));
+    const allowed = clamped(elevation + pitch, -STEEPEST, STEEPEST) - elevation;
+    const turn = point => add(centre, rotated(rotated(sub(point, centre), right, allowed), [0, 1, 0], yaw));
+    return { ...camera, position: turn(camera.position), look_at: turn(camera.look_at) };
+}
+
+// Shift by a drag of pixels, so that what is `depth` metres away follows the pointer.
+export function panned(camera, [dx, dy], height, depth) {
+    const { right, up } = axes(camera);
+    const metres = 2 * Math.tan(camera.fov * Math.PI / 360) * depth / height;
+    return moved(camera, add(scaled(right, -dx * metres), scaled(up, dy * metres)));
+}
+
+// Approach to a point: its distance is multiplied by `factor`, and it stays where it is in the picture.
+export const dollied = (camera, centre, factor) =>
+    moved(camera, scaled(sub(centre, camera.position), 1 - factor));
+
+// Flight by metres to the right, upwards (in the world) and forward.
+export function flown(camera, [rightward, upward, onward]) {
+    const { right, forward } = axes(camera);
+    return moved(camera, add(add(scaled(right, rightward), [0, upward, 0]), scaled(forward, onward)));
+}
+
+export const zoomed = (camera, factor) => ({ ...camera, fov: clamped(camera.fov * factor, 1, 150) });
+
+// Distance of a point along the view's axis.
+export const depth = (camera, point) => dot(sub(point, camera.position), axes(camera).forward);
+
+// Place of a point in a picture of a size, pixels; null if it is behind the camera.
+export function projected(camera, point, [width, height]) {
+    const { right, up, forward } = axes(camera);
+    const ray = sub(point, camera.position);
+    const along = dot(ray, forward);
+    if (along <= 0) return null;
+    const focal = height / (2 * Math.tan(camera.fov * Math.PI / 360));
+    return [width / 2 + focal * dot(ray, right) / along, height / 2 - focal * dot(ray, up) / along];
+}
+
+// Centre of turns while nothing is chosen: on the view's axis, as far away as the middle of the scene.
+export function middle(camera, { low, high }) {
+    const size = length(sub(high, low));
+    const centre = scaled(add(low, high), 0.5);
+    const ahead = Math.max(depth(camera, centre), 0.1 * size);
+    return add(camera.position, scaled(axes(camera).forward, ahead));
+}
+
+// The camera in single precision, as the renderer has it.
+export const rounded = ({ position, look_at, fov }) =>
+    ({ position: position.map(Math.fround), look_at: look_at.map(Math.fround), fov: Math.fround(fov) });
+
+// The shortest decimal of a number in single precision.
+export function shortest(value) {
+    const single = Math.fround(value);
+    for (let digits = 1; digits < 9; digits++) {
+        const text = single.toPrecision(digits);
+        if (Math.fround(text) === single) return String(Number(text));
+    }
+    return String(Number(single.toPrecision(9)));
+}
+
+// Options of the command line that place a camera.
+export function pose({ position, look_at, fov }) {
+    const place = point => point.map(shortest).join(",");
+    return `--camera-at ${place(position)} --look-at ${place(look_at)} --fov ${shortest(fov)}`;
+}

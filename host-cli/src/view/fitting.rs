@@ -1,0 +1,76 @@
+//! Pilot renders, by which a quality finds its settings: on a thread beside the painter, so that a new wish need not wait for them.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::quality::{Fit, Quality};
+use photoncard_driver::render::{Observer, Phase, RenderError, RenderSettings};
+use photoncard_driver::scene::FixedScene;
+
+/// Result of pilot renders; `None` where no setting depends on the scene.
+pub(super) type Found = Result<Option<Fit>, RenderError>;
+
+/// Time between two looks at the thread.
+const LOOK: Duration = Duration::from_millis(2);
+
+/// Pilot renders at work.
+pub(super) struct Fitting {
+    thread: JoinHandle<Found>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Fitting {
+    /// Begins pilot renders of the settings' view, with at most `threads` threads.
+    ///
+    /// # Errors
+    /// If their thread cannot be started.
+    pub(super) fn start(
+        scene: Arc<FixedScene<'static>>,
+        quality: Quality,
+        settings: RenderSettings,
+        threads: Option<usize>,
+    ) -> std::io::Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let observer = Stop(stop.clone());
+        let work = move || {
+            let fit = || quality.fit(&scene, &PackedScene::new(&scene)?, &settings, &observer);
+            let pool = threads.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build());
+            match pool {
+                Some(Ok(pool)) => pool.install(fit),
+                _ => fit(),
+            }
+        };
+        Ok(Self { thread: std::thread::Builder::new().name("pilot".into()).spawn(work)?, stop })
+    }
+
+    /// Waits for the result, or until `must_stop`; then the work goes on.
+    pub(super) fn wait(self, must_stop: &dyn Fn() -> bool) -> Result<Found, Self> {
+        while !self.thread.is_finished() {
+            if must_stop() {
+                return Err(self);
+            }
+            std::thread::sleep(LOOK);
+        }
+        Ok(self.thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    }
+
+    /// Ends the work, whose result is lost.
+    pub(super) fn stop(self) {
+        self.stop.store(true, Ordering::Relaxed);
+        // Its panic would be one of a result that nobody wants.
+        let _ = self.thread.join();
+    }
+}
+
+struct Stop(Arc<AtomicBool>);
+
+impl Observer for Stop {
+    fn progress(&self, _: Phase, _: u64, _: u64) {}
+
+    fn is_stopped(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}

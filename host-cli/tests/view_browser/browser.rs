@@ -1,0 +1,227 @@
+//! A headless Chromium, driven by its `DevTools` protocol.
+
+use std::io::{BufRead, BufReader};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+use data_encoding::BASE64;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+use tungstenite::{Message, WebSocket};
+
+/// Limit of time for the browser's start, and for each of its answers.
+const PATIENCE: Duration = Duration::from_secs(40);
+/// Programs that are a Chromium, in this order.
+const PROGRAMS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+/// A browser with a profile of its own, until it is dropped.
+pub(crate) struct Browser {
+    process: Child,
+    address: String,
+    control: Tab,
+    _profile: TempDir,
+}
+
+impl Browser {
+    /// Starts a Chromium. Returns `None` and says so if the tests are to be left out.
+    pub(crate) fn start() -> Option<Self> {
+        if let Ok(reason) = std::env::var("PHOTONCARD_SKIP_BROWSER") {
+            eprintln!("SKIPPED: the page is not tested, as PHOTONCARD_SKIP_BROWSER is set: {reason}");
+            return None;
+        }
+        let profile = tempfile::tempdir().unwrap();
+        let mut process = PROGRAMS.iter().find_map(|program| launch(program, &profile)).expect(
+            "there is no Chromium; install it (apt-get install chromium), or leave these tests out by setting \
+             PHOTONCARD_SKIP_BROWSER to the reason",
+        );
+        let address = announced(&mut process);
+        let control = Tab::connect(&address);
+        let address = address.split("/devtools/").next().unwrap().to_owned();
+        Some(Self { process, address, control, _profile: profile })
+    }
+
+    /// A new tab with a window of its own, of a size, in which nothing is loaded: one behind another would stand still.
+    pub(crate) fn tab(&mut self, size: [u32; 2]) -> Tab {
+        let target =
+            self.control.call("Target.createTarget", &json!({"url": "about:blank", "newWindow": true}));
+        let target = target["targetId"].as_str().unwrap();
+        let mut tab = Tab::connect(&format!("{}/devtools/page/{target}", self.address));
+        for domain in ["Runtime.enable", "Log.enable", "Page.enable"] {
+            tab.call(domain, &json!({}));
+        }
+        tab.resize(size);
+        tab
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // Both fail if the process has ended.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+fn launch(program: &str, profile: &TempDir) -> Option<Child> {
+    let mut command = Command::new(program);
+    command.args([
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-dev-shm-usage",
+        "--no-first-run",
+    ]);
+    // WebGL2 by the processor, and colours as they are.
+    command.args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--force-color-profile=srgb"]);
+    command.args(["--remote-debugging-port=0", "about:blank"]);
+    command.arg(format!("--user-data-dir={}", profile.path().display()));
+    command.env("HOME", profile.path()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    command.spawn().ok()
+}
+
+/// Address of the `DevTools`, which the browser prints.
+fn announced(process: &mut Child) -> String {
+    let lines = BufReader::new(process.stderr.take().unwrap()).lines();
+    let (sender, receiver) = mpsc::channel();
+    // It goes on to the end of the browser, whose messages would fill the pipe.
+    std::thread::spawn(move || {
+        for line in lines.map_while(Result::ok) {
+            if let Some(address) = line.strip_prefix("DevTools listening on ") {
+                let _ = sender.send(address.to_owned());
+            }
+        }
+    });
+    receiver.recv_timeout(PATIENCE).expect("the browser prints the address of its DevTools")
+}
+
+/// A tab, by a connection of its own.
+pub(crate) struct Tab {
+    socket: WebSocket<TcpStream>,
+    calls: u64,
+    /// Errors of the page's scripts and resources.
+    pub(crate) faults: Vec<String>,
+}
+
+impl Tab {
+    fn connect(address: &str) -> Self {
+        let host = address.strip_prefix("ws://").unwrap().split('/').next().unwrap();
+        let stream = TcpStream::connect(host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        stream.set_nodelay(true).unwrap();
+        let (socket, _) = tungstenite::client(address, stream).unwrap();
+        Self { socket, calls: 0, faults: Vec::new() }
+    }
+
+    /// Calls a method, and notes what goes wrong in the page meanwhile.
+    pub(crate) fn call(&mut self, method: &str, parameters: &Value) -> Value {
+        self.calls += 1;
+        let call = json!({"id": self.calls, "method": method, "params": parameters});
+        self.socket.send(Message::text(call.to_string())).unwrap();
+        loop {
+            let message = self.socket.read().unwrap_or_else(|error| panic!("{method}: {error}"));
+            let answer: Value = serde_json::from_str(message.to_text().unwrap()).unwrap();
+            if answer["id"] == self.calls {
+                assert!(answer["error"].is_null(), "{call}: {answer}");
+                return answer["result"].clone();
+            }
+            self.note(&answer);
+        }
+    }
+
+    fn note(&mut self, event: &Value) {
+        let parameters = &event["params"];
+        match event["method"].as_str() {
+            Some("Runtime.exceptionThrown") => self.faults.push(parameters.to_string()),
+            Some("Log.entryAdded") if parameters["entry"]["level"] == "error" => {
+                self.faults.push(parameters["entry"].to_string());
+            }
+            _ => (),
+        }
+    }
+
+    pub(crate) fn open(&mut self, address: &str) {
+        self.call("Page.navigate", &json!({"url": address}));
+    }
+
+    /// Value of an expression, which may be a promise.
+    pub(crate) fn value(&mut self, expression: &str) -> Value {
+        let parameters = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
+        let result = self.call("Runtime.evaluate", &parameters);
+        assert!(result["exceptionDetails"].is_null(), "{expression}: {}", result["exceptionDetails"]);
+        result["result"]["value"].clone()
+    }
+
+    /// Waits until an expression is true.
+    pub(crate) fn wait(&mut self, expression: &str, limit: Duration) {
+        let start = Instant::now();
+        while self.value(&format!("Boolean({expression})")) != true {
+            if start.elapsed() > limit {
+                let seen =
+                    self.value("document.body.innerText + ' ' + JSON.stringify(window.photoncard?.state)");
+                panic!("not within {limit:?}: {expression}; the page shows {seen}; {:?}", self.faults);
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    pub(crate) fn resize(&mut self, [width, height]: [u32; 2]) {
+        let parameters = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
+        self.call("Emulation.setDeviceMetricsOverride", &parameters);
+    }
+
+    fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], more: &Value) {
+        let mut parameters = json!({"type": kind, "x": x, "y": y});
+        parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        self.call("Input.dispatchMouseEvent", &parameters);
+    }
+
+    /// Drags by `[dx, dy]` pixels with a button (`left`, `middle` or `right`); without a shift it is a click.
+    pub(crate) fn press(&mut self, button: &str, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) {
+        let buttons = match button {
+            "left" => 1,
+            "right" => 2,
+            _ => 4,
+        };
+        let held = json!({"button": button, "buttons": buttons, "clickCount": 1});
+        self.mouse("mousePressed", [x, y], &held);
+        for step in 1..=3 {
+            let share = f64::from(step) / 3.0;
+            self.mouse("mouseMoved", [x + share * dx, y + share * dy], &held);
+        }
+        self.mouse("mouseReleased", [x + dx, y + dy], &json!({"button": button, "clickCount": 1}));
+    }
+
+    pub(crate) fn wheel(&mut self, place: [f64; 2], pixels: f64) {
+        self.mouse("mouseWheel", place, &json!({"deltaX": 0, "deltaY": pixels}));
+    }
+
+    /// Holds a key, by its code, for some milliseconds.
+    pub(crate) fn hold(&mut self, code: &str, milliseconds: u64) {
+        self.key("keyDown", code);
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        self.key("keyUp", code);
+    }
+
+    /// Sends an event of a key: `keyDown` or `keyUp`.
+    pub(crate) fn key(&mut self, kind: &str, code: &str) {
+        self.call("Input.dispatchKeyEvent", &json!({"type": kind, "code": code}));
+    }
+
+    /// Codes of the pixels of a rectangle `[x, y, width, height]` on the screen.
+    pub(crate) fn pixels(&mut self, [x, y, width, height]: [f64; 4]) -> Vec<[u8; 3]> {
+        let clip = json!({"x": x, "y": y, "width": width, "height": height, "scale": 1});
+        let shot = self.call("Page.captureScreenshot", &json!({"format": "png", "clip": clip}));
+        decoded(&BASE64.decode(shot["data"].as_str().unwrap().as_bytes()).unwrap())
+    }
+}
+
+/// Codes of the pixels of a PNG, without its alpha.
+pub(crate) fn decoded(png: &[u8]) -> Vec<[u8; 3]> {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    let channels = info.line_size / info.width as usize;
+    bytes.chunks(channels).map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
+}

@@ -1,0 +1,78 @@
+//! The command under test, and a page of another origin.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use crate::support::Room;
+
+/// A running `photoncard view`, until it is dropped.
+pub(crate) struct View {
+    process: Child,
+    /// Address of the page, with the token.
+    pub(crate) address: String,
+}
+
+impl View {
+    /// Starts the command on a free port, with the folder `out` of the room.
+    pub(crate) fn start(room: &Room, scene: &str, options: &[&str]) -> Self {
+        std::fs::create_dir_all(room.path("out")).unwrap();
+        let mut command = room.command();
+        command.args(["view", scene, "--listen", "127.0.0.1:0", "--out", "out"]).args(options);
+        let mut process = command.stdout(Stdio::piped()).spawn().unwrap();
+        let mut lines = BufReader::new(process.stdout.take().unwrap()).lines();
+        let address = lines.by_ref().map_while(Result::ok).find_map(|line| {
+            line.split_whitespace().find(|word| word.starts_with("http://")).map(str::to_owned)
+        });
+        // What it prints later must find a reader.
+        std::thread::spawn(move || lines.for_each(drop));
+        Self { process, address: address.expect("the command prints the address of its page") }
+    }
+
+    /// Address of the socket, as a page would have it.
+    pub(crate) fn socket(&self) -> String {
+        self.address.replace("http://", "ws://").replace("/?", "/socket?")
+    }
+}
+
+impl Drop for View {
+    fn drop(&mut self) {
+        // Both fail if the process has ended.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Runs a command line as a shell does, with this program as `photoncard`.
+pub(crate) fn run_shown(room: &Room, line: &str) {
+    let folder = std::path::Path::new(env!("CARGO_BIN_EXE_photoncard")).parent().unwrap();
+    let path = std::env::join_paths(
+        std::iter::once(folder.to_owned()).chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
+    );
+    let mut command = Command::new("sh");
+    command.args(["-c", line]).env("PATH", path.unwrap()).current_dir(room.path(".")).stdin(Stdio::null());
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Serves one page, to whoever asks, on a port of its own: another origin. Returns its address.
+pub(crate) fn serve_page(page: String) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("http://{}/", listener.local_addr().unwrap());
+    std::thread::spawn(move || {
+        for stream in listener.incoming().map_while(Result::ok) {
+            answer(stream, &page);
+        }
+    });
+    address
+}
+
+/// Answers one request; a browser may also connect and ask nothing.
+fn answer(mut stream: TcpStream, page: &str) {
+    stream.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
+    if matches!(stream.read(&mut [0; 4096]), Ok(1..)) {
+        let head = "HTTP/1.1 200 OK\r\nContent-Type: text/html\r\nConnection: close\r\nContent-Length:";
+        let _ = write!(stream, "{head} {}\r\n\r\n{page}", page.len());
+    }
+}

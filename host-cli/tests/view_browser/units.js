@@ -1,0 +1,80 @@
+// Properties of the page's modules that need no picture. The value is a list of what does not hold.
+(async () => {
+    const camera = await import("/camera.js");
+    const { Picture } = await import("/picture.js");
+    const { decoded } = await import("/tiles.js");
+    const tone = await import("/tone.js");
+    const { hexOf, linearOf } = await import("/fields.js");
+
+    const faults = [];
+    const check = (holds, what) => holds || faults.push(what);
+    const near = (a, b, tolerance = 1e-9) => [a].flat().every((value, at) => Math.abs(value - [b].flat()[at]) <= tolerance);
+    let seed = 1;
+    const random = () => (seed = seed * 48271 % 2147483647) / 2147483647;
+    const point = () => [0, 1, 2].map(() => 8 * random() - 4);
+
+    for (let round = 0; round < 200; round++) {
+        const view = { position: point(), look_at: point(), fov: 20 + 80 * random() };
+        const size = [320, 200];
+        const { right, up, forward } = camera.axes(view);
+        check(near([camera.dot(right, up), camera.dot(up, forward), right[1]], [0, 0, 0]), "axes are upright");
+        check(near(camera.projected(view, view.look_at, size), [160, 100], 1e-6), "the middle is what is looked at");
+
+        // A point in the picture stays where it is while the camera turns about it or comes closer.
+        const centre = camera.add(view.position, camera.add(camera.scaled(forward, 2), camera.scaled(right, random() - 0.5)));
+        const place = camera.projected(view, centre, size);
+        const orbited = camera.turned(view, centre, 6 * random() - 3, 0.2 * random() - 0.1);
+        check(near(camera.projected(orbited, centre, size), place, 1e-6), "the centre of an orbit stays");
+        check(near(camera.projected(camera.dollied(view, centre, 0.5), centre, size), place, 1e-6), "so does that of a dolly");
+        const panned = camera.panned(view, [7, -4], size[1], camera.depth(view, centre));
+        check(near(camera.projected(panned, centre, size), camera.add(place, [7, -4]), 1e-6), "a pan follows the pointer");
+        const looked = camera.turned(view, view.position, 1, 9);
+        check(near(looked.position, view.position) && camera.axes(looked).up[1] > 0, "a turn stops before the zenith");
+        const flown = camera.flown(view, [0, 0, 3]);
+        check(near(flown.position, camera.add(view.position, camera.scaled(forward, 3))), "a flight is along the view");
+
+        const value = Math.fround(10 ** (20 * random() - 10));
+        const text = camera.shortest(value);
+        check(Math.fround(text) === value, `${value} is printed as ${text}`);
+    }
+    check(camera.shortest(0.1) === "0.1" && camera.shortest(-2) === "-2", "short numbers stay short");
+    check(camera.projected({ position: [0, 0, 0], look_at: [0, 0, -1], fov: 40 }, [0, 0, 1], [9, 9]) === null, "nothing is behind");
+
+    // Tiles: [version, step, x, y, columns, rows, samples, card] and pixels.
+    const message = (head, pixels) => {
+        const buffer = new ArrayBuffer(32 + 4 * pixels.length);
+        head.forEach((word, at) => new DataView(buffer).setUint32(4 * at, word, true));
+        pixels.forEach((value, at) => new DataView(buffer).setFloat32(32 + 4 * at, value, true));
+        return buffer;
+    };
+    check(decoded(new ArrayBuffer(31)) === null && decoded(message([1, 1, 0, 0, 2, 2, 1, 0], [0])) === null, "lengths are checked");
+    check(decoded(message([1, 0, 0, 0, 1, 1, 1, 0], [1, 2, 3])) === null, "a step of 0 is refused");
+    const picture = new Picture([5, 3]);
+    const coarse = [1, 2, 3, 4, 5, 6].flatMap(value => [value, value, value]);
+    check(picture.put(decoded(message([7, 2, 0, 0, 3, 2, 1, 0], coarse))) && picture.isWhole, "a coarse picture is whole");
+    const reds = () => Array.from({ length: 15 }, (_, at) => picture.data[4 * at]).join("");
+    check(reds() === "112231122344556", `coarse pixels are repeated: ${reds()}`);
+    check(!picture.put(decoded(message([6, 1, 0, 0, 1, 1, 1, 0], [9, 9, 9]))), "an older tile is left");
+    check(picture.put(decoded(message([7, 1, 4, 2, 1, 1, 1, 0], [9, 9, 9]))) && !picture.isWhole, "a finer one is taken");
+    check(!picture.put(decoded(message([7, 2, 0, 0, 3, 2, 1, 0], coarse))), "a coarser one of the same picture is left");
+    check(reds() === "112231122344559", `one pixel is finer: ${reds()}`);
+    check(!picture.put(decoded(message([8, 1, 5, 0, 1, 1, 1, 0], [9, 9, 9]))), "a tile outside is left");
+    picture.resize([10, 3]);
+    check(picture.data[4 * 29] === 9 && picture.data.length === 120, "another size stretches the picture");
+
+    // Tone mapping, with the values that `photoncard tonemap` has.
+    const grey = (curve, value) => tone.codes([value, value, value], { mode: tone.MODES.light, scale: 1, curve })[1];
+    for (const [linear, code] of [[0, 0], [0.003, 10], [0.18, 118], [0.5, 188], [1, 255], [7, 255], [-1, 0], [Infinity, 255]]) {
+        check(grey("none", linear) === code, `${linear} is ${grey("none", linear)}, not ${code}`);
+    }
+    check(grey("reinhard", 4) === 255 && grey("reinhard", 1e30) === 255 && grey("aces", Infinity) === 255, "the sun is white");
+    check(grey("reinhard", NaN) === 0, "what is no number is black");
+    const lit = new Float32Array([1, 1, 1, 0, 4, 4, 4, 0, 0, 0, 0, 0, Infinity, 1, 1, 0]);
+    check(near(tone.automaticScale(lit), 0.09, 1e-8), "the log-average of lit pixels becomes middle grey");
+    check(tone.automaticScale(new Float32Array(8)) === 1, "a black picture stays");
+    check([0, 1, 127, 255].every(code => {
+        const hex = `#${code.toString(16).padStart(2, "0").repeat(3)}`;
+        return hexOf(linearOf(hex)) === hex;
+    }), "colours come back from their codes");
+    return faults;
+})()
