@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use photoncard_driver::quality::Quality;
-use photoncard_driver::render::{CardError, Observer, Phase, RenderError, Renderer};
+use photoncard_driver::render::{CardError, Observer, Phase, RenderError, Renderer, Rendering};
 use photoncard_driver::scene::{FixedScene, Scene};
 use photoncard_driver::sink::{FinishedTile, TileSink};
 use photoncard_shared::message::Tile;
@@ -109,8 +109,7 @@ impl<'a> Painter<'a> {
     }
 
     fn render(&mut self, task: &Task) -> Result<(), RenderError> {
-        let easel = Easel::new(self.hub, task);
-        let rendering = self.renderer.render_fixed(&self.scene, &task.settings, &easel)?;
+        let rendering = self.render_by_passes(task)?;
         let statistics = rendering.statistics.clone();
         if task.work.pass == Pass::Full {
             let mut provenance = statistics.provenance.pixels.clone();
@@ -121,6 +120,29 @@ impl<'a> Painter<'a> {
         }
         self.hub.change(|view, now| view.finish(task, Outcome::Done, Some(&statistics), now));
         Ok(())
+    }
+
+    /// Renders a picture by passes that double the samples of a pixel; by one with irradiance records, which each pass would gather again.
+    fn render_by_passes(&mut self, task: &Task) -> Result<Rendering, RenderError> {
+        let asked = &task.settings.integrator;
+        let with = |samples: u32| {
+            task.settings.clone().with(|settings| {
+                settings.integrator.samples = samples;
+                settings.integrator.planned_samples = Some(asked.planned());
+            })
+        };
+        let mut samples = if asked.irradiance_error.is_some() { asked.samples } else { 1 };
+        let easel = Easel::new(self.hub, task, samples);
+        let mut rendering = self.renderer.render_fixed(&self.scene, &with(samples), &easel)?;
+        while samples < asked.samples {
+            let origin = Origin { samples, ..task.origin };
+            self.hub.change(|view, _| view.refine(origin, &rendering.statistics));
+            samples = asked.samples.min(2 * samples);
+            let easel = Easel::new(self.hub, task, samples);
+            rendering =
+                self.renderer.refine(&self.scene, &with(samples), Arc::new(rendering.film), &easel)?;
+        }
+        Ok(rendering)
     }
 
     fn fail(&self, task: &Task, error: &RenderError) {
@@ -165,8 +187,9 @@ struct Easel<'a> {
 }
 
 impl<'a> Easel<'a> {
-    fn new(hub: &'a Hub, task: &Task) -> Self {
-        Self { hub, origin: task.origin, is_preparing: AtomicBool::new(false), cards: Mutex::default() }
+    fn new(hub: &'a Hub, task: &Task, samples: u32) -> Self {
+        let origin = Origin { samples, ..task.origin };
+        Self { hub, origin, is_preparing: AtomicBool::new(false), cards: Mutex::default() }
     }
 }
 

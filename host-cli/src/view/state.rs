@@ -369,11 +369,25 @@ impl View {
             self.cost.add(statistics);
         }
         self.refinement.finish(outcome, now);
-        if outcome == Outcome::Done && task.work.version == self.refinement.version() {
-            self.done = Some(task.origin);
-            self.canvas.keep(task.origin);
+        if outcome == Outcome::Done {
+            self.keep(task.origin);
         }
         self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
+    }
+
+    /// Takes a complete pass of fewer samples than the picture's.
+    pub(super) fn refine(&mut self, origin: Origin, statistics: &Statistics) {
+        self.cost.add(statistics);
+        self.keep(origin);
+        self.revisions.state += 1;
+    }
+
+    /// Keeps the tiles of a complete pass of the newest wish alone.
+    fn keep(&mut self, origin: Origin) {
+        if origin.version == self.refinement.version() {
+            self.done = Some(origin);
+            self.canvas.keep(origin);
+        }
     }
 
     /// Takes the settings that pilot renders have found.
