@@ -43,12 +43,18 @@ fn frame() -> FrameParameters {
 
 const TILE: Tile = Tile { id: 7, x: 0, y: 0, width: 8, height: 8 };
 
+/// Answers to a tile of 64 pixels, 16 of which fit a reply.
+fn tile_of_64_pixels(id: u32) -> [Answer; 5] {
+    let pixels = || Answer::Pixels(16);
+    [pixels(), pixels(), pixels(), pixels(), Answer::TileDone(id)]
+}
+
 fn renders_a_tile(wire: &mut Wire, image: &CardImage) {
     wire.hello();
     assert_eq!(wire.load(image.lines()), [Answer::ImageAccepted]);
     assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
     let answers = wire.say(&Command::RenderTile(TILE));
-    assert_eq!(answers, [Answer::Pixels(25), Answer::Pixels(25), Answer::Pixels(14), Answer::TileDone(7)]);
+    assert_eq!(answers, tile_of_64_pixels(7));
 }
 
 #[test]
@@ -87,7 +93,7 @@ fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
         let mut wire = Wire::<Large>::of_kind(&mut memory);
         wire.hello();
         wire.load(image().lines());
-        let done = |id| [Answer::Pixels(25), Answer::Pixels(25), Answer::Pixels(14), Answer::TileDone(id)];
+        let done = tile_of_64_pixels;
         let begin = |in_flight| Command::BeginFrame(FrameParameters { in_flight, ..frame() });
         let tile = |id| Command::RenderTile(Tile { id, ..TILE });
         assert_eq!(wire.say(&begin(0)), [Answer::Fault(FaultCode::Parameter)]);
@@ -120,7 +126,7 @@ fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
     });
 }
 
-/// With layers a pixel takes four sums of the buffer: the micro chip has room for 64 pixels, and 12 fit a reply.
+/// With layers a pixel takes four sums of the buffer: the micro chip has room for 64 pixels, and 8 fit a reply.
 #[test]
 fn a_tile_with_layers_has_a_fourth_of_the_pixels() {
     with_room_for_a_card(|| {
@@ -140,8 +146,8 @@ fn a_tile_with_layers_has_a_fourth_of_the_pixels() {
                 assert_eq!(answers, [Answer::Fault(FaultCode::Tile)]);
             }
         }
-        let mut expected = vec![Answer::Pixels(12); 5];
-        expected.extend([Answer::Pixels(4), Answer::TileDone(7)]);
+        let mut expected = vec![Answer::Pixels(8); 8];
+        expected.push(Answer::TileDone(7));
         assert_eq!(wire.say(&Command::RenderTile(TILE)), expected);
     });
 }
