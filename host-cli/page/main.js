@@ -18,11 +18,11 @@ const display = displayOn(canvas);
 const picture = new Picture();
 const times = new Times();
 
-// What the command last said, and what this page asks for.
+// State of the command as last received, and the requests of this page.
 let scene = null, state = null, isOpen = false, steers = false;
 let camera = null, isCameraOwn = false, toSend = null;
 const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cursor: undefined, edits: new Map() };
-// What the canvas shows is not what it should: drawn in the next frame.
+// True if the canvas is outdated: it is drawn in the next frame.
 let isStale = true, isNewPicture = false;
 
 const connection = new Connection(
@@ -253,7 +253,7 @@ window.photoncard = {
     times, picture, view, connection, display,
     get scene() { return scene; },
     get state() { return state; },
-    // Whether the picture is finished and nothing that changes it is on its way. A change that the command refuses has no answer.
+    // True if the picture is finished and no change of it is on its way. A change that the command refuses has no answer.
     get isSettled() {
         const isQuiet = !toSend && asked.edits.size === 0 && (times.waiting === 0 || times.silence > 1500);
         return isOpen && isQuiet && Boolean(state?.settled) && picture.isWhole && picture.step === 1 &&

@@ -77,7 +77,7 @@ export class Picture {
         }
     }
 
-    // Whether every pixel of the newest coarseness and number of samples has come.
+    // True once every pixel of the newest coarseness and number of samples has come.
     get isWhole() {
         const [columns, rows] = this.size.map(side => Math.ceil(side / this.step));
         return this.step < Infinity && this.filled >= columns * rows;

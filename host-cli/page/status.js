@@ -1,4 +1,4 @@
-// What the page tells: how far the picture is, the command line, errors, and what was copied.
+// Status of the page: progress of the picture, the command line, errors, and what was copied.
 
 const byId = id => document.getElementById(id);
 const ORDINALS = { 2: "2nd", 4: "4th", 8: "8th" };

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use photoncard_driver::film::FilmPixel;
 use photoncard_driver::sink::FinishedTile;
 
-/// What a page shows.
+/// Radiance or a layer, as a page shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     Radiance,

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::wish::Wish;
 
-/// What pages are told of a scene once.
+/// Description of a scene in the first message to a page.
 pub(super) struct SceneFacts {
     name: String,
     low: Vec3,

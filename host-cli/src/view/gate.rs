@@ -14,7 +14,7 @@ const PAGE: &str = "/";
 /// Path of the WebSocket.
 const SOCKET: &str = "/socket";
 
-/// What a request may have.
+/// Conditions of a request.
 #[derive(Debug, PartialEq)]
 pub(super) enum Resource {
     /// A file of the page.
@@ -41,7 +41,7 @@ impl Gate {
         format!("http://{address}{PAGE}?token={token}")
     }
 
-    /// What a request may have.
+    /// Conditions of a request.
     ///
     /// # Errors
     /// If it may have nothing.

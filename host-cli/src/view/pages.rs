@@ -78,7 +78,7 @@ impl Page {
         self.received = self.received.max(bytes.min(self.sent));
     }
 
-    /// What to send next; `None` if there is nothing, or the page is behind. A state comes before the first tile of its wish, and the
+    /// Next message to send; `None` if there is nothing, or the page is behind. A state comes before the first tile of its wish, and the
     /// settled one after the last tile.
     pub(super) fn take(
         &mut self,

@@ -25,7 +25,7 @@ use crate::arguments::SceneOptions;
 /// Number of a page.
 pub(super) type PageNumber = u64;
 
-/// What a view is made of.
+/// Parts of a view.
 pub(super) struct Start {
     pub(super) options: SceneOptions,
     pub(super) quality: Quality,
@@ -48,7 +48,7 @@ pub(super) struct Task {
     pub(super) origin: Origin,
 }
 
-/// What a page's message asks of the caller.
+/// Work for the caller that a page's message asks for.
 #[derive(Debug, PartialEq)]
 pub(super) enum Effect {
     Nothing,
@@ -64,7 +64,7 @@ pub(super) struct View {
     wish: Wish,
     /// Materials and lights of the wish, and the file's cameras.
     scene: Scene,
-    /// The same of the first wish, to which `reset` returns.
+    /// Materials and lights of the first wish, to which `reset` returns.
     first: Scene,
     refinement: Refinement,
     canvas: Canvas,

@@ -1,4 +1,4 @@
-//! What is to be seen: settings, camera and changes of the scene, as pages have asked for them.
+//! Wishes: settings, camera and changes of the scene, as pages have asked for them.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use super::request::Setting;
 /// Error of interpolated irradiance where a quality states none.
 const IRRADIANCE_ERROR: f32 = 0.1;
 
-/// What is to be seen.
+/// Settings, camera and changes that pages have asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Wish {
     /// Settings of the settled picture.

@@ -25,7 +25,7 @@ impl View {
         let address = lines.by_ref().map_while(Result::ok).find_map(|line| {
             line.split_whitespace().find(|word| word.starts_with("http://")).map(str::to_owned)
         });
-        // What it prints later must find a reader.
+        // Later lines must find a reader.
         std::thread::spawn(move || lines.for_each(drop));
         Self { process, address: address.expect("the command prints the address of its page") }
     }
