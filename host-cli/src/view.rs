@@ -23,6 +23,7 @@ mod hub;
 mod page_files;
 mod pages;
 mod painter;
+mod painting;
 mod passes;
 mod refinement;
 mod request;

@@ -5,19 +5,17 @@ use std::time::Duration;
 
 use glam::Vec3;
 use photoncard_driver::layer::Layers;
-use photoncard_driver::quality::{Fit, Quality, Stated};
-use photoncard_driver::render::{RenderError, RenderSettings, Statistics};
+use photoncard_driver::quality::{Quality, Stated};
+use photoncard_driver::render::{RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
-use photoncard_driver::sink::FinishedTile;
 use serde_json::{Value, json};
 
-use super::canvas::{Canvas, Origin, Patch, Shown};
+use super::canvas::{Canvas, Origin, Shown};
 use super::cards::CardBoard;
 use super::command_line;
 use super::describe::{self, Cost, SceneFacts};
 use super::pages::{Outgoing, Page, Revisions};
-use super::passes;
-use super::refinement::{COARSEST, Next, Outcome, Pass, Refinement, Work};
+use super::refinement::{COARSEST, Refinement, Work};
 use super::request::{Fault, Request, Saving, parse};
 use super::wish::{Sketch, Wish};
 use crate::arguments::SceneOptions;
@@ -43,7 +41,7 @@ pub(super) struct Start {
 pub(super) struct Task {
     pub(super) work: Work,
     pub(super) wish: Wish,
-    /// Settings of the pass; of [`Pass::Fit`] those of the wish.
+    /// Settings of the pass; of [`super::refinement::Pass::Fit`] those of the wish.
     pub(super) settings: RenderSettings,
     pub(super) origin: Origin,
 }
@@ -60,28 +58,28 @@ pub(super) enum Effect {
 
 /// State of a view.
 pub(super) struct View {
-    start: Start,
-    wish: Wish,
+    pub(super) start: Start,
+    pub(super) wish: Wish,
     /// Materials and lights of the wish, and the file's cameras.
     scene: Scene,
     /// Materials and lights of the first wish, to which `reset` returns.
     first: Scene,
-    refinement: Refinement,
-    canvas: Canvas,
+    pub(super) refinement: Refinement,
+    pub(super) canvas: Canvas,
     /// Pass of the newest wish that was finished last.
-    done: Option<Origin>,
-    cost: Cost,
+    pub(super) done: Option<Origin>,
+    pub(super) cost: Cost,
     /// Number of the first wish of the picture's size.
     of_size: u32,
     /// Pixel that tiles near to are rendered first.
-    cursor: Option<[u32; 2]>,
+    pub(super) cursor: Option<[u32; 2]>,
     pub(super) cards: CardBoard,
     pages: BTreeMap<PageNumber, Page>,
     next_page: PageNumber,
     steering: Option<PageNumber>,
     /// Number of the last message of the page that steers.
     message: u64,
-    revisions: Revisions,
+    pub(super) revisions: Revisions,
 }
 
 impl View {
@@ -258,7 +256,7 @@ impl View {
     }
 
     /// Drops what no page should see any more. A first pass that is spared is seen until the newest wish has a tile.
-    fn begin_picture(&mut self) {
+    pub(super) fn begin_picture(&mut self) {
         match self.spared() {
             Some(version) => self.canvas.keep_version(version),
             None => self.canvas.clear(),
@@ -268,7 +266,7 @@ impl View {
     }
 
     /// Number of the wish whose tiles are shown as they come.
-    fn spared(&self) -> Option<u32> {
+    pub(super) fn spared(&self) -> Option<u32> {
         self.refinement.spares().filter(|version| *version >= self.of_size)
     }
 
@@ -314,101 +312,6 @@ impl View {
         };
         self.reply(number, &message);
         Ok(())
-    }
-
-    /// Next thing to do.
-    pub(super) fn next(&mut self, now: Duration) -> Result<Task, Option<Duration>> {
-        let work = match self.refinement.next(now) {
-            Next::Work(work) => work,
-            Next::Wait(until) => return Err(until),
-        };
-        let (settings, step) = match work.pass {
-            Pass::Coarse(step) => (passes::coarse(&self.wish.settings, step), step),
-            Pass::Fit => (self.wish.settings.clone(), 1),
-            Pass::Full => (passes::full(&self.wish.settings, self.cursor), 1),
-        };
-        let origin = Origin { version: work.version, step, samples: settings.integrator.samples };
-        Ok(Task { work, wish: self.wish.clone(), settings, origin })
-    }
-
-    /// Returns whether the running work should stop.
-    pub(super) fn must_stop(&self) -> bool {
-        self.refinement.must_stop()
-    }
-
-    /// Tells that the running work has begun or ended to trace photons and to build the card image.
-    pub(super) fn prepares(&mut self, is_preparing: bool) {
-        self.refinement.prepares(is_preparing);
-    }
-
-    /// Takes a tile of the running work, which `card` has rendered.
-    pub(super) fn put(&mut self, origin: Origin, card: &str, tile: &FinishedTile) {
-        let (number, is_new) = self.cards.rendered(card);
-        if is_new {
-            self.revisions.cards += 1;
-        }
-        if self.spared() == Some(origin.version) {
-            self.canvas.put(Patch::new(origin, number, tile.clone()));
-        }
-    }
-
-    /// Takes a tile back.
-    pub(super) fn revoke(&mut self, origin: Origin, id: u32) {
-        self.canvas.revoke(origin, id);
-    }
-
-    /// Takes the end of the running work. Its picture was that of `statistics`.
-    pub(super) fn finish(
-        &mut self,
-        task: &Task,
-        outcome: Outcome,
-        statistics: Option<&Statistics>,
-        now: Duration,
-    ) {
-        if let Some(statistics) = statistics {
-            self.cost.add(statistics);
-        }
-        self.refinement.finish(outcome, now);
-        if outcome == Outcome::Done {
-            self.keep(task.origin);
-        }
-        self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
-    }
-
-    /// Takes a complete pass of fewer samples than the picture's.
-    pub(super) fn refine(&mut self, origin: Origin, statistics: &Statistics) {
-        self.cost.add(statistics);
-        self.keep(origin);
-        self.revisions.state += 1;
-    }
-
-    /// Keeps the tiles of a complete pass of the newest wish alone.
-    fn keep(&mut self, origin: Origin) {
-        if origin.version == self.refinement.version() {
-            self.done = Some(origin);
-            self.canvas.keep(origin);
-        }
-    }
-
-    /// Takes the settings that pilot renders have found.
-    pub(super) fn fit(&mut self, task: &Task, fit: Option<&Fit>, now: Duration) {
-        let photons = self.wish.settings.photons.count;
-        if let Some(fit) = fit {
-            let stated = self.start.stated;
-            self.wish.fit(fit, stated);
-            self.start.wish.fit(fit, stated);
-        }
-        let has_other_photons = self.wish.settings.photons.count != photons;
-        if has_other_photons {
-            self.begin_picture();
-        }
-        self.finish(task, Outcome::Fitted { has_other_photons }, None, now);
-    }
-
-    /// Notes that a card is lost.
-    pub(super) fn lose_card(&mut self, name: &str, error: String, now: Duration) {
-        self.cards.lose(name, error, now);
-        self.revisions.cards += 1;
     }
 
     /// Notes that a lost card has answered.

@@ -1,0 +1,110 @@
+//! The painter's side of a view: its next task, tiles, and the ends of passes.
+
+use std::time::Duration;
+
+use photoncard_driver::quality::Fit;
+use photoncard_driver::render::Statistics;
+use photoncard_driver::sink::FinishedTile;
+
+use super::canvas::{Origin, Patch};
+use super::pages::Revisions;
+use super::passes;
+use super::refinement::{Next, Outcome, Pass};
+use super::state::{Task, View};
+
+impl View {
+    /// Next thing to do.
+    pub(super) fn next(&mut self, now: Duration) -> Result<Task, Option<Duration>> {
+        let work = match self.refinement.next(now) {
+            Next::Work(work) => work,
+            Next::Wait(until) => return Err(until),
+        };
+        let (settings, step) = match work.pass {
+            Pass::Coarse(step) => (passes::coarse(&self.wish.settings, step), step),
+            Pass::Fit => (self.wish.settings.clone(), 1),
+            Pass::Full => (passes::full(&self.wish.settings, self.cursor), 1),
+        };
+        let origin = Origin { version: work.version, step, samples: settings.integrator.samples };
+        Ok(Task { work, wish: self.wish.clone(), settings, origin })
+    }
+
+    /// Returns whether the running work should stop.
+    pub(super) fn must_stop(&self) -> bool {
+        self.refinement.must_stop()
+    }
+
+    /// Tells that the running work has begun or ended to trace photons and to build the card image.
+    pub(super) fn prepares(&mut self, is_preparing: bool) {
+        self.refinement.prepares(is_preparing);
+    }
+
+    /// Takes a tile of the running work, which `card` has rendered.
+    pub(super) fn put(&mut self, origin: Origin, card: &str, tile: &FinishedTile) {
+        let (number, is_new) = self.cards.rendered(card);
+        if is_new {
+            self.revisions.cards += 1;
+        }
+        if self.spared() == Some(origin.version) {
+            self.canvas.put(Patch::new(origin, number, tile.clone()));
+        }
+    }
+
+    /// Takes a tile back.
+    pub(super) fn revoke(&mut self, origin: Origin, id: u32) {
+        self.canvas.revoke(origin, id);
+    }
+
+    /// Takes the end of the running work. Its picture was that of `statistics`.
+    pub(super) fn finish(
+        &mut self,
+        task: &Task,
+        outcome: Outcome,
+        statistics: Option<&Statistics>,
+        now: Duration,
+    ) {
+        if let Some(statistics) = statistics {
+            self.cost.add(statistics);
+        }
+        self.refinement.finish(outcome, now);
+        if outcome == Outcome::Done {
+            self.keep(task.origin);
+        }
+        self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
+    }
+
+    /// Takes a complete pass of fewer samples than the picture's.
+    pub(super) fn refine(&mut self, origin: Origin, statistics: &Statistics) {
+        self.cost.add(statistics);
+        self.keep(origin);
+        self.revisions.state += 1;
+    }
+
+    /// Keeps the tiles of a complete pass of the newest wish alone.
+    fn keep(&mut self, origin: Origin) {
+        if origin.version == self.refinement.version() {
+            self.done = Some(origin);
+            self.canvas.keep(origin);
+        }
+    }
+
+    /// Takes the settings that pilot renders have found.
+    pub(super) fn fit(&mut self, task: &Task, fit: Option<&Fit>, now: Duration) {
+        let photons = self.wish.settings.photons.count;
+        if let Some(fit) = fit {
+            let stated = self.start.stated;
+            self.wish.fit(fit, stated);
+            self.start.wish.fit(fit, stated);
+        }
+        let has_other_photons = self.wish.settings.photons.count != photons;
+        if has_other_photons {
+            self.begin_picture();
+        }
+        self.finish(task, Outcome::Fitted { has_other_photons }, None, now);
+    }
+
+    /// Notes that a card is lost.
+    pub(super) fn lose_card(&mut self, name: &str, error: String, now: Duration) {
+        self.cards.lose(name, error, now);
+        self.revisions.cards += 1;
+    }
+}
