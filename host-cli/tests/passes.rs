@@ -34,8 +34,10 @@ fn render_or_panic(room: &Room, picture: &str, options: &[&str]) -> Outcome {
 
 /// Number of samples a pixel that a render reports.
 fn samples(outcome: &Outcome) -> String {
-    let (before, _) = outcome.stderr.rsplit_once(" samples a pixel").expect("the number of samples");
-    before.rsplit(' ').next().unwrap().to_owned()
+    let (before, _) = outcome.stderr.rsplit_once(" a pixel, ").expect("the number of samples");
+    let mut words = before.rsplit(' ');
+    assert!(words.next().unwrap().starts_with("sample"));
+    words.next().unwrap().to_owned()
 }
 
 #[test]

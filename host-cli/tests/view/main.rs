@@ -142,7 +142,7 @@ fn pictures_are_refined_from_coarse_to_fine_and_follow_edits() {
     // A page that is behind misses coarse ones.
     assert!(steps.is_sorted_by(|a, b| a > b) && steps.last() == Some(&1), "{steps:?}");
     assert_eq!(state["changes"], json!([{"name": "lamp.emission", "value": 0.25}]));
-    page.send(&json!({"type": "pick", "at": [20, 15]}));
+    page.send(&json!({"type": "pick", "at": [10, 8]}));
     let picked = page.wait_for("picked");
     assert!(
         picked["point"][1].as_f64().unwrap().abs() < 0.1 && picked["depth"].as_f64().unwrap() > 1.0,
