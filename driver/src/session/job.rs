@@ -29,6 +29,7 @@ pub struct Assignment {
 
 /// Event of a session.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "most events are finished tiles, and few wait")]
 pub enum Event {
     /// The card has received image and frame.
     Ready,

@@ -110,13 +110,19 @@ impl Numbers<'_> {
     }
 }
 
-fn added(sums: [i64; 3], more: [i64; 3]) -> [i64; 3] {
-    core::array::from_fn(|channel| sums[channel].saturating_add(more[channel]))
+/// Sums of the channels or axes of two vectors by `add`.
+fn added<T>([a, b, c]: [T; 3], [p, q, r]: [T; 3], add: fn(T, T) -> T) -> [T; 3] {
+    [add(a, p), add(b, q), add(c, r)]
+}
+
+/// Sum of light, saturating.
+fn added_light(light: [i64; 3], more: [i64; 3]) -> [i64; 3] {
+    added(light, more, i64::saturating_add)
 }
 
 impl LayerSums {
     fn light(&self) -> [i64; 3] {
-        added(added(self.direct, self.indirect), self.caustic)
+        added_light(added_light(self.direct, self.indirect), self.caustic)
     }
 }
 
@@ -180,20 +186,20 @@ impl PixelSums {
     #[must_use]
     pub fn plus(&self, more: &Self) -> Self {
         let view = Self {
-            albedo: core::array::from_fn(|i| self.albedo[i].saturating_add(more.albedo[i])),
-            normal: core::array::from_fn(|i| self.normal[i].saturating_add(more.normal[i])),
+            albedo: added(self.albedo, more.albedo, u32::saturating_add),
+            normal: added(self.normal, more.normal, i32::saturating_add),
             depth: self.depth.saturating_add(more.depth),
             surfaces: self.surfaces.saturating_add(more.surfaces),
             ..Self::default()
         };
         match (&self.layers, &more.layers) {
             (Some(layers), Some(more)) => view.with_layers(LayerSums {
-                direct: added(layers.direct, more.direct),
-                indirect: added(layers.indirect, more.indirect),
-                caustic: added(layers.caustic, more.caustic),
+                direct: added_light(layers.direct, more.direct),
+                indirect: added_light(layers.indirect, more.indirect),
+                caustic: added_light(layers.caustic, more.caustic),
                 gathers: layers.gathers.saturating_add(more.gathers),
             }),
-            _ => view.with_light(added(self.light, more.light)),
+            _ => view.with_light(added_light(self.light, more.light)),
         }
     }
 
