@@ -22,7 +22,7 @@ const FIRST_SAMPLES: u32 = 1;
 /// Share of the remaining time that a pass is planned for.
 const PLANNED_SHARE: f64 = 0.95;
 
-/// End of a picture by passes; whichever comes first, and [`MAX_SAMPLES`] in any case.
+/// End of a picture by passes: the first of the two, and 4096 samples a pixel in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
     /// Time of the render; the first pass may take longer.
@@ -61,7 +61,7 @@ impl Renderer {
         let chosen = RefCell::new((settings.photons.clone(), settings.integrator.clone()));
         let first = |packed: &PackedScene| {
             let (photons, integrator) = choose(packed)?;
-            let integrator = first_pass(&integrator);
+            let integrator = first_pass(&integrator, aim);
             *chosen.borrow_mut() = (photons.clone(), integrator.clone());
             Ok((photons, integrator))
         };
@@ -93,10 +93,15 @@ impl Renderer {
     }
 }
 
-/// Integrator of the first pass of a picture: with irradiance records the planned samples, as each pass gathers the records again.
-fn first_pass(integrator: &Integrator) -> Integrator {
+/// Integrator of the first pass of a picture: with irradiance records the planned samples, as each pass gathers the records again, and a
+/// fourth of them where time is short.
+fn first_pass(integrator: &Integrator, aim: Aim) -> Integrator {
     let planned = integrator.planned();
-    let samples = if integrator.irradiance_error.is_some() { planned } else { FIRST_SAMPLES };
+    let samples = match (integrator.irradiance_error, aim.time) {
+        (None, _) => FIRST_SAMPLES,
+        (Some(_), None) => planned,
+        (Some(_), Some(_)) => planned.div_ceil(4),
+    };
     Integrator { samples, planned_samples: Some(planned), ..integrator.clone() }
 }
 
