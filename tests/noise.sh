@@ -18,7 +18,7 @@ for scene in cornell.gltf cornell-glossy.gltf room.glb atrium.glb roughness.glb;
     options=(--size "$size" --irradiance-cache off --gather-rays 8 --shadow-rays 1 --photons 500000)
     "$photoncard" render "scenes/$scene" "${options[@]}" --seed 9 --spp 4096 --quiet -o "$work/reference.exr"
     "$photoncard" render "scenes/$scene" "${options[@]}" --noise "$noise" -o "$work/picture.exr" 2>"$work/said"
-    samples=$(grep -o '[0-9]* samples a pixel' "$work/said" | cut -d' ' -f1)
+    samples=$(grep -o '[0-9]* samples a pixel' "$work/said" | tail -1 | cut -d' ' -f1)
     estimated=$(grep -o 'noise [0-9.]* %' "$work/said" | cut -d' ' -f2)
     "$photoncard" diff "$work/picture.exr" "$work/reference.exr" >"$work/diff.json"
     python3 - "$scene" "$samples" "$estimated" "$noise" "$work/diff.json" <<'END'
