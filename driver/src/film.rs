@@ -263,11 +263,8 @@ impl Film {
             (true, layers) => sums.with_layers(layers.unwrap_or_default()),
             (false, _) => sums.with_light(sums.light),
         };
-        let mut at = index * self.format.record_bytes();
-        sums.write(&mut |bytes| {
-            self.records[at..at + bytes.len()].copy_from_slice(bytes);
-            at += bytes.len();
-        });
+        let bytes = self.format.record_bytes();
+        store(&sums, &mut self.records[index * bytes..(index + 1) * bytes]);
         if !std::mem::replace(&mut self.written[index], true) {
             self.missing -= 1;
         }
@@ -286,13 +283,7 @@ impl Film {
         for ((record, more_sums), (written, more_written)) in
             records.zip(self.written.iter_mut().zip(&more.written))
         {
-            let sums = PixelSums::read(record).unwrap_or_default().plus(&more_sums);
-            let mut rest = record;
-            sums.write(&mut |bytes| {
-                let (head, tail) = std::mem::take(&mut rest).split_at_mut(bytes.len());
-                head.copy_from_slice(bytes);
-                rest = tail;
-            });
+            store(&PixelSums::read(record).unwrap_or_default().plus(&more_sums), record);
             self.missing += usize::from(*written && !more_written);
             *written &= more_written;
         }
@@ -350,6 +341,15 @@ impl Film {
             .contains(x, y)
             .then(|| (y - y0) as usize * self.window.width() as usize + (x - x0) as usize)
     }
+}
+
+/// Writes sums over a record of their format.
+fn store(sums: &PixelSums, record: &mut [u8]) {
+    let mut at = 0;
+    sums.write(&mut |bytes| {
+        record[at..at + bytes.len()].copy_from_slice(bytes);
+        at += bytes.len();
+    });
 }
 
 impl TileSink for Mutex<Film> {

@@ -35,7 +35,7 @@ pub use self::error::PartialError;
 use self::error::VERSION;
 use self::file::{FAMILY, Title, read_title};
 use self::records::{HEAD_BYTES, read_tiles, record};
-use self::samples::KeptSamples;
+use self::samples::{KeptSamples, Split};
 use crate::film::Film;
 use crate::sink::{FinishedTile, TileSink};
 
@@ -121,14 +121,16 @@ impl PartialRender {
         let mut reader = BufReader::new(file);
         let Some(head) = self.read_head(&mut reader)? else { return Ok(None) };
         let asked = film.format().samples;
-        let too_large = |error| self.error(io::Error::new(io::ErrorKind::OutOfMemory, error));
-        let mut found = KeptSamples::new(film.empty_with(asked).map_err(too_large)?);
+        let mut found = KeptSamples::new(film);
         let sound = read_tiles(&mut reader, head, &mut found).map_err(|error| self.error(error))?;
-        let (base, rest) = found.split().map_err(|samples| PartialError::Differs {
+        let Split { base, rest } = found.split().map_err(|samples| PartialError::Differs {
             path: self.path.clone(),
             differences: vec![format!("spp was {samples}, and not all of them are finished, and is {asked}")],
         })?;
-        *film = rest;
+        match rest {
+            Some(rest) => *film = rest,
+            None => film.set_samples(asked - base.as_ref().map_or(0, |base| base.format().samples)),
+        }
         file.set_len(sound).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|error| self.error(error))?;
         let mut kept = self.lock();
         kept.holds_earlier = sound > head;

@@ -14,17 +14,25 @@ pub(super) struct SampleRange {
 }
 
 /// Films of ranges of samples, for a picture of more of them.
-pub(super) struct KeptSamples {
-    /// Empty film of the picture, which its format is of.
-    empty: Film,
+pub(super) struct KeptSamples<'a> {
+    /// Empty film of the picture.
+    empty: &'a Film,
     ranges: Vec<(SampleRange, Film)>,
     /// Maximum number of samples, up to the last, that any record has.
     most: u32,
 }
 
-impl KeptSamples {
+/// Samples of a picture, as far as they are kept.
+pub(super) struct Split {
+    /// The complete film of the first samples, if there are any but not all of the picture's.
+    pub(super) base: Option<Film>,
+    /// Film of the other samples; `None` if none of their tiles is kept.
+    pub(super) rest: Option<Film>,
+}
+
+impl<'a> KeptSamples<'a> {
     /// No samples yet of the picture that `empty` is the film of.
-    pub(super) fn new(empty: Film) -> Self {
+    pub(super) fn new(empty: &'a Film) -> Self {
         Self { empty, ranges: Vec::new(), most: 0 }
     }
 
@@ -55,12 +63,11 @@ impl KeptSamples {
         self.ranges.get_mut(index).map(|(_, film)| film)
     }
 
-    /// The complete film of the first samples, if there are any but not all of the picture's, and the film of the rest, which may have
-    /// tiles already.
+    /// The samples that the picture takes over.
     ///
     /// # Errors
     /// If there are samples of pictures of other numbers alone: the greatest of these numbers.
-    pub(super) fn split(mut self) -> Result<(Option<Film>, Film), u32> {
+    pub(super) fn split(mut self) -> Result<Split, u32> {
         let samples = self.format().samples;
         let mut base: Option<Film> = None;
         let done = |base: &Option<Film>| base.as_ref().map_or(0, |film| film.format().samples);
@@ -83,13 +90,10 @@ impl KeptSamples {
         let first = done(&base);
         let rest = SampleRange { first, count: samples - first };
         let kept = self.ranges.iter().position(|(range, _)| *range == rest);
-        match kept {
-            Some(index) => Ok((base, self.ranges.swap_remove(index).1)),
-            None if base.is_none() && self.most > 0 => Err(self.most),
-            None => {
-                self.empty.set_samples(rest.count);
-                Ok((base, self.empty))
-            }
+        let rest = kept.map(|index| self.ranges.swap_remove(index).1);
+        if base.is_none() && rest.is_none() && self.most > 0 {
+            return Err(self.most);
         }
+        Ok(Split { base, rest })
     }
 }

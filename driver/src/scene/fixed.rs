@@ -30,6 +30,11 @@ impl FixedScene<'_> {
     pub fn is_specular(&self) -> bool {
         *self.is_specular.get_or_init(|| self.scene.is_specular())
     }
+
+    /// The scene.
+    pub fn into_scene(self) -> Scene {
+        self.scene.into_owned()
+    }
 }
 
 impl Deref for FixedScene<'_> {
@@ -37,13 +42,6 @@ impl Deref for FixedScene<'_> {
 
     fn deref(&self) -> &Scene {
         &self.scene
-    }
-}
-
-impl FixedScene<'_> {
-    /// The scene.
-    pub fn into_scene(self) -> Scene {
-        self.scene.into_owned()
     }
 }
 
