@@ -20,7 +20,9 @@ use photoncard_firmware::kind::{
 use photoncard_firmware::memory::CardMemory;
 use photoncard_firmware::serve::serve;
 use photoncard_shared::budget::Budget;
+use photoncard_shared::frame::MAX_FRAME;
 use photoncard_shared::link::Port;
+use photoncard_shared::transport::WINDOW;
 
 use self::dram::EmulatedDram;
 pub use self::dram::SharedImage;
@@ -106,6 +108,8 @@ impl EmulatedKind {
 
 /// Capacity of a loopback link in each direction, bytes.
 const LINK_CAPACITY: usize = 64 << 10;
+/// Bytes of a card for which the host is woken: a third of the frames that may be in flight.
+const WOKEN_AT: usize = WINDOW * MAX_FRAME / 3;
 /// Stack of a chip's thread, bytes: the chip's buffers are built there before they move to the heap.
 pub(crate) const THREAD_STACK: usize = 16 << 20;
 
@@ -143,7 +147,8 @@ impl EmulatedCard {
         model: Option<MemoryModel>,
         shared: SharedImage,
     ) -> std::io::Result<Self> {
-        let (host, mut card) = loopback(LINK_CAPACITY);
+        let (host, card) = loopback(LINK_CAPACITY);
+        let mut card = card.patient(WOKEN_AT);
         let trace = model.as_ref().and_then(|model| model.trace.as_ref());
         let trace_has_failed = trace.map(TraceFile::has_failed);
         let thread = std::thread::Builder::new()

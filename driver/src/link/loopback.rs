@@ -1,10 +1,17 @@
 //! Link within the process: two bounded queues of bytes. They fill up more readily than hardware, which tests flow control.
+//!
+//! A card writes a frame of some hundred bytes at a time, and to wake the host for each takes longer than the host's work on it.
+//! The end of a [patient](LoopbackPort::patient) writer wakes the reader for many frames at once.
 
 use std::collections::VecDeque;
+use std::io::Read;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use photoncard_shared::link::{Port, PortError};
+
+/// Time after which a patient writer's next call wakes the reader in any case.
+const PATIENCE: Duration = Duration::from_micros(500);
 
 /// One direction of the link.
 #[derive(Default)]
@@ -47,25 +54,52 @@ pub struct LoopbackPort {
     incoming: Arc<Direction>,
     outgoing: Arc<Direction>,
     capacity: usize,
+    /// Bytes in transit at which a write wakes the reader.
+    wakes_at: usize,
+    /// Time of the first write since the reader was woken, if any.
+    written: Option<Instant>,
 }
 
 /// Creates a link and returns its two ends. Each direction holds `capacity` bytes, at least one.
 pub fn loopback(capacity: usize) -> (LoopbackPort, LoopbackPort) {
     let capacity = capacity.max(1);
     let (a, b) = (Arc::<Direction>::default(), Arc::<Direction>::default());
-    let first = LoopbackPort { incoming: a.clone(), outgoing: b.clone(), capacity };
-    (first, LoopbackPort { incoming: b, outgoing: a, capacity })
+    let port = |incoming: &Arc<Direction>, outgoing: &Arc<Direction>| LoopbackPort {
+        incoming: incoming.clone(),
+        outgoing: outgoing.clone(),
+        capacity,
+        wakes_at: 0,
+        written: None,
+    };
+    (port(&a, &b), port(&b, &a))
+}
+
+impl LoopbackPort {
+    /// The port of a writer that goes on to call it while it has work, and before it waits: the reader is woken once so many bytes are
+    /// there, after some time, or when the writer itself waits for bytes.
+    #[must_use]
+    pub fn patient(mut self, wakes_at: usize) -> Self {
+        self.wakes_at = wakes_at.min(self.capacity);
+        self
+    }
+
+    /// Wakes the reader if it is due.
+    fn wake(&mut self, is_due: bool) {
+        if self.written.is_some_and(|written| is_due || written.elapsed() >= PATIENCE) {
+            self.written = None;
+            self.outgoing.changed.notify_all();
+        }
+    }
 }
 
 impl Port for LoopbackPort {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
+        self.wake(!wait.is_zero());
         let mut queue = self.incoming.wait(wait, |queue| !queue.bytes.is_empty());
-        let count = buffer.len().min(queue.bytes.len());
+        // To read from a queue in memory does not fail.
+        let count = queue.bytes.read(buffer).unwrap_or(0);
         if count == 0 {
             return if queue.closed { Err(PortError::Closed) } else { Ok(0) };
-        }
-        for (target, byte) in buffer.iter_mut().zip(queue.bytes.drain(..count)) {
-            *target = byte;
         }
         self.incoming.changed.notify_all();
         Ok(count)
@@ -79,7 +113,10 @@ impl Port for LoopbackPort {
         }
         let count = bytes.len().min(capacity - queue.bytes.len());
         queue.bytes.extend(&bytes[..count]);
-        self.outgoing.changed.notify_all();
+        let is_due = queue.bytes.len() >= self.wakes_at;
+        drop(queue);
+        self.written.get_or_insert_with(Instant::now);
+        self.wake(is_due);
         Ok(count)
     }
 }
@@ -107,6 +144,26 @@ mod tests {
         assert_eq!(buffer, [1, 2, 3]);
         assert_eq!(host.write(&[5, 6], SOON), Ok(2));
         assert_eq!(host.read(&mut buffer, SOON), Ok(0));
+    }
+
+    #[test]
+    fn a_patient_writer_wakes_the_reader_before_it_waits() {
+        let (mut host, card) = loopback(64);
+        let mut card = card.patient(16);
+        std::thread::scope(|scope| {
+            let reader = scope.spawn(move || {
+                let mut buffer = [0; 8];
+                let begun = Instant::now();
+                let count = host.read(&mut buffer, Duration::from_secs(60)).unwrap();
+                (begun.elapsed() < Duration::from_secs(30), buffer[..count].to_vec())
+            });
+            card.write(&[1, 2], SOON).unwrap();
+            card.write(&[3], SOON).unwrap();
+            let waiting = card.read(&mut [0; 1], Duration::from_secs(1));
+            let (was_woken, bytes) = reader.join().unwrap();
+            assert!(was_woken && [1, 2, 3].starts_with(&bytes) && !bytes.is_empty());
+            assert!(matches!(waiting, Ok(0) | Err(PortError::Closed)));
+        });
     }
 
     #[test]

@@ -197,7 +197,7 @@ impl Observer for Easel<'_> {
     fn progress(&self, phase: Phase, _: u64, _: u64) {
         let is_preparing = matches!(phase, Phase::Photons | Phase::Pack);
         if self.is_preparing.swap(is_preparing, Ordering::Relaxed) != is_preparing {
-            self.hub.change(|view, _| view.prepares(is_preparing));
+            self.hub.change(|view, now| view.prepares(is_preparing, now));
         }
     }
 

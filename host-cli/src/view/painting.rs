@@ -34,8 +34,8 @@ impl View {
     }
 
     /// Tells that the running work has begun or ended to trace photons and to build the card image.
-    pub(super) fn prepares(&mut self, is_preparing: bool) {
-        self.refinement.prepares(is_preparing);
+    pub(super) fn prepares(&mut self, is_preparing: bool, now: Duration) {
+        self.refinement.prepares(is_preparing, now);
     }
 
     /// Takes a tile of the running work, which `card` has rendered.

@@ -17,6 +17,8 @@ const MAX_PAUSE: Duration = Duration::from_secs(8);
 
 /// Side of the squares of the first pass, pixels.
 pub(super) const COARSEST: u32 = 8;
+/// Time of the pass that follows a coarse one: passes whose pictures would hardly be seen are left out.
+const SEEN: Duration = Duration::from_millis(800);
 
 /// One picture on the way to the settled one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,14 +36,24 @@ impl Pass {
     pub(super) const FIRST: Self = Self::Coarse(COARSEST);
 }
 
-/// The pass after another one; `None` after the last. Passes of more and more samples go here.
-fn next_pass(pass: Pass, is_fitted: bool) -> Option<Pass> {
+/// The pass after another one that took `time`; `None` after the last.
+fn next_pass(pass: Pass, time: Duration, is_fitted: bool) -> Option<Pass> {
     match pass {
-        Pass::Coarse(step) if step > 1 => Some(Pass::Coarse(step / 2)),
+        Pass::Coarse(step) if step > 1 => Some(Pass::Coarse(next_step(step, time))),
         Pass::Coarse(_) if !is_fitted => Some(Pass::Fit),
         Pass::Coarse(_) | Pass::Fit => Some(Pass::Full),
         Pass::Full => None,
     }
+}
+
+/// Side of the squares after a pass of the side `step` that took `time`: a half, or less where four times as many pixels for each half
+/// take no more than [`SEEN`].
+fn next_step(step: u32, time: Duration) -> u32 {
+    let (mut next, mut time) = (step / 2, 4 * time);
+    while next > 1 && 4 * time <= SEEN {
+        (next, time) = (next / 2, 4 * time);
+    }
+    next
 }
 
 /// Work on a pass.
@@ -90,6 +102,8 @@ pub(super) struct Refinement {
     is_fitted: bool,
     is_refused: bool,
     running: Option<Work>,
+    /// Time at which the running work began, or last ended to prepare.
+    begun: Duration,
     /// True while the running work traces photons and builds the card image.
     is_preparing: bool,
     /// False if the last first pass was stopped: the next one is done.
@@ -109,6 +123,7 @@ impl Refinement {
             is_fitted,
             is_refused: false,
             running: None,
+            begun: Duration::ZERO,
             is_preparing: false,
             may_stop_first: true,
             moving_until: Duration::ZERO,
@@ -147,8 +162,8 @@ impl Refinement {
     }
 
     /// Tells that the running work has begun or ended to trace photons and to build the card image.
-    pub(super) fn prepares(&mut self, is_preparing: bool) {
-        self.is_preparing = is_preparing;
+    pub(super) fn prepares(&mut self, is_preparing: bool, now: Duration) {
+        (self.is_preparing, self.begun) = (is_preparing, now);
     }
 
     /// Tells that a card can be reached again.
@@ -181,7 +196,7 @@ impl Refinement {
             return Next::Wait(Some(begin));
         }
         let work = Work { version: self.version, edition: self.edition, pass };
-        (self.running, self.is_preparing) = (Some(work), false);
+        (self.running, self.begun, self.is_preparing) = (Some(work), now, false);
         Next::Work(work)
     }
 
@@ -194,7 +209,7 @@ impl Refinement {
                 self.may_stop_first |= work.pass == Pass::FIRST;
                 self.card_returns();
                 if is_newest {
-                    self.pass = next_pass(work.pass, self.is_fitted);
+                    self.pass = next_pass(work.pass, now.saturating_sub(self.begun), self.is_fitted);
                 }
             }
             Outcome::Fitted { has_other_photons } => {
@@ -202,7 +217,7 @@ impl Refinement {
                 if has_other_photons {
                     self.wish(true);
                 } else if is_newest {
-                    self.pass = next_pass(work.pass, true);
+                    self.pass = next_pass(work.pass, Duration::ZERO, true);
                 }
             }
             Outcome::Stopped => self.may_stop_first &= work.pass != Pass::FIRST,
@@ -228,26 +243,58 @@ mod tests {
         }
     }
 
-    /// Does all work until the picture settles. Returns the passes.
-    fn settle(refinement: &mut Refinement) -> Vec<Pass> {
+    /// Does all work until the picture settles, 4096 pixels in `time`. Returns the passes.
+    fn settle(refinement: &mut Refinement, time: Duration) -> Vec<Pass> {
         let mut passes = Vec::new();
+        let mut now = NOW;
         while !refinement.is_settled() {
-            let pass = work(refinement, NOW).pass;
+            let pass = work(refinement, now).pass;
             passes.push(pass);
             let found = Outcome::Fitted { has_other_photons: false };
-            refinement.finish(if pass == Pass::Fit { found } else { Outcome::Done }, NOW);
+            if let Pass::Coarse(step) = pass {
+                now += time * (COARSEST / step).pow(2);
+            }
+            refinement.finish(if pass == Pass::Fit { found } else { Outcome::Done }, now);
         }
         passes
+    }
+
+    /// Does the coarse passes, in no time.
+    fn finish_coarse(refinement: &mut Refinement) {
+        for step in [8, 1] {
+            assert_eq!(work(refinement, NOW).pass, Pass::Coarse(step));
+            refinement.finish(Outcome::Done, NOW);
+        }
     }
 
     #[test]
     fn a_wish_is_refined_from_coarse_to_full() {
         let mut refinement = Refinement::new(false);
         let coarse = [8, 4, 2, 1].map(Pass::Coarse);
-        assert_eq!(settle(&mut refinement), [&coarse[..], &[Pass::Fit, Pass::Full]].concat());
+        let time = Duration::from_millis(100);
+        assert_eq!(settle(&mut refinement, time), [&coarse[..], &[Pass::Fit, Pass::Full]].concat());
         refinement.wish(false);
-        assert_eq!(settle(&mut refinement), [&coarse[..], &[Pass::Full]].concat());
+        assert_eq!(settle(&mut refinement, time), [&coarse[..], &[Pass::Full]].concat());
         assert_eq!(refinement.next(NOW), Next::Wait(None));
+    }
+
+    #[test]
+    fn coarse_pictures_that_would_hardly_be_seen_are_left_out() {
+        for (milliseconds, steps) in [(60, &[8, 4, 2, 1][..]), (30, &[8, 2, 1]), (10, &[8, 1])] {
+            let passes = settle(&mut Refinement::new(true), Duration::from_millis(milliseconds));
+            let coarse: Vec<_> = steps.iter().map(|&step| Pass::Coarse(step)).collect();
+            assert_eq!(passes, [&coarse[..], &[Pass::Full]].concat());
+        }
+    }
+
+    #[test]
+    fn photons_and_image_are_no_time_of_a_pass() {
+        let mut refinement = Refinement::new(true);
+        work(&mut refinement, NOW);
+        refinement.prepares(true, NOW);
+        refinement.prepares(false, NOW + Duration::from_secs(3));
+        refinement.finish(Outcome::Done, NOW + Duration::from_millis(3010));
+        assert_eq!(work(&mut refinement, NOW + Duration::from_secs(4)).pass, Pass::Coarse(1));
     }
 
     #[test]
@@ -270,12 +317,12 @@ mod tests {
     fn photons_of_the_same_scene_are_traced_to_their_end() {
         let mut refinement = Refinement::new(true);
         work(&mut refinement, NOW);
-        refinement.prepares(true);
+        refinement.prepares(true, NOW);
         refinement.wish(false);
         assert!(!refinement.must_stop());
-        refinement.prepares(false);
+        refinement.prepares(false, NOW);
         assert!(refinement.must_stop());
-        refinement.prepares(true);
+        refinement.prepares(true, NOW);
         refinement.wish(true);
         assert!(refinement.must_stop());
     }
@@ -284,10 +331,7 @@ mod tests {
     fn costly_passes_wait_for_rest() {
         let mut refinement = Refinement::new(true);
         refinement.moves(true, NOW);
-        for _ in 0..4 {
-            work(&mut refinement, NOW);
-            refinement.finish(Outcome::Done, NOW);
-        }
+        finish_coarse(&mut refinement);
         assert_eq!(refinement.next(NOW), Next::Wait(Some(NOW + REST)));
         assert_eq!(work(&mut refinement, NOW + REST).pass, Pass::Full);
         refinement.finish(Outcome::Stopped, NOW);
@@ -324,16 +368,13 @@ mod tests {
         refinement.finish(Outcome::Refused, NOW);
         assert_eq!(refinement.next(NOW), Next::Wait(None));
         refinement.wish(false);
-        settle(&mut refinement);
+        settle(&mut refinement, Duration::ZERO);
     }
 
     #[test]
     fn other_photons_of_a_fit_are_a_new_edition() {
         let mut refinement = Refinement::new(false);
-        for _ in 0..4 {
-            work(&mut refinement, NOW);
-            refinement.finish(Outcome::Done, NOW);
-        }
+        finish_coarse(&mut refinement);
         let fit = work(&mut refinement, NOW);
         refinement.finish(Outcome::Fitted { has_other_photons: true }, NOW);
         let work = work(&mut refinement, NOW);

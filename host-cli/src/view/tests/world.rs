@@ -136,11 +136,11 @@ impl World {
             return self.end(Outcome::NoCard);
         }
         if job.preparing > 0 {
-            self.view.prepares(true);
+            self.view.prepares(true, self.now);
             job.preparing -= 1;
             if job.preparing == 0 {
                 self.prepared = Some(job.task.wish.clone());
-                self.view.prepares(false);
+                self.view.prepares(false, self.now);
             }
             return;
         }
