@@ -1,26 +1,33 @@
-//! Estimate of the noise of a picture from the difference of its passes.
+//! Estimate of the noise of a picture from the differences of its passes.
 //!
-//! Let `A` and `B` be the means of the pixels over `n` samples each, and `M` their mean, with the errors `e_n` and `e_2n` (root mean
-//! squares). With `e_2n = 2^-r e_n`, `E[(A - B)^2] = 4 (e_n^2 - e_2n^2)`, as `M` is the mean of both, and
-//! `e_2n = |A - B| / (2 sqrt(4^r - 1))`. For independent samples `r = 1/2`; samples of a stratified sequence that add up to its
-//! runs have a greater `r`, which is measured from one doubling to the next.
+//! Let `A` and `B` be the means of the pixels over the first and the next `n` samples, `M` their mean, `e_n` and `e_2n` the errors of `A`
+//! and `M` (root mean squares), and `D_n = E[(A - B)^2]`. `B` has the error of `A`, so that `e_2n^2 = e_n^2 - D_n / 4`, and
+//! `e_2n^2 = (D_2n + D_4n + ...) / 4`: the sum of the differences of passes to come. These are extrapolated. The noise of edges and of
+//! choices with many dimensions falls as of independent samples, `D_2n = D_n / 2`; that of smooth light faster, as `D_2n = D_n / 4` (Owen
+//! 1997, with a lower rate than the limit of smooth integrands). With a share of each, `D_n = a + b` and `D_(n/2) = 2 a + 4 b`, the
+//! last two differences give both, and `e_2n^2 = (a + b / 3) / 4`.
 
 use crate::film::Film;
 
-/// Limits of the measured rate of convergence `r`.
-const RATES: (f64, f64) = (0.5, 1.0);
-
-/// Estimate of the noise of a picture from the difference of its passes.
+/// Estimate of the noise of a picture from the differences of its passes, each of which doubles the samples.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NoiseEstimate {
-    /// Samples, and relative noise of the picture with the rate 1/2, of the last two pictures.
-    last: [Option<(u32, f64)>; 2],
+    /// Samples after the last pass that has doubled them.
+    samples: f64,
+    /// Mean squared difference of the last two passes that have doubled the samples, relative to the mean pixel.
+    differences: [Option<f64>; 2],
+    /// Samples after the last pass.
+    all: f64,
 }
 
 impl NoiseEstimate {
-    /// Adds the picture before a pass and the one after it.
+    /// Adds the picture before a pass and the one after it. A pass that does not double the samples has no part in the estimate.
     pub(super) fn add(&mut self, before: &Film, after: &Film) {
-        let (few, all) = (f64::from(before.format().samples), f64::from(after.format().samples));
+        let [few, all] = [before, after].map(|film| f64::from(film.format().samples));
+        self.all = all;
+        if all != 2.0 * few {
+            return;
+        }
         let [mut squares, mut sum, mut count] = [0.0; 3];
         for (before, after) in before.pixels().zip(after.pixels()) {
             for (before, after) in before.radiance.into_iter().zip(after.radiance) {
@@ -29,33 +36,47 @@ impl NoiseEstimate {
                 count += 1.0;
             }
         }
-        let more = all - few;
-        if sum <= 0.0 || more <= 0.0 {
+        if sum <= 0.0 {
             return;
         }
-        // The difference to the mean of all samples, as a share of that between the two parts.
-        let between = (squares / count).sqrt() * all / more;
-        let noise = between * (few * more).sqrt() / all / (sum / count);
-        self.last = [self.last[1], Some((after.format().samples, noise))];
+        // `A - B` is twice `A - M`.
+        let difference = 4.0 * squares / count / (sum / count).powi(2);
+        self.differences = [self.differences[1], Some(difference)];
+        self.samples = all;
     }
 
-    /// Rate of convergence: noise is in proportion to the number of samples to the power of minus this.
-    fn rate(&self) -> f64 {
-        let [Some((few, more_noise)), Some((all, noise))] = self.last else { return RATES.0 };
-        let rate = (more_noise / noise).ln() / (f64::from(all) / f64::from(few)).ln();
-        if rate.is_finite() { rate.clamp(RATES.0, RATES.1) } else { RATES.0 }
+    /// Squared noise at the last doubling: the part that falls as of independent samples, and the one that falls faster.
+    fn parts(&self) -> Option<[f64; 2]> {
+        let [before, last] = self.differences;
+        let last = last?;
+        let fast = before.map_or(0.0, |before| (before / 2.0 - last).clamp(0.0, last));
+        Some([(last - fast) / 4.0, fast / 12.0])
     }
 
-    /// Noise of the last picture, relative to its mean; `None` before there are two passes.
+    /// Squared noise of a picture of `samples`, no fewer than at the last doubling.
+    fn squared_at(&self, samples: f64) -> Option<f64> {
+        let [slow, fast] = self.parts()?;
+        let ratio = self.samples / samples;
+        // Samples beyond the last doubling, up to the next one, are evenly distributed among themselves alone.
+        let of_both = if samples > self.samples { 2.0 } else { 1.0 };
+        Some(slow * ratio + of_both * fast * ratio * ratio)
+    }
+
+    /// Noise of the last picture, relative to its mean; `None` before there is a pass that has doubled the samples.
     pub(super) fn noise(&self) -> Option<f64> {
-        let (_, noise) = self.last[1]?;
-        Some(noise / (4.0_f64.powf(self.rate()) - 1.0).sqrt())
+        Some(self.squared_at(self.all)?.sqrt())
     }
 
-    /// Number of samples to be added to `samples` so that the noise is at most `aim`; `None` before there is an estimate.
-    pub(super) fn samples_to(&self, aim: f64, samples: u32) -> Option<u32> {
-        let factor = (self.noise()? / aim).max(1.0).powf(1.0 / self.rate());
-        Some((f64::from(samples) * (factor - 1.0)).ceil() as u32)
+    /// Number of samples to be added so that the noise is at most `aim`; `None` before there is an estimate.
+    pub(super) fn samples_to(&self, aim: f64) -> Option<u32> {
+        if self.noise()? <= aim {
+            return Some(0);
+        }
+        let [slow, fast] = self.parts()?;
+        // slow x + 2 fast x^2 = aim^2, for x = samples at the last doubling / samples.
+        let limit = aim * aim;
+        let inverse = (slow + (slow * slow + 8.0 * fast * limit).sqrt()) / (2.0 * limit);
+        Some((self.samples * inverse - self.all).ceil().max(1.0) as u32)
     }
 }
 
@@ -97,8 +118,14 @@ mod tests {
         let truth = (squares / f64::from(SIDE * SIDE)).sqrt() / 0.5;
         let found = estimate.noise().unwrap();
         assert!((found / truth - 1.0).abs() < tolerance, "{found} {truth}");
-        assert_eq!(estimate.samples_to(found, 32), Some(0));
-        assert!(estimate.samples_to(found / 2.0, 32).is_some_and(|more| (32..=96).contains(&more)));
+        assert_eq!(estimate.samples_to(found), Some(0));
+        assert!(estimate.samples_to(found / 2.0).is_some_and(|more| (32..=96).contains(&more)));
+        // A last pass that does not double the samples.
+        let more = estimate.samples_to(0.8 * found).unwrap();
+        estimate.add(&before, &film(32 + more, &value));
+        let noise = estimate.noise().unwrap();
+        assert!((0.7 * found..=0.8 * found).contains(&noise), "{noise} of {found}");
+        assert_eq!(estimate.samples_to(0.8 * found), Some(0));
     }
 
     #[test]

@@ -118,7 +118,7 @@ fn next_pass(
     if let Some(aim) = aim.noise
         && samples >= MIN_SAMPLES
     {
-        more = more.min(estimate.samples_to(aim, samples).unwrap_or(more));
+        more = more.min(estimate.samples_to(aim).unwrap_or(more));
     }
     if let Some(time) = aim.time {
         let left = time.saturating_sub(elapsed).as_secs_f64();
