@@ -21,6 +21,14 @@ impl MemoryPort for StuckLine {
     fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         Ok(&self.0[address.0 as usize])
     }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        for (target, line) in self.0[first.0 as usize..].iter_mut().zip(lines) {
+            target.0 = *line;
+            target.0.iter_mut().step_by(4).for_each(|byte| *byte |= 0x10);
+        }
+        Some(())
+    }
 }
 
 impl CardMemory for StuckLine {
@@ -30,14 +38,6 @@ impl CardMemory for StuckLine {
 
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.0.get(first.0 as usize..(first.0 + count) as usize)
-    }
-
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        for (target, line) in self.0[first.0 as usize..].iter_mut().zip(lines) {
-            target.0 = *line;
-            target.0.iter_mut().step_by(4).for_each(|byte| *byte |= 0x10);
-        }
-        Some(())
     }
 }
 

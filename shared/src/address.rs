@@ -59,10 +59,12 @@ pub enum Structure {
     Attributes = 11,
     /// Texture records and texels.
     Textures = 12,
+    /// Irradiance records that a chip keeps from one frame to the next, beyond the image.
+    IrradianceRecords = 13,
 }
 
 /// Number of structures.
-pub const STRUCTURES: usize = 13;
+pub const STRUCTURES: usize = 14;
 
 impl Structure {
     /// All structures, in order.
@@ -80,6 +82,7 @@ impl Structure {
         Self::CausticPhotons,
         Self::Attributes,
         Self::Textures,
+        Self::IrradianceRecords,
     ];
 
     /// True if the structure belongs to a photon map or to the irradiance points, false if it belongs to the scene.

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Work done on a tile. Sums over all tiles do not depend on which chip rendered which tile.
+/// Work done on a tile. Sums over all tiles do not depend on which chip rendered which tile, unless chips keep irradiance records
+/// ([`FrameParameters::keep_records`](crate::message::FrameParameters::keep_records)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
     /// Eye rays: 2 a sample, for its light and for its other channels; another for each later piece of work on a sample
@@ -28,6 +29,8 @@ pub struct Counters {
     pub tables: u64,
     /// Irradiance records gathered.
     pub records: u64,
+    /// Irradiance records of an earlier frame that were read back instead.
+    pub kept_records: u64,
     /// Samples of a frame with final gather rays that see a surface with a Lambertian part.
     pub lambertian_samples: u64,
     /// Samples in [`Self::lambertian_samples`] whose indirect irradiance was interpolated.
@@ -71,6 +74,7 @@ impl Counters {
         gathers: 0,
         tables: 0,
         records: 0,
+        kept_records: 0,
         lambertian_samples: 0,
         interpolated_samples: 0,
         photons_tested: 0,
@@ -119,6 +123,7 @@ impl Counters {
         self.gathers = self.gathers.saturating_add(other.gathers);
         self.tables = self.tables.saturating_add(other.tables);
         self.records = self.records.saturating_add(other.records);
+        self.kept_records = self.kept_records.saturating_add(other.kept_records);
         self.lambertian_samples = self.lambertian_samples.saturating_add(other.lambertian_samples);
         self.interpolated_samples = self.interpolated_samples.saturating_add(other.interpolated_samples);
         self.photons_tested = self.photons_tested.saturating_add(other.photons_tested);

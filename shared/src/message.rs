@@ -37,7 +37,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 13;
+pub const PROTOCOL_VERSION: u16 = 14;
 
 /// Maximum number of lines of one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
@@ -120,6 +120,9 @@ pub struct FrameParameters {
     pub filter: Filter,
     /// Maximum number of tiles in flight, at least 1; a chip limits it to [`Budget::in_flight`].
     pub in_flight: u32,
+    /// `true` for one of several frames of a picture: irradiance records of a tile are kept in card memory, where there is room
+    /// beyond the image, for a frame of other samples.
+    pub keep_records: bool,
 }
 
 /// Pixel filter: the density of a pixel's samples around its centre, in both directions alike. Samples are drawn from the filter and

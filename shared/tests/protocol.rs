@@ -241,7 +241,7 @@ fn the_page_is_of_this_version() {
 /// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
 #[test]
 fn golden_structures() {
-    assert_eq!(PROTOCOL_VERSION, 13);
+    assert_eq!(PROTOCOL_VERSION, 14);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,
@@ -292,6 +292,7 @@ fn golden_structures() {
         layers: true,
         filter: Filter::BlackmanHarris,
         in_flight: 9,
+        keep_records: true,
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero].concat();
@@ -304,7 +305,7 @@ fn golden_structures() {
         &one,
         &[8, 2, 0xac, 2, 1, 1, 50],
         &one,
-        &[1, 2, 9],
+        &[1, 2, 9, 1],
     ]
     .concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);
@@ -320,23 +321,25 @@ fn golden_structures() {
         gathers: 8,
         tables: 9,
         records: 10,
-        lambertian_samples: 11,
-        interpolated_samples: 12,
-        photons_tested: 13,
-        photons_taken: 14,
-        photons_selected: 15,
-        distances_compared: 16,
-        photons_found: 17,
-        photons_reflected: 18,
-        photons_on_microfacets: 19,
-        normals_decoded: 20,
-        lookups: 21,
-        points_tested: 22,
-        drains: 23,
+        kept_records: 11,
+        lambertian_samples: 12,
+        interpolated_samples: 13,
+        photons_tested: 14,
+        photons_taken: 15,
+        photons_selected: 16,
+        distances_compared: 17,
+        photons_found: 18,
+        photons_reflected: 19,
+        photons_on_microfacets: 20,
+        normals_decoded: 21,
+        lookups: 22,
+        points_tested: 23,
+        drains: 24,
         most_waiting: 300,
     };
-    let bytes =
-        [5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 0xac, 2];
+    let bytes = [
+        5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 0xac, 2,
+    ];
     assert_eq!(encoded(&Reply::TileDone { tile: 16, counters }), bytes);
 }
 

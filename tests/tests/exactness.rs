@@ -58,7 +58,7 @@ fn variants() -> Vec<RenderSettings> {
         (tile, Hilbert, None, None),
     ];
     let scheduled = schedules.map(|(tile, order, bins, queue)| RenderSettings {
-        schedule: Schedule { tile: Some(tile), order, bins, queue, in_flight: None, focus: None },
+        schedule: Schedule { tile: Some(tile), order, bins, queue, in_flight: None, ..Schedule::default() },
         ..settings()
     });
     let cards = [
@@ -74,7 +74,14 @@ fn variants() -> Vec<RenderSettings> {
         (&["emulated:3"], 7, Hilbert, None),
     ];
     let dealt = cards.map(|(cards, tile, order, queue)| RenderSettings {
-        schedule: Schedule { tile: Some(tile), order, bins: None, queue, in_flight: None, focus: None },
+        schedule: Schedule {
+            tile: Some(tile),
+            order,
+            bins: None,
+            queue,
+            in_flight: None,
+            ..Schedule::default()
+        },
         cards: CardSet { addresses: cards.iter().copied().map(card).collect(), ..CardSet::default() },
         ..settings()
     });
@@ -182,7 +189,7 @@ proptest! {
         let changed = base.with(|s| {
             let has_room = cards.starts_with("emulated-large");
             let in_flight = in_flight.filter(|_| has_room);
-            s.schedule = Schedule { tile: Some(tile), order, bins: None, queue, in_flight, focus: None };
+            s.schedule = Schedule { tile: Some(tile), order, bins: None, queue, in_flight, ..Schedule::default() };
             s.cards.addresses = vec![card(cards)];
         });
         let film = render_or_panic(&scene, &changed).film;

@@ -60,16 +60,26 @@ fn technique() -> impl Strategy<Value = RenderSettings> {
 }
 
 /// Number of samples, order of gathers and cards of a pass.
-fn passes() -> impl Strategy<Value = Vec<(u32, GatherOrder, &'static str)>> {
+type Pass = (u32, GatherOrder, &'static str);
+
+/// Passes on cards that stay open, or each on others.
+fn passes() -> impl Strategy<Value = Vec<Pass>> {
     use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
-    let order = prop::sample::select(vec![Naive, Tiled, DirectionBins, Hash, Sort]);
-    let cards = prop::sample::select(vec![
-        "emulated:1",
-        "emulated:2",
-        "emulated-micro:2",
-        "emulated:1+emulated-micro:1",
-    ]);
-    prop::collection::vec((1..4_u32, order, cards), 1..4)
+    let order = || prop::sample::select(vec![Naive, Tiled, DirectionBins, Hash, Sort]);
+    let cards = || {
+        prop::sample::select(vec![
+            "emulated:1",
+            "emulated:2",
+            "emulated-large:1",
+            "emulated-micro:2",
+            "emulated:1+emulated-micro:1",
+        ])
+    };
+    let on_others = prop::collection::vec((1..4_u32, order(), cards()), 1..4);
+    let on_same = (cards(), prop::collection::vec((1..4_u32, order()), 2..5));
+    let on_same = on_same
+        .prop_map(|(on, passes)| passes.into_iter().map(|(samples, order)| (samples, order, on)).collect());
+    prop_oneof![on_others, on_same]
 }
 
 proptest! {
@@ -86,6 +96,7 @@ proptest! {
             samples += more;
             let settings = technique.clone().with(|s| {
                 s.schedule.order = order;
+                s.schedule.keep_records = true;
                 s.cards.addresses = cards(on);
             });
             picture = Some(pass(&mut renderer, &scene, &settings, (samples, picture)));
@@ -96,6 +107,78 @@ proptest! {
         prop_assert_eq!(found.format(), expected.format());
         prop_assert!(found.sums().eq(expected.sums()), "{:?}", passes);
     }
+}
+
+/// Settings of a picture by passes with irradiance records.
+fn with_records() -> RenderSettings {
+    settings().with(|s| {
+        (s.integrator.irradiance_error, s.integrator.planned_samples) = (Some(0.1), Some(4));
+        s.schedule.keep_records = true;
+    })
+}
+
+#[test]
+fn records_are_gathered_once_while_camera_scene_settings_and_cards_stay() {
+    let scene = everything();
+    let scene = FixedScene::from(&scene);
+    for on in [
+        "emulated:1",
+        "emulated-large:1",
+        "emulated-micro:1",
+        "emulated-micro:2",
+        "emulated:1+emulated-micro:2",
+    ] {
+        let settings = with_records().with(|s| s.cards.addresses = cards(on));
+        let mut renderer = Renderer::default();
+        let [mut gathers, mut records, mut kept] = [0; 3];
+        let mut picture = None;
+        for samples in [1, 2, 4] {
+            let rendering = pass(&mut renderer, &scene, &settings, (samples, picture.take()));
+            gathers += rendering.statistics.gathers;
+            records += rendering.statistics.records;
+            kept += rendering.statistics.kept_records;
+            picture = Some(rendering);
+        }
+        let whole = render_or_panic(&everything(), &settings.clone().with(|s| s.integrator.samples = 4));
+        assert!(picture.expect("a pass").film.sums().eq(whole.film.sums()), "{on}");
+        let all = whole.statistics.records;
+        assert_eq!(records + kept, 3 * all, "{on}");
+        // Of several cards one may take a tile of another that is late.
+        if settings.cards.count() == 1 {
+            assert_eq!((gathers, records), (whole.statistics.gathers, all), "{on}");
+        }
+    }
+}
+
+#[test]
+fn records_are_gathered_again_on_other_cards_and_for_another_camera() {
+    let scene = everything();
+    let scene = FixedScene::from(&scene);
+    let settings = with_records();
+    let mut renderer = Renderer::default();
+    let first = pass(&mut renderer, &scene, &settings, (1, None));
+    let records = first.statistics.records;
+    let second = pass(&mut renderer, &scene, &settings, (2, Some(first)));
+    assert_eq!((second.statistics.records, second.statistics.kept_records), (0, records));
+    // The cards are lost, and others in their place.
+    renderer.close_cards();
+    let third = pass(&mut renderer, &scene, &settings, (3, Some(second)));
+    assert_eq!((third.statistics.records, third.statistics.kept_records), (records, 0));
+    let elsewhere = settings.clone().with(|s| s.picture.camera_at = Some([0.1, 0.2, 2.0]));
+    pass(&mut renderer, &scene, &elsewhere, (1, None));
+    let fourth = pass(&mut renderer, &scene, &settings, (4, Some(third)));
+    assert_eq!((fourth.statistics.records, fourth.statistics.kept_records), (records, 0));
+    // Cards that are compared keep nothing.
+    let verified =
+        settings.clone().with(|s| (s.cards.verify, s.cards.addresses) = (Some(0.5), cards("emulated:2")));
+    let mut picture = Some(fourth);
+    for samples in [5, 6] {
+        let next = pass(&mut renderer, &scene, &verified, (samples, picture.take()));
+        assert_eq!((next.statistics.records, next.statistics.kept_records), (records, 0));
+        picture = Some(next);
+    }
+    let at_once = render_or_panic(&everything(), &settings.with(|s| s.integrator.samples = 6)).film;
+    assert!(picture.expect("a pass").film.sums().eq(at_once.sums()));
 }
 
 #[test]

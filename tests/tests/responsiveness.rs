@@ -14,7 +14,7 @@ use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::kind::MICRO;
 use photoncard_firmware::memory::{CardMemory, MemoryPort};
 use photoncard_firmware::serve::serve;
-use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::address::{Line, LineAddress, Structure};
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::link::{Port, PortError};
@@ -42,10 +42,6 @@ impl CardMemory for CountingMemory<'_> {
 
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.lines.get(first.0 as usize..(first.0 + count) as usize)
-    }
-
-    fn write(&mut self, _: LineAddress, _: &[[u8; LINE_BYTES]]) -> Option<()> {
-        None
     }
 }
 

@@ -120,6 +120,15 @@ impl MemoryPort for DefectiveMemory {
     fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         Ok(&self.shown[address.0 as usize])
     }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        let words = lines.as_flattened().as_chunks().0;
+        for (index, bytes) in (first.0 * WORDS_PER_LINE..).zip(words) {
+            self.store(index, u32::from_le_bytes(*bytes));
+        }
+        self.writes += lines.len() as u32;
+        Some(())
+    }
 }
 
 impl CardMemory for DefectiveMemory {
@@ -129,15 +138,6 @@ impl CardMemory for DefectiveMemory {
 
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.shown.get(first.0 as usize..(first.0 + count) as usize)
-    }
-
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        let words = lines.as_flattened().as_chunks().0;
-        for (index, bytes) in (first.0 * WORDS_PER_LINE..).zip(words) {
-            self.store(index, u32::from_le_bytes(*bytes));
-        }
-        self.writes += lines.len() as u32;
-        Some(())
     }
 
     fn write_byte(&mut self, address: LineAddress, place: usize, byte: u8) -> Option<()> {
@@ -279,6 +279,10 @@ fn a_memory_without_its_lines_is_a_fault() {
         fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
             Err(Fault { code: FaultCode::LineRange, detail: address.0 })
         }
+
+        fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+            self.0.get_mut(first.0 as usize..first.0 as usize + lines.len()).map(drop)
+        }
     }
     impl CardMemory for Short {
         fn lines(&self) -> u32 {
@@ -287,10 +291,6 @@ fn a_memory_without_its_lines_is_a_fault() {
 
         fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
             self.0.get(first.0 as usize..(first.0 + count) as usize)
-        }
-
-        fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-            self.0.get_mut(first.0 as usize..first.0 as usize + lines.len()).map(drop)
         }
     }
     let fault = |detail| Fault { code: FaultCode::LineRange, detail };

@@ -105,6 +105,8 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             queue: Work = Some(9),
             in_flight: Work = Some(1),
             focus: Nothing = Some([3, 4]),
+            // There is no irradiance cache.
+            keep_records: Nothing = true,
         }
         cards: CardSet {
             addresses: Nothing = cards("emulated-micro:2"),

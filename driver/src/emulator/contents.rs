@@ -98,7 +98,10 @@ impl Contents {
                 self.photon_leaves += 1;
                 self.photons += u64::from(PhotonLeaf::read(line).photons());
             }
-            Structure::Header | Structure::Attributes | Structure::Textures => {}
+            Structure::Header
+            | Structure::Attributes
+            | Structure::Textures
+            | Structure::IrradianceRecords => {}
         }
     }
 }
@@ -142,6 +145,10 @@ impl<M: MemoryPort> MemoryPort for Inspected<M> {
         Ok(line)
     }
 
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(first, lines)
+    }
+
     #[inline(always)]
     fn enter(&mut self, stage: Stage) {
         self.stage = stage;
@@ -160,9 +167,5 @@ impl<M: CardMemory> CardMemory for Inspected<M> {
 
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
-    }
-
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.memory.write(first, lines)
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! A host and its emulated cards live in one process, and each card's DRAM holds the same image. A card still receives it
 //! line by line over its link. As long as the received lines equal the lines of the host's image at the same addresses, the
-//! card stores no copy and reads the host's. At the first line that differs it switches to lines of its own, so that a card
-//! always reads what was written.
+//! card stores no copy and reads the host's; lines beyond the image are its own. At the first line of the image that differs it switches
+//! to lines of its own, so that a card always reads what was written.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -36,8 +36,12 @@ pub(super) struct EmulatedDram {
 /// Lines from the first to the last written one.
 enum Stored {
     Own(Vec<Line>),
-    /// The first lines of an image, and their number.
-    Shared(Arc<CardImage>, usize),
+    /// The first lines of an image, and their number; and lines after the whole image.
+    Shared {
+        image: Arc<CardImage>,
+        written: usize,
+        beyond: Vec<Line>,
+    },
 }
 
 impl EmulatedDram {
@@ -49,14 +53,18 @@ impl EmulatedDram {
     fn get(&self, address: LineAddress) -> Option<&Line> {
         match &self.lines {
             Stored::Own(lines) => lines.get(address.0 as usize),
-            Stored::Shared(image, written) => image.lines().get(..*written)?.get(address.0 as usize),
+            Stored::Shared { image, written, beyond } => {
+                let line = image.lines().get(..*written)?.get(address.0 as usize);
+                line.or_else(|| beyond.get((address.0 as usize).checked_sub(image.lines().len())?))
+            }
         }
     }
 
+    /// All lines, without those beyond a shared image.
     fn all(&self) -> &[Line] {
         match &self.lines {
             Stored::Own(lines) => lines,
-            Stored::Shared(image, written) => &image.lines()[..*written],
+            Stored::Shared { image, written, .. } => &image.lines()[..*written],
         }
     }
 
@@ -66,9 +74,9 @@ impl EmulatedDram {
         if matches!(&self.lines, Stored::Own(own) if own.is_empty())
             && let Some(image) = self.shared.0.get()
         {
-            self.lines = Stored::Shared(image.clone(), 0);
+            self.lines = Stored::Shared { image: image.clone(), written: 0, beyond: Vec::new() };
         }
-        let Stored::Shared(image, written) = &mut self.lines else { return false };
+        let Stored::Shared { image, written, .. } = &mut self.lines else { return false };
         let end = first + lines.len();
         let is_same = |image: &[Line]| image.iter().zip(lines).all(|(line, bytes)| line.0 == *bytes);
         let shares = first <= *written && image.lines().get(first..end).is_some_and(is_same);
@@ -77,12 +85,44 @@ impl EmulatedDram {
         }
         shares
     }
+
+    /// The card's own lines, and the index in them of the line `first`. In a shared image the card stores all lines itself.
+    fn own_from(&mut self, first: usize) -> (&mut Vec<Line>, usize) {
+        if let Stored::Shared { image, written, beyond } = &self.lines
+            && first < image.lines().len()
+        {
+            let mut own = image.lines()[..*written].to_vec();
+            if !beyond.is_empty() {
+                own.resize(image.lines().len(), Line::ZERO);
+                own.extend_from_slice(beyond);
+            }
+            self.lines = Stored::Own(own);
+        }
+        match &mut self.lines {
+            Stored::Own(own) => (own, first),
+            Stored::Shared { image, beyond, .. } => (beyond, first - image.lines().len()),
+        }
+    }
 }
 
 impl MemoryPort for EmulatedDram {
     #[inline(always)]
     fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         self.get(address).ok_or(Fault { code: FaultCode::LineRange, detail: address.0 })
+    }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        let first = first.0 as usize;
+        first.checked_add(lines.len()).filter(|&end| end <= self.limit as usize)?;
+        if !self.share(first, lines) {
+            let (own, first) = self.own_from(first);
+            let end = first + lines.len();
+            if own.len() < end {
+                own.resize(end, Line::ZERO);
+            }
+            copy_lines(lines, &mut own[first..end]);
+        }
+        Some(())
     }
 }
 
@@ -94,23 +134,6 @@ impl CardMemory for EmulatedDram {
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         let end = first.0.checked_add(count)?;
         self.all().get(first.0 as usize..end as usize)
-    }
-
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        let first = first.0 as usize;
-        let end = first.checked_add(lines.len()).filter(|&end| end <= self.limit as usize)?;
-        if self.share(first, lines) {
-            return Some(());
-        }
-        if let Stored::Shared(..) = self.lines {
-            self.lines = Stored::Own(self.all().to_vec());
-        }
-        let Stored::Own(own) = &mut self.lines else { return None };
-        if own.len() < end {
-            own.resize(end, Line::ZERO);
-        }
-        copy_lines(lines, own.get_mut(first..end)?);
-        Some(())
     }
 }
 
@@ -132,7 +155,7 @@ mod tests {
     }
 
     fn is_shared(dram: &EmulatedDram) -> bool {
-        matches!(dram.lines, Stored::Shared(..))
+        matches!(dram.lines, Stored::Shared { .. })
     }
 
     /// Writes lines to a DRAM with a shared image and to one without, and compares the contents.
@@ -142,12 +165,14 @@ mod tests {
             assert_eq!(dram.write(address, lines), Some(()));
         }
         let [shared, own] = drams;
-        assert!(shared.all() == own.all());
         for line in 0..own.all().len() as u32 + 2 {
             let line = LineAddress(line);
             let read = |dram: &mut EmulatedDram| dram.read(Structure::Header, line, 0..1).copied();
             assert!(read(shared) == read(own));
-            assert!(shared.stored(line, 2) == own.stored(line, 2));
+            // No image has lines beyond the shared one.
+            if (line.0 as usize) < shared.all().len() - 1 {
+                assert!(shared.stored(line, 2) == own.stored(line, 2));
+            }
         }
     }
 
@@ -161,7 +186,11 @@ mod tests {
         other[3][7] ^= 1;
         // First line, lines, and whether the DRAM shares the image afterwards.
         type Step<'a> = (usize, &'a [[u8; LINE_BYTES]], bool);
-        let runs: [&[Step]; 5] = [
+        let end = bytes.len();
+        let beyond = [[1; LINE_BYTES]; 3];
+        let runs: [&[Step]; 7] = [
+            &[(0, &bytes, true), (end, &beyond, true), (end + 1, &beyond, true), (3, &bytes[3..], true)],
+            &[(0, &bytes, true), (end, &beyond, true), (3, &other[3..4], false), (end, &bytes[..9], false)],
             &[(0, &bytes, true), (2, &bytes[2..4], true)],
             &[
                 (0, &bytes[..2], true),

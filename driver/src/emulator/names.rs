@@ -19,6 +19,7 @@ choices!(Structure {
     CausticPhotons = "caustic_photons": "Photons of the caustic map",
     Attributes = "attributes": "Vertex attributes",
     Textures = "textures": "Texture records and texels",
+    IrradianceRecords = "irradiance_records": "Irradiance records kept from an earlier frame",
 });
 
 choices!(Stage {

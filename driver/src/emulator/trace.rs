@@ -209,6 +209,10 @@ impl<M: MemoryPort> MemoryPort for Traced<M> {
         Ok(line)
     }
 
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(first, lines)
+    }
+
     #[inline(always)]
     fn enter(&mut self, stage: Stage) {
         self.stage = stage;
@@ -231,10 +235,6 @@ impl<M: CardMemory> CardMemory for Traced<M> {
 
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
-    }
-
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.memory.write(first, lines)
     }
 }
 

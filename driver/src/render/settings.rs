@@ -140,6 +140,13 @@ impl RenderSettings {
         }
     }
 
+    /// Returns whether cards keep irradiance records for pictures of other samples.
+    fn keeps_records(&self) -> bool {
+        self.schedule.keep_records
+            && self.integrator.irradiance_error.is_some()
+            && self.cards.verify.is_none()
+    }
+
     /// Parameters of the frame for a camera of the scene.
     pub fn frame(
         &self,
@@ -169,6 +176,7 @@ impl RenderSettings {
             layers: self.picture.layers.are_of_chip(),
             filter: self.picture.filter,
             in_flight: self.schedule.in_flight.unwrap_or(u32::MAX),
+            keep_records: self.keeps_records(),
         }
     }
 

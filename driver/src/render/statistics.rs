@@ -51,8 +51,10 @@ pub struct Statistics {
     pub gathers: u64,
     /// Number of these searches that filled an importance table.
     pub tables: u64,
-    /// Number of irradiance records; a record that two tiles use counts twice.
+    /// Number of irradiance records gathered; a record that two tiles use counts twice.
     pub records: u64,
+    /// Number of irradiance records of an earlier pass that were used again.
+    pub kept_records: u64,
     /// Share of interpolated irradiance among the samples that see a surface with a Lambertian part.
     pub interpolated_share: f64,
     /// Number of photons whose distance was computed.
@@ -122,6 +124,7 @@ impl Statistics {
             gathers: counters.gathers,
             tables: counters.tables,
             records: counters.records,
+            kept_records: counters.kept_records,
             interpolated_share: counters.interpolated_samples as f64
                 / counters.lambertian_samples.max(1) as f64,
             photons_tested: counters.photons_tested,

@@ -151,6 +151,7 @@ mod tests {
             layers: false,
             filter: Filter::Box,
             in_flight: 2,
+            keep_records: false,
         }
     }
 

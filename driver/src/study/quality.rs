@@ -214,6 +214,7 @@ fn comparable(settings: &RenderSettings) -> RenderSettings {
             queue: None,
             in_flight: None,
             focus: None,
+            keep_records: false,
         },
         ..settings.clone()
     };

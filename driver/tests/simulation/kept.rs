@@ -80,7 +80,7 @@ fn a_kept_card_renders_what_a_new_one_does_and_receives_the_changed_lines() {
                 }
                 let before = station.session.link_bytes().image;
                 station.started = false;
-                let pixels = complete_alone(&run, &mut station, random);
+                let (pixels, _) = complete_alone(&run, &mut station, random);
                 let alone = Run::new(&next, 1, 0).go();
                 assert!(alone.pixels == Some(pixels), "seed {seed}: other pixels after {between:?}");
                 let sent = station.session.link_bytes().image - before;
@@ -101,5 +101,41 @@ fn a_kept_card_renders_what_a_new_one_does_and_receives_the_changed_lines() {
             }
         }
         assert!(unchanged > 2 && changed > 2 && damaged > 2, "{unchanged} {changed} {damaged}");
+    });
+}
+
+/// Passes on one card, in whose memory not all irradiance records have room, now and then of another camera.
+#[test]
+fn passes_on_a_kept_card_are_those_on_a_new_one() {
+    with_room_for_a_card(|| {
+        let [mut gathered, mut kept] = [0; 2];
+        for seed in seeds(0..SEEDS) {
+            let random = &mut Random(hash(!seed));
+            let mut fixture = Fixture::new().of_passes();
+            let mut station = Station::new(0, &fixture, random);
+            for _ in 0..FRAMES {
+                let mut run = Run::new(&fixture, 1, seed);
+                let between = ALL[random.below(ALL.len())];
+                match between {
+                    Between::Interruption => begin(&mut station, &run, random),
+                    Between::Reset => station.reset_card(&run),
+                    Between::BadLine => {
+                        run.faults = Faults { stalls: 0, resets: 0, deaths: 0, ..Faults::of(random) }
+                    }
+                    Between::Nothing | Between::Damage => {}
+                }
+                station.started = false;
+                let (pixels, work) = complete_alone(&run, &mut station, random);
+                let alone = Run::new(&fixture, 1, 0).go();
+                assert!(alone.pixels == Some(pixels), "seed {seed}: other pixels after {between:?}");
+                assert_eq!(work.records + work.kept_records, alone.counters.records, "seed {seed}");
+                gathered += work.records;
+                kept += work.kept_records;
+                let samples = 1 + random.below(2) as u32;
+                let is_other = random.below(4) == 0;
+                fixture = if is_other { fixture.changed(random) } else { fixture.next_pass(samples) };
+            }
+        }
+        assert!(gathered > 100 && kept > 100, "{gathered} {kept}");
     });
 }

@@ -23,6 +23,7 @@ use photoncard_driver::film::PixelValue;
 use photoncard_driver::scheduler::SchedulerError;
 use photoncard_driver::session::{LinkBytes, Session};
 use photoncard_firmware::sampler::hash;
+use photoncard_shared::counters::Counters;
 
 use self::conditions::Run;
 use self::line::{Faults, Random};
@@ -171,7 +172,7 @@ fn queues_that_fill_within_a_tile_end_in_the_same_picture() {
 }
 
 /// Steps a card on its own until the picture is complete. Returns its pixels.
-fn complete_alone(run: &Run, station: &mut Station, random: &mut Random) -> Vec<PixelValue> {
+fn complete_alone(run: &Run, station: &mut Station, random: &mut Random) -> (Vec<PixelValue>, Counters) {
     let film = Mutex::new(run.fixture.film());
     let dispatcher = Dispatcher::new(run.fixture.scheduler(1, None, 0), vec![&film]);
     let mut step = 0;
@@ -184,8 +185,9 @@ fn complete_alone(run: &Run, station: &mut Station, random: &mut Random) -> Vec<
             station.given_up
         );
     }
+    let counters = dispatcher.scheduler().counters();
     drop(dispatcher);
-    film.into_inner().unwrap().pixels().collect()
+    (film.into_inner().unwrap().pixels().collect(), counters)
 }
 
 /// The card is reset while the host is busy with something else, before there is a job.
@@ -207,7 +209,7 @@ fn a_card_that_is_reset_before_the_start_is_greeted_again() {
         }
         station.card = fixture.card();
         station.started = false;
-        assert!(Some(complete_alone(&run, &mut station, random)) == alone.pixels);
+        assert!(Some(complete_alone(&run, &mut station, random).0) == alone.pixels);
         assert_eq!(station.session.link_bytes().resets, 1);
     });
 }
@@ -257,7 +259,7 @@ fn a_session_number_that_the_card_holds_is_another_after_a_while() {
             }
             station.session = Session::new(77, Duration::ZERO);
             station.started = false;
-            assert!(Some(complete_alone(&run, &mut station, random)) == alone.pixels, "seed {seed}");
+            assert!(Some(complete_alone(&run, &mut station, random).0) == alone.pixels, "seed {seed}");
             assert!(station.session.link_bytes().resets <= 1, "seed {seed}");
             resets += station.session.link_bytes().resets;
         }

@@ -82,6 +82,11 @@ impl MemoryPort for Memory {
         let fault = Fault { code: FaultCode::LineRange, detail: address.0 };
         self.lines.get(address.0 as usize).ok_or(fault)
     }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        copy_lines(lines, self.lines.get_mut(first.0 as usize..first.0 as usize + lines.len())?);
+        Some(())
+    }
 }
 
 impl CardMemory for Memory {
@@ -91,11 +96,6 @@ impl CardMemory for Memory {
 
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.lines.get(first.0 as usize..first.0 as usize + count as usize)
-    }
-
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        copy_lines(lines, self.lines.get_mut(first.0 as usize..first.0 as usize + lines.len())?);
-        Some(())
     }
 }
 
@@ -166,6 +166,22 @@ impl Fixture {
         let changed = Self::of(&scene, settings);
         let upload = Upload::new(Arc::new(changed.upload.lines().to_vec())).after(&self.upload);
         Self { upload: Arc::new(upload), ..changed }
+    }
+
+    /// This frame with irradiance records, which cards keep as far as their memory has room.
+    pub(crate) fn of_passes(&self) -> Self {
+        let settings = self.settings.clone().with(|s| {
+            (s.integrator.irradiance_error, s.integrator.planned_samples) = (Some(0.2), Some(4));
+            s.schedule.keep_records = true;
+        });
+        Self::of(&self.scene, settings)
+    }
+
+    /// Further samples of this frame.
+    pub(crate) fn next_pass(&self, samples: u32) -> Self {
+        let next = Self::of(&self.scene, self.settings.clone().with(|s| s.integrator.samples = samples));
+        let first_sample = self.frame.first_sample + self.frame.samples;
+        Self { frame: FrameParameters { first_sample, ..next.frame }, ..next }
     }
 
     fn of(scene: &Scene, settings: RenderSettings) -> Self {

@@ -111,7 +111,9 @@ impl<K: ChipKind> Engine<K> {
             Command::BeginFrame(frame) => {
                 let scene = self.image.scene().filter(|_| self.checksums.is_none()).ok_or(OUT_OF_ORDER)?;
                 check_frame(&K::BUDGET, &scene.header, &frame)?;
+                let room = scene.header.lines..memory.lines();
                 self.drop_tiles();
+                self.chip.begin_frame(&frame, room);
                 self.frame = Some(frame);
                 Ok(Some(Reply::FrameAccepted))
             }
@@ -152,6 +154,7 @@ impl<K: ChipKind> Engine<K> {
         self.image = ImageState::None;
         self.checksums = None;
         self.frame = None;
+        self.chip.forget_records();
         self.drop_tiles();
     }
 

@@ -3,18 +3,25 @@
 use super::gathers::Gathers;
 use super::pixel_sums::PixelSums;
 use super::points::Points;
+use crate::irradiance_cache::RecordStore;
 use crate::kind::ChipKind;
 
-/// Gather points, sums and gathers of a chip.
+/// Gather points, sums and gathers of a chip, and its kept irradiance records.
 pub(super) struct Shared<K: ChipKind> {
     /// Gather points of the active tile.
     pub(super) points: Points<K::Points>,
     pub(super) sums: PixelSums<K::TilePixels>,
     pub(super) gathers: Gathers<K::Candidates, K::GatherQueue>,
+    pub(super) store: RecordStore,
 }
 
 impl<K: ChipKind> Shared<K> {
     pub(super) const fn new() -> Self {
-        Self { points: Points::new(), sums: PixelSums::new(), gathers: Gathers::new() }
+        Self {
+            points: Points::new(),
+            sums: PixelSums::new(),
+            gathers: Gathers::new(),
+            store: RecordStore::EMPTY,
+        }
     }
 }

@@ -28,6 +28,8 @@ pub(super) struct Flight<K: ChipKind> {
     /// Number of the block's gathers in the queue.
     pub(super) waiting: u32,
     pub(super) cache: IrradianceCache<K::IrradianceRecords>,
+    /// True if the records of the block are those of an earlier frame.
+    pub(super) is_recalled: bool,
     /// Number of each pixel's sum in [`super::pixel_sums::PixelSums`], or [`NO_SUM`].
     sums: <K::TilePixels as Capacity>::Buffer<u16>,
     /// State of the pixel that is being completed.
@@ -43,6 +45,7 @@ impl<K: ChipKind> Vacant for Flight<K> {
         position: Position::VACANT,
         waiting: 0,
         cache: IrradianceCache::new(),
+        is_recalled: false,
         sums: Buffer::EMPTY,
         completion: None,
     };
@@ -86,8 +89,10 @@ impl<K: ChipKind> Flight<K> {
         self.sums.view_mut().clear();
         // Fits: a tile has at most as many pixels.
         let _ = self.sums.view_mut().resize(self.block.pixels() as usize, NO_SUM);
+        self.is_recalled = false;
         match allowed_error(frame) {
             None => self.position = Position::at(Pass::Eye),
+            Some(_) if frame.keep_records => self.position = Position::at(Pass::Recall),
             Some(_) => self.begin_records(),
         }
     }

@@ -11,6 +11,7 @@
 //! | `PixelSums` | sums of the pixels with gather rays: a ring for all tiles in flight |
 //! | `Points` | nothing: gather points of the tile whose rays are being cast |
 //! | `Gathers` | nothing: the queue, each gather with its tile in flight |
+//! | `RecordStore` | nothing: the place of the irradiance records that frames of one picture share |
 
 mod buffers;
 mod completion;
@@ -25,12 +26,14 @@ mod position;
 mod records;
 mod stored_point;
 
+use core::ops::Range;
+
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FrameParameters, Tile};
 
 use self::buffers::Shared;
 pub use self::finished_pixel::{FinishedPixel, PixelView};
-use self::flight::{Flight, allowed_error};
+use self::flight::Flight;
 pub use self::light::{Component, PixelLight};
 use self::position::{Pass, Position};
 use crate::gather::{GatherQueue, PointIndex};
@@ -107,6 +110,16 @@ impl<K: ChipKind> Chip<K> {
             flight.vacate();
             self.shared.sums.end(number);
         }
+    }
+
+    /// Begins a frame, with the lines of card memory beyond the image, where irradiance records may be kept. Without this call none are.
+    pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
+        self.shared.store.begin_frame(frame, room);
+    }
+
+    /// Forgets the irradiance records of earlier frames, as the image changes.
+    pub fn forget_records(&mut self) {
+        self.shared.store.forget();
     }
 
     /// Begins a tile of a frame. Returns false if the tile has no pixels or more than [`Self::tile_pixels`], or as many tiles
@@ -187,6 +200,7 @@ impl<K: ChipKind> Chip<K> {
         }
         let done = flight.counters.rays_and_gathers();
         match pass {
+            Pass::Recall => flight.recall(job, shared)?,
             Pass::Survey => flight.survey(job, shared)?,
             Pass::RecordPoints => flight.choose_record_point(job, shared)?,
             Pass::RecordRays => flight.cast_for_record(job, shared, number)?,
@@ -224,9 +238,7 @@ impl<K: ChipKind> Chip<K> {
         let Self { flights, shared, .. } = self;
         let Some(flight) = flights.values_mut().get_mut(number) else { return Ok(Progress::Idle) };
         if flight.pass() == Pass::Wait {
-            if let Some(allowed) = allowed_error(job.frame) {
-                flight.cache.end_gather(&mut job.context(&mut flight.counters), allowed);
-            }
+            flight.end_records(job, shared);
             flight.position = Position::at(Pass::Complete);
         }
         if flight.position.index >= flight.block.pixels() {

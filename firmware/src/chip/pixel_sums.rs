@@ -147,6 +147,7 @@ mod tests {
             layers,
             filter: Default::default(),
             in_flight: 3,
+            keep_records: false,
         }
     }
 

@@ -45,14 +45,16 @@ impl Block {
     }
 }
 
-/// Passes of a block, in order. The passes from [`Pass::Survey`] to [`Pass::RecordRays`] are skipped without the
-/// irradiance cache.
+/// Passes of a block, in order. The passes from [`Pass::Recall`] to [`Pass::RecordRays`] are skipped without the
+/// irradiance cache, and those after the first with kept records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
     /// No tile.
     Vacant,
     /// The next block has not begun.
     NextBlock,
+    /// Search for the irradiance records that an earlier frame has kept.
+    Recall,
     /// Survey: placement of irradiance records, level by level of the lattice.
     Survey,
     /// Directions of the gather rays of the records.

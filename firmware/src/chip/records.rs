@@ -7,12 +7,30 @@ use super::flight::{Flight, allowed_error};
 use super::position::{Pass, Position};
 use super::stored_point::StoredPoint;
 use crate::gather::{GatherTarget, PointIndex};
-use crate::irradiance_cache::Full;
+use crate::irradiance_cache::{Full, Recalled};
 use crate::kind::ChipKind;
 use crate::memory::MemoryPort;
 use crate::render::{GatherPoint, RenderJob, final_gather};
 
 impl<K: ChipKind> Flight<K> {
+    /// Reads back the block's records, if an earlier frame has kept them.
+    pub(super) fn recall<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+    ) -> Result<(), Fault> {
+        let window = self.window();
+        match shared.store.recall(&mut job.context(&mut self.counters), &window, &mut self.cache)? {
+            Recalled::Records => {
+                self.is_recalled = true;
+                self.position = Position::at(Pass::Eye);
+            }
+            Recalled::Divided => self.divide_block(),
+            Recalled::Nothing => self.begin_records(),
+        }
+        Ok(())
+    }
+
     /// Begins the survey of the block's records.
     pub(super) fn begin_records(&mut self) {
         self.position = Position::at(Pass::Survey);
@@ -38,7 +56,12 @@ impl<K: ChipKind> Flight<K> {
                 self.position = Position::at(Pass::RecordPoints);
             }
             Ok(false) => {}
-            Err(Full) => self.divide_block(),
+            Err(Full) => {
+                if job.frame.keep_records {
+                    shared.store.keep_full(job.memory, &window);
+                }
+                self.divide_block();
+            }
         }
         Ok(())
     }
@@ -98,5 +121,17 @@ impl<K: ChipKind> Flight<K> {
             self.position = Position::at(Pass::Eye);
         }
         Ok(())
+    }
+
+    /// Ends the gather of the block's records, and keeps them if the frame asks for it.
+    pub(super) fn end_records<M: MemoryPort>(&mut self, job: &mut RenderJob<M>, shared: &mut Shared<K>) {
+        let Some(allowed) = allowed_error(job.frame) else { return };
+        if self.is_recalled {
+            return;
+        }
+        self.cache.end_gather(&mut job.context(&mut self.counters), allowed);
+        if job.frame.keep_records {
+            shared.store.keep(job.memory, &self.window(), &self.cache);
+        }
     }
 }

@@ -21,18 +21,23 @@
 //! records do not fit into the cache is rendered in smaller blocks: more records are computed twice, and no pixel
 //! changes.
 //!
+//! Frames of one picture that differ in samples share their records, which [`RecordStore`] keeps in card memory.
+//!
 //! Direct light is divided between shadow rays and gather rays ([`crate::render::direct`]): the gather rays' part,
 //! mostly light of large emitters, is in the records.
 
 mod gradient;
 mod interpolation;
+mod kept_line;
 mod lattice;
 mod record;
+mod store;
 mod survey;
 mod survey_state;
 
 pub use interpolation::SeenSample;
 pub use lattice::{LatticePoint, Window};
+pub use store::{Recalled, RecordStore};
 
 use glam::Vec3;
 use heapless::Vec;

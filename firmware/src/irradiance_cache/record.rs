@@ -86,7 +86,7 @@ pub(super) struct Record {
     /// Unit normal on the side of the eye.
     pub(super) normal: Vec3,
     /// Maximum magnitude of the coordinates that the position was computed from, metres: it bounds the rounding error.
-    magnitude: f32,
+    pub(super) magnitude: f32,
     /// Harmonic mean of the distances to the surroundings, metres; undefined before the survey ends.
     pub(super) distance: f32,
     /// Radius of validity, metres: `distance`, clamped from below so that the record reaches some pixels.

@@ -47,6 +47,12 @@ impl<M: MemoryPort> MemoryPort for Counted<M> {
         Ok(line)
     }
 
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(first, lines)?;
+        self.traffic.written_bytes += lines.len() as u64 * LINE_BYTES as u64;
+        Some(())
+    }
+
     #[inline(always)]
     fn missed(&mut self, structure: Structure) {
         self.traffic.count_miss(self.stage, structure);
@@ -71,11 +77,5 @@ impl<M: CardMemory> CardMemory for Counted<M> {
 
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
-    }
-
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.memory.write(first, lines)?;
-        self.traffic.written_bytes += lines.len() as u64 * LINE_BYTES as u64;
-        Some(())
     }
 }

@@ -30,6 +30,12 @@ impl MemoryPort for Dram<'_> {
     fn near(&self, address: LineAddress) -> Option<&Line> {
         self.lines.get(address.0 as usize)
     }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        let first = first.0 as usize;
+        copy_lines(lines, self.lines.get_mut(first..first.checked_add(lines.len())?)?);
+        Some(())
+    }
 }
 
 /// Read-only memory, which many readers may share.
@@ -58,11 +64,6 @@ impl CardMemory for Dram<'_> {
         self.lines.get(first..first.checked_add(count as usize)?)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        let first = first.0 as usize;
-        copy_lines(lines, self.lines.get_mut(first..first.checked_add(lines.len())?)?);
-        Some(())
-    }
     fn write_byte(&mut self, address: LineAddress, place: usize, byte: u8) -> Option<()> {
         // The compiler, which does not know the place, cannot join this store with others to one of a word.
         *black_box(self.lines.get_mut(address.0 as usize)?.0.get_mut(place)?) = byte;

@@ -122,7 +122,7 @@ pub struct LineCache<E, L> {
     /// Tags by set, in each set from the most to the least recently used.
     entries: E,
     lines: L,
-    /// True if the cache is known to be empty: each of the thousands of writes that load an image clears it.
+    /// True if the cache is known to be empty: the thousands of writes that load an image have nothing to invalidate.
     is_clear: bool,
     /// End of the memory, if filling the last cache line has found it; `u32::MAX` before.
     end: u32,
@@ -147,6 +147,21 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
         }
         self.is_clear = true;
         self.end = u32::MAX;
+    }
+
+    /// Invalidates lines that are written.
+    fn forget(&mut self, written: &Range<u32>) {
+        // A cache line at the end of a memory that grows is incomplete.
+        if written.end > self.end {
+            self.clear();
+        }
+        if self.is_clear {
+            return;
+        }
+        for block in written.start / self.shape.lines..written.end.div_ceil(self.shape.lines) {
+            let set = self.entries.as_mut().get_mut(self.shape.entries_of(block)).unwrap_or_default();
+            set.iter_mut().filter(|entry| entry.block == block).for_each(|entry| entry.block = NOTHING);
+        }
     }
 
     /// The line at an address, read from `memory` on a miss.
@@ -257,11 +272,26 @@ where
 {
     #[inline(always)]
     fn read(&mut self, structure: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
+        if structure == Structure::IrradianceRecords {
+            // Each line is read once: it would take the place of others.
+            self.memory.missed(structure);
+            return self.memory.read(structure, address, 0..LINE_BYTES as u32);
+        }
         let cache = match &mut self.scene {
             Some(scene) if !structure.is_photon_map() => scene,
             _ => &mut self.first,
         };
         cache.read(&mut self.memory, structure, address)
+    }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(first, lines)?;
+        let written = first.0..first.0.saturating_add(lines.len() as u32);
+        self.first.forget(&written);
+        if let Some(scene) = &mut self.scene {
+            scene.forget(&written);
+        }
+        Some(())
     }
 
     #[inline(always)]
@@ -289,11 +319,5 @@ where
 
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
-    }
-
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        // Lines are written between tiles, while an image is loaded: the caches must not keep old contents.
-        self.begin_tile();
-        self.memory.write(first, lines)
     }
 }

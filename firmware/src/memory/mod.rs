@@ -17,7 +17,7 @@ use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::{Fault, FaultCode};
 pub use traffic::{Reads, STAGES, Stage, Traffic};
 
-/// Read access of a chip to card memory. A cache or a counter is a `MemoryPort` over a `MemoryPort`.
+/// Access of a chip to card memory. A cache or a counter is a `MemoryPort` over a `MemoryPort`.
 pub trait MemoryPort {
     /// Reads a line of a structure; the chip uses the bytes in `used`.
     ///
@@ -29,6 +29,11 @@ pub trait MemoryPort {
     /// cached or counted.
     #[inline(always)]
     fn near(&self, _: LineAddress) -> Option<&Line> {
+        None
+    }
+
+    /// Writes lines from line `first`; `None`, and nothing is written, if they are not all in the memory, or it can be read alone.
+    fn write(&mut self, _first: LineAddress, _lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         None
     }
 
@@ -52,9 +57,6 @@ pub trait CardMemory: MemoryPort {
 
     /// `count` lines from line `first`, bypassing caches and counters; `None` if they are not all in the memory.
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]>;
-
-    /// Writes lines from line `first`; `None`, and nothing is written, if they are not all in the memory.
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()>;
 
     /// Writes one byte of a written line; `None`, and nothing is written, if it is not in the memory. A memory that the processor
     /// addresses directly stores the byte alone.

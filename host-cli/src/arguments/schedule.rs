@@ -38,6 +38,7 @@ impl ScheduleOptions {
             queue: self.queue,
             in_flight: self.in_flight,
             focus: None,
+            keep_records: false,
         }
     }
 }

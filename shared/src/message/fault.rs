@@ -93,11 +93,13 @@ pub enum Parameter {
     Filter,
     /// Tiles in flight.
     InFlight,
+    /// Keeping of irradiance records.
+    KeepRecords,
 }
 
 impl Parameter {
     /// All parameters, in the order of their numbers.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Width,
         Self::Height,
         Self::Camera,
@@ -119,6 +121,7 @@ impl Parameter {
         Self::Layers,
         Self::Filter,
         Self::InFlight,
+        Self::KeepRecords,
     ];
 
     /// The fault of a card that cannot render with this parameter's value.
@@ -150,6 +153,7 @@ impl Parameter {
             Self::Layers => "layers",
             Self::Filter => "pixel filter",
             Self::InFlight => "tiles in flight",
+            Self::KeepRecords => "keeping of irradiance records",
         }
     }
 }

@@ -47,6 +47,7 @@ pub(super) fn frame() -> FrameParameters {
         caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
         layers: false,
         in_flight: 3,
+        keep_records: true,
     }
 }
 

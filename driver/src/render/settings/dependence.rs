@@ -18,7 +18,8 @@ impl RenderSettings {
     /// All settings that pixels depend on.
     pub fn of_pixels(&self) -> NamedSettings {
         let Self { picture, photons, integrator, schedule, cards, outputs } = self;
-        let Schedule { tile: _, order: _, bins: _, queue: _, in_flight: _, focus: _ } = schedule;
+        let Schedule { tile: _, order: _, bins: _, queue: _, in_flight: _, focus: _, keep_records: _ } =
+            schedule;
         let CardSet { addresses: _, faults: _, verify: _, caches: _, trace: _ } = cards;
         let TileOutputs { partial: _, display: _ } = outputs;
         let Picture { width, height, crop: _, camera, camera_at, look_at, fov, layers, filter } = picture;
@@ -70,7 +71,8 @@ impl RenderSettings {
         settings
     }
 
-    /// Every setting that a chip's work and memory traffic depend on besides the kind of chip and its caches, and no pixel.
+    /// Every setting that a chip's work and memory traffic depend on besides the kind of chip and its caches, and no pixel; for a picture of
+    /// its own.
     pub fn of_work(&self) -> NamedSettings {
         let Self { picture: _, photons, integrator: _, schedule, cards: _, outputs: _ } = self;
         let PhotonMaps {
@@ -82,7 +84,7 @@ impl RenderSettings {
             caustic_neighbors: _,
             radiance: _,
         } = photons;
-        let Schedule { tile, order, bins, queue, in_flight, focus: _ } = schedule;
+        let Schedule { tile, order, bins, queue, in_flight, focus: _, keep_records: _ } = schedule;
         named([
             ("photon-map", json!(layout.name())),
             ("tile", json!(tile)),

@@ -143,11 +143,22 @@ pub struct Schedule {
     pub in_flight: Option<u32>,
     /// Pixel near which tiles are rendered first; `None` to spread them over the picture. With modelled memory it has no effect.
     pub focus: Option<[u32; 2]>,
+    /// `true` for one of several pictures whose samples are added ([`Renderer::refine`](crate::render::Renderer::refine)): cards keep
+    /// irradiance records between them, each in its memory beyond the image. Not with `verify`, which compares the work of cards.
+    pub keep_records: bool,
 }
 
 impl Default for Schedule {
     fn default() -> Self {
-        Self { tile: None, order: GatherOrder::Sort, bins: None, queue: None, in_flight: None, focus: None }
+        Self {
+            tile: None,
+            order: GatherOrder::Sort,
+            bins: None,
+            queue: None,
+            in_flight: None,
+            focus: None,
+            keep_records: false,
+        }
     }
 }
 

@@ -1,0 +1,143 @@
+//! Lines of kept irradiance records: little-endian words of 32 bits, those of floats by their bits.
+
+use glam::Vec3;
+use photoncard_shared::address::{LINE_BYTES, Line};
+
+use super::record::{Content, Irradiance, Record};
+use super::{LatticePoint, MAX_ROOTS, Window};
+
+/// Words of a line.
+pub(super) const WORDS: usize = LINE_BYTES / 4;
+
+/// The words of a line.
+pub(super) fn words_of(line: &Line) -> [u32; WORDS] {
+    let mut words = [0; WORDS];
+    for (word, bytes) in words.iter_mut().zip(line.0.as_chunks().0) {
+        *word = u32::from_le_bytes(*bytes);
+    }
+    words
+}
+
+/// The line of words.
+pub(super) fn line_of(words: [u32; WORDS]) -> Line {
+    let mut line = Line::ZERO;
+    for (bytes, word) in line.0.as_chunks_mut().0.iter_mut().zip(words) {
+        *bytes = word.to_le_bytes();
+    }
+    line
+}
+
+/// The line of the first words; the others are 0.
+fn line_of_first(first: impl IntoIterator<Item = u32>) -> Line {
+    let mut words = [0; WORDS];
+    words.iter_mut().zip(first).for_each(|(word, value)| *word = value);
+    line_of(words)
+}
+
+/// First line of a block of records.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct BlockHead {
+    pub(super) window: Window,
+    /// Line of the next older block of the same hash; 0 for none.
+    pub(super) older: u32,
+    /// Number of records in the following lines; `None` if those of the window do not fit into the cache.
+    pub(super) records: Option<u32>,
+    /// The divided cells of each coarsest cell.
+    pub(super) divided: [u32; MAX_ROOTS],
+}
+
+/// Number that stands for records that do not fit.
+const FULL: u32 = u32::MAX;
+
+impl BlockHead {
+    pub(super) fn line(&self) -> Line {
+        let Window { x0, x1, y0, y1 } = self.window;
+        let single = [x0, x1, y0, y1, self.older, self.records.unwrap_or(FULL)];
+        line_of_first(single.into_iter().chain(self.divided))
+    }
+
+    pub(super) fn read(line: &Line) -> Self {
+        let [x0, x1, y0, y1, older, records, rest @ ..] = words_of(line);
+        Self {
+            window: Window { x0, x1, y0, y1 },
+            older,
+            records: Some(records).filter(|&records| records != FULL),
+            divided: rest.first_chunk().copied().unwrap_or_default(),
+        }
+    }
+}
+
+/// A gathered record with its lattice point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct KeptRecord {
+    pub(super) point: LatticePoint,
+    pub(super) record: Record,
+}
+
+impl KeptRecord {
+    /// The line of the record; `None` if it is not gathered.
+    pub(super) fn line(&self) -> Option<Line> {
+        let Self { point: LatticePoint { x, y }, record } = *self;
+        let Content::Gathered(Irradiance { mean, translation, rotation }) = record.content else {
+            return None;
+        };
+        let lengths = [record.magnitude, record.distance, record.radius];
+        let vectors = [record.position, record.normal, mean].into_iter().chain(translation).chain(rotation);
+        let values = lengths.into_iter().chain(vectors.flat_map(|vector| vector.to_array()));
+        Some(line_of_first([x, y].into_iter().chain(values.map(f32::to_bits))))
+    }
+
+    /// The record of a line, whatever it holds.
+    pub(super) fn read(line: &Line) -> Option<Self> {
+        let [x, y, magnitude, distance, radius, rest @ ..] = words_of(line);
+        let vectors = rest.as_chunks::<3>().0.first_chunk()?;
+        let vectors = vectors.map(|vector| Vec3::from_array(vector.map(f32::from_bits)));
+        let [position, normal, mean, along, across, about, about_other] = vectors;
+        let content = Content::Gathered(Irradiance {
+            mean,
+            translation: [along, across],
+            rotation: [about, about_other],
+        });
+        let [magnitude, distance, radius] = [magnitude, distance, radius].map(f32::from_bits);
+        let record = Record { position, normal, magnitude, distance, radius, content };
+        Some(Self { point: LatticePoint { x, y }, record })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_read_is_what_was_written() {
+        let vector = |from: f32| Vec3::new(from, -from, from + 0.25);
+        let irradiance = Irradiance {
+            mean: vector(1.0),
+            translation: [2.0, 3.0].map(vector),
+            rotation: [4.0, 5.0].map(vector),
+        };
+        let record = Record {
+            position: vector(6.0),
+            normal: vector(7.0),
+            magnitude: 8.0,
+            distance: 9.0,
+            radius: 10.0,
+            content: Content::Gathered(irradiance),
+        };
+        let kept = KeptRecord { point: LatticePoint { x: 65_536, y: 11 }, record };
+        assert_eq!(kept.line().and_then(|line| KeptRecord::read(&line)), Some(kept));
+        for records in [None, Some(0), Some(512)] {
+            let window = Window { x0: 1, x1: 2, y0: 3, y1: 4 };
+            let divided = core::array::from_fn(|root| root as u32 * 0x11_1111);
+            let head = BlockHead { window, older: 5, records, divided };
+            assert_eq!(BlockHead::read(&head.line()), head);
+        }
+    }
+
+    #[test]
+    fn a_record_that_is_not_gathered_has_no_line() {
+        let surface = crate::scene::Surface::white(Vec3::ONE, Vec3::Z, 1.0);
+        let kept = KeptRecord { point: LatticePoint { x: 0, y: 0 }, record: Record::new(&surface, 0.5) };
+        assert_eq!(kept.line(), None);
+    }
+}

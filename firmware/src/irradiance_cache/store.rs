@@ -1,0 +1,211 @@
+//! Irradiance records that a chip keeps in card memory from one frame of a picture to the next, beyond the image.
+//!
+//! Records depend on the scene and the camera, and not on the samples of a frame or its order of work. The gathered records of a block
+//! are written with the division of its cells; a frame of other samples reads them back in place of survey and gathers. A block whose
+//! records do not fit into the cache is noted as well, so that its survey is not repeated. Blocks that are not found are surveyed and
+//! gathered again, to the same bits: those for which there was no room, and all after a change of the image or of the frame.
+//!
+//! | lines | contents |
+//! |---|---|
+//! | 128 | directory: for each hash of a window the newest block, by the address of its head; 0 for none |
+//! | 1 a block | [`BlockHead`] |
+//! | 1 a record | after the head of its block, [`KeptRecord`] |
+
+use core::ops::Range;
+
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::message::{self, Drain, Fault, FrameParameters};
+
+use super::kept_line::{BlockHead, KeptRecord, WORDS, line_of, words_of};
+use super::{IrradianceCache, MAX_ROOTS, Window};
+use crate::kind::{Capacity, Map};
+use crate::memory::{MemoryPort, Stage};
+use crate::render::Context;
+use crate::sampler::hash;
+
+/// Lines of the directory.
+const DIRECTORY_LINES: u32 = 128;
+/// Maximum length of a frame's parameters in a message, bytes, or more.
+const KEY_BYTES: usize = 128;
+
+/// Parameters that the records of a frame depend on, encoded: the bits of floats count.
+type Key = [u8; KEY_BYTES];
+
+/// The lines beyond the image, with the records of one picture.
+pub struct RecordStore {
+    /// Key of the picture; `None` if nothing may be kept.
+    key: Option<Key>,
+    /// Lines beyond the image: the first one, and the end.
+    first: u32,
+    limit: u32,
+    /// End of the lines in use: `first` without a directory.
+    end: u32,
+}
+
+/// Result of a search for a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Recalled {
+    /// The cache has the records of the block.
+    Records,
+    /// The records of the block do not fit into the cache.
+    Divided,
+    /// The block is not known.
+    Nothing,
+}
+
+impl RecordStore {
+    /// The store without room.
+    pub const EMPTY: Self = Self { key: None, first: 0, limit: 0, end: 0 };
+
+    /// Begins a frame with `room` beyond the image. Keeps the records of earlier frames that are the same, and forgets others. The
+    /// image must be that of the frames before, or [`Self::forget`] be called.
+    pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
+        let key = key(frame);
+        if key.is_none() || key != self.key || [room.start, room.end] != [self.first, self.limit] {
+            *self = Self { key, first: room.start, limit: room.end, end: room.start };
+        }
+    }
+
+    /// Forgets all records.
+    pub fn forget(&mut self) {
+        *self = Self::EMPTY;
+    }
+
+    /// Fills a cache with the kept records of a window, if there are any.
+    ///
+    /// # Errors
+    /// If the memory is shorter than it was.
+    pub fn recall<M: MemoryPort, R: Capacity>(
+        &self,
+        context: &mut Context<M>,
+        window: &Window,
+        cache: &mut IrradianceCache<R>,
+    ) -> Result<Recalled, Fault> {
+        context.memory.enter(Stage::Survey);
+        let Some((at, head)) = self.find(context.memory, window)? else { return Ok(Recalled::Nothing) };
+        let Some(count) = head.records else { return Ok(Recalled::Divided) };
+        if cache.begin(window).is_err() || count as usize > R::ENTRIES {
+            return Ok(Recalled::Nothing);
+        }
+        for address in (at..).skip(1).take(count as usize) {
+            if let Some(KeptRecord { point, record }) = KeptRecord::read(read(context.memory, address)?) {
+                // Fits: their number is checked.
+                let _ = cache.records.insert(point, Some(record));
+            }
+        }
+        for ((_, divided), kept) in cache.roots.iter_mut().zip(head.divided) {
+            *divided = kept;
+        }
+        context.counters.kept_records += u64::from(count);
+        Ok(Recalled::Records)
+    }
+
+    /// Writes the gathered records of a window, if there is room.
+    pub fn keep<M: MemoryPort, R: Capacity>(
+        &mut self,
+        memory: &mut M,
+        window: &Window,
+        cache: &IrradianceCache<R>,
+    ) {
+        let records = || {
+            let entries = (0..cache.records.entries()).filter_map(|index| cache.records.entry(index));
+            entries.filter_map(|(&point, record)| KeptRecord { point, record: (*record)? }.line())
+        };
+        let mut divided = [0; MAX_ROOTS];
+        for (kept, (_, mask)) in divided.iter_mut().zip(&cache.roots) {
+            *kept = *mask;
+        }
+        let count = records().count() as u32;
+        let head = BlockHead { window: *window, older: 0, records: Some(count), divided };
+        let _ = self.append(memory, &head, records());
+    }
+
+    /// Notes that the records of a window do not fit into the cache, if there is room.
+    pub fn keep_full<M: MemoryPort>(&mut self, memory: &mut M, window: &Window) {
+        let head = BlockHead { window: *window, older: 0, records: None, divided: [0; MAX_ROOTS] };
+        let _ = self.append(memory, &head, core::iter::empty());
+    }
+
+    /// Head of a window's block, with its address.
+    fn find<M: MemoryPort>(
+        &self,
+        memory: &mut M,
+        window: &Window,
+    ) -> Result<Option<(u32, BlockHead)>, Fault> {
+        if self.end == self.first {
+            return Ok(None);
+        }
+        let blocks = self.first + DIRECTORY_LINES;
+        let (line, word) = self.place(window);
+        let mut newer = self.end;
+        let mut at = words_of(read(memory, line)?).get(word).copied().unwrap_or(0);
+        // Each block lies before the newer one, so that the search ends whatever the memory holds.
+        while (blocks..newer).contains(&at) {
+            let head = BlockHead::read(read(memory, at)?);
+            if head.window == *window {
+                return Ok(Some((at, head)));
+            }
+            (newer, at) = (at, head.older);
+        }
+        Ok(None)
+    }
+
+    /// Line of the directory, and word in it, of a window.
+    fn place(&self, window: &Window) -> (u32, usize) {
+        let hash = hash(window.x0 ^ hash(window.y0));
+        (self.first + hash % DIRECTORY_LINES, (hash / DIRECTORY_LINES) as usize % WORDS)
+    }
+
+    /// Appends a block and enters it into the directory. `None` without room.
+    fn append<M: MemoryPort>(
+        &mut self,
+        memory: &mut M,
+        head: &BlockHead,
+        records: impl Iterator<Item = Line>,
+    ) -> Option<()> {
+        let directory = if self.end == self.first { DIRECTORY_LINES } else { 0 };
+        let at = self.end.checked_add(directory)?;
+        let end = at.checked_add(1)?.checked_add(head.records.unwrap_or(0))?;
+        if self.key.is_none() || end > self.limit {
+            return None;
+        }
+        for address in self.end..at {
+            write(memory, address, &Line::ZERO)?;
+        }
+        let (line, word) = self.place(&head.window);
+        let mut newest = words_of(read(memory, line).ok()?);
+        let older = newest.get(word).copied()?;
+        *newest.get_mut(word)? = at;
+        write(memory, at, &BlockHead { older, ..*head }.line())?;
+        for (address, record) in (at..end).skip(1).zip(records) {
+            write(memory, address, &record)?;
+        }
+        write(memory, line, &line_of(newest))?;
+        self.end = end;
+        Some(())
+    }
+}
+
+fn read<M: MemoryPort>(memory: &mut M, address: u32) -> Result<&Line, Fault> {
+    memory.read(Structure::IrradianceRecords, LineAddress(address), 0..LINE_BYTES as u32)
+}
+
+fn write<M: MemoryPort>(memory: &mut M, address: u32, line: &Line) -> Option<()> {
+    memory.write(LineAddress(address), &[line.0])
+}
+
+/// The key of a frame; `None` if it keeps no records.
+fn key(frame: &FrameParameters) -> Option<Key> {
+    let of_records = FrameParameters {
+        first_sample: 0,
+        samples: 1,
+        bins: 1,
+        drain: Drain::Immediate,
+        queue: 1,
+        in_flight: 1,
+        ..*frame
+    };
+    let mut key = [0; KEY_BYTES];
+    frame.keep_records.then(|| message::encode(&of_records, &mut key)).flatten()?;
+    Some(key)
+}
