@@ -22,7 +22,7 @@ use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{MemoryModel, SharedImage};
 use crate::pack::CardImage;
-use crate::scheduler::{Scheduler, Standing};
+use crate::scheduler::{CardNumber, Scheduler, Standing};
 use crate::session::{Job, PixelLimits, Upload};
 use crate::sink::TileSink;
 
@@ -119,6 +119,12 @@ impl Cards {
         upload
     }
 
+    /// Tiles of the last picture, each with the number of its card.
+    fn homes(&self) -> impl Iterator<Item = (CardNumber, &Tile)> {
+        let cards = self.cards.iter().enumerate();
+        cards.flat_map(|(number, (_, card))| card.tiles.iter().map(move |tile| (number, tile)))
+    }
+
     /// Renders a scheduler's tiles on all cards, into sinks.
     fn render(
         &mut self,
@@ -147,6 +153,9 @@ impl Cards {
         let links = self.cards.iter_mut().map(|(_, card)| card.count_bytes()).collect();
         let loaded = latest(results)?.max(begun);
         let scheduler = crew.dispatcher.scheduler();
+        for (number, (_, card)) in self.cards.iter_mut().enumerate() {
+            card.tiles = scheduler.rendered_by(number).copied().collect();
+        }
         let is_given_up = |card: usize| scheduler.standing(card) == Standing::GivenUp;
         let given_up: Vec<bool> = (0..count).map(is_given_up).collect();
         let given_up_before = self.lost;
@@ -198,7 +207,10 @@ impl Executor for Cards {
         let limits = PixelLimits::new(&scene_image.header, frame);
         let job = Job { upload: self.upload(image), frame: *frame, limits };
         let scheduler = settings.scheduler(tiles, self.cards.len());
-        let scheduler = scheduler.with_kept(&film.lock().unwrap_or_else(PoisonError::into_inner));
+        let mut scheduler = scheduler.with_kept(&film.lock().unwrap_or_else(PoisonError::into_inner));
+        if frame.keep_records && frame.first_sample > 0 {
+            scheduler = scheduler.with_homes(self.homes());
+        }
         let outcome = self.render(&job, scheduler, sinks, outputs);
         self.used = Instant::now();
         if settings.modelled_caches().is_none() {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::link::{Port, PortError};
-use photoncard_shared::message::MemoryUse;
+use photoncard_shared::message::{MemoryUse, Tile};
 
 use super::exchange::exchange;
 use super::open_card::OpenCard;
@@ -20,6 +20,8 @@ pub(super) struct GreetedCard {
     pub(super) budget: Budget,
     /// Bytes of the link that statistics of earlier renders hold.
     pub(super) counted: LinkBytes,
+    /// Tiles of the last picture that the card alone has rendered.
+    pub(super) tiles: Vec<Tile>,
 }
 
 impl GreetedCard {
@@ -107,7 +109,7 @@ pub(super) fn greet(
     observer: &dyn Observer,
 ) -> Result<GreetedCard, GreetingError> {
     let (session, budget) = greet_port(&mut card, start, observer)?;
-    Ok(GreetedCard { card, session, budget, counted: LinkBytes::default() })
+    Ok(GreetedCard { card, session, budget, counted: LinkBytes::default(), tiles: Vec::new() })
 }
 
 /// [`greet`], on any port.

@@ -1,5 +1,6 @@
 //! State of a card in the scheduler.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use photoncard_shared::counters::Counters;
@@ -27,6 +28,8 @@ pub(super) struct Card {
     pub(super) lie: Option<Tile>,
     /// Indices of the tiles assigned to the card; it works on the first ones, as many as it has in flight.
     pub(super) tiles: Vec<usize>,
+    /// Indices of waiting tiles that this card has rendered before.
+    pub(super) at_home: VecDeque<usize>,
     /// Work on the tiles that this card alone has rendered.
     pub(super) counters: Counters,
     /// Maximum over its tiles of the mean time of a ray or gather, seconds.
@@ -35,8 +38,14 @@ pub(super) struct Card {
 
 impl Card {
     pub(super) fn new() -> Self {
-        let tiles = Vec::new();
-        Self { standing: Standing::Living, lie: None, tiles, counters: Counters::ZERO, slowest: None }
+        Self {
+            standing: Standing::Living,
+            lie: None,
+            tiles: Vec::new(),
+            at_home: VecDeque::new(),
+            counters: Counters::ZERO,
+            slowest: None,
+        }
     }
 
     /// Updates [`Self::slowest`] by the time and the work of a tile.

@@ -29,9 +29,10 @@ impl Scheduler {
         }
         let is_idle = tiles.is_empty();
         let index = (self.next_compared(card))
-            .or_else(|| if self.has_share(card) { self.next_waiting(is_idle) } else { None })
+            .or_else(|| if self.has_share(card) { self.next_waiting(card, is_idle) } else { None })
             .or_else(|| self.compared_for(card, usize::MAX))
             .or_else(|| if is_idle { self.next_set_apart(card) } else { None })
+            .or_else(|| if is_idle { self.next_of_others(now) } else { None })
             .or_else(|| self.next_to_help(card, now))?;
         let entry = &mut self.entries[index];
         entry.copies.push(Copy { card, since: now });
@@ -48,11 +49,14 @@ impl Scheduler {
     /// that wait at a card behind a long one are late, and near the end no card would be free to take them.
     fn has_share(&self, card: CardNumber) -> bool {
         let others = self.living().filter(|&other| other != card).count();
-        self.waiting.len() > PLENTY * self.cards[card].tiles.len() * others
+        self.waiting_anywhere() > PLENTY * self.cards[card].tiles.len() * others
     }
 
-    /// Next tile that no card has; a suspect one only for an idle card.
-    fn next_waiting(&mut self, is_idle: bool) -> Option<usize> {
+    /// Next tile that no card has: one of its own, or one of all cards; a suspect one only for an idle card.
+    fn next_waiting(&mut self, card: CardNumber, is_idle: bool) -> Option<usize> {
+        if let Some(own) = self.cards[card].at_home.pop_front() {
+            return Some(own);
+        }
         let next = self.waiting.iter().position(|&index| is_idle || !self.is_suspect(index))?;
         self.waiting.remove(next)
     }
@@ -102,13 +106,18 @@ impl Scheduler {
         self.entries.iter().filter(|entry| entry.is_open())
     }
 
+    /// Time that a card may have a tile before idle cards help.
+    pub(super) fn patience(&self) -> Duration {
+        self.times.mean().map_or(HELP_WITHOUT_MEAN, |mean| mean.saturating_mul(HELP_AFTER))
+    }
+
     /// Tile that an idle card duplicates, because other cards have had it for too long: one with the minimum number of
     /// copies, and among these the oldest.
     fn next_to_help(&mut self, card: CardNumber, now: Duration) -> Option<usize> {
         if !self.has_helpers || !self.cards[card].tiles.is_empty() || now < self.next_help {
             return None;
         }
-        let patience = self.times.mean().map_or(HELP_WITHOUT_MEAN, |mean| mean.saturating_mul(HELP_AFTER));
+        let patience = self.patience();
         let mut candidates = Vec::new();
         self.next_help = now + patience;
         for &index in self.cards.iter().flat_map(|card| &card.tiles) {

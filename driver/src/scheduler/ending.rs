@@ -48,7 +48,7 @@ impl Scheduler {
         let is_at_work = || self.cards.iter().any(|card| !card.tiles.is_empty());
         // A found tile is not done yet, but needs no card: another thread passes it to the sinks.
         let is_found = || self.entries.iter().any(|entry| matches!(entry.progress, Progress::Found(_)));
-        if self.is_complete() || !self.waiting.is_empty() || is_at_work() || is_found() {
+        if self.is_complete() || self.waiting_anywhere() > 0 || is_at_work() || is_found() {
             return true;
         }
         let can_compare = || {

@@ -81,6 +81,11 @@ impl Entry {
         self.answers.iter().any(|answer| answer.source == Source::Card(card))
     }
 
+    /// Earliest time at which a card can have started its copy.
+    pub(super) fn since(&self, card: CardNumber) -> Option<Duration> {
+        self.copies.iter().find(|copy| copy.card == card).map(|copy| copy.since)
+    }
+
     pub(super) fn crashes_of(&self, card: CardNumber) -> usize {
         self.crashes.iter().filter(|&&crashed| crashed == card).count()
     }

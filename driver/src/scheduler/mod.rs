@@ -7,6 +7,8 @@
 //!   that the outvoted card alone has rendered are rendered again.
 //! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the cards that have
 //!   crashed at it the minimum number of times, and is abandoned after five crashes.
+//! - A tile of a picture by passes waits for the card that rendered it before, which has kept its irradiance records. Idle cards take tiles
+//!   of others from the end, unless these will soon come to them.
 //! - If no tile waits, an idle card duplicates the tile that another card has had for the longest time, once that exceeds
 //!   twice the mean time of a tile. The first answer counts.
 //!
@@ -17,6 +19,7 @@ mod dealing;
 mod ending;
 mod entry;
 mod error;
+mod homes;
 #[cfg(test)]
 mod tests;
 mod tiles;
@@ -253,6 +256,9 @@ impl Scheduler {
         if self.cards[card].standing != Standing::GivenUp {
             self.cards[card].standing = standing;
         }
+        if standing != Standing::Living {
+            self.release_homes(card);
+        }
     }
 
     /// Availability of a card.
@@ -273,7 +279,7 @@ impl Scheduler {
     /// Gives up a card that sent wrong pixels of the tile `about`, with all tiles that it alone has rendered. Returns the
     /// tiles for the sinks to revoke. None of its tiles may be in transit to the sinks.
     pub fn expel(&mut self, card: CardNumber, about: Tile) -> Vec<Tile> {
-        self.cards[card].standing = Standing::GivenUp;
+        self.set_standing(card, Standing::GivenUp);
         self.cards[card].lie = Some(about);
         self.cards[card].counters = Counters::ZERO;
         let mut revoked = Vec::new();

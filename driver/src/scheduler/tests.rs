@@ -248,3 +248,57 @@ fn a_card_has_time_as_its_own_tiles_or_those_of_others_tell() {
     // Ten rays took a second.
     assert_eq!([scheduler.slowest(0), scheduler.slowest(1)], [Some(0.1 * 50.0), Some(0.1 * 1000.0)]);
 }
+
+/// Scheduler of `tiles` tiles of which the first card of two has rendered the first `of_first` before.
+fn with_homes(tiles: u32, of_first: u32) -> Scheduler {
+    let before: Vec<Tile> = (0..tiles).map(tile).collect();
+    scheduler(tiles, 2).with_homes(before.iter().map(|tile| (usize::from(tile.id >= of_first), tile)))
+}
+
+#[test]
+fn a_card_takes_the_tiles_that_it_has_rendered_before() {
+    let mut first = scheduler(30, 2);
+    for id in 0..30 {
+        let card = [0, 1, 1][id as usize % 3];
+        assert_eq!(take(&mut first, card, Duration::ZERO), Some(id));
+        answer(&mut first, card, id, 0, SECOND);
+    }
+    let homes: Vec<(CardNumber, Tile)> =
+        (0..2).flat_map(|card| first.rendered_by(card).map(move |tile| (card, *tile))).collect();
+    let mut second = scheduler(31, 2).with_homes(homes.iter().map(|(card, tile)| (*card, tile)));
+    for id in (0..30).step_by(3) {
+        assert_eq!(take(&mut second, 0, Duration::ZERO), Some(id));
+        answer(&mut second, 0, id, 0, SECOND);
+    }
+    // A tile that no card has rendered is any card's.
+    assert_eq!(take(&mut second, 0, SECOND), Some(30));
+}
+
+#[test]
+fn an_idle_card_takes_the_last_of_many_tiles_of_another() {
+    let mut scheduler = with_homes(8, 0);
+    assert_eq!(take(&mut scheduler, 1, Duration::ZERO), Some(0));
+    for id in [7, 6, 5] {
+        assert_eq!(take(&mut scheduler, 0, SECOND / 2), Some(id));
+        answer(&mut scheduler, 0, id, 0, SECOND);
+    }
+    // Four are left at home.
+    assert_eq!(take(&mut scheduler, 0, SECOND / 2), None);
+    // The other card has been at its tile for twice the mean time.
+    assert_eq!(take(&mut scheduler, 0, 2 * SECOND), Some(4));
+}
+
+#[test]
+fn tiles_of_a_lost_card_and_other_rectangles_are_any_cards() {
+    let mut scheduler = with_homes(3, 0);
+    assert_eq!(take(&mut scheduler, 1, Duration::ZERO), Some(0));
+    assert_eq!(take(&mut scheduler, 0, Duration::ZERO), None);
+    scheduler.set_standing(1, Standing::Lost);
+    scheduler.give_back(1, 0, false, SECOND);
+    for id in 0..3 {
+        assert_eq!(take(&mut scheduler, 0, SECOND), Some(id));
+    }
+    let wider = Tile { width: 2, ..tile(0) };
+    let mut others = self::scheduler(1, 2).with_homes([(1, &wider)]);
+    assert_eq!(take(&mut others, 0, Duration::ZERO), Some(0));
+}
