@@ -17,7 +17,7 @@ use crate::scene::FixedScene;
 const MAX_SAMPLES: u32 = 4096;
 /// Minimum number of samples whose noise is trusted to be below a limit.
 const MIN_SAMPLES: u32 = 16;
-/// Number of samples of a first pass without irradiance records, which each pass gathers again.
+/// Number of samples of a first pass.
 const FIRST_SAMPLES: u32 = 1;
 /// Share of the remaining time that a pass is planned for.
 const PLANNED_SHARE: f64 = 0.95;
@@ -25,7 +25,7 @@ const PLANNED_SHARE: f64 = 0.95;
 /// End of a picture by passes: the first of the two, and 4096 samples a pixel in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
-    /// Time of the render; the first pass may take longer.
+    /// Time of the render; the first pass may take longer, and without room for irradiance records on a card the second.
     pub time: Option<Duration>,
     /// Noise: estimated standard error of the pixels (root mean square), relative to the mean of the picture.
     pub noise: Option<f64>,
@@ -61,17 +61,21 @@ impl Renderer {
         let chosen = RefCell::new((settings.photons.clone(), settings.integrator.clone()));
         let first = |packed: &PackedScene| {
             let (photons, integrator) = choose(packed)?;
-            let integrator = first_pass(&integrator, aim);
+            let planned_samples = Some(integrator.planned());
+            let integrator = Integrator { samples: FIRST_SAMPLES, planned_samples, ..integrator };
             *chosen.borrow_mut() = (photons.clone(), integrator.clone());
             Ok((photons, integrator))
         };
-        let rendering = self.render_chosen_fixed(scene, settings, &first, observer)?;
+        let settings = settings.clone().with(|settings| settings.schedule.keep_records = true);
+        let rendering = self.render_chosen_fixed(scene, &settings, &first, observer)?;
         let (photons, integrator) = chosen.into_inner();
-        let mut settings = RenderSettings { photons, integrator, ..settings.clone() };
+        let mut settings = RenderSettings { photons, integrator, ..settings };
         let mut passes = Passes { rendering, noise: None, count: 1, ended_by: None };
         let mut estimate = NoiseEstimate::default();
         let mut pace = Pace::default();
-        pace.add(settings.integrator.samples, passes.rendering.statistics.time_s.render);
+        if settings.integrator.irradiance_error.is_none() {
+            pace.add(settings.integrator.samples, passes.rendering.statistics.time_s.render);
+        }
         while let Some(more) = next_pass(&passes, &estimate, &pace, aim, start.elapsed()) {
             let before = Arc::new(passes.rendering.film.clone());
             settings.integrator.samples += more;
@@ -91,18 +95,6 @@ impl Renderer {
         passes.rendering.statistics.time_s.total = start.elapsed().as_secs_f64();
         Ok(passes)
     }
-}
-
-/// Integrator of the first pass of a picture: with irradiance records the planned samples, as each pass gathers the records again, and a
-/// fourth of them where time is short.
-fn first_pass(integrator: &Integrator, aim: Aim) -> Integrator {
-    let planned = integrator.planned();
-    let samples = match (integrator.irradiance_error, aim.time) {
-        (None, _) => FIRST_SAMPLES,
-        (Some(_), None) => planned,
-        (Some(_), Some(_)) => planned.div_ceil(4),
-    };
-    Integrator { samples, planned_samples: Some(planned), ..integrator.clone() }
 }
 
 /// Number of samples of the next pass; `None` at the end.
@@ -130,7 +122,7 @@ fn next_pass(
 /// Time of passes: a part that each has, and one in proportion to its samples.
 #[derive(Default)]
 struct Pace {
-    /// Samples and seconds of the last two passes.
+    /// Samples and seconds of the last two passes, without a first one that gathers irradiance records for all.
     last: [Option<(f64, f64)>; 2],
 }
 
@@ -141,7 +133,7 @@ impl Pace {
 
     /// Number of samples that a pass of this time has.
     fn samples_in(&self, seconds: f64) -> u32 {
-        let Some((samples, time)) = self.last[1] else { return 1 };
+        let Some((samples, time)) = self.last[1] else { return u32::from(seconds > 0.0) };
         let slope = self.last[0].filter(|(before, _)| *before != samples);
         let slope = slope.map(|(before, other)| (time - other) / (samples - before));
         // The time of a sample is at most what it would be without a part that each pass has, and not much less.

@@ -122,16 +122,17 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Renders a picture by passes that double the samples of a pixel; by one with irradiance records, which each pass would gather again.
+    /// Renders a picture by passes that double the samples of a pixel.
     fn render_by_passes(&mut self, task: &Task) -> Result<Rendering, RenderError> {
         let asked = &task.settings.integrator;
         let with = |samples: u32| {
             task.settings.clone().with(|settings| {
                 settings.integrator.samples = samples;
                 settings.integrator.planned_samples = Some(asked.planned());
+                settings.schedule.keep_records = asked.samples > 1;
             })
         };
-        let mut samples = if asked.irradiance_error.is_some() { asked.samples } else { 1 };
+        let mut samples = 1;
         let easel = Easel::new(self.hub, task, samples);
         let mut rendering = self.renderer.render_fixed(&self.scene, &with(samples), &easel)?;
         while samples < asked.samples {
