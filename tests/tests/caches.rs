@@ -1,8 +1,9 @@
 //! Line caches: they hit and miss like an LRU oracle, and return the contents of memory.
 
+use std::ops::Range;
+
 use photoncard_firmware::memory::{
-    CacheEntry, CacheShape, CardMemory, Counted, Dram, LineCache, LineCaches, Lines, MemoryPort, SetIndex,
-    Stage,
+    CacheEntry, CacheShape, Counted, Dram, LineCache, LineCaches, Lines, MemoryPort, SetIndex, Stage,
 };
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::{Fault, FaultCode};
@@ -122,4 +123,56 @@ fn what_is_written_is_read_and_not_what_was_cached() {
         }
     }
     assert!(memory.write(LineAddress(7), &[[0; LINE_BYTES]; 2]).is_none());
+}
+
+#[test]
+fn a_write_and_a_kept_record_take_the_place_of_no_other_line() {
+    let mut lines = vec![Line::ZERO; 64];
+    let shape = CacheShape::new(1024, 512, 2, SetIndex::Modulo).unwrap();
+    let mut memory = LineCaches::unified(Counted::new(Dram::new(&mut lines)), cache(shape));
+    for address in [0, 4, 1, 5] {
+        memory.read(Structure::Nodes, LineAddress(address), 0..128).unwrap();
+    }
+    let fetched =
+        |memory: &LineCaches<Counted<Dram>, _, _>| memory.below().traffic().sum(|_, _| true).requests;
+    assert_eq!(fetched(&memory), 8);
+    memory.write(LineAddress(20), &[[7; LINE_BYTES]]).unwrap();
+    for _ in 0..2 {
+        let kept = memory.read(Structure::IrradianceRecords, LineAddress(20), 0..128).unwrap();
+        assert_eq!(kept.0, [7; LINE_BYTES]);
+    }
+    assert_eq!(fetched(&memory), 10);
+    for address in [0, 4] {
+        memory.read(Structure::Nodes, LineAddress(address), 0..128).unwrap();
+    }
+    assert_eq!(fetched(&memory), 10);
+}
+
+/// A memory that has the lines that were written.
+struct Growing(Vec<Line>);
+
+impl MemoryPort for Growing {
+    fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
+        self.0.get(address.0 as usize).ok_or(Fault { code: FaultCode::LineRange, detail: address.0 })
+    }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.0.truncate(first.0 as usize);
+        self.0.extend(lines.iter().map(|line| Line(*line)));
+        Some(())
+    }
+}
+
+#[test]
+fn lines_that_a_memory_grows_by_are_read() {
+    let shape = CacheShape::new(1024, 512, 2, SetIndex::Modulo).unwrap();
+    let mut memory = LineCaches::unified(Growing(Vec::new()), cache(shape));
+    for value in 0..20 {
+        memory.write(LineAddress(value), &[[value as u8; LINE_BYTES]]).unwrap();
+        for address in 0..value + 3 {
+            let read = memory.read(Structure::Nodes, LineAddress(address), 0..128).map(|line| line.0[0]);
+            let expected = (address <= value).then_some(address as u8);
+            assert_eq!(read.ok(), expected, "line {address} of {value}");
+        }
+    }
 }
