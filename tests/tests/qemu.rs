@@ -4,15 +4,16 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
 use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{
-    CardAddress, CardSet, Integrator, MemoryUse, PatternTest, PhotonMaps, Picture, RenderSettings,
+    CardAddress, CardSet, Integrator, MemoryUse, PatternTest, PhotonMaps, Picture, RenderSettings, Renderer,
     Unobserved, card_info, card_self_test,
 };
-use photoncard_driver::scene::gltf;
+use photoncard_driver::scene::{FixedScene, gltf};
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::kind::MICRO;
 use photoncard_firmware::memory::Dram;
@@ -163,6 +164,7 @@ fn renders_as_the_emulated_card(name: &str) {
     }
     passes_the_self_test(name, &address);
     renders_everything(name, &address);
+    keeps_irradiance_records(name, &address);
     stays_within_the_budget(name, &address);
     drop(machine);
 }
@@ -193,6 +195,31 @@ fn renders_everything(name: &str, address: &CardAddress) {
     for (index, (sums, expected)) in film.sums().zip(expected.sums()).enumerate() {
         assert_eq!(sums, expected, "{name}, pixel {index}");
     }
+}
+
+/// Two passes, of which the first gathers all irradiance records.
+fn keeps_irradiance_records(name: &str, address: &CardAddress) {
+    let scene = everything();
+    let settings = settings().with(|s| {
+        (s.picture.width, s.picture.height) = (24, 20);
+        (s.photons.count, s.photons.caustic_photons) = (3000, Some(1000));
+        (s.integrator.gather_rays, s.integrator.shadow_rays, s.integrator.samples) = (2, 1, 2);
+        (s.integrator.irradiance_error, s.integrator.planned_samples) = (Some(0.1), Some(2));
+    });
+    let expected = render_or_panic(&scene, &settings);
+    let remote = settings.with(|s| {
+        s.cards.addresses = vec![address.clone()];
+        s.schedule.keep_records = true;
+    });
+    let mut renderer = Renderer::default();
+    let first = remote.clone().with(|s| s.integrator.samples = 1);
+    let first = renderer.render(&scene, &first, &Unobserved).unwrap_or_else(|error| panic!("{error}"));
+    let all = renderer.refine(&FixedScene::from(&scene), &remote, Arc::new(first.film), &Unobserved);
+    let all = all.unwrap_or_else(|error| panic!("{error}"));
+    assert!(all.film.sums().eq(expected.film.sums()), "{name}");
+    let records = expected.statistics.records;
+    assert_eq!((first.statistics.records, first.statistics.kept_records), (records, 0), "{name}");
+    assert_eq!((all.statistics.records, all.statistics.kept_records), (0, records), "{name}");
 }
 
 /// Checks the on-chip memory that the image reports over its link after all renders.

@@ -53,12 +53,14 @@ pub enum Recalled {
     Nothing,
 }
 
+// Not inlined: the stack of rays and gathers would have the lines of these functions as well.
 impl RecordStore {
     /// The store without room.
     pub const EMPTY: Self = Self { key: None, first: 0, limit: 0, end: 0 };
 
     /// Begins a frame with `room` beyond the image. Keeps the records of earlier frames that are the same, and forgets others. The
     /// image must be that of the frames before, or [`Self::forget`] be called.
+    #[inline(never)]
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
         let key = key(frame);
         if key.is_none() || key != self.key || [room.start, room.end] != [self.first, self.limit] {
@@ -75,6 +77,7 @@ impl RecordStore {
     ///
     /// # Errors
     /// If the memory is shorter than it was.
+    #[inline(never)]
     pub fn recall<M: MemoryPort, R: Capacity>(
         &self,
         context: &mut Context<M>,
@@ -101,6 +104,7 @@ impl RecordStore {
     }
 
     /// Writes the gathered records of a window, if there is room.
+    #[inline(never)]
     pub fn keep<M: MemoryPort, R: Capacity>(
         &mut self,
         memory: &mut M,
@@ -121,6 +125,7 @@ impl RecordStore {
     }
 
     /// Notes that the records of a window do not fit into the cache, if there is room.
+    #[inline(never)]
     pub fn keep_full<M: MemoryPort>(&mut self, memory: &mut M, window: &Window) {
         let head = BlockHead { window: *window, older: 0, records: None, divided: [0; MAX_ROOTS] };
         let _ = self.append(memory, &head, core::iter::empty());
