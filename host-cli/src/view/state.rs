@@ -119,6 +119,7 @@ impl View {
         let mut page = Page::new();
         let mut hello = self.start.facts.hello(&self.first, out, self.steering == Some(number));
         hello["size_stated"] = json!(self.start.is_size_stated);
+        hello["counts_memory"] = json!(self.wish.settings.modelled_caches().is_some());
         page.reply(hello.to_string());
         self.pages.insert(number, page);
         number
@@ -359,7 +360,7 @@ impl View {
             }
             described
         });
-        let done = self.done.unwrap_or(Origin { version: 0, step: COARSEST, samples: 0 });
+        let done = self.done.unwrap_or(Origin { version: 0, is_coarse: true, step: COARSEST, samples: 0 });
         json!({
             "type": "state",
             "size": [settings.picture.width, settings.picture.height],

@@ -171,9 +171,9 @@ impl Page {
         else {
             panic!("no header")
         };
-        assert_eq!(words.len(), 8 + 3 * (columns * rows) as usize);
+        assert_eq!(words.len(), 11 + 3 * (columns * rows) as usize);
         self.steps.push((version, step));
-        for (index, pixel) in (0..columns * rows).zip(words[8..].as_chunks::<3>().0) {
+        for (index, pixel) in (0..columns * rows).zip(words[11..].as_chunks::<3>().0) {
             let [left, top] = [x + index % columns * step, y + index / columns * step];
             let pixel = pixel.map(f32::from_le_bytes);
             for offset in 0..step * step {
