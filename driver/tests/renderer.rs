@@ -151,8 +151,11 @@ fn a_fixed_scene_gives_the_pictures_of_any_scene() {
 /// The observer learns of each tile, first its card with the lines that it has read, and then its pixels.
 #[test]
 fn an_observer_receives_every_tile_with_its_card() {
+    /// Card of a tile, and lines that it has read from DRAM.
+    type Report = (String, Option<u64>);
+
     #[derive(Default)]
-    struct Watcher(Mutex<(HashMap<u32, (String, Option<u64>)>, u64)>);
+    struct Watcher(Mutex<(HashMap<u32, Report>, u64)>);
 
     impl Observer for Watcher {
         fn progress(&self, _: Phase, _: u64, _: u64) {}
