@@ -119,7 +119,6 @@ impl View {
         let mut page = Page::new();
         let mut hello = self.start.facts.hello(&self.first, out, self.steering == Some(number));
         hello["size_stated"] = json!(self.start.is_size_stated);
-        hello["counts_memory"] = json!(self.wish.settings.modelled_caches().is_some());
         page.reply(hello.to_string());
         self.pages.insert(number, page);
         number
