@@ -290,7 +290,7 @@ impl Film {
         Ok(())
     }
 
-    /// A tile of further samples with the samples of the film added; `None` if the film lacks one of its pixels, or its units or
+    /// A tile of further samples with the samples of the film added, and with its own counters; `None` if the film lacks one of its pixels, or its units or
     /// layers differ.
     pub fn added_to(&self, tile: &FinishedTile) -> Option<FinishedTile> {
         let format = self.format.plus(tile.format())?;
@@ -298,7 +298,9 @@ impl Film {
             return None;
         }
         let sums = tile.sums().filter_map(|((x, y), sums)| Some(self.sums_at(x, y)?.plus(&sums)));
-        FinishedTile::of_pixels(*tile.tile(), sums, format)
+        let mut added = FinishedTile::of_pixels(*tile.tile(), sums, format)?;
+        added.counters = tile.counters;
+        Some(added)
     }
 
     /// Number of pixels of the crop window that were never written.

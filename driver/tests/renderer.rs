@@ -148,11 +148,14 @@ fn a_fixed_scene_gives_the_pictures_of_any_scene() {
     }
 }
 
-/// The observer learns of each tile, first its card and then its pixels.
+/// The observer learns of each tile, first its card with the lines that it has read, and then its pixels.
 #[test]
 fn an_observer_receives_every_tile_with_its_card() {
+    /// Card of a tile, and lines that it has read from DRAM.
+    type Report = (String, Option<u64>);
+
     #[derive(Default)]
-    struct Watcher(Mutex<(HashMap<u32, String>, u64)>);
+    struct Watcher(Mutex<(HashMap<u32, Report>, u64)>);
 
     impl Observer for Watcher {
         fn progress(&self, _: Phase, _: u64, _: u64) {}
@@ -161,8 +164,8 @@ fn an_observer_receives_every_tile_with_its_card() {
             false
         }
 
-        fn rendered(&self, card: &str, tile: &Tile) {
-            self.0.lock().unwrap().0.insert(tile.id, card.to_owned());
+        fn rendered(&self, card: &str, tile: &Tile, dram_lines: Option<u64>) {
+            self.0.lock().unwrap().0.insert(tile.id, (card.to_owned(), dram_lines));
         }
 
         fn tiles(&self) -> Option<&dyn TileSink> {
@@ -181,12 +184,24 @@ fn an_observer_receives_every_tile_with_its_card() {
     }
 
     let frame = Frame { camera: 0, seed: 0, photons: 300, lamp: 1, wall: 1 };
-    let settings = frame.settings().with(|s| s.cards.addresses = vec!["emulated:2".parse().unwrap()]);
-    let watcher = Watcher::default();
-    render(&frame.scene(&base()), &settings, &watcher).unwrap();
-    let (cards, pixels) = watcher.0.into_inner().unwrap();
-    assert_eq!((cards.len(), pixels), (6, 12 * 8));
-    assert!(cards.values().all(|card| settings.cards.names().contains(card)), "{cards:?}");
+    for caches in [None, Some(CacheSettings::default())] {
+        let settings = frame.settings().with(|s| {
+            s.cards.addresses = vec!["emulated:2".parse().unwrap()];
+            s.cards.caches = caches;
+        });
+        let watcher = Watcher::default();
+        let rendering = render(&frame.scene(&base()), &settings, &watcher).unwrap();
+        let (cards, pixels) = watcher.0.into_inner().unwrap();
+        assert_eq!((cards.len(), pixels), (6, 12 * 8));
+        assert!(cards.values().all(|(card, _)| settings.cards.names().contains(card)), "{cards:?}");
+        let of_tiles: Option<u64> = cards.values().map(|(_, lines)| *lines).sum();
+        let of_frame = rendering
+            .statistics
+            .memory
+            .map(|memory| (memory.photon_map.dram_bytes + memory.scene.dram_bytes) / LINE_BYTES as u64);
+        assert_eq!(of_tiles, of_frame);
+        assert!(of_tiles.is_none_or(|lines| lines > 0));
+    }
 }
 
 #[test]

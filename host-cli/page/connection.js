@@ -1,9 +1,11 @@
-// The WebSocket to the command: opened again when it is lost, and acknowledged as far as tiles were shown.
+// The WebSocket to the command: opened again when it is lost, and acknowledged as tiles come.
 
 const FIRST_WAIT = 250;
 const MAX_WAIT = 4000;
 // Bytes that may wait to be sent before a camera is left out: a newer one follows.
 const MAX_WAITING = 16384;
+// Bytes of tiles after which they are acknowledged: a fourth of those that may be on the way.
+const SHARE = 1 << 20;
 
 export class Connection {
     #socket = null;
@@ -39,6 +41,7 @@ export class Connection {
         } else {
             this.#received += data.byteLength;
             this.handlers.tile(data);
+            this.#acknowledge();
         }
     }
 
@@ -57,11 +60,11 @@ export class Connection {
         return this.#id;
     }
 
-    // Acknowledges what has come; to be called when it is on the screen.
-    acknowledge(version) {
-        if (this.#received === this.#acknowledged) return;
+    // Whoever takes tiles in slowly gets fewer; drawings do not hold them up.
+    #acknowledge() {
+        if (this.#received < this.#acknowledged + SHARE) return;
         this.#acknowledged = this.#received;
-        this.send({ type: "shown", version, bytes: this.#received });
+        this.send({ type: "shown", bytes: this.#received });
     }
 
     // Closes the socket, as a lost connection would.

@@ -1,27 +1,29 @@
 // The picture on a canvas: by WebGL2, where exposure and curve cost nothing, or else by the processor on a 2D canvas.
 
-import { CURVES, SHADER, cardColour, codes } from "./tone.js";
+import { CURVES, SHADER, codes, marked } from "./tone.js";
 
 const CORNERS = `#version 300 es
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1, 0, 1); }`;
 
-// A display has `draw(picture, tone)`; `tone` is {mode, scale, curve, byCard}.
-export function displayOn(canvas) {
+// A display has `draw(picture, tone)`; `tone` is {mode, scale, curve, overlay, greatest}. `restored()` is called
+// when a lost context is there again.
+export function displayOn(canvas, restored) {
     const options = { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true };
     const gl = canvas.getContext("webgl2", options);
-    return gl ? new Shader(canvas, gl) : new Processor(canvas);
+    return gl ? new Shader(canvas, gl, restored) : new Processor(canvas);
 }
 
 class Shader {
     kind = "WebGL2";
 
-    constructor(canvas, gl) {
+    constructor(canvas, gl, restored) {
         Object.assign(this, { canvas, gl, size: [0, 0] });
         // A restored context has lost program and texture.
         canvas.addEventListener("webglcontextlost", event => event.preventDefault());
         canvas.addEventListener("webglcontextrestored", () => {
             this.size = [0, 0];
             this.#prepare();
+            restored();
         });
         this.#prepare();
     }
@@ -41,21 +43,22 @@ class Shader {
         }
         gl.useProgram(program);
         this.place = Object.fromEntries(
-            ["scale", "mode", "curve", "byCard"].map(name => [name, gl.getUniformLocation(program, name)]));
+            ["scale", "mode", "curve", "overlay", "greatest"].map(name => [name, gl.getUniformLocation(program, name)]));
         gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
         for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
             gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
         }
     }
 
-    draw(picture, { mode, scale, curve, byCard }) {
+    draw(picture, { mode, scale, curve, overlay, greatest }) {
         const { gl, canvas, place } = this;
         if (gl.isContextLost()) return;
         this.#upload(picture);
         gl.uniform1f(place.scale, scale);
         gl.uniform1i(place.mode, mode);
         gl.uniform1i(place.curve, CURVES.indexOf(curve));
-        gl.uniform1i(place.byCard, byCard);
+        gl.uniform1i(place.overlay, overlay);
+        gl.uniform1f(place.greatest, greatest);
         gl.viewport(0, 0, canvas.width, canvas.height);
         gl.drawArrays(gl.TRIANGLES, 0, 3);
     }
@@ -96,19 +99,11 @@ class Processor {
         if (!rows) return;
         const image = context.createImageData(width, rows[1] - rows[0]);
         for (let to = 0, from = 4 * width * rows[0]; to < image.data.length; to += 4, from += 4) {
-            const [red, green, blue, alpha] = picture.data.subarray(from, from + 4);
-            const shown = marked(codes([red, green, blue], tone), alpha, tone.byCard);
-            image.data.set([...shown, 255], to);
+            const [red, green, blue, mark] = picture.data.subarray(from, from + 4);
+            image.data.set([...marked(codes([red, green, blue], tone), mark, tone), 255], to);
         }
         context.putImageData(image, 0, rows[0]);
     }
-}
-
-function marked(shown, alpha, byCard) {
-    if (!byCard || alpha < 1) return shown;
-    const card = cardColour(Math.floor(alpha) - 1);
-    const share = alpha % 1 > 0.25 ? 0.8 : 0.35;
-    return shown.map((code, part) => Math.round(code * (1 - share) + 255 * card[part] * share));
 }
 
 function fitted(canvas, { size: [width, height] }) {

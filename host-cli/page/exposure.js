@@ -1,23 +1,23 @@
-// Exposure, curve and overlay as the panel has them.
+// Exposure and curve as the panel has them.
 
 import { shortest } from "./camera.js";
 import { MODES, automaticScale, greatest, modeOf } from "./tone.js";
 
-// Milliseconds between automatic exposures of a picture that is not settled, and pixels of it that are looked at.
+// Milliseconds between measurements of a picture that is not settled, and pixels of it that are looked at.
 const WAIT = 150;
 const PIXELS = 20000;
 
 export class Exposure {
     #inputs = Object.fromEntries(
-        ["exposure", "automatic", "stops", "curve", "overlay"].map(id => [id, document.getElementById(id)]));
+        ["exposure", "automatic", "stops", "curve"].map(id => [id, document.getElementById(id)]));
     #scale = 1;
     #measuredAt = -Infinity;
 
     // `changed()` is called when the picture must be shown otherwise.
     constructor(changed) {
-        const { exposure, automatic, curve, overlay } = this.#inputs;
+        const { exposure, automatic, curve } = this.#inputs;
         exposure.addEventListener("input", () => automatic.checked = false);
-        for (const input of [exposure, automatic, curve, overlay]) {
+        for (const input of [exposure, automatic, curve]) {
             input.addEventListener("input", () => {
                 this.renew();
                 changed();
@@ -25,31 +25,27 @@ export class Exposure {
         }
     }
 
-    // The automatic exposure is measured again.
+    // The picture is measured again.
     renew() {
         this.#measuredAt = -Infinity;
     }
 
     // Mapping of a layer to the screen. A settled picture is measured as `photoncard tonemap` does it, others in passing.
     of(layer, picture, isSettled) {
-        const { exposure, automatic, stops, curve, overlay } = this.#inputs;
+        const { exposure, automatic, stops, curve } = this.#inputs;
         const mode = modeOf(layer);
-        if (mode === MODES.amount) {
-            // Distances have no useful maximum under the sky.
-            const scale = layer === "Z" ? 2 * automaticScale(picture.data) : 1 / (greatest(picture.data) || 1);
-            return { mode, scale, curve: "none", byCard: overlay.value === "card" };
-        }
+        const isLight = mode === MODES.light;
         const age = performance.now() - this.#measuredAt;
-        if (!automatic.checked) {
+        if (isLight && !automatic.checked) {
             this.#scale = Math.fround(2 ** Number(exposure.value));
-        } else if (mode === MODES.light && (isSettled ? age === Infinity : age > WAIT)) {
+        } else if ((isLight || mode === MODES.amount) && (isSettled ? age === Infinity : age > WAIT)) {
             const stride = isSettled ? 1 : Math.ceil(picture.data.length / 4 / PIXELS);
-            this.#scale = Math.fround(automaticScale(picture.data, stride));
+            this.#scale = Math.fround(measured(layer, picture.data, stride));
             this.#measuredAt = performance.now();
-            exposure.value = Math.log2(this.#scale);
+            if (isLight) exposure.value = Math.log2(this.#scale);
         }
-        stops.textContent = Math.log2(this.#scale).toFixed(1);
-        return { mode, scale: this.#scale, curve: curve.value, byCard: overlay.value === "card" };
+        if (isLight) stops.textContent = Math.log2(this.#scale).toFixed(1);
+        return { mode, scale: this.#scale, curve: curve.value };
     }
 
     // Fields of `save`: null is the automatic exposure.
@@ -64,4 +60,10 @@ export class Exposure {
         return (exposure === null ? "" : ` --exposure ${shortest(exposure)}`) +
             (tonemap === "reinhard" ? "" : ` --tonemap ${tonemap}`);
     }
+}
+
+function measured(layer, data, stride) {
+    if (modeOf(layer) === MODES.light) return automaticScale(data, stride);
+    // Distances have no useful maximum under the sky.
+    return layer === "Z" ? 2 * automaticScale(data, stride) : 1 / (greatest(data, stride) || 1);
 }

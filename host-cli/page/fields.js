@@ -93,7 +93,7 @@ export class Fields {
         });
         number.addEventListener("input", edit);
         const control = element("div", {},
-            element("label", {}, "Colour", tint), element("label", {}, "Strength, W/(sr m²)", number));
+            element("label", {}, "Emission", tint), element("label", {}, "Strength, W/(sr m²)", number));
         return this.follow(name, own, control, value => {
             strength = Math.max(...rgb(value));
             if (strength > 0) colour = rgb(value).map(part => part / strength);
@@ -101,13 +101,12 @@ export class Fields {
         });
     }
 
-    // A tick that takes a value to 0 and back.
-    onOff(name, own) {
-        let lit = own;
+    // A tick that takes a value to 0 and back, or to another one.
+    onOff(name, own, label = "on", lit = own) {
         const input = element("input", { type: "checkbox" });
         const dark = Array.isArray(own) ? [0, 0, 0] : 0;
         input.addEventListener("change", () => this.edit(name, input.checked ? lit : dark));
-        return this.follow(name, own, element("label", { className: "tick" }, input, "on"), value => {
+        return this.follow(name, own, element("label", { className: "tick" }, input, label), value => {
             input.checked = rgb(value).some(part => part > 0);
             if (input.checked) lit = value;
         });

@@ -6,6 +6,8 @@ import { Controls } from "./controls.js";
 import { displayOn } from "./display.js";
 import { Exposure } from "./exposure.js";
 import { element } from "./fields.js";
+import { Overlay } from "./overlay.js";
+import { Pace } from "./pace.js";
 import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
 import { copy, setText, showStatus, tell } from "./status.js";
@@ -14,7 +16,8 @@ import { Times } from "./times.js";
 
 const byId = id => document.getElementById(id);
 const canvas = byId("picture");
-const display = displayOn(canvas);
+const drawing = new Pace(draw), sending = new Pace(sendMoves);
+const display = displayOn(canvas, () => drawing.soon());
 const picture = new Picture();
 const times = new Times();
 
@@ -22,17 +25,19 @@ const times = new Times();
 let scene = null, state = null, isOpen = false, steers = false;
 let camera = null, isCameraOwn = false, toSend = null;
 const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cursor: undefined, edits: new Map() };
-// True if the canvas is outdated: it is drawn in the next frame.
-let isStale = true, isNewPicture = false;
+// Pixel under the pointer; null for none.
+let pointed = null;
 
 const connection = new Connection(
     `${location.protocol.replace("http", "ws")}//${location.host}/socket${location.search}`,
     { message: take, tile: takeTile, changed: open => { isOpen = open; show(); } });
 const exposure = new Exposure(show);
+const overlay = new Overlay(picture, showLayer);
 
 // Shows the status, and the picture in the next frame.
 function show() {
-    isStale = true;
+    drawing.soon();
+    sending.soon();
     showStatus(isOpen, state, png());
 }
 
@@ -43,7 +48,10 @@ const send = (what, message) => {
 };
 
 const panel = new Panel(
-    (name, value) => asked.edits.set(name, value),
+    (name, value) => {
+        asked.edits.set(name, value);
+        sending.soon();
+    },
     (name, value) => send(name, { type: "setting", name, value }));
 
 const view = {
@@ -55,12 +63,14 @@ const view = {
         camera = next;
         isCameraOwn = true;
         toSend = { isMoving };
-        isStale = true;
+        sending.soon();
+        showCentre();
     },
     pick: at => scene && send("", { type: "pick", at }),
     cursor(at) {
-        asked.cursor = at;
-        showValue(at);
+        asked.cursor = pointed = at;
+        sending.soon();
+        showValue();
     },
 };
 const controls = new Controls(canvas, view);
@@ -70,7 +80,7 @@ function take(message) {
         hello, state: takeState,
         cards: ({ cards }) => panel.cards(cards),
         saved: ({ path }) => byId("saved").textContent = `saved ${path}`,
-        picked: ({ point }) => { controls.centre = point; isStale = true; },
+        picked: ({ point }) => { controls.centre = point; showCentre(); },
         steers: ({ value }) => setSteers(value),
         error({ text }) {
             tell(text);
@@ -133,7 +143,9 @@ function takeState(message) {
 function takeTile(buffer) {
     const tile = decoded(buffer);
     if (!tile || !picture.put(tile)) return;
-    isStale = isNewPicture = true;
+    // What answers a change is shown at once, and so is all that is whole.
+    if (picture.isFirst || picture.isWhole) drawing.soon();
+    else drawing.later();
 }
 
 // Asks for the size that the window or the panel wants.
@@ -156,25 +168,23 @@ function layOut() {
     const factor = Math.floor(box.width) === width && Math.floor(box.height) === height ? 1 : fitting;
     canvas.style.width = `${width * factor}px`;
     canvas.style.height = `${height * factor}px`;
-    isStale = true;
-}
-
-function frame() {
-    requestAnimationFrame(frame);
-    sendMoves();
-    if (!isStale) return;
-    isStale = false;
-    const isSettled = state?.settled && picture.version === state.version;
-    display.draw(picture, exposure.of(asked.layer, picture, isSettled));
-    times.drawn(picture, isNewPicture);
-    isNewPicture = false;
-    connection.acknowledge(picture.version);
-    setText("times", times.text);
     showCentre();
 }
 
+function draw() {
+    const isSettled = state?.settled && picture.version === state.version;
+    display.draw(picture, { ...exposure.of(asked.layer, picture, isSettled), ...overlay.tone });
+    times.drawn(picture);
+    setText("times", times.text);
+    showValue();
+}
+
 function sendMoves() {
-    if (!isOpen || !scene || connection.isBusy) return;
+    if (!isOpen || !scene) return;
+    if (connection.isBusy) {
+        sending.later();
+        return;
+    }
     if (toSend && steers) {
         const view = rounded(camera), text = JSON.stringify(view);
         // A camera that comes to rest makes no new picture.
@@ -199,9 +209,18 @@ function showCentre() {
     byId("centre").style.top = `${canvas.offsetTop + place[1] * factor}px`;
 }
 
-function showValue(at) {
-    const value = at && picture.at(at);
-    byId("value").textContent = value ? `${at.join(", ")}: ${value.map(part => part.toPrecision(4)).join("  ")}` : "\u00a0";
+function showValue() {
+    const value = pointed ? picture.at(pointed) : [];
+    setText("value", value.length ? `${pointed.join(", ")}: ${value.map(part => part.toPrecision(4)).join("  ")}` : "\u00a0");
+    overlay.show(pointed);
+}
+
+// Shows the layer that is asked for, or another overlay: all tiles come again.
+function showLayer() {
+    picture.restart(picture.version);
+    exposure.renew();
+    send("layer", { type: "layer", name: asked.layer });
+    drawing.soon();
 }
 
 // Options of the command line that write a PNG, if the picture is shown otherwise than by default.
@@ -218,9 +237,7 @@ function save(ending) {
 const on = (id, type, act) => byId(id).addEventListener(type, act);
 on("layer", "change", ({ target }) => {
     asked.layer = target.value;
-    picture.restart(picture.version);
-    send("layer", { type: "layer", name: asked.layer });
-    isStale = true;
+    showLayer();
 });
 on("side", "change", ({ target }) => { asked.side = target.value; fit(); });
 on("camera", "change", ({ target }) => {
@@ -246,7 +263,6 @@ new ResizeObserver(() => {
     clearTimeout(resized);
     resized = setTimeout(fit, 200);
 }).observe(byId("stage"));
-requestAnimationFrame(frame);
 
 // For tests and for whoever looks in the browser's console.
 window.photoncard = {
@@ -257,6 +273,6 @@ window.photoncard = {
     get isSettled() {
         const isQuiet = !toSend && asked.edits.size === 0 && (times.waiting === 0 || times.silence > 1500);
         return isOpen && isQuiet && Boolean(state?.settled) && picture.isWhole && picture.step === 1 &&
-            picture.version === state.version && !isStale;
+            picture.version === state.version && !drawing.isWaiting;
     },
 };

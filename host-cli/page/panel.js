@@ -3,8 +3,10 @@
 import { Fields, element, hexOf, short } from "./fields.js";
 import { cardColour } from "./tone.js";
 
-// Largest value of each property with a slider.
-const MAX_OF_PROPERTY = { roughness: 1, metallic: 1, transmission: 1, alpha: 1 };
+// Properties with a slider, which end at 1, and names of others.
+const SHARES = ["roughness", "metallic", "transmission", "alpha"];
+const LABELS = { ior: "index of refraction" };
+const labelOf = property => (LABELS[property] ?? property).replace(/^./, first => first.toUpperCase());
 
 const listed = names => names.map(name => [name, name]);
 
@@ -13,6 +15,7 @@ const TECHNIQUES = [
     ["photons", "Photons", 1],
     ["spp", "Samples a pixel", 1],
     ["gather_rays", "Gather rays", 0],
+    ["tile", "Side of tiles (0: widest)", 0],
     ["order", "Order of gathers", listed(["naive", "tiled", "dirbin", "hash", "sort"])],
     ["sampling", "Importance sampling", listed(["brdf", "photon", "combined", "mixture"])],
     ["cache", "Irradiance cache", [[true, "on"], [false, "off"]]],
@@ -83,10 +86,17 @@ export class Panel {
         const rows = Object.entries(properties).map(([property, value]) => {
             const of = `${name}.${property}`;
             if (property === "emission") return fields.emission(of, value);
-            if (Array.isArray(value)) return fields.colour(of, property, value);
-            return fields.number(of, property, value, MAX_OF_PROPERTY[property]);
+            if (property === "thickness") return this.#solid(fields, of, value, `${name}.transmission`, properties.transmission);
+            if (Array.isArray(value)) return fields.colour(of, labelOf(property), value);
+            return fields.number(of, labelOf(property), value, SHARES.includes(property) ? 1 : undefined);
         });
         return element("details", {}, element("summary", {}, swatch, name), ...rows);
+    }
+
+    // A tick for solids, of what transmits light alone.
+    #solid(fields, name, value, transmission, own) {
+        const control = fields.onOff(name, value, "Solid, not a thin wall", 1);
+        return fields.follow(transmission, own, control, share => control.hidden = !(share > 0));
     }
 
     // The state of the picture; the last change may have been refused.

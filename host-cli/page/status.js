@@ -34,7 +34,18 @@ export function tell(text) {
 
 export async function copy(text, button) {
     const label = button.dataset.label ??= button.textContent;
-    const isCopied = await navigator.clipboard?.writeText(text).then(() => true, () => false);
+    const isCopied = await navigator.clipboard?.writeText(text).then(() => true, () => false) ?? selected(text);
     button.textContent = isCopied ? "Copied" : "Not allowed";
     setTimeout(() => button.textContent = label, 1500);
+}
+
+// Copies as a selection: pages of other machines have no other way. Returns whether the browser allows it.
+function selected(text) {
+    const area = document.createElement("textarea");
+    area.value = text;
+    document.body.append(area);
+    area.select();
+    const isCopied = document.execCommand("copy");
+    area.remove();
+    return isCopied;
 }

@@ -39,17 +39,17 @@ export class Times {
     }
 
     // The picture was drawn. It answers all changes that it holds, even if it is newer.
-    drawn(picture, isNew) {
+    drawn({ version, whole }) {
         const now = performance.now();
-        if (picture.isWhole && isNew && picture.version !== this.#counted) {
-            this.#counted = picture.version;
+        if (whole.version > this.#counted) {
+            this.#counted = whole.version;
             this.#wholes.push(now);
         }
         while (this.#wholes[0] < now - 1000) this.#wholes.shift();
-        for (const run of this.measured.filter(({ version }) => version <= picture.version)) {
-            run.first ??= now - run.at;
-            if (picture.isWhole) run.coarse ??= now - run.at;
-            if (picture.isWhole && picture.step === 1) run.full ??= now - run.at;
+        for (const run of this.measured.filter(run => run.version <= version)) run.first ??= now - run.at;
+        for (const run of this.measured.filter(run => run.version <= whole.version)) {
+            run.coarse ??= now - run.at;
+            if (whole.step === 1) run.full ??= now - run.at;
         }
     }
 

@@ -14,6 +14,9 @@ export const modeOf = layer =>
 
 export const CURVES = ["none", "reinhard", "aces"];
 
+// Marks over the picture: none, the colour of the card, or a map of heat.
+export const OVERLAYS = { none: 0, card: 1, heat: 2 };
+
 const luminance = (red, green, blue) => Math.fround(0.2126 * red + 0.7152 * green + 0.0722 * blue);
 
 // Scale that brings the log-average luminance of the lit pixels to middle grey. `stride` skips pixels: 1 takes all.
@@ -30,9 +33,9 @@ export function automaticScale(data, stride = 1) {
 }
 
 // The greatest finite value of a layer of amounts.
-export function greatest(data) {
+export function greatest(data, stride = 1) {
     let found = 0;
-    for (let at = 0; at < data.length; at += 4) {
+    for (let at = 0; at < data.length; at += 4 * stride) {
         if (data[at] > found && data[at] < Infinity) found = data[at];
     }
     return found;
@@ -48,7 +51,7 @@ function compressed(curve, rgb) {
 const encoded = x => x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055;
 const unit = x => Math.min(Math.max(x, 0), 1);
 
-// Colour of an amount from 0 to 1: black, blue, red, yellow, white.
+// Colour of an amount from 0 to 1: black, blue, red, white.
 const heat = t => [unit(3 * t - 1), unit(3 * t - 2), unit(t < 1 / 3 ? 3 * t : t < 2 / 3 ? 2 - 3 * t : 3 * t - 2)];
 
 // Colour of a card, which tells eight neighbours apart.
@@ -66,13 +69,20 @@ export function codes(rgb, { mode, scale, curve }) {
     return shown.map(x => Math.floor(255 * x + 0.5));
 }
 
+// Codes of a pixel with its mark, as the shader below computes them. Marks of cards are a half higher along the edges of tiles.
+export function marked(codes, mark, { overlay, greatest }) {
+    if (overlay === OVERLAYS.none || mark < 0) return codes;
+    const mixed = (from, to, share) => codes.map((_, part) => Math.floor(from(part) * (1 - share) + 255 * to[part] * share + 0.5));
+    if (overlay === OVERLAYS.card) return mixed(part => codes[part], cardColour(Math.floor(mark)), mark % 1 > 0.25 ? 0.8 : 0.35);
+    return mixed(() => luminance(...codes), heat(unit(mark / greatest)), 0.65);
+}
+
 export const SHADER = `#version 300 es
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D picture;
-uniform float scale;
-uniform int mode, curve;
-uniform bool byCard;
+uniform float scale, greatest;
+uniform int mode, curve, overlay;
 out vec4 colour;
 
 vec3 compressed(vec3 x) {
@@ -99,11 +109,11 @@ vec3 shown(vec3 value) {
     return encoded(clamp(value, 0.0, 1.0));
 }
 
-// Alpha is the number of the card that rendered the pixel, from 1 on, and a half more along the tile's edges.
-vec3 marked(vec3 shown, float alpha) {
-    if (!byCard || alpha < 1.0) return shown;
-    vec3 card = 0.5 + 0.5 * cos(6.2831853 * ((floor(alpha) - 1.0) * 0.381966 + vec3(0.0, 1.0, 2.0) / 3.0));
-    return mix(shown, card, fract(alpha) > 0.25 ? 0.8 : 0.35);
+vec3 marked(vec3 shown, float mark) {
+    if (overlay == 0 || mark < 0.0) return shown;
+    vec3 card = 0.5 + 0.5 * cos(6.2831853 * (floor(mark) * 0.381966 + vec3(0.0, 1.0, 2.0) / 3.0));
+    if (overlay == 1) return mix(shown, card, fract(mark) > 0.25 ? 0.8 : 0.35);
+    return mix(vec3(dot(shown, vec3(0.2126, 0.7152, 0.0722))), heat(clamp(mark / greatest, 0.0, 1.0)), 0.65);
 }
 
 void main() {

@@ -110,8 +110,8 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
 fn check(settings: &RenderSettings) -> Result<(), Failure> {
     let [option, reason] = if settings.picture.crop.is_some() {
         ["--crop", "a view shows the whole picture"]
-    } else if settings.modelled_caches().is_some() {
-        ["--counters, --cache or --trace", "they are of one render, and a view has many"]
+    } else if settings.cards.trace.is_some() {
+        ["--trace", "it is of one render, and a view has many"]
     } else {
         settings.check()?;
         return Ok(());

@@ -5,6 +5,7 @@ pub mod direct;
 mod dram;
 pub mod memory_model;
 mod names;
+mod tile_lines;
 pub mod trace;
 pub mod whole_frame;
 
@@ -27,6 +28,8 @@ use photoncard_shared::transport::WINDOW;
 use self::dram::EmulatedDram;
 pub use self::dram::SharedImage;
 use self::memory_model::{CacheSettings, CacheSpec, MeasuredMemory, MemoryTraffic};
+pub use self::tile_lines::TileLines;
+use self::tile_lines::TileMeter;
 use self::trace::{TraceFile, Traced};
 use crate::choice::choices;
 use crate::link::{LoopbackPort, loopback};
@@ -134,6 +137,7 @@ pub struct EmulatedCard {
     thread: Option<JoinHandle<Option<MemoryRecord>>>,
     port: Option<LoopbackPort>,
     trace_has_failed: Option<Arc<AtomicBool>>,
+    tile_lines: TileLines,
 }
 
 impl EmulatedCard {
@@ -151,11 +155,13 @@ impl EmulatedCard {
         let mut card = card.patient(WOKEN_AT);
         let trace = model.as_ref().and_then(|model| model.trace.as_ref());
         let trace_has_failed = trace.map(TraceFile::has_failed);
+        let tile_lines = TileLines::default();
+        let noted = tile_lines.clone();
         let thread = std::thread::Builder::new()
             .name("chip".into())
             .stack_size(THREAD_STACK)
-            .spawn(move || run(kind, model, shared, &mut card))?;
-        Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed })
+            .spawn(move || run(kind, model.map(|model| (model, noted)), shared, &mut card))?;
+        Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines })
     }
 
     /// The host's end of the link.
@@ -169,6 +175,11 @@ impl EmulatedCard {
     /// Returns whether writing the trace has failed.
     pub fn trace_has_failed(&self) -> bool {
         self.trace_has_failed.as_ref().is_some_and(|failed| failed.load(Ordering::Relaxed))
+    }
+
+    /// Lines from DRAM of the tiles that the card has rendered, if its memory is modelled.
+    pub fn tile_lines(&self) -> &TileLines {
+        &self.tile_lines
     }
 
     /// Ends the card. Returns the record of its memory, if it is modelled.
@@ -211,20 +222,21 @@ pub fn serve_card(kind: EmulatedKind, mut port: impl Port + Send) -> std::io::Re
 
 fn run(
     kind: EmulatedKind,
-    model: Option<MemoryModel>,
+    model: Option<(MemoryModel, TileLines)>,
     shared: SharedImage,
     port: &mut impl Port,
 ) -> Option<MemoryRecord> {
     let dram = EmulatedDram::new(kind.budget().dram_bytes, shared);
     match model {
         None => serve_on(kind, dram, port, |_| None),
-        Some(MemoryModel { caches, trace }) => {
+        Some((MemoryModel { caches, trace }, tile_lines)) => {
             let (below, above) = match trace {
                 Some(trace) if trace.is_below_caches() => (Some(trace), None),
                 trace => (None, trace),
             };
             let memory = Traced::new(caches.over(Traced::new(dram, below)), above);
-            serve_on(kind, memory, port, |memory| {
+            serve_on(kind, TileMeter::new(memory, tile_lines), port, |meter| {
+                let memory = meter.below_mut();
                 let traffic = MeasuredMemory::traffic(memory.below());
                 // Below the caches: what counts contents, requests, the caches themselves, and what counts fetches.
                 let dram = memory.below_mut().below_mut().below_mut().below_mut();

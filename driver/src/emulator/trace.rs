@@ -18,6 +18,7 @@ use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
+use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use crate::choice::{Choice, choices};
 use crate::output::{OutputError, PendingFile};
 
@@ -225,6 +226,12 @@ impl<M: MemoryPort> MemoryPort for Traced<M> {
             trace.begin_tile();
         }
         self.memory.begin_tile();
+    }
+}
+
+impl<M: MeasuredMemory> MeasuredMemory for Traced<M> {
+    fn traffic(&self) -> MemoryTraffic {
+        self.memory.traffic()
     }
 }
 

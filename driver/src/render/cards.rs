@@ -20,7 +20,7 @@ use super::{CardAddress, CardError, CardSet, Observer, RenderError, RenderSettin
 use crate::dispatcher::Dispatcher;
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
-use crate::emulator::{MemoryModel, SharedImage};
+use crate::emulator::{MemoryModel, SharedImage, TileLines};
 use crate::pack::CardImage;
 use crate::scheduler::{CardNumber, Scheduler, Standing};
 use crate::session::{Job, PixelLimits, Upload};
@@ -136,7 +136,10 @@ impl Cards {
         let begun = self.start.elapsed();
         let count = self.cards.len();
         let names: Vec<String> = self.cards.iter().map(|(name, _)| name.clone()).collect();
-        let rendered = |card: usize, tile: &Tile| outputs.observer.rendered(&names[card], tile);
+        let lines: Vec<TileLines> = self.cards.iter().map(|(_, card)| card.card.tile_lines()).collect();
+        let rendered = |card: usize, tile: &Tile| {
+            outputs.observer.rendered(&names[card], tile, lines[card].take(tile.id));
+        };
         let crew = Crew {
             dispatcher: Dispatcher::new(scheduler, sinks).telling(&rendered),
             outputs,

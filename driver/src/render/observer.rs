@@ -41,8 +41,9 @@ pub trait Observer: Sync {
     /// Reports that a card was lost or given up; the others render its tiles.
     fn lost(&self, _card: &str, _error: &CardError) {}
 
-    /// Reports that a card has rendered a tile, before the sinks have it.
-    fn rendered(&self, _card: &str, _tile: &Tile) {}
+    /// Reports that a card has rendered a tile, before the sinks have it; with the lines that it has read from DRAM, if its memory is
+    /// [modelled](super::RenderSettings::modelled_caches).
+    fn rendered(&self, _card: &str, _tile: &Tile, _dram_lines: Option<u64>) {}
 
     /// Sink of the observer's own for finished tiles.
     fn tiles(&self) -> Option<&dyn TileSink> {

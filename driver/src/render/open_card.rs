@@ -6,7 +6,7 @@ use photoncard_shared::link::{Port, PortError};
 
 use super::CardError;
 use super::address::{CardAddress, RemoteAddress};
-use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage};
+use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage, TileLines};
 use crate::link::{FaultInjector, LineFaults, LinkError, connect_tcp, connect_unix, open_serial};
 
 /// Host's end of a link.
@@ -70,6 +70,14 @@ impl OpenCard {
     /// Returns whether writing the trace has failed.
     pub(super) fn trace_has_failed(&self) -> bool {
         matches!(&self.connection, Connection::Emulated(card) if card.trace_has_failed())
+    }
+
+    /// Lines from DRAM of the card's tiles, if its memory is modelled.
+    pub(super) fn tile_lines(&self) -> TileLines {
+        match &self.connection {
+            Connection::Emulated(card) => card.tile_lines().clone(),
+            Connection::Remote { .. } => TileLines::default(),
+        }
     }
 
     /// Ends an emulated card, or closes the link to a remote one. Returns the record of a modelled memory.

@@ -292,6 +292,7 @@ impl<K: ChipKind> Engine<K> {
                 self.add_pixel((pixel.tile, pixel.index), &sums, transport);
             }
             Progress::Tile(tile, counters) => {
+                memory.end_tile(tile);
                 self.send_pixels(transport);
                 self.finished = Some((tile, counters));
             }

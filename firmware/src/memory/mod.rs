@@ -48,6 +48,10 @@ pub trait MemoryPort {
     /// Begins a tile: caches are cleared, so that its misses do not depend on the tiles before it.
     #[inline(always)]
     fn begin_tile(&mut self) {}
+
+    /// Ends a tile, before its end is sent.
+    #[inline(always)]
+    fn end_tile(&mut self, _: u32) {}
 }
 
 /// Memory that a card image is loaded into.

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use photoncard_driver::film::FilmPixel;
 use photoncard_driver::sink::FinishedTile;
+use photoncard_shared::counters::Counters;
 
 /// Radiance or a layer, as a page shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,10 +22,45 @@ pub(super) enum Shown {
 pub(super) struct Origin {
     /// Number of the wish.
     pub(super) version: u32,
+    /// True for a picture by cheap settings.
+    pub(super) is_coarse: bool,
     /// Side of the square that a pixel stands for.
     pub(super) step: u32,
     /// Samples of a pixel.
     pub(super) samples: u32,
+}
+
+/// Work of a tile, for all samples of its pixels.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct TileWork {
+    /// Searches for photons.
+    gathers: u64,
+    /// Irradiance records gathered.
+    records: u64,
+    /// Lines read from DRAM, if memory is modelled.
+    dram_lines: Option<u64>,
+}
+
+impl TileWork {
+    pub(super) fn new(counters: &Counters, dram_lines: Option<u64>) -> Self {
+        let gathers = counters.gathers.saturating_add(counters.caustic_gathers);
+        Self { gathers, records: counters.records, dram_lines }
+    }
+
+    /// Work of this and of more samples.
+    fn and(self, more: Self) -> Self {
+        Self {
+            gathers: self.gathers.saturating_add(more.gathers),
+            records: self.records.saturating_add(more.records),
+            dram_lines: self.dram_lines.zip(more.dram_lines).map(|(a, b)| a.saturating_add(b)),
+        }
+    }
+
+    /// Counts for a tile's header; [`UNKNOWN`] for one that is not known.
+    fn words(self) -> [u32; 3] {
+        [Some(self.gathers), Some(self.records), self.dram_lines]
+            .map(|count| count.map_or(UNKNOWN, |count| count.min(u64::from(UNKNOWN - 1)) as u32))
+    }
 }
 
 /// A tile with its origin.
@@ -34,16 +70,27 @@ pub(super) struct Patch {
     /// Number of the card.
     card: u32,
     tile: FinishedTile,
+    work: TileWork,
 }
 
+/// Count that is not known.
+const UNKNOWN: u32 = u32::MAX;
 /// Bytes of a tile's header.
-const HEADER: usize = 32;
+const HEADER: usize = 44;
 /// Bytes of a pixel.
 const PIXEL: usize = 12;
 
 impl Patch {
-    pub(super) fn new(origin: Origin, card: u32, tile: FinishedTile) -> Self {
-        Self { origin, card, tile }
+    pub(super) fn new(origin: Origin, card: u32, tile: FinishedTile, work: TileWork) -> Self {
+        Self { origin, card, tile, work }
+    }
+
+    /// Returns whether this tile has further samples of the pixels of another one.
+    fn goes_on(&self, earlier: &Self) -> bool {
+        let area = |patch: &Self| (patch.tile.tile().x, patch.tile.tile().y, patch.tile.tile().pixels());
+        earlier.origin.samples < self.origin.samples
+            && Origin { samples: self.origin.samples, ..earlier.origin } == self.origin
+            && area(earlier) == area(self)
     }
 
     /// Bytes of the message that shows the tile.
@@ -53,12 +100,13 @@ impl Patch {
 
     /// Message that shows the tile.
     pub(super) fn message(&self, shown: Shown) -> Vec<u8> {
-        let Origin { version, step, samples } = self.origin;
+        let Origin { version, is_coarse: _, step, samples } = self.origin;
+        let [gathers, records, lines] = self.work.words();
         let tile = self.tile.tile();
         let mut bytes = Vec::with_capacity(self.bytes());
-        let header =
-            [version, step, tile.x * step, tile.y * step, tile.width, tile.height, samples, self.card];
-        header.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        let place = [tile.x * step, tile.y * step, tile.width, tile.height];
+        let header = [&[version, step][..], &place, &[samples, self.card, gathers, records, lines]];
+        header.iter().copied().flatten().for_each(|value| bytes.extend(value.to_le_bytes()));
         for (_, pixel) in self.tile.pixels() {
             values(&pixel, shown).iter().for_each(|value| bytes.extend(value.to_le_bytes()));
         }
@@ -95,11 +143,14 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// Adds a tile, and drops those of older wishes.
-    pub(super) fn put(&mut self, patch: Patch) {
+    /// Adds a tile, and drops those of older wishes. Its work is added to that of the samples before.
+    pub(super) fn put(&mut self, mut patch: Patch) {
         let version = patch.origin.version;
         if self.patches.front().is_some_and(|(_, oldest)| oldest.origin.version < version) {
             self.keep_version(version);
+        }
+        if let Some((_, earlier)) = self.patches.iter().rev().find(|(_, earlier)| patch.goes_on(earlier)) {
+            patch.work = earlier.work.and(patch.work);
         }
         self.patches.push_back((self.next, Arc::new(patch)));
         self.next += 1;

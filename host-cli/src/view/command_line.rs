@@ -18,6 +18,7 @@ pub(super) fn words(scene: &SceneOptions, quality: Quality, wish: &Wish) -> Vec<
     of_photons(&wish.settings.photons, &mut words);
     of_rays(&wish.settings.integrator, &mut words);
     words.add("--order", wish.settings.schedule.order.name());
+    words.add_some("--tile", wish.settings.schedule.tile);
     words.add("-o", "picture.exr");
     words.0
 }

@@ -106,10 +106,10 @@ fn properties(material: &Material) -> Map<String, Value> {
             add("diffuse", json!(base_colour.to_array()));
             add("metallic", json!(metallic));
             add("roughness", json!(roughness));
-            if let Some(transmission) = transmission {
-                add("transmission", json!(transmission.factor));
-                add("ior", json!(transmission.ior));
-            }
+            add("ior", json!(material.reflection.ior()));
+            add("transmission", json!(transmission.map_or(0.0, |transmission| transmission.factor)));
+            let is_solid = transmission.is_some_and(|transmission| transmission.is_volume);
+            add("thickness", json!(u8::from(is_solid)));
         }
     }
     properties
@@ -136,6 +136,7 @@ pub(super) fn settings(settings: &RenderSettings) -> Value {
         "sampling": integrator.sampling.name(),
         "cache": integrator.irradiance_error.is_some(),
         "order": schedule.order.name(),
+        "tile": schedule.tile.unwrap_or(0),
         "layers": picture.layers.to_string(),
     })
 }

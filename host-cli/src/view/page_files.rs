@@ -31,6 +31,8 @@ static FILES: &[PageFile] = &files![
     SCRIPT "exposure.js",
     SCRIPT "fields.js",
     SCRIPT "main.js",
+    SCRIPT "overlay.js",
+    SCRIPT "pace.js",
     SCRIPT "panel.js",
     SCRIPT "picture.js",
     SCRIPT "status.js",

@@ -183,8 +183,8 @@ struct Easel<'a> {
     hub: &'a Hub,
     origin: Origin,
     is_preparing: AtomicBool,
-    /// Name of the card of each tile between its report and its pixels.
-    cards: Mutex<HashMap<u32, String>>,
+    /// Card of each tile, and lines that it has read from DRAM, between its report and its pixels.
+    cards: Mutex<HashMap<u32, (String, Option<u64>)>>,
 }
 
 impl<'a> Easel<'a> {
@@ -210,8 +210,9 @@ impl Observer for Easel<'_> {
         self.hub.change(|view, now| view.lose_card(card, error.to_string(), now));
     }
 
-    fn rendered(&self, card: &str, tile: &Tile) {
-        self.cards.lock().unwrap_or_else(PoisonError::into_inner).insert(tile.id, card.to_owned());
+    fn rendered(&self, card: &str, tile: &Tile, dram_lines: Option<u64>) {
+        let mut cards = self.cards.lock().unwrap_or_else(PoisonError::into_inner);
+        cards.insert(tile.id, (card.to_owned(), dram_lines));
     }
 
     fn tiles(&self) -> Option<&dyn TileSink> {
@@ -222,8 +223,9 @@ impl Observer for Easel<'_> {
 impl TileSink for Easel<'_> {
     fn put(&self, tile: &FinishedTile) {
         let id = tile.tile().id;
-        let card = self.cards.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
-        self.hub.change(|view, _| view.put(self.origin, card.as_deref().unwrap_or_default(), tile));
+        let report = self.cards.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        let (card, dram_lines) = report.unwrap_or_default();
+        self.hub.change(|view, _| view.put(self.origin, &card, dram_lines, tile));
     }
 
     fn revoke(&self, tile: &Tile) {

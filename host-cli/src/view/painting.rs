@@ -6,7 +6,7 @@ use photoncard_driver::quality::Fit;
 use photoncard_driver::render::Statistics;
 use photoncard_driver::sink::FinishedTile;
 
-use super::canvas::{Origin, Patch};
+use super::canvas::{Origin, Patch, TileWork};
 use super::pages::Revisions;
 use super::passes;
 use super::refinement::{Next, Outcome, Pass};
@@ -24,7 +24,8 @@ impl View {
             Pass::Fit => (self.wish.settings.clone(), 1),
             Pass::Full => (passes::full(&self.wish.settings, self.cursor), 1),
         };
-        let origin = Origin { version: work.version, step, samples: settings.integrator.samples };
+        let is_coarse = matches!(work.pass, Pass::Coarse(_));
+        let origin = Origin { version: work.version, is_coarse, step, samples: settings.integrator.samples };
         Ok(Task { work, wish: self.wish.clone(), settings, origin })
     }
 
@@ -38,14 +39,19 @@ impl View {
         self.refinement.prepares(is_preparing, now);
     }
 
-    /// Takes a tile of the running work, which `card` has rendered.
-    pub(super) fn put(&mut self, origin: Origin, card: &str, tile: &FinishedTile) {
+    /// Takes a tile of the running work, which `card` has rendered, with the lines that it has read from DRAM.
+    pub(super) fn put(&mut self, origin: Origin, card: &str, dram_lines: Option<u64>, tile: &FinishedTile) {
         let (number, is_new) = self.cards.rendered(card);
         if is_new {
             self.revisions.cards += 1;
         }
         if self.spared() == Some(origin.version) {
-            self.canvas.put(Patch::new(origin, number, tile.clone()));
+            self.canvas.put(Patch::new(
+                origin,
+                number,
+                tile.clone(),
+                TileWork::new(&tile.counters, dram_lines),
+            ));
         }
     }
 

@@ -60,6 +60,8 @@ pub(super) enum Setting {
     Samples(u32),
     GatherRays(u32),
     Order(GatherOrder),
+    /// Side of the tiles; 0 for the widest that cards have room for.
+    Tile(u32),
     Cache(bool),
     Sampling(Sampling),
 }
@@ -123,6 +125,7 @@ fn setting(fields: &Fields) -> Result<Setting, String> {
         "spp" => Setting::Samples(whole()? as u32),
         "gather_rays" => Setting::GatherRays(whole()? as u32),
         "order" => Setting::Order(Choice::of_name(&fields.text("value")?)?),
+        "tile" => Setting::Tile(whole()? as u32),
         "cache" => Setting::Cache(fields.switch("value")?),
         "sampling" => Setting::Sampling(Choice::of_name(&fields.text("value")?)?),
         _ => return Err(format!("there is no setting {name:?}")),

@@ -359,7 +359,7 @@ impl View {
             }
             described
         });
-        let done = self.done.unwrap_or(Origin { version: 0, step: COARSEST, samples: 0 });
+        let done = self.done.unwrap_or(Origin { version: 0, is_coarse: true, step: COARSEST, samples: 0 });
         json!({
             "type": "state",
             "size": [settings.picture.width, settings.picture.height],

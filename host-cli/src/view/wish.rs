@@ -47,10 +47,12 @@ impl Wish {
         (picture.camera_at, picture.look_at, picture.fov) = (Some(position), Some(look_at), Some(fov));
     }
 
-    /// Sets a property, in place of an earlier value of it.
+    /// Sets a property, at the place of an earlier value of it: what was possible after that one stays so.
     pub(super) fn set(&mut self, name: String, value: Vec<f32>) {
-        self.edits.retain(|(edited, _)| *edited != name);
-        self.edits.push((name, value));
+        match self.edits.iter_mut().find(|(edited, _)| *edited == name) {
+            Some((_, earlier)) => *earlier = value,
+            None => self.edits.push((name, value)),
+        }
     }
 
     /// Changes a setting.
@@ -62,6 +64,7 @@ impl Wish {
             Setting::Samples(samples) => integrator.samples = samples,
             Setting::GatherRays(rays) => integrator.gather_rays = rays,
             Setting::Order(order) => schedule.order = order,
+            Setting::Tile(side) => schedule.tile = (side > 0).then_some(side),
             Setting::Cache(false) => integrator.irradiance_error = None,
             Setting::Cache(true) => {
                 integrator.irradiance_error.get_or_insert(IRRADIANCE_ERROR);
@@ -91,7 +94,7 @@ impl Wish {
                 Setting::Samples(_) => stated.samples = true,
                 Setting::GatherRays(_) => stated.gather_rays = true,
                 Setting::Cache(_) => stated.cache = true,
-                Setting::Order(_) | Setting::Sampling(_) => {}
+                Setting::Order(_) | Setting::Tile(_) | Setting::Sampling(_) => {}
             }
         }
         fit.apply(&mut self.settings, stated);

@@ -101,6 +101,37 @@ fn the_settled_picture_is_that_of_the_command_shown() {
     }
 }
 
+/// The tiles of a settled picture took together what its command takes; with samples in several passes as well.
+#[test]
+#[cfg(unix)]
+fn tiles_tell_what_they_took() {
+    const UNKNOWN: u32 = u32::MAX;
+    let room = Room::new();
+    for (counters, options) in [
+        (&["--counters"][..], ["--spp", "1", "--irradiance-cache", "on"]),
+        (&[], ["--spp", "3", "--irradiance-cache", "off"]),
+    ] {
+        let view = small_view(&room, &[counters, &options, &["--tile", "8"]].concat());
+        let mut page = view.connect();
+        let mut state = page.settle();
+        state["command"] =
+            format!("{} --card emulated:1 --counters --stats stats.json", state["command"].as_str().unwrap())
+                .into();
+        run_shown(&room, &state, "a.exr");
+        let stats: Value = serde_json::from_slice(&room.read("stats.json")).unwrap();
+        let sum = |part: usize| page.work.values().map(|work| u64::from(work[part])).sum::<u64>();
+        assert_eq!(page.work.len(), 6);
+        assert_eq!(json!([sum(0), sum(1)]), json!([stats["gathers"], stats["records"]]));
+        let bytes = |part: &str| stats["memory"][part]["dram_bytes"].as_u64().unwrap();
+        assert_eq!(sum(1) > 0, options[3] == "on");
+        if counters.is_empty() {
+            assert!(page.work.values().all(|work| work[2] == UNKNOWN));
+        } else {
+            assert_eq!(128 * sum(2), bytes("photon_map") + bytes("scene"));
+        }
+    }
+}
+
 /// The shown command of a view whose quality finds its settings by pilot renders states all that they have found.
 #[test]
 #[cfg(unix)]
@@ -311,7 +342,7 @@ fn what_a_view_cannot_be_is_said_at_once() {
         (&["--listen", view.host.as_str()][..], "--listen 127.0.0.1:0"),
         (&["--listen", "127.0.0.1"], "--listen"),
         (&["--listen", "127.0.0.1:0", "--crop", "0,1,0,1"], "--crop"),
-        (&["--listen", "127.0.0.1:0", "--counters"], "--counters"),
+        (&["--listen", "127.0.0.1:0", "--trace", "trace.gz"], "--trace"),
         (&["--listen", "127.0.0.1:0", "--out", "absent"], "absent"),
         (&["--listen", "127.0.0.1:0", "--set", "flor.alpha=1"], "'floor'"),
     ] {
@@ -321,6 +352,49 @@ fn what_a_view_cannot_be_is_said_at_once() {
             "{options:?}: {}",
             outcome.stderr
         );
+    }
+}
+
+/// A script stands in for the program that opens addresses, and `sh` for whoever reads what the view prints.
+#[test]
+#[cfg(target_os = "linux")]
+fn open_opens_the_page_and_other_addresses_come_with_a_warning() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    std::fs::create_dir(room.path("bin")).unwrap();
+    room.write("bin/xdg-open", "#!/bin/sh\necho \"$@\" > opened.part && mv opened.part opened\n");
+    assert!(
+        Command::new("chmod")
+            .args(["+x", "bin/xdg-open"])
+            .current_dir(room.path("."))
+            .status()
+            .unwrap()
+            .success()
+    );
+    let path = std::env::join_paths(
+        std::iter::once(room.path("bin")).chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
+    );
+    for (address, is_warned) in [("127.0.0.1:0", false), ("0.0.0.0:0", true)] {
+        let mut command = room.command();
+        command
+            .args(["view", "scene.gltf", "--open", "--listen", address])
+            .env("PATH", path.as_ref().unwrap());
+        let [out, err] = ["out", "err"].map(|name| std::fs::File::create(room.path(name)).unwrap());
+        let mut view = command.args(SMALL).stdout(out).stderr(err).spawn().unwrap();
+        let mut opened = None;
+        for _ in 0..1000 {
+            opened = std::fs::read_to_string(room.path("opened")).ok();
+            if opened.is_some() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        view.kill().and_then(|()| view.wait()).unwrap();
+        let [said, warned] = ["out", "err"].map(|name| String::from_utf8(room.read(name)).unwrap());
+        assert_eq!(opened.as_ref(), Some(&said), "{warned}");
+        assert!(said.starts_with("http://") && said.contains("/?token="), "{said}");
+        assert_eq!(warned.contains("warning: other machines can reach 0.0.0.0:"), is_warned, "{warned}");
+        std::fs::remove_file(room.path("opened")).unwrap();
     }
 }
 

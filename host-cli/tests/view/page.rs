@@ -100,11 +100,20 @@ pub(crate) struct Page {
     pub(crate) pixels: HashMap<(u32, u32), [f32; 3]>,
     /// Side of a pixel's square in each tile, with its wish.
     pub(crate) steps: Vec<(u32, u32)>,
+    /// Gathers, irradiance records and lines of DRAM of each tile of the newest wish whose pixels are the picture's, by its corner.
+    pub(crate) work: HashMap<(u32, u32), [u32; 3]>,
 }
 
 impl Page {
     fn new(socket: WebSocket<TcpStream>) -> Self {
-        Self { socket, received: 0, last: HashMap::new(), pixels: HashMap::new(), steps: Vec::new() }
+        Self {
+            socket,
+            received: 0,
+            last: HashMap::new(),
+            pixels: HashMap::new(),
+            steps: Vec::new(),
+            work: HashMap::new(),
+        }
     }
 
     pub(crate) fn send(&mut self, message: &Value) {
@@ -166,14 +175,20 @@ impl Page {
     fn draw(&mut self, tile: &[u8]) {
         self.received += tile.len();
         let words = tile.as_chunks::<4>().0;
-        let [version, step, x, y, columns, rows, ..] =
-            words[..8].iter().map(|word| u32::from_le_bytes(*word)).collect::<Vec<_>>()[..]
+        let [version, step, x, y, columns, rows, _, _, work @ ..] =
+            &words[..11].iter().map(|word| u32::from_le_bytes(*word)).collect::<Vec<_>>()[..]
         else {
             panic!("no header")
         };
-        assert_eq!(words.len(), 8 + 3 * (columns * rows) as usize);
+        let [version, step, x, y, columns, rows] = [version, step, x, y, columns, rows].map(|word| *word);
+        assert_eq!(words.len(), 11 + 3 * (columns * rows) as usize);
+        if step == 1 {
+            self.work.insert((x, y), work.try_into().unwrap());
+        } else {
+            self.work.clear();
+        }
         self.steps.push((version, step));
-        for (index, pixel) in (0..columns * rows).zip(words[8..].as_chunks::<3>().0) {
+        for (index, pixel) in (0..columns * rows).zip(words[11..].as_chunks::<3>().0) {
             let [left, top] = [x + index % columns * step, y + index / columns * step];
             let pixel = pixel.map(f32::from_le_bytes);
             for offset in 0..step * step {

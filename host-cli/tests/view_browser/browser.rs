@@ -197,6 +197,25 @@ impl Tab {
         self.mouse("mouseWheel", place, &json!({"deltaX": 0, "deltaY": pixels}));
     }
 
+    /// Touches places with a finger each, moves each to its second place, and lets go.
+    pub(crate) fn touch(&mut self, fingers: &[[[f64; 2]; 2]]) {
+        let points = |share: f64| -> Vec<Value> {
+            let at =
+                |[[x, y], [to_x, to_y]]: &[[f64; 2]; 2]| (x + share * (to_x - x), y + share * (to_y - y));
+            fingers
+                .iter()
+                .enumerate()
+                .map(|(id, finger)| (id, at(finger)))
+                .map(|(id, (x, y))| json!({"id": id, "x": x, "y": y}))
+                .collect()
+        };
+        let steps = (1..=4).map(|step| ("touchMove", points(0.25 * f64::from(step))));
+        let all = std::iter::once(("touchStart", points(0.0))).chain(steps).chain([("touchEnd", Vec::new())]);
+        for (kind, points) in all {
+            self.call("Input.dispatchTouchEvent", &json!({"type": kind, "touchPoints": points}));
+        }
+    }
+
     /// Holds a key, by its code, for some milliseconds.
     pub(crate) fn hold(&mut self, code: &str, milliseconds: u64) {
         self.key("keyDown", code);
@@ -207,6 +226,13 @@ impl Tab {
     /// Sends an event of a key: `keyDown` or `keyUp`.
     pub(crate) fn key(&mut self, kind: &str, code: &str) {
         self.call("Input.dispatchKeyEvent", &json!({"type": kind, "code": code}));
+    }
+
+    /// Bytes of the page's objects and buffers, those of garbage left out.
+    pub(crate) fn memory(&mut self) -> u64 {
+        self.call("HeapProfiler.collectGarbage", &json!({}));
+        let usage = self.call("Runtime.getHeapUsage", &json!({}));
+        ["usedSize", "backingStorageSize"].iter().filter_map(|part| usage[part].as_f64()).sum::<f64>() as u64
     }
 
     /// Codes of the pixels of a rectangle `[x, y, width, height]` on the screen.

@@ -4,6 +4,7 @@
 mod support;
 
 mod browser;
+mod devices;
 mod latency;
 mod person;
 mod random;
@@ -37,6 +38,10 @@ const SMALL: [&str; 14] = [
 
 /// Size of the browser's window, in which the panel is below the picture.
 const WINDOW: [u32; 2] = [360, 420];
+
+/// Script by which a page finds no WebGL2.
+const WITHOUT_WEBGL2: &str = "const get = HTMLCanvasElement.prototype.getContext; HTMLCanvasElement.prototype.getContext = \
+     function (kind, ...rest) { return kind === 'webgl2' ? null : get.call(this, kind, ...rest); }";
 
 /// A time that no step takes, on a machine that does much else.
 const LIMIT: Duration = Duration::from_secs(30);
@@ -93,9 +98,7 @@ fn the_screen_has_the_codes_of_the_png() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     let view = View::start(&room, &shipped("cornell.gltf"), &SMALL);
-    let without = "const get = HTMLCanvasElement.prototype.getContext; HTMLCanvasElement.prototype.getContext = \
-                   function (kind, ...rest) { return kind === 'webgl2' ? null : get.call(this, kind, ...rest); }";
-    for (kind, script) in [("WebGL2", ""), ("2D canvas", without)] {
+    for (kind, script) in [("WebGL2", ""), ("2D canvas", WITHOUT_WEBGL2)] {
         let mut tab = browser.tab(WINDOW);
         tab.call("Page.addScriptToEvaluateOnNewDocument", &json!({"source": script}));
         tab.open(&view.address);
@@ -147,6 +150,36 @@ fn a_light_that_is_switched_off_darkens_the_picture() {
     }
 }
 
+/// A material has the properties of its kind, and a solid where it transmits light.
+#[test]
+fn a_material_becomes_glass() {
+    let Some(mut browser) = Browser::start() else { return };
+    let room = Room::new();
+    let view = View::start(&room, &shipped("cornell-spheres.glb"), &SMALL);
+    let mut tab = opened(&mut browser, &view);
+    assert_eq!(
+        tab.labels("white"),
+        ["Alpha", "Diffuse", "Emission", "Strength, W/(sr m²)", "Exponent", "Specular"]
+    );
+    let of_glass = ["Index of refraction", "Metallic", "Roughness", "Transmission"];
+    assert_eq!(tab.labels("mirror")[4..], of_glass);
+    for (label, value) in [("Metallic", 0.0), ("Transmission", 0.5)] {
+        tab.set_material("mirror", label, value);
+        tab.wait(SETTLED, LIMIT);
+    }
+    assert_eq!(tab.labels("mirror")[7..], ["Solid, not a thin wall", "Transmission"]);
+    for (label, value) in
+        [("Solid, not a thin wall", 1.0), ("Transmission", 1.0), ("Index of refraction", 2.5)]
+    {
+        tab.set_material("mirror", label, value);
+        tab.wait(SETTLED, LIMIT);
+    }
+    let changes = "photoncard.state.changes.map(({name, value}) => `${name}=${value}`).join(' ')";
+    let expected = "mirror.metallic=0 mirror.transmission=1 mirror.thickness=1 mirror.ior=2.5";
+    assert_eq!(tab.value(changes), expected);
+    check_saved(&room, &mut tab, "glass");
+}
+
 #[test]
 fn two_pages_look_and_one_steers() {
     let Some(mut browser) = Browser::start() else { return };
@@ -190,6 +223,16 @@ fn a_page_of_another_origin_is_refused() {
     opened(&mut browser, &view);
 }
 
+/// Bytes that the page may hold more after many actions: a small picture, and the last measurements.
+const MAX_PAGE: u64 = 8 << 20;
+/// Bytes that the command may hold more: tiles of two pictures and three films of 700x500 pixels, which is the largest window, each
+/// pixel with its layers. Tiles that were kept after each action would take more.
+const MAX_COMMAND: u64 = 5 * 700 * 500 * 112;
+
+fn check_memory((whose, after, before): (&str, u64, u64), limit: u64) {
+    assert!(after <= before + limit, "the {whose} holds {after} bytes, and held {before}");
+}
+
 #[test]
 fn five_hundred_random_actions_end_at_the_exact_picture() {
     let Some(mut browser) = Browser::start() else { return };
@@ -200,10 +243,15 @@ fn five_hundred_random_actions_end_at_the_exact_picture() {
     let options = [&SMALL[..], &["--card", "emulated:1", "--card", &remote]].concat();
     let view = View::start(&room, "two-lights.gltf", &options);
     let mut tab = opened(&mut browser, &view);
+    let (page, command) = (tab.memory(), view.memory());
     random::act(&room, &mut tab, &mut cards, 500);
     tab.choose("layer", "radiance");
     tab.wait(SETTLED, LIMIT);
     check_saved(&room, &mut tab, "last");
+    check_memory(("page", tab.memory(), page), MAX_PAGE);
+    if let (Some(after), Some(before)) = (view.memory(), command) {
+        check_memory(("command", after, before), MAX_COMMAND);
+    }
     // Errors of the network are the sockets that were closed.
     tab.faults.retain(|fault| !fault.contains("WebSocket"));
     assert_eq!(tab.faults, [""; 0]);

@@ -25,6 +25,10 @@ pub(crate) trait Person {
     fn fill_window(&mut self);
     /// Turns the switch of a light.
     fn switch(&mut self, light: &str);
+    /// Labels of a material's fields, as far as they are shown.
+    fn labels(&mut self, material: &str) -> Vec<String>;
+    /// Changes a field of a material, by its label, or turns a switch.
+    fn set_material(&mut self, material: &str, label: &str, value: f64);
     /// Takes over the steering, if another page has it.
     fn take_over(&mut self);
     /// Saves the picture. Returns the command line that the page shows.
@@ -84,6 +88,25 @@ impl Person for Tab {
         self.wait(&format!("photoncard.state.version > {version}"), LIMIT);
     }
 
+    fn labels(&mut self, material: &str) -> Vec<String> {
+        let shown = self.value(&format!(
+            "{}.filter(label => !label.hidden).map(label => label.firstChild.textContent || label.textContent)",
+            labels_of(material)
+        ));
+        serde_json::from_value(shown).unwrap()
+    }
+
+    fn set_material(&mut self, material: &str, label: &str, value: f64) {
+        let version = self.value("photoncard.state.version");
+        self.value(&format!(
+            "(input => {{ if (input.type === 'checkbox') return input.click(); input.value = {value}; \
+             input.dispatchEvent(new Event('input', {{bubbles: true}})); }})\
+             ({}.find(label => label.textContent.startsWith('{label}')).querySelector('input'))",
+            labels_of(material)
+        ));
+        self.wait(&format!("photoncard.state.version > {version}"), LIMIT);
+    }
+
     fn take_over(&mut self) {
         self.wait("photoncard.scene", LIMIT);
         self.value("document.getElementById('spectator').hidden || document.getElementById('steer').click()");
@@ -119,6 +142,14 @@ impl Person for Tab {
         assert!(walls.iter().any(|[red, green, _]| *red > 1.5 * green), "{walls:?}");
         assert!(walls.iter().any(|[red, green, _]| *green > 1.5 * red), "{walls:?}");
     }
+}
+
+/// Labels of a material's fields, as an expression.
+fn labels_of(material: &str) -> String {
+    format!(
+        "[...[...document.querySelectorAll('#materials details')].find(one => \
+         one.querySelector('summary').textContent === '{material}').querySelectorAll('label')]"
+    )
 }
 
 /// The mean of what pixels lack to white.

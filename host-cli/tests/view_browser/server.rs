@@ -30,6 +30,13 @@ impl View {
         Self { process, address: address.expect("the command prints the address of its page") }
     }
 
+    /// Bytes of memory that the command holds; `None` where the system does not tell.
+    pub(crate) fn memory(&self) -> Option<u64> {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).ok()?;
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+        Some(1024 * line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?)
+    }
+
     /// Address of the socket, as a page would have it.
     pub(crate) fn socket(&self) -> String {
         self.address.replace("http://", "ws://").replace("/?", "/socket?")

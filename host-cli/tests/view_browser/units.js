@@ -1,6 +1,7 @@
 // Properties of the page's modules that need no picture. The value is a list of what does not hold.
 (async () => {
     const camera = await import("/camera.js");
+    const { Pace } = await import("/pace.js");
     const { Picture } = await import("/picture.js");
     const { decoded } = await import("/tiles.js");
     const tone = await import("/tone.js");
@@ -40,14 +41,14 @@
     check(camera.shortest(0.1) === "0.1" && camera.shortest(-2) === "-2", "short numbers stay short");
     check(camera.projected({ position: [0, 0, 0], look_at: [0, 0, -1], fov: 40 }, [0, 0, 1], [9, 9]) === null, "nothing is behind");
 
-    // Tiles: [version, step, x, y, columns, rows, samples, card] and pixels.
+    // Tiles: [version, step, x, y, columns, rows, samples, card, gathers, records, lines] and pixels.
     const message = (head, pixels) => {
-        const buffer = new ArrayBuffer(32 + 4 * pixels.length);
+        const buffer = new ArrayBuffer(44 + 4 * pixels.length);
         head.forEach((word, at) => new DataView(buffer).setUint32(4 * at, word, true));
-        pixels.forEach((value, at) => new DataView(buffer).setFloat32(32 + 4 * at, value, true));
+        pixels.forEach((value, at) => new DataView(buffer).setFloat32(44 + 4 * at, value, true));
         return buffer;
     };
-    check(decoded(new ArrayBuffer(31)) === null && decoded(message([1, 1, 0, 0, 2, 2, 1, 0], [0])) === null, "lengths are checked");
+    check(decoded(new ArrayBuffer(43)) === null && decoded(message([1, 1, 0, 0, 2, 2, 1, 0], [0])) === null, "lengths are checked");
     check(decoded(message([1, 0, 0, 0, 1, 1, 1, 0], [1, 2, 3])) === null, "a step of 0 is refused");
     const picture = new Picture([5, 3]);
     const coarse = [1, 2, 3, 4, 5, 6].flatMap(value => [value, value, value]);
@@ -59,8 +60,38 @@
     check(!picture.put(decoded(message([7, 2, 0, 0, 3, 2, 1, 0], coarse))), "a coarser one of the same picture is left");
     check(reds() === "112231122344559", `one pixel is finer: ${reds()}`);
     check(!picture.put(decoded(message([8, 1, 5, 0, 1, 1, 1, 0], [9, 9, 9]))), "a tile outside is left");
+    check(picture.whole.version === 7 && picture.whole.step === 2 && !picture.isFirst, "the last whole picture is known");
+
+    // Marks of an overlay: those of new tiles, whose greatest one counts.
+    picture.mark(({ gathers, lines }) => [lines >= 0 ? lines : gathers, 99]);
+    check(picture.greatest < 0 && picture.markAt([0, 0]) < 0, "another overlay begins without marks");
+    picture.restart(7);
+    const heads = [[7, 1, 0, 0, 5, 2, 1, 0, 50, 0, 0xffffffff], [7, 1, 0, 2, 5, 1, 1, 0, 20, 0, 40], [8, 1, 0, 0, 5, 3, 1, 0, 10, 0, 0xffffffff]];
+    const marked = heads.map(head => {
+        picture.put(decoded(message(head, Array(3 * head[4] * head[5]).fill(1))));
+        return [picture.markAt([3, 1]), picture.markAt([3, 2]), picture.markAt([0, 1]), picture.greatest].join();
+    });
+    check(marked.join(" ") === "50,-1,99,50 50,99,99,50 10,10,99,10", `marks are those of tiles: ${marked.join(" ")}`);
+    picture.data[4 * 14] = 9;
     picture.resize([10, 3]);
     check(picture.data[4 * 29] === 9 && picture.data.length === 120, "another size stretches the picture");
+
+    // What can wait is drawn once, later, and what cannot in the next frame.
+    const drawn = [];
+    const pace = new Pace(() => drawn.push(performance.now()));
+    const frames = count => count === 0 ? null : new Promise(requestAnimationFrame).then(() => frames(count - 1));
+    pace.soon();
+    pace.soon();
+    await frames(2);
+    check(drawn.length === 1 && !pace.isWaiting, "one of several wishes is granted");
+    for (let round = 0; round < 5; round++) pace.later();
+    check(pace.isWaiting, "a drawing that can wait is not forgotten");
+    while (pace.isWaiting) await frames(1);
+    check(drawn.length === 2 && drawn[1] - drawn[0] >= 99, `it waits: ${drawn}`);
+    pace.later();
+    pace.soon();
+    await frames(2);
+    check(drawn.length === 3 && !pace.isWaiting, "one that cannot wait takes its place");
 
     // Tone mapping, with the values that `photoncard tonemap` has.
     const grey = (curve, value) => tone.codes([value, value, value], { mode: tone.MODES.light, scale: 1, curve })[1];
@@ -71,6 +102,9 @@
     check(grey("reinhard", NaN) === 0, "what is no number is black");
     const lit = new Float32Array([1, 1, 1, 0, 4, 4, 4, 0, 0, 0, 0, 0, Infinity, 1, 1, 0]);
     check(near(tone.automaticScale(lit), 0.09, 1e-8), "the log-average of lit pixels becomes middle grey");
+    const mapped = (overlay, mark) => tone.marked([100, 100, 100], mark, { overlay, greatest: 8 }).join();
+    check(mapped(tone.OVERLAYS.none, 3) === "100,100,100" && mapped(tone.OVERLAYS.heat, -1) === "100,100,100", "what has no mark stays");
+    check(mapped(tone.OVERLAYS.heat, 0) === "35,35,35" && mapped(tone.OVERLAYS.heat, 99) === "201,201,201", "heat is from black to white");
     check(tone.automaticScale(new Float32Array(8)) === 1, "a black picture stays");
     check([0, 1, 127, 255].every(code => {
         const hex = `#${code.toString(16).padStart(2, "0").repeat(3)}`;

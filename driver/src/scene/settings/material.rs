@@ -150,6 +150,19 @@ impl Material {
     }
 }
 
+impl Reflection {
+    /// Index of refraction, stated or that of the reflectance; `None` without a dielectric part.
+    pub fn ior(&self) -> Option<f32> {
+        match *self {
+            Self::Phong { .. } => None,
+            Self::MetallicRoughness { transmission: Some(Transmission { ior, .. }), .. } => Some(ior),
+            Self::MetallicRoughness { dielectric, grazing, .. } => {
+                Some(index_of_refraction(dielectric, grazing))
+            }
+        }
+    }
+}
+
 /// F0 of an index of refraction: `((n - 1) / (n + 1))^2`.
 fn f0(ior: f32) -> f32 {
     let amplitude = (ior - 1.0) / (ior + 1.0);

@@ -59,8 +59,9 @@ fn options(random: &mut Random) -> Vec<String> {
         options.insert(0, "--".into());
     }
     let mut named = vec![format!("--quality={quality}")];
-    let choices: [(&str, String); 14] = [
+    let choices: [(&str, String); 15] = [
         ("seed", random.below(1 << 32).to_string()),
+        ("tile", (1 + random.below(64)).to_string()),
         ("spp", (1 + random.below(64)).to_string()),
         ("gather-rays", random.below(100).to_string()),
         ("shadow-rays", random.below(9).to_string()),
@@ -111,6 +112,8 @@ fn wish(options: &ViewOptions, random: &mut Random) -> Wish {
                 Setting::Cache(false),
                 Setting::Sampling(Sampling::Mixture),
                 Setting::Order(GatherOrder::Tiled),
+                Setting::Tile(8),
+                Setting::Tile(0),
             ])),
             _ => {
                 wish.add_layers();
@@ -133,6 +136,7 @@ fn the_command_line_shown_parses_to_the_settings_of_the_view() {
         assert_eq!(settings.of_pixels(), wish.settings.of_pixels(), "{arguments:?}: {line}");
         assert_eq!(settings.photons.layout, wish.settings.photons.layout, "{line}");
         assert_eq!(settings.schedule.order, wish.settings.schedule.order, "{line}");
+        assert_eq!(settings.schedule.tile, wish.settings.schedule.tile, "{line}");
         assert_eq!(settings.picture.layers, wish.settings.picture.layers, "{line}");
         // Nothing is left to a pilot render.
         assert_eq!(render.stated(), Stated::ALL, "{line}");

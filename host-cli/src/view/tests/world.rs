@@ -152,11 +152,11 @@ impl World {
                 let sums = std::iter::repeat_n(sums, tile.pixels() as usize);
                 let tile = FinishedTile::of_pixels(tile, sums, SumFormat::ONE).unwrap();
                 let origin = job.task.origin;
-                self.view.put(origin, "card 0 (tcp:card:7000)", &tile);
+                self.view.put(origin, "card 0 (tcp:card:7000)", None, &tile);
                 // Now and then a card has lied.
                 if self.now.as_millis().is_multiple_of(64) {
                     self.view.revoke(origin, tile.tile().id);
-                    self.view.put(origin, "card 0 (tcp:card:7000)", &tile);
+                    self.view.put(origin, "card 0 (tcp:card:7000)", None, &tile);
                 }
             }
             None if job.task.work.pass == Pass::Fit => {
@@ -271,10 +271,10 @@ impl ModelPage {
         assert!(version >= self.version, "a tile of an older wish");
         self.versions += u64::from(version != self.version);
         self.version = version;
-        assert_eq!(words.len(), 8 + 3 * (columns * rows) as usize);
+        assert_eq!(words.len(), 11 + 3 * (columns * rows) as usize);
         for index in 0..columns * rows {
             let [left, top] = [x + index % columns * step, y + index / columns * step];
-            let value = words[8 + 3 * index as usize];
+            let value = words[11 + 3 * index as usize];
             for offset in 0..step * step {
                 self.pixels.insert((left + offset % step, top + offset / step), value);
             }

@@ -1,0 +1,82 @@
+//! Lines that a chip has read from its DRAM for each tile: a note beside the link, as cards and host are in one process.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::message::Fault;
+
+use super::memory_model::MeasuredMemory;
+
+/// Lines from DRAM of the tiles that a card has rendered, by tile.
+#[derive(Clone, Debug, Default)]
+pub struct TileLines(Arc<Mutex<HashMap<u32, u64>>>);
+
+impl TileLines {
+    fn note(&self, tile: u32, lines: u64) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(tile, lines);
+    }
+
+    /// Takes the lines of a tile that the card has rendered; `None` if its memory is not modelled. Of tiles in flight together each
+    /// has the lines since the end of the one before.
+    pub fn take(&self, tile: u32) -> Option<u64> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&tile)
+    }
+}
+
+/// Memory that notes the lines of each tile when it ends.
+pub(super) struct TileMeter<M> {
+    memory: M,
+    notes: TileLines,
+    /// Lines of all tiles so far.
+    counted: u64,
+}
+
+impl<M> TileMeter<M> {
+    pub(super) fn new(memory: M, notes: TileLines) -> Self {
+        Self { memory, notes, counted: 0 }
+    }
+
+    /// The memory below.
+    pub(super) fn below_mut(&mut self) -> &mut M {
+        &mut self.memory
+    }
+}
+
+impl<M: MeasuredMemory> MemoryPort for TileMeter<M> {
+    #[inline(always)]
+    fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault> {
+        self.memory.read(structure, address, used)
+    }
+
+    #[inline(always)]
+    fn enter(&mut self, stage: Stage) {
+        self.memory.enter(stage);
+    }
+
+    fn begin_tile(&mut self) {
+        self.memory.begin_tile();
+    }
+
+    fn end_tile(&mut self, tile: u32) {
+        let counted = self.memory.traffic().fetched.of_tiles(|_| true).bytes / LINE_BYTES as u64;
+        self.notes.note(tile, counted - self.counted);
+        self.counted = counted;
+    }
+}
+
+impl<M: CardMemory + MeasuredMemory> CardMemory for TileMeter<M> {
+    fn lines(&self) -> u32 {
+        self.memory.lines()
+    }
+
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        self.memory.stored(first, count)
+    }
+
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(first, lines)
+    }
+}
