@@ -51,6 +51,10 @@ impl<M: MeasuredMemory> MemoryPort for TileMeter<M> {
         self.memory.read(structure, address, used)
     }
 
+    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(first, lines)
+    }
+
     #[inline(always)]
     fn enter(&mut self, stage: Stage) {
         self.memory.enter(stage);
@@ -74,9 +78,5 @@ impl<M: CardMemory + MeasuredMemory> CardMemory for TileMeter<M> {
 
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
-    }
-
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.memory.write(first, lines)
     }
 }
