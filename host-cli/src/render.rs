@@ -36,7 +36,9 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
         let fit = if stated == Stated::ALL {
             None
         } else {
-            options.quality.fit(&scene, packed, &settings, &progress)?
+            let fit = options.quality.fit(&scene, packed, &settings, &progress)?;
+            let noise = options.samples.aim().and_then(|aim| aim.noise);
+            fit.map(|fit| noise.map_or(fit, |noise| fit.for_noise(noise)))
         };
         Ok(chosen(options, &settings, found.get_or_init(|| fit).as_ref(), &progress))
     };
