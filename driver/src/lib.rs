@@ -109,7 +109,7 @@
 //! | links | [`link`], [`session`] | ports of bytes; the host's end of the protocol, without I/O |
 //! | cards | [`emulator`] | chips on threads of this process, memory models and traces |
 //! | tiles to cards | [`scheduler`], [`dispatcher`] | which card renders which tile; finished tiles to the sinks |
-//! | sinks | [`viewer`], [`partial`], [`display`] | [`Viewer`](viewer::Viewer), the trait of sinks that show tiles; the file of finished tiles, for `--resume`; the client of a display server |
+//! | sinks | [`viewer`], [`partial`], [`parts`], [`display`] | [`Viewer`](viewer::Viewer), the trait of sinks that show tiles; the file of finished tiles, for `--resume`; parts of a picture, and their merge; the client of a display server |
 //! | cost model | [`cost_model`] | FLOPs and DRAM bytes of a frame by Table 7.1 |
 //! | render | [`render`] | one render from a scene to a complete film; settings, statistics, card addresses |
 //! | quality | [`quality`] | settings for what a picture is needed for, by pilot renders |
@@ -150,6 +150,7 @@ pub mod link;
 pub mod output;
 pub mod pack;
 pub mod partial;
+pub mod parts;
 pub mod photon;
 pub mod photon_map;
 pub mod printable;

@@ -6,6 +6,7 @@ mod files;
 mod integrator;
 mod lights;
 mod machine;
+mod merge;
 mod outputs;
 mod photons;
 mod picture;
@@ -38,6 +39,7 @@ use photoncard_shared::message::PROTOCOL_VERSION;
 use self::choice::choice;
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::lights::LightOptions;
+pub(crate) use self::merge::MergeOptions;
 pub(crate) use self::render::RenderOptions;
 pub(crate) use self::scene::SceneOptions;
 pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};
@@ -80,6 +82,8 @@ impl Arguments {
 pub(crate) enum Command {
     /// Render a glTF scene to a picture, EXR or PNG
     Render(Box<RenderOptions>),
+    /// Merge the parts of a picture, EXR or PNG, which renders with --part have written
+    Merge(MergeOptions),
     /// Walk through a scene: a page of the browser shows it while it is rendered
     View(Box<ViewOptions>),
     /// Tone-map an EXR picture to a PNG, as a render does

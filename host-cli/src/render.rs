@@ -2,6 +2,7 @@
 
 pub(crate) mod files;
 mod messages;
+pub(crate) mod part;
 
 use std::sync::OnceLock;
 use std::time::Instant;

@@ -18,7 +18,6 @@ use crate::pack::PackedScene;
 use crate::partial::PartialRender;
 use crate::photon_map::{PhotonSettings, check_image};
 use crate::scene::{FixedScene, Scene};
-use crate::scheduler::tiles;
 
 /// Finished picture.
 pub struct Rendering {
@@ -173,7 +172,7 @@ impl Renderer {
         // A film may be large: it is allocated after the settings are checked.
         let mut film = settings.film(source.sum_scale())?;
         base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
-        let tiles = tiles(settings.window(), tile, settings.schedule.order);
+        let tiles = settings.tiles(tile);
         let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
         let made = source.prepare(scene, settings, &budgets, &mut times, observer)?;
         let prepared = &kept.insert(made).prepared;

@@ -16,7 +16,8 @@ use super::tone::ToneOptions;
 pub(crate) struct OutputOptions {
     /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated
     ///
-    /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures.
+    /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures. With --part the file is OUT.part, for
+    /// photoncard merge.
     #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", required = true, value_parser = picture())]
     pub(crate) pictures: Vec<PictureOutput>,
     /// Continue a render that was stopped or has failed

@@ -3,7 +3,7 @@
 use clap::Args;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::{Quality, Stated};
-use photoncard_driver::render::{RenderSettings, TileOutputs};
+use photoncard_driver::render::{RenderSettings, Schedule, TileOutputs};
 
 use super::cards::CardOptions;
 use super::choice::choice;
@@ -13,7 +13,7 @@ use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
 use super::samples::SampleOptions;
 use super::scene::SceneOptions;
-use super::schedule::ScheduleOptions;
+use super::schedule::{PartOptions, ScheduleOptions};
 use super::threads::threads;
 
 #[derive(Args)]
@@ -33,6 +33,8 @@ pub(crate) struct RenderOptions {
     pub(crate) samples: SampleOptions,
     #[command(flatten)]
     pub(super) schedule: ScheduleOptions,
+    #[command(flatten)]
+    pub(crate) parts: PartOptions,
     #[command(flatten)]
     pub(crate) cards: CardOptions,
     #[command(flatten)]
@@ -64,7 +66,7 @@ impl RenderOptions {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),
             integrator: self.integrator.settings(&base.integrator),
-            schedule: self.schedule.settings(),
+            schedule: Schedule { part: self.parts.part, ..self.schedule.settings() },
             cards,
             outputs,
         }

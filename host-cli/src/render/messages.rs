@@ -98,9 +98,10 @@ pub(super) fn say_done(options: &RenderOptions, rendering: &Rendering) {
     if let Some(memory) = &statistics.memory {
         say_memory(memory, statistics);
     }
+    let pixels = rendering.film.pixels().len() - rendering.film.missing();
     let pictures = options.outputs.pictures.iter().map(|picture| picture.path.display().to_string());
     let pictures = pictures.collect::<Vec<_>>().join(", ");
-    say(format_args!("photoncard: {pictures}: {}", summary(statistics, rendering.film.pixels().len())));
+    say(format_args!("photoncard: {pictures}: {}", summary(statistics, pixels)));
 }
 
 /// End of a picture by passes.

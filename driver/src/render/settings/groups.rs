@@ -10,6 +10,7 @@ use crate::film::Window;
 use crate::layer::Layers;
 use crate::link::LineFaults;
 use crate::partial::PartialSettings;
+use crate::parts::Part;
 use crate::photon_map::PhotonLayout;
 use crate::render::address::CardAddress;
 use crate::scheduler::GatherOrder;
@@ -143,6 +144,8 @@ pub struct Schedule {
     pub in_flight: Option<u32>,
     /// Pixel near which tiles are rendered first; `None` to spread them over the picture. With modelled memory it has no effect.
     pub focus: Option<[u32; 2]>,
+    /// Part of the picture to render; `None` for all of it.
+    pub part: Option<Part>,
     /// `true` for one of several pictures whose samples are added ([`Renderer::refine`](crate::render::Renderer::refine)): cards keep
     /// irradiance records between them, each in its memory beyond the image. Not with `verify`, which compares the work of cards.
     pub keep_records: bool,
@@ -157,6 +160,7 @@ impl Default for Schedule {
             queue: None,
             in_flight: None,
             focus: None,
+            part: None,
             keep_records: false,
         }
     }
