@@ -99,7 +99,7 @@
 //!
 //! | layer | modules | contents |
 //! |---|---|---|
-//! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic |
+//! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign`, `heading` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic; headings of files |
 //! | tiles | [`sums`], [`sink`] | format of pixels' sums, and their values; a finished tile, and [`TileSink`](sink::TileSink), the trait of every output |
 //! | pictures | [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`] | pixels of a picture; its layers; files; comparison |
 //! | scenes | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
@@ -128,7 +128,7 @@
 //! ```
 //!
 //! Terms are defined in `docs/glossary.md`, design decisions and "how to add" lists are in `docs/architecture.md`.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 mod allocation;
 pub mod bvh;
@@ -144,6 +144,7 @@ pub mod exr;
 pub mod film;
 mod fold;
 mod foreign;
+mod heading;
 pub mod layer;
 mod light;
 pub mod link;

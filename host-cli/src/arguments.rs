@@ -10,6 +10,8 @@ mod merge;
 mod outputs;
 mod photons;
 mod picture;
+mod prepare;
+mod prepared;
 mod render;
 mod samples;
 mod scene;
@@ -40,6 +42,7 @@ use self::choice::choice;
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::lights::LightOptions;
 pub(crate) use self::merge::MergeOptions;
+pub(crate) use self::prepare::PrepareOptions;
 pub(crate) use self::render::RenderOptions;
 pub(crate) use self::scene::SceneOptions;
 pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};
@@ -73,7 +76,7 @@ impl Arguments {
         let given = std::env::args_os();
         Self::try_parse().unwrap_or_else(|error| {
             let escaped = given.map(|argument| printable(&argument.to_string_lossy()).into_owned());
-            Self::try_parse_from(escaped).err().unwrap_or(error).exit()
+            prepared::with_remedy(Self::try_parse_from(escaped).err().unwrap_or(error)).exit()
         })
     }
 }
@@ -82,6 +85,8 @@ impl Arguments {
 pub(crate) enum Command {
     /// Render a glTF scene to a picture, EXR or PNG
     Render(Box<RenderOptions>),
+    /// Prepare a scene: write its card image, with photon map and settings, for photoncard render --prepared
+    Prepare(Box<PrepareOptions>),
     /// Merge the parts of a picture, EXR or PNG, which renders with --part have written
     Merge(MergeOptions),
     /// Walk through a scene: a page of the browser shows it while it is rendered

@@ -12,7 +12,7 @@
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
 //! | `progress` | progress of a render |
-//! | `render`, `merge`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
+//! | `render` (and `prepare`), `merge`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render from Rust, use
 //! `photoncard_driver` directly.
@@ -50,6 +50,7 @@ fn main() -> ExitCode {
     report::lay_out_errors();
     let result = match &arguments.command {
         Command::Render(options) => render::run(options),
+        Command::Prepare(options) => render::prepare::run(options),
         Command::Merge(options) => merge::run(options),
         Command::View(options) => view::run(options),
         Command::Tonemap(options) => tonemap::run(options),

@@ -3,20 +3,23 @@
 pub(crate) mod files;
 mod messages;
 pub(crate) mod part;
+pub(crate) mod prepare;
+mod prepared;
 
 use std::sync::OnceLock;
 use std::time::Instant;
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::quality::{Fit, Stated};
+use photoncard_driver::quality::{Fit, Measured, Quality, Stated};
 use photoncard_driver::render::{
-    CardAddress, Integrator, Passes, PhotonMaps, RenderError, RenderSettings, Renderer, render_chosen,
+    CardAddress, Integrator, NamedSettings, Passes, PhotonMaps, RenderError, RenderSettings, Renderer,
+    Rendering, render_chosen,
 };
 use photoncard_driver::scene::{FixedScene, Scene};
 use serde_json::json;
 
-use crate::arguments::RenderOptions;
+use crate::arguments::{RenderOptions, SceneOptions};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::input;
@@ -24,6 +27,9 @@ use crate::progress::Progress;
 
 /// Renders a scene, and writes the picture and all other requested outputs.
 pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
+    if options.prepared.prepared {
+        return prepared::run(options);
+    }
     let mut settings = options.settings();
     files::check(options)?;
     let start = Instant::now();
@@ -51,27 +57,10 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
         Ok((rendering, Some(messages::End { noise, passes: count, ended_by })))
     })?;
     progress.finish();
-    let (mut rendering, end) = result.inspect_err(|error: &RenderError| {
-        if !error.is_input() && progress.has_kept() {
-            let path = options.outputs.partial_path();
-            say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
-        }
-    })?;
-    rendering.statistics.time_s.scene = scene_seconds;
-    rendering.statistics.time_s.total += scene_seconds;
-    let provenance = &mut rendering.statistics.provenance;
-    provenance.pixels.extend(input::provenance(&options.scene));
-    provenance.work.insert("quality".to_owned(), json!(options.quality.name()));
-    provenance.work.insert("threads".to_owned(), json!(options.threads));
+    let (rendering, end) = result.inspect_err(|error| say_kept(options, error, &progress))?;
+    let (inputs, quality) = (input::provenance(&options.scene), options.quality);
     let pilot = found.into_inner().flatten().map(|fit| fit.measured);
-    provenance.work.insert("pilot".to_owned(), json!(pilot));
-    files::write(options, &rendering)?;
-    if let Some(partial) = rendering.partial.take().filter(|_| !options.samples.keep_samples) {
-        partial.remove().map_err(Failure::work)?;
-    }
-    if !options.quiet {
-        messages::say_done(options, &rendering);
-    }
+    finish(options, Finished { rendering, scene_seconds, inputs, quality, pilot })?;
     let Some(end) = end else { return Ok(()) };
     if !options.quiet {
         messages::say_end(&end);
@@ -80,6 +69,45 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
         // The picture that was asked for until then is written.
         None | Some(RenderError::Stopped) => Ok(()),
         Some(error) => Err(error.into()),
+    }
+}
+
+/// A finished render, and what its provenance says beside.
+struct Finished {
+    rendering: Rendering,
+    /// Time of reading, seconds.
+    scene_seconds: f64,
+    /// Inputs by their names.
+    inputs: NamedSettings,
+    quality: Quality,
+    pilot: Option<Measured>,
+}
+
+/// Writes the outputs of a finished render.
+fn finish(options: &RenderOptions, finished: Finished) -> Result<(), Failure> {
+    let Finished { mut rendering, scene_seconds, inputs, quality, pilot } = finished;
+    rendering.statistics.time_s.scene = scene_seconds;
+    rendering.statistics.time_s.total += scene_seconds;
+    let provenance = &mut rendering.statistics.provenance;
+    provenance.pixels.extend(inputs);
+    provenance.work.insert("quality".to_owned(), json!(quality.name()));
+    provenance.work.insert("threads".to_owned(), json!(options.threads));
+    provenance.work.insert("pilot".to_owned(), json!(pilot));
+    files::write(options, &rendering)?;
+    if let Some(partial) = rendering.partial.take().filter(|_| !options.samples.keep_samples) {
+        partial.remove().map_err(Failure::work)?;
+    }
+    if !options.quiet {
+        messages::say_done(options, &rendering);
+    }
+    Ok(())
+}
+
+/// Says where the finished tiles of a render are that has failed or was stopped.
+fn say_kept(options: &RenderOptions, error: &RenderError, progress: &Progress) {
+    if !error.is_input() && progress.has_kept() {
+        let path = options.outputs.partial_path();
+        say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
     }
 }
 
@@ -104,16 +132,22 @@ fn chosen(
 fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
     // The image must fit every card.
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
-    let mut scene = input::load(&options.scene, dram_bytes)?;
-    for assignment in &options.scene.assignments {
-        scene.apply(assignment).map_err(Failure::input)?;
-    }
-    scene.check_light().map_err(Failure::input)?;
+    let scene = scene_of(&options.scene, dram_bytes)?;
     let camera = settings.camera(&scene)?;
     let misfit = options.picture.fit(&camera, &mut settings.picture);
     if !options.quiet {
         messages::say_loaded(options, settings, &scene, &camera, misfit);
     }
+    Ok(scene)
+}
+
+/// The scene of the options, with its assignments, for cards of `dram_bytes`.
+fn scene_of(options: &SceneOptions, dram_bytes: u32) -> Result<Scene, Failure> {
+    let mut scene = input::load(options, dram_bytes)?;
+    for assignment in &options.assignments {
+        scene.apply(assignment).map_err(Failure::input)?;
+    }
+    scene.check_light().map_err(Failure::input)?;
     Ok(scene)
 }
 

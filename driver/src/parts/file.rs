@@ -1,25 +1,21 @@
 //! The file of a part.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use photoncard_shared::checksum::checksum;
 use photoncard_shared::message::Tile;
 
 use super::error::{PartError, VERSION};
 use super::head::{PartHead, PartPicture};
 use crate::film::Film;
+use crate::heading::{HeadingFault, Kind};
 use crate::output::{OutputError, PendingFile};
 use crate::partial::records::{decode, record, record_bytes};
 use crate::sink::FinishedTile;
 
-/// Beginning of the first line in all versions; the version's number follows.
-const FAMILY: &str = "photoncard part ";
-/// Maximum length of the first line: a number of 10 digits and the line feed.
-const MAX_TITLE: u64 = FAMILY.len() as u64 + 11;
-/// Maximum length of the head, bytes.
-const MAX_HEAD: u64 = 1 << 20;
+/// Kind of the file.
+const KIND: Kind = Kind { name: "photoncard part", version: VERSION };
 
 /// Writes the part of the head from a film that has its pixels, whole or not at all.
 ///
@@ -28,9 +24,7 @@ const MAX_HEAD: u64 = 1 << 20;
 pub fn write(path: &Path, head: &PartHead, film: &Film) -> Result<(), PartError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
     let mut file = io::BufWriter::new(PendingFile::create(path)?);
-    let text = serde_json::to_string(head).map_err(|error| failed(error.into()))?;
-    let mut bytes = format!("{FAMILY}{VERSION}\n{text}\n").into_bytes();
-    bytes.extend(checksum(&bytes).to_le_bytes());
+    let bytes = KIND.heading(head).map_err(|error| failed(error.into()))?;
     file.write_all(&bytes).map_err(failed)?;
     // A finished render has all pixels of its part.
     for tile in head.part.patches(film.window()).iter().filter_map(|patch| film.finished(patch)) {
@@ -61,28 +55,14 @@ impl PartFile {
             return Err(unreadable(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
         }
         let mut reader = BufReader::new(File::open(path).map_err(unreadable)?);
-        let mut bytes = Vec::new();
-        reader.by_ref().take(MAX_TITLE).read_until(b'\n', &mut bytes).map_err(unreadable)?;
-        check_title(path, &bytes)?;
-        let title = bytes.len();
-        reader.by_ref().take(MAX_HEAD).read_until(b'\n', &mut bytes).map_err(unreadable)?;
-        let mut sum = [0; 4];
-        if let Err(error) = reader.read_exact(&mut sum) {
-            return Err(if error.kind() == io::ErrorKind::UnexpectedEof {
-                damaged("it ends within its head")
-            } else {
-                unreadable(error)
-            });
-        }
-        if checksum(&bytes).to_le_bytes() != sum {
-            return Err(damaged("its head has another checksum"));
-        }
-        let head: Option<PartHead> = bytes.get(title..).and_then(|text| serde_json::from_slice(text).ok());
-        let picture = head.as_ref().and_then(PartHead::picture);
-        let (Some(head), Some(picture)) = (head, picture) else {
-            return Err(damaged("its head is of no picture"));
-        };
-        let bytes = [(bytes.len() + sum.len()) as u64, found.len()];
+        let (head, bytes): (PartHead, u64) = KIND.read(&mut reader).map_err(|fault| match fault {
+            HeadingFault::Foreign => PartError::Foreign { path: path.to_owned() },
+            HeadingFault::Version(found) => PartError::Version { path: path.to_owned(), found },
+            HeadingFault::Damaged(fault) => damaged(fault),
+            HeadingFault::Unreadable(source) => unreadable(source),
+        })?;
+        let picture = head.picture().ok_or_else(|| damaged("its head is of no picture"))?;
+        let bytes = [bytes, found.len()];
         Ok(Self { path: path.to_owned(), head, picture, bytes })
     }
 
@@ -125,16 +105,5 @@ impl PartFile {
             put(decode(&bytes, patch, self.picture.format).ok_or_else(damaged)?)?;
         }
         Ok(())
-    }
-}
-
-/// Checks the first line.
-fn check_title(path: &Path, line: &[u8]) -> Result<(), PartError> {
-    let number = line.strip_prefix(FAMILY.as_bytes()).and_then(|number| number.strip_suffix(b"\n"));
-    let version = number.and_then(|number| str::from_utf8(number).ok()?.parse::<u32>().ok());
-    match version {
-        Some(VERSION) => Ok(()),
-        Some(found) => Err(PartError::Version { path: path.to_owned(), found }),
-        None => Err(PartError::Foreign { path: path.to_owned() }),
     }
 }

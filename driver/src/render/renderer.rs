@@ -51,6 +51,11 @@ pub struct Renderer {
 }
 
 impl Renderer {
+    /// Renderer with the card image of a prepared scene.
+    pub(super) fn with_image(kept: Kept) -> Self {
+        Self { cards: None, kept: Some(kept) }
+    }
+
     /// Renders a picture of a scene.
     ///
     /// # Errors
@@ -224,15 +229,15 @@ fn connected<'c>(
 }
 
 /// A card image, and what it was made of.
-struct Kept {
+pub(super) struct Kept {
     /// [`Scene::checksum_without_cameras`].
-    scene: String,
-    photons: PhotonSettings,
-    prepared: Prepared,
+    pub(super) scene: String,
+    pub(super) photons: PhotonSettings,
+    pub(super) prepared: Prepared,
 }
 
 /// Origin of the card image.
-enum Source {
+pub(super) enum Source {
     /// The image of an earlier picture.
     Kept(Kept),
     /// The packed scene; its photons are to be traced.
@@ -241,7 +246,7 @@ enum Source {
 
 impl Source {
     /// Source of the image, with the settings that are stated or chosen.
-    fn new(
+    pub(super) fn new(
         scene: &FixedScene,
         settings: &RenderSettings,
         choose: Option<Choice>,
@@ -278,7 +283,7 @@ impl Source {
     ///
     /// # Errors
     /// If it does not fit a budget, the photons cannot be traced, or the observer stops the render.
-    fn prepare(
+    pub(super) fn prepare(
         self,
         scene: &FixedScene,
         settings: &RenderSettings,

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Deref;
 use std::sync::OnceLock;
 
-use super::Scene;
+use super::{Camera, Scene};
 
 /// A scene that stays as it is between pictures. What a render derives from all triangles and texels is computed once.
 #[derive(Debug)]
@@ -42,6 +42,15 @@ impl Deref for FixedScene<'_> {
 
     fn deref(&self) -> &Scene {
         &self.scene
+    }
+}
+
+impl FixedScene<'static> {
+    /// The cameras of a scene of these checksums, with cameras and without. Of the rest nothing is there but whether it is specular.
+    pub(crate) fn of_cameras(cameras: Vec<Camera>, checksums: [String; 2], is_specular: bool) -> Self {
+        let [checksum, without_cameras] = checksums.map(OnceLock::from);
+        let scene = Cow::Owned(Scene { cameras, ..Scene::default() });
+        Self { scene, checksum, without_cameras, is_specular: is_specular.into() }
     }
 }
 

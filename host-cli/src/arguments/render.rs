@@ -11,6 +11,7 @@ use super::integrator::IntegratorOptions;
 use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
+use super::prepared::PreparedOption;
 use super::samples::SampleOptions;
 use super::scene::SceneOptions;
 use super::schedule::{PartOptions, ScheduleOptions};
@@ -20,6 +21,8 @@ use super::threads::threads;
 pub(crate) struct RenderOptions {
     #[command(flatten)]
     pub(crate) scene: SceneOptions,
+    #[command(flatten)]
+    pub(crate) prepared: PreparedOption,
     /// Quality of the picture, by which the options that are not stated are chosen
     #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
     pub(crate) quality: Quality,
@@ -55,8 +58,13 @@ impl RenderOptions {
 
     /// Settings of these options, with those of the quality for a scene that is not known.
     pub(crate) fn settings(&self) -> RenderSettings {
+        self.settings_of(self.quality)
+    }
+
+    /// [`Self::settings`] with another quality.
+    pub(crate) fn settings_of(&self, quality: Quality) -> RenderSettings {
         let cards = self.cards.settings();
-        let base = self.quality.settings();
+        let base = quality.settings();
         let outputs = TileOutputs {
             // Finished passes are no tiles that a render could go on with.
             partial: self.outputs.partial().filter(|_| self.samples.aim().is_none()),

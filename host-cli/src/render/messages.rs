@@ -5,9 +5,11 @@ use std::path::Path;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{
-    MemoryStatistics, Picture, ReadStatistics, RenderError, RenderSettings, Rendering, Statistics, Times,
+    MemoryStatistics, NamedSettings, Picture, ReadStatistics, RenderError, RenderSettings, Rendering,
+    Statistics, Times,
 };
 use photoncard_driver::scene::{Camera, Scene};
+use serde_json::Value;
 
 use crate::arguments::RenderOptions;
 use crate::console::say;
@@ -31,6 +33,25 @@ pub(super) fn say_loaded(
     for notice in options.without_effect(scene).into_iter().chain(misfit) {
         say(format_args!("photoncard: {notice}"));
     }
+}
+
+/// Prints what was prepared, and the view of it.
+pub(super) fn say_prepared(
+    options: &RenderOptions,
+    settings: &RenderSettings,
+    inputs: &NamedSettings,
+    camera: &Camera,
+    misfit: Option<&String>,
+) {
+    let path = &options.scene.path;
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let scene = inputs.get("scene").and_then(Value::as_str).unwrap_or_default();
+    let RenderSettings { picture: Picture { width, height, .. }, photons, .. } = settings;
+    say(format_args!(
+        "photoncard: {name}: {scene} with {} photons, prepared; seen by '{}', {width} x {height} pixels",
+        photons.count, camera.name
+    ));
+    misfit.into_iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
 }
 
 /// Settings of a render, with those that its quality has found for the scene.

@@ -1,6 +1,7 @@
 //! The groups of settings. Defaults are the dissertation's nominal values (Table 7.1) on one emulated reference chip.
 
 use photoncard_shared::message::{Filter, Radiance, Sampling};
+use serde::{Deserialize, Serialize};
 
 use crate::display::DisplaySettings;
 use crate::emulator::EmulatedKind;
@@ -55,7 +56,8 @@ impl Default for Picture {
 }
 
 /// Photon map and caustic map.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PhotonMaps {
     /// Number of photons in the map.
     pub count: usize,
@@ -89,7 +91,8 @@ impl Default for PhotonMaps {
 }
 
 /// Estimation of light by rays.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Integrator {
     /// Seed of all random numbers, including photon paths.
     pub seed: u32,
