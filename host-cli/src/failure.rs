@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use miette::{Diagnostic, MietteDiagnostic, Report};
+use photoncard_driver::printable::printable;
 use photoncard_driver::render::RenderError;
 
 /// Failure of a command.
@@ -57,6 +58,14 @@ impl Failure {
         Self::Input(Report::new(
             MietteDiagnostic::new(text).with_help("make the folder first, or choose another"),
         ))
+    }
+
+    /// The message alone, in one line.
+    pub(crate) fn line(&self) -> String {
+        match self {
+            Self::Input(report) | Self::Work(report) => printable(&report.to_string()).into_owned(),
+            Self::Stopped(text) => (*text).to_owned(),
+        }
     }
 
     /// Exit status.

@@ -12,7 +12,7 @@
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
 //! | `progress` | progress of a render |
-//! | `render` (and `prepare`), `merge`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
+//! | `render` (and `prepare`), `merge`, `farm`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render from Rust, use
 //! `photoncard_driver` directly.
@@ -28,6 +28,7 @@ mod documents;
 mod emulate;
 mod environment;
 mod failure;
+mod farm;
 mod input;
 mod merge;
 mod outputs;
@@ -42,7 +43,8 @@ mod view;
 
 use std::process::ExitCode;
 
-use crate::arguments::{Arguments, CardCommand, Command, SceneCommand};
+use crate::arguments::{Arguments, CardCommand, Command, ProgressForm, SceneCommand};
+use crate::progress::openjd;
 
 fn main() -> ExitCode {
     // Invalid arguments end the process here, with status 2.
@@ -52,6 +54,7 @@ fn main() -> ExitCode {
         Command::Render(options) => render::run(options),
         Command::Prepare(options) => render::prepare::run(options),
         Command::Merge(options) => merge::run(options),
+        Command::Farm(command) => farm::run(command),
         Command::View(options) => view::run(options),
         Command::Tonemap(options) => tonemap::run(options),
         Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),
@@ -69,6 +72,9 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             console::say_failure(&failure);
+            if arguments.command.progress() == ProgressForm::Openjd {
+                openjd::fail(&failure);
+            }
             failure.status()
         }
     }

@@ -16,7 +16,7 @@ const MAX_COMMANDS: usize = 100;
 
 /// Merges parts to the picture, and writes it.
 pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
-    let MergeOptions { parts: paths, pictures, sample_type, tone } = options;
+    let MergeOptions { parts: paths, pictures, sample_type, tone, progress: _ } = options;
     if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
         return Err(part::needless());
     }

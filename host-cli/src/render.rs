@@ -13,7 +13,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::quality::{Fit, Measured, Quality, Stated};
 use photoncard_driver::render::{
-    CardAddress, Integrator, NamedSettings, Passes, PhotonMaps, RenderError, RenderSettings, Renderer,
+    CardAddress, Integrator, NamedSettings, Passes, Phase, PhotonMaps, RenderError, RenderSettings, Renderer,
     Rendering, render_chosen,
 };
 use photoncard_driver::scene::{FixedScene, Scene};
@@ -36,7 +36,8 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let scene = read_scene(options, &mut settings)?;
     let scene_seconds = start.elapsed().as_secs_f64();
     let progress = Progress::start(options.quiet, settings.cards.count())
-        .map_err(|error| Failure::work_error(&error))?;
+        .map_err(|error| Failure::work_error(&error))?
+        .in_form(options.progress, Phase::Tiles);
     let found = OnceLock::new();
     let choose = |packed: &PackedScene| {
         let stated = options.stated();

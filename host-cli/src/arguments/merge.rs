@@ -8,6 +8,7 @@ use photoncard_driver::exr::SampleFormat;
 
 use super::choice::choice;
 use super::files::{PictureOutput, picture};
+use super::progress::ProgressForm;
 use super::tone::ToneOptions;
 
 #[derive(Args)]
@@ -23,4 +24,7 @@ pub(crate) struct MergeOptions {
     pub(crate) sample_type: SampleFormat,
     #[command(flatten)]
     pub(crate) tone: ToneOptions,
+    /// Form of the progress, and of the message of a failure
+    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
+    pub(crate) progress: ProgressForm,
 }

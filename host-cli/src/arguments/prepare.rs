@@ -13,6 +13,7 @@ use super::files::file;
 use super::integrator::IntegratorOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
+use super::progress::ProgressForm;
 use super::scene::SceneOptions;
 use super::threads::threads;
 
@@ -41,6 +42,9 @@ pub(crate) struct PrepareOptions {
     /// Show no progress
     #[arg(long)]
     pub(crate) quiet: bool,
+    /// Form of the progress, and of the message of a failure
+    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
+    pub(crate) progress: ProgressForm,
 }
 
 impl PrepareOptions {

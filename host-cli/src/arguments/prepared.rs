@@ -4,7 +4,7 @@ use clap::Args;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
 /// Options of what is prepared.
-const OF_PREPARATION: [&str; 24] = [
+pub(crate) const OF_PREPARATION: [&str; 24] = [
     "assignments",
     "energy_compensation",
     "variant",

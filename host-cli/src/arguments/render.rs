@@ -12,6 +12,7 @@ use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
 use super::prepared::PreparedOption;
+use super::progress::ProgressForm;
 use super::samples::SampleOptions;
 use super::scene::SceneOptions;
 use super::schedule::{PartOptions, ScheduleOptions};
@@ -48,6 +49,9 @@ pub(crate) struct RenderOptions {
     /// Show no progress
     #[arg(long)]
     pub(crate) quiet: bool,
+    /// Form of the progress, and of the message of a failure
+    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
+    pub(crate) progress: ProgressForm,
 }
 
 impl RenderOptions {

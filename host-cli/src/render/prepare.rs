@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::quality::Stated;
-use photoncard_driver::render::PreparedScene;
+use photoncard_driver::render::{Phase, PreparedScene};
 use photoncard_driver::scene::FixedScene;
 use serde_json::{Map, Value, json};
 
@@ -24,7 +24,9 @@ pub(crate) fn run(options: &PrepareOptions) -> Result<(), Failure> {
     let scene = scene_of(&options.scene, budget.dram_bytes)?;
     let camera = settings.camera(&scene)?;
     options.picture.fit(&camera, &mut settings.picture);
-    let progress = Progress::start(options.quiet, 1).map_err(|error| Failure::work_error(&error))?;
+    let progress = Progress::start(options.quiet, 1)
+        .map_err(|error| Failure::work_error(&error))?
+        .in_form(options.progress, Phase::Photons);
     let said = OnceLock::new();
     let choose = |packed: &PackedScene| {
         let stated = options.stated();

@@ -5,7 +5,7 @@ use std::time::Instant;
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::Quality;
-use photoncard_driver::render::{NamedSettings, PreparedScene};
+use photoncard_driver::render::{NamedSettings, Phase, PreparedScene};
 use serde_json::Value;
 
 use super::{Finished, files, finish, messages, on_threads, say_kept};
@@ -27,7 +27,8 @@ pub(super) fn run(options: &RenderOptions) -> Result<(), Failure> {
     }
     let scene_seconds = start.elapsed().as_secs_f64();
     let progress = Progress::start(options.quiet, settings.cards.count())
-        .map_err(|error| Failure::work_error(&error))?;
+        .map_err(|error| Failure::work_error(&error))?
+        .in_form(options.progress, Phase::Tiles);
     let (mut renderer, scene) = prepared.into_renderer();
     let result = on_threads(options.threads, || renderer.render_fixed(&scene, &settings, &progress))?;
     progress.finish();
