@@ -30,8 +30,7 @@ pub(super) fn template(job: &Job) -> String {
 
 /// Name of the job, as the format allows: printable, at most 128 characters, and no expression.
 fn name(job: &Job) -> String {
-    let printable = job.name.replace("{{", "{ {");
-    let name: String = printable.chars().filter(|c| !c.is_control()).take(100).collect();
+    let name: String = job.name.chars().filter(|c| !c.is_control() && !"{}".contains(*c)).take(100).collect();
     format!("photoncard {name}")
 }
 

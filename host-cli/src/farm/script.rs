@@ -35,9 +35,9 @@ fn words(words: &[String]) -> String {
     words.iter().map(|each| format!(" {}", word(each))).collect()
 }
 
-/// A word in the quotes of a shell. No two braces follow each other: they begin an expression of Open Job Description.
+/// A word in the quotes of a shell. No two braces follow each other: they enclose expressions of Open Job Description.
 fn word(word: &str) -> String {
-    quoted(word).replace('{', "{''")
+    quoted(word).replace('{', "{''").replace('}', "}''")
 }
 
 /// The scene is prepared again by each job. Parts of another scene under its name are removed.

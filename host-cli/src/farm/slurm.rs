@@ -17,8 +17,8 @@ pub(super) fn script(job: &Job) -> String {
         r#"#!/bin/sh
 #SBATCH --requeue
 #SBATCH --open-mode=append
-# Renders {name} by Slurm: `sh SCRIPT` submits it, with further options of sbatch behind. A task that is killed is queued again, and
-# goes on with what is done.
+# Renders {name} by Slurm: `sh SCRIPT` submits it, with further options of sbatch behind. A task that fails or is killed is queued
+# again, and goes on with what is done.
 set -eu
 job=$(realpath "$0")
 cd {home}
@@ -30,12 +30,18 @@ submit() {{
     sbatch --parsable --job-name={job_name}-"$step" --output={logs}/"$step"-%j.log --kill-on-invalid-dep=yes "$@" "$job" "$step"
 }}
 
+# Queues a task again that has failed, three times at most.
+again() {{
+    [ "${{SLURM_RESTART_COUNT:-0}}" -ge 3 ] || scontrol requeue "$SLURM_JOB_ID"
+    exit 1
+}}
+
 case "${{1:-submit}}" in
 prepare) prepare ;;
 tasks)
     number=$SLURM_ARRAY_TASK_ID
     while [ "$number" -lt {tasks} ]; do
-        task "$number"
+        task "$number" || again
         number=$((number + {step}))
     done
     ;;
