@@ -60,10 +60,13 @@ impl Failure {
         ))
     }
 
-    /// The message alone, in one line.
+    /// The message and its causes, in one line.
     pub(crate) fn line(&self) -> String {
         match self {
-            Self::Input(report) | Self::Work(report) => printable(&report.to_string()).into_owned(),
+            Self::Input(report) | Self::Work(report) => {
+                let causes: Vec<String> = report.chain().map(ToString::to_string).collect();
+                printable(&causes.join(": ")).into_owned()
+            }
             Self::Stopped(text) => (*text).to_owned(),
         }
     }

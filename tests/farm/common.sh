@@ -5,6 +5,7 @@
 # OPTIONS="..."   options of photoncard render (--quality draft --size 1024x1024)
 # FRAMES=A-B      frames of the scene's animations, each in PARTS parts; without it a picture
 # KILLED=10       one of so many renders is killed
+# WITHIN=1000     milliseconds within which it is
 # PHOTONCARD=FILE the program; by default it is built
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
@@ -29,19 +30,20 @@ cat >bin/photoncard <<END
 #!/usr/bin/env bash
 "$(realpath "$PHOTONCARD")" "\$@" &
 if [ "\$1" = render ] && [ \$((RANDOM % ${KILLED:-10})) = 0 ]; then
-    sleep "0.\$((RANDOM % 900 + 100))"
-    kill -KILL \$! 2>/dev/null && echo killed >>"$work/times/\$\$"
+    sleep "0.\$(printf %03d \$((RANDOM % ${WITHIN:-1000})))"
+    kill -KILL \$! 2>/dev/null && : >"$work/times/\$\$.killed"
 fi
 wait \$!
 status=\$?
-times | tail -n 1 >>"$work/times/\$\$"
+times >"$work/times/\$\$"
 exit \$status
 END
 chmod +x bin/photoncard
 
 # Sum of what was noted, seconds.
 seconds() {
-    cat times/* | tr ' ' '\n' | sed -n 's/^\([0-9]*\)m\([0-9.]*\)s$/\1 \2/p' | awk '{ sum += 60 * $1 + $2 } END { printf "%.1f", sum }'
+    # The second line is of the processes that a shell has waited for.
+    awk -F '[ms ]+' 'FNR == 2 { sum += 60 * $1 + $2 + 60 * $3 + $4 } END { printf "%.2f", sum }' times/*
 }
 
 # One undisturbed process.
@@ -50,7 +52,7 @@ whole() {
     [ -z "${FRAMES:-}" ] || { frames=(--frames "$FRAMES"); output=whole.######.exr; }
     KILLED=0 "$PHOTONCARD" render "$scene" "${options[@]}" "${frames[@]}" -o "$output" &
     wait $!
-    times | tail -n 1 >times/whole
+    times >times/whole
     undisturbed=$(seconds)
     rm times/whole
 }
@@ -65,6 +67,6 @@ check() {
         other=out${picture#whole}
         cmp "$picture" "$other" || { echo "$1: $other is not the picture of one process" >&2; exit 1; }
     done
-    echo "$1: $parts parts${FRAMES:+ of the frames $FRAMES}, $(cat times/* | grep -c killed || true) renders killed: the pictures are those of one process"
+    echo "$1: $parts parts${FRAMES:+ of the frames $FRAMES}, $(find times -name "*.killed" | wc -l) renders killed: the pictures are those of one process"
     echo "$1: CPU time $(seconds) s, of one process $undisturbed s"
 }

@@ -19,7 +19,7 @@ worker() {
     while [ "$first" -le "$last" ]; do
         task=$((first + ${CHUNK:-10} - 1))
         [ "$task" -le "$last" ] || task=$last
-        for frame in $(frames); do
+        for frame in "${frames[@]}"; do
             tries=0
             until run render --task-param "Part=$first-$task" ${frame:+--task-param "$frame"}; do
                 tries=$((tries + 1))
@@ -31,14 +31,11 @@ worker() {
 }
 
 # Frames as parameters, or one empty word.
-frames() {
-    [ -n "${FRAMES:-}" ] || { echo; return; }
-    seq "${FRAMES%-*}" "${FRAMES#*-}" | sed 's/.*/Frame=&-&/'
-}
+frames=("")
+[ -z "${FRAMES:-}" ] || mapfile -t frames < <(seq "${FRAMES%-*}" "${FRAMES#*-}" | sed 's/.*/Frame=&-&/')
 
 log=steps.log
 run prepare
-IFS=$'\n'
 worker 1 $((parts / 2)) &
 first=$!
 worker $((parts / 2 + 1)) "$parts" &

@@ -70,7 +70,7 @@ pub enum PartError {
     #[error(transparent)]
     Film(#[from] FilmError),
     /// Error of reading a part.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}", path.display())]
     #[diagnostic(help("check that the path names a file and that it may be read"))]
     Unreadable {
         /// Path of the file.

@@ -50,7 +50,7 @@ pub enum PreparedError {
         fault: &'static str,
     },
     /// Error of reading.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}", path.display())]
     #[diagnostic(help("check that the path names a file and that it may be read"))]
     Unreadable {
         /// Path of the file.
