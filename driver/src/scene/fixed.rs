@@ -4,12 +4,16 @@ use std::borrow::Cow;
 use std::ops::Deref;
 use std::sync::OnceLock;
 
-use super::Scene;
+use photoncard_shared::checksum::Checksum;
+
+use super::{Camera, Scene};
 
 /// A scene that stays as it is between pictures. What a render derives from all triangles and texels is computed once.
 #[derive(Debug)]
 pub struct FixedScene<'a> {
     scene: Cow<'a, Scene>,
+    /// [`Scene::bulk_checksum`].
+    bulk: OnceLock<Checksum>,
     checksum: OnceLock<String>,
     without_cameras: OnceLock<String>,
     is_specular: OnceLock<bool>,
@@ -18,17 +22,27 @@ pub struct FixedScene<'a> {
 impl FixedScene<'_> {
     /// [`Scene::checksum`].
     pub fn checksum(&self) -> &str {
-        self.checksum.get_or_init(|| self.scene.checksum())
+        self.checksum.get_or_init(|| self.scene.checksum_after(self.bulk(), &self.scene.cameras))
     }
 
     /// [`Scene::checksum_without_cameras`].
     pub fn checksum_without_cameras(&self) -> &str {
-        self.without_cameras.get_or_init(|| self.scene.checksum_without_cameras())
+        self.without_cameras.get_or_init(|| self.scene.checksum_after(self.bulk(), &[]))
     }
 
     /// [`Scene::is_specular`].
     pub fn is_specular(&self) -> bool {
         *self.is_specular.get_or_init(|| self.scene.is_specular())
+    }
+
+    fn bulk(&self) -> Checksum {
+        self.bulk.get_or_init(|| self.scene.bulk_checksum()).clone()
+    }
+
+    /// Moves the cameras, or takes others: nothing that a render derives from triangles and texels is computed again.
+    pub fn set_cameras(&mut self, cameras: Vec<Camera>) {
+        self.scene.to_mut().cameras = cameras;
+        self.checksum = OnceLock::new();
     }
 
     /// The scene.
@@ -61,6 +75,7 @@ impl<'a> FixedScene<'a> {
     fn of(scene: Cow<'a, Scene>) -> Self {
         Self {
             scene,
+            bulk: OnceLock::new(),
             checksum: OnceLock::new(),
             without_cameras: OnceLock::new(),
             is_specular: OnceLock::new(),

@@ -29,6 +29,8 @@ pub(super) struct Notices {
     pub(super) blender_spots: Vec<String>,
     /// Images that cannot be read, each with its reason.
     pub(super) unreadable: Vec<String>,
+    /// True if the scene is that of a moment of its animations.
+    pub(super) moves: bool,
     /// True if the scene has no camera and received a default one.
     pub(super) framed: bool,
     /// Meshes with normals or colours that are not finite.
@@ -95,8 +97,6 @@ impl Notices {
         note(sentence, "material", &mismatched);
         let other_modes = meshes(root, |primitive| Topology::of(primitive).is_none());
         note("points and lines are ignored, only triangles are rendered", "mesh", &other_modes);
-        let morphed =
-            meshes(root, |primitive| primitive.targets.as_ref().is_some_and(|list| !list.is_empty()));
         let meshes_of = |indices: &BTreeSet<usize>| -> Vec<String> {
             indices.iter().map(|&index| mesh_name(root, index)).collect()
         };
@@ -112,9 +112,9 @@ impl Notices {
             "mesh",
             &meshes_of(tangents),
         );
-        note("morph targets are ignored, the base shape is rendered", "mesh", &morphed);
-        let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
-        note("animations are ignored, the scene is rendered as it stands", "animation", &moving);
+        let moving =
+            names("animation", &root.animations, |animation| animation.name.as_ref(), |_| !self.moves);
+        note("the scene is rendered as it stands, its animations by --frames", "animation", &moving);
         let lights = document.lights();
         let limited = names("light", lights, |light| light.name.as_ref(), |light| light.range.is_some());
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
