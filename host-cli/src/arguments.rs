@@ -3,6 +3,7 @@
 mod cards;
 mod choice;
 mod files;
+mod frames;
 mod integrator;
 mod lights;
 mod machine;
@@ -38,6 +39,7 @@ use photoncard_shared::message::PROTOCOL_VERSION;
 use self::choice::choice;
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::lights::LightOptions;
+pub(crate) use self::outputs::OutputOptions;
 pub(crate) use self::render::RenderOptions;
 pub(crate) use self::scene::SceneOptions;
 pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};

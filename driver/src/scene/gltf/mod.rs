@@ -83,5 +83,5 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory, or
 /// has no triangle with an area; or if there is no such variant. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
 pub fn load_with(path: &Path, settings: &LoadSettings) -> Result<Scene, SceneError> {
-    SceneFile::open(path, settings)?.at_rest()
+    SceneFile::open(path, settings)?.into_rest()
 }

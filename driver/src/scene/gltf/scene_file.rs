@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
+use gltf::json;
+
 use super::accessor::Source;
 use super::animation::{self, Animation, Moment, Poses};
 use super::buffers::Buffers;
@@ -51,7 +53,16 @@ impl SceneFile {
     /// # Errors
     /// If a node is not sound, the scene exceeds the cards' memory, or it has no triangle with an area.
     pub fn at_rest(&self) -> Result<Scene, SceneError> {
-        self.scene(None)
+        self.placed(self.bare.clone(), None)
+    }
+
+    /// [`Self::at_rest`] of a file that is not needed any more.
+    ///
+    /// # Errors
+    /// As [`Self::at_rest`].
+    pub fn into_rest(mut self) -> Result<Scene, SceneError> {
+        let bare = std::mem::take(&mut self.bare);
+        self.placed(bare, None)
     }
 
     /// The scene at a moment of its animations. Before the first keyframe of a channel, and after its last, its value stays. Without
@@ -60,7 +71,7 @@ impl SceneFile {
     /// # Errors
     /// As [`Self::at_rest`]; if an animation is not sound or unknown, or two that play move the same part of a node.
     pub fn at(&self, moment: &Moment) -> Result<Scene, SceneError> {
-        self.scene(Some(moment))
+        self.placed(self.bare.clone(), Some(moment))
     }
 
     /// The cameras of the scene at a moment, without its geometry; none if the file has none.
@@ -71,6 +82,11 @@ impl SceneFile {
         let buffers = Buffers::load(&self.document)?;
         let source = Source::new(&self.document, &buffers);
         nodes::cameras(&self.document, &animation::poses(&source, moment)?)
+    }
+
+    /// Returns whether the file has animations.
+    pub fn is_animated(&self) -> bool {
+        !self.document.root.animations.is_empty()
     }
 
     /// The animations of the file.
@@ -116,17 +132,17 @@ impl SceneFile {
             if node.mesh.is_some() || has_light || is_joint(index) {
                 return false;
             }
-            open.extend(node.children.iter().flatten().map(|child| child.value()));
+            open.extend(node.children.iter().flatten().map(json::Index::value));
         }
         true
     }
 
-    fn scene(&self, moment: Option<&Moment>) -> Result<Scene, SceneError> {
-        let Self { document, light_units, bare, room, unreadable, framed: _ } = self;
+    /// The scene, from what it has without its nodes.
+    fn placed(&self, mut scene: Scene, moment: Option<&Moment>) -> Result<Scene, SceneError> {
+        let Self { document, light_units, bare: _, room, unreadable, framed: _ } = self;
         let buffers = Buffers::load(document)?;
         let source = Source::new(document, &buffers);
         let poses = moment.map_or(Ok(Poses::new()), |moment| animation::poses(&source, moment))?;
-        let mut scene = bare.clone();
         let mut notices =
             Notices { unreadable: unreadable.clone(), moves: moment.is_some(), ..Notices::default() };
         nodes::place(&source, &poses, *light_units, &mut scene, &mut room.clone(), &mut notices)?;
