@@ -15,9 +15,9 @@ const INTERVAL: f32 = 0.5;
 /// Place from which the lamp hangs, length of its rod, half its side, metres, and its largest angle, radians.
 const PIVOT: Vec3 = Vec3::new(0.0, 0.98, 0.35);
 const ROD: f32 = 0.6;
-const LAMP: f32 = 0.06;
+const LAMP: f32 = 0.09;
 const SWING: f32 = 0.7;
-const LAMP_RADIANCE: [f64; 3] = [12.0, 9.0, 5.0];
+const LAMP_RADIANCE: [f64; 3] = [4.0, 3.0, 1.7];
 /// Intensity of the point light below the lamp, W/sr.
 const GLOW: f64 = 0.4;
 

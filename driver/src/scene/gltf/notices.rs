@@ -29,8 +29,6 @@ pub(super) struct Notices {
     pub(super) blender_spots: Vec<String>,
     /// Images that cannot be read, each with its reason.
     pub(super) unreadable: Vec<String>,
-    /// True if the scene is that of a moment of its animations.
-    pub(super) moves: bool,
     /// True if the scene has no camera and received a default one.
     pub(super) framed: bool,
     /// Meshes with normals or colours that are not finite.
@@ -112,9 +110,6 @@ impl Notices {
             "mesh",
             &meshes_of(tangents),
         );
-        let moving =
-            names("animation", &root.animations, |animation| animation.name.as_ref(), |_| !self.moves);
-        note("the scene is rendered as it stands, its animations by --frames", "animation", &moving);
         let lights = document.lights();
         let limited = names("light", lights, |light| light.name.as_ref(), |light| light.range.is_some());
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
@@ -135,6 +130,13 @@ impl Notices {
         }
         sentences
     }
+}
+
+/// Notice on animations, of which only the scene at rest is had.
+pub(super) fn of_animations(root: &json::Root) -> Option<String> {
+    let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
+    let sentence = "the scene is rendered as it stands, its animations by --frames";
+    (!moving.is_empty()).then(|| format!("{sentence}: {}", list("animation", &moving)))
 }
 
 /// Notice on units of lights that the exporter's name has chosen.

@@ -9,7 +9,7 @@ use super::accessor::Source;
 use super::animation::{self, Animation, Moment, Poses};
 use super::buffers::Buffers;
 use super::document::Document;
-use super::notices::Notices;
+use super::notices::{self, Notices};
 use super::room::Room;
 use super::settings::LoadSettings;
 use super::texture::Textures;
@@ -56,13 +56,15 @@ impl SceneFile {
         self.placed(self.bare.clone(), None)
     }
 
-    /// [`Self::at_rest`] of a file that is not needed any more.
+    /// [`Self::at_rest`] of a file that is not needed any more; animations are among the notices.
     ///
     /// # Errors
     /// As [`Self::at_rest`].
     pub fn into_rest(mut self) -> Result<Scene, SceneError> {
         let bare = std::mem::take(&mut self.bare);
-        self.placed(bare, None)
+        let mut scene = self.placed(bare, None)?;
+        scene.notices.extend(notices::of_animations(&self.document.root));
+        Ok(scene)
     }
 
     /// The scene at a moment of its animations. Before the first keyframe of a channel, and after its last, its value stays. Without
@@ -143,8 +145,7 @@ impl SceneFile {
         let buffers = Buffers::load(document)?;
         let source = Source::new(document, &buffers);
         let poses = moment.map_or(Ok(Poses::new()), |moment| animation::poses(&source, moment))?;
-        let mut notices =
-            Notices { unreadable: unreadable.clone(), moves: moment.is_some(), ..Notices::default() };
+        let mut notices = Notices { unreadable: unreadable.clone(), ..Notices::default() };
         nodes::place(&source, &poses, *light_units, &mut scene, &mut room.clone(), &mut notices)?;
         let file = || document.path.clone();
         match (scene.triangles.is_empty(), scene.skipped_triangles) {
