@@ -138,7 +138,7 @@ fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
 }
 
 /// The scene at rest, after it was placed at a moment of its animations.
-fn load(path: &Path) -> Result<Scene, SceneError> {
+pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
     let file = SceneFile::open(path, &LoadSettings::default())?;
     let scene = file.at_rest()?;
     let moment = Moment { animations: Vec::new(), seconds: 1.0 };
