@@ -8,7 +8,8 @@ use photoncard_driver::quality::Fit;
 use photoncard_driver::render::{Integrator, PhotonMaps, RenderError, RenderSettings, Renderer, Rendering};
 use photoncard_driver::scene::{FixedScene, Scene};
 
-use super::{Finished, assigned, chosen, dram_bytes, files, finish, messages, on_threads, say_kept, view};
+use super::steps::{Finished, assigned, chosen, dram_bytes, finish, on_threads, say_kept, view};
+use super::{files, messages};
 use crate::arguments::{OutputOptions, RenderOptions};
 use crate::failure::Failure;
 use crate::input::Input;
@@ -94,7 +95,11 @@ impl<'a> Sequence<'a> {
         self.scene_seconds += start.elapsed().as_secs_f64();
         let result = on_threads(self.options.threads, || self.picture(settings))?;
         self.progress.finish();
-        let (rendering, fit) = result.inspect_err(|error| say_kept(error, &self.progress, outputs))?;
+        let result = result.inspect_err(|error| say_kept(error, &self.progress, outputs));
+        let (rendering, fit) = result.map_err(|error| match error {
+            RenderError::Stopped => Failure::Stopped("stopped; the frames before are written"),
+            error => error.into(),
+        })?;
         let finished = Finished {
             rendering,
             scene_seconds: std::mem::take(&mut self.scene_seconds),
