@@ -88,7 +88,9 @@ fn camera(camera: &Camera) -> String {
 }
 
 fn animation(animation: &Animation) -> String {
-    let Animation { name, seconds: [begin, end], moves_only_cameras } = animation;
+    let Animation { name, seconds, moves_only_cameras } = animation;
+    // Times are of single precision in the file.
+    let [begin, end] = seconds.map(|time| time as f32);
     let moved = if *moves_only_cameras { "moves cameras alone" } else { "moves meshes or lights" };
     format!("{name}: {begin} to {end} s, {moved}")
 }

@@ -82,3 +82,30 @@ impl<'a> FixedScene<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::scene::Triangle;
+
+    fn camera(x: f32) -> Camera {
+        let [right, up, forward] = [Vec3::X, Vec3::Y, Vec3::NEG_Z];
+        let origin = Vec3::X * x;
+        Camera { name: "eye".to_owned(), origin, right, up, forward, vertical_fov: 1.0, aspect: None }
+    }
+
+    #[test]
+    fn cameras_that_are_set_are_those_of_the_scene_and_change_no_other_checksum() {
+        let triangles = vec![Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y], 0)];
+        let scene = Scene { triangles, cameras: vec![camera(0.0)], ..Scene::default() };
+        let moved = Scene { cameras: vec![camera(1.0)], ..scene.clone() };
+        let mut fixed = FixedScene::from(&scene);
+        assert_eq!(fixed.checksum(), scene.checksum());
+        fixed.set_cameras(moved.cameras.clone());
+        assert_eq!((fixed.checksum(), fixed.cameras.as_slice()), (&*moved.checksum(), &*moved.cameras));
+        assert_ne!(fixed.checksum(), scene.checksum());
+        assert_eq!(fixed.checksum_without_cameras(), scene.checksum_without_cameras());
+    }
+}
