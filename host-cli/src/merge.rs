@@ -38,8 +38,8 @@ pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
 /// Prints the commands that make the missing parts.
 fn say_missing(parts: &Parts) {
     let missing = parts.missing();
-    let Some((head, path)) = parts.any() else { return };
-    let command = |part: &Part| part::command(head, path, *part);
+    let Some(head) = parts.any() else { return };
+    let command = |part: &Part| part::command(head, *part);
     missing.iter().take(MAX_COMMANDS).for_each(|part| say(format_args!("{}", command(part))));
 }
 

@@ -67,6 +67,19 @@ impl Progress {
         }
     }
 
+    /// [`Self::start`] for frames, one after another. Without a terminal a frame tells nothing before its end.
+    pub(crate) fn of_frames(quiet: bool, cards: usize) -> std::io::Result<Self> {
+        Self::start(quiet || !std::io::stderr().is_terminal(), cards)
+    }
+
+    /// Begins the display of the next frame.
+    pub(crate) fn begin_frame(&self) {
+        self.kept.store(false, Ordering::Relaxed);
+        if let Some(mut display) = self.display() {
+            (display.phase, display.resumed) = (None, 0);
+        }
+    }
+
     /// Returns whether finished tiles are in the partial file.
     pub(crate) fn has_kept(&self) -> bool {
         self.kept.load(Ordering::Relaxed)

@@ -20,7 +20,7 @@ pub struct PartHead {
     pub settings: Map<String, Value>,
     /// Layers of the picture, as in `--aov`.
     pub layers: String,
-    /// Arguments of the command that makes the part, without the part and the name of its file.
+    /// Arguments of the command that has made the part.
     pub command: Vec<String>,
     /// Bits of the units of the sums of radiance and depth, single precision.
     pub units: [u32; 2],

@@ -69,9 +69,9 @@ impl Parts {
         self.patches.keys().filter(|part| !found.contains(part)).copied().collect()
     }
 
-    /// Head and path of one of the files.
-    pub fn any(&self) -> Option<(&PartHead, &Path)> {
-        self.files.first().map(|file| (&file.head, &*file.path))
+    /// Head of one of the files.
+    pub fn any(&self) -> Option<&PartHead> {
+        self.files.first().map(|file| &file.head)
     }
 
     /// Merges the parts. Several files of a part must have equal pixels.

@@ -43,15 +43,19 @@ pub(crate) struct PreparedOption {
 
 /// The error of arguments with a remedy, if one of them is of the preparation.
 pub(super) fn with_remedy(mut error: Error) -> Error {
-    let names_flag = |kind| match error.get(kind) {
-        Some(ContextValue::String(name)) => name == "--prepared",
-        Some(ContextValue::Strings(names)) => names.iter().any(|name| name == "--prepared"),
-        _ => false,
+    let names = |option: &str| {
+        [ContextKind::InvalidArg, ContextKind::PriorArg].into_iter().any(|kind| match error.get(kind) {
+            Some(ContextValue::String(name)) => name.starts_with(option),
+            Some(ContextValue::Strings(names)) => names.iter().any(|name| name.starts_with(option)),
+            _ => false,
+        })
     };
-    let is_refused = error.kind() == ErrorKind::ArgumentConflict
-        && (names_flag(ContextKind::InvalidArg) || names_flag(ContextKind::PriorArg));
-    if is_refused {
-        let remedy = "state it to photoncard prepare: the prepared scene depends on it";
+    if error.kind() == ErrorKind::ArgumentConflict && names("--prepared") {
+        let remedy = if names("--frames") {
+            "leave --prepared out, and give the glTF file: a prepared scene stands still"
+        } else {
+            "state it to photoncard prepare: the prepared scene depends on it"
+        };
         let remedy = ContextValue::StyledStrs(vec![remedy.into()]);
         let _ = error.insert(ContextKind::Suggested, remedy);
     }

@@ -2,11 +2,14 @@
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
-use photoncard_driver::quality::{Quality, Stated};
-use photoncard_driver::render::{RenderSettings, Schedule, TileOutputs};
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::quality::{Fit, Quality, Stated};
+use photoncard_driver::render::{Observer, RenderError, RenderSettings, Schedule, TileOutputs};
+use photoncard_driver::scene::Scene;
 
 use super::cards::CardOptions;
 use super::choice::choice;
+use super::frames::FrameOptions;
 use super::integrator::IntegratorOptions;
 use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
@@ -27,6 +30,8 @@ pub(crate) struct RenderOptions {
     /// Quality of the picture, by which the options that are not stated are chosen
     #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
     pub(crate) quality: Quality,
+    #[command(flatten)]
+    pub(crate) frames: FrameOptions,
     #[command(flatten)]
     pub(crate) picture: PictureOptions,
     #[command(flatten)]
@@ -60,6 +65,23 @@ impl RenderOptions {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
+    /// What the quality finds for a scene, unless all that it would choose is stated.
+    ///
+    /// # Errors
+    /// As [`Quality::fit`].
+    pub(crate) fn fit(
+        &self,
+        scene: &Scene,
+        packed: &PackedScene,
+        settings: &RenderSettings,
+        observer: &dyn Observer,
+    ) -> Result<Option<Fit>, RenderError> {
+        if self.stated() == Stated::ALL {
+            return Ok(None);
+        }
+        self.quality.fit(scene, packed, settings, observer)
+    }
+
     /// Settings of these options, with those of the quality for a scene that is not known.
     pub(crate) fn settings(&self) -> RenderSettings {
         self.settings_of(self.quality)
@@ -69,18 +91,22 @@ impl RenderOptions {
     pub(crate) fn settings_of(&self, quality: Quality) -> RenderSettings {
         let cards = self.cards.settings();
         let base = quality.settings();
-        let outputs = TileOutputs {
-            // Finished passes are no tiles that a render could go on with.
-            partial: self.outputs.partial().filter(|_| self.samples.aim().is_none()),
-            display: self.outputs.display(),
-        };
         RenderSettings {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),
             integrator: self.integrator.settings(&base.integrator),
             schedule: Schedule { part: self.parts.part, ..self.schedule.settings() },
             cards,
-            outputs,
+            outputs: self.tile_outputs(&self.outputs),
+        }
+    }
+
+    /// Settings of these outputs while a picture is rendered.
+    pub(crate) fn tile_outputs(&self, outputs: &OutputOptions) -> TileOutputs {
+        TileOutputs {
+            // Finished passes are no tiles that a render could go on with.
+            partial: outputs.partial().filter(|_| self.samples.aim().is_none()),
+            display: outputs.display(),
         }
     }
 }

@@ -8,8 +8,15 @@ use miette::{MietteDiagnostic, Report};
 use photoncard_shared::checksum::checksum;
 
 use super::words::Words;
-use crate::arguments::{Arguments, FarmOptions, Frames, PictureFormat};
+use crate::arguments::{Arguments, FarmOptions, PictureFormat};
 use crate::failure::Failure;
+
+/// Consecutive frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Frames {
+    pub(super) first: u32,
+    pub(super) last: u32,
+}
 
 /// Steps of a farm's work on a picture or on frames.
 pub(super) struct Job {
@@ -38,10 +45,7 @@ impl Job {
                 "give -o OUT.exr or -o OUT.png",
             ));
         }
-        let has_place = |path: &Path| path.to_string_lossy().matches('#').count() > 0;
-        if options.frames.is_some() && !pictures.iter().all(|picture| has_place(&picture.path)) {
-            return Err(refusal("an output has no place for the number of a frame", "give -o OUT.####.exr"));
-        }
+        let frames = frames(options)?;
         let given: Vec<String> = given.map(text).collect::<Result<_, _>>()?;
         let print = given.join("\n");
         let command = Arguments::command();
@@ -62,13 +66,30 @@ impl Job {
         let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let path = |path: PathBuf| text(path.into_os_string());
         let (home, folder) = (path(home)?, path(folder)?);
-        Ok(Self { name, home, folder, words, parts: options.parts, frames: options.frames })
+        Ok(Self { name, home, folder, words, parts: options.parts, frames })
     }
 
     /// Number of tasks between preparation and merge.
     pub(super) fn tasks(&self) -> u64 {
         let frames = self.frames.map_or(1, |Frames { first, last }| last - first + 1);
         u64::from(frames) * u64::from(self.parts)
+    }
+}
+
+/// The frames of options, if there are any.
+fn frames(options: &FarmOptions) -> Result<Option<Frames>, Failure> {
+    let Some(numbers) = options.render.frames.numbers() else { return Ok(None) };
+    let numbers: Vec<u32> = numbers.collect();
+    let [first, last] = [numbers.first(), numbers.last()].map(|number| number.copied().unwrap_or(0));
+    if numbers.len() as u64 != u64::from(last - first) + 1 {
+        return Err(refusal(
+            "the frames of a job follow each other",
+            "give --frames A-B, and a job for each such range",
+        ));
+    }
+    match options.render.outputs.of_frame(first) {
+        Ok(_) => Ok(Some(Frames { first, last })),
+        Err(_) => Err(refusal("an output has no place for the number of a frame", "give -o OUT.####.exr")),
     }
 }
 

@@ -2,9 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::job::Job;
+use super::job::{Frames, Job};
 use super::script::functions;
-use crate::arguments::Frames;
 
 /// The template of a job, as JSON.
 pub(super) fn template(job: &Job) -> String {

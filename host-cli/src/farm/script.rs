@@ -1,7 +1,6 @@
 //! The steps of a job as functions of a POSIX shell. Each may be repeated, also while or after it was killed.
 
-use super::job::Job;
-use crate::arguments::Frames;
+use super::job::{Frames, Job};
 use crate::shell::quoted;
 
 /// Functions `prepare`, `part` and `merge`, and `task`, which renders the task of a number from 0 on. `extra` are further options of renders. The script that

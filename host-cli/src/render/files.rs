@@ -11,22 +11,26 @@ use photoncard_driver::render::Rendering;
 use photoncard_driver::tone_mapping::{ToneMapping, write_png};
 
 use super::part;
-use crate::arguments::{PictureFormat, PictureOutput, RenderOptions, TextOutput};
+use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
 use crate::console::{print_json, printable_json};
 use crate::failure::Failure;
-use crate::{input, outputs};
+use crate::input;
 
 /// Checks that all files can be written, and that none replaces the scene, the environment or another one.
-pub(super) fn check(options: &RenderOptions) -> Result<(), Failure> {
-    part::check(options.parts.part, &options.outputs.pictures)?;
-    let mut written: Vec<&Path> = options.outputs.pictures.iter().map(|picture| &*picture.path).collect();
-    written.extend(options.outputs.stats.as_ref().and_then(TextOutput::path));
+pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
+    part::check(options.parts.part, &outputs.pictures)?;
+    let mut written: Vec<&Path> = outputs.pictures.iter().map(|picture| &*picture.path).collect();
+    written.extend(outputs.stats.as_ref().and_then(TextOutput::path));
     written.extend(options.cards.trace.as_deref());
-    outputs::check(&input::files(&options.scene), &written, &[&options.outputs.partial_path()])
+    crate::outputs::check(&input::files(&options.scene), &written, &[&outputs.partial_path()])
 }
 
 /// Writes pictures and statistics.
-pub(super) fn write(options: &RenderOptions, rendering: &Rendering) -> Result<(), Failure> {
+pub(super) fn write(
+    options: &RenderOptions,
+    outputs: &OutputOptions,
+    rendering: &Rendering,
+) -> Result<(), Failure> {
     let provenance = serde_json::to_string(&rendering.statistics.provenance.pixels);
     let provenance = printable_json(&provenance.map_err(|error| Failure::work_error(&error))?);
     let layers = options.picture.layers();
@@ -37,13 +41,13 @@ pub(super) fn write(options: &RenderOptions, rendering: &Rendering) -> Result<()
     let form = Form {
         part: options.parts.part.map(head),
         layers: layers.clone(),
-        sample_type: options.outputs.sample_type(),
-        tone: options.outputs.tone.mapping(),
+        sample_type: outputs.sample_type(),
+        tone: outputs.tone.mapping(),
     };
-    for picture in &options.outputs.pictures {
+    for picture in &outputs.pictures {
         write_picture(picture, &rendering.film, &provenance, &form)?;
     }
-    let Some(stats) = &options.outputs.stats else { return Ok(()) };
+    let Some(stats) = &outputs.stats else { return Ok(()) };
     let text = serde_json::to_string_pretty(&rendering.statistics);
     let text = text.map_err(|error| Failure::work_error(&error))?;
     match stats {

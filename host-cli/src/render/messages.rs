@@ -11,7 +11,7 @@ use photoncard_driver::render::{
 use photoncard_driver::scene::{Camera, Scene};
 use serde_json::Value;
 
-use crate::arguments::RenderOptions;
+use crate::arguments::{OutputOptions, RenderOptions};
 use crate::console::say;
 use crate::progress::duration;
 
@@ -113,16 +113,36 @@ fn ignored(path: &Path, notices: &[String]) -> Option<String> {
     Some(said)
 }
 
-/// Prints the end of a render: its pictures, its time and its samples.
-pub(super) fn say_done(options: &RenderOptions, rendering: &Rendering) {
+/// Prints the end of a picture: its files, its time, and its samples or what a frame has cost.
+pub(super) fn say_done(outputs: &OutputOptions, rendering: &Rendering, frame: Option<u32>) {
     let statistics = &rendering.statistics;
     if let Some(memory) = &statistics.memory {
         say_memory(memory, statistics);
     }
     let pixels = rendering.film.pixels().len() - rendering.film.missing();
-    let pictures = options.outputs.pictures.iter().map(|picture| picture.path.display().to_string());
+    let pictures = outputs.pictures.iter().map(|picture| picture.path.display().to_string());
     let pictures = pictures.collect::<Vec<_>>().join(", ");
-    say(format_args!("photoncard: {pictures}: {}", summary(statistics, pixels)));
+    let summary = match frame {
+        Some(frame) => format!("frame {frame}, {}", cost(statistics)),
+        None => summary(statistics, pixels),
+    };
+    say(format_args!("photoncard: {pictures}: {summary}"));
+}
+
+/// Prints the end of all frames.
+pub(super) fn say_frames(count: usize, seconds: f64) {
+    say(format_args!("photoncard: {} in {}", counted(count, "frame"), duration(seconds)));
+}
+
+/// Costs of a frame, and of what it does not share with the one before.
+fn cost(statistics: &Statistics) -> String {
+    let Statistics { time_s, link, .. } = statistics;
+    let Times { total, scene, pilot, photons, pack, load, render, .. } = time_s;
+    let sent: u64 = link.image_bytes.iter().sum();
+    let phases = [("pilot", pilot), ("scene", scene), ("photons", photons), ("card image", pack)];
+    let phases = phases.iter().filter(|(_, seconds)| **seconds >= 0.005);
+    let phases: String = phases.map(|(name, seconds)| format!("{name} {seconds:.2} s, ")).collect();
+    format!("{total:.2} s: {phases}{sent} bytes sent in {load:.2} s, tiles {render:.2} s")
 }
 
 /// End of a picture by passes.

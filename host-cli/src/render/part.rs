@@ -34,29 +34,40 @@ fn refusal(text: String, help: &str) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// Arguments of this process without the part and its file.
+/// Arguments of this process.
 pub(super) fn arguments() -> Vec<String> {
-    let given = std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned());
-    without_part(given)
+    std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-fn without_part(mut given: impl Iterator<Item = String>) -> Vec<String> {
-    let mut kept = Vec::new();
-    while let Some(argument) = given.next() {
-        match &*argument {
-            "--part" | "-o" | "--output" => drop(given.next()),
-            _ if ["--part=", "--output=", "-o"].iter().any(|option| argument.starts_with(option)) => {}
-            _ => kept.push(argument),
+/// Command that makes another part, by the head of one that is there.
+pub(crate) fn command(head: &PartHead, part: Part) -> String {
+    shell::command(with_part(head, part))
+}
+
+/// The arguments of the head with another part, the name of its file, and the frame of the head alone.
+fn with_part(head: &PartHead, part: Part) -> Vec<String> {
+    let frame = head.settings.get("frame").map(ToString::to_string);
+    let changed = |option: &str, value: &str| match option {
+        "--part" => part.to_string(),
+        "--frames" => frame.clone().unwrap_or(value.to_owned()),
+        _ => name_of(Path::new(value), head.part, part).to_string_lossy().into_owned(),
+    };
+    let mut words = Vec::new();
+    let mut given = head.command.iter();
+    while let Some(word) = given.next() {
+        let whole = ["--part=", "--frames=", "--output=", "-o"];
+        let option = whole.into_iter().find(|option| word.starts_with(option) && word.len() > option.len());
+        words.push(match option {
+            Some(option) => {
+                format!("{option}{}", changed(option.trim_end_matches('='), &word[option.len()..]))
+            }
+            None => word.clone(),
+        });
+        if ["--part", "--frames", "--output", "-o"].contains(&&**word) {
+            words.extend(given.next().map(|value| changed(word, value)));
         }
     }
-    kept
-}
-
-/// Command that makes another part, by the head and the path of one that is there.
-pub(crate) fn command(head: &PartHead, path: &Path, part: Part) -> String {
-    let name = name_of(path, head.part, part).to_string_lossy().into_owned();
-    let own = ["--part".to_owned(), part.to_string(), "-o".to_owned(), name];
-    shell::command(head.command.iter().cloned().chain(own))
+    words
 }
 
 /// Path of another part: the last number of the name that is the part's is replaced, with the zeros before it; without one the number
@@ -81,13 +92,31 @@ fn name_of(path: &Path, part: Part, other: Part) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use photoncard_driver::film::{Film, SumFormat, Window};
+    use photoncard_driver::layer::Layers;
+
     use super::*;
 
     #[test]
     fn the_command_of_a_part_is_that_of_another_with_other_names() {
-        let given = "render a.gltf --part 1/8 --spp 4 -o a.part --output=b -oc --quiet".split(' ');
-        let kept = without_part(given.map(str::to_owned));
-        assert_eq!(kept, ["render", "a.gltf", "--spp", "4", "--quiet"]);
+        let film = Film::new(1, 1, Window::full(1, 1), SumFormat::ONE).unwrap();
+        let head = |frame: Option<u32>, line: &str| {
+            let settings = frame.map(|frame| ("frame".to_owned(), frame.into())).into_iter().collect();
+            let command = line.split(' ').map(str::to_owned).collect();
+            PartHead::new(Part::new(1, 8).unwrap(), &film, settings, &Layers::default(), command)
+        };
+        for (frame, given, expected) in [
+            (
+                None,
+                "render a.gltf --part 1/8 --spp 4 -o a.1.part -q",
+                "render a.gltf --part 2/8 --spp 4 -o a.2.part -q",
+            ),
+            (None, "render --output=1.part --part=1/8", "render --output=2.part --part=2/8"),
+            (Some(7), "render --frames 1-9 -o##.1.part", "render --frames 7 -o##.2.part"),
+        ] {
+            let words = with_part(&head(frame, given), Part::new(2, 8).unwrap());
+            assert_eq!(words.join(" "), expected);
+        }
         let [part, other] = [3, 12].map(|number| Part::new(number, 16).unwrap());
         for (name, expected) in [
             ("a.3.part", "a.12.part"),

@@ -9,7 +9,8 @@ use photoncard_driver::render::{Phase, PreparedScene};
 use photoncard_driver::scene::FixedScene;
 use serde_json::{Map, Value, json};
 
-use super::{messages, on_threads, scene_of};
+use super::messages;
+use super::steps::{assigned, on_threads};
 use crate::arguments::PrepareOptions;
 use crate::console::say;
 use crate::failure::Failure;
@@ -21,7 +22,7 @@ pub(crate) fn run(options: &PrepareOptions) -> Result<(), Failure> {
     outputs::check(&input::files(&options.scene), &[&options.output], &[])?;
     let mut settings = options.settings();
     let budget = options.card.budget();
-    let scene = scene_of(&options.scene, budget.dram_bytes)?;
+    let scene = assigned(&options.scene, input::load(&options.scene, budget.dram_bytes)?)?;
     let camera = settings.camera(&scene)?;
     options.picture.fit(&camera, &mut settings.picture);
     let progress = Progress::start(options.quiet, 1)

@@ -8,14 +8,15 @@ use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{NamedSettings, Phase, PreparedScene};
 use serde_json::Value;
 
-use super::{Finished, files, finish, messages, on_threads, say_kept};
+use super::steps::{Finished, finish, on_threads, say_kept};
+use super::{files, messages};
 use crate::arguments::RenderOptions;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
 /// Renders a prepared scene, and writes the picture and all other requested outputs.
 pub(super) fn run(options: &RenderOptions) -> Result<(), Failure> {
-    files::check(options)?;
+    files::check(options, &options.outputs)?;
     let start = Instant::now();
     let prepared = PreparedScene::open(&options.scene.path).map_err(Failure::input)?;
     let (quality, inputs) = notes(options, &prepared)?;
@@ -32,8 +33,9 @@ pub(super) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let (mut renderer, scene) = prepared.into_renderer();
     let result = on_threads(options.threads, || renderer.render_fixed(&scene, &settings, &progress))?;
     progress.finish();
-    let rendering = result.inspect_err(|error| say_kept(options, error, &progress))?;
-    finish(options, Finished { rendering, scene_seconds, inputs, quality, pilot: None })
+    let rendering = result.inspect_err(|error| say_kept(error, &progress, &options.outputs))?;
+    let finished = Finished { rendering, scene_seconds, inputs, quality, fit: None, frame: None };
+    finish(options, &options.outputs, finished)
 }
 
 /// Quality and inputs of a prepared scene.

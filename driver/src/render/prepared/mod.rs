@@ -107,7 +107,7 @@ impl PreparedScene {
         RenderSettings { photons, integrator, ..settings }
     }
 
-    /// Renderer of the prepared scene, and the scene that it renders with [`Renderer::render_fixed`] by [`Self::settings`].
+    /// Renderer of the prepared scene, and the scene that it renders with [`Renderer::render_fixed`] by [`Self::settings`], whose cameras stay.
     pub fn into_renderer(self) -> (Renderer, FixedScene<'static>) {
         (Renderer::with_image(self.kept), self.scene)
     }
