@@ -212,6 +212,22 @@ fn progress_and_failure_are_lines_of_open_job_description() {
     assert!(outcome.stdout.starts_with("openjd_fail: cannot read absent.part"), "{}", outcome.stdout);
 }
 
+#[test]
+fn frames_of_a_job_are_those_of_one_render() {
+    let (room, _) = room();
+    std::fs::copy(shipped("cornell-moving.glb"), room.path(FOLDER).join(SCENE)).unwrap();
+    let frames = [&["--frames", "8-10", "--fps", "12"], &OPTIONS[..]].concat();
+    let whole = run(&room, &[&["render", SCENE, "-o", "whole.##.exr"], &frames[..]].concat());
+    assert_eq!(whole.status, Some(0), "{}", whole.stderr);
+    let own = ["farm", "parallel", SCENE, "--parts", "2", "-o", "it's out.##.exr"];
+    let script = run(&room, &[&own[..], &frames].concat()).stdout;
+    by_hand(&room, &script);
+    for frame in ["08", "09", "10"] {
+        let read = |name: &str| std::fs::read(room.path(FOLDER).join(format!("{name}.{frame}.exr"))).unwrap();
+        assert!(read("it's out") == read("whole"), "{frame}");
+    }
+}
+
 /// Tasks of frames name the frame, and its pictures are merged one by one.
 #[test]
 fn frames_are_tasks_of_their_own() {

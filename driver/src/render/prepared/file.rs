@@ -6,9 +6,9 @@ use std::path::Path;
 
 use photoncard_shared::address::LINE_BYTES;
 
-use super::PreparedScene;
 use super::error::{PreparedError, VERSION};
 use super::head::{Head, checksum};
+use super::scene::PreparedScene;
 use crate::heading::{HeadingFault, Kind};
 use crate::output::{OutputError, PendingFile};
 use crate::pack::{CardImage, MappedLines};
@@ -19,8 +19,25 @@ pub(super) const KIND: Kind = Kind { name: "photoncard prepared scene", version:
 /// Multiple of bytes at which the lines begin: a page of memory, and so a line.
 const PAGE: u64 = 4096;
 
-/// Writes a prepared scene.
-pub(super) fn write(scene: &PreparedScene, path: &Path) -> Result<(), PreparedError> {
+impl PreparedScene {
+    /// Writes the prepared scene, whole or not at all.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), PreparedError> {
+        write(self, path)
+    }
+
+    /// Opens a prepared scene.
+    ///
+    /// # Errors
+    /// If the file is none, of another version of format or program, damaged or unreadable.
+    pub fn open(path: &Path) -> Result<Self, PreparedError> {
+        open(path)
+    }
+}
+
+fn write(scene: &PreparedScene, path: &Path) -> Result<(), PreparedError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
     let mut bytes = KIND.heading(&Head::new(scene)).map_err(|error| failed(error.into()))?;
     bytes.resize(bytes.len().next_multiple_of(PAGE as usize), 0);
@@ -31,8 +48,7 @@ pub(super) fn write(scene: &PreparedScene, path: &Path) -> Result<(), PreparedEr
     Ok(file.into_inner().map_err(|error| failed(error.into_error()))?.commit()?)
 }
 
-/// Opens a prepared scene.
-pub(super) fn open(path: &Path) -> Result<PreparedScene, PreparedError> {
+fn open(path: &Path) -> Result<PreparedScene, PreparedError> {
     let unreadable = |source| PreparedError::Unreadable { path: path.to_owned(), source };
     let damaged = |fault| PreparedError::Damaged { path: path.to_owned(), fault };
     let found = std::fs::metadata(path).map_err(unreadable)?;

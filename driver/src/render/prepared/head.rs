@@ -9,7 +9,7 @@ use photoncard_shared::message::CausticGather;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::{PreparedScene, is_camera};
+use super::scene::{PreparedScene, is_camera};
 use crate::pack::CardImage;
 use crate::render::preparation::Prepared;
 use crate::render::renderer::Kept;

@@ -3,12 +3,13 @@ use std::path::{Path, PathBuf};
 
 use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::sampler::hash;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::file::KIND;
 use super::*;
 use crate::film::Film;
-use crate::render::{Picture, Unobserved, render};
+use crate::pack::PackedScene;
+use crate::render::{Integrator, PhotonMaps, Picture, RenderSettings, Unobserved, render};
 use crate::scene::Scene;
 use crate::scene::gltf;
 
