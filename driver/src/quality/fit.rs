@@ -79,8 +79,29 @@ const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
 const WEIGHT_OF_RECORDS: f64 = 0.5;
 /// Weight of the squared error of the map in 4x4 pixels: it is no noise of a pixel, but a blotch.
 const WEIGHT_OF_MAP: f64 = 6.0;
+/// Error of 4x4 pixels by the photon map, as a share of the noise that a picture is rendered to. That of single pixels is up to twice as large.
+const SHARE_OF_MAP: f64 = 0.25;
+/// Error of interpolated irradiance by the rays of its records, likewise.
+const SHARE_OF_RECORDS: f64 = 0.5;
+/// Maximum numbers of photons, and of rays of a record, for the noise that a picture is rendered to.
+const MAX_PHOTONS: usize = 8_000_000;
+const MAX_RAYS_OF_RECORD: u32 = 8_000;
 
 impl Fit {
+    /// Settings for a picture that gets samples until their noise is `noise`, relative to the mean pixel: with more photons, and more rays of
+    /// irradiance records, where the errors that no number of samples lowers would exceed their share of it.
+    pub fn for_noise(self, noise: f64) -> Self {
+        let Measured { gather_ray, million_photons, .. } = self.measured;
+        let photons = 1e6 * (million_photons / (SHARE_OF_MAP * noise)).powi(2);
+        let rays = WEIGHT_OF_RECORDS * (gather_ray / (SHARE_OF_RECORDS * noise)).powi(2);
+        let rays = if self.interpolates { within(rays, &(0..=MAX_RAYS_OF_RECORD), 8) } else { 0 };
+        Self {
+            photons: self.photons.max(rounded(photons, &(0..=MAX_PHOTONS))),
+            gather_rays: self.gather_rays.max(rays),
+            ..self
+        }
+    }
+
     /// Changes settings to these, but for the stated ones. Samples of a stated number share the shadow rays of a pixel, and without a cache
     /// its gather rays.
     pub fn apply(&self, settings: &mut RenderSettings, stated: Stated) {
@@ -261,6 +282,24 @@ mod tests {
         let alone = level.fit(&VARIANCES, &Pictured { is_cached: false, ..PICTURED });
         assert!(!alone.interpolates && alone.gather_rays > good(VARIANCES).gather_rays);
         assert_eq!(alone.gather_rays, good(Variances { lambertian: 0.0, ..VARIANCES }).gather_rays);
+    }
+
+    #[test]
+    fn little_noise_takes_the_photons_and_rays_of_records_that_keep_their_errors_below_it() {
+        let fit = good(VARIANCES);
+        assert_eq!(fit.for_noise(1.0), fit);
+        for noise in [0.02, 0.01, 0.005] {
+            let Fit { photons, gather_rays, interpolates, .. } = fit.for_noise(noise);
+            assert!(interpolates);
+            let of_map = VARIANCES.photon / photons as f64;
+            let of_records = WEIGHT_OF_RECORDS * VARIANCES.gather_ray / f64::from(gather_rays);
+            assert!(of_map <= (0.25 * noise).powi(2), "{of_map}");
+            assert!(of_records <= (0.5 * noise).powi(2) || gather_rays == MAX_RAYS_OF_RECORD, "{of_records}");
+        }
+        let least = fit.for_noise(1e-6);
+        assert_eq!((least.photons, least.gather_rays), (MAX_PHOTONS, MAX_RAYS_OF_RECORD));
+        let alone = Fit { interpolates: false, ..fit };
+        assert_eq!(alone.for_noise(1e-3).gather_rays, fit.gather_rays);
     }
 
     #[test]

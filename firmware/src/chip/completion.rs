@@ -1,14 +1,17 @@
-//! The completion of a pixel, once no gather of its block waits: light that needs no gather rays, albedo, normal and depth.
+//! The completion of a pixel: light that needs no gather rays, albedo, normal and depth.
 //!
-//! Every sample is looked at again, as no chip has room to keep them.
+//! Pixels without gather rays of their own are completed first, once the irradiance records of their block are gathered: each sample is
+//! looked at once. Those with gather rays are found by it. They are completed when no gather of the block waits, and every sample is
+//! looked at again, as no chip has room to keep them.
 
 use photoncard_shared::message::Fault;
 
 use super::buffers::Shared;
-use super::finished_pixel::{Completion, FinishedPixel, PixelView};
+use super::finished_pixel::{Completion, FinishedPixel};
 use super::flight::Flight;
 use super::light::{Component, PixelLight};
 use super::pixels::{allowed_error_at, direct_light, per_unit, pixel_point, seen_sample};
+use super::position::Pass;
 use crate::irradiance_cache::IrradianceCache;
 use crate::kind::ChipKind;
 use crate::memory::{MemoryPort, Stage};
@@ -16,7 +19,17 @@ use crate::render::eye::{Sight, View};
 use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
 
 impl<K: ChipKind> Flight<K> {
-    /// Completes the next sample of the present pixel. Returns the pixel with its last sample.
+    /// Next pixel to be completed in the present pass; `None` after the last.
+    pub(super) fn pixel_to_complete(&self) -> Option<u32> {
+        let rest = self.position.index..self.block.pixels();
+        match self.pass() {
+            Pass::CompletePlain => (!rest.is_empty()).then_some(rest.start),
+            _ => self.first_with_rays(rest),
+        }
+    }
+
+    /// Completes the next sample of a pixel. Returns the pixel with its last sample. A pixel with gather rays is left for a later pass if it
+    /// is not known to have any.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -24,16 +37,14 @@ impl<K: ChipKind> Flight<K> {
         &mut self,
         job: &mut RenderJob<M>,
         shared: &mut Shared<K>,
-        flight: usize,
+        (flight, pixel): (usize, u32),
     ) -> Result<Option<FinishedPixel>, Fault> {
-        let pixel = self.position.index;
+        self.position.index = pixel;
         let stored = self.sum(pixel).map(|number| shared.sums.light(job.frame, (flight, number)));
-        let mut completion = self.completion.take().unwrap_or_else(|| Completion {
-            light: stored.unwrap_or(PixelLight::NONE),
-            view: PixelView::NOTHING,
-            sample: 0,
-        });
+        let mut completion =
+            self.completion.take().unwrap_or_else(|| Completion::new(stored.unwrap_or(PixelLight::NONE)));
         let at = self.sample(job.frame, pixel, completion.sample);
+        let is_plain = self.pass() == Pass::CompletePlain;
         let context = &mut job.context(&mut self.counters);
         match eye::view(context, at)? {
             Sight::Background(radiance) => {
@@ -41,7 +52,12 @@ impl<K: ChipKind> Flight<K> {
             }
             Sight::Surface(view) => {
                 completion.view.add(&context.scene.header, &view);
-                light_sample(context, &self.cache, shared, (at, &view), &mut completion.light)?;
+                let has_rays = light_sample(context, &self.cache, shared, (at, &view), &mut completion)?;
+                if has_rays && is_plain {
+                    self.give_rays(pixel);
+                    self.position.index += 1;
+                    return Ok(None);
+                }
             }
         }
         completion.sample += 1;
@@ -49,19 +65,24 @@ impl<K: ChipKind> Flight<K> {
             self.completion = Some(completion);
             return Ok(None);
         }
-        let Completion { light, view, .. } = completion;
+        self.position.index += 1;
+        let Completion { light, view, lambertian, interpolated, .. } = completion;
+        self.counters.lambertian_samples += u64::from(lambertian);
+        self.counters.interpolated_samples += u64::from(interpolated);
         Ok(Some(FinishedPixel { tile: self.tile.id, index: self.index_in_tile(pixel), light, view }))
     }
 }
 
-/// Adds emission and interpolated irradiance of a sample and, without gather rays, its light by shadow rays and caustics.
+/// Adds emission and interpolated irradiance of a sample and, without gather rays, its light by shadow rays and caustics. Returns whether
+/// it has gather rays.
 fn light_sample<K: ChipKind, M: MemoryPort>(
     context: &mut Context<M>,
     cache: &IrradianceCache<K::IrradianceRecords>,
     shared: &mut Shared<K>,
     (at, view): (PixelSample, &View),
-    light: &mut PixelLight,
-) -> Result<(), Fault> {
+    completion: &mut Completion,
+) -> Result<bool, Fault> {
+    let Completion { light, lambertian, interpolated: interpolated_samples, .. } = completion;
     let frame = context.frame;
     let per_unit = per_unit(context);
     let surface = &view.surface;
@@ -69,7 +90,9 @@ fn light_sample<K: ChipKind, M: MemoryPort>(
     let allowed = allowed_error_at(frame, view);
     let interpolated =
         allowed.and_then(|allowed| cache.interpolate(&seen_sample(context, at, view), allowed));
+    *lambertian += u32::from(frame.gather_rays > 0 && surface.reflection.has_lambertian());
     if let Some(irradiance) = interpolated {
+        *interpolated_samples += 1;
         let reflected = surface.reflector().lambertian_albedo() * irradiance;
         light.add(frame, Component::Indirect, reflected * per_unit);
     }
@@ -79,7 +102,7 @@ fn light_sample<K: ChipKind, M: MemoryPort>(
         if purpose == Purpose::Sample {
             light.count_gather(frame);
         }
-        return Ok(());
+        return Ok(true);
     }
     context.memory.enter(Stage::Shadow);
     // The bits of a surface depend on the way it is read.
@@ -90,5 +113,5 @@ fn light_sample<K: ChipKind, M: MemoryPort>(
     for (component, brought) in direct_light(context, at, &point, shared)? {
         light.add(frame, component, brought);
     }
-    Ok(())
+    Ok(false)
 }

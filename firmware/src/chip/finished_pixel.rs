@@ -74,4 +74,15 @@ pub(super) struct Completion {
     pub(super) view: PixelView,
     /// The next sample.
     pub(super) sample: u32,
+    /// Number of samples of surfaces with a Lambertian part.
+    pub(super) lambertian: u32,
+    /// Number of samples whose irradiance is interpolated.
+    pub(super) interpolated: u32,
+}
+
+impl Completion {
+    /// Completion of a pixel with the light of its gather rays.
+    pub(super) const fn new(light: PixelLight) -> Self {
+        Self { light, view: PixelView::NOTHING, sample: 0, lambertian: 0, interpolated: 0 }
+    }
 }

@@ -1,5 +1,7 @@
 //! A tile in flight: its state from the command to its last pixel.
 
+use core::ops::Range;
+
 use heapless::Vec;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
@@ -13,8 +15,10 @@ use crate::render::PixelSample;
 /// Capacity of the stack of blocks: enough for all halvings of a tile.
 const MAX_BLOCKS: usize = 32;
 
-/// Number of a pixel without a sum.
-const NO_SUM: u16 = u16::MAX;
+/// In place of the number of its sum, a pixel without gather rays of its own, as far as is known.
+const PLAIN: u16 = u16::MAX;
+/// In place of the number of its sum, a pixel with gather rays and no sum yet.
+const UNSUMMED: u16 = PLAIN - 1;
 
 /// State of a tile in flight. It is rendered in one block or, if its irradiance records do not fit into the cache, in several smaller
 /// ones, one after another.
@@ -28,9 +32,7 @@ pub(super) struct Flight<K: ChipKind> {
     /// Number of the block's gathers in the queue.
     pub(super) waiting: u32,
     pub(super) cache: IrradianceCache<K::IrradianceRecords>,
-    /// True if the records of the block are those of an earlier frame.
-    pub(super) is_recalled: bool,
-    /// Number of each pixel's sum in [`super::pixel_sums::PixelSums`], or [`NO_SUM`].
+    /// Number of each pixel's sum in [`super::pixel_sums::PixelSums`], [`PLAIN`] or [`UNSUMMED`].
     sums: <K::TilePixels as Capacity>::Buffer<u16>,
     /// State of the pixel that is being completed.
     pub(super) completion: Option<Completion>,
@@ -45,7 +47,6 @@ impl<K: ChipKind> Vacant for Flight<K> {
         position: Position::VACANT,
         waiting: 0,
         cache: IrradianceCache::new(),
-        is_recalled: false,
         sums: Buffer::EMPTY,
         completion: None,
     };
@@ -74,11 +75,11 @@ impl<K: ChipKind> Flight<K> {
         self.position.pass
     }
 
-    /// True if the pixels of the block are being completed, or can be.
+    /// True if pixels of the block are being completed, or can be.
     pub(super) fn is_completable(&self) -> bool {
         match self.pass() {
-            Pass::Complete => true,
-            Pass::Wait => self.waiting == 0,
+            Pass::CompletePlain | Pass::Complete => true,
+            Pass::WaitForRecords | Pass::Wait => self.waiting == 0,
             _ => false,
         }
     }
@@ -86,12 +87,10 @@ impl<K: ChipKind> Flight<K> {
     /// Begins the next block.
     pub(super) fn begin_block(&mut self, frame: &FrameParameters) {
         self.block = self.blocks.pop().unwrap_or(Block::EMPTY);
-        self.sums.view_mut().clear();
-        // Fits: a tile has at most as many pixels.
-        let _ = self.sums.view_mut().resize(self.block.pixels() as usize, NO_SUM);
-        self.is_recalled = false;
+        self.set_all_sums(PLAIN);
         match allowed_error(frame) {
-            None => self.position = Position::at(Pass::Eye),
+            None if frame.gather_rays == 0 => self.position = Position::at(Pass::CompletePlain),
+            None => self.do_without_records(),
             Some(_) if frame.keep_records => self.position = Position::at(Pass::Recall),
             Some(_) => self.begin_records(),
         }
@@ -117,9 +116,17 @@ impl<K: ChipKind> Flight<K> {
         self.position = Position::at(Pass::NextBlock);
     }
 
+    /// Goes on to the gather rays of all pixels.
     pub(super) fn do_without_records(&mut self) {
         self.cache.forget();
-        self.position = Position::at(Pass::Eye);
+        self.set_all_sums(UNSUMMED);
+        self.position = Position::at(Pass::NextPixels);
+    }
+
+    fn set_all_sums(&mut self, sum: u16) {
+        self.sums.view_mut().clear();
+        // Fits: a tile has at most as many pixels.
+        let _ = self.sums.view_mut().resize(self.block.pixels() as usize, sum);
     }
 
     pub(super) fn window(&self) -> Window {
@@ -142,7 +149,19 @@ impl<K: ChipKind> Flight<K> {
 
     /// Number of the sum of pixel `index` of the block; `None` without one.
     pub(super) fn sum(&self, index: u32) -> Option<u16> {
-        self.sums.view().get(index as usize).copied().filter(|&number| number != NO_SUM)
+        self.sums.view().get(index as usize).copied().filter(|&number| number < UNSUMMED)
+    }
+
+    /// First of some pixels of the block with gather rays of its own; `None` without one.
+    pub(super) fn first_with_rays(&self, pixels: Range<u32>) -> Option<u32> {
+        let states = self.sums.view().get(pixels.start as usize..pixels.end as usize)?;
+        let index = states.iter().position(|&state| state != PLAIN)?;
+        Some(pixels.start + index as u32)
+    }
+
+    /// Notes that pixel `index` of the block has gather rays of its own.
+    pub(super) fn give_rays(&mut self, index: u32) {
+        self.set_sum(index, UNSUMMED);
     }
 
     /// Sets the number of the sum of pixel `index` of the block.

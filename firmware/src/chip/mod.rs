@@ -1,9 +1,10 @@
 //! One chip: its tiles in flight, and their passes.
 //!
 //! A tile goes through the passes of `position`, block by block; every pass is done for all gather points before the next begins, so
-//! that gathers of neighbouring points are adjacent. When all rays of a block are cast, its gathers wait in the queue with those of
-//! other tiles, and the next tile begins: the queue is drained when it is full, or when there is nothing else to do. Pixels are
-//! completed when the last gather of their block is done. Each call of [`Chip::step`] does a small piece of this work.
+//! that gathers of neighbouring points are adjacent. When all rays of the irradiance records of a block are cast, or all rays of its
+//! pixels, their gathers wait in the queue with those of other tiles, and another tile goes on: the queue is drained when it is full, or
+//! when there is nothing else to do. Pixels are completed when the last of these gathers is done: first those that need the records
+//! alone. Each call of [`Chip::step`] does a small piece of this work.
 //!
 //! | state | kept from the command to the last pixel, of each tile in flight |
 //! |---|---|
@@ -68,8 +69,8 @@ const GATHERS_PER_PIECE: u64 = 16;
 pub enum Progress {
     /// There is more to do.
     Busy,
-    /// A pixel of a tile is complete. The pixels of a tile come row by row or, if it is rendered in several blocks, row by row
-    /// of each block.
+    /// A pixel of a tile is complete. The pixels of each block of a tile come row by row: those without gather rays of their own,
+    /// then the others.
     Pixel(FinishedPixel),
     /// A tile is complete, with its last pixel before: its number, and the counts of its work.
     Tile(u32, Counters),
@@ -207,7 +208,7 @@ impl<K: ChipKind> Chip<K> {
             Pass::Eye => flight.look(job, shared, number)?,
             Pass::Direct => flight.light_directly(job, shared, number)?,
             Pass::Rays => flight.cast_for_pixel(job, shared, number)?,
-            Pass::Vacant | Pass::NextBlock | Pass::Wait | Pass::Complete => self.active = None,
+            _ => self.active = None,
         }
         if let Some(flight) = self.flights.values().get(number) {
             *work += flight.counters.rays_and_gathers().wrapping_sub(done);
@@ -215,20 +216,27 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Begins the next block of a tile in flight. Without one the chip has room for a tile or must drain its queue.
+    /// Begins the next block of a tile in flight, or the gather rays of its pixels. Without one the chip has room for a tile or must drain
+    /// its queue.
     fn go_on(&mut self, frame: &FrameParameters) -> Progress {
-        if let Some(number) = self.find(|flight| flight.pass() == Pass::NextBlock)
+        let of_pass = |pass| self.find(|flight| flight.pass() == pass);
+        if let Some(number) = of_pass(Pass::NextPixels).or_else(|| of_pass(Pass::NextBlock))
             && let Some(flight) = self.flights.values_mut().get_mut(number)
         {
-            self.shared.sums.begin(number);
-            flight.begin_block(frame);
+            if flight.pass() == Pass::NextPixels {
+                self.shared.sums.begin(number);
+                flight.position = Position::at(Pass::Eye);
+            } else {
+                flight.begin_block(frame);
+            }
             self.active = Some(number);
             return Progress::Busy;
         }
         if self.vacant(frame).is_none() && self.flush(frame) { Progress::Busy } else { Progress::Idle }
     }
 
-    /// Completes the next sample of a block whose gathers are done.
+    /// Completes the next sample of a block whose gathers are done. Its last pixels are followed by those with gather rays, by another block
+    /// or by the end of the tile.
     fn complete<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -237,11 +245,20 @@ impl<K: ChipKind> Chip<K> {
     ) -> Result<Progress, Fault> {
         let Self { flights, shared, .. } = self;
         let Some(flight) = flights.values_mut().get_mut(number) else { return Ok(Progress::Idle) };
-        if flight.pass() == Pass::Wait {
-            flight.end_records(job, shared);
-            flight.position = Position::at(Pass::Complete);
+        match flight.pass() {
+            Pass::WaitForRecords => {
+                flight.end_records(job, shared);
+                flight.position = Position::at(Pass::CompletePlain);
+            }
+            Pass::Wait => flight.position = Position::at(Pass::Complete),
+            _ => {}
         }
-        if flight.position.index >= flight.block.pixels() {
+        let Some(pixel) = flight.pixel_to_complete() else {
+            let is_plain = flight.pass() == Pass::CompletePlain;
+            if is_plain && flight.first_with_rays(0..flight.block.pixels()).is_some() {
+                flight.position = Position::at(Pass::NextPixels);
+                return Ok(Progress::Busy);
+            }
             shared.sums.end(number);
             if flight.has_blocks() {
                 flight.position = Position::at(Pass::NextBlock);
@@ -249,11 +266,10 @@ impl<K: ChipKind> Chip<K> {
             }
             flight.vacate();
             return Ok(Progress::Tile(flight.tile.id, flight.counters));
-        }
+        };
         let done = flight.counters.rays_and_gathers();
-        let finished = flight.complete(job, shared, number)?;
+        let finished = flight.complete(job, shared, (number, pixel))?;
         *work += flight.counters.rays_and_gathers().wrapping_sub(done);
-        flight.position.index += u32::from(finished.is_some());
         Ok(finished.map_or(Progress::Busy, Progress::Pixel))
     }
 

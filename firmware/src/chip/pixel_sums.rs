@@ -73,7 +73,7 @@ impl<C: Capacity> PixelSums<C> {
         !self.runs.iter().any(|run| run.holds(self.end, places))
     }
 
-    /// Appends a pixel without light to the run of the tile in flight that began last, and returns its number in the run. To be called
+    /// Appends a pixel without light to the run that began last, and returns its number in the run. To be called
     /// only if [`Self::has_room`].
     pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> u16 {
         let count = sums_of_pixel(frame.layers) as usize;

@@ -1,5 +1,5 @@
-//! The passes of a block's pixels, stripe by stripe and sample by sample: gather rays of the samples whose irradiance is not
-//! interpolated, and direct light, which is weighted against these rays.
+//! The passes of a block's pixels with gather rays of their own, stripe by stripe and sample by sample: these rays, and direct light,
+//! which is weighted against them.
 
 use photoncard_shared::message::{Fault, FrameParameters};
 
@@ -76,7 +76,7 @@ impl<K: ChipKind> Flight<K> {
         self.sum(self.position.first + self.position.index).is_some() || shared.sums.has_room(frame)
     }
 
-    /// Casts the eye ray of a sample, and stores its gather point if it has gather rays.
+    /// Looks at the present sample of the next pixel with gather rays.
     pub(super) fn look<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -86,15 +86,34 @@ impl<K: ChipKind> Flight<K> {
         if self.position.index == 0 {
             shared.points.clear();
         }
-        let pixel = self.position.first + self.position.index;
+        let [first, stripe] = [self.position.first, self.stripe()];
+        let next = self.first_with_rays(first + self.position.index..first + stripe);
+        self.position.index = next.map_or(stripe, |pixel| pixel - first);
+        if let Some(pixel) = next {
+            self.store_point(job, shared, (flight, pixel))?;
+        }
+        if self.position.next_index(stripe) {
+            if shared.points.len() > 0 {
+                self.position.pass = Pass::Direct;
+            } else {
+                self.end_sample(job.frame);
+            }
+        }
+        Ok(())
+    }
+
+    /// Casts the eye ray of the present sample of a pixel, and stores its gather point if it has gather rays.
+    fn store_point<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+        (flight, pixel): (usize, u32),
+    ) -> Result<(), Fault> {
         let at = self.sample(job.frame, pixel, self.position.sample);
         let frame = job.frame;
         let context = &mut job.context(&mut self.counters);
         if let Some(view) = eye::view(context, at)?.surface() {
             let mut point = gather_point(context, &self.cache, at, &view);
-            let is_lambertian = frame.gather_rays > 0 && view.surface.reflection.has_lambertian();
-            context.counters.lambertian_samples += u64::from(is_lambertian);
-            context.counters.interpolated_samples += u64::from(point.purpose == Purpose::Lobe);
             if point.rays > 0 {
                 point.choose_directions(context, shared.gathers.candidates())?;
                 if self.sum(pixel).is_none() {
@@ -106,13 +125,6 @@ impl<K: ChipKind> Flight<K> {
                     rays: StoredRays::new(&point),
                 };
                 shared.points.push(pixel as u16, stored);
-            }
-        }
-        if self.position.next_index(self.stripe()) {
-            if shared.points.len() > 0 {
-                self.position.pass = Pass::Direct;
-            } else {
-                self.end_sample(frame);
             }
         }
         Ok(())

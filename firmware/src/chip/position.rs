@@ -45,8 +45,9 @@ impl Block {
     }
 }
 
-/// Passes of a block, in order. The passes from [`Pass::Recall`] to [`Pass::RecordRays`] are skipped without the
-/// irradiance cache, and those after the first with kept records.
+/// Passes of a block, in order. The passes from [`Pass::Recall`] to [`Pass::WaitForRecords`] are skipped without the irradiance cache, and
+/// those after the first with kept records; [`Pass::CompletePlain`] is skipped where every sample has gather rays, and the passes after it
+/// are of the other pixels alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
     /// No tile.
@@ -61,6 +62,12 @@ pub(super) enum Pass {
     RecordPoints,
     /// Gather rays of the records, bin by bin.
     RecordRays,
+    /// Gathers of the records wait.
+    WaitForRecords,
+    /// Completion of the pixels without gather rays of their own. The others are found, and left.
+    CompletePlain,
+    /// The passes of the pixels with gather rays have not begun.
+    NextPixels,
     /// Eye rays of one sample of each pixel of a stripe.
     Eye,
     /// Shadow rays and caustic gathers of the samples with gather rays.

@@ -22,8 +22,7 @@ impl<K: ChipKind> Flight<K> {
         let window = self.window();
         match shared.store.recall(&mut job.context(&mut self.counters), &window, &mut self.cache)? {
             Recalled::Records => {
-                self.is_recalled = true;
-                self.position = Position::at(Pass::Eye);
+                self.position = Position::at(Pass::CompletePlain);
             }
             Recalled::Divided => self.divide_block(),
             Recalled::Nothing => self.begin_records(),
@@ -118,7 +117,7 @@ impl<K: ChipKind> Flight<K> {
             }
         }
         if position.next_index(points.len()) && position.next_bin(bins) {
-            self.position = Position::at(Pass::Eye);
+            self.position = Position::at(Pass::WaitForRecords);
         }
         Ok(())
     }
@@ -126,9 +125,6 @@ impl<K: ChipKind> Flight<K> {
     /// Ends the gather of the block's records, and keeps them if the frame asks for it.
     pub(super) fn end_records<M: MemoryPort>(&mut self, job: &mut RenderJob<M>, shared: &mut Shared<K>) {
         let Some(allowed) = allowed_error(job.frame) else { return };
-        if self.is_recalled {
-            return;
-        }
         self.cache.end_gather(&mut job.context(&mut self.counters), allowed);
         if job.frame.keep_records {
             shared.store.keep(job.memory, &self.window(), &self.cache);

@@ -79,7 +79,9 @@ impl RenderOptions {
         if self.stated() == Stated::ALL {
             return Ok(None);
         }
-        self.quality.fit(scene, packed, settings, observer)
+        let fit = self.quality.fit(scene, packed, settings, observer)?;
+        let noise = self.samples.aim().and_then(|aim| aim.noise);
+        Ok(fit.map(|fit| noise.map_or(fit, |noise| fit.for_noise(noise))))
     }
 
     /// Settings of these options, with those of the quality for a scene that is not known.

@@ -15,8 +15,8 @@ pub(crate) struct SampleOptions {
     time: Option<Duration>,
     /// Add samples until the estimated standard error of the pixels is below this share of the picture's mean
     ///
-    /// The estimate is the root mean square over all pixels, by the difference of passes. It is of the noise alone, not of the error of the
-    /// photon map or of interpolated irradiance.
+    /// The estimate is the root mean square over all pixels, by the difference of passes. It is of the noise of samples alone: photons and rays
+    /// of irradiance records, where they are not stated, are as many as keep their errors small beside it.
     #[arg(long, value_name = "ERROR", value_parser = noise, allow_negative_numbers = true, conflicts_with_all = NOT_BY_PASSES)]
     noise: Option<f64>,
     /// Keep the samples beside the finished picture, in OUT.exr.partial: --resume with a greater --spp adds to them

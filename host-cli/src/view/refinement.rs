@@ -17,8 +17,12 @@ const MAX_PAUSE: Duration = Duration::from_secs(8);
 
 /// Side of the squares of the first pass, pixels.
 pub(super) const COARSEST: u32 = 8;
-/// Time of the pass that follows a coarse one: passes whose pictures would hardly be seen are left out.
+/// Time of the pass of every pixel up to which no other follows the first: their pictures would hardly be seen.
 const SEEN: Duration = Duration::from_millis(800);
+/// Time of the pass of every pixel up to which that of every second is left out, which takes a quarter of it.
+const AWAITED: Duration = Duration::from_secs(4);
+/// Side of the squares before that pass.
+const FINE: u32 = 4;
 
 /// One picture on the way to the settled one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,14 +50,11 @@ fn next_pass(pass: Pass, time: Duration, is_fitted: bool) -> Option<Pass> {
     }
 }
 
-/// Side of the squares after a pass of the side `step` that took `time`: a half, or less where four times as many pixels for each half
-/// take no more than [`SEEN`].
+/// Side of the squares after a pass of the side `step` that took `time`: a half, or 1 where the pass of every pixel is near, if it takes
+/// as long for each of them.
 fn next_step(step: u32, time: Duration) -> u32 {
-    let (mut next, mut time) = (step / 2, 4 * time);
-    while next > 1 && 4 * time <= SEEN {
-        (next, time) = (next / 2, 4 * time);
-    }
-    next
+    let limit = if step > FINE { SEEN } else { AWAITED };
+    if time * (step * step) <= limit { 1 } else { step / 2 }
 }
 
 /// Work on a pass.
@@ -280,7 +281,9 @@ mod tests {
 
     #[test]
     fn coarse_pictures_that_would_hardly_be_seen_are_left_out() {
-        for (milliseconds, steps) in [(60, &[8, 4, 2, 1][..]), (30, &[8, 2, 1]), (10, &[8, 1])] {
+        for (milliseconds, steps) in
+            [(70, &[8, 4, 2, 1][..]), (60, &[8, 4, 1]), (20, &[8, 4, 1]), (10, &[8, 1])]
+        {
             let passes = settle(&mut Refinement::new(true), Duration::from_millis(milliseconds));
             let coarse: Vec<_> = steps.iter().map(|&step| Pass::Coarse(step)).collect();
             assert_eq!(passes, [&coarse[..], &[Pass::Full]].concat());
