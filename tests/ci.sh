@@ -78,6 +78,30 @@ if ! has_browser && ! { install_browser && has_browser; }; then
     echo "ci: SKIPPED: the page of the live view is not tested: $PHOTONCARD_SKIP_BROWSER" >&2
 fi
 
+# The engines of farms that jobs are tested with: GNU parallel, in whose place a loop can stand, and the runner of Open Job Description.
+install_parallel() {
+    if [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then
+        echo "ci: GNU parallel is missing; run: sudo apt-get install parallel" >&2
+        return 1
+    fi
+    export DEBIAN_FRONTEND=noninteractive
+    apt-get update -qq
+    apt-get install -y -qq --no-install-recommends parallel >/dev/null
+}
+install_openjd() {
+    local folder=${CARGO_TARGET_DIR:-target}/openjd
+    python3 -m venv "$folder" && "$folder/bin/pip" install --quiet openjd-cli==0.8.0 || return 1
+    PHOTONCARD_OPENJD=$(realpath "$folder/bin/openjd")
+    export PHOTONCARD_OPENJD
+}
+farms_untested=()
+command -v parallel >/dev/null || install_parallel || farms_untested+=("GNU parallel")
+unset PHOTONCARD_OPENJD
+command -v openjd >/dev/null || install_openjd || farms_untested+=("Open Job Description (pip install openjd-cli)")
+for engine in "${farms_untested[@]}"; do
+    echo "ci: SKIPPED: jobs of farms are printed, but not run by $engine: it cannot be installed" >&2
+done
+
 # The firmware's operations are counted where it runs without floating-point instructions: tests/src/operations.
 uncounted=""
 if rustup target add x86_64-unknown-none; then
@@ -168,6 +192,9 @@ fi
 [ -z "$unpublished" ] || echo "ci: SKIPPED: the rehearsal of 'cargo publish': $unpublished" >&2
 [ -z "$uncounted" ] || echo "ci: SKIPPED: the count of operations: $uncounted" >&2
 [ ${#unchecked[@]} = 0 ] || echo "ci: SKIPPED: checks for ${unchecked[*]}: rustup cannot add them" >&2
+for engine in "${farms_untested[@]}"; do
+    echo "ci: SKIPPED: jobs of farms by $engine: it cannot be installed" >&2
+done
 [ -z "${PHOTONCARD_SKIP_BROWSER:-}" ] || echo "ci: SKIPPED: the page of the live view: $PHOTONCARD_SKIP_BROWSER" >&2
 [ -z "${PHOTONCARD_SKIP_QEMU:-}" ] || echo "ci: SKIPPED: images on QEMU: $PHOTONCARD_SKIP_QEMU" >&2
 step "done"

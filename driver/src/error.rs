@@ -302,6 +302,16 @@ pub enum SceneError {
         remedy: String,
     },
 
+    /// Error of an animation name that the scene's file lacks.
+    #[error("the scene has no animation '{name}'")]
+    #[diagnostic(code(scene::animation), help("choose one of: {animations}"))]
+    UnknownAnimation {
+        /// Requested name.
+        name: String,
+        /// Names of the file's animations.
+        animations: String,
+    },
+
     /// Error of a variant name that the scene's file lacks.
     #[error("the scene has no variant '{name}'")]
     #[diagnostic(code(scene::variant), help("choose one of: {variants}"))]

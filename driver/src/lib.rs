@@ -99,7 +99,7 @@
 //!
 //! | layer | modules | contents |
 //! |---|---|---|
-//! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic |
+//! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign`, `heading` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic; headings of files |
 //! | tiles | [`sums`], [`sink`] | format of pixels' sums, and their values; a finished tile, and [`TileSink`](sink::TileSink), the trait of every output |
 //! | pictures | [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`] | pixels of a picture; its layers; files; comparison |
 //! | scenes | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
@@ -109,7 +109,7 @@
 //! | links | [`link`], [`session`] | ports of bytes; the host's end of the protocol, without I/O |
 //! | cards | [`emulator`] | chips on threads of this process, memory models and traces |
 //! | tiles to cards | [`scheduler`], [`dispatcher`] | which card renders which tile; finished tiles to the sinks |
-//! | sinks | [`viewer`], [`partial`], [`display`] | [`Viewer`](viewer::Viewer), the trait of sinks that show tiles; the file of finished tiles, for `--resume`; the client of a display server |
+//! | sinks | [`viewer`], [`partial`], [`parts`], [`display`] | [`Viewer`](viewer::Viewer), the trait of sinks that show tiles; the file of finished tiles, for `--resume`; parts of a picture, and their merge; the client of a display server |
 //! | cost model | [`cost_model`] | FLOPs and DRAM bytes of a frame by Table 7.1 |
 //! | render | [`render`] | one render from a scene to a complete film; settings, statistics, card addresses |
 //! | quality | [`quality`] | settings for what a picture is needed for, by pilot renders |
@@ -128,7 +128,7 @@
 //! ```
 //!
 //! Terms are defined in `docs/glossary.md`, design decisions and "how to add" lists are in `docs/architecture.md`.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 mod allocation;
 pub mod bvh;
@@ -144,12 +144,14 @@ pub mod exr;
 pub mod film;
 mod fold;
 mod foreign;
+mod heading;
 pub mod layer;
 mod light;
 pub mod link;
 pub mod output;
 pub mod pack;
 pub mod partial;
+pub mod parts;
 pub mod photon;
 pub mod photon_map;
 pub mod printable;

@@ -20,6 +20,8 @@ use crate::scene::Scene;
 mod card_image;
 mod corners;
 mod error;
+mod image_lines;
+mod mapped;
 mod materials;
 mod textures;
 mod writer;
@@ -27,6 +29,7 @@ mod writer;
 pub use self::card_image::CardImage;
 use self::corners::PackedCorners;
 pub use self::error::PackError;
+pub(crate) use self::mapped::MappedLines;
 pub(crate) use self::writer::ImageWriter;
 
 /// Bytes of memory that packing takes per triangle beside the scene, mainly for binary trees.

@@ -17,7 +17,7 @@
 
 mod error;
 mod file;
-mod records;
+pub(crate) mod records;
 mod samples;
 #[cfg(test)]
 mod tests;

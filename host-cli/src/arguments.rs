@@ -2,13 +2,19 @@
 
 mod cards;
 mod choice;
+mod farm;
 mod files;
+mod frames;
 mod integrator;
 mod lights;
 mod machine;
+mod merge;
 mod outputs;
 mod photons;
 mod picture;
+mod prepare;
+mod prepared;
+mod progress;
 mod render;
 mod samples;
 mod scene;
@@ -36,8 +42,14 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::PROTOCOL_VERSION;
 
 use self::choice::choice;
+pub(crate) use self::farm::{FarmCommand, FarmOptions};
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::lights::LightOptions;
+pub(crate) use self::merge::MergeOptions;
+pub(crate) use self::outputs::OutputOptions;
+pub(crate) use self::prepare::PrepareOptions;
+pub(crate) use self::prepared::OF_PREPARATION;
+pub(crate) use self::progress::ProgressForm;
 pub(crate) use self::render::RenderOptions;
 pub(crate) use self::scene::SceneOptions;
 pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};
@@ -65,13 +77,25 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     )
 });
 
+impl Command {
+    /// Form in which the command tells of its progress and its failure.
+    pub(crate) fn progress(&self) -> ProgressForm {
+        match self {
+            Self::Render(options) => options.progress,
+            Self::Prepare(options) => options.progress,
+            Self::Merge(options) => options.progress,
+            _ => ProgressForm::Text,
+        }
+    }
+}
+
 impl Arguments {
     /// Parses the arguments of the process. Invalid ones end it with a message in which they are escaped.
     pub(crate) fn parse_printably() -> Self {
         let given = std::env::args_os();
         Self::try_parse().unwrap_or_else(|error| {
             let escaped = given.map(|argument| printable(&argument.to_string_lossy()).into_owned());
-            Self::try_parse_from(escaped).err().unwrap_or(error).exit()
+            prepared::with_remedy(Self::try_parse_from(escaped).err().unwrap_or(error)).exit()
         })
     }
 }
@@ -80,6 +104,13 @@ impl Arguments {
 pub(crate) enum Command {
     /// Render a glTF scene to a picture, EXR or PNG
     Render(Box<RenderOptions>),
+    /// Prepare a scene: write its card image, with photon map and settings, for photoncard render --prepared
+    Prepare(Box<PrepareOptions>),
+    /// Merge the parts of a picture, EXR or PNG, which renders with --part have written
+    Merge(MergeOptions),
+    /// Print the job of a render for the engine of a farm: preparation, parts, merge
+    #[command(subcommand)]
+    Farm(FarmCommand),
     /// Walk through a scene: a page of the browser shows it while it is rendered
     View(Box<ViewOptions>),
     /// Tone-map an EXR picture to a PNG, as a render does

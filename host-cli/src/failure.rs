@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use miette::{Diagnostic, MietteDiagnostic, Report};
+use photoncard_driver::printable::printable;
 use photoncard_driver::render::RenderError;
 
 /// Failure of a command.
@@ -57,6 +58,17 @@ impl Failure {
         Self::Input(Report::new(
             MietteDiagnostic::new(text).with_help("make the folder first, or choose another"),
         ))
+    }
+
+    /// The message and its causes, in one line.
+    pub(crate) fn line(&self) -> String {
+        match self {
+            Self::Input(report) | Self::Work(report) => {
+                let causes: Vec<String> = report.chain().map(ToString::to_string).collect();
+                printable(&causes.join(": ")).into_owned()
+            }
+            Self::Stopped(text) => (*text).to_owned(),
+        }
     }
 
     /// Exit status.

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::render::NamedSettings;
-use photoncard_driver::scene::Scene;
-use photoncard_driver::scene::gltf::{LoadSettings, load_with};
+use photoncard_driver::scene::gltf::{LoadSettings, Moment, SceneFile};
+use photoncard_driver::scene::{Environment, Scene};
 use serde_json::json;
 
 use crate::arguments::SceneOptions;
@@ -23,16 +23,49 @@ pub(crate) fn files(options: &SceneOptions) -> Vec<(&Path, &'static str)> {
 
 /// Loads the scene for cards of `dram_bytes`, before the assignments to its materials.
 pub(crate) fn load(options: &SceneOptions, dram_bytes: u32) -> Result<Scene, Failure> {
-    let (variant, light_units) = (options.variant.clone(), options.lights.light_units);
-    let load = LoadSettings { dram_bytes, variant, light_units };
-    let mut scene = load_with(&options.path, &load).map_err(Failure::input)?;
-    if options.energy_compensation {
+    let Input { file, environment, compensates_energy } = Input::open(options, dram_bytes)?;
+    let scene = file.into_rest().map_err(Failure::input)?;
+    Ok(completed(scene, environment, compensates_energy))
+}
+
+/// Scene file and environment, which are read once for scenes at several moments.
+pub(crate) struct Input {
+    pub(crate) file: SceneFile,
+    environment: Option<Environment>,
+    compensates_energy: bool,
+}
+
+impl Input {
+    /// Opens the files for cards of `dram_bytes`.
+    pub(crate) fn open(options: &SceneOptions, dram_bytes: u32) -> Result<Self, Failure> {
+        let (variant, light_units) = (options.variant.clone(), options.lights.light_units);
+        let load = LoadSettings { dram_bytes, variant, light_units };
+        Ok(Self {
+            file: SceneFile::open(&options.path, &load).map_err(Failure::input)?,
+            environment: options.environment.as_ref().map(EnvironmentOption::load).transpose()?,
+            compensates_energy: options.energy_compensation,
+        })
+    }
+
+    /// The scene as it stands, before the assignments to its materials.
+    pub(crate) fn at_rest(&self) -> Result<Scene, Failure> {
+        let scene = self.file.at_rest().map_err(Failure::input)?;
+        Ok(completed(scene, self.environment.clone(), self.compensates_energy))
+    }
+
+    /// The scene at a moment of its animations, before the assignments to its materials.
+    pub(crate) fn at(&self, moment: &Moment) -> Result<Scene, Failure> {
+        let scene = self.file.at(moment).map_err(Failure::input)?;
+        Ok(completed(scene, self.environment.clone(), self.compensates_energy))
+    }
+}
+
+fn completed(mut scene: Scene, environment: Option<Environment>, compensates_energy: bool) -> Scene {
+    if compensates_energy {
         scene.compensate_energy();
     }
-    if let Some(environment) = &options.environment {
-        scene.environment = Some(environment.load()?);
-    }
-    Ok(scene)
+    scene.environment = environment;
+    scene
 }
 
 /// File name of the scene.

@@ -9,9 +9,10 @@
 //! | `failure` | errors with their exit status |
 //! | `arguments`, `environment` | command line: options of every command, and their values |
 //! | `input` | scene and environment of a render |
+//! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
 //! | `progress` | progress of a render |
-//! | `render`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
+//! | `render` (and `prepare`), `merge`, `farm`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render from Rust, use
 //! `photoncard_driver` directly.
@@ -27,19 +28,23 @@ mod documents;
 mod emulate;
 mod environment;
 mod failure;
+mod farm;
 mod input;
+mod merge;
 mod outputs;
 mod progress;
 mod render;
 mod report;
 mod scene;
+mod shell;
 mod study;
 mod tonemap;
 mod view;
 
 use std::process::ExitCode;
 
-use crate::arguments::{Arguments, CardCommand, Command, SceneCommand};
+use crate::arguments::{Arguments, CardCommand, Command, ProgressForm, SceneCommand};
+use crate::progress::openjd;
 
 fn main() -> ExitCode {
     // Invalid arguments end the process here, with status 2.
@@ -47,6 +52,9 @@ fn main() -> ExitCode {
     report::lay_out_errors();
     let result = match &arguments.command {
         Command::Render(options) => render::run(options),
+        Command::Prepare(options) => render::prepare::run(options),
+        Command::Merge(options) => merge::run(options),
+        Command::Farm(command) => farm::run(command),
         Command::View(options) => view::run(options),
         Command::Tonemap(options) => tonemap::run(options),
         Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),
@@ -64,6 +72,9 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             console::say_failure(&failure);
+            if arguments.command.progress() == ProgressForm::Openjd {
+                openjd::fail(&failure);
+            }
             failure.status()
         }
     }

@@ -1,5 +1,6 @@
 //! Progress of a render or of a card's self-test: a bar on a terminal, otherwise a line for each tenth of a phase.
 
+pub(crate) mod openjd;
 pub(crate) mod remaining;
 
 use std::error::Error;
@@ -12,7 +13,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use photoncard_driver::render::{CardError, Observer, Phase};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
+use self::openjd::Percent;
 use self::remaining::Remaining;
+use crate::arguments::ProgressForm;
 use crate::console::say;
 
 /// Display of the progress of a render or of a card's self-test; SIGINT and SIGTERM stop it.
@@ -20,6 +23,8 @@ pub(crate) struct Progress {
     stopped: Arc<AtomicBool>,
     kept: AtomicBool,
     display: Option<Mutex<Display>>,
+    /// Progress as a farm's engine reads it.
+    percent: Option<Percent>,
 }
 
 /// Seconds of a phase before the tiles until its first line, without a terminal.
@@ -51,7 +56,28 @@ impl Progress {
             told: 0,
         };
         let display = (!quiet).then_some(Mutex::new(display));
-        Ok(Self { stopped: stop_on_signals()?, kept: AtomicBool::new(false), display })
+        Ok(Self { stopped: stop_on_signals()?, kept: AtomicBool::new(false), display, percent: None })
+    }
+
+    /// Progress in a form, of which a phase is most of the work.
+    pub(crate) fn in_form(self, form: ProgressForm, phase: Phase) -> Self {
+        match form {
+            ProgressForm::Text => self,
+            ProgressForm::Openjd => Self { display: None, percent: Some(Percent::of(phase)), ..self },
+        }
+    }
+
+    /// [`Self::start`] for frames, one after another. Without a terminal a frame tells nothing before its end.
+    pub(crate) fn of_frames(quiet: bool, cards: usize) -> std::io::Result<Self> {
+        Self::start(quiet || !std::io::stderr().is_terminal(), cards)
+    }
+
+    /// Begins the display of the next frame.
+    pub(crate) fn begin_frame(&self) {
+        self.kept.store(false, Ordering::Relaxed);
+        if let Some(mut display) = self.display() {
+            (display.phase, display.resumed) = (None, 0);
+        }
     }
 
     /// Returns whether finished tiles are in the partial file.
@@ -83,6 +109,9 @@ impl Observer for Progress {
     fn progress(&self, phase: Phase, done: u64, total: u64) {
         if let Some(mut display) = self.display() {
             display.show(phase, done, total);
+        }
+        if let Some(percent) = &self.percent {
+            percent.tell(phase, done, total);
         }
     }
 

@@ -1,45 +1,51 @@
 //! `photoncard render`.
 
 pub(crate) mod files;
+mod frames;
 mod messages;
+pub(crate) mod part;
+pub(crate) mod prepare;
+mod prepared;
+mod steps;
 
 use std::sync::OnceLock;
 use std::time::Instant;
 
-use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::quality::{Fit, Stated};
-use photoncard_driver::render::{
-    CardAddress, Integrator, Passes, PhotonMaps, RenderError, RenderSettings, Renderer, render_chosen,
-};
+use photoncard_driver::render::{Passes, Phase, RenderError, RenderSettings, Renderer, render_chosen};
 use photoncard_driver::scene::{FixedScene, Scene};
-use serde_json::json;
 
+pub(crate) use self::steps::on_threads;
+use self::steps::{Finished, assigned, chosen, dram_bytes, finish, say_kept, view};
 use crate::arguments::RenderOptions;
-use crate::console::say;
 use crate::failure::Failure;
 use crate::input;
 use crate::progress::Progress;
 
-/// Renders a scene, and writes the picture and all other requested outputs.
+/// Renders a scene, and writes the pictures and all other requested outputs.
 pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
+    if options.prepared.prepared {
+        return prepared::run(options);
+    }
+    match options.frames.numbers() {
+        Some(numbers) => frames::run(options, numbers),
+        None => run_one(options),
+    }
+}
+
+/// Renders the scene as it stands.
+fn run_one(options: &RenderOptions) -> Result<(), Failure> {
     let mut settings = options.settings();
-    files::check(options)?;
+    files::check(options, &options.outputs)?;
     let start = Instant::now();
     let scene = read_scene(options, &mut settings)?;
     let scene_seconds = start.elapsed().as_secs_f64();
     let progress = Progress::start(options.quiet, settings.cards.count())
-        .map_err(|error| Failure::work_error(&error))?;
+        .map_err(|error| Failure::work_error(&error))?
+        .in_form(options.progress, Phase::Tiles);
     let found = OnceLock::new();
     let choose = |packed: &PackedScene| {
-        let stated = options.stated();
-        let fit = if stated == Stated::ALL {
-            None
-        } else {
-            let fit = options.quality.fit(&scene, packed, &settings, &progress)?;
-            let noise = options.samples.aim().and_then(|aim| aim.noise);
-            fit.map(|fit| noise.map_or(fit, |noise| fit.for_noise(noise)))
-        };
+        let fit = options.fit(&scene, packed, &settings, &progress)?;
         Ok(chosen(options, &settings, found.get_or_init(|| fit).as_ref(), &progress))
     };
     let result = on_threads(options.threads, || {
@@ -52,27 +58,11 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
         Ok((rendering, Some(messages::End { noise, passes: count, ended_by })))
     })?;
     progress.finish();
-    let (mut rendering, end) = result.inspect_err(|error: &RenderError| {
-        if !error.is_input() && progress.has_kept() {
-            let path = options.outputs.partial_path();
-            say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
-        }
-    })?;
-    rendering.statistics.time_s.scene = scene_seconds;
-    rendering.statistics.time_s.total += scene_seconds;
-    let provenance = &mut rendering.statistics.provenance;
-    provenance.pixels.extend(input::provenance(&options.scene));
-    provenance.work.insert("quality".to_owned(), json!(options.quality.name()));
-    provenance.work.insert("threads".to_owned(), json!(options.threads));
-    let pilot = found.into_inner().flatten().map(|fit| fit.measured);
-    provenance.work.insert("pilot".to_owned(), json!(pilot));
-    files::write(options, &rendering)?;
-    if let Some(partial) = rendering.partial.take().filter(|_| !options.samples.keep_samples) {
-        partial.remove().map_err(Failure::work)?;
-    }
-    if !options.quiet {
-        messages::say_done(options, &rendering);
-    }
+    let (rendering, end) = result.inspect_err(|error| say_kept(error, &progress, &options.outputs))?;
+    let fit = found.into_inner().flatten();
+    let (inputs, quality) = (input::provenance(&options.scene), options.quality);
+    let finished = Finished { rendering, scene_seconds, inputs, quality, fit, frame: None };
+    finish(options, &options.outputs, finished)?;
     let Some(end) = end else { return Ok(()) };
     if !options.quiet {
         messages::say_end(&end);
@@ -84,46 +74,8 @@ pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
     }
 }
 
-/// Photons and integrator of the options, with what the quality has found for this scene where nothing is stated.
-fn chosen(
-    options: &RenderOptions,
-    settings: &RenderSettings,
-    fit: Option<&Fit>,
-    progress: &Progress,
-) -> (PhotonMaps, Integrator) {
-    let chosen = settings.clone().with(|settings| {
-        if let Some(fit) = fit {
-            fit.apply(settings, options.stated());
-        }
-    });
-    if !options.quiet && fit.is_some() {
-        progress.say(format_args!("photoncard: {}", messages::chosen(options.quality, &chosen)));
-    }
-    (chosen.photons, chosen.integrator)
-}
-
 fn read_scene(options: &RenderOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
-    // The image must fit every card.
-    let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
-    let mut scene = input::load(&options.scene, dram_bytes)?;
-    for assignment in &options.scene.assignments {
-        scene.apply(assignment).map_err(Failure::input)?;
-    }
-    scene.check_light().map_err(Failure::input)?;
-    let camera = settings.camera(&scene)?;
-    let misfit = options.picture.fit(&camera, &mut settings.picture);
-    if !options.quiet {
-        messages::say_loaded(options, settings, &scene, &camera, misfit);
-    }
+    let scene = assigned(&options.scene, input::load(&options.scene, dram_bytes(settings))?)?;
+    view(options, settings, &scene)?;
     Ok(scene)
-}
-
-/// Runs `work` on a pool of `threads` threads.
-pub(crate) fn on_threads<T: Send>(
-    threads: Option<usize>,
-    work: impl FnOnce() -> T + Send,
-) -> Result<T, Failure> {
-    let Some(threads) = threads else { return Ok(work()) };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    Ok(pool.map_err(|error| Failure::work_error(&error))?.install(work))
 }

@@ -4,7 +4,7 @@ mod json;
 
 use std::path::Path;
 
-use photoncard_driver::scene::gltf::{LoadSettings, load_with};
+use photoncard_driver::scene::gltf::{Animation, LoadSettings, SceneFile};
 use photoncard_driver::scene::{
     Camera, Encoding, Image, Layers, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture, Wrap,
 };
@@ -16,9 +16,11 @@ use crate::failure::Failure;
 /// Prints the contents of a scene: a report, or JSON.
 pub(crate) fn info(path: &Path, json: bool, lights: &LightOptions) -> Result<(), Failure> {
     let settings = LoadSettings { light_units: lights.light_units, ..LoadSettings::default() };
-    let scene = load_with(path, &settings).map_err(Failure::input)?;
+    let file = SceneFile::open(path, &settings).map_err(Failure::input)?;
+    let animations = file.animations().map_err(Failure::input)?;
+    let scene = file.at_rest().map_err(Failure::input)?;
     if json {
-        return print_json(&format!("{:#}", json::contents(&scene)));
+        return print_json(&format!("{:#}", json::contents(&scene, &animations)));
     }
     let mut lines = vec![path.display().to_string()];
     lines.extend(geometry(&scene).map(|row| format!("  {row}")));
@@ -26,6 +28,7 @@ pub(crate) fn info(path: &Path, json: bool, lights: &LightOptions) -> Result<(),
     for (heading, rows) in [
         ("Cameras", scene.cameras.iter().map(camera).collect::<Vec<_>>()),
         ("Punctual lights", scene.lights.iter().map(light).collect()),
+        ("Animations", animations.iter().map(animation).collect()),
         ("Materials", scene.materials.iter().map(|item| material(item, &scene)).collect()),
         ("Images", scene.images.iter().map(image).collect()),
         ("Variants", scene.variants.clone()),
@@ -82,6 +85,14 @@ fn camera(camera: &Camera) -> String {
     let Camera { name, origin, .. } = camera;
     let aspect = camera.aspect.map_or(String::new(), |aspect| format!(", aspect ratio {aspect}"));
     format!("{name}: at {origin}, vertical field of view {degrees:.1} degrees{aspect}")
+}
+
+fn animation(animation: &Animation) -> String {
+    let Animation { name, seconds, moves_only_cameras } = animation;
+    // Times are of single precision in the file.
+    let [begin, end] = seconds.map(|time| time as f32);
+    let moved = if *moves_only_cameras { "moves cameras alone" } else { "moves meshes or lights" };
+    format!("{name}: {begin} to {end} s, {moved}")
 }
 
 fn light(light: &PunctualLight) -> String {

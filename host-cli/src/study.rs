@@ -18,6 +18,7 @@ use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::remaining::Remaining;
 use crate::progress::{duration, stop_on_signals};
+use crate::shell;
 
 /// Message of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
@@ -76,18 +77,7 @@ fn failure(error: StudyError) -> Failure {
 
 /// Command line as typed, with the program's name without its folder.
 fn command_line() -> String {
-    let arguments = std::env::args_os().skip(1).map(|argument| quoted(&argument.to_string_lossy()));
-    std::iter::once("photoncard".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
-}
-
-/// Quotes an argument for a shell.
-fn quoted(argument: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
-    if !argument.is_empty() && argument.chars().all(is_plain) {
-        argument.to_owned()
-    } else {
-        format!("'{}'", argument.replace('\'', "'\\''"))
-    }
+    shell::command(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
 }
 
 /// Progress of a study: a bar on a terminal, otherwise a line for each tenth.

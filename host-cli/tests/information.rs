@@ -160,6 +160,12 @@ fn every_command_has_help() {
     for command in [
         &[][..],
         &["render"],
+        &["prepare"],
+        &["merge"],
+        &["farm"],
+        &["farm", "openjd"],
+        &["farm", "slurm"],
+        &["farm", "parallel"],
         &["scene"],
         &["scene", "info"],
         &["card"],

@@ -67,10 +67,16 @@ const OTHERS: [&[&str]; 22] = [
 ];
 
 /// Options on the storage of samples, which the file states itself, and on messages.
-const OF_THE_FILE: [&str; 4] = ["--output", "--sample-type", "--quiet", "--help"];
+const OF_THE_FILE: [&str; 5] = ["--output", "--sample-type", "--quiet", "--progress", "--help"];
 
 /// Option that pixels depend on, and that no shipped scene takes.
 const OF_SCENES_WITH_VARIANTS: &str = "--variant";
+
+/// Options of frames, which a test of their own has.
+const OF_FRAMES: [&str; 3] = ["--frames", "--animation", "--fps"];
+
+/// Options of prepared scenes and of parts, which tests of their own have.
+const OF_FARMS: [&str; 2] = ["--part", "--prepared"];
 
 /// Options that state the number of samples by an aim.
 const OF_SAMPLES: [&str; 2] = ["--noise", "--time"];
@@ -232,7 +238,12 @@ fn every_option_is_known_to_change_pixels_or_not_to() {
     let offered: BTreeSet<_> = options.collect();
     let of_pixels = options_of_pixels();
     let known = of_pixels.iter().map(|(options, ..)| options[0]).chain(OTHERS.map(|options| options[0]));
-    let known: BTreeSet<_> =
-        known.chain(OF_THE_FILE).chain(OF_SAMPLES).chain([OF_SCENES_WITH_VARIANTS]).collect();
+    let known: BTreeSet<_> = known
+        .chain(OF_THE_FILE)
+        .chain(OF_SAMPLES)
+        .chain(OF_FRAMES)
+        .chain(OF_FARMS)
+        .chain([OF_SCENES_WITH_VARIANTS])
+        .collect();
     assert_eq!(offered, known);
 }

@@ -1,7 +1,7 @@
 //! Builder of glTF files from meshes, materials, nodes and cameras.
 
 use base64::Engine;
-use glam::{Vec2, Vec3};
+use glam::{Mat3, Quat, Vec2, Vec3};
 
 use crate::document::{
     Accessor, Buffer, BufferView, CameraEntry, Document, ImageEntry, MaterialEntry, MeshEntry, Node,
@@ -11,6 +11,7 @@ use crate::material::Material;
 use crate::mesh::Mesh;
 
 /// glTF's constants for component types, targets of buffer views, and the filter of samplers.
+const UNSIGNED_BYTE: u32 = 5121;
 const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
@@ -21,7 +22,7 @@ const LINEAR: u32 = 9729;
 /// Vertices and indices that are in the file, for use by any number of meshes.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
-    attributes: PrimitiveAttributes,
+    pub(crate) attributes: PrimitiveAttributes,
     indices: Option<usize>,
     mode: Option<u32>,
 }
@@ -79,14 +80,25 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The node's matrix: a glTF camera looks along its own -z with +y up.
-    fn matrix(&self) -> [f32; 16] {
+    /// Axes of the node: a glTF camera looks along its own -z with +y up.
+    fn axes(&self) -> [Vec3; 3] {
         let back = self.eye - self.target;
         // Divided rather than normalised, so that coordinate axes stay exact.
         let back = back / back.length();
         let right = Vec3::Y.cross(back);
         let right = right / right.length();
-        let up = back.cross(right);
+        [right, back.cross(right), back]
+    }
+
+    /// The node's rotation.
+    pub(crate) fn rotation(&self) -> Quat {
+        let [right, up, back] = self.axes();
+        Quat::from_mat3(&Mat3::from_cols(right, up, back))
+    }
+
+    /// The node's matrix.
+    fn matrix(&self) -> [f32; 16] {
+        let [right, up, back] = self.axes();
         let mut matrix = [0.0; 16];
         for (column, vector) in [right, up, back, self.eye].into_iter().enumerate() {
             // Adding zero turns -0 into 0.
@@ -100,8 +112,8 @@ impl Camera {
 /// A glTF file under construction.
 #[derive(Clone, Debug, Default)]
 pub struct SceneBuilder {
-    document: Document,
-    roots: Vec<usize>,
+    pub(crate) document: Document,
+    pub(crate) roots: Vec<usize>,
     binary: Vec<u8>,
 }
 
@@ -144,7 +156,7 @@ impl SceneBuilder {
             (indices.flat_map(|&index| index.to_le_bytes()).collect(), UNSIGNED_INT)
         };
         let count = 3 * mesh.triangles.len();
-        let indices = Some(self.accessor(bytes, ELEMENT_ARRAY_BUFFER, component, count, "SCALAR"));
+        let indices = Some(self.accessor(bytes, Some(ELEMENT_ARRAY_BUFFER), component, count, "SCALAR"));
         Geometry { attributes, indices, mode: None }
     }
 
@@ -159,9 +171,9 @@ impl SceneBuilder {
     fn attributes(&mut self, mesh: &Mesh) -> PrimitiveAttributes {
         let (min, max) = mesh.bounds();
         let position = self.vectors(mesh.positions.iter().map(Vec3::to_array), "VEC3");
-        self.document.accessors[position].min = Some(min.to_array());
-        self.document.accessors[position].max = Some(max.to_array());
-        let mut attributes = PrimitiveAttributes { position, normal: None, texcoord_0: None, color_0: None };
+        self.document.accessors[position].min = Some(min.to_array().to_vec());
+        self.document.accessors[position].max = Some(max.to_array().to_vec());
+        let mut attributes = PrimitiveAttributes { position, ..PrimitiveAttributes::default() };
         if mesh.normals == mesh.positions {
             attributes.normal = Some(position);
         } else if !mesh.normals.is_empty() {
@@ -176,25 +188,37 @@ impl SceneBuilder {
         attributes
     }
 
-    fn vectors<const N: usize>(
+    /// Adds an attribute of vertices.
+    pub(crate) fn vectors<const N: usize>(
         &mut self,
         values: impl ExactSizeIterator<Item = [f32; N]>,
         kind: &'static str,
     ) -> usize {
         let count = values.len();
         let bytes = values.flatten().flat_map(f32::to_le_bytes).collect();
-        self.accessor(bytes, ARRAY_BUFFER, FLOAT, count, kind)
+        self.accessor(bytes, Some(ARRAY_BUFFER), FLOAT, count, kind)
+    }
+
+    /// Adds numbers of no vertices, `count` elements of them.
+    pub(crate) fn numbers(&mut self, values: &[f32], count: usize, kind: &'static str) -> usize {
+        let bytes = values.iter().copied().flat_map(f32::to_le_bytes).collect();
+        self.accessor(bytes, None, FLOAT, count, kind)
+    }
+
+    /// Adds joints of vertices, four of each.
+    pub(crate) fn joints(&mut self, joints: &[[u8; 4]]) -> usize {
+        self.accessor(joints.as_flattened().to_vec(), Some(ARRAY_BUFFER), UNSIGNED_BYTE, joints.len(), "VEC4")
     }
 
     fn accessor(
         &mut self,
         bytes: Vec<u8>,
-        target: u32,
+        target: Option<u32>,
         component_type: u32,
         count: usize,
         kind: &'static str,
     ) -> usize {
-        let buffer_view = self.view(bytes, Some(target));
+        let buffer_view = self.view(bytes, target);
         let accessor = Accessor { buffer_view, component_type, count, kind, min: None, max: None };
         self.document.accessors.push(accessor);
         self.document.accessors.len() - 1
@@ -215,6 +239,7 @@ impl SceneBuilder {
             indices: geometry.indices,
             material,
             mode: geometry.mode,
+            targets: None,
         });
         self.document.meshes.push(MeshEntry { name: name.into(), primitives: primitives.collect() });
         self.document.meshes.len() - 1
@@ -226,10 +251,11 @@ impl SceneBuilder {
         self.document.nodes.len() - 1
     }
 
-    /// Adds a root node.
-    pub fn root(&mut self, node: Node) {
+    /// Adds a root node; returns its index.
+    pub fn root(&mut self, node: Node) -> usize {
         let index = self.node(node);
         self.roots.push(index);
+        index
     }
 
     /// Adds a root node with `mesh` in `material`; mesh and node have one name.
@@ -246,12 +272,17 @@ impl SceneBuilder {
 
     /// Adds a camera and its root node, both with one name.
     pub fn camera(&mut self, name: &str, camera: &Camera) {
+        let index = self.lens(name, camera);
+        let matrix = Some(camera.matrix());
+        self.root(Node { name: name.into(), camera: Some(index), matrix, ..Node::default() });
+    }
+
+    /// Adds a camera without its node; returns its index.
+    pub(crate) fn lens(&mut self, name: &str, camera: &Camera) -> usize {
         let (aspect_ratio, yfov) = (camera.aspect_ratio, camera.yfov);
         let perspective = Perspective { aspect_ratio, yfov, znear: 0.001, zfar: 1000.0 };
         self.document.cameras.push(CameraEntry { name: name.into(), kind: "perspective", perspective });
-        let index = self.document.cameras.len() - 1;
-        let matrix = Some(camera.matrix());
-        self.root(Node { name: name.into(), camera: Some(index), matrix, ..Node::default() });
+        self.document.cameras.len() - 1
     }
 
     fn finish(mut self, uri: Option<String>) -> (Document, Vec<u8>) {
@@ -261,6 +292,7 @@ impl SceneBuilder {
         let mut used: Vec<_> =
             document.materials.iter().flat_map(|material| material.extensions.names()).collect();
         used.extend(document.materials.iter().filter_map(MaterialEntry::transform_extension));
+        used.extend(document.extensions.as_ref().map(|_| "KHR_lights_punctual"));
         used.sort_unstable();
         used.dedup();
         document.extensions_used = used;

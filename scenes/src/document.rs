@@ -12,6 +12,8 @@ pub struct Document {
     pub(crate) asset: Asset,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) extensions_used: Vec<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) extensions: Option<RootExtensions>,
     pub(crate) scene: usize,
     pub(crate) scenes: Vec<Roots>,
     pub(crate) nodes: Vec<Node>,
@@ -27,6 +29,10 @@ pub struct Document {
     pub(crate) accessors: Vec<Accessor>,
     pub(crate) buffer_views: Vec<BufferView>,
     pub(crate) buffers: Vec<Buffer>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) skins: Vec<Skin>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) animations: Vec<AnimationEntry>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -46,7 +52,7 @@ pub(crate) struct Roots {
     pub(crate) nodes: Vec<usize>,
 }
 
-/// A node of the hierarchy: a mesh or a camera, with its transform and its children.
+/// A node of the hierarchy: a mesh, a camera or a light, with its transform and its children.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Node {
     pub(crate) name: String,
@@ -55,7 +61,11 @@ pub struct Node {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) camera: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) skin: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) translation: Option<[f32; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) rotation: Option<[f32; 4]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) scale: Option<[f32; 3]>,
     /// Transform in column-major order.
@@ -63,6 +73,8 @@ pub struct Node {
     pub(crate) matrix: Option<[f32; 16]>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) children: Vec<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) extensions: Option<NodeExtensions>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -79,9 +91,11 @@ pub(crate) struct Primitive {
     pub(crate) material: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) mode: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) targets: Option<Vec<MorphTarget>>,
 }
 
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(crate) struct PrimitiveAttributes {
     pub(crate) position: usize,
@@ -91,6 +105,17 @@ pub(crate) struct PrimitiveAttributes {
     pub(crate) texcoord_0: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) color_0: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) joints_0: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) weights_0: Option<usize>,
+}
+
+/// Displacements of a primitive's vertices.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub(crate) struct MorphTarget {
+    pub(crate) position: usize,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -290,9 +315,9 @@ pub(crate) struct Accessor {
     #[serde(rename = "type")]
     pub(crate) kind: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) min: Option<[f32; 3]>,
+    pub(crate) min: Option<Vec<f32>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) max: Option<[f32; 3]>,
+    pub(crate) max: Option<Vec<f32>>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -311,4 +336,69 @@ pub(crate) struct Buffer {
     pub(crate) byte_length: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) uri: Option<String>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Skin {
+    pub(crate) joints: Vec<usize>,
+    pub(crate) inverse_bind_matrices: usize,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct AnimationEntry {
+    pub(crate) name: String,
+    pub(crate) channels: Vec<Channel>,
+    pub(crate) samplers: Vec<KeyframeSampler>,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Channel {
+    pub(crate) sampler: usize,
+    pub(crate) target: ChannelTarget,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct ChannelTarget {
+    pub(crate) node: usize,
+    pub(crate) path: &'static str,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct KeyframeSampler {
+    pub(crate) input: usize,
+    pub(crate) output: usize,
+    pub(crate) interpolation: &'static str,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct RootExtensions {
+    #[serde(rename = "KHR_lights_punctual")]
+    pub(crate) lights: Lights,
+}
+
+#[derive(Clone, Debug, Default, Serialize)]
+pub(crate) struct Lights {
+    pub(crate) lights: Vec<PointLight>,
+}
+
+/// Light of `KHR_lights_punctual` that shines alike in all directions.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct PointLight {
+    #[serde(rename = "type")]
+    pub(crate) kind: &'static str,
+    pub(crate) name: String,
+    pub(crate) color: [f64; 3],
+    pub(crate) intensity: f64,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct NodeExtensions {
+    #[serde(rename = "KHR_lights_punctual")]
+    pub(crate) light: LightIndex,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct LightIndex {
+    pub(crate) light: usize,
 }

@@ -8,6 +8,7 @@
 //! | [`mesh`], `sphere` | triangle meshes and operations on them |
 //! | [`material`] | reflection, transmission and emission, as glTF states them |
 //! | [`document`], [`builder`] | glTF's JSON, and its assembly from meshes, materials, nodes and cameras |
+//! | `motion` | animations, and what they move: cameras, lights, joints and morph targets |
 //! | `cornell`, `furnace`, `atrium`, `room`, `roughness` | one module for each scene and its variants |
 //! | `sky` | environment map for `atrium-open.glb` |
 //!
@@ -21,6 +22,7 @@ pub mod document;
 mod furnace;
 pub mod material;
 pub mod mesh;
+mod motion;
 mod room;
 mod roughness;
 mod sky;
@@ -42,8 +44,10 @@ pub fn scenes() -> Vec<SceneFile> {
         SceneFile { name: "cornell-glossy.gltf", bytes: cornell::glossy_floor() },
         SceneFile { name: "cornell-uplight.gltf", bytes: cornell::uplight() },
         SceneFile { name: "cornell-spheres.glb", bytes: cornell::spheres() },
+        SceneFile { name: "cornell-moving.glb", bytes: cornell::moving() },
         SceneFile { name: "furnace.gltf", bytes: furnace::furnace() },
         SceneFile { name: "atrium.glb", bytes: atrium::atrium() },
+        SceneFile { name: "atrium-walk.glb", bytes: atrium::walk() },
         SceneFile { name: "atrium-open.glb", bytes: atrium::open() },
         SceneFile { name: "room.glb", bytes: room::room() },
         SceneFile { name: "roughness.glb", bytes: roughness::roughness() },

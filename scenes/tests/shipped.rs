@@ -10,13 +10,15 @@ use gltf::mesh::Mode;
 use gltf::{Gltf, Node, Primitive};
 
 /// Name of each scene, its range of triangles, and its cameras.
-const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 9] = [
+const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 11] = [
     ("cornell.gltf", 36..=36, &["camera"]),
     ("cornell-glossy.gltf", 36..=36, &["camera", "floor"]),
     ("cornell-uplight.gltf", 46..=46, &["camera"]),
     ("cornell-spheres.glb", 40_972..=40_972, &["camera"]),
+    ("cornell-moving.glb", 102..=102, &["camera"]),
     ("furnace.gltf", 12..=12, &["camera"]),
     ("atrium.glb", 60_000..=150_000, &["court", "gallery"]),
+    ("atrium-walk.glb", 60_000..=150_000, &["walk"]),
     ("atrium-open.glb", 60_000..=150_000, &["court", "gallery"]),
     ("room.glb", 1_500..=3_000, &["camera"]),
     ("roughness.glb", 51_206..=51_206, &["camera"]),

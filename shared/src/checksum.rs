@@ -74,7 +74,7 @@ pub fn checksum(bytes: &[u8]) -> u32 {
 }
 
 /// A CRC-32C over bytes that come in pieces.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Checksum(u32);
 
 impl Default for Checksum {

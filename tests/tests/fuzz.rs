@@ -22,6 +22,8 @@ const INPUTS: [(&str, u64); NAMES.len()] = [
     ("textures", 6000),
     ("environments", 20_000),
     ("exr", 8000),
+    ("parts", 4000),
+    ("prepared", 4000),
 ];
 
 /// Lock that runs one test at a time, so that no allocations of another are counted.

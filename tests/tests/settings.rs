@@ -7,6 +7,7 @@ use photoncard_driver::emulator::trace::{TraceFormat, TraceSettings};
 use photoncard_driver::film::{Film, Window};
 use photoncard_driver::layer::Layers;
 use photoncard_driver::partial::PartialSettings;
+use photoncard_driver::parts::Part;
 use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{
     CardAddress, CardSet, Filter, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling,
@@ -105,6 +106,8 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             queue: Work = Some(9),
             in_flight: Work = Some(1),
             focus: Nothing = Some([3, 4]),
+            // A part that is all of the picture.
+            part: Nothing = Part::new(1, 1),
             // There is no irradiance cache.
             keep_records: Nothing = true,
         }

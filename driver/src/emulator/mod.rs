@@ -85,7 +85,8 @@ impl EmulatedKind {
         }
     }
 
-    pub(crate) fn budget(self) -> Budget {
+    /// Budget of a chip of the kind.
+    pub fn budget(self) -> Budget {
         match self {
             Self::Reference => Reference::BUDGET,
             Self::Large => Large::BUDGET,

@@ -6,8 +6,11 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::image::{Header, Lights, Section, SectionKind};
+use photoncard_shared::image::{Header, HeaderError, Lights, Section, SectionKind};
 use photoncard_shared::layout::{BvhNode, Material, NodeBox, Record, WideNode};
+
+use super::image_lines::ImageLines;
+use super::mapped::MappedLines;
 
 /// Sections of lights.
 const LIGHT_SECTIONS: [SectionKind; 4] = [
@@ -22,7 +25,7 @@ const LIGHT_SECTIONS: [SectionKind; 4] = [
 pub struct CardImage {
     /// Header, as encoded in the first lines.
     pub(super) header: Header,
-    pub(super) lines: Vec<Line>,
+    pub(super) lines: ImageLines,
 }
 
 impl AsRef<[Line]> for CardImage {
@@ -32,6 +35,23 @@ impl AsRef<[Line]> for CardImage {
 }
 
 impl CardImage {
+    /// Image of lines that are mapped from a file.
+    ///
+    /// # Errors
+    /// If they do not begin with a header of as many lines.
+    pub(crate) fn mapped(lines: MappedLines) -> Result<Self, &'static str> {
+        let header = lines.first_chunk().map(Header::read);
+        let header = match header {
+            Some(Ok(header)) => header,
+            Some(Err(HeaderError::Version(_))) => return Err("its card image has another layout"),
+            Some(Err(_)) | None => return Err("it holds no card image"),
+        };
+        if header.lines as usize != lines.len() {
+            return Err("its card image has another length");
+        }
+        Ok(Self { header, lines: ImageLines::Mapped(lines.into()) })
+    }
+
     /// All lines, the header's first.
     pub fn lines(&self) -> &[Line] {
         &self.lines
@@ -55,7 +75,7 @@ impl CardImage {
     /// The lines of a section, mutable.
     pub(crate) fn section_mut(&mut self, kind: SectionKind) -> &mut [Line] {
         let range = self.range(kind);
-        &mut self.lines[range]
+        &mut self.lines.make_mut()[range]
     }
 
     /// Indices of a section's lines.
@@ -75,7 +95,7 @@ impl CardImage {
             dark.header.sections[kind as usize] = Section::default();
         }
         let header = dark.header.to_lines();
-        dark.lines.iter_mut().zip(header).for_each(|(line, header)| *line = header);
+        dark.lines.make_mut().iter_mut().zip(header).for_each(|(line, header)| *line = header);
         let materials = dark.header.section(SectionKind::Materials).records as usize;
         let lines = dark.section_mut(SectionKind::Materials);
         for index in 0..materials {

@@ -5,11 +5,13 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
 
 use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::checksum::checksum;
+use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{PixelSums, Tile};
 
 use super::samples::{KeptSamples, SampleRange};
 use crate::film::Window;
 use crate::sink::{FinishedTile, pixel_positions};
+use crate::sums::SumFormat;
 
 /// Magic number of a record. As in PNG, a transfer that alters line ends or eighth bits destroys it.
 pub(super) const MAGIC: [u8; 8] = *b"\x89TILE\r\n\x1a";
@@ -23,14 +25,32 @@ const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
 const MAX_IN_VAIN: u64 = 32 << 20;
 
 /// Encodes the record of a finished tile, whose samples begin with `first_sample`.
-pub(super) fn record(finished: &FinishedTile, first_sample: u32) -> Vec<u8> {
-    let Tile { x, y, width, height, .. } = *finished.tile();
-    let mut bytes = MAGIC.to_vec();
-    let samples = finished.format().samples;
-    bytes.extend([x, y, width, height, first_sample, samples].map(u32::to_le_bytes).as_flattened());
+pub(crate) fn record(finished: &FinishedTile, first_sample: u32) -> Vec<u8> {
+    let mut bytes = head(finished.tile(), first_sample, finished.format().samples);
     bytes.extend(finished.records());
     bytes.extend(checksum(&bytes).to_le_bytes());
     bytes
+}
+
+/// Encodes the head of a tile's record.
+fn head(tile: &Tile, first_sample: u32, samples: u32) -> Vec<u8> {
+    let Tile { x, y, width, height, .. } = *tile;
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend([x, y, width, height, first_sample, samples].map(u32::to_le_bytes).as_flattened());
+    bytes
+}
+
+/// Size of the record of a tile, bytes.
+pub(crate) fn record_bytes(tile: &Tile, format: &SumFormat) -> u64 {
+    (HEAD_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * format.record_bytes() as u64
+}
+
+/// Decodes the record of a tile with all samples of the format; `None` unless it is that, sound and whole.
+pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat) -> Option<FinishedTile> {
+    let (bytes, sum) = record.split_last_chunk::<CHECKSUM_BYTES>()?;
+    let pixels = bytes.strip_prefix(&*head(tile, 0, format.samples))?;
+    let is_sound = checksum(bytes).to_le_bytes() == *sum;
+    is_sound.then(|| FinishedTile::new(*tile, pixels.to_vec(), format, Counters::ZERO)).flatten()
 }
 
 /// Reads all valid tiles from offset `start` on. Returns the end of the last one. After invalid bytes the

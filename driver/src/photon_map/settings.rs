@@ -1,6 +1,7 @@
 //! Parameters of a photon map.
 
 use photoncard_shared::message::Radiance;
+use serde::{Deserialize, Serialize};
 
 use crate::choice::choices;
 
@@ -26,7 +27,7 @@ pub struct PhotonSettings {
 }
 
 /// Layout of the photon map in card memory. A gather finds the same photons in each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PhotonLayout {
     /// The left-balanced kd-tree of Jensen (2001), of 20-byte records: the dissertation's.
     Jensen,

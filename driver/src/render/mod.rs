@@ -19,6 +19,7 @@ mod open_card;
 mod outputs;
 mod passes;
 mod preparation;
+mod prepared;
 mod provenance;
 mod renderer;
 mod reopening;
@@ -38,6 +39,7 @@ pub use passes::{Aim, Passes};
 pub use photoncard_shared::budget::MAX_BINS;
 pub use photoncard_shared::message::{Filter, Radiance, Sampling};
 pub use photoncard_shared::message::{MemoryPattern, MemoryUse, WrongWord, WrongWords};
+pub use prepared::{PreparedError, PreparedScene};
 pub use provenance::Provenance;
 pub use renderer::{Chosen, Renderer, Rendering};
 pub use self_test::{

@@ -18,7 +18,6 @@ use crate::pack::PackedScene;
 use crate::partial::PartialRender;
 use crate::photon_map::{PhotonSettings, check_image};
 use crate::scene::{FixedScene, Scene};
-use crate::scheduler::tiles;
 
 /// Finished picture.
 pub struct Rendering {
@@ -52,6 +51,11 @@ pub struct Renderer {
 }
 
 impl Renderer {
+    /// Renderer with the card image of a prepared scene.
+    pub(super) fn with_image(kept: Kept) -> Self {
+        Self { cards: None, kept: Some(kept) }
+    }
+
     /// Renders a picture of a scene.
     ///
     /// # Errors
@@ -173,7 +177,7 @@ impl Renderer {
         // A film may be large: it is allocated after the settings are checked.
         let mut film = settings.film(source.sum_scale())?;
         base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
-        let tiles = tiles(settings.window(), tile, settings.schedule.order);
+        let tiles = settings.tiles(tile);
         let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
         let made = source.prepare(scene, settings, &budgets, &mut times, observer)?;
         let prepared = &kept.insert(made).prepared;
@@ -225,15 +229,15 @@ fn connected<'c>(
 }
 
 /// A card image, and what it was made of.
-struct Kept {
+pub(super) struct Kept {
     /// [`Scene::checksum_without_cameras`].
-    scene: String,
-    photons: PhotonSettings,
-    prepared: Prepared,
+    pub(super) scene: String,
+    pub(super) photons: PhotonSettings,
+    pub(super) prepared: Prepared,
 }
 
 /// Origin of the card image.
-enum Source {
+pub(super) enum Source {
     /// The image of an earlier picture.
     Kept(Kept),
     /// The packed scene; its photons are to be traced.
@@ -242,7 +246,7 @@ enum Source {
 
 impl Source {
     /// Source of the image, with the settings that are stated or chosen.
-    fn new(
+    pub(super) fn new(
         scene: &FixedScene,
         settings: &RenderSettings,
         choose: Option<Choice>,
@@ -279,7 +283,7 @@ impl Source {
     ///
     /// # Errors
     /// If it does not fit a budget, the photons cannot be traced, or the observer stops the render.
-    fn prepare(
+    pub(super) fn prepare(
         self,
         scene: &FixedScene,
         settings: &RenderSettings,

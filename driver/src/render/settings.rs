@@ -9,7 +9,7 @@ use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::Budget;
-use photoncard_shared::message::{self, CausticGather, FrameParameters, SumScale};
+use photoncard_shared::message::{self, CausticGather, FrameParameters, SumScale, Tile};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
@@ -17,6 +17,7 @@ use crate::emulator::memory_model::CacheSettings;
 use crate::film::{Film, FilmError, Window};
 use crate::photon_map::PhotonSettings;
 use crate::scene::{Camera, Scene};
+use crate::scheduler::tiles;
 use crate::sums::SumFormat;
 
 /// Settings of a render: each field is an option of the command line, in groups.
@@ -80,6 +81,15 @@ impl RenderSettings {
         };
         let narrower = |&side: &u32| (side / 2 >= NARROWEST_TILE && tiles(side) < wanted).then_some(side / 2);
         std::iter::successors(Some(widest), narrower).last().unwrap_or(widest)
+    }
+
+    /// Tiles to render, each of at most `side * side` pixels.
+    pub fn tiles(&self, side: u32) -> Vec<Tile> {
+        let order = self.schedule.order;
+        match self.schedule.part {
+            Some(part) => part.tiles(self.window(), side, order),
+            None => tiles(self.window(), side, order),
+        }
     }
 
     /// Empty film for the picture, with sums in units of `scale`.

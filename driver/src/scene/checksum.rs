@@ -9,15 +9,16 @@ use super::{Camera, Scene};
 impl Scene {
     /// CRC-32C of all contents of the scene that a render reads, as eight hexadecimal digits.
     pub fn checksum(&self) -> String {
-        self.checksum_with(&self.cameras)
+        self.checksum_after(self.bulk_checksum(), &self.cameras)
     }
 
     /// [`Self::checksum`] of a scene without its cameras: everything that its card image depends on.
     pub fn checksum_without_cameras(&self) -> String {
-        self.checksum_with(&[])
+        self.checksum_after(self.bulk_checksum(), &[])
     }
 
-    fn checksum_with(&self, cameras: &[Camera]) -> String {
+    /// Sum of the triangles and texels.
+    pub(super) fn bulk_checksum(&self) -> Checksum {
         let mut sum = Checksum::default();
         for triangle in &self.triangles {
             triangle.vertices.iter().for_each(|vertex| add(&mut sum, &vertex.to_array()));
@@ -38,6 +39,11 @@ impl Scene {
         if let Some(environment) = &self.environment {
             add(&mut sum, environment.texels.as_flattened());
         }
+        sum
+    }
+
+    /// Sum of all contents, with these cameras, after that of the triangles and texels.
+    pub(super) fn checksum_after(&self, mut sum: Checksum, cameras: &[Camera]) -> String {
         sum.update(self.description(cameras).as_bytes());
         format!("{:08x}", sum.value())
     }

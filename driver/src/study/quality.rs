@@ -214,6 +214,7 @@ fn comparable(settings: &RenderSettings) -> RenderSettings {
             queue: None,
             in_flight: None,
             focus: None,
+            part: None,
             keep_records: false,
         },
         ..settings.clone()

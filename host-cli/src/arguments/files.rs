@@ -28,6 +28,8 @@ pub(crate) enum PictureFormat {
     Exr,
     /// PNG: tone-mapped for a screen.
     Png,
+    /// Part of a picture, for `photoncard merge`.
+    Part,
 }
 
 /// Output for a picture.
@@ -44,7 +46,8 @@ pub(super) fn picture() -> impl TypedValueParser<Value = PictureOutput> {
         let format = match ending.as_deref() {
             Some("exr") => PictureFormat::Exr,
             Some("png") => PictureFormat::Png,
-            _ => return Err("a picture is a file OUT.exr, linear radiance with layers, or OUT.png, tone-mapped; give its name one of these endings"),
+            Some("part") => PictureFormat::Part,
+            _ => return Err("a picture is a file OUT.exr, linear radiance with layers, or OUT.png, tone-mapped, and a part of one OUT.part; give its name one of these endings"),
         };
         Ok(PictureOutput { path, format })
     })
@@ -54,7 +57,9 @@ pub(super) fn picture() -> impl TypedValueParser<Value = PictureOutput> {
 pub(super) fn png() -> impl TypedValueParser<Value = PathBuf> {
     picture().try_map(|PictureOutput { path, format }| match format {
         PictureFormat::Png => Ok(path),
-        PictureFormat::Exr => Err("a tone-mapped picture is a PNG; give its name the ending .png"),
+        PictureFormat::Exr | PictureFormat::Part => {
+            Err("a tone-mapped picture is a PNG; give its name the ending .png")
+        }
     })
 }
 
@@ -98,6 +103,7 @@ mod tests {
             ("b.c/A.EXR", Some(PictureFormat::Exr)),
             ("./-.png", Some(PictureFormat::Png)),
             ("a.exr.Png", Some(PictureFormat::Png)),
+            ("a.exr.part", Some(PictureFormat::Part)),
             ("-", None),
             ("a", None),
             (".exr", None),

@@ -9,14 +9,16 @@ use photoncard_driver::partial::PartialSettings;
 
 use super::choice::choice;
 use super::files::{PictureFormat, PictureOutput, TextOutput, picture, text};
+use super::frames::numbered;
 use super::tone::ToneOptions;
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 #[command(next_help_heading = "Outputs")]
 pub(crate) struct OutputOptions {
     /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated
     ///
-    /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures.
+    /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures. With --part the file is OUT.part, for
+    /// photoncard merge.
     #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", required = true, value_parser = picture())]
     pub(crate) pictures: Vec<PictureOutput>,
     /// Continue a render that was stopped or has failed
@@ -48,6 +50,21 @@ impl OutputOptions {
         let mut name = self.main_path().as_os_str().to_owned();
         name.push(".partial");
         name.into()
+    }
+
+    /// Outputs of a frame.
+    ///
+    /// # Errors
+    /// If a name has no place for the frame's number: the name.
+    pub(crate) fn of_frame(&self, frame: u32) -> Result<Self, &Path> {
+        let mut outputs = self.clone();
+        for (output, pattern) in outputs.pictures.iter_mut().zip(&self.pictures) {
+            output.path = numbered(&pattern.path, frame).ok_or(&*pattern.path)?;
+        }
+        if let Some(TextOutput::File(pattern)) = &self.stats {
+            outputs.stats = Some(TextOutput::File(numbered(pattern, frame).ok_or(&**pattern)?));
+        }
+        Ok(outputs)
     }
 
     /// Type of an EXR's samples.

@@ -2,27 +2,36 @@
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
-use photoncard_driver::quality::{Quality, Stated};
-use photoncard_driver::render::{RenderSettings, TileOutputs};
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::quality::{Fit, Quality, Stated};
+use photoncard_driver::render::{Observer, RenderError, RenderSettings, Schedule, TileOutputs};
+use photoncard_driver::scene::Scene;
 
 use super::cards::CardOptions;
 use super::choice::choice;
+use super::frames::FrameOptions;
 use super::integrator::IntegratorOptions;
 use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
+use super::prepared::PreparedOption;
+use super::progress::ProgressForm;
 use super::samples::SampleOptions;
 use super::scene::SceneOptions;
-use super::schedule::ScheduleOptions;
+use super::schedule::{PartOptions, ScheduleOptions};
 use super::threads::threads;
 
 #[derive(Args)]
 pub(crate) struct RenderOptions {
     #[command(flatten)]
     pub(crate) scene: SceneOptions,
+    #[command(flatten)]
+    pub(crate) prepared: PreparedOption,
     /// Quality of the picture, by which the options that are not stated are chosen
     #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
     pub(crate) quality: Quality,
+    #[command(flatten)]
+    pub(crate) frames: FrameOptions,
     #[command(flatten)]
     pub(crate) picture: PictureOptions,
     #[command(flatten)]
@@ -34,6 +43,8 @@ pub(crate) struct RenderOptions {
     #[command(flatten)]
     pub(super) schedule: ScheduleOptions,
     #[command(flatten)]
+    pub(crate) parts: PartOptions,
+    #[command(flatten)]
     pub(crate) cards: CardOptions,
     #[command(flatten)]
     pub(crate) outputs: OutputOptions,
@@ -43,6 +54,9 @@ pub(crate) struct RenderOptions {
     /// Show no progress
     #[arg(long)]
     pub(crate) quiet: bool,
+    /// Form of the progress, and of the message of a failure
+    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
+    pub(crate) progress: ProgressForm,
 }
 
 impl RenderOptions {
@@ -51,22 +65,50 @@ impl RenderOptions {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
+    /// What the quality finds for a scene, unless all that it would choose is stated.
+    ///
+    /// # Errors
+    /// As [`Quality::fit`].
+    pub(crate) fn fit(
+        &self,
+        scene: &Scene,
+        packed: &PackedScene,
+        settings: &RenderSettings,
+        observer: &dyn Observer,
+    ) -> Result<Option<Fit>, RenderError> {
+        if self.stated() == Stated::ALL {
+            return Ok(None);
+        }
+        let fit = self.quality.fit(scene, packed, settings, observer)?;
+        let noise = self.samples.aim().and_then(|aim| aim.noise);
+        Ok(fit.map(|fit| noise.map_or(fit, |noise| fit.for_noise(noise))))
+    }
+
     /// Settings of these options, with those of the quality for a scene that is not known.
     pub(crate) fn settings(&self) -> RenderSettings {
+        self.settings_of(self.quality)
+    }
+
+    /// [`Self::settings`] with another quality.
+    pub(crate) fn settings_of(&self, quality: Quality) -> RenderSettings {
         let cards = self.cards.settings();
-        let base = self.quality.settings();
-        let outputs = TileOutputs {
-            // Finished passes are no tiles that a render could go on with.
-            partial: self.outputs.partial().filter(|_| self.samples.aim().is_none()),
-            display: self.outputs.display(),
-        };
+        let base = quality.settings();
         RenderSettings {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),
             integrator: self.integrator.settings(&base.integrator),
-            schedule: self.schedule.settings(),
+            schedule: Schedule { part: self.parts.part, ..self.schedule.settings() },
             cards,
-            outputs,
+            outputs: self.tile_outputs(&self.outputs),
+        }
+    }
+
+    /// Settings of these outputs while a picture is rendered.
+    pub(crate) fn tile_outputs(&self, outputs: &OutputOptions) -> TileOutputs {
+        TileOutputs {
+            // Finished passes are no tiles that a render could go on with.
+            partial: outputs.partial().filter(|_| self.samples.aim().is_none()),
+            display: outputs.display(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
+use photoncard_driver::parts::Part;
 use photoncard_driver::render::Schedule;
 use photoncard_driver::scheduler::GatherOrder;
 
@@ -28,6 +29,16 @@ pub(crate) struct ScheduleOptions {
     pub(super) in_flight: Option<u32>,
 }
 
+#[derive(Args)]
+#[command(next_help_heading = "Order of the work")]
+pub(crate) struct PartOptions {
+    /// Render the K-th of N parts of the picture alone, to -o OUT.part; photoncard merge makes the picture of all
+    ///
+    /// Parts cost about alike, and may be rendered by any machines and cards, in any order. The picture is, to the bit, that of one render.
+    #[arg(long, value_name = "K/N", conflicts_with_all = ["time", "noise", "keep_samples"])]
+    pub(crate) part: Option<Part>,
+}
+
 impl ScheduleOptions {
     /// Settings of these options.
     pub(super) fn settings(&self) -> Schedule {
@@ -38,6 +49,7 @@ impl ScheduleOptions {
             queue: self.queue,
             in_flight: self.in_flight,
             focus: None,
+            part: None,
             keep_records: false,
         }
     }

@@ -6,7 +6,7 @@ use photoncard_driver::tone_mapping::{ToneCurve, ToneMapping};
 
 use super::choice::choice;
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct ToneOptions {
     /// Exposure of the PNG in stops, or auto [default: auto]
     ///

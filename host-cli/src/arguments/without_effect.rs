@@ -80,12 +80,12 @@ impl RenderOptions {
         let outputs = &self.outputs;
         let [no_exr, no_png] = [PictureFormat::Exr, PictureFormat::Png].map(|format| !outputs.has(format));
         let [of_exr, of_png] = ["without -o OUT.exr", "without -o OUT.png"].map(str::to_owned);
-        let is_shown = outputs.display_server.is_some();
+        let has_layers = outputs.display_server.is_some() || outputs.has(PictureFormat::Part);
         [
             (outputs.tone.exposure.is_some() && no_png, "--exposure", of_png.clone()),
             (outputs.tone.curve.is_some() && no_png, "--tonemap", of_png),
             (outputs.sample_type.is_some() && no_exr, "--sample-type", of_exr.clone()),
-            (self.picture.aov.is_some() && no_exr && !is_shown, "--aov", of_exr),
+            (self.picture.aov.is_some() && no_exr && !has_layers, "--aov", of_exr),
         ]
     }
 }

@@ -6,35 +6,48 @@ use photoncard_driver::exr::{self, SampleFormat};
 use photoncard_driver::film::Film;
 use photoncard_driver::layer::Layers;
 use photoncard_driver::output;
+use photoncard_driver::parts::{self, PartHead};
 use photoncard_driver::render::Rendering;
 use photoncard_driver::tone_mapping::{ToneMapping, write_png};
 
-use crate::arguments::{PictureFormat, PictureOutput, RenderOptions, TextOutput};
+use super::part;
+use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
 use crate::console::{print_json, printable_json};
 use crate::failure::Failure;
-use crate::{input, outputs};
+use crate::input;
 
 /// Checks that all files can be written, and that none replaces the scene, the environment or another one.
-pub(super) fn check(options: &RenderOptions) -> Result<(), Failure> {
-    let mut written: Vec<&Path> = options.outputs.pictures.iter().map(|picture| &*picture.path).collect();
-    written.extend(options.outputs.stats.as_ref().and_then(TextOutput::path));
+pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
+    part::check(options.parts.part, &outputs.pictures)?;
+    let mut written: Vec<&Path> = outputs.pictures.iter().map(|picture| &*picture.path).collect();
+    written.extend(outputs.stats.as_ref().and_then(TextOutput::path));
     written.extend(options.cards.trace.as_deref());
-    outputs::check(&input::files(&options.scene), &written, &[&options.outputs.partial_path()])
+    crate::outputs::check(&input::files(&options.scene), &written, &[&outputs.partial_path()])
 }
 
 /// Writes pictures and statistics.
-pub(super) fn write(options: &RenderOptions, rendering: &Rendering) -> Result<(), Failure> {
+pub(super) fn write(
+    options: &RenderOptions,
+    outputs: &OutputOptions,
+    rendering: &Rendering,
+) -> Result<(), Failure> {
     let provenance = serde_json::to_string(&rendering.statistics.provenance.pixels);
     let provenance = printable_json(&provenance.map_err(|error| Failure::work_error(&error))?);
-    let form = Form {
-        layers: options.picture.layers(),
-        sample_type: options.outputs.sample_type(),
-        tone: options.outputs.tone.mapping(),
+    let layers = options.picture.layers();
+    let head = |part| {
+        let settings = rendering.statistics.provenance.pixels.clone();
+        PartHead::new(part, &rendering.film, settings, &layers, part::arguments())
     };
-    for picture in &options.outputs.pictures {
+    let form = Form {
+        part: options.parts.part.map(head),
+        layers: layers.clone(),
+        sample_type: outputs.sample_type(),
+        tone: outputs.tone.mapping(),
+    };
+    for picture in &outputs.pictures {
         write_picture(picture, &rendering.film, &provenance, &form)?;
     }
-    let Some(stats) = &options.outputs.stats else { return Ok(()) };
+    let Some(stats) = &outputs.stats else { return Ok(()) };
     let text = serde_json::to_string_pretty(&rendering.statistics);
     let text = text.map_err(|error| Failure::work_error(&error))?;
     match stats {
@@ -52,6 +65,8 @@ pub(crate) struct Form {
     pub(crate) sample_type: SampleFormat,
     /// Tone mapping of a PNG.
     pub(crate) tone: ToneMapping,
+    /// Head of a part; `None` for a whole picture.
+    pub(crate) part: Option<PartHead>,
 }
 
 /// Writes a picture with its provenance, whole or not at all.
@@ -70,6 +85,10 @@ pub(crate) fn write_picture(
             let radiance = film.pixels().map(|pixel| pixel.radiance);
             write_png(path, size, radiance, form.tone, Some(provenance))
                 .map_err(|error| Failure::work_error(&error))
+        }
+        PictureFormat::Part => {
+            let head = form.part.as_ref().ok_or_else(part::needless)?;
+            parts::write(path, head, film).map_err(Failure::work)
         }
     }
 }

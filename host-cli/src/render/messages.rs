@@ -5,11 +5,13 @@ use std::path::Path;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{
-    MemoryStatistics, Picture, ReadStatistics, RenderError, RenderSettings, Rendering, Statistics, Times,
+    MemoryStatistics, NamedSettings, Picture, ReadStatistics, RenderError, RenderSettings, Rendering,
+    Statistics, Times,
 };
 use photoncard_driver::scene::{Camera, Scene};
+use serde_json::Value;
 
-use crate::arguments::RenderOptions;
+use crate::arguments::{OutputOptions, RenderOptions};
 use crate::console::say;
 use crate::progress::duration;
 
@@ -31,6 +33,25 @@ pub(super) fn say_loaded(
     for notice in options.without_effect(scene).into_iter().chain(misfit) {
         say(format_args!("photoncard: {notice}"));
     }
+}
+
+/// Prints what was prepared, and the view of it.
+pub(super) fn say_prepared(
+    options: &RenderOptions,
+    settings: &RenderSettings,
+    inputs: &NamedSettings,
+    camera: &Camera,
+    misfit: Option<&String>,
+) {
+    let path = &options.scene.path;
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let scene = inputs.get("scene").and_then(Value::as_str).unwrap_or_default();
+    let RenderSettings { picture: Picture { width, height, .. }, photons, .. } = settings;
+    say(format_args!(
+        "photoncard: {name}: {scene} with {} photons, prepared; seen by '{}', {width} x {height} pixels",
+        photons.count, camera.name
+    ));
+    misfit.into_iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
 }
 
 /// Settings of a render, with those that its quality has found for the scene.
@@ -92,15 +113,36 @@ fn ignored(path: &Path, notices: &[String]) -> Option<String> {
     Some(said)
 }
 
-/// Prints the end of a render: its pictures, its time and its samples.
-pub(super) fn say_done(options: &RenderOptions, rendering: &Rendering) {
+/// Prints the end of a picture: its files, its time, and its samples or what a frame has cost.
+pub(super) fn say_done(outputs: &OutputOptions, rendering: &Rendering, frame: Option<u32>) {
     let statistics = &rendering.statistics;
     if let Some(memory) = &statistics.memory {
         say_memory(memory, statistics);
     }
-    let pictures = options.outputs.pictures.iter().map(|picture| picture.path.display().to_string());
+    let pixels = rendering.film.pixels().len() - rendering.film.missing();
+    let pictures = outputs.pictures.iter().map(|picture| picture.path.display().to_string());
     let pictures = pictures.collect::<Vec<_>>().join(", ");
-    say(format_args!("photoncard: {pictures}: {}", summary(statistics, rendering.film.pixels().len())));
+    let summary = match frame {
+        Some(frame) => format!("frame {frame}, {}", cost(statistics)),
+        None => summary(statistics, pixels),
+    };
+    say(format_args!("photoncard: {pictures}: {summary}"));
+}
+
+/// Prints the end of all frames.
+pub(super) fn say_frames(count: usize, seconds: f64) {
+    say(format_args!("photoncard: {} in {}", counted(count, "frame"), duration(seconds)));
+}
+
+/// Costs of a frame, and of what it does not share with the one before.
+fn cost(statistics: &Statistics) -> String {
+    let Statistics { time_s, link, .. } = statistics;
+    let Times { total, scene, pilot, photons, pack, load, render, .. } = time_s;
+    let sent: u64 = link.image_bytes.iter().sum();
+    let phases = [("pilot", pilot), ("scene", scene), ("photons", photons), ("card image", pack)];
+    let phases = phases.iter().filter(|(_, seconds)| **seconds >= 0.005);
+    let phases: String = phases.map(|(name, seconds)| format!("{name} {seconds:.2} s, ")).collect();
+    format!("{total:.2} s: {phases}{sent} bytes sent in {load:.2} s, tiles {render:.2} s")
 }
 
 /// End of a picture by passes.

@@ -1,12 +1,13 @@
 //! Contents of a scene as JSON. The keys are stable.
 
+use photoncard_driver::scene::gltf::Animation;
 use photoncard_driver::scene::{
     Camera, Encoding, Image, Material, PunctualKind, PunctualLight, Reflection, Scene,
 };
 use serde_json::{Value, json};
 
 /// All contents of a scene but its vertices and texels.
-pub(super) fn contents(scene: &Scene) -> Value {
+pub(super) fn contents(scene: &Scene, animations: &[Animation]) -> Value {
     let (lower, upper) = scene.bounds();
     json!({
         "triangles": scene.triangles.len(),
@@ -15,6 +16,7 @@ pub(super) fn contents(scene: &Scene) -> Value {
         "bounds": [lower.to_array(), upper.to_array()],
         "textures": scene.textures.len(),
         "cameras": scene.cameras.iter().map(camera).collect::<Vec<_>>(),
+        "animations": animations.iter().map(animation).collect::<Vec<_>>(),
         "lights": scene.lights.iter().map(light).collect::<Vec<_>>(),
         "materials": scene.materials.iter().map(material).collect::<Vec<_>>(),
         "images": scene.images.iter().map(image).collect::<Vec<_>>(),
@@ -34,6 +36,11 @@ fn camera(camera: &Camera) -> Value {
         "fov": vertical_fov.to_degrees(),
         "aspect": aspect,
     })
+}
+
+fn animation(animation: &Animation) -> Value {
+    let Animation { name, seconds, moves_only_cameras } = animation;
+    json!({"name": name, "seconds": seconds, "moves_only_cameras": moves_only_cameras})
 }
 
 fn light(light: &PunctualLight) -> Value {

@@ -180,8 +180,8 @@ impl Hub {
 /// Writes a picture as `photoncard render` does.
 fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMapping) -> Result<(), String> {
     let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
-    let form =
-        Form { layers: settled.wish.settings.picture.layers.clone(), sample_type: SampleFormat::Float, tone };
+    let layers = settled.wish.settings.picture.layers.clone();
+    let form = Form { layers, sample_type: SampleFormat::Float, tone, part: None };
     let picture = PictureOutput { path: path.to_owned(), format };
     let film = &settled.rendering.film;
     write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.to_string())

@@ -8,6 +8,7 @@ mod masonry;
 mod palette;
 mod parts;
 mod side;
+mod walk;
 
 use glam::Vec3;
 
@@ -16,6 +17,11 @@ use dimensions::{GALLERY_FLOOR, HALF, OUTER_WALL, ROOF, STEP_TOP};
 use palette::Palette;
 use parts::Parts;
 use side::Plan;
+
+pub(crate) use self::walk::walk;
+
+/// Field of view and aspect ratio of the cameras: a horizontal field of view of 73 degrees at 16:9.
+const LENS: (f64, f64) = (0.789, 16.0 / 9.0);
 
 const RED: usize = 0;
 const GREEN: usize = 1;
@@ -63,11 +69,17 @@ const SIDES: [Plan; 4] = [
 
 /// The court under a sky and a sun of its own.
 pub(crate) fn atrium() -> Vec<u8> {
+    let mut scene = lit_court();
+    place_cameras(&mut scene);
+    scene.into_glb()
+}
+
+/// The court under a sky and a sun, without cameras.
+fn lit_court() -> SceneBuilder {
     let (mut scene, colours) = court();
     scene.object("sky", &light::sky(), colours.sky);
     scene.object("sun", &light::sun(), colours.sun);
-    place_cameras(&mut scene);
-    scene.into_glb()
+    scene
 }
 
 /// The court without any light, to be lit by an environment map.
@@ -179,8 +191,7 @@ fn furnish(scene: &mut SceneBuilder, colours: &Palette, parts: &Parts) {
 }
 
 fn place_cameras(scene: &mut SceneBuilder) {
-    // A horizontal field of view of 73 degrees at 16:9.
-    let (yfov, aspect_ratio) = (0.789, 16.0 / 9.0);
+    let (yfov, aspect_ratio) = LENS;
     let court =
         Camera { eye: Vec3::new(-11.2, 2.0, -2.9), target: Vec3::new(-2.0, 3.4, 0.6), yfov, aspect_ratio };
     scene.camera("court", &court);

@@ -1,10 +1,12 @@
 //! Fuzzing of scenes: glTF as text and as GLB, loaded and packed.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use photoncard_driver::error::SceneError;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::scene::gltf;
+use photoncard_driver::scene::Scene;
+use photoncard_driver::scene::gltf::{LoadSettings, Moment, SceneFile};
 use tempfile::TempDir;
 
 use super::mutation;
@@ -25,7 +27,7 @@ pub(super) struct Scenes {
 }
 
 /// Scene with every feature that the loader reads: a hierarchy, sparse positions, normals, coordinates, colours, a skin,
-/// instances, a strip, textures, a lobe, glass, a converted material, variants, lights, an orthographic camera.
+/// instances, a strip, textures, a lobe, glass, a converted material, variants, lights, an orthographic camera, animations, morph targets.
 const RICH: &[u8] = include_bytes!("../../fuzz/rich.gltf");
 const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/furnace.gltf"),
@@ -38,7 +40,7 @@ const PNG: &[u8] = include_bytes!("../../../driver/tests/images/texel.png");
 const JPEG: &[u8] = include_bytes!("../../../driver/tests/images/grey.jpg");
 
 /// Bytes of a triangle: vertices, indices, an index and a position of a sparse accessor, coordinates, colours, joints,
-/// weights, a matrix, and images.
+/// weights, a matrix, images, and times, rotations and weights of keyframes.
 fn triangle_bytes() -> Vec<u8> {
     let vertices = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let indices = [0_u16, 1, 2, 1].map(u16::to_le_bytes);
@@ -66,6 +68,9 @@ fn triangle_bytes() -> Vec<u8> {
         bytes.extend(image);
         bytes.resize(bytes.len().next_multiple_of(4), 0);
     }
+    let keyframes =
+        [[0.25_f32, 1.5, 0.0, 0.0], [0.0, 1.0, 0.0, 0.6], [0.0, 0.8, 0.0, 1.0], [0.0, 0.5, 0.25, 0.0]];
+    bytes.extend(keyframes.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
     bytes
 }
 
@@ -132,6 +137,17 @@ fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
+/// The scene at rest, after it was placed at a moment of its animations.
+pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
+    let file = SceneFile::open(path, &LoadSettings::default())?;
+    let scene = file.at_rest()?;
+    let moment = Moment { animations: Vec::new(), seconds: 1.0 };
+    file.animations()?;
+    file.cameras_at(&moment)?;
+    file.at(&moment)?;
+    Ok(scene)
+}
+
 impl Target for Scenes {
     fn name(&self) -> &'static str {
         "gltf"
@@ -171,7 +187,7 @@ impl Target for Scenes {
 
     fn read(&self, input: &[u8]) -> bool {
         fs::write(self.path(), input).expect("there is room for a scene");
-        let scene = match gltf::load(&self.path()) {
+        let scene = match load(&self.path()) {
             Ok(scene) => scene,
             Err(error) => {
                 let _ = error.to_string();

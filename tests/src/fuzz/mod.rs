@@ -6,6 +6,7 @@
 mod compressed;
 pub(crate) mod environment;
 pub(crate) mod gltf;
+mod headed;
 mod image;
 mod messages;
 pub(crate) mod mutation;
@@ -25,8 +26,20 @@ pub use self::run::{Failure, Report, Settings, fuzz};
 pub use self::target::Target;
 
 /// Names of all targets.
-pub const NAMES: [&str; 10] =
-    ["frames", "messages", "session", "image", "gltf", "meshopt", "draco", "textures", "environments", "exr"];
+pub const NAMES: [&str; 12] = [
+    "frames",
+    "messages",
+    "session",
+    "image",
+    "gltf",
+    "meshopt",
+    "draco",
+    "textures",
+    "environments",
+    "exr",
+    "parts",
+    "prepared",
+];
 
 /// Target with the name `name`.
 pub fn target(name: &str) -> Option<Arc<dyn Target>> {
@@ -41,6 +54,8 @@ pub fn target(name: &str) -> Option<Arc<dyn Target>> {
         "textures" => Some(Arc::new(texture::Textures::new())),
         "environments" => Some(Arc::new(environment::Environments::new())),
         "exr" => Some(Arc::new(picture::Pictures::new())),
+        "parts" => Some(Arc::new(headed::Files::parts())),
+        "prepared" => Some(Arc::new(headed::Files::prepared())),
         _ => None,
     }
 }

@@ -21,7 +21,7 @@ pub struct Inputs {
     seeds: Vec<Seed>,
 }
 
-const SCENES: [&str; 13] = [
+const SCENES: [&str; 14] = [
     "scenes/cornell.gltf",
     "scenes/cornell-glossy.gltf",
     "scenes/cornell-uplight.gltf",
@@ -30,6 +30,7 @@ const SCENES: [&str; 13] = [
     "scenes/room.glb",
     "scenes/roughness.glb",
     "scenes/cornell-spheres.glb",
+    "scenes/cornell-moving.glb",
     "scenes/atrium.glb",
     "driver/tests/compressed/meshopt-0.glb",
     "driver/tests/compressed/meshopt-1.glb",

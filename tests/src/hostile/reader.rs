@@ -12,6 +12,7 @@ use photoncard_driver::scene::{Environment, Scene, gltf};
 
 use super::inputs::as_file;
 use super::{Inputs, Settings};
+use crate::fuzz::gltf::load;
 
 /// Maximum number of triangles of a scene that is always rendered; larger ones are only loaded and packed, with rare
 /// exceptions.
@@ -58,7 +59,7 @@ fn read(folder: &Path, extension: &str, bytes: Vec<u8>, number: u64) -> bool {
             }
             environment.is_some()
         }
-        _ => told(gltf::load(&path)).map(|scene| use_scene(scene, number)).is_some(),
+        _ => told(load(&path)).map(|scene| use_scene(scene, number)).is_some(),
     }
 }
 

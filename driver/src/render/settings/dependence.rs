@@ -18,8 +18,16 @@ impl RenderSettings {
     /// All settings that pixels depend on.
     pub fn of_pixels(&self) -> NamedSettings {
         let Self { picture, photons, integrator, schedule, cards, outputs } = self;
-        let Schedule { tile: _, order: _, bins: _, queue: _, in_flight: _, focus: _, keep_records: _ } =
-            schedule;
+        let Schedule {
+            tile: _,
+            order: _,
+            bins: _,
+            queue: _,
+            in_flight: _,
+            focus: _,
+            part: _,
+            keep_records: _,
+        } = schedule;
         let CardSet { addresses: _, faults: _, verify: _, caches: _, trace: _ } = cards;
         let TileOutputs { partial: _, display: _ } = outputs;
         let Picture { width, height, crop: _, camera, camera_at, look_at, fov, layers, filter } = picture;
@@ -84,7 +92,7 @@ impl RenderSettings {
             caustic_neighbors: _,
             radiance: _,
         } = photons;
-        let Schedule { tile, order, bins, queue, in_flight, focus: _, keep_records: _ } = schedule;
+        let Schedule { tile, order, bins, queue, in_flight, focus: _, part: _, keep_records: _ } = schedule;
         named([
             ("photon-map", json!(layout.name())),
             ("tile", json!(tile)),

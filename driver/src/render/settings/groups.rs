@@ -1,6 +1,7 @@
 //! The groups of settings. Defaults are the dissertation's nominal values (Table 7.1) on one emulated reference chip.
 
 use photoncard_shared::message::{Filter, Radiance, Sampling};
+use serde::{Deserialize, Serialize};
 
 use crate::display::DisplaySettings;
 use crate::emulator::EmulatedKind;
@@ -10,6 +11,7 @@ use crate::film::Window;
 use crate::layer::Layers;
 use crate::link::LineFaults;
 use crate::partial::PartialSettings;
+use crate::parts::Part;
 use crate::photon_map::PhotonLayout;
 use crate::render::address::CardAddress;
 use crate::scheduler::GatherOrder;
@@ -54,7 +56,8 @@ impl Default for Picture {
 }
 
 /// Photon map and caustic map.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PhotonMaps {
     /// Number of photons in the map.
     pub count: usize,
@@ -88,7 +91,8 @@ impl Default for PhotonMaps {
 }
 
 /// Estimation of light by rays.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Integrator {
     /// Seed of all random numbers, including photon paths.
     pub seed: u32,
@@ -143,6 +147,8 @@ pub struct Schedule {
     pub in_flight: Option<u32>,
     /// Pixel near which tiles are rendered first; `None` to spread them over the picture. With modelled memory it has no effect.
     pub focus: Option<[u32; 2]>,
+    /// Part of the picture to render; `None` for all of it.
+    pub part: Option<Part>,
     /// `true` for one of several pictures whose samples are added ([`Renderer::refine`](crate::render::Renderer::refine)): cards keep
     /// irradiance records between them, each in its memory beyond the image. Not with `verify`, which compares the work of cards.
     pub keep_records: bool,
@@ -157,6 +163,7 @@ impl Default for Schedule {
             queue: None,
             in_flight: None,
             focus: None,
+            part: None,
             keep_records: false,
         }
     }

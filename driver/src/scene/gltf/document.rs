@@ -25,6 +25,8 @@ const CHUNK_HEADER: usize = 8;
 const CHUNK_JSON: u32 = u32::from_le_bytes(*b"JSON");
 const CHUNK_BIN: u32 = u32::from_le_bytes(*b"BIN\0");
 
+const INCONSISTENT: &str = "export the scene again; the file is inconsistent";
+
 /// Parsed file whose indices are all valid.
 pub(super) struct Document {
     pub(super) path: PathBuf,
@@ -100,6 +102,7 @@ impl Document {
             }
         }
         self.check_positions()?;
+        self.check_targets()?;
         self.check_rules()
     }
 
@@ -123,12 +126,22 @@ impl Document {
                 if let Some(index) = position.filter(|index| index.value() >= accessors) {
                     let item = format!("meshes[{m}].primitives[{p}].attributes.POSITION");
                     let reason = format!("accessor {index} does not exist, there are {accessors}");
-                    return Err(self.invalid(
-                        item,
-                        reason,
-                        "export the scene again; the file is inconsistent",
-                    ));
+                    return Err(self.invalid(item, reason, INCONSISTENT));
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks the nodes that animations move, which the `gltf` crate does not validate.
+    fn check_targets(&self) -> Result<(), SceneError> {
+        let nodes = self.root.nodes.len();
+        for (a, animation) in self.root.animations.iter().enumerate() {
+            let mut channels = animation.channels.iter().map(|channel| channel.target.node).enumerate();
+            if let Some((c, node)) = channels.find(|(_, node)| node.value() >= nodes) {
+                let item = format!("animations[{a}].channels[{c}].target.node");
+                let reason = format!("node {node} does not exist, there are {nodes}");
+                return Err(self.invalid(item, reason, INCONSISTENT));
             }
         }
         Ok(())

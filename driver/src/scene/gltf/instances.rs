@@ -1,6 +1,6 @@
 //! Instances of a node's mesh (`EXT_mesh_gpu_instancing`).
 
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DQuat, DVec3};
 use gltf::json;
 use gltf::json::accessor::{ComponentType, Type};
 use serde::Deserialize;
@@ -85,8 +85,9 @@ impl<'a> Instances<'a> {
         let vector = |elements: &Option<Elements<'a>>, default: DVec3| {
             elements.as_ref().map_or(default, |found| DVec3::from(found.vec3(instance).map(f64::from)))
         };
-        let rotation =
-            self.rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |found| found.floats(instance, [0.0; 4]));
+        let rotation = self.rotation.as_ref().map_or(DQuat::IDENTITY, |found| {
+            DQuat::from_array(found.floats(instance, [0.0; 4]).map(f64::from))
+        });
         let (translation, scale) = (vector(&self.translation, DVec3::ZERO), vector(&self.scale, DVec3::ONE));
         let composed = composed(translation, rotation, scale).filter(DMat4::is_finite);
         composed.ok_or_else(|| {

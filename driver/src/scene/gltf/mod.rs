@@ -5,6 +5,7 @@
 //! allocated for a count alone.
 
 mod accessor;
+mod animation;
 mod buffers;
 mod camera;
 mod compression;
@@ -14,12 +15,14 @@ mod extensions;
 mod files;
 mod image;
 mod instances;
+mod keyframes;
 mod layers;
 mod light;
 mod limits;
 mod material;
 mod mesh;
 mod mikktspace;
+mod morph;
 mod names;
 mod nodes;
 mod not_finite;
@@ -29,6 +32,7 @@ mod parse_cost;
 mod pose;
 mod primitive;
 mod room;
+mod scene_file;
 mod settings;
 mod skin;
 mod solid_glass;
@@ -43,14 +47,10 @@ mod vertex;
 
 use std::path::Path;
 
-use self::accessor::Source;
-use self::buffers::Buffers;
-use self::document::Document;
+pub use self::animation::{Animation, Moment};
 pub use self::limits::MAX_TRIANGLES;
-use self::notices::Notices;
-use self::room::Room;
+pub use self::scene_file::SceneFile;
 pub use self::settings::LoadSettings;
-use self::texture::Textures;
 use crate::error::SceneError;
 use crate::scene::Scene;
 
@@ -83,32 +83,5 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory, or
 /// has no triangle with an area; or if there is no such variant. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
 pub fn load_with(path: &Path, settings: &LoadSettings) -> Result<Scene, SceneError> {
-    let LoadSettings { dram_bytes, variant, light_units } = settings;
-    let mut document = Document::read(path)?;
-    variant.as_deref().map_or(Ok(()), |name| variants::select(&mut document, name))?;
-    let buffers = Buffers::load(&document)?;
-    let source = Source::new(&document, &buffers);
-    let mut room = Room::new(path, (*dram_bytes).into());
-    room.materials(document.root.materials.len())?;
-    let mut notices = Notices::default();
-    let mut textures = Textures::new(&document);
-    let materials = material::load(&document, &mut textures)?;
-    let generator = document.root.asset.generator.clone();
-    let variants = variants::names(&document);
-    let mut scene = Scene { materials, variants, generator, ..Scene::default() };
-    textures.finish(&source, &mut room, &mut scene, &mut notices.unreadable)?;
-    nodes::place(&source, *light_units, &mut scene, &mut room, &mut notices)?;
-    let file = || path.to_owned();
-    match (scene.triangles.is_empty(), scene.skipped_triangles) {
-        (true, 0) => return Err(SceneError::NoGeometry { file: file() }),
-        (true, skipped) => return Err(SceneError::OnlyZeroArea { file: file(), skipped }),
-        _ => {}
-    }
-    if scene.cameras.is_empty() {
-        scene.cameras.push(camera::frame(&scene));
-        notices.framed = true;
-    }
-    notices.solid_glass = solid_glass::make_solid(&document, &mut scene)?;
-    scene.notices = notices.finish(&document);
-    Ok(scene)
+    SceneFile::open(path, settings)?.into_rest()
 }

@@ -6,3 +6,12 @@ use gltf::json;
 pub(super) fn mesh_name(root: &json::Root, mesh: usize) -> String {
     root.meshes[mesh].name.clone().unwrap_or_else(|| format!("mesh {mesh}"))
 }
+
+/// Names for a choice, in quotation marks.
+pub(super) fn listed(names: &[String]) -> String {
+    if names.is_empty() {
+        return "none: leave the option out".to_owned();
+    }
+    let quoted: Vec<_> = names.iter().map(|name| format!("'{name}'")).collect();
+    quoted.join(", ")
+}

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use glam::DMat4;
 
 use super::accessor::Source;
+use super::animation::Poses;
 use super::camera::CameraPlacer;
 use super::document::Document;
 use super::instances::Instances;
@@ -16,29 +17,31 @@ use super::room::Room;
 use super::skin::Skin;
 use super::transform;
 use crate::error::SceneError;
-use crate::scene::{LightUnits, Scene};
+use crate::scene::{Camera, LightUnits, Scene};
 
 /// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
 
-/// Adds the meshes, lights and cameras of the scene's nodes; the lights are stated in `units`.
+/// Adds the meshes, lights and cameras of the scene's nodes in their poses; the lights are stated in `units`.
 ///
 /// All triangles are counted before the first is added.
 pub(super) fn place(
     source: &Source<'_>,
+    poses: &Poses,
     units: LightUnits,
     scene: &mut Scene,
     room: &mut Room,
     notices: &mut Notices,
 ) -> Result<(), SceneError> {
     let document = source.document;
-    let nodes = walk(document)?;
+    let nodes = walk(document, poses)?;
     let mut worlds = vec![None; document.root.nodes.len()];
     for &(index, world) in &nodes {
         worlds[index] = Some(world);
     }
     let mut placer = Placer {
         source,
+        poses,
         meshes: MeshPlacer::new(source),
         cameras: CameraPlacer::new(document),
         lights: LightPlacer::new(document, units),
@@ -52,8 +55,21 @@ pub(super) fn place(
     Ok(())
 }
 
+/// Cameras of the scene's nodes in their poses.
+pub(super) fn cameras(document: &Document, poses: &Poses) -> Result<Vec<Camera>, SceneError> {
+    let mut placer = CameraPlacer::new(document);
+    let (mut scene, mut notices) = (Scene::default(), Notices::default());
+    for (index, world) in walk(document, poses)? {
+        if let Some(camera) = document.root.nodes[index].camera {
+            placer.place(camera.value(), index, &world, &mut scene, &mut notices)?;
+        }
+    }
+    Ok(scene.cameras)
+}
+
 struct Placer<'a> {
     source: &'a Source<'a>,
+    poses: &'a Poses,
     meshes: MeshPlacer<'a>,
     cameras: CameraPlacer<'a>,
     lights: LightPlacer<'a>,
@@ -62,7 +78,7 @@ struct Placer<'a> {
     worlds: Vec<Option<DMat4>>,
 }
 
-impl Placer<'_> {
+impl<'a> Placer<'a> {
     /// Counts the triangles of a node.
     fn count(&mut self, index: usize, scene: &mut Scene) -> Result<(), SceneError> {
         let node = &self.source.document.root.nodes[index];
@@ -88,9 +104,10 @@ impl Placer<'_> {
         let document = self.source.document;
         let node = &document.root.nodes[index];
         if let Some(mesh) = node.mesh {
+            let weights = self.weights(index, mesh.value());
             match node.skin {
-                Some(skin) => self.place_skinned(mesh.value(), skin.value(), world, scene)?,
-                None => self.place_mesh(mesh.value(), index, world, scene)?,
+                Some(skin) => self.place_skinned((mesh.value(), weights), skin.value(), world, scene)?,
+                None => self.place_mesh((mesh.value(), weights), index, world, scene)?,
             }
         }
         if let Some(camera) = node.camera {
@@ -103,9 +120,17 @@ impl Placer<'_> {
         Ok(())
     }
 
+    /// Weights of the morph targets of a node's mesh.
+    fn weights(&self, node: usize, mesh: usize) -> &'a [f32] {
+        let root = &self.source.document.root;
+        let posed = self.poses.get(&node).and_then(|pose| pose.weights.as_ref());
+        let stated = [posed, root.nodes[node].weights.as_ref(), root.meshes[mesh].weights.as_ref()];
+        stated.into_iter().flatten().next().map_or(&[], Vec::as_slice)
+    }
+
     fn place_mesh(
         &mut self,
-        mesh: usize,
+        (mesh, weights): (usize, &[f32]),
         node: usize,
         world: DMat4,
         scene: &mut Scene,
@@ -115,18 +140,18 @@ impl Placer<'_> {
         }
         let instances = Instances::of(self.source, node, &self.source.document.root.nodes[node])?;
         let Some(instances) = instances else {
-            return self.meshes.place(mesh, &Pose::new(world, None), scene);
+            return self.meshes.place(mesh, &Pose::new(world, None, weights), scene);
         };
         for instance in 0..instances.count {
             let local = instances.transform(self.source, instance)?;
-            self.meshes.place(mesh, &Pose::new(world * local, None), scene)?;
+            self.meshes.place(mesh, &Pose::new(world * local, None, weights), scene)?;
         }
         Ok(())
     }
 
     fn place_skinned(
         &mut self,
-        mesh: usize,
+        (mesh, weights): (usize, &[f32]),
         skin: usize,
         world: DMat4,
         scene: &mut Scene,
@@ -134,12 +159,12 @@ impl Placer<'_> {
         if !self.skins.contains_key(&skin) {
             self.skins.insert(skin, Skin::new(self.source, skin, &self.worlds)?);
         }
-        self.meshes.place(mesh, &Pose::new(world, self.skins.get(&skin)), scene)
+        self.meshes.place(mesh, &Pose::new(world, self.skins.get(&skin), weights), scene)
     }
 }
 
 /// Nodes of the default scene, or of the first, with their world transforms; each parent precedes its children.
-fn walk(document: &Document) -> Result<Vec<(usize, DMat4)>, SceneError> {
+fn walk(document: &Document, poses: &Poses) -> Result<Vec<(usize, DMat4)>, SceneError> {
     let root = &document.root;
     let chosen = root.scene.map_or(0, |scene| scene.value());
     let Some(chosen) = root.scenes.get(chosen) else {
@@ -161,7 +186,7 @@ fn walk(document: &Document) -> Result<Vec<(usize, DMat4)>, SceneError> {
             return Err(document.invalid(format!("nodes[{index}]"), reason, remedy));
         }
         let node = &root.nodes[index];
-        let Some(local) = transform::local(node) else {
+        let Some(local) = transform::local(node, poses.get(&index)) else {
             let reason =
                 "the transform is not finite, or does not keep parallels parallel, or has a zero rotation";
             return fault(reason, "give the node a finite translation, rotation and scale");

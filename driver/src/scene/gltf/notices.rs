@@ -95,8 +95,6 @@ impl Notices {
         note(sentence, "material", &mismatched);
         let other_modes = meshes(root, |primitive| Topology::of(primitive).is_none());
         note("points and lines are ignored, only triangles are rendered", "mesh", &other_modes);
-        let morphed =
-            meshes(root, |primitive| primitive.targets.as_ref().is_some_and(|list| !list.is_empty()));
         let meshes_of = |indices: &BTreeSet<usize>| -> Vec<String> {
             indices.iter().map(|&index| mesh_name(root, index)).collect()
         };
@@ -112,9 +110,6 @@ impl Notices {
             "mesh",
             &meshes_of(tangents),
         );
-        note("morph targets are ignored, the base shape is rendered", "mesh", &morphed);
-        let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
-        note("animations are ignored, the scene is rendered as it stands", "animation", &moving);
         let lights = document.lights();
         let limited = names("light", lights, |light| light.name.as_ref(), |light| light.range.is_some());
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
@@ -135,6 +130,13 @@ impl Notices {
         }
         sentences
     }
+}
+
+/// Notice on animations, of which only the scene at rest is had.
+pub(super) fn of_animations(root: &json::Root) -> Option<String> {
+    let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
+    let sentence = "the scene is rendered as it stands, its animations by --frames";
+    (!moving.is_empty()).then(|| format!("{sentence}: {}", list("animation", &moving)))
 }
 
 /// Notice on units of lights that the exporter's name has chosen.

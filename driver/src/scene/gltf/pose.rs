@@ -1,4 +1,4 @@
-//! Pose of a mesh: the transform of its node, or the joint matrices of its skin.
+//! Pose of a mesh: the transform of its node, or the joint matrices of its skin, and the weights of its morph targets.
 
 use std::borrow::Cow;
 
@@ -12,12 +12,14 @@ use super::transform::Transform;
 pub(super) struct Pose<'s> {
     transform: Transform,
     skin: Option<&'s Skin>,
+    /// Weights of the mesh's morph targets; 0 for those beyond.
+    pub(super) weights: &'s [f32],
 }
 
 impl<'s> Pose<'s> {
     /// Pose with the node's world transform, which primitives with joints ignore if there is a skin.
-    pub(super) fn new(world: DMat4, skin: Option<&'s Skin>) -> Self {
-        Self { transform: Transform::new(world), skin }
+    pub(super) fn new(world: DMat4, skin: Option<&'s Skin>, weights: &'s [f32]) -> Self {
+        Self { transform: Transform::new(world), skin, weights }
     }
 
     /// World transform of a vertex.

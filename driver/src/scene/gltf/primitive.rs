@@ -11,6 +11,7 @@ use gltf::json::validation::Checked;
 
 use super::accessor::{Elements, Format, Integers, Source};
 use super::draco::Decoded;
+use super::morph::{self, MorphTarget};
 use super::room::{self, Room};
 use super::topology::Topology;
 use crate::allocation::OutOfMemory;
@@ -88,6 +89,8 @@ pub(super) struct Primitive<'a> {
     pub(super) colours: Option<Elements<'a>>,
     /// Joints with their weights, four in each pair.
     pub(super) influences: Vec<(Elements<'a>, Elements<'a>)>,
+    /// Morph targets, in the mesh's order.
+    pub(super) targets: Vec<MorphTarget<'a>>,
     /// Index of the material in the scene.
     pub(super) material: u32,
 }
@@ -200,6 +203,7 @@ impl<'a> Primitive<'a> {
             coordinates: sets,
             colours: of_count(Semantic::Colors(0), &COLOURS)?,
             influences: influences(&attributes, positions.count)?,
+            targets: morph::targets(source, &item, primitive, positions.count)?,
             material,
             positions,
             indices,

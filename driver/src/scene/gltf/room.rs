@@ -15,6 +15,7 @@ use photoncard_shared::layout::{
 use crate::error::SceneError;
 
 /// Memory of a card, and the part that is taken.
+#[derive(Clone)]
 pub(super) struct Room {
     file: PathBuf,
     available: u64,

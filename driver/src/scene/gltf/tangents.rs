@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::mikktspace::{self, Corner};
+use super::morph::Displaced;
 use super::primitive::Tangents;
 use super::transform::Transform;
 use super::vertex::{Corners, VertexReader};
@@ -81,7 +82,12 @@ impl VertexReader<'_, '_> {
     ) -> CornerTangents {
         [0, 1, 2].map(|corner| {
             let local = match tangents {
-                Tangents::Stated => self.stated_tangent(corners.vertices[corner]),
+                Tangents::Stated => {
+                    let vertex = corners.vertices[corner];
+                    let stated = self.stated_tangent(vertex);
+                    let along = stated.truncate();
+                    self.displaced(along, corners.weights, Displaced::Tangent, vertex).extend(stated.w)
+                }
                 Tangents::Computed(list) => list[triangle as usize][corners.order[corner]],
             };
             world(local, &corners.transforms[corner], normals[corner].as_dvec3())

@@ -3,6 +3,8 @@
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use gltf::json;
 
+use super::animation::NodePose;
+
 /// Affine transform with its matrix for normals.
 #[derive(Clone)]
 pub(super) struct Transform {
@@ -37,22 +39,23 @@ impl Transform {
     }
 }
 
-/// Local transform of a node; `None` if it is not affine.
-pub(super) fn local(node: &json::Node) -> Option<DMat4> {
+/// Local transform of a node in a pose, which has no part in a matrix; `None` if it is not affine.
+pub(super) fn local(node: &json::Node, pose: Option<&NodePose>) -> Option<DMat4> {
     let transform = if let Some(columns) = node.matrix {
         DMat4::from_cols_array(&columns.map(f64::from))
     } else {
-        let vector =
-            |values: Option<[f32; 3]>, default| values.map_or(default, |v| DVec3::from(v.map(f64::from)));
-        let rotation = node.rotation.map_or([0.0, 0.0, 0.0, 1.0], |rotation| rotation.0);
-        composed(vector(node.translation, DVec3::ZERO), rotation, vector(node.scale, DVec3::ONE))?
+        let vector = |values: [f32; 3]| DVec3::from(values.map(f64::from));
+        let translation = pose.and_then(|pose| pose.translation).or(node.translation.map(vector));
+        let scale = pose.and_then(|pose| pose.scale).or(node.scale.map(vector));
+        let stated = || node.rotation.map(|rotation| DQuat::from_array(rotation.0.map(f64::from)));
+        let rotation = pose.and_then(|pose| pose.rotation).or_else(stated).unwrap_or(DQuat::IDENTITY);
+        composed(translation.unwrap_or(DVec3::ZERO), rotation, scale.unwrap_or(DVec3::ONE))?
     };
     (transform.is_finite() && transform.row(3).to_array() == [0.0, 0.0, 0.0, 1.0]).then_some(transform)
 }
 
 /// Translation times rotation times scale; `None` if the quaternion is not a rotation.
-pub(super) fn composed(translation: DVec3, rotation: [f32; 4], scale: DVec3) -> Option<DMat4> {
-    let rotation = DQuat::from_array(rotation.map(f64::from));
+pub(super) fn composed(translation: DVec3, rotation: DQuat, scale: DVec3) -> Option<DMat4> {
     let length = rotation.length();
     let rotation = (length > 0.0 && length.is_finite()).then(|| rotation / length)?;
     Some(DMat4::from_scale_rotation_translation(scale, rotation, translation))

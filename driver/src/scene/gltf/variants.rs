@@ -3,6 +3,7 @@
 use gltf::json;
 
 use super::document::Document;
+use super::names::listed;
 use crate::error::SceneError;
 
 /// Names of the document's variants.
@@ -43,12 +44,4 @@ fn material_in(primitive: &json::mesh::Primitive, variant: usize) -> Option<u32>
     let of_variant = |index: &u32| *index as usize == variant;
     let mapping = stated.mappings.iter().find(|mapping| mapping.variants.iter().any(of_variant))?;
     Some(mapping.material)
-}
-
-fn listed(names: &[String]) -> String {
-    if names.is_empty() {
-        return "none: leave the option out".to_owned();
-    }
-    let quoted: Vec<_> = names.iter().map(|name| format!("'{name}'")).collect();
-    quoted.join(", ")
 }

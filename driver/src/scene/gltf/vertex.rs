@@ -6,6 +6,7 @@ use std::cell::Cell;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::accessor::Source;
+use super::morph::{Displaced, displaced};
 use super::names::mesh_name;
 use super::not_finite::NotFinite;
 use super::pose::Pose;
@@ -29,6 +30,8 @@ pub(super) struct Corners<'p> {
     /// Places in the file's triangle.
     pub(super) order: [usize; 3],
     pub(super) transforms: [Cow<'p, Transform>; 3],
+    /// Weights of morph targets.
+    pub(super) weights: &'p [f32],
 }
 
 /// Reader of the vertices of one primitive.
@@ -80,7 +83,8 @@ impl VertexReader<'_, '_> {
     pub(super) fn corners<'p>(&self, triangle: u64, pose: &'p Pose<'_>) -> Result<Corners<'p>, SceneError> {
         let [a, b, c] = self.indices(triangle)?;
         let transforms = [self.transform(pose, a)?, self.transform(pose, b)?, self.transform(pose, c)?];
-        let mut corners = Corners { vertices: [a, b, c], order: [0, 1, 2], transforms };
+        let weights = pose.weights;
+        let mut corners = Corners { vertices: [a, b, c], order: [0, 1, 2], transforms, weights };
         // A mirroring transform swaps front and back; reversing the order of vertices restores them.
         if corners.transforms[0].is_mirror {
             corners.vertices.swap(1, 2);
@@ -94,7 +98,7 @@ impl VertexReader<'_, '_> {
     pub(super) fn places(&self, corners: &Corners<'_>) -> Result<[Vec3; 3], SceneError> {
         let mut places = [Vec3::ZERO; 3];
         for ((place, vertex), transform) in places.iter_mut().zip(corners.vertices).zip(&corners.transforms) {
-            *place = self.place(vertex, transform)?;
+            *place = self.place(vertex, transform, corners.weights)?;
         }
         Ok(places)
     }
@@ -105,8 +109,9 @@ impl VertexReader<'_, '_> {
     }
 
     /// World position of a vertex.
-    fn place(&self, vertex: u64, transform: &Transform) -> Result<Vec3, SceneError> {
-        let local = Vec3::from(self.primitive.positions.vec3(vertex));
+    fn place(&self, vertex: u64, transform: &Transform, weights: &[f32]) -> Result<Vec3, SceneError> {
+        let stated = Vec3::from(self.primitive.positions.vec3(vertex));
+        let local = self.displaced(stated, weights, Displaced::Position, vertex);
         let placed = transform.place(local);
         let is_usable = |value: f32| value.abs() <= MAX_COORDINATE;
         if placed.to_array().into_iter().all(is_usable) {
@@ -118,6 +123,11 @@ impl VertexReader<'_, '_> {
             format!("is {local}: not a finite number")
         };
         Err(self.fault("POSITION", vertex, reason))
+    }
+
+    /// Attribute of a vertex, displaced by the morph targets.
+    pub(super) fn displaced(&self, base: Vec3, weights: &[f32], attribute: Displaced, vertex: u64) -> Vec3 {
+        displaced(base, &self.primitive.targets, weights, attribute, vertex)
     }
 
     /// Attributes of a triangle's corners beyond positions; `None` if they are the default ones.
@@ -177,7 +187,8 @@ impl VertexReader<'_, '_> {
         let mut is_smooth = false;
         for ((normal, vertex), transform) in normals.iter_mut().zip(corners.vertices).zip(&corners.transforms)
         {
-            let local = Vec3::from(elements.vec3(vertex));
+            let stated = Vec3::from(elements.vec3(vertex));
+            let local = self.displaced(stated, corners.weights, Displaced::Normal, vertex);
             if !local.is_finite() {
                 self.not_finite.normals.set(true);
             }

@@ -1,7 +1,11 @@
 //! The Cornell box, scaled to two metres, and three variants: with a glossy floor, with a lamp that faces the ceiling, and
 //! with a mirror ball and a glass ball instead of its blocks.
 
+mod moving;
+
 use glam::Vec3;
+
+pub(crate) use self::moving::moving;
 
 use crate::builder::{Camera, SceneBuilder};
 use crate::document::{Node, Phong};

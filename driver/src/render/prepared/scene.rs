@@ -1,0 +1,89 @@
+//! A scene with all that its pictures need.
+
+use glam::Vec3;
+use photoncard_shared::budget::Budget;
+use serde_json::{Map, Value};
+
+use crate::pack::PackedScene;
+use crate::render::renderer::{Chosen, Kept, Renderer, Source};
+use crate::render::times::Times;
+use crate::render::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
+use crate::scene::{Camera, FixedScene};
+
+/// A scene with its photon map, as a card image, and the settings that it depends on.
+pub struct PreparedScene {
+    /// The cameras of the scene, and what is known of the rest.
+    pub(super) scene: FixedScene<'static>,
+    pub(super) photons: PhotonMaps,
+    pub(super) integrator: Integrator,
+    pub(super) kept: Kept,
+    pub(super) notes: Map<String, Value>,
+}
+
+impl PreparedScene {
+    /// Prepares a scene: packs it, has photons and integrator chosen, and traces photons. The image must fit cards with `budgets`. `notes` are
+    /// the caller's, such as names of the inputs.
+    ///
+    /// # Errors
+    /// As of [`Renderer::render_chosen`].
+    pub fn new(
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        budgets: &[Budget],
+        choose: &dyn Fn(&PackedScene) -> Chosen,
+        notes: Map<String, Value>,
+        observer: &dyn Observer,
+    ) -> Result<Self, RenderError> {
+        settings.camera(scene)?;
+        settings.check()?;
+        let mut times = Times::default();
+        let (settings, source) = Source::new(scene, settings, Some(choose), &mut None, &mut times)?;
+        settings.check()?;
+        settings.check_budgets(budgets)?;
+        let kept = source.prepare(scene, &settings, budgets, &mut times, observer)?;
+        let RenderSettings { photons, integrator, .. } = settings;
+        let scene = FixedScene::of_cameras(
+            scene.cameras.clone(),
+            [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned),
+            scene.is_specular(),
+        );
+        Ok(Self { scene, photons, integrator, kept, notes })
+    }
+
+    /// Cameras of the scene, without anything else of it.
+    pub fn scene(&self) -> &FixedScene<'static> {
+        &self.scene
+    }
+
+    /// Notes of the caller that prepared the scene.
+    pub fn notes(&self) -> &Map<String, Value> {
+        &self.notes
+    }
+
+    /// Size of the card image, bytes.
+    pub fn image_bytes(&self) -> u64 {
+        self.kept.prepared.image.bytes()
+    }
+
+    /// Settings with the photons and the integrator that the scene was prepared for.
+    #[must_use]
+    pub fn settings(&self, settings: RenderSettings) -> RenderSettings {
+        let (photons, integrator) = (self.photons.clone(), self.integrator.clone());
+        RenderSettings { photons, integrator, ..settings }
+    }
+
+    /// Renderer of the prepared scene, and the scene that it renders with [`Renderer::render_fixed`] by [`Self::settings`], whose cameras stay.
+    pub fn into_renderer(self) -> (Renderer, FixedScene<'static>) {
+        (Renderer::with_image(self.kept), self.scene)
+    }
+}
+
+/// Returns whether a camera is one: finite, and with an opening.
+pub(super) fn is_camera(camera: &Camera) -> bool {
+    let Camera { name: _, origin, right, up, forward, vertical_fov, aspect } = camera;
+    let is_length = |length: f32| length.is_normal() && length > 0.0;
+    [origin, right, up, forward].into_iter().all(|vector| Vec3::is_finite(*vector))
+        && is_length(*vertical_fov)
+        && *vertical_fov < std::f32::consts::PI
+        && aspect.is_none_or(is_length)
+}

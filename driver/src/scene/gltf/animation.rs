@@ -1,0 +1,241 @@
+//! Animations: poses of nodes at a moment (glTF 2.0, 3.11 and appendix C).
+
+use std::collections::BTreeMap;
+
+use glam::{DQuat, DVec3, DVec4, Vec4Swizzles as _};
+use gltf::json;
+use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::animation::{Interpolation, Property};
+use gltf::json::validation::Checked;
+
+use super::accessor::{Elements, Format, Integers, Source};
+use super::document::Document;
+use super::keyframes::{Keyframes, Place};
+use super::names::listed;
+use crate::error::SceneError;
+
+const FRACTIONS: &[ComponentType] =
+    &[ComponentType::F32, ComponentType::I8, ComponentType::U8, ComponentType::I16, ComponentType::U16];
+const VECTORS: Format =
+    Format { types: &[Type::Vec3], components: &[ComponentType::F32], integers: Integers::Whole };
+const ROTATIONS: Format =
+    Format { types: &[Type::Vec4], components: FRACTIONS, integers: Integers::Normalized };
+const WEIGHTS: Format =
+    Format { types: &[Type::Scalar], components: FRACTIONS, integers: Integers::Normalized };
+
+const REMEDY: &str = "export the animation again; its channels and samplers do not fit";
+
+/// A moment of a scene's animations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// Names of the animations that play; all of the file if none is stated.
+    pub animations: Vec<String>,
+    /// Time since the begin of the animations, seconds.
+    pub seconds: f64,
+}
+
+/// An animation of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Animation {
+    /// Name; `animation N` without one.
+    pub name: String,
+    /// Times of its first and last keyframe, seconds.
+    pub seconds: [f64; 2],
+    /// True if it moves cameras alone: neither meshes nor lights.
+    pub moves_only_cameras: bool,
+}
+
+/// Part of a node's transform, or of its mesh's shape, that an animation states in place of the node.
+#[derive(Clone, Debug, Default)]
+pub(super) struct NodePose {
+    pub(super) translation: Option<DVec3>,
+    pub(super) rotation: Option<DQuat>,
+    pub(super) scale: Option<DVec3>,
+    /// Weights of morph targets.
+    pub(super) weights: Option<Vec<f32>>,
+}
+
+/// Poses of the nodes that are animated.
+pub(super) type Poses = BTreeMap<usize, NodePose>;
+
+/// Name of an animation.
+pub(super) fn name(index: usize, animation: &json::Animation) -> String {
+    animation.name.clone().unwrap_or_else(|| format!("animation {index}"))
+}
+
+/// Indices of the animations of these names, or of all for none.
+///
+/// # Errors
+/// If there is no animation of a name; the error lists the names.
+pub(super) fn playing(document: &Document, names: &[String]) -> Result<Vec<usize>, SceneError> {
+    let all: Vec<_> = document.root.animations.iter().enumerate().map(|(i, clip)| name(i, clip)).collect();
+    if let Some(unknown) = names.iter().find(|name| !all.contains(name)) {
+        return Err(SceneError::UnknownAnimation { name: unknown.clone(), animations: listed(&all) });
+    }
+    let plays = |index: &usize| names.is_empty() || names.contains(&all[*index]);
+    Ok((0..all.len()).filter(plays).collect())
+}
+
+/// Poses of the nodes at a moment.
+///
+/// # Errors
+/// If an animation is not sound, or two that play move the same part of a node.
+pub(super) fn poses(source: &Source<'_>, moment: &Moment) -> Result<Poses, SceneError> {
+    let mut poses = Poses::new();
+    for index in playing(source.document, &moment.animations)? {
+        for channel in 0..source.document.root.animations[index].channels.len() {
+            let channel = Channel::new(source, index, channel)?;
+            channel.apply(moment.seconds, &mut poses)?;
+        }
+    }
+    Ok(poses)
+}
+
+/// Times of the first and the last keyframe of an animation, seconds; both zero without channels.
+pub(super) fn extent(source: &Source<'_>, index: usize) -> Result<[f64; 2], SceneError> {
+    let mut extent: Option<[f64; 2]> = None;
+    for channel in 0..source.document.root.animations[index].channels.len() {
+        let [first, last] = Channel::new(source, index, channel)?.keyframes.extent();
+        let [begin, end] = extent.unwrap_or([first, last]);
+        extent = Some([begin.min(first), end.max(last)]);
+    }
+    Ok(extent.unwrap_or_default())
+}
+
+/// Nodes that an animation moves.
+pub(super) fn targets(animation: &json::Animation) -> impl Iterator<Item = usize> {
+    animation.channels.iter().map(|channel| channel.target.node.value())
+}
+
+/// A channel whose sampler is sound.
+struct Channel<'a> {
+    source: &'a Source<'a>,
+    /// Place in the file.
+    item: String,
+    node: usize,
+    property: Property,
+    keyframes: Keyframes<'a>,
+    values: Elements<'a>,
+    /// Number of elements of a keyframe's value: that of morph targets, or one.
+    elements: u64,
+}
+
+impl<'a> Channel<'a> {
+    fn new(source: &'a Source<'a>, animation: usize, channel: usize) -> Result<Self, SceneError> {
+        let document = source.document;
+        let clip = &document.root.animations[animation];
+        let json::animation::Channel { sampler, target, .. } = &clip.channels[channel];
+        let item = format!("animations[{animation}].channels[{channel}]");
+        let sampler_item = format!("animations[{animation}].samplers[{sampler}]");
+        let sampler = &clip.samplers[sampler.value()];
+        let fault = |reason: String| document.invalid(&item, reason, REMEDY);
+        let (Checked::Valid(property), Checked::Valid(interpolation)) = (target.path, sampler.interpolation)
+        else {
+            return Err(fault("its path or interpolation is not one that glTF knows".to_owned()));
+        };
+        let node = target.node.value();
+        let elements = match property {
+            Property::MorphTargetWeights => morph_targets(document, node) as u64,
+            _ => 1,
+        };
+        let format = match property {
+            Property::Translation | Property::Scale => &VECTORS,
+            Property::Rotation => &ROTATIONS,
+            Property::MorphTargetWeights => &WEIGHTS,
+        };
+        let keyframes =
+            Keyframes::new(source, sampler.input.value(), &format!("{sampler_item}.input"), interpolation)?;
+        let values =
+            Elements::new(source, sampler.output.value(), &format!("{sampler_item}.output"), format)?;
+        let needed = keyframes.values_of_each().saturating_mul(elements).saturating_mul(keyframes.count());
+        if values.count < needed {
+            let reason = format!("its sampler has {} values, and needs {needed}", values.count);
+            return Err(fault(reason));
+        }
+        if property != Property::MorphTargetWeights && document.root.nodes[node].matrix.is_some() {
+            let reason = format!("nodes[{node}], which it moves, has a matrix");
+            return Err(document.invalid(&item, reason, "state translation, rotation and scale of the node"));
+        }
+        Ok(Self { source, item, node, property, keyframes, values, elements })
+    }
+
+    /// Adds the channel's value at a time to the pose of its node.
+    fn apply(&self, seconds: f64, poses: &mut Poses) -> Result<(), SceneError> {
+        let pose = poses.entry(self.node).or_default();
+        let place = self.keyframes.at(seconds);
+        let is_stated = match self.property {
+            Property::Translation => pose.translation.replace(self.value(place, 0).xyz()).is_some(),
+            Property::Scale => pose.scale.replace(self.value(place, 0).xyz()).is_some(),
+            Property::Rotation => pose.rotation.replace(self.rotation(place)).is_some(),
+            Property::MorphTargetWeights => {
+                let weights = (0..self.elements).map(|target| self.value(place, target).x as f32).collect();
+                pose.weights.replace(weights).is_some()
+            }
+        };
+        let is_sound = pose.translation.is_none_or(DVec3::is_finite)
+            && pose.scale.is_none_or(DVec3::is_finite)
+            && pose.rotation.is_none_or(DQuat::is_finite)
+            && pose.weights.iter().flatten().all(|weight| weight.is_finite());
+        if is_stated {
+            let reason = format!("two channels that play move nodes[{}] alike", self.node);
+            return Err(
+                self.fault(reason, "choose animations that do not contradict each other, by --animation")
+            );
+        }
+        if !is_sound {
+            return Err(self.fault(format!("at {seconds} s its value is not finite"), REMEDY));
+        }
+        Ok(())
+    }
+
+    fn fault(&self, reason: String, remedy: &'static str) -> SceneError {
+        self.source.document.invalid(&self.item, reason, remedy)
+    }
+
+    /// Value `kind` (in-tangent, value, out-tangent of a cubic spline) of a keyframe's element.
+    fn key(&self, keyframe: u64, kind: u64, element: u64) -> DVec4 {
+        let of_each = self.keyframes.values_of_each();
+        let index = (keyframe * of_each + kind) * self.elements + element;
+        DVec4::from_array(self.values.floats(index, [0.0; 4]).map(f64::from))
+    }
+
+    /// Value of an element, interpolated component by component.
+    fn value(&self, place: Place, element: u64) -> DVec4 {
+        let Place { keyframe, share, interval } = place;
+        match self.keyframes.interpolation {
+            Interpolation::Step => self.key(keyframe, 0, element),
+            Interpolation::Linear if share <= 0.0 => self.key(keyframe, 0, element),
+            Interpolation::Linear => {
+                let [from, to] = [keyframe, keyframe + 1].map(|keyframe| self.key(keyframe, 0, element));
+                from * (1.0 - share) + to * share
+            }
+            Interpolation::CubicSpline if share <= 0.0 => self.key(keyframe, 1, element),
+            Interpolation::CubicSpline => {
+                let (from, to) = (keyframe, keyframe + 1);
+                let (square, cube) = (share * share, share * share * share);
+                self.key(from, 1, element) * (2.0 * cube - 3.0 * square + 1.0)
+                    + self.key(from, 2, element) * (interval * (cube - 2.0 * square + share))
+                    + self.key(to, 1, element) * (3.0 * square - 2.0 * cube)
+                    + self.key(to, 0, element) * (interval * (cube - square))
+            }
+        }
+    }
+
+    /// Rotation, of unit length unless it is zero; linear along the shorter arc.
+    fn rotation(&self, place: Place) -> DQuat {
+        let unit = |value: DVec4| DQuat::from_vec4(value.normalize_or_zero());
+        let Place { keyframe, share, .. } = place;
+        if self.keyframes.interpolation == Interpolation::Linear && share > 0.0 {
+            let [from, to] = [keyframe, keyframe + 1].map(|keyframe| unit(self.key(keyframe, 0, 0)));
+            return from.slerp(to, share);
+        }
+        unit(self.value(place, 0))
+    }
+}
+
+/// Number of morph targets of a node's mesh.
+fn morph_targets(document: &Document, node: usize) -> usize {
+    let mesh = document.root.nodes[node].mesh.map(|mesh| &document.root.meshes[mesh.value()]);
+    let primitives = mesh.into_iter().flat_map(|mesh| &mesh.primitives);
+    primitives.filter_map(|primitive| primitive.targets.as_ref()).map(Vec::len).max().unwrap_or(0)
+}

@@ -1,0 +1,25 @@
+//! Options of `photoncard farm`.
+
+use clap::{Args, Subcommand};
+use photoncard_driver::parts::MAX_PARTS;
+
+use super::render::RenderOptions;
+
+#[derive(Subcommand)]
+pub(crate) enum FarmCommand {
+    /// Print a job template of Open Job Description, as AWS Deadline Cloud and the openjd command run it
+    Openjd(Box<FarmOptions>),
+    /// Print a script that submits the job to Slurm
+    Slurm(Box<FarmOptions>),
+    /// Print a script that runs the job by GNU parallel
+    Parallel(Box<FarmOptions>),
+}
+
+#[derive(Args)]
+pub(crate) struct FarmOptions {
+    #[command(flatten)]
+    pub(crate) render: RenderOptions,
+    /// Number of parts of a picture, each of which is a task
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PARTS)), help_heading = "Farm")]
+    pub(crate) parts: u32,
+}

@@ -1,0 +1,144 @@
+//! Options of frames: moments of a scene's animations, each a picture of its own.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use photoncard_driver::render::NamedSettings;
+use photoncard_driver::scene::gltf::Moment;
+use serde_json::json;
+
+/// Number of frames in a second, if it is not stated: Blender's.
+const FPS: f64 = 24.0;
+/// Maximum number of frames in a second.
+const MAX_FPS: f64 = 100_000.0;
+/// Maximum number of a frame.
+const MAX_FRAME: u32 = 999_999;
+
+/// Options that frames do not have: they are of one render.
+const NOT_OF_FRAMES: [&str; 4] = ["time", "noise", "trace", "prepared"];
+
+#[derive(Args)]
+#[command(next_help_heading = "Frames")]
+pub(crate) struct FrameOptions {
+    /// Render frames of the scene's animations: 1-240, several ranges 1-10,20, or every tenth frame 1-240x10
+    ///
+    /// Frame N is the scene N / --fps seconds after the begin of its animations. Names of outputs have a run of #, which the frame's number
+    /// replaces: out.####.exr. The settings that --quality finds are those of the scene as it stands, for all frames.
+    #[arg(long, value_name = "RANGES", value_parser = frames, conflicts_with_all = NOT_OF_FRAMES)]
+    frames: Option<Frames>,
+    /// Animation that plays, by its name; may be repeated [default: all of the file]
+    #[arg(long = "animation", value_name = "NAME", requires = "frames", hide_short_help = true)]
+    animations: Vec<String>,
+    /// Frames in a second [default: 24]
+    #[arg(long, value_name = "NUMBER", requires = "frames", value_parser = fps, allow_negative_numbers = true)]
+    fps: Option<f64>,
+}
+
+/// Numbers of frames, increasing.
+#[derive(Clone, Debug, PartialEq)]
+struct Frames(BTreeSet<u32>);
+
+impl FrameOptions {
+    /// Numbers of the frames, increasing; `None` for a picture of the scene as it stands.
+    pub(crate) fn numbers(&self) -> Option<impl Iterator<Item = u32>> {
+        self.frames.as_ref().map(|Frames(numbers)| numbers.iter().copied())
+    }
+
+    /// Names of the animations that play; all for none.
+    pub(crate) fn animations(&self) -> &[String] {
+        &self.animations
+    }
+
+    fn fps(&self) -> f64 {
+        self.fps.unwrap_or(FPS)
+    }
+
+    /// Moment of a frame.
+    pub(crate) fn moment(&self, frame: u32) -> Moment {
+        Moment { animations: self.animations.clone(), seconds: f64::from(frame) / self.fps() }
+    }
+
+    /// What a frame's pixels depend on, besides the options of a picture.
+    pub(crate) fn provenance(&self, frame: u32) -> NamedSettings {
+        let named =
+            [("frame", json!(frame)), ("fps", json!(self.fps())), ("animation", json!(self.animations))];
+        named.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
+    }
+}
+
+/// Path of a frame's output: the last run of `#` in the file's name becomes the number, with zeros before it. `None` without a `#`.
+pub(super) fn numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
+    let name = pattern.file_name()?.to_str()?;
+    let end = name.rfind('#')? + 1;
+    let begin = name[..end].trim_end_matches('#').len();
+    let (width, rest) = (end - begin, &name[end..]);
+    Some(pattern.with_file_name(format!("{}{frame:0width$}{rest}", &name[..begin])))
+}
+
+fn frames(text: &str) -> Result<Frames, String> {
+    let ranges: Option<Vec<_>> = text.split(',').map(range).collect();
+    let ranges = ranges.ok_or_else(|| {
+        format!("frames are ranges of numbers up to {MAX_FRAME}, such as 1-240, 1-10,20 or 1-240x10")
+    })?;
+    Ok(Frames(ranges.into_iter().flatten().collect()))
+}
+
+/// Range of frames: `7`, `1-240` or `1-240x10`.
+fn range(text: &str) -> Option<impl Iterator<Item = u32>> {
+    let (ends, step) = text.split_once('x').unwrap_or((text, "1"));
+    let (first, last) = ends.split_once('-').unwrap_or((ends, ends));
+    let [first, last, step] = [number(first)?, number(last)?, number(step)?];
+    (first <= last && step > 0).then(|| (first..=last).step_by(step as usize))
+}
+
+fn number(text: &str) -> Option<u32> {
+    let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
+    text.parse().ok().filter(|&number| is_number && number <= MAX_FRAME)
+}
+
+fn fps(text: &str) -> Result<f64, String> {
+    let fps = text.parse().ok().filter(|&fps| fps > 0.0 && fps <= MAX_FPS);
+    fps.ok_or_else(|| format!("frames in a second are a number above 0 and up to {MAX_FPS}, such as 24"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_numbers_in_order_without_repetition() {
+        for (text, expected) in [
+            ("7", &[7][..]),
+            ("0-2", &[0, 1, 2]),
+            ("5,1-3,2", &[1, 2, 3, 5]),
+            ("1-10x4", &[1, 5, 9]),
+            ("999999", &[999_999]),
+        ] {
+            assert_eq!(frames(text).map(|Frames(found)| found.into_iter().collect()), Ok(expected.to_vec()));
+        }
+        for text in ["", "-", "1-", "-1", "3-1", "1-5x0", "1,", "1.5", "+1", "1000000", "1-2-3", "#", "1- 2"]
+        {
+            assert!(frames(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_last_run_of_signs_in_the_name_is_the_number() {
+        for (pattern, frame, expected) in [
+            ("out.####.exr", 7, Some("out.0007.exr")),
+            ("out.#.exr", 12, Some("out.12.exr")),
+            ("a#/b##c##.png", 123, Some("a#/b##c123.png")),
+            ("a#/b.png", 1, None),
+            ("", 1, None),
+        ] {
+            assert_eq!(numbered(Path::new(pattern), frame), expected.map(PathBuf::from), "{pattern}");
+        }
+    }
+
+    #[test]
+    fn frame_rates_are_above_zero() {
+        assert_eq!((fps("24"), fps("29.97")), (Ok(24.0), Ok(29.97)));
+        assert!(["0", "-1", "nan", "inf", "1e9", ""].iter().all(|text| fps(text).is_err()));
+    }
+}

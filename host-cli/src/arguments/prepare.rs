@@ -1,0 +1,67 @@
+//! Options of `photoncard prepare`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use photoncard_driver::choice::Choice;
+use photoncard_driver::emulator::EmulatedKind;
+use photoncard_driver::quality::{Quality, Stated};
+use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
+
+use super::choice::choice;
+use super::files::file;
+use super::integrator::IntegratorOptions;
+use super::photons::PhotonOptions;
+use super::picture::PictureOptions;
+use super::progress::ProgressForm;
+use super::scene::SceneOptions;
+use super::threads::threads;
+
+#[derive(Args)]
+pub(crate) struct PrepareOptions {
+    #[command(flatten)]
+    pub(crate) scene: SceneOptions,
+    /// The file to write, for photoncard render --prepared
+    #[arg(short, long, value_name = "OUT.card", value_parser = file())]
+    pub(crate) output: PathBuf,
+    /// Quality of the pictures, by which the options that are not stated are chosen
+    #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
+    pub(crate) quality: Quality,
+    #[command(flatten)]
+    pub(crate) picture: PictureOptions,
+    #[command(flatten)]
+    photons: PhotonOptions,
+    #[command(flatten)]
+    integrator: IntegratorOptions,
+    /// Kind of the cards that will render: the card image must fit their memory
+    #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>(), help_heading = "Cards")]
+    pub(crate) card: EmulatedKind,
+    /// Threads for the work [default: one per core]
+    #[arg(long, value_parser = threads, allow_negative_numbers = true, hide_short_help = true)]
+    pub(crate) threads: Option<usize>,
+    /// Show no progress
+    #[arg(long)]
+    pub(crate) quiet: bool,
+    /// Form of the progress, and of the message of a failure
+    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
+    pub(crate) progress: ProgressForm,
+}
+
+impl PrepareOptions {
+    /// Options that are stated, of those that a quality chooses for a scene.
+    pub(crate) fn stated(&self) -> Stated {
+        Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
+    }
+
+    /// Settings of a picture of these options, with those of the quality for a scene that is not known.
+    pub(crate) fn settings(&self) -> RenderSettings {
+        let base = self.quality.settings();
+        RenderSettings {
+            picture: self.picture.settings(&base.picture),
+            photons: self.photons.settings(&base.photons),
+            integrator: self.integrator.settings(&base.integrator),
+            cards: CardSet { addresses: vec![CardAddress::emulated(self.card)], ..CardSet::default() },
+            ..RenderSettings::default()
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! The option of a render that its scene is a prepared one.
+
+use clap::Args;
+use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
+
+/// Options of what is prepared.
+pub(crate) const OF_PREPARATION: [&str; 24] = [
+    "assignments",
+    "energy_compensation",
+    "variant",
+    "light_units",
+    "environment",
+    "quality",
+    "photons",
+    "photon_map",
+    "neighbors",
+    "caustic_photons",
+    "caustic_neighbors",
+    "max_distance",
+    "radiance",
+    "seed",
+    "gather_rays",
+    "shadow_rays",
+    "spp",
+    "planned_spp",
+    "sampling",
+    "irradiance_cache",
+    "ic_error",
+    "time",
+    "noise",
+    "keep_samples",
+];
+
+#[derive(Args)]
+pub(crate) struct PreparedOption {
+    /// SCENE is a file that photoncard prepare has written: no glTF file is read, and no photon is traced
+    ///
+    /// The scene, its photons, rays and samples are those that were stated to photoncard prepare. Options of the picture and of its camera are stated as
+    /// for a glTF file.
+    #[arg(long, help_heading = "Scene", conflicts_with_all = OF_PREPARATION)]
+    pub(crate) prepared: bool,
+}
+
+/// The error of arguments with a remedy, if one of them is of the preparation.
+pub(super) fn with_remedy(mut error: Error) -> Error {
+    let names = |option: &str| {
+        [ContextKind::InvalidArg, ContextKind::PriorArg].into_iter().any(|kind| match error.get(kind) {
+            Some(ContextValue::String(name)) => name.starts_with(option),
+            Some(ContextValue::Strings(names)) => names.iter().any(|name| name.starts_with(option)),
+            _ => false,
+        })
+    };
+    if error.kind() == ErrorKind::ArgumentConflict && names("--prepared") {
+        let remedy = if names("--frames") {
+            "leave --prepared out, and give the glTF file: a prepared scene stands still"
+        } else {
+            "state it to photoncard prepare: the prepared scene depends on it"
+        };
+        let remedy = ContextValue::StyledStrs(vec![remedy.into()]);
+        let _ = error.insert(ContextKind::Suggested, remedy);
+    }
+    error
+}

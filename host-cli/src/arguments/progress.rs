@@ -1,0 +1,13 @@
+//! Form in which a command tells of its progress.
+
+use clap::ValueEnum;
+
+/// Form of progress and failure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ProgressForm {
+    /// A bar on a terminal, else lines on standard error
+    #[default]
+    Text,
+    /// Lines of Open Job Description on standard output
+    Openjd,
+}

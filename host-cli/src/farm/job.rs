@@ -1,0 +1,105 @@
+//! A job: the steps by which a farm renders a picture or frames.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use clap::CommandFactory;
+use miette::{MietteDiagnostic, Report};
+use photoncard_shared::checksum::checksum;
+
+use super::words::Words;
+use crate::arguments::{Arguments, FarmOptions, PictureFormat};
+use crate::failure::Failure;
+
+/// Consecutive frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Frames {
+    pub(super) first: u32,
+    pub(super) last: u32,
+}
+
+/// Steps of a farm's work on a picture or on frames.
+pub(super) struct Job {
+    /// Name of the job: that of the picture's file.
+    pub(super) name: String,
+    /// Folder in which all paths of the job begin.
+    pub(super) home: String,
+    /// Folder of the prepared scene and of the parts.
+    pub(super) folder: String,
+    pub(super) words: Words,
+    /// Number of parts of a picture.
+    pub(super) parts: u32,
+    pub(super) frames: Option<Frames>,
+}
+
+impl Job {
+    /// Job of options, and of the words that they were read from.
+    ///
+    /// # Errors
+    /// If an option is of no job, a name is not text, or frames have no place in one.
+    pub(super) fn new(options: &FarmOptions, given: impl Iterator<Item = OsString>) -> Result<Self, Failure> {
+        let pictures = &options.render.outputs.pictures;
+        if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
+            return Err(refusal(
+                "a job makes pictures, of parts of its own",
+                "give -o OUT.exr or -o OUT.png",
+            ));
+        }
+        let frames = frames(options)?;
+        let given: Vec<String> = given.map(text).collect::<Result<_, _>>()?;
+        let print = given.join("\n");
+        let command = Arguments::command();
+        let engine = command.find_subcommand("farm").and_then(|farm| farm.find_subcommand("slurm"));
+        let words = engine.map_or(Ok(Words::default()), |engine| Words::new(given, engine));
+        let words = words.map_err(|name| {
+            refusal(
+                &format!("{name} is not for a farm's job"),
+                "leave it out: tasks state what they need themselves",
+            )
+        })?;
+        let output = pictures.first().map_or(Path::new("out"), |picture| &picture.path);
+        let stem =
+            output.file_stem().unwrap_or_default().to_string_lossy().replace(".#", "").replace('#', "");
+        // Jobs of other options share no files.
+        let folder = output.with_file_name(format!("{stem}.{:08x}.farm", checksum(print.as_bytes())));
+        let home = std::env::current_dir().map_err(|error| Failure::work_error(&error))?;
+        let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let path = |path: PathBuf| text(path.into_os_string());
+        let (home, folder) = (path(home)?, path(folder)?);
+        Ok(Self { name, home, folder, words, parts: options.parts, frames })
+    }
+
+    /// Number of tasks between preparation and merge.
+    pub(super) fn tasks(&self) -> u64 {
+        let frames = self.frames.map_or(1, |Frames { first, last }| last - first + 1);
+        u64::from(frames) * u64::from(self.parts)
+    }
+}
+
+/// The frames of options, if there are any.
+fn frames(options: &FarmOptions) -> Result<Option<Frames>, Failure> {
+    let Some(numbers) = options.render.frames.numbers() else { return Ok(None) };
+    let numbers: Vec<u32> = numbers.collect();
+    let [first, last] = [numbers.first(), numbers.last()].map(|number| number.copied().unwrap_or(0));
+    if numbers.len() as u64 != u64::from(last - first) + 1 {
+        return Err(refusal(
+            "the frames of a job follow each other",
+            "give --frames A-B, and a job for each such range",
+        ));
+    }
+    match options.render.outputs.of_frame(first) {
+        Ok(_) => Ok(Some(Frames { first, last })),
+        Err(_) => Err(refusal("an output has no place for the number of a frame", "give -o OUT.####.exr")),
+    }
+}
+
+fn text(word: OsString) -> Result<String, Failure> {
+    word.into_string().map_err(|word| {
+        let text = format!("'{}' is not UTF-8, and a job is text", word.to_string_lossy());
+        refusal(&text, "rename it")
+    })
+}
+
+fn refusal(text: &str, help: &str) -> Failure {
+    Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
+}

@@ -1,0 +1,106 @@
+//! The steps of a job as functions of a POSIX shell. Each may be repeated, also while or after it was killed.
+
+use super::job::{Frames, Job};
+use crate::shell::quoted;
+
+/// Functions `prepare`, `part` and `merge`, and `task`, which renders the task of a number from 0 on. `extra` are further options of renders. The script that
+/// has them begins in the job's home.
+pub(super) fn functions(job: &Job, extra: &str) -> String {
+    let parts = job.parts;
+    let folder = word(&job.folder);
+    match job.frames {
+        None => format!(
+            "folder={folder}\n\n{}\n{}\n{}\n{}",
+            prepare(job, extra),
+            part(job, extra),
+            format_args!(
+                "merge() {{ photoncard merge \"$folder\"/*of{parts}.part{}{extra}; }}\n",
+                words(&job.words.merge)
+            ),
+            "task() { part \"$(($1 + 1))\"; }\n",
+        ),
+        Some(Frames { first, last }) => format!(
+            "folder={folder}\n\n{}\n{}\n{}\n{}",
+            "prepare() { mkdir -p \"$folder\"; }\n",
+            part_of_frames(job, extra),
+            merge_frames(job, [first, last], extra),
+            format_args!("task() {{ part \"$(($1 % {parts} + 1))\" \"$(({first} + $1 / {parts}))\"; }}\n"),
+        ),
+    }
+}
+
+/// Words in the quotes of a shell, each with a blank before it.
+fn words(words: &[String]) -> String {
+    words.iter().map(|each| format!(" {}", word(each))).collect()
+}
+
+/// A word in the quotes of a shell. No two braces follow each other: they enclose expressions of Open Job Description.
+fn word(word: &str) -> String {
+    quoted(word).replace('{', "{''").replace('}', "}''")
+}
+
+/// The scene is prepared again by each job. Parts of another scene under its name are removed.
+fn prepare(job: &Job, extra: &str) -> String {
+    let words = [&job.words.scene, &job.words.prepare, &job.words.both].map(|list| words(list)).concat();
+    format!(
+        "prepare() {{
+    mkdir -p \"$folder\"
+    photoncard prepare{words}{extra} -o \"$folder/new.card\"
+    if cmp -s \"$folder/new.card\" \"$folder/scene.card\"; then
+        rm -f \"$folder/new.card\"
+    else
+        rm -f \"$folder\"/*.part \"$folder\"/*.part.partial \"$folder/joblog\"
+        mv \"$folder/new.card\" \"$folder/scene.card\"
+    fi
+}}
+"
+    )
+}
+
+fn part(job: &Job, extra: &str) -> String {
+    let words = [&job.words.both, &job.words.render].map(|list| words(list)).concat();
+    let part = format!("\"$folder/$1of{}.part\"", job.parts);
+    format!(
+        "part() {{
+    [ -e {part} ] ||
+        photoncard render --prepared \"$folder/scene.card\"{words}{extra} --resume --part \"$1/{}\" -o {part}
+}}
+",
+        job.parts
+    )
+}
+
+/// Frames are rendered from the scene's file, which has its animations.
+fn part_of_frames(job: &Job, extra: &str) -> String {
+    let Job { words: all, parts, .. } = job;
+    let words = [&all.scene, &all.prepare, &all.both, &all.render].map(|list| words(list)).concat();
+    format!(
+        "part() {{
+    photoncard render{words}{extra} --frames \"$2\" --resume --part \"$1/{parts}\" -o \"$folder/######.$1of{parts}.part\"
+}}
+"
+    )
+}
+
+fn merge_frames(job: &Job, [first, last]: [u32; 2], extra: &str) -> String {
+    let outputs: String = job.words.merge.iter().map(|word| format!(" {}", numbered(word))).collect();
+    format!(
+        "merge() {{
+    frame={first}
+    while [ \"$frame\" -le {last} ]; do
+        photoncard merge \"$folder/$(printf %06d \"$frame\")\".*of{}.part{outputs}{extra}
+        frame=$((frame + 1))
+    done
+}}
+",
+        job.parts
+    )
+}
+
+/// A word in quotes, in which the number of the frame replaces the last run of `#`.
+fn numbered(text: &str) -> String {
+    let Some((before, after)) = text.rsplit_once('#') else { return word(text) };
+    let kept = before.trim_end_matches('#');
+    let width = before.len() - kept.len() + 1;
+    format!("{}\"$(printf %0{width}d \"$frame\")\"{}", word(kept), word(after))
+}

@@ -1,0 +1,124 @@
+//! The words of a command line, sorted by the steps of a job that they are of.
+
+use clap::{ArgAction, Command};
+
+use crate::arguments::OF_PREPARATION;
+
+/// Options of the picture, of which the pilot of a preparation is as well, and of any work.
+const OF_BOTH: [&str; 10] =
+    ["size", "crop", "camera", "camera_at", "look_at", "fov", "aov", "filter", "threads", "quiet"];
+/// Options of the picture's files.
+const OF_MERGE: [&str; 4] = ["pictures", "sample_type", "exposure", "curve"];
+/// Options of the job itself.
+const OF_JOB: [&str; 2] = ["parts", "frames"];
+/// Options that a job states itself, or that are of one render alone.
+const OF_NO_JOB: [&str; 9] =
+    ["part", "prepared", "resume", "stats", "time", "noise", "keep_samples", "trace", "progress"];
+
+/// Words of a command line.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Words {
+    pub(super) scene: Vec<String>,
+    /// Options of the scene, of photons and of rays.
+    pub(super) prepare: Vec<String>,
+    /// Options of the picture, and of any work.
+    pub(super) both: Vec<String>,
+    /// Options of cards, and of the order of the work.
+    pub(super) render: Vec<String>,
+    /// Options of the picture's files.
+    pub(super) merge: Vec<String>,
+}
+
+impl Words {
+    /// Sorts words that `command` takes.
+    ///
+    /// # Errors
+    /// If an option is of no job: its name.
+    pub(super) fn new(given: impl IntoIterator<Item = String>, command: &Command) -> Result<Self, String> {
+        let mut words = Self::default();
+        let mut given = given.into_iter();
+        while let Some(word) = given.next() {
+            let (name, has_value) = match word.split_once('=') {
+                Some((name, _)) if name.starts_with("--") => (name, true),
+                _ => (&*word, false),
+            };
+            let is_short = name.starts_with("-o");
+            let is_named =
+                |long: Option<&str>| long.is_some_and(|long| name.strip_prefix("--") == Some(long));
+            let argument = (command.get_arguments()).find(|argument| {
+                is_named(argument.get_long()) || is_short && argument.get_short() == Some('o')
+            });
+            let Some(argument) = argument else {
+                words.scene.extend((word != "--").then_some(word));
+                continue;
+            };
+            let takes_value = matches!(argument.get_action(), ArgAction::Set | ArgAction::Append);
+            let is_whole = has_value || is_short && name.len() > 2;
+            let value = if takes_value && !is_whole { given.next() } else { None };
+            let id = argument.get_id().as_str();
+            if let Some(room) = words.room(id).ok_or_else(|| name.to_owned())? {
+                room.extend([word].into_iter().chain(value));
+            }
+        }
+        Ok(words)
+    }
+
+    /// Words that an option is among; `Some(None)` for one of the job itself, `None` for one of no job.
+    fn room(&mut self, id: &str) -> Option<Option<&mut Vec<String>>> {
+        Some(Some(match id {
+            _ if OF_NO_JOB.contains(&id) => return None,
+            _ if OF_JOB.contains(&id) => return Some(None),
+            _ if OF_PREPARATION.contains(&id) => &mut self.prepare,
+            _ if OF_BOTH.contains(&id) => &mut self.both,
+            _ if OF_MERGE.contains(&id) => &mut self.merge,
+            _ => &mut self.render,
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::arguments::Arguments;
+
+    fn sorted(line: &str) -> Result<Words, String> {
+        let command = Arguments::command();
+        let farm = command.find_subcommand("farm").and_then(|farm| farm.find_subcommand("slurm")).unwrap();
+        Words::new(line.split(' ').map(str::to_owned), farm)
+    }
+
+    #[test]
+    fn words_are_sorted_by_the_steps_that_take_them() {
+        let line = "--size 8x8 --photons=9 a.gltf -o b.exr --quiet --card emulated:1 --irradiance-cache on --parts 3 -oc.png \
+                    --sample-type half --tile 8 --set -x.y=1 --frames=1-2";
+        let words = sorted(line).unwrap();
+        assert_eq!(words.scene, ["a.gltf"]);
+        assert_eq!(words.both, ["--size", "8x8", "--quiet"]);
+        assert_eq!(words.prepare, ["--photons=9", "--irradiance-cache", "on", "--set", "-x.y=1"]);
+        assert_eq!(words.render, ["--card", "emulated:1", "--tile", "8"]);
+        assert_eq!(words.merge, ["-o", "b.exr", "-oc.png", "--sample-type", "half"]);
+    }
+
+    #[test]
+    fn options_of_one_render_are_of_no_job() {
+        for option in
+            ["--part=1/2", "--prepared", "--resume", "--stats", "--time", "--noise=0.1", "--keep-samples"]
+        {
+            let name = option.split('=').next().unwrap();
+            assert_eq!(sorted(&format!("a.gltf {option}")), Err(name.to_owned()));
+        }
+    }
+
+    /// No name is of an option that is not.
+    #[test]
+    fn each_name_is_that_of_an_option() {
+        let command = Arguments::command();
+        let farm = command.find_subcommand("farm").and_then(|farm| farm.find_subcommand("slurm")).unwrap();
+        let names = OF_BOTH.iter().chain(&OF_MERGE).chain(&OF_JOB).chain(&OF_NO_JOB).chain(&OF_PREPARATION);
+        for name in names {
+            assert!(farm.get_arguments().any(|argument| argument.get_id() == name), "{name}");
+        }
+    }
+}

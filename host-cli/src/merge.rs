@@ -1,0 +1,52 @@
+//! `photoncard merge`.
+
+use std::path::Path;
+
+use photoncard_driver::parts::{Part, PartError, Parts};
+
+use crate::arguments::{MergeOptions, PictureFormat};
+use crate::console::{printable_json, say};
+use crate::failure::Failure;
+use crate::outputs;
+use crate::render::files::{Form, write_picture};
+use crate::render::part;
+
+/// Maximum number of missing parts whose commands are printed.
+const MAX_COMMANDS: usize = 100;
+
+/// Merges parts to the picture, and writes it.
+pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
+    let MergeOptions { parts: paths, pictures, sample_type, tone, progress: _ } = options;
+    if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
+        return Err(part::needless());
+    }
+    let inputs: Vec<(&Path, &str)> = paths.iter().map(|path| (path.as_path(), "a part")).collect();
+    let written: Vec<&Path> = pictures.iter().map(|picture| &*picture.path).collect();
+    outputs::check(&inputs, &written, &[])?;
+    let parts = Parts::open(paths).map_err(Failure::input)?;
+    say_missing(&parts);
+    let merged = parts.merge().map_err(failure)?;
+    let provenance =
+        serde_json::to_string(&merged.provenance).map_err(|error| Failure::work_error(&error))?;
+    let form = Form { layers: merged.layers, sample_type: *sample_type, tone: tone.mapping(), part: None };
+    for picture in pictures {
+        write_picture(picture, &merged.film, &printable_json(&provenance), &form)?;
+    }
+    Ok(())
+}
+
+/// Prints the commands that make the missing parts.
+fn say_missing(parts: &Parts) {
+    let missing = parts.missing();
+    let Some(head) = parts.any() else { return };
+    let command = |part: &Part| part::command(head, *part);
+    missing.iter().take(MAX_COMMANDS).for_each(|part| say(format_args!("{}", command(part))));
+}
+
+/// Failure of a merge: that of its input, but for a disk or memory that is full.
+fn failure(error: PartError) -> Failure {
+    match error {
+        PartError::Film(_) | PartError::Unequal { .. } => Failure::work(error),
+        error => Failure::input(error),
+    }
+}

@@ -1,0 +1,118 @@
+//! Steps of a render that a picture and a frame share.
+
+use photoncard_driver::choice::Choice;
+use photoncard_driver::quality::{Fit, Quality};
+use photoncard_driver::render::{
+    CardAddress, Integrator, NamedSettings, PhotonMaps, RenderError, RenderSettings, Rendering,
+};
+use photoncard_driver::scene::Scene;
+use serde_json::json;
+
+use super::{files, messages};
+use crate::arguments::{OutputOptions, RenderOptions, SceneOptions};
+use crate::console::say;
+use crate::failure::Failure;
+use crate::progress::Progress;
+
+/// Says where the finished tiles of a render are that was ended by an error.
+pub(super) fn say_kept(error: &RenderError, progress: &Progress, outputs: &OutputOptions) {
+    if !error.is_input() && progress.has_kept() {
+        let path = outputs.partial_path();
+        say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
+    }
+}
+
+/// A finished picture, and what it was made by.
+pub(super) struct Finished {
+    pub(super) rendering: Rendering,
+    /// Time of reading the scene, seconds.
+    pub(super) scene_seconds: f64,
+    /// Inputs of the scene, by their names.
+    pub(super) inputs: NamedSettings,
+    pub(super) quality: Quality,
+    /// What the quality has found for the scene, if it was looked for.
+    pub(super) fit: Option<Fit>,
+    /// Number of the frame, if it is one.
+    pub(super) frame: Option<u32>,
+}
+
+/// Writes the outputs of a finished picture, and says so.
+pub(super) fn finish(
+    options: &RenderOptions,
+    outputs: &OutputOptions,
+    finished: Finished,
+) -> Result<(), Failure> {
+    let Finished { mut rendering, scene_seconds, inputs, quality, fit, frame } = finished;
+    rendering.statistics.time_s.scene = scene_seconds;
+    rendering.statistics.time_s.total += scene_seconds;
+    let provenance = &mut rendering.statistics.provenance;
+    provenance.pixels.extend(inputs);
+    provenance.pixels.extend(frame.map(|frame| options.frames.provenance(frame)).into_iter().flatten());
+    provenance.work.insert("quality".to_owned(), json!(quality.name()));
+    provenance.work.insert("threads".to_owned(), json!(options.threads));
+    provenance.work.insert("pilot".to_owned(), json!(fit.map(|fit| fit.measured)));
+    files::write(options, outputs, &rendering)?;
+    if let Some(partial) = rendering.partial.take().filter(|_| !options.samples.keep_samples) {
+        partial.remove().map_err(Failure::work)?;
+    }
+    if !options.quiet {
+        messages::say_done(outputs, &rendering, frame);
+    }
+    Ok(())
+}
+
+/// Photons and integrator of the options, with what the quality has found for this scene where nothing is stated.
+pub(super) fn chosen(
+    options: &RenderOptions,
+    settings: &RenderSettings,
+    fit: Option<&Fit>,
+    progress: &Progress,
+) -> (PhotonMaps, Integrator) {
+    let chosen = settings.clone().with(|settings| {
+        if let Some(fit) = fit {
+            fit.apply(settings, options.stated());
+        }
+    });
+    if !options.quiet && fit.is_some() {
+        progress.say(format_args!("photoncard: {}", messages::chosen(options.quality, &chosen)));
+    }
+    (chosen.photons, chosen.integrator)
+}
+
+/// Memory of every card, bytes: the image must fit.
+pub(super) fn dram_bytes(settings: &RenderSettings) -> u32 {
+    settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX)
+}
+
+/// The scene with the options' assignments; it has light.
+pub(super) fn assigned(options: &SceneOptions, mut scene: Scene) -> Result<Scene, Failure> {
+    for assignment in &options.assignments {
+        scene.apply(assignment).map_err(Failure::input)?;
+    }
+    scene.check_light().map_err(Failure::input)?;
+    Ok(scene)
+}
+
+/// Gives the picture the aspect ratio of the camera, and says what was loaded.
+pub(super) fn view(
+    options: &RenderOptions,
+    settings: &mut RenderSettings,
+    scene: &Scene,
+) -> Result<(), Failure> {
+    let camera = settings.camera(scene)?;
+    let misfit = options.picture.fit(&camera, &mut settings.picture);
+    if !options.quiet {
+        messages::say_loaded(options, settings, scene, &camera, misfit);
+    }
+    Ok(())
+}
+
+/// Runs `work` on a pool of `threads` threads.
+pub(crate) fn on_threads<T: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> T + Send,
+) -> Result<T, Failure> {
+    let Some(threads) = threads else { return Ok(work()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    Ok(pool.map_err(|error| Failure::work_error(&error))?.install(work))
+}

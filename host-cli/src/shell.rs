@@ -1,0 +1,35 @@
+//! Commands for a shell.
+
+/// Command line of this program with these arguments, for a POSIX shell.
+pub(crate) fn command(arguments: impl IntoIterator<Item = String>) -> String {
+    let arguments = arguments.into_iter().map(|argument| quoted(&argument));
+    std::iter::once("photoncard".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
+}
+
+/// Quotes a word for a POSIX shell: the shell reads it as it is.
+pub(crate) fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::process::Command;
+
+    use super::*;
+
+    #[test]
+    fn a_shell_reads_quoted_words_as_they_are() {
+        for word in
+            ["", "a", "a b", "it's", "'", "\"$HOME\"", "`id`;&|<>*?~#!\\", "-x=1,2:3", "a\nb", "\u{e4} {}"]
+        {
+            let script = format!("printf %s {}", quoted(word));
+            let output = Command::new("sh").args(["-c", &script]).output().unwrap();
+            assert_eq!(String::from_utf8(output.stdout).unwrap(), word);
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Fuzzing of files with headings: parts of pictures, and prepared scenes. Their checksums are made anew in half of the inputs, as somebody would who means harm.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use photoncard_driver::film::{Film, SumFormat, Window};
+use photoncard_driver::layer::Layers;
+use photoncard_driver::parts::{self, Part, PartError, PartHead, Parts};
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, PreparedScene, RenderSettings, Unobserved};
+use photoncard_firmware::kind::REFERENCE;
+use photoncard_shared::checksum::checksum;
+use tempfile::TempDir;
+
+use super::mutation;
+use super::random::Random;
+use super::target::Target;
+use crate::everything::everything;
+
+/// Maximum number of bytes that a file may have allocated: patches of the largest picture, of which the file has next to none.
+const BOUND: usize = 256 << 20;
+/// Multiple of bytes at which the lines of a prepared scene begin.
+const PAGE: usize = 4096;
+
+/// Target of a kind of files.
+pub(super) struct Files {
+    name: &'static str,
+    seeds: Vec<Vec<u8>>,
+    folder: TempDir,
+    read: fn(&Path) -> bool,
+}
+
+impl Files {
+    /// Parts of a picture: all of it, and one of three.
+    pub(super) fn parts() -> Self {
+        let folder = tempfile::tempdir().expect("there is room for a folder");
+        let settings = settings();
+        let window = Window::full(settings.picture.width, settings.picture.height);
+        let mut film = Film::new(window.x1, window.y1, window, SumFormat::ONE).expect("a film");
+        for (x, y) in (0..window.y1).flat_map(|y| (0..window.x1).map(move |x| (x, y))) {
+            film.write(x, y, &Default::default()).expect("a pixel of the film");
+        }
+        let written = |(number, count): (u32, u32)| {
+            let part = Part::new(number, count).expect("a part");
+            let command = vec!["render".to_owned()];
+            let head = PartHead::new(part, &film, settings.of_pixels(), &Layers::default(), command);
+            let path = folder.path().join("part");
+            parts::write(&path, &head, &film).expect("there is room for a part");
+            fs::read(path).expect("a part")
+        };
+        let seeds = [(1, 1), (2, 3)].map(written).into();
+        Self { name: "parts", seeds, folder, read: read_part }
+    }
+
+    /// A prepared scene with every kind of section.
+    pub(super) fn prepared() -> Self {
+        let folder = tempfile::tempdir().expect("there is room for a folder");
+        let RenderSettings { photons, integrator, .. } = settings();
+        let choose = |_: &_| Ok((photons.clone(), integrator.clone()));
+        let scene = everything();
+        let prepared = PreparedScene::new(
+            &(&scene).into(),
+            &settings(),
+            &[REFERENCE],
+            &choose,
+            Default::default(),
+            &Unobserved,
+        );
+        let path = folder.path().join("scene.card");
+        prepared.expect("the scene is sound").write(&path).expect("there is room for a scene");
+        Self { name: "prepared", seeds: vec![fs::read(path).expect("a scene")], folder, read: read_prepared }
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.path().join("file")
+    }
+}
+
+fn settings() -> RenderSettings {
+    RenderSettings::default().with(|settings| {
+        settings.picture = Picture { width: 20, height: 17, ..Picture::default() };
+        settings.photons =
+            PhotonMaps { count: 60, neighbors: 8, caustic_photons: Some(30), ..PhotonMaps::default() };
+        settings.integrator = Integrator { gather_rays: 4, shadow_rays: 1, ..Integrator::default() };
+    })
+}
+
+/// Reads a part, and merges it if the picture has no other.
+fn read_part(path: &Path) -> bool {
+    match Parts::open(&[path.to_owned()]).and_then(|parts| parts.merge()) {
+        Ok(merged) => {
+            assert!(merged.film.is_complete());
+            true
+        }
+        Err(error) => {
+            let _ = error.to_string();
+            matches!(error, PartError::Missing { .. })
+        }
+    }
+}
+
+fn read_prepared(path: &Path) -> bool {
+    let settings = match PreparedScene::open(path) {
+        Ok(prepared) => prepared.settings(RenderSettings::default()),
+        Err(error) => {
+            let _ = error.to_string();
+            return false;
+        }
+    };
+    // Which settings are possible is a render's to say.
+    let _ = settings.check();
+    true
+}
+
+/// A file of a head that was edited, with a checksum of its own.
+fn resigned(file: &[u8], page: usize, random: &mut Random) -> Vec<u8> {
+    let mut lines = file.splitn(3, |&byte| byte == b'\n');
+    let [title, head, rest] = [(); 3].map(|()| lines.next().unwrap_or_default().to_vec());
+    let old = title.len() + head.len() + 2 + 4;
+    let body = rest.get(4 + (old.next_multiple_of(page) - old)..).unwrap_or_default();
+    let mut text = head;
+    mutation::edit_json(&mut text, random);
+    text.retain(|&byte| byte != b'\n');
+    let mut bytes = [&title[..], b"\n", &text, b"\n"].concat();
+    bytes.extend(checksum(&bytes).to_le_bytes());
+    bytes.resize(bytes.len().next_multiple_of(page), 0);
+    [&bytes, body].concat()
+}
+
+impl Target for Files {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn allocation_bound(&self, input: usize) -> usize {
+        BOUND + 8 * input
+    }
+
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        let mut file = random.pick(&self.seeds).clone();
+        let page = if self.name == "prepared" { PAGE } else { 1 };
+        if random.once_in(2) {
+            return resigned(&file, page, random);
+        }
+        mutation::edit_bytes(&mut file, &self.seeds, random);
+        file
+    }
+
+    fn read(&self, input: &[u8]) -> bool {
+        fs::write(self.path(), input).expect("there is room for a file");
+        (self.read)(&self.path())
+    }
+}
