@@ -50,7 +50,7 @@ fn outputs_of(options: &RenderOptions, number: u32) -> Result<OutputOptions, Fai
 struct Sequence<'a> {
     options: &'a RenderOptions,
     input: Input,
-    /// The scene of the last frame.
+    /// The scene of the last frame; at first that at rest, if nothing but cameras moves.
     scene: FixedScene<'static>,
     /// True if a frame has the geometry and the lights of the others.
     is_still: bool,
@@ -70,13 +70,14 @@ impl<'a> Sequence<'a> {
         let is_still = input.file.only_cameras_move(options.frames.animations()).map_err(Failure::input)?;
         let rest = assigned(&options.scene, input.at_rest()?)?;
         view(options, settings, &rest)?;
+        let scene = if is_still { rest.clone() } else { Scene::default() };
         let progress = Progress::of_frames(options.quiet, settings.cards.count())
             .map_err(|error| Failure::work_error(&error))?
             .in_form(options.progress, Phase::Tiles);
         Ok(Self {
             options,
             input,
-            scene: rest.clone().into(),
+            scene: scene.into(),
             is_still,
             rest: Some(rest),
             renderer: Renderer::default(),

@@ -18,6 +18,24 @@ use crate::error::SceneError;
 use crate::scene::{Camera, LightUnits, Scene};
 
 /// An open glTF file: materials and images are read once, geometry for each moment.
+///
+/// ```
+/// # use std::path::Path;
+/// use photoncard_driver::scene::FixedScene;
+/// use photoncard_driver::scene::gltf::{LoadSettings, Moment, SceneFile};
+/// # fn main() -> Result<(), photoncard_driver::error::SceneError> {
+/// let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell-moving.glb");
+/// let file = SceneFile::open(&path, &LoadSettings::default())?;
+/// let pan = Moment { animations: vec!["pan".into()], seconds: 0.5 };
+/// assert!(file.only_cameras_move(&pan.animations)?);
+/// let mut scene = FixedScene::from(file.at_rest()?);
+/// scene.set_cameras(file.cameras_at(&pan)?);
+/// assert_eq!(scene.cameras[0].origin.to_array(), [0.3, 0.1, 3.9]);
+/// let play = file.at(&Moment { animations: vec!["play".into()], seconds: 0.5 })?;
+/// assert_ne!(play.triangles, scene.triangles);
+/// # Ok(())
+/// # }
+/// ```
 pub struct SceneFile {
     document: Document,
     light_units: LightUnits,
