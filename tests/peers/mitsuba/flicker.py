@@ -67,12 +67,12 @@ class Mitsuba:
 
     def frames(self, samples, name, seeds):
         """All frames, each by its seed."""
-        pictures, before = [], cpu_seconds()
+        before = cpu_seconds()
         rendered = [self.render(index, samples, seed) for index, seed in enumerate(seeds)]
         seconds = (cpu_seconds() - before) / len(rendered)
-        for index, picture in enumerate(rendered):
-            pictures.append(self.folder / f"mitsuba-{name}-{index:04}.exr")
-            mi.Bitmap(picture).write(str(pictures[-1]))
+        pictures = [self.folder / f"mitsuba-{name}.{index:04}.exr" for index in range(len(rendered))]
+        for picture, path in zip(rendered, pictures, strict=True):
+            mi.Bitmap(picture).write(str(path))
         return Frames(f"Mitsuba, {samples} samples, {name} seed", pictures, seconds)
 
     def render(self, index, samples, seed):
