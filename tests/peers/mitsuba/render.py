@@ -64,9 +64,9 @@ def passes(scene, integrator, samples, arguments):
     return picture
 
 
-def render(scene, integrator, samples, seed):
-    """A picture, computed."""
-    picture = mi.render(scene, integrator=integrator, spp=samples, seed=seed)
+def render(scene, integrator, samples, seed, sensor=0):
+    """A picture, computed; by the scene's own camera unless another is given."""
+    picture = mi.render(scene, sensor=sensor, integrator=integrator, spp=samples, seed=seed)
     dr.eval(picture)
     dr.sync_thread()
     return picture
