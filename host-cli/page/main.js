@@ -148,6 +148,17 @@ function takeTile(buffer) {
     else drawing.later();
 }
 
+// Takes the command's camera in place of this page's own.
+function followCamera() {
+    isCameraOwn = false;
+    toSend = null;
+    asked.camera = "";
+    byId("camera").value = "";
+    if (!state) return;
+    camera = state.camera;
+    showCentre();
+}
+
 // Asks for the size that the window or the panel wants.
 function fit() {
     const box = byId("stage").getBoundingClientRect();
@@ -246,7 +257,11 @@ on("camera", "change", ({ target }) => {
 });
 on("fov", "input", ({ target }) => target.validity.valid && target.value !== "" && camera &&
     view.move({ ...camera, fov: Number(target.value) }, false));
-on("reset", "click", () => send("reset", { type: "reset" }));
+on("reset", "click", () => {
+    asked.edits.clear();
+    followCamera();
+    send("reset", { type: "reset" });
+});
 on("steer", "click", () => send("", { type: "steer" }));
 on("save-exr", "click", () => save("exr"));
 on("save-png", "click", () => save("png"));
