@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use glam::Vec3;
-use photoncard_driver::layer::Layers;
 use photoncard_driver::quality::{Quality, Stated};
 use photoncard_driver::render::{RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
@@ -223,6 +222,9 @@ impl View {
                 let picture = &self.wish.settings.picture;
                 wish = self.start.wish.clone();
                 (wish.settings.picture.width, wish.settings.picture.height) = (picture.width, picture.height);
+                if self.pages.values().any(Page::shows_layer_of_chip) {
+                    wish.add_layers();
+                }
             }
             Request::Cursor(at) => {
                 self.cursor = at;
@@ -278,12 +280,8 @@ impl View {
 
     /// Shows a page another layer; the chips' own take a picture with layers.
     fn show(&mut self, number: PageNumber, shown: Shown) -> Result<(), String> {
-        let is_of_chip = match shown {
-            Shown::Radiance => false,
-            Shown::Layer(layer) => layer.name().parse::<Layers>().is_ok_and(|layers| layers.are_of_chip()),
-        };
         let mut wish = self.wish.clone();
-        if is_of_chip && wish.add_layers() {
+        if shown.is_of_chip() && wish.add_layers() {
             if self.steering != Some(number) {
                 return Err("this layer is not rendered, and another page steers: take over first".into());
             }

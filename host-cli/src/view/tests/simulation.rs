@@ -126,6 +126,18 @@ fn a_slow_page_gets_fewer_and_newer_tiles() {
     assert!(10 * slow < quick, "{slow} of {quick} bytes");
 }
 
+#[test]
+fn a_reset_leaves_pages_the_layers_that_they_show() {
+    let mut world = World::new();
+    world.connect();
+    for (layer, is_of_chip) in [("direct", true), ("N", false)] {
+        world.send(0, &json!({"type": "layer", "name": layer}));
+        world.send(0, &json!({"type": "reset"}));
+        world.settle();
+        assert_eq!(world.view.wish().settings.picture.layers.are_of_chip(), is_of_chip, "{layer}");
+    }
+}
+
 /// Tiles wait for acknowledgement beyond some megabytes.
 #[test]
 fn a_page_that_acknowledges_nothing_is_not_flooded() {
