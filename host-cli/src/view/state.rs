@@ -123,6 +123,11 @@ impl View {
         number
     }
 
+    /// Returns whether a page is there.
+    pub(super) fn has(&self, number: PageNumber) -> bool {
+        self.pages.contains_key(&number)
+    }
+
     /// Lets a page go. If it steered, the one that has been there for the longest time does.
     pub(super) fn disconnect(&mut self, number: PageNumber) {
         self.pages.remove(&number);

@@ -289,6 +289,19 @@ fn a_wish_that_no_card_can_fulfil_is_named() {
     assert_eq!(page.settle()["settings"]["gather_rays"], 3);
 }
 
+/// There are 16 places, and no page that is gone holds one, even while nothing changes.
+#[test]
+fn pages_come_and_go() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    view.connect().settle();
+    for _ in 0..40 {
+        let mut page = view.connect();
+        page.wait("state", |state| state["settled"] == true);
+        page.leave();
+    }
+}
+
 #[test]
 fn of_two_pages_one_steers() {
     let room = Room::new();
