@@ -64,6 +64,10 @@ pub(super) struct View {
     /// Materials and lights of the first wish, to which `reset` returns.
     first: Scene,
     pub(super) refinement: Refinement,
+    /// Wish of the picture that settled last.
+    pub(super) settled: Option<Wish>,
+    /// Reason for which the newest wish is not rendered.
+    pub(super) refused: Option<String>,
     pub(super) canvas: Canvas,
     /// Pass of the newest wish that was finished last.
     pub(super) done: Option<Origin>,
@@ -88,6 +92,7 @@ impl View {
     /// If the first wish is not possible.
     pub(super) fn new(start: Start) -> Result<Self, RenderError> {
         let wish = start.wish.clone();
+        wish.check_cards()?;
         let is_fitted = start.stated == Stated::ALL || start.quality == Quality::Paper;
         Ok(Self {
             first: start.sketch.with(&wish)?,
@@ -96,6 +101,8 @@ impl View {
             wish,
             start,
             refinement: Refinement::new(is_fitted),
+            settled: None,
+            refused: None,
             canvas: Canvas::default(),
             done: None,
             cost: Cost::default(),
@@ -219,7 +226,10 @@ impl View {
                 moves = Some(is_moving);
             }
             Request::Set { name, value } => wish.set(name, value),
-            Request::Setting(setting) => wish.change(setting),
+            Request::Setting(setting) => {
+                wish.change(setting);
+                wish.check_cards().map_err(|error| with_remedy(&error))?;
+            }
             Request::Size([width, height]) => {
                 (wish.settings.picture.width, wish.settings.picture.height) = (width, height);
             }
@@ -245,7 +255,7 @@ impl View {
     }
 
     /// Takes a new wish, if it is one.
-    fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
+    pub(super) fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
         if wish == self.wish {
             // The page is told that its message was heard.
             self.revisions.state += 1;
@@ -258,6 +268,7 @@ impl View {
             self.of_size = self.refinement.version();
         }
         self.wish = wish;
+        self.refused = None;
         self.begin_picture();
         Ok(())
     }
@@ -290,7 +301,7 @@ impl View {
             if self.steering != Some(number) {
                 return Err("this layer is not rendered, and another page steers: take over first".into());
             }
-            self.wish_for(wish).map_err(|error| with_remedy(&error))?;
+            wish.check_cards().and_then(|()| self.wish_for(wish)).map_err(|error| with_remedy(&error))?;
         }
         self.of_page(number, |page| page.show(shown));
         self.revisions.state += 1;
@@ -371,6 +382,7 @@ impl View {
             "samples": done.samples,
             "spp": settings.integrator.samples,
             "settled": has_all && self.refinement.is_settled(),
+            "refused": self.refused,
             "version": self.refinement.version(),
             "id": self.message,
             "command": command_line::quoted(&self.command()),

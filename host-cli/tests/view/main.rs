@@ -275,16 +275,26 @@ fn hostile_messages_are_answered_or_end_their_connection_alone() {
     assert_eq!(std::fs::read_dir(room.path("out")).unwrap().count(), 0);
 }
 
-/// A setting that a card refuses is named, and the next one is rendered.
 #[test]
-fn a_wish_that_no_card_can_fulfil_is_named() {
+fn settings_that_no_card_can_hold_are_named_and_change_nothing() {
     let room = Room::new();
     let view = small_view(&room, &[]);
     let mut page = view.connect();
-    page.settle();
-    page.send(&json!({"type": "setting", "name": "gather_rays", "value": 4_000_000}));
-    let error = page.wait_for("error");
-    assert!(error["text"].as_str().unwrap().contains("--gather-rays"), "{error}");
+    let before = page.settle();
+    for (name, value, option) in [
+        ("gather_rays", u32::MAX, "--gather-rays"),
+        ("spp", 0, "--spp"),
+        ("spp", 5000, "--spp"),
+        ("tile", 100, "--tile"),
+    ] {
+        page.send(&json!({"type": "setting", "name": name, "value": value}));
+        let error = page.wait_for("error");
+        assert!(error["text"].as_str().unwrap().contains(option), "{error}");
+    }
+    page.send(&camera(0.2, false));
+    let after = page.settle();
+    assert_eq!(after["settings"], before["settings"]);
+    assert_eq!(after["version"], before["version"].as_u64().unwrap() + 1);
     page.send(&json!({"type": "setting", "name": "gather_rays", "value": 3}));
     assert_eq!(page.settle()["settings"]["gather_rays"], 3);
 }
@@ -358,6 +368,8 @@ fn what_a_view_cannot_be_is_said_at_once() {
         (&["--listen", "127.0.0.1:0", "--trace", "trace.gz"], "--trace"),
         (&["--listen", "127.0.0.1:0", "--out", "absent"], "absent"),
         (&["--listen", "127.0.0.1:0", "--set", "flor.alpha=1"], "'floor'"),
+        (&["--listen", "127.0.0.1:0", "--spp", "0"], "--spp"),
+        (&["--listen", "127.0.0.1:0", "--tile", "1000"], "--tile"),
     ] {
         let outcome = room.run(&[&["view", "scene.gltf"], options].concat());
         assert!(
