@@ -24,7 +24,7 @@ const times = new Times();
 // State of the command as last received, and the requests of this page.
 let scene = null, state = null, isOpen = false, steers = false;
 let camera = null, isCameraOwn = false, toSend = null;
-const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cursor: undefined, edits: new Map() };
+const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cameraId: 0, cursor: undefined, edits: new Map() };
 // Pixel under the pointer; null for none.
 let pointed = null;
 
@@ -44,7 +44,7 @@ function show() {
 const send = (what, message) => {
     const id = connection.send(message);
     if (what) times.sent(id, what);
-    return id !== 0;
+    return id;
 };
 
 const panel = new Panel(
@@ -82,8 +82,9 @@ function take(message) {
         saved: ({ path }) => byId("saved").textContent = `saved ${path}`,
         picked: ({ point }) => { controls.centre = point; showCentre(); },
         steers: ({ value }) => setSteers(value),
-        error({ text }) {
+        error({ text, id }) {
             tell(text);
+            if (id && id === asked.cameraId) followCamera();
             if (state) panel.update(state, true);
         },
     }[message.type];
@@ -199,7 +200,7 @@ function sendMoves() {
     if (toSend && steers) {
         const view = rounded(camera), text = JSON.stringify(view);
         // A camera that comes to rest makes no new picture.
-        send(text === asked.camera ? "" : "camera", { type: "camera", ...view, moving: toSend.isMoving });
+        asked.cameraId = send(text === asked.camera ? "" : "camera", { type: "camera", ...view, moving: toSend.isMoving });
         asked.camera = text;
         toSend = null;
     }

@@ -81,11 +81,10 @@ impl From<String> for Fault {
     }
 }
 
-/// Reads a message, and its number if it has one.
-pub(super) fn parse(text: &str) -> Result<(Request, Option<u64>), Fault> {
-    let Ok(Value::Object(message)) = serde_json::from_str(text) else { return Err(Fault::Foreign) };
-    let number = message.get("id").and_then(Value::as_u64);
-    Ok((request(&Fields(&message))?, number))
+/// Reads a message, and its number if it has one; both stay apart, as a refused message has a number too.
+pub(super) fn parse(text: &str) -> (Result<Request, Fault>, Option<u64>) {
+    let Ok(Value::Object(message)) = serde_json::from_str(text) else { return (Err(Fault::Foreign), None) };
+    (request(&Fields(&message)), message.get("id").and_then(Value::as_u64))
 }
 
 fn request(fields: &Fields) -> Result<Request, Fault> {
@@ -238,7 +237,7 @@ mod tests {
             (r#"{"type":"pick","at":[3,4]}"#, Request::Pick([3, 4])),
             (r#"{"type":"shown","version":3,"bytes":77}"#, Request::Shown(77)),
         ] {
-            assert_eq!(parse(text), Ok((request, None)), "{text}");
+            assert_eq!(parse(text), (Ok(request), None), "{text}");
         }
     }
 
@@ -246,7 +245,7 @@ mod tests {
     fn a_picture_is_saved_as_it_is_shown() {
         let saved = |exposure, curve| {
             let tone = ToneMapping { exposure, curve };
-            Ok((Request::Save(Saving { name: "a.png".into(), tone }), Some(7)))
+            (Ok(Request::Save(Saving { name: "a.png".into(), tone })), Some(7))
         };
         for (more, saving) in [
             ("", saved(None, ToneCurve::Reinhard)),
@@ -260,7 +259,7 @@ mod tests {
     #[test]
     fn what_is_no_message_is_foreign() {
         for text in ["", "hello", "[1]", "3", "null", "{", &"[".repeat(10_000)] {
-            assert_eq!(parse(text), Err(Fault::Foreign), "{text:.20}");
+            assert_eq!(parse(text), (Err(Fault::Foreign), None), "{text:.20}");
         }
     }
 
@@ -297,7 +296,7 @@ mod tests {
             (r#"{"type":"save","name":"a.png","exposure":1e9}"#.into(), "exposure"),
             (r#"{"type":"save","name":"a.png","tonemap":"best"}"#.into(), "best"),
         ] {
-            match parse(&text) {
+            match parse(&text).0 {
                 Err(Fault::Refused(reason)) => assert!(reason.contains(said), "{text}: {reason}"),
                 other => panic!("{text}: {other:?}"),
             }

@@ -160,10 +160,6 @@ impl View {
         }
     }
 
-    fn reply_error(&mut self, number: PageNumber, text: &str) {
-        self.reply(number, &json!({"type": "error", "text": text}));
-    }
-
     /// Tells all pages of an error.
     pub(super) fn tell_error(&mut self, text: &str) {
         let message = json!({"type": "error", "text": text}).to_string();
@@ -172,15 +168,15 @@ impl View {
 
     /// Takes a message of a page.
     pub(super) fn receive(&mut self, number: PageNumber, text: &str, now: Duration) -> Effect {
-        let acted = parse(text).and_then(|(request, id)| Ok((self.act(number, request, now)?, id)));
-        match acted {
-            Ok((effect, id)) => {
+        let (request, id) = parse(text);
+        match request.and_then(|request| Ok(self.act(number, request, now)?)) {
+            Ok(effect) => {
                 self.note(number, id);
                 effect
             }
             Err(Fault::Foreign) => Effect::Close,
             Err(Fault::Refused(reason)) => {
-                self.reply_error(number, &reason);
+                self.reply(number, &json!({"type": "error", "text": reason, "id": id}));
                 Effect::Nothing
             }
         }

@@ -190,9 +190,9 @@ fn a_scene_stays_lit() {
     let view = small_view(&room, &[]);
     let mut page = view.connect();
     let version = page.settle()["version"].clone();
-    page.send(&json!({"type": "set", "name": "lamp.emission", "value": 0}));
+    page.send(&json!({"type": "set", "name": "lamp.emission", "value": 0, "id": 7}));
     let error = page.wait_for("error");
-    assert!(error["text"].as_str().unwrap().contains("light"), "{error}");
+    assert!(error["text"].as_str().unwrap().contains("light") && error["id"] == 7, "{error}");
     page.send(&camera(0.5, false));
     assert_eq!(page.settle()["version"], version.as_u64().unwrap() + 1);
 }
