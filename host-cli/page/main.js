@@ -63,6 +63,7 @@ const view = {
         camera = next;
         isCameraOwn = true;
         toSend = { isMoving };
+        byId("camera").value = "";
         sending.soon();
         showCentre();
     },
@@ -254,8 +255,13 @@ on("layer", "change", ({ target }) => {
 on("side", "change", ({ target }) => { asked.side = target.value; fit(); });
 on("camera", "change", ({ target }) => {
     const chosen = scene.cameras[target.value];
-    if (target.value !== "" && chosen) view.move({ position: chosen.position, look_at: chosen.look_at, fov: chosen.fov }, false);
+    if (target.value === "" || !chosen) return;
+    const place = target.value;
+    view.move({ position: chosen.position, look_at: chosen.look_at, fov: chosen.fov }, false);
+    target.value = place;
 });
+// What is typed and is not possible gives way to what the camera has.
+on("fov", "change", ({ target }) => camera && (target.value = shortest(camera.fov)));
 on("fov", "input", ({ target }) => target.validity.valid && target.value !== "" && camera &&
     view.move({ ...camera, fov: Number(target.value) }, false));
 on("reset", "click", () => {
