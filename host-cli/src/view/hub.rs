@@ -184,5 +184,5 @@ fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMappin
     let form = Form { layers, sample_type: SampleFormat::Float, tone, part: None };
     let picture = PictureOutput { path: path.to_owned(), format };
     let film = &settled.rendering.film;
-    write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.to_string())
+    write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.line())
 }

@@ -358,6 +358,22 @@ fn a_card_that_dies_and_comes_back_is_shown_and_used() {
 }
 
 #[test]
+fn why_a_picture_is_not_saved_is_told_in_plain_text() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("out")).unwrap();
+    let view = small_view(&room, &["--out", "out"]);
+    let mut page = view.connect();
+    page.settle();
+    std::fs::remove_dir(room.path("out")).unwrap();
+    for name in ["a.exr", "a.png"] {
+        page.send(&json!({"type": "save", "name": name}));
+        let error = page.wait_for("error");
+        let text = error["text"].as_str().unwrap();
+        assert!(text.starts_with("cannot write") && text.contains(name) && !text.contains('\n'), "{text}");
+    }
+}
+
+#[test]
 fn what_a_view_cannot_be_is_said_at_once() {
     let room = Room::new();
     let view = small_view(&room, &[]);
