@@ -131,6 +131,11 @@ fn setting(fields: &Fields) -> Result<Setting, String> {
     })
 }
 
+/// Returns whether a view shows pictures of a size.
+pub(super) fn is_size_of_view(width: u64, height: u64) -> bool {
+    [width, height].iter().all(|side| (1..=MAX_SIDE).contains(side)) && width * height <= MAX_PIXELS
+}
+
 /// Fields of a message.
 struct Fields<'a>(&'a Map<String, Value>);
 
@@ -199,10 +204,9 @@ impl Fields<'_> {
 
     fn size(&self) -> Result<[u32; 2], String> {
         let list = self.field("size")?.as_array().filter(|list| list.len() == 2);
-        let number = |value: &Value| value.as_u64().filter(|side| (1..=MAX_SIDE).contains(side));
-        let sides: Option<Vec<u64>> = list.and_then(|list| list.iter().map(number).collect());
+        let sides: Option<Vec<u64>> = list.and_then(|list| list.iter().map(Value::as_u64).collect());
         match sides.as_deref() {
-            Some(&[width, height]) if width * height <= MAX_PIXELS => Ok([width as u32, height as u32]),
+            Some(&[width, height]) if is_size_of_view(width, height) => Ok([width as u32, height as u32]),
             _ => Err(format!(
                 "a size is a list of two whole numbers from 1 to {MAX_SIDE}, {MAX_PIXELS} pixels in all"
             )),

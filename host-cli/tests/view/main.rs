@@ -381,6 +381,8 @@ fn what_a_view_cannot_be_is_said_at_once() {
         (&["--listen", view.host.as_str()][..], "--listen 127.0.0.1:0"),
         (&["--listen", "127.0.0.1"], "--listen"),
         (&["--listen", "127.0.0.1:0", "--crop", "0,1,0,1"], "--crop"),
+        (&["--listen", "127.0.0.1:0", "--size", "5000x5000"], "4194304"),
+        (&["--listen", "127.0.0.1:0", "--size", "5000x1"], "4096"),
         (&["--listen", "127.0.0.1:0", "--trace", "trace.gz"], "--trace"),
         (&["--listen", "127.0.0.1:0", "--out", "absent"], "absent"),
         (&["--listen", "127.0.0.1:0", "--set", "flor.alpha=1"], "'floor'"),
