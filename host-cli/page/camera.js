@@ -11,6 +11,10 @@ const clamped = (value, low, high) => Math.min(Math.max(value, low), high);
 
 // Elevation that a turn does not pass: at 90 degrees the top of the picture would jump.
 const STEEPEST = 89.5 * Math.PI / 180;
+// Greatest coordinate of a camera, metres: a move beyond it is none.
+const FARTHEST = 1e9;
+// Shortest view from a camera to what it looks at, as a share of its greatest coordinate: single precision tells its direction.
+const SHORTEST = 1e-3;
 // Sine of the angle to the vertical below which a direction counts as vertical, as in the renderer.
 const VERTICAL = 1e-6;
 
@@ -29,8 +33,13 @@ function rotated(vector, axis, angle) {
     return add(add(scaled(vector, cosine), scaled(cross(axis, vector), sine)), along);
 }
 
-const moved = (camera, shift) =>
-    ({ ...camera, position: add(camera.position, shift), look_at: add(camera.look_at, shift) });
+const greatest = (...points) => Math.max(...points.flat().map(Math.abs));
+
+// The camera after a shift, which it keeps from where no number would tell its place.
+function moved(camera, shift) {
+    const there = { ...camera, position: add(camera.position, shift), look_at: add(camera.look_at, shift) };
+    return greatest(there.position, there.look_at) <= FARTHEST ? there : camera;
+}
 
 // Turn about a point: `yaw` about the vertical, `pitch` about the picture's right, radians. About the camera's own position it
 // looks around; about another point, that point stays where it is in the picture.
@@ -82,9 +91,14 @@ export function middle(camera, { low, high }) {
     return add(camera.position, scaled(axes(camera).forward, ahead));
 }
 
-// The camera in single precision, as the renderer has it.
-export const rounded = ({ position, look_at, fov }) =>
-    ({ position: position.map(Math.fround), look_at: look_at.map(Math.fround), fov: Math.fround(fov) });
+// The camera in single precision, as the renderer has it. From far away it looks at a place farther along its view.
+export function rounded(camera) {
+    const { position, look_at, fov } = camera;
+    const least = SHORTEST * greatest(position);
+    const isNear = length(sub(look_at, position)) < least;
+    const place = isNear ? add(position, scaled(axes(camera).forward, least)) : look_at;
+    return { position: position.map(Math.fround), look_at: place.map(Math.fround), fov: Math.fround(fov) };
+}
 
 // The shortest decimal of a number in single precision.
 export function shortest(value) {
@@ -97,7 +111,8 @@ export function shortest(value) {
 }
 
 // Options of the command line that place a camera.
-export function pose({ position, look_at, fov }) {
+export function pose(camera) {
+    const { position, look_at, fov } = rounded(camera);
     const place = point => point.map(shortest).join(",");
     return `--camera-at ${place(position)} --look-at ${place(look_at)} --fov ${shortest(fov)}`;
 }

@@ -24,7 +24,7 @@ const times = new Times();
 // State of the command as last received, and the requests of this page.
 let scene = null, state = null, isOpen = false, steers = false;
 let camera = null, isCameraOwn = false, toSend = null;
-const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cursor: undefined, edits: new Map() };
+const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cameraId: 0, cursor: undefined, edits: new Map() };
 // Pixel under the pointer; null for none.
 let pointed = null;
 
@@ -44,7 +44,7 @@ function show() {
 const send = (what, message) => {
     const id = connection.send(message);
     if (what) times.sent(id, what);
-    return id !== 0;
+    return id;
 };
 
 const panel = new Panel(
@@ -63,6 +63,7 @@ const view = {
         camera = next;
         isCameraOwn = true;
         toSend = { isMoving };
+        byId("camera").value = "";
         sending.soon();
         showCentre();
     },
@@ -82,8 +83,9 @@ function take(message) {
         saved: ({ path }) => byId("saved").textContent = `saved ${path}`,
         picked: ({ point }) => { controls.centre = point; showCentre(); },
         steers: ({ value }) => setSteers(value),
-        error({ text }) {
+        error({ text, id }) {
             tell(text);
+            if (id && id === asked.cameraId) followCamera();
             if (state) panel.update(state, true);
         },
     }[message.type];
@@ -148,6 +150,17 @@ function takeTile(buffer) {
     else drawing.later();
 }
 
+// Takes the command's camera in place of this page's own.
+function followCamera() {
+    isCameraOwn = false;
+    toSend = null;
+    asked.camera = "";
+    byId("camera").value = "";
+    if (!state) return;
+    camera = state.camera;
+    showCentre();
+}
+
 // Asks for the size that the window or the panel wants.
 function fit() {
     const box = byId("stage").getBoundingClientRect();
@@ -188,7 +201,7 @@ function sendMoves() {
     if (toSend && steers) {
         const view = rounded(camera), text = JSON.stringify(view);
         // A camera that comes to rest makes no new picture.
-        send(text === asked.camera ? "" : "camera", { type: "camera", ...view, moving: toSend.isMoving });
+        asked.cameraId = send(text === asked.camera ? "" : "camera", { type: "camera", ...view, moving: toSend.isMoving });
         asked.camera = text;
         toSend = null;
     }
@@ -242,11 +255,20 @@ on("layer", "change", ({ target }) => {
 on("side", "change", ({ target }) => { asked.side = target.value; fit(); });
 on("camera", "change", ({ target }) => {
     const chosen = scene.cameras[target.value];
-    if (target.value !== "" && chosen) view.move({ position: chosen.position, look_at: chosen.look_at, fov: chosen.fov }, false);
+    if (target.value === "" || !chosen) return;
+    const place = target.value;
+    view.move({ position: chosen.position, look_at: chosen.look_at, fov: chosen.fov }, false);
+    target.value = place;
 });
+// What is typed and is not possible gives way to what the camera has.
+on("fov", "change", ({ target }) => camera && (target.value = shortest(camera.fov)));
 on("fov", "input", ({ target }) => target.validity.valid && target.value !== "" && camera &&
     view.move({ ...camera, fov: Number(target.value) }, false));
-on("reset", "click", () => send("reset", { type: "reset" }));
+on("reset", "click", () => {
+    asked.edits.clear();
+    followCamera();
+    send("reset", { type: "reset" });
+});
 on("steer", "click", () => send("", { type: "steer" }));
 on("save-exr", "click", () => save("exr"));
 on("save-png", "click", () => save("png"));

@@ -6,6 +6,7 @@ const MESSAGE_TIME = 8000;
 
 const progress = {
     lost: () => "No connection: trying again. A command that was started anew prints another address.",
+    refused: state => `Refused: ${state.refused}`,
     settled: () => "Settled: this is the picture of the command below, to the last bit.",
     working: state => !state ? "Waiting for the first picture."
         : state.step > 1 ? `Coarse: every ${ORDINALS[state.step] ?? `${state.step}th`} pixel.`
@@ -13,7 +14,7 @@ const progress = {
 };
 
 export function showStatus(isOpen, state, more) {
-    const name = !isOpen ? "lost" : state?.settled ? "settled" : "working";
+    const name = !isOpen ? "lost" : state?.refused ? "refused" : state?.settled ? "settled" : "working";
     byId("status").dataset.state = name;
     setText("progress", progress[name](state));
     if (state) setText("command", state.command + more);

@@ -43,13 +43,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::render::{CardAddress, RenderSettings};
+use photoncard_driver::render::{CardAddress, Picture, RenderSettings};
 use photoncard_driver::scene::Scene;
 
 use self::describe::SceneFacts;
 use self::gate::Gate;
 use self::hub::Hub;
 use self::painter::Painter;
+use self::request::{MAX_PIXELS, MAX_SIDE, is_size_of_view};
 use self::saving::Folder;
 use self::state::{Start, View};
 use self::wish::{Sketch, Wish};
@@ -114,10 +115,23 @@ fn check(settings: &RenderSettings) -> Result<(), Failure> {
         ["--trace", "it is of one render, and a view has many"]
     } else {
         settings.check()?;
-        return Ok(());
+        return check_size(&settings.picture);
     };
     let report = MietteDiagnostic::new(format!("photoncard view has no {option}: {reason}"));
     Err(Failure::Input(Report::new(report.with_help("leave it out, or use photoncard render"))))
+}
+
+/// Checks that a view shows pictures of the size.
+fn check_size(&Picture { width, height, .. }: &Picture) -> Result<(), Failure> {
+    if is_size_of_view(width.into(), height.into()) {
+        return Ok(());
+    }
+    let report = MietteDiagnostic::new(format!(
+        "photoncard view has no --size {width}x{height}: a view shows up to {MAX_SIDE} pixels a side and {MAX_PIXELS} in all"
+    ));
+    Err(Failure::Input(Report::new(
+        report.with_help("give less, such as --size 1024x768, or use photoncard render"),
+    )))
 }
 
 /// Loads the scene, before its assignments.

@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use photoncard_driver::film::FilmPixel;
+use photoncard_driver::layer::{Layer, Layers};
 use photoncard_driver::sink::FinishedTile;
 use photoncard_shared::counters::Counters;
 
@@ -14,7 +15,17 @@ use photoncard_shared::counters::Counters;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     Radiance,
-    Layer(photoncard_driver::layer::Layer),
+    Layer(Layer),
+}
+
+impl Shown {
+    /// Returns whether chips render it in pictures with layers alone.
+    pub(super) fn is_of_chip(self) -> bool {
+        match self {
+            Self::Radiance => false,
+            Self::Layer(layer) => layer.name().parse::<Layers>().is_ok_and(|layers| layers.are_of_chip()),
+        }
+    }
 }
 
 /// Origin of tiles.

@@ -145,7 +145,7 @@ impl Hub {
         drop(self.folder.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Waits for the next message to a page, at most for `longest`.
+    /// Waits for the next message to a page, at most for `longest`, and no longer than the page is there.
     pub(super) fn next_message(
         &self,
         page: PageNumber,
@@ -158,7 +158,7 @@ impl Hub {
                 return Some(message);
             }
             let left = longest.saturating_sub(begin.elapsed());
-            if left.is_zero() || self.is_over() {
+            if left.is_zero() || self.is_over() || !view.has(page) {
                 return None;
             }
             view = self.changed.wait_timeout(view, left).unwrap_or_else(PoisonError::into_inner).0;
@@ -184,5 +184,5 @@ fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMappin
     let form = Form { layers, sample_type: SampleFormat::Float, tone, part: None };
     let picture = PictureOutput { path: path.to_owned(), format };
     let film = &settled.rendering.film;
-    write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.to_string())
+    write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.line())
 }

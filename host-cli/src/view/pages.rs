@@ -72,6 +72,11 @@ impl Page {
         (self.shown, self.next) = (shown, 0);
     }
 
+    /// Returns whether the page shows a layer that only pictures with layers of chips have.
+    pub(super) fn shows_layer_of_chip(&self) -> bool {
+        self.shown.is_of_chip()
+    }
+
     /// Takes the acknowledgement of all bytes of tiles so far.
     pub(super) fn acknowledge(&mut self, bytes: u64) {
         // A page cannot have received what was not sent.

@@ -150,10 +150,7 @@ impl<'a> Painter<'a> {
         self.hub.change(|view, now| {
             let outcome = match error {
                 RenderError::Stopped => Outcome::Stopped,
-                error if error.is_input() => {
-                    view.tell_error(&with_remedy(error));
-                    Outcome::Refused
-                }
+                error if error.is_input() => return view.refuse(task, &with_remedy(error), now),
                 RenderError::Card { card, source } => {
                     view.lose_card(card, source.to_string(), now);
                     view.tell_error(&format!("no card is left: {error}; the view goes on when one returns"));

@@ -72,10 +72,28 @@ impl View {
             self.cost.add(statistics);
         }
         self.refinement.finish(outcome, now);
+        if outcome == Outcome::Done && task.work.pass == Pass::Full {
+            self.settled = Some(task.wish.clone());
+        }
         if outcome == Outcome::Done {
             self.keep(task.origin);
         }
         self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
+    }
+
+    /// Takes the end of work that is not possible. The newest wish goes back to the settings of the picture that settled last, if these are
+    /// others.
+    pub(super) fn refuse(&mut self, task: &Task, reason: &str, now: Duration) {
+        self.tell_error(reason);
+        self.finish(task, Outcome::Refused, None, now);
+        if task.work.version != self.version() {
+            return;
+        }
+        let before = self.settled.as_ref().map(|settled| self.wish.by_settings_of(settled));
+        let is_possible = before.is_some_and(|wish| wish != self.wish && self.wish_for(wish).is_ok());
+        if !is_possible {
+            self.refused = Some(reason.to_owned());
+        }
     }
 
     /// Takes a complete pass of fewer samples than the picture's.

@@ -81,11 +81,10 @@ impl From<String> for Fault {
     }
 }
 
-/// Reads a message, and its number if it has one.
-pub(super) fn parse(text: &str) -> Result<(Request, Option<u64>), Fault> {
-    let Ok(Value::Object(message)) = serde_json::from_str(text) else { return Err(Fault::Foreign) };
-    let number = message.get("id").and_then(Value::as_u64);
-    Ok((request(&Fields(&message))?, number))
+/// Reads a message, and its number if it has one; both stay apart, as a refused message has a number too.
+pub(super) fn parse(text: &str) -> (Result<Request, Fault>, Option<u64>) {
+    let Ok(Value::Object(message)) = serde_json::from_str(text) else { return (Err(Fault::Foreign), None) };
+    (request(&Fields(&message)), message.get("id").and_then(Value::as_u64))
 }
 
 fn request(fields: &Fields) -> Result<Request, Fault> {
@@ -130,6 +129,11 @@ fn setting(fields: &Fields) -> Result<Setting, String> {
         "sampling" => Setting::Sampling(Choice::of_name(&fields.text("value")?)?),
         _ => return Err(format!("there is no setting {name:?}")),
     })
+}
+
+/// Returns whether a view shows pictures of a size.
+pub(super) fn is_size_of_view(width: u64, height: u64) -> bool {
+    [width, height].iter().all(|side| (1..=MAX_SIDE).contains(side)) && width * height <= MAX_PIXELS
 }
 
 /// Fields of a message.
@@ -200,10 +204,9 @@ impl Fields<'_> {
 
     fn size(&self) -> Result<[u32; 2], String> {
         let list = self.field("size")?.as_array().filter(|list| list.len() == 2);
-        let number = |value: &Value| value.as_u64().filter(|side| (1..=MAX_SIDE).contains(side));
-        let sides: Option<Vec<u64>> = list.and_then(|list| list.iter().map(number).collect());
+        let sides: Option<Vec<u64>> = list.and_then(|list| list.iter().map(Value::as_u64).collect());
         match sides.as_deref() {
-            Some(&[width, height]) if width * height <= MAX_PIXELS => Ok([width as u32, height as u32]),
+            Some(&[width, height]) if is_size_of_view(width, height) => Ok([width as u32, height as u32]),
             _ => Err(format!(
                 "a size is a list of two whole numbers from 1 to {MAX_SIDE}, {MAX_PIXELS} pixels in all"
             )),
@@ -238,7 +241,7 @@ mod tests {
             (r#"{"type":"pick","at":[3,4]}"#, Request::Pick([3, 4])),
             (r#"{"type":"shown","version":3,"bytes":77}"#, Request::Shown(77)),
         ] {
-            assert_eq!(parse(text), Ok((request, None)), "{text}");
+            assert_eq!(parse(text), (Ok(request), None), "{text}");
         }
     }
 
@@ -246,7 +249,7 @@ mod tests {
     fn a_picture_is_saved_as_it_is_shown() {
         let saved = |exposure, curve| {
             let tone = ToneMapping { exposure, curve };
-            Ok((Request::Save(Saving { name: "a.png".into(), tone }), Some(7)))
+            (Ok(Request::Save(Saving { name: "a.png".into(), tone })), Some(7))
         };
         for (more, saving) in [
             ("", saved(None, ToneCurve::Reinhard)),
@@ -260,7 +263,7 @@ mod tests {
     #[test]
     fn what_is_no_message_is_foreign() {
         for text in ["", "hello", "[1]", "3", "null", "{", &"[".repeat(10_000)] {
-            assert_eq!(parse(text), Err(Fault::Foreign), "{text:.20}");
+            assert_eq!(parse(text), (Err(Fault::Foreign), None), "{text:.20}");
         }
     }
 
@@ -297,7 +300,7 @@ mod tests {
             (r#"{"type":"save","name":"a.png","exposure":1e9}"#.into(), "exposure"),
             (r#"{"type":"save","name":"a.png","tonemap":"best"}"#.into(), "best"),
         ] {
-            match parse(&text) {
+            match parse(&text).0 {
                 Err(Fault::Refused(reason)) => assert!(reason.contains(said), "{text}: {reason}"),
                 other => panic!("{text}: {other:?}"),
             }

@@ -1,8 +1,9 @@
 //! Pictures that pages save: plain names in one folder, and never in place of a file that the view has not written.
 
-use std::collections::BTreeSet;
-use std::fs;
+use std::collections::BTreeMap;
+use std::fs::{self, Metadata};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use crate::arguments::PictureFormat;
 
@@ -14,8 +15,34 @@ const DEVICES: [&str; 6] = ["aux", "con", "nul", "prn", "conin$", "conout$"];
 /// The folder of saved pictures.
 pub(super) struct Folder {
     path: PathBuf,
-    /// Names of pictures that were saved, in lower case.
-    saved: BTreeSet<String>,
+    /// Pictures that were saved, by their names.
+    saved: BTreeMap<String, Identity>,
+}
+
+/// Identity of a file with its content: a file that takes its place has another one, and so has one that others have written to.
+#[derive(PartialEq)]
+struct Identity {
+    length: u64,
+    modified: Option<SystemTime>,
+    /// Device and number of the file, where file systems have them.
+    number: Option<[u64; 2]>,
+}
+
+impl Identity {
+    fn new(found: &Metadata) -> Self {
+        Self { length: found.len(), modified: found.modified().ok(), number: number(found) }
+    }
+}
+
+#[cfg(unix)]
+fn number(found: &Metadata) -> Option<[u64; 2]> {
+    use std::os::unix::fs::MetadataExt;
+    Some([found.dev(), found.ino()])
+}
+
+#[cfg(not(unix))]
+fn number(_: &Metadata) -> Option<[u64; 2]> {
+    None
 }
 
 impl Folder {
@@ -25,7 +52,7 @@ impl Folder {
         if !path.is_dir() {
             return Err(std::io::Error::new(std::io::ErrorKind::NotADirectory, "it is no folder"));
         }
-        Ok(Self { path, saved: BTreeSet::new() })
+        Ok(Self { path, saved: BTreeMap::new() })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -43,15 +70,14 @@ impl Folder {
     ) -> Result<PathBuf, String> {
         let format = format_of(name)?;
         let path = self.path.join(name);
-        let is_own = self.saved.contains(&name.to_ascii_lowercase());
-        match fs::symlink_metadata(&path) {
-            Ok(found) if !found.is_file() || !is_own => {
-                return Err(format!("{name} is there already, and not of this view: choose another name"));
-            }
-            _ => {}
+        if let Ok(found) = fs::symlink_metadata(&path)
+            && !(found.is_file() && self.saved.get(name) == Some(&Identity::new(&found)))
+        {
+            return Err(format!("{name} is there already, and not of this view: choose another name"));
         }
         write(&path, format)?;
-        self.saved.insert(name.to_ascii_lowercase());
+        let written = fs::symlink_metadata(&path).map_err(|error| format!("{name} is gone: {error}"))?;
+        self.saved.insert(name.to_owned(), Identity::new(&written));
         Ok(path)
     }
 }
@@ -140,6 +166,32 @@ mod tests {
         }
         assert_eq!(fs::read(room.path().join("own.exr")).unwrap(), b"mine");
         assert!(!room.path().join("elsewhere").exists());
+    }
+
+    /// On file systems whose names have no case, both names are one.
+    #[test]
+    fn a_file_whose_name_differs_in_case_stays() {
+        let room = tempfile::tempdir().unwrap();
+        let mut folder = Folder::new(room.path()).unwrap();
+        fs::write(room.path().join("A.EXR"), b"mine").unwrap();
+        let _ = folder.save("a.exr", write);
+        assert!(folder.save("A.EXR", write).is_err());
+        assert_eq!(fs::read(room.path().join("A.EXR")).unwrap(), b"mine");
+    }
+
+    #[test]
+    fn a_file_in_place_of_a_saved_picture_stays() {
+        let room = tempfile::tempdir().unwrap();
+        let mut folder = Folder::new(room.path()).unwrap();
+        let path = room.path().join("a.exr");
+        for content in [b"a longer one".as_slice(), b"other"] {
+            folder.save("a.exr", write).unwrap();
+            fs::remove_file(&path).unwrap();
+            fs::write(&path, content).unwrap();
+            assert!(folder.save("a.exr", write).is_err());
+            assert_eq!(fs::read(&path).unwrap(), content);
+            fs::remove_file(&path).unwrap();
+        }
     }
 
     #[test]

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use glam::Vec3;
-use photoncard_driver::layer::Layers;
 use photoncard_driver::quality::{Quality, Stated};
 use photoncard_driver::render::{RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
@@ -65,6 +64,10 @@ pub(super) struct View {
     /// Materials and lights of the first wish, to which `reset` returns.
     first: Scene,
     pub(super) refinement: Refinement,
+    /// Wish of the picture that settled last.
+    pub(super) settled: Option<Wish>,
+    /// Reason for which the newest wish is not rendered.
+    pub(super) refused: Option<String>,
     pub(super) canvas: Canvas,
     /// Pass of the newest wish that was finished last.
     pub(super) done: Option<Origin>,
@@ -89,6 +92,7 @@ impl View {
     /// If the first wish is not possible.
     pub(super) fn new(start: Start) -> Result<Self, RenderError> {
         let wish = start.wish.clone();
+        wish.check_cards()?;
         let is_fitted = start.stated == Stated::ALL || start.quality == Quality::Paper;
         Ok(Self {
             first: start.sketch.with(&wish)?,
@@ -97,6 +101,8 @@ impl View {
             wish,
             start,
             refinement: Refinement::new(is_fitted),
+            settled: None,
+            refused: None,
             canvas: Canvas::default(),
             done: None,
             cost: Cost::default(),
@@ -124,6 +130,11 @@ impl View {
         number
     }
 
+    /// Returns whether a page is there.
+    pub(super) fn has(&self, number: PageNumber) -> bool {
+        self.pages.contains_key(&number)
+    }
+
     /// Lets a page go. If it steered, the one that has been there for the longest time does.
     pub(super) fn disconnect(&mut self, number: PageNumber) {
         self.pages.remove(&number);
@@ -149,10 +160,6 @@ impl View {
         }
     }
 
-    fn reply_error(&mut self, number: PageNumber, text: &str) {
-        self.reply(number, &json!({"type": "error", "text": text}));
-    }
-
     /// Tells all pages of an error.
     pub(super) fn tell_error(&mut self, text: &str) {
         let message = json!({"type": "error", "text": text}).to_string();
@@ -161,15 +168,15 @@ impl View {
 
     /// Takes a message of a page.
     pub(super) fn receive(&mut self, number: PageNumber, text: &str, now: Duration) -> Effect {
-        let acted = parse(text).and_then(|(request, id)| Ok((self.act(number, request, now)?, id)));
-        match acted {
-            Ok((effect, id)) => {
+        let (request, id) = parse(text);
+        match request.and_then(|request| Ok(self.act(number, request, now)?)) {
+            Ok(effect) => {
                 self.note(number, id);
                 effect
             }
             Err(Fault::Foreign) => Effect::Close,
             Err(Fault::Refused(reason)) => {
-                self.reply_error(number, &reason);
+                self.reply(number, &json!({"type": "error", "text": reason, "id": id}));
                 Effect::Nothing
             }
         }
@@ -215,7 +222,10 @@ impl View {
                 moves = Some(is_moving);
             }
             Request::Set { name, value } => wish.set(name, value),
-            Request::Setting(setting) => wish.change(setting),
+            Request::Setting(setting) => {
+                wish.change(setting);
+                wish.check_cards().map_err(|error| with_remedy(&error))?;
+            }
             Request::Size([width, height]) => {
                 (wish.settings.picture.width, wish.settings.picture.height) = (width, height);
             }
@@ -223,6 +233,9 @@ impl View {
                 let picture = &self.wish.settings.picture;
                 wish = self.start.wish.clone();
                 (wish.settings.picture.width, wish.settings.picture.height) = (picture.width, picture.height);
+                if self.pages.values().any(Page::shows_layer_of_chip) {
+                    wish.add_layers();
+                }
             }
             Request::Cursor(at) => {
                 self.cursor = at;
@@ -238,7 +251,7 @@ impl View {
     }
 
     /// Takes a new wish, if it is one.
-    fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
+    pub(super) fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
         if wish == self.wish {
             // The page is told that its message was heard.
             self.revisions.state += 1;
@@ -251,6 +264,7 @@ impl View {
             self.of_size = self.refinement.version();
         }
         self.wish = wish;
+        self.refused = None;
         self.begin_picture();
         Ok(())
     }
@@ -278,16 +292,12 @@ impl View {
 
     /// Shows a page another layer; the chips' own take a picture with layers.
     fn show(&mut self, number: PageNumber, shown: Shown) -> Result<(), String> {
-        let is_of_chip = match shown {
-            Shown::Radiance => false,
-            Shown::Layer(layer) => layer.name().parse::<Layers>().is_ok_and(|layers| layers.are_of_chip()),
-        };
         let mut wish = self.wish.clone();
-        if is_of_chip && wish.add_layers() {
+        if shown.is_of_chip() && wish.add_layers() {
             if self.steering != Some(number) {
                 return Err("this layer is not rendered, and another page steers: take over first".into());
             }
-            self.wish_for(wish).map_err(|error| with_remedy(&error))?;
+            wish.check_cards().and_then(|()| self.wish_for(wish)).map_err(|error| with_remedy(&error))?;
         }
         self.of_page(number, |page| page.show(shown));
         self.revisions.state += 1;
@@ -368,6 +378,7 @@ impl View {
             "samples": done.samples,
             "spp": settings.integrator.samples,
             "settled": has_all && self.refinement.is_settled(),
+            "refused": self.refused,
             "version": self.refinement.version(),
             "id": self.message,
             "command": command_line::quoted(&self.command()),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use photoncard_driver::layer::Layers;
 use photoncard_driver::quality::{Fit, Stated};
-use photoncard_driver::render::{RenderError, RenderSettings};
+use photoncard_driver::render::{CardAddress, RenderError, RenderSettings};
 use photoncard_driver::scene::{Environment, Scene};
 
 use super::request::Setting;
@@ -75,6 +75,24 @@ impl Wish {
         if integrator.gather_rays == 0 {
             integrator.irradiance_error = None;
         }
+    }
+
+    /// Checks the settings against what emulated cards can hold; what others can is not known before they are greeted.
+    ///
+    /// # Errors
+    /// The first setting that is not possible on a card.
+    pub(super) fn check_cards(&self) -> Result<(), RenderError> {
+        self.settings.cards.addresses.iter().try_for_each(|address| match address {
+            CardAddress::Emulated { kind, .. } => self.settings.check_budget(&kind.budget()),
+            CardAddress::Remote(_) => Ok(()),
+        })
+    }
+
+    /// This wish by the settings of another one: camera, size, layers and changes of the scene stay.
+    pub(super) fn by_settings_of(&self, other: &Self) -> Self {
+        let picture = self.settings.picture.clone();
+        let settings = RenderSettings { picture, ..other.settings.clone() };
+        Self { settings, stated: other.stated.clone(), ..self.clone() }
     }
 
     /// Asks for all layers that chips can render. Returns whether they were not.

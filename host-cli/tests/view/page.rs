@@ -160,6 +160,12 @@ impl Page {
         self.wait("state", |state| state["settled"] == true && Some(&state["version"]) != before.as_ref())
     }
 
+    /// Closes the connection.
+    pub(crate) fn leave(mut self) {
+        self.socket.close(None).unwrap();
+        self.wait_for_end();
+    }
+
     /// Waits until the view closes the connection.
     pub(crate) fn wait_for_end(&mut self) {
         let begin = Instant::now();

@@ -204,6 +204,42 @@ fn two_pages_look_and_one_steers() {
     first.wait(&format!("{camera} !== '{}'", after.as_str().unwrap()), LIMIT);
 }
 
+/// What a page has moved goes back with everything else, and the next move begins there.
+#[test]
+fn undoing_all_changes_takes_the_camera_back() {
+    let Some(mut browser) = Browser::start() else { return };
+    let room = Room::new();
+    let view = View::start(&room, &shipped("cornell.gltf"), &SMALL);
+    let mut tab = opened(&mut browser, &view);
+    let [own, known] =
+        ["view", "state"].map(|part| format!("JSON.stringify(photoncard.{part}.camera.position)"));
+    let start = tab.value(&known);
+    let start = start.as_str().unwrap();
+
+    // A place that the camera has left can be chosen again.
+    tab.choose("camera", "0");
+    assert_eq!(tab.value("document.getElementById('camera').value"), "0");
+    tab.drag("left", [0.5, 0.5], [60.0, 20.0]);
+    tab.wait(&format!("{known} !== '{start}' && {SETTLED}"), LIMIT);
+    assert_eq!(tab.value("document.getElementById('camera').value"), "");
+
+    tab.choose("layer", "direct");
+    tab.wait(&format!("photoncard.state.settings.layers !== 'albedo,N,Z' && {SETTLED}"), LIMIT);
+    tab.value("document.getElementById('reset').click()");
+    tab.wait(&format!("{known} === '{start}' && {SETTLED}"), LIMIT);
+    assert_eq!(tab.value(&own), start);
+    assert_eq!(tab.value("photoncard.picture.data.some((value, part) => part % 4 < 3 && value > 0)"), true);
+
+    // What the command does not take leaves the page at what it has.
+    tab.value("photoncard.view.move({ position: [0, 0, 1e16], look_at: [0, 0, 0], fov: 40 }, false)");
+    tab.wait(&format!("{own} === '{start}'"), LIMIT);
+    let fov = "document.getElementById('fov').value";
+    let before = tab.value(fov);
+    tab.choose("fov", "200");
+    assert_eq!(tab.value(fov), before);
+    assert_eq!(tab.faults, [""; 0]);
+}
+
 /// Even if the page knows the token.
 #[test]
 fn a_page_of_another_origin_is_refused() {

@@ -38,6 +38,19 @@
         const text = camera.shortest(value);
         check(Math.fround(text) === value, `${value} is printed as ${text}`);
     }
+    // However far a camera is moved, the command can have it, and it sees what it saw.
+    const start = { position: [0, 1, 4], look_at: [0.5, 1, 1], fov: 40 };
+    const rest = camera.axes(start).forward;
+    for (const [how, move] of [
+        ["dolly", view => camera.dollied(view, [0, 1, 0], 2.7)], ["pan", view => camera.panned(view, [90, 90], 200, 1e8)],
+        ["flight", view => camera.flown(view, [1e7, 0, -1e7])], ["no number", view => camera.flown(view, [NaN, 0, 0])],
+    ]) {
+        let view = start;
+        for (let round = 0; round < 300; round++) view = move(view);
+        const sent = camera.rounded(view);
+        check([sent.position, sent.look_at].flat().every(value => Math.abs(value) <= 1e9 * 1.01), `a ${how} ends: ${sent.position}`);
+        check(near(camera.axes(sent).forward, rest, 1e-3), `a ${how} keeps the direction: ${camera.axes(sent).forward}`);
+    }
     check(camera.shortest(0.1) === "0.1" && camera.shortest(-2) === "-2", "short numbers stay short");
     check(camera.projected({ position: [0, 0, 0], look_at: [0, 0, -1], fov: 40 }, [0, 0, 1], [9, 9]) === null, "nothing is behind");
 

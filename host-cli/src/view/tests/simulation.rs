@@ -126,6 +126,18 @@ fn a_slow_page_gets_fewer_and_newer_tiles() {
     assert!(10 * slow < quick, "{slow} of {quick} bytes");
 }
 
+#[test]
+fn a_reset_leaves_pages_the_layers_that_they_show() {
+    let mut world = World::new();
+    world.connect();
+    for (layer, is_of_chip) in [("direct", true), ("N", false)] {
+        world.send(0, &json!({"type": "layer", "name": layer}));
+        world.send(0, &json!({"type": "reset"}));
+        world.settle();
+        assert_eq!(world.view.wish().settings.picture.layers.are_of_chip(), is_of_chip, "{layer}");
+    }
+}
+
 /// Tiles wait for acknowledgement beyond some megabytes.
 #[test]
 fn a_page_that_acknowledges_nothing_is_not_flooded() {
@@ -141,4 +153,41 @@ fn a_page_that_acknowledges_nothing_is_not_flooded() {
     world.acknowledge(0);
     world.settle();
     world.check_pictures();
+}
+
+/// What a card on a link can hold is known when it refuses. Camera and edits stay.
+#[test]
+fn settings_that_a_card_refuses_give_way_to_those_of_the_last_settled_picture() {
+    let mut world = World::new();
+    world.connect();
+    world.settle();
+    let rays = world.view.wish().settings.integrator.gather_rays;
+    world.max_rays = rays;
+    world.send(0, &json!({"type": "set", "name": "lamp.emission", "value": 2}));
+    world.send(0, &json!({"type": "setting", "name": "gather_rays", "value": rays + 1}));
+    world.settle();
+    world.check_pictures();
+    assert_eq!(world.view.wish().settings.integrator.gather_rays, rays);
+    assert_eq!(world.view.wish().assignments(), ["lamp.emission=2"]);
+    let page = &world.pages[&0];
+    assert_eq!((page.errors, &page.state.as_ref().unwrap()["refused"]), (1, &Value::Null));
+}
+
+#[test]
+fn a_view_without_possible_settings_says_so_until_it_has_some() {
+    let mut world = World::new();
+    world.connect();
+    world.max_rays = 0;
+    let refused = |world: &mut World| {
+        (0..200).for_each(|_| world.paint());
+        while world.read(0) {}
+        world.pages[&0].state.as_ref().unwrap()["refused"].clone()
+    };
+    assert_eq!(refused(&mut world), "too many rays");
+    world.send(0, &json!({"type": "set", "name": "lamp.emission", "value": 2}));
+    assert_eq!(refused(&mut world), "too many rays");
+    world.send(0, &json!({"type": "setting", "name": "gather_rays", "value": 0}));
+    world.settle();
+    world.check_pictures();
+    assert_eq!(refused(&mut world), Value::Null);
 }

@@ -48,6 +48,8 @@ pub(super) struct World {
     pub(super) pages: BTreeMap<PageNumber, ModelPage>,
     pub(super) now: Duration,
     pub(super) has_card: bool,
+    /// Gather rays that the card can hold.
+    pub(super) max_rays: u32,
     job: Option<Job>,
     /// Wish whose photons the card has.
     prepared: Option<Wish>,
@@ -104,7 +106,16 @@ impl World {
         };
         let view = View::new(start).unwrap_or_else(|error| panic!("{error}"));
         let now = Duration::from_secs(1);
-        Self { view, pages: BTreeMap::new(), now, has_card: true, job: None, prepared: None, firsts: 0 }
+        Self {
+            view,
+            pages: BTreeMap::new(),
+            now,
+            has_card: true,
+            max_rays: u32::MAX,
+            job: None,
+            prepared: None,
+            firsts: 0,
+        }
     }
 
     pub(super) fn connect(&mut self) {
@@ -134,6 +145,10 @@ impl World {
         if !self.has_card {
             self.view.lose_card("card 0 (tcp:card:7000)", "gone".into(), self.now);
             return self.end(Outcome::NoCard);
+        }
+        if job.task.settings.integrator.gather_rays > self.max_rays {
+            let task = self.job.take().unwrap().task;
+            return self.view.refuse(&task, "too many rays", self.now);
         }
         if job.preparing > 0 {
             self.view.prepares(true, self.now);
