@@ -17,6 +17,7 @@
 
 mod error;
 mod file;
+mod head;
 pub(crate) mod records;
 mod samples;
 #[cfg(test)]
@@ -24,23 +25,19 @@ mod tests;
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use photoncard_shared::message::Tile;
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 pub use self::error::PartialError;
-use self::error::VERSION;
-use self::file::{FAMILY, Title, read_title};
+use self::head::{differences, read_head, title};
 use self::records::{HEAD_BYTES, read_tiles, record};
 use self::samples::{KeptSamples, Split};
 use crate::film::Film;
 use crate::sink::{FinishedTile, TileSink};
-
-/// Maximum size of the settings, bytes.
-const MAX_SETTINGS: u64 = 1 << 20;
 
 /// File of finished tiles, and whether a render continues from it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -119,7 +116,12 @@ impl PartialRender {
     fn resume(&self, mut file: &File, film: &mut Film) -> Result<Option<Film>, PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let mut reader = BufReader::new(file);
-        let Some(head) = self.read_head(&mut reader)? else { return Ok(None) };
+        let Some(head) = read_head(&mut reader, &self.path)? else { return Ok(None) };
+        let differences = differences(&head.settings, &self.settings);
+        if !differences.is_empty() {
+            return Err(PartialError::Differs { path: self.path.clone(), differences });
+        }
+        let head = head.bytes;
         let asked = film.format().samples;
         let mut found = KeptSamples::new(film);
         let sound = read_tiles(&mut reader, head, &mut found).map_err(|error| self.error(error))?;
@@ -137,28 +139,6 @@ impl PartialRender {
         kept.holds_tiles = kept.holds_earlier;
         kept.is_begun = true;
         Ok(base)
-    }
-
-    /// Checks title and settings. Returns their size in bytes; `None` if the file ends before they do.
-    fn read_head(&self, reader: &mut impl BufRead) -> Result<Option<u64>, PartialError> {
-        let foreign = || PartialError::Foreign { path: self.path.clone() };
-        match read_title(reader).map_err(|error| self.error(error))?.ok_or_else(foreign)? {
-            Title::CutOff => return Ok(None),
-            Title::Version(VERSION) => {}
-            Title::Version(found) => return Err(PartialError::Version { path: self.path.clone(), found }),
-        }
-        let mut settings = Vec::new();
-        let mut limited = reader.take(MAX_SETTINGS);
-        limited.read_until(b'\n', &mut settings).map_err(|error| self.error(error))?;
-        if !settings.ends_with(b"\n") && (settings.len() as u64) < MAX_SETTINGS {
-            return Ok(None);
-        }
-        let found: Value = serde_json::from_slice(&settings).map_err(|_| foreign())?;
-        let differences = differences(&found, &self.settings);
-        if !differences.is_empty() {
-            return Err(PartialError::Differs { path: self.path.clone(), differences });
-        }
-        Ok(Some((title().len() + settings.len()) as u64))
     }
 
     fn append(&self, kept: &mut KeptTiles, tile: &FinishedTile) -> Result<(), PartialError> {
@@ -257,21 +237,4 @@ impl TileSink for PartialRender {
             kept.failed.get_or_insert(error);
         }
     }
-}
-
-/// First line of the file.
-fn title() -> String {
-    format!("{FAMILY}{VERSION}\n")
-}
-
-/// Descriptions of the settings that differ.
-fn differences(found: &Value, asked: &Value) -> Vec<String> {
-    let empty = Map::new();
-    let [found, asked] = [found, asked].map(|value| value.as_object().unwrap_or(&empty));
-    let names = asked.keys().chain(found.keys().filter(|name| !asked.contains_key(*name)));
-    let differing = names.filter(|name| found.get(*name) != asked.get(*name));
-    let say = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
-    differing
-        .map(|name| format!("{name} was {} and is {}", say(found.get(name)), say(asked.get(name))))
-        .collect()
 }

@@ -50,7 +50,7 @@ pub(crate) use self::outputs::OutputOptions;
 pub(crate) use self::prepare::PrepareOptions;
 pub(crate) use self::prepared::OF_PREPARATION;
 pub(crate) use self::progress::ProgressForm;
-pub(crate) use self::render::RenderOptions;
+pub(crate) use self::render::{RenderOptions, Unfitted};
 pub(crate) use self::scene::SceneOptions;
 pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};
 pub(crate) use self::study_output::StudyOutput;

@@ -45,8 +45,9 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
         .in_form(options.progress, Phase::Tiles);
     let found = OnceLock::new();
     let choose = |packed: &PackedScene| {
-        let fit = options.fit(&scene, packed, &settings, &progress)?;
-        Ok(chosen(options, &settings, found.get_or_init(|| fit).as_ref(), &progress))
+        let unfitted = options.unfitted(&settings)?;
+        let fit = options.fit(&scene, packed, &unfitted, &progress)?;
+        Ok(chosen(options, unfitted, found.get_or_init(|| fit).as_ref(), &progress))
     };
     let result = on_threads(options.threads, || {
         let Some(aim) = options.samples.aim() else {

@@ -6,6 +6,7 @@ mod support;
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
+use serde_json::Value;
 use support::{Outcome, Room, shipped};
 
 /// Options without which a pilot would choose samples and rays.
@@ -70,6 +71,47 @@ fn kept_samples_are_added_to_and_the_picture_is_that_of_one_render() {
         assert!(outcome.stderr.contains(word), "{}", outcome.stderr);
     }
     assert!(room.read("a.exr.partial") == kept);
+}
+
+/// Options without anything that a pilot chooses.
+const CHOSEN: [&str; 4] = ["--quality", "draft", "--size", "16x12"];
+
+/// Renders the Cornell box with settings that a pilot chooses.
+fn chosen(room: &Room, picture: &str, options: &[&str]) -> Outcome {
+    room.run(&[&["render", &shipped("cornell.gltf"), "-o", picture][..], &CHOSEN, options].concat())
+}
+
+#[test]
+fn kept_samples_are_added_to_with_the_settings_that_were_chosen_for_them() {
+    let room = Room::new();
+    let first = chosen(&room, "a.exr", &["--spp", "3", "--keep-samples"]);
+    assert_eq!(first.status, Some(0), "{}", first.stderr);
+    let kept = room.read("a.exr.partial");
+    // What is stated and differs is refused, and alone it is named.
+    for (options, difference) in [
+        (["--planned-spp", "5"], "planned-spp was 3 and is 5"),
+        (["--shadow-rays", "15"], "shadow-rays was "),
+        (["--photons", "2345"], " and is 2345"),
+        (["--ic-error", "0.3"], " and is 0.3"),
+        (["--irradiance-cache", "off"], "ic-error was "),
+    ] {
+        let outcome = chosen(&room, "a.exr", &[&["--spp", "7", "--resume"], &options[..]].concat());
+        assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains(difference), "{}", outcome.stderr);
+        assert!(outcome.stderr.matches(" was ").count() <= 2, "{}", outcome.stderr);
+    }
+    assert!(room.read("a.exr.partial") == kept);
+    let more = chosen(&room, "a.exr", &["--spp", "7", "--resume", "--stats", "a.json"]);
+    assert_eq!(more.status, Some(0), "{}", more.stderr);
+    assert!(more.stderr.contains("kept samples: 7 samples a pixel"), "{}", more.stderr);
+    let statistics: Value = serde_json::from_slice(&room.read("a.json")).expect("JSON");
+    let pixels = &statistics["provenance"]["pixels"];
+    assert_eq!(pixels["planned-spp"], 3);
+    let names = ["spp", "planned-spp", "photons", "gather-rays", "shadow-rays", "ic-error"];
+    let stated = names.map(|name| format!("--{name}={}", pixels[name]));
+    let once = chosen(&room, "once.exr", &stated.each_ref().map(String::as_str));
+    assert_eq!(once.status, Some(0), "{}", once.stderr);
+    assert!(room.read("a.exr") == room.read("once.exr"), "{stated:?}");
 }
 
 #[test]

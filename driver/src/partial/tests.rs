@@ -5,7 +5,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{LayerSums, PIXEL_BYTES, PixelSums, Tile};
 use serde_json::json;
 
-use super::file::{check_lock, is_at};
+use super::file::{FAMILY, check_lock, is_at};
 use super::records::{CHECKSUM_BYTES, HEAD_BYTES, MAGIC};
 use super::*;
 use crate::film::{SumFormat, Window};
@@ -237,10 +237,15 @@ fn a_head_that_is_cut_off_holds_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = written(&folder);
     let head = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(1).unwrap().0;
+    let settings = partial(&folder, true);
     for length in [0, 1, FAMILY.len(), title().len() - 1, title().len(), title().len() + 1, head] {
+        fs::write(&settings.path, &bytes[..length]).unwrap();
+        assert_eq!(settings.kept().unwrap(), None, "{length}");
         assert!(taken_over(&folder, &bytes[..length]).is_empty(), "{length}");
     }
     assert_eq!(taken_over(&folder, &bytes), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(settings.kept().unwrap().map(Value::Object), Some(json!({ "seed": 1 })));
+    assert_eq!(partial(&folder, false).kept().unwrap(), None);
 }
 
 #[test]

@@ -24,9 +24,9 @@ pub(crate) struct IntegratorOptions {
     spp: Option<u32>,
     /// Samples per pixel of the finished picture, by which the irradiance cache divides the gather rays of a pixel [default: --spp]
     ///
-    /// A picture that --resume goes on with has the number of its first render.
+    /// With --resume this number, and photons and rays that are not stated, are those of the kept samples.
     #[arg(long, value_name = "SPP", allow_negative_numbers = true, hide_short_help = true)]
-    planned_spp: Option<u32>,
+    pub(super) planned_spp: Option<u32>,
     /// Sampling density of the directions of gather rays; it never changes the picture's expected value
     #[arg(long, default_value = Integrator::default().sampling.name(), value_parser = choice::<Sampling>(), hide_short_help = true)]
     pub(super) sampling: Sampling,

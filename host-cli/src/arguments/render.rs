@@ -3,6 +3,7 @@
 use clap::Args;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
+use photoncard_driver::partial::{PartialError, PartialSettings};
 use photoncard_driver::quality::{Fit, Quality, Stated};
 use photoncard_driver::render::{Observer, RenderError, RenderSettings, Schedule, TileOutputs};
 use photoncard_driver::scene::Scene;
@@ -59,13 +60,35 @@ pub(crate) struct RenderOptions {
     pub(crate) progress: ProgressForm,
 }
 
+/// Settings that a fit changes where they are not stated.
+pub(crate) struct Unfitted {
+    pub(crate) settings: RenderSettings,
+    /// Settings that are stated, or those of kept samples.
+    pub(crate) stated: Stated,
+    /// If there are kept samples.
+    pub(crate) are_kept: bool,
+}
+
 impl RenderOptions {
     /// Options that are stated, of those that a quality chooses for a scene.
     pub(crate) fn stated(&self) -> Stated {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
-    /// What the quality finds for a scene, unless all that it would choose is stated.
+    /// Settings that a fit begins with: those of kept samples in place of `settings` where the options state none, if the render goes on
+    /// from any.
+    ///
+    /// # Errors
+    /// If the file of kept samples cannot be read.
+    pub(crate) fn unfitted(&self, settings: &RenderSettings) -> Result<Unfitted, PartialError> {
+        let kept = settings.outputs.partial.as_ref().map(PartialSettings::kept).transpose()?.flatten();
+        let (mut settings, stated) = (settings.clone(), self.stated());
+        let Some(kept) = kept else { return Ok(Unfitted { settings, stated, are_kept: false }) };
+        settings.take_over(&kept, stated);
+        Ok(Unfitted { settings, stated: Stated { samples: stated.samples, ..Stated::ALL }, are_kept: true })
+    }
+
+    /// What the quality finds for a scene, unless all that it would choose is stated or kept.
     ///
     /// # Errors
     /// As [`Quality::fit`].
@@ -73,13 +96,13 @@ impl RenderOptions {
         &self,
         scene: &Scene,
         packed: &PackedScene,
-        settings: &RenderSettings,
+        unfitted: &Unfitted,
         observer: &dyn Observer,
     ) -> Result<Option<Fit>, RenderError> {
-        if self.stated() == Stated::ALL {
+        if unfitted.stated == Stated::ALL {
             return Ok(None);
         }
-        let fit = self.quality.fit(scene, packed, settings, observer)?;
+        let fit = self.quality.fit(scene, packed, &unfitted.settings, observer)?;
         let noise = self.samples.aim().and_then(|aim| aim.noise);
         Ok(fit.map(|fit| noise.map_or(fit, |noise| fit.for_noise(noise))))
     }

@@ -139,12 +139,13 @@ impl<'a> Sequence<'a> {
         };
         let found = std::cell::RefCell::new(None);
         let choose = |packed: &PackedScene| {
+            let unfitted = options.unfitted(settings)?;
             let fit = if *is_still {
-                options.fit(&rest, packed, settings, progress)
+                options.fit(&rest, packed, &unfitted, progress)
             } else {
-                options.fit(&rest, &PackedScene::new(&rest)?, settings, progress)
+                options.fit(&rest, &PackedScene::new(&rest)?, &unfitted, progress)
             }?;
-            let chosen = chosen(options, settings, fit.as_ref(), progress);
+            let chosen = chosen(options, unfitted, fit.as_ref(), progress);
             *found.borrow_mut() = Some((fit, chosen.clone()));
             Ok(chosen)
         };

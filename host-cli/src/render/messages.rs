@@ -54,17 +54,23 @@ pub(super) fn say_prepared(
     misfit.into_iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
 }
 
-/// Settings of a render, with those that its quality has found for the scene.
-pub(super) fn chosen(quality: Quality, settings: &RenderSettings) -> String {
+/// Origin of settings that a quality has found for a scene.
+pub(super) fn by_quality(quality: Quality) -> String {
+    format!("quality {}", quality.name())
+}
+
+/// Settings of a render that are found for a scene or kept; `are_planned` if passes decide the number of samples.
+pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     let RenderSettings { photons, integrator, .. } = settings;
     let (interpolated, of) = match integrator.irradiance_error {
         Some(error) => (format!("irradiance interpolated to within {error}"), "a pixel and a record"),
         None => ("no irradiance interpolated".to_owned(), "a sample"),
     };
+    let (planned, samples) =
+        if are_planned { ("planned for ", integrator.planned()) } else { ("", integrator.samples) };
     format!(
-        "quality {}: {} a pixel; {} a sample, {} {of}; {interpolated}; {} photons, {} a gather",
-        quality.name(),
-        counted(integrator.samples as usize, "sample"),
+        "{planned}{} a pixel; {} a sample, {} {of}; {interpolated}; {} photons, {} a gather",
+        counted(samples as usize, "sample"),
         counted(integrator.shadow_rays as usize, "shadow ray"),
         counted(integrator.gather_rays as usize, "gather ray"),
         photons.count,

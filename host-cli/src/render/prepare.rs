@@ -41,7 +41,8 @@ pub(crate) fn run(options: &PrepareOptions) -> Result<(), Failure> {
                 fit.apply(settings, stated);
             }
         });
-        let _ = said.set(messages::chosen(options.quality, &chosen));
+        let by = messages::by_quality(options.quality);
+        let _ = said.set(format!("{by}: {}", messages::chosen(&chosen, false)));
         Ok((chosen.photons, chosen.integrator))
     };
     let fixed = FixedScene::from(&scene);

@@ -9,7 +9,7 @@ use photoncard_driver::scene::Scene;
 use serde_json::json;
 
 use super::{files, messages};
-use crate::arguments::{OutputOptions, RenderOptions, SceneOptions};
+use crate::arguments::{OutputOptions, RenderOptions, SceneOptions, Unfitted};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::Progress;
@@ -61,22 +61,23 @@ pub(super) fn finish(
     Ok(())
 }
 
-/// Photons and integrator of the options, with what the quality has found for this scene where nothing is stated.
+/// Photons and integrator of the options, with what the quality has found for this scene where nothing is stated or kept.
 pub(super) fn chosen(
     options: &RenderOptions,
-    settings: &RenderSettings,
+    unfitted: Unfitted,
     fit: Option<&Fit>,
     progress: &Progress,
 ) -> (PhotonMaps, Integrator) {
-    let chosen = settings.clone().with(|settings| {
-        if let Some(fit) = fit {
-            fit.apply(settings, options.stated());
-        }
-    });
-    if !options.quiet && fit.is_some() {
-        progress.say(format_args!("photoncard: {}", messages::chosen(options.quality, &chosen)));
+    let Unfitted { mut settings, stated, are_kept } = unfitted;
+    if let Some(fit) = fit {
+        fit.apply(&mut settings, stated);
     }
-    (chosen.photons, chosen.integrator)
+    if !options.quiet && (fit.is_some() || are_kept) {
+        let by = if are_kept { "kept samples".to_owned() } else { messages::by_quality(options.quality) };
+        let are_planned = options.samples.aim().is_some();
+        progress.say(format_args!("photoncard: {by}: {}", messages::chosen(&settings, are_planned)));
+    }
+    (settings.photons, settings.integrator)
 }
 
 /// Memory of every card, bytes: the image must fit.

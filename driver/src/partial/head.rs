@@ -1,0 +1,76 @@
+//! Head of a partial render: title and settings.
+
+use std::io::{self, BufRead, BufReader, Read, Seek};
+use std::path::Path;
+
+use serde_json::{Map, Value};
+
+use super::PartialSettings;
+use super::error::{PartialError, VERSION};
+use super::file::{self, FAMILY, Title, read_title};
+
+/// Maximum size of the settings, bytes.
+const MAX_SETTINGS: u64 = 1 << 20;
+
+/// Head of a partial render.
+pub(super) struct Head {
+    /// Settings that identify the picture, by the names of options.
+    pub(super) settings: Map<String, Value>,
+    /// Size of title and settings, bytes.
+    pub(super) bytes: u64,
+}
+
+impl PartialSettings {
+    /// Settings of the samples that a render goes on from, by the names of options; `None` if it is not to be resumed, or there are none.
+    ///
+    /// # Errors
+    /// If the file is no partial render of this version, in use by another render or unreadable.
+    pub fn kept(&self) -> Result<Option<Map<String, Value>>, PartialError> {
+        let Some(file) = self.resume.then(|| file::open(&self.path, false)).transpose()?.flatten() else {
+            return Ok(None);
+        };
+        (&file).rewind().map_err(failed(&self.path))?;
+        Ok(read_head(&mut BufReader::new(&file), &self.path)?.map(|head| head.settings))
+    }
+}
+
+/// Reads title and settings; `None` if the file ends before they do.
+pub(super) fn read_head(reader: &mut impl BufRead, path: &Path) -> Result<Option<Head>, PartialError> {
+    let foreign = || PartialError::Foreign { path: path.to_owned() };
+    match read_title(reader).map_err(failed(path))?.ok_or_else(foreign)? {
+        Title::CutOff => return Ok(None),
+        Title::Version(VERSION) => {}
+        Title::Version(found) => return Err(PartialError::Version { path: path.to_owned(), found }),
+    }
+    let mut settings = Vec::new();
+    let mut limited = reader.take(MAX_SETTINGS);
+    limited.read_until(b'\n', &mut settings).map_err(failed(path))?;
+    if !settings.ends_with(b"\n") && (settings.len() as u64) < MAX_SETTINGS {
+        return Ok(None);
+    }
+    let bytes = (title().len() + settings.len()) as u64;
+    let settings = serde_json::from_slice(&settings).map_err(|_| foreign())?;
+    Ok(Some(Head { settings, bytes }))
+}
+
+/// Error of a file that cannot be read.
+fn failed(path: &Path) -> impl Fn(io::Error) -> PartialError {
+    move |source| PartialError::File { path: path.to_owned(), source }
+}
+
+/// First line of the file.
+pub(super) fn title() -> String {
+    format!("{FAMILY}{VERSION}\n")
+}
+
+/// Descriptions of the settings that differ.
+pub(super) fn differences(found: &Map<String, Value>, asked: &Value) -> Vec<String> {
+    let empty = Map::new();
+    let asked = asked.as_object().unwrap_or(&empty);
+    let names = asked.keys().chain(found.keys().filter(|name| !asked.contains_key(*name)));
+    let differing = names.filter(|name| found.get(*name) != asked.get(*name));
+    let say = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
+    differing
+        .map(|name| format!("{name} was {} and is {}", say(found.get(name)), say(asked.get(name))))
+        .collect()
+}

@@ -1,0 +1,83 @@
+//! Settings of kept samples, for a render that adds to them.
+
+use serde_json::Value;
+
+use super::{NamedSettings, RenderSettings};
+use crate::quality::Stated;
+
+impl RenderSettings {
+    /// Takes over what a quality may have chosen for kept samples of a picture, by the names of options, and their planned number, but for
+    /// what is stated. A value that is no such setting is left out: a render compares all settings with those of the samples.
+    pub fn take_over(&mut self, kept: &NamedSettings, stated: Stated) {
+        let number = |name: &str| kept.get(name).and_then(Value::as_u64);
+        let rays = |name: &str| number(name).and_then(|rays| u32::try_from(rays).ok());
+        let Self { photons, integrator, .. } = self;
+        if !stated.photons {
+            let kept = number("photons").and_then(|count| usize::try_from(count).ok());
+            photons.count = kept.unwrap_or(photons.count);
+        }
+        if !stated.gather_rays {
+            integrator.gather_rays = rays("gather-rays").unwrap_or(integrator.gather_rays);
+        }
+        if !stated.shadow_rays {
+            integrator.shadow_rays = rays("shadow-rays").unwrap_or(integrator.shadow_rays);
+        }
+        // The error is the quality's own; the scene decides only if irradiance is interpolated.
+        if !stated.cache && kept.get("ic-error").is_some_and(Value::is_null) {
+            integrator.irradiance_error = None;
+        }
+        integrator.planned_samples = integrator.planned_samples.or(rays("planned-spp"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn kept(settings: &RenderSettings) -> NamedSettings {
+        let mut kept = settings.of_pixels();
+        kept.insert("planned-spp".to_owned(), json!(settings.integrator.planned()));
+        kept
+    }
+
+    #[test]
+    fn what_is_not_stated_becomes_that_of_the_kept_samples() {
+        let earlier = RenderSettings::default().with(|s| {
+            s.photons.count = 3000;
+            s.integrator.samples = 3;
+            (s.integrator.gather_rays, s.integrator.shadow_rays) = (40, 6);
+        });
+        let asked = RenderSettings::default().with(|s| {
+            s.integrator.samples = 7;
+            s.integrator.irradiance_error = Some(0.1);
+        });
+        let taken = |stated| asked.clone().with(|settings| settings.take_over(&kept(&earlier), stated));
+        let planned = Some(3);
+        let all = earlier.clone().with(|s| {
+            (s.integrator.samples, s.integrator.planned_samples) = (7, planned);
+        });
+        assert_eq!(taken(Stated::default()), all);
+        let none = asked.clone().with(|s| s.integrator.planned_samples = planned);
+        assert_eq!(taken(Stated::ALL), none);
+        let of_other_quality = earlier.with(|s| s.integrator.irradiance_error = Some(0.2));
+        let taken = asked.clone().with(|s| s.take_over(&kept(&of_other_quality), Stated::default()));
+        assert_eq!(taken.integrator.irradiance_error, Some(0.1));
+        let planned = asked.with(|s| s.integrator.planned_samples = Some(9));
+        assert_eq!(
+            planned.with(|s| s.take_over(&kept(&all), Stated::ALL)).integrator.planned_samples,
+            Some(9)
+        );
+    }
+
+    #[test]
+    fn values_that_are_no_settings_are_left_out() {
+        for value in [json!(-1), json!("many"), json!(1e9), json!([1]), json!(u64::from(u32::MAX) + 1)] {
+            let names = ["gather-rays", "shadow-rays", "planned-spp", "ic-error"];
+            let kept = names.map(|name| (name.to_owned(), value.clone())).into_iter().collect();
+            let asked = RenderSettings::default();
+            assert_eq!(asked.clone().with(|s| s.take_over(&kept, Stated::default())), asked);
+        }
+    }
+}
