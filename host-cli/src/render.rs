@@ -1,5 +1,6 @@
 //! `photoncard render`.
 
+mod end;
 pub(crate) mod files;
 mod frames;
 mod messages;
@@ -12,9 +13,12 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::render::{Passes, Phase, RenderError, RenderSettings, Renderer, render_chosen};
+use photoncard_driver::render::{
+    Ending, Passes, Phase, RenderError, RenderSettings, Renderer, render_chosen,
+};
 use photoncard_driver::scene::{FixedScene, Scene};
 
+use self::end::{End, at_once};
 pub(crate) use self::steps::on_threads;
 use self::steps::{Finished, assigned, chosen, dram_bytes, finish, say_kept, view};
 use crate::arguments::RenderOptions;
@@ -55,23 +59,26 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
         };
         let scene = FixedScene::from(&scene);
         let passes = Renderer::default().render_until(&scene, &settings, &choose, aim, &progress)?;
-        let Passes { rendering, noise, count, ended_by } = passes;
-        Ok((rendering, Some(messages::End { noise, passes: count, ended_by })))
+        let Passes { rendering, noise, count, ending } = passes;
+        let samples = rendering.statistics.samples;
+        Ok((rendering, Some(End { aim, noise, passes: count, samples, ending })))
     })?;
     progress.finish();
     let (rendering, end) = result.inspect_err(|error| say_kept(error, &progress, &options.outputs))?;
     let fit = found.into_inner().flatten();
     let (inputs, quality) = (input::provenance(&options.scene), options.quality);
+    let at_once = at_once(options, &rendering.statistics, fit.is_some());
     let finished = Finished { rendering, scene_seconds, inputs, quality, fit, frame: None };
     finish(options, &options.outputs, finished)?;
     let Some(end) = end else { return Ok(()) };
     if !options.quiet {
-        messages::say_end(&end);
+        end.say(&at_once);
     }
-    match end.ended_by {
+    match end.ending {
         // The picture that was asked for until then is written.
-        None | Some(RenderError::Stopped) => Ok(()),
-        Some(error) => Err(error.into()),
+        Ending::Failed(RenderError::Stopped) => Ok(()),
+        Ending::Failed(error) => Err(error.into()),
+        Ending::Reached | Ending::MaxSamples | Ending::Black => Ok(()),
     }
 }
 

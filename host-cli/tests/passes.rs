@@ -82,6 +82,26 @@ fn chosen(room: &Room, picture: &str, options: &[&str]) -> Outcome {
 }
 
 #[test]
+fn the_options_that_an_aim_ends_with_render_its_picture_at_once() {
+    let room = Room::new();
+    for (aim, others) in [
+        (["--noise", "0.15"], &[][..]),
+        (["--time", "0.5"], &[]),
+        (["--time", "0.2"], &["--planned-spp", "9", "--photons", "3000"]),
+        (["--time", "0.2"], &["--irradiance-cache", "off", "--shadow-rays", "1"]),
+    ] {
+        let outcome = chosen(&room, "passes.exr", &[&aim, others].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains("quality draft: planned for "), "{}", outcome.stderr);
+        let (_, at_once) = outcome.stderr.split_once("this picture in one render: ").expect("the options");
+        let at_once: Vec<&str> = at_once.lines().next().unwrap().split(' ').collect();
+        let once = chosen(&room, "once.exr", &[&at_once, others].concat());
+        assert_eq!(once.status, Some(0), "{}", once.stderr);
+        assert!(room.read("passes.exr") == room.read("once.exr"), "{aim:?} {at_once:?}");
+    }
+}
+
+#[test]
 fn kept_samples_are_added_to_with_the_settings_that_were_chosen_for_them() {
     let room = Room::new();
     let first = chosen(&room, "a.exr", &["--spp", "3", "--keep-samples"]);
@@ -112,6 +132,34 @@ fn kept_samples_are_added_to_with_the_settings_that_were_chosen_for_them() {
     let once = chosen(&room, "once.exr", &stated.each_ref().map(String::as_str));
     assert_eq!(once.status, Some(0), "{}", once.stderr);
     assert!(room.read("a.exr") == room.read("once.exr"), "{stated:?}");
+}
+
+#[test]
+fn an_aim_that_is_missed_is_told() {
+    let room = Room::new();
+    let outcome = room.run(
+        &[
+            &["render", &shipped("cornell.gltf"), "-o", "a.exr", "--size", "2x2"][..],
+            &STATED[2..],
+            &["--noise", "0.000001"],
+        ]
+        .concat(),
+    );
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    assert!(
+        outcome.stderr.contains("the aim of 0.0001 % is not reached: 4096 is the maximum"),
+        "{}",
+        outcome.stderr
+    );
+    // A black picture.
+    let away = ["--noise", "0.1", "--look-at", "0,1,100"];
+    let outcome = render_or_panic(&room, "black.exr", &away);
+    assert!(
+        outcome.stderr.contains("5 passes, noise of a black picture has no measure"),
+        "{}",
+        outcome.stderr
+    );
+    assert_eq!(samples(&outcome), "16");
 }
 
 #[test]

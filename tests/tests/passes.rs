@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use photoncard_driver::layer::Layers;
 use photoncard_driver::partial::PartialSettings;
-use photoncard_driver::render::{Aim, CardAddress, RenderSettings, Renderer, Rendering, Unobserved};
+use photoncard_driver::render::{Aim, CardAddress, Ending, RenderSettings, Renderer, Rendering, Unobserved};
 use photoncard_driver::scene::FixedScene;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_shared::message::Radiance;
@@ -268,7 +268,7 @@ fn passes_until_an_aim_are_the_render_of_their_samples() {
         let choose = |_: &_| Ok((settings.photons.clone(), settings.integrator.clone()));
         let passes = Renderer::default().render_until(&scene, &settings, &choose, aim, &Unobserved);
         let Ok(passes) = passes else { panic!("no passes") };
-        assert!(passes.ended_by.is_none());
+        assert!(matches!(passes.ending, Ending::Reached), "{:?}", passes.ending);
         let samples = passes.rendering.film.format().samples;
         let at_once =
             settings.with(|s| (s.integrator.samples, s.integrator.planned_samples) = (samples, Some(4)));

@@ -21,6 +21,8 @@ pub(super) struct NoiseEstimate {
     differences: [Option<f64>; 3],
     /// Samples after the last pass.
     all: f64,
+    /// If the picture of the last pass that has doubled the samples is black.
+    is_of_black: bool,
 }
 
 impl NoiseEstimate {
@@ -39,13 +41,19 @@ impl NoiseEstimate {
                 count += 1.0;
             }
         }
-        if sum <= 0.0 {
+        self.is_of_black = sum <= 0.0;
+        if self.is_of_black {
             return;
         }
         // `A - B` is twice `A - M`.
         let difference = 4.0 * squares / count / (sum / count).powi(2);
         self.differences = [self.differences[1], self.differences[2], Some(difference)];
         self.samples = all;
+    }
+
+    /// Returns whether the picture is black, so that noise has no measure.
+    pub(super) fn is_of_black(&self) -> bool {
+        self.is_of_black
     }
 
     /// Squared noise at the last doubling.

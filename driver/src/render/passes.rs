@@ -22,7 +22,7 @@ const FIRST_SAMPLES: u32 = 1;
 /// Share of the remaining time that a pass is planned for.
 const PLANNED_SHARE: f64 = 0.95;
 
-/// End of a picture by passes: the first of the two, and 4096 samples a pixel in any case.
+/// Aim of a picture by passes: the first of the two, and 4096 samples a pixel in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
     /// Time of the render; the first pass may take longer, and without room for irradiance records on a card the second.
@@ -39,8 +39,21 @@ pub struct Passes {
     pub noise: Option<f64>,
     /// Number of complete passes.
     pub count: u32,
+    /// End of the passes.
+    pub ending: Ending,
+}
+
+/// End of the passes of a picture.
+#[derive(Debug)]
+pub enum Ending {
+    /// The aim is reached.
+    Reached,
+    /// The aim is not reached, and the picture has the maximum number of samples.
+    MaxSamples,
+    /// The picture is black: noise relative to its mean has no measure.
+    Black,
     /// Error that ended a pass after the first, or the observer's stop.
-    pub ended_by: Option<RenderError>,
+    Failed(RenderError),
 }
 
 impl Renderer {
@@ -70,20 +83,27 @@ impl Renderer {
         let rendering = self.render_chosen_fixed(scene, &settings, &first, observer)?;
         let (photons, integrator) = chosen.into_inner();
         let mut settings = RenderSettings { photons, integrator, ..settings };
-        let mut passes = Passes { rendering, noise: None, count: 1, ended_by: None };
+        let mut passes = Passes { rendering, noise: None, count: 1, ending: Ending::Reached };
         let mut estimate = NoiseEstimate::default();
         let mut pace = Pace::default();
         if settings.integrator.irradiance_error.is_none() {
             pace.add(settings.integrator.samples, passes.rendering.statistics.time_s.render);
         }
-        while let Some(more) = next_pass(&passes, &estimate, &pace, aim, start.elapsed()) {
+        loop {
+            let more = match next_pass(&passes, &estimate, &pace, aim, start.elapsed()) {
+                Ok(more) => more,
+                Err(ending) => {
+                    passes.ending = ending;
+                    break;
+                }
+            };
             let before = Arc::new(passes.rendering.film.clone());
             settings.integrator.samples += more;
             let begun = Instant::now();
             match self.refine(scene, &settings, before.clone(), observer) {
                 Ok(rendering) => passes.rendering = rendering,
                 Err(error) => {
-                    passes.ended_by = Some(error);
+                    passes.ending = Ending::Failed(error);
                     break;
                 }
             }
@@ -97,26 +117,36 @@ impl Renderer {
     }
 }
 
-/// Number of samples of the next pass; `None` at the end.
+/// Number of samples of the next pass.
+///
+/// # Errors
+/// The end of the passes.
 fn next_pass(
     passes: &Passes,
     estimate: &NoiseEstimate,
     pace: &Pace,
     aim: Aim,
     elapsed: Duration,
-) -> Option<u32> {
+) -> Result<u32, Ending> {
     let samples = passes.rendering.film.format().samples;
-    let mut more = samples.min(MAX_SAMPLES.saturating_sub(samples));
+    let mut more = samples;
     if let Some(aim) = aim.noise
         && samples >= MIN_SAMPLES
     {
+        if estimate.is_of_black() {
+            return Err(Ending::Black);
+        }
         more = more.min(estimate.samples_to(aim).unwrap_or(more));
     }
     if let Some(time) = aim.time {
         let left = time.saturating_sub(elapsed).as_secs_f64();
         more = more.min(pace.samples_in(PLANNED_SHARE * left));
     }
-    (more > 0).then_some(more)
+    match more.min(MAX_SAMPLES.saturating_sub(samples)) {
+        0 if more > 0 => Err(Ending::MaxSamples),
+        0 => Err(Ending::Reached),
+        more => Ok(more),
+    }
 }
 
 /// Time of passes: a part that each has, and one in proportion to its samples.

@@ -75,6 +75,11 @@ impl RenderOptions {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
+    /// Returns whether the planned number of samples is stated.
+    pub(crate) fn states_planned_samples(&self) -> bool {
+        self.integrator.planned_spp.is_some()
+    }
+
     /// Settings that a fit begins with: those of kept samples in place of `settings` where the options state none, if the render goes on
     /// from any.
     ///

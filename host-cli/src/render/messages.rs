@@ -5,8 +5,7 @@ use std::path::Path;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{
-    MemoryStatistics, NamedSettings, Picture, ReadStatistics, RenderError, RenderSettings, Rendering,
-    Statistics, Times,
+    MemoryStatistics, NamedSettings, Picture, ReadStatistics, RenderSettings, Rendering, Statistics, Times,
 };
 use photoncard_driver::scene::{Camera, Scene};
 use serde_json::Value;
@@ -149,27 +148,6 @@ fn cost(statistics: &Statistics) -> String {
     let phases = phases.iter().filter(|(_, seconds)| **seconds >= 0.005);
     let phases: String = phases.map(|(name, seconds)| format!("{name} {seconds:.2} s, ")).collect();
     format!("{total:.2} s: {phases}{sent} bytes sent in {load:.2} s, tiles {render:.2} s")
-}
-
-/// End of a picture by passes.
-pub(super) struct End {
-    pub(super) noise: Option<f64>,
-    pub(super) passes: u32,
-    pub(super) ended_by: Option<RenderError>,
-}
-
-/// Prints the end of a picture by passes.
-pub(super) fn say_end(end: &End) {
-    let passes = if end.passes == 1 { "1 pass".to_owned() } else { format!("{} passes", end.passes) };
-    let noise = end.noise.map_or("noise is known after two passes".to_owned(), |noise| {
-        format!("estimated noise {:.2} % of the mean", 100.0 * noise)
-    });
-    let ended = if end.ended_by.is_some() {
-        "; ended before the aim: the picture has the samples of complete passes"
-    } else {
-        ""
-    };
-    say(format_args!("photoncard: {passes}, {noise}{ended}"));
 }
 
 /// Time, samples, and what the picture was limited by as far as the statistics know.

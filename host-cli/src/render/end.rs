@@ -1,0 +1,94 @@
+//! End of a picture by passes.
+
+use photoncard_driver::render::{Aim, Ending, Statistics};
+
+use crate::arguments::RenderOptions;
+use crate::console::say;
+
+/// End of a picture by passes.
+pub(super) struct End {
+    pub(super) aim: Aim,
+    pub(super) noise: Option<f64>,
+    pub(super) passes: u32,
+    pub(super) samples: u32,
+    pub(super) ending: Ending,
+}
+
+impl End {
+    /// Prints the end, and the options that render an equal picture at once.
+    pub(super) fn say(&self, at_once: &str) {
+        say(format_args!("photoncard: this picture in one render: {at_once}"));
+        say(format_args!("photoncard: {}", self.line()));
+    }
+
+    fn line(&self) -> String {
+        let passes = if self.passes == 1 { "1 pass".to_owned() } else { format!("{} passes", self.passes) };
+        let noise = match self.noise {
+            Some(noise) => format!("estimated noise {:.2} % of the mean", 100.0 * noise),
+            None if self.passes > 1 => "noise of a black picture has no measure".to_owned(),
+            None => "noise is known after two passes".to_owned(),
+        };
+        let most = format!("{} is the maximum number of samples", self.samples);
+        let ended = match (&self.ending, self.aim.noise) {
+            (Ending::Reached, _) => String::new(),
+            (Ending::MaxSamples, Some(noise)) => {
+                format!("; the aim of {} is not reached: {most}", percent(noise))
+            }
+            (Ending::MaxSamples, None) => format!("; ended before the time: {most}"),
+            (Ending::Black, _) => "; ended before the aim".to_owned(),
+            (Ending::Failed(_), _) => {
+                "; ended before the aim: the picture has the samples of complete passes".to_owned()
+            }
+        };
+        format!("{passes}, {noise}{ended}")
+    }
+}
+
+/// A share in per cent, without zeros at the end.
+fn percent(share: f64) -> String {
+    let digits = format!("{:.6}", 100.0 * share);
+    format!("{} %", digits.trim_end_matches('0').trim_end_matches('.'))
+}
+
+/// Options that render the picture of `statistics` at once, beside those of the command but its aim; `is_fitted` if a pilot has found some.
+pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitted: bool) -> String {
+    let (stated, pixels) = (options.stated(), &statistics.provenance.pixels);
+    let are_needed = [
+        ("spp", true),
+        ("planned-spp", !options.states_planned_samples()),
+        ("photons", is_fitted && !stated.photons),
+        ("gather-rays", is_fitted && !stated.gather_rays),
+        ("shadow-rays", is_fitted && !stated.shadow_rays),
+    ];
+    let needed = are_needed.into_iter().filter(|(_, is_needed)| *is_needed);
+    let words = needed.filter_map(|(name, _)| Some(format!("--{name} {}", pixels.get(name)?)));
+    words.collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_driver::render::RenderError;
+
+    use super::*;
+
+    #[test]
+    fn a_missed_aim_is_told() {
+        let of = |noise, estimated, ending| {
+            let aim = Aim { noise, time: None };
+            End { aim, noise: estimated, passes: 13, samples: 4096, ending }.line()
+        };
+        let line = |noise, ending| of(noise, Some(0.0123), ending);
+        let begin = "13 passes, estimated noise 1.23 % of the mean";
+        assert_eq!(line(Some(0.02), Ending::Reached), begin);
+        for (noise, percent) in [(1e-6, "0.0001 %"), (0.01, "1 %"), (0.005, "0.5 %")] {
+            let missed =
+                format!("; the aim of {percent} is not reached: 4096 is the maximum number of samples");
+            assert_eq!(line(Some(noise), Ending::MaxSamples), format!("{begin}{missed}"));
+        }
+        assert!(line(None, Ending::MaxSamples).contains("before the time"));
+        assert!(line(Some(0.1), Ending::Failed(RenderError::Stopped)).contains("before the aim"));
+        assert!(
+            of(Some(0.1), None, Ending::Black).contains("black picture has no measure; ended before the aim")
+        );
+    }
+}
