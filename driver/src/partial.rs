@@ -33,20 +33,12 @@ use photoncard_shared::message::Tile;
 use serde_json::Value;
 
 pub use self::error::PartialError;
+pub use self::head::PartialSettings;
 use self::head::{differences, read_head, title};
 use self::records::{HEAD_BYTES, read_tiles, record};
 use self::samples::{KeptSamples, Split};
 use crate::film::Film;
 use crate::sink::{FinishedTile, TileSink};
-
-/// File of finished tiles, and whether a render continues from it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PartialSettings {
-    /// Path of the file.
-    pub path: PathBuf,
-    /// True to take over its tiles.
-    pub resume: bool,
-}
 
 /// File of a render's finished tiles. It is created with the first tile.
 pub struct PartialRender {

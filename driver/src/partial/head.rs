@@ -1,11 +1,10 @@
 //! Head of a partial render: title and settings.
 
 use std::io::{self, BufRead, BufReader, Read, Seek};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
 
-use super::PartialSettings;
 use super::error::{PartialError, VERSION};
 use super::file::{self, FAMILY, Title, read_title};
 
@@ -18,6 +17,15 @@ pub(super) struct Head {
     pub(super) settings: Map<String, Value>,
     /// Size of title and settings, bytes.
     pub(super) bytes: u64,
+}
+
+/// File of finished tiles, and whether a render continues from it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PartialSettings {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// True to take over its tiles.
+    pub resume: bool,
 }
 
 impl PartialSettings {

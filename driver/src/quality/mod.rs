@@ -3,6 +3,7 @@
 //! Settings that depend on the scene are found by a pilot render ([`Quality::fit`]): few pixels, from photon maps of few photons.
 
 mod fit;
+mod kept;
 mod level;
 mod pilot;
 mod spread;

@@ -4,7 +4,6 @@ mod camera;
 mod check;
 mod dependence;
 mod groups;
-mod kept;
 
 use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;

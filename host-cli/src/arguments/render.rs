@@ -89,7 +89,7 @@ impl RenderOptions {
         let kept = settings.outputs.partial.as_ref().map(PartialSettings::kept).transpose()?.flatten();
         let (mut settings, stated) = (settings.clone(), self.stated());
         let Some(kept) = kept else { return Ok(Unfitted { settings, stated, are_kept: false }) };
-        settings.take_over(&kept, stated);
+        stated.take_over(&mut settings, &kept);
         Ok(Unfitted { settings, stated: Stated { samples: stated.samples, ..Stated::ALL }, are_kept: true })
     }
 

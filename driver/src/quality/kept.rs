@@ -2,28 +2,28 @@
 
 use serde_json::Value;
 
-use super::{NamedSettings, RenderSettings};
-use crate::quality::Stated;
+use super::Stated;
+use crate::render::{NamedSettings, RenderSettings};
 
-impl RenderSettings {
-    /// Takes over what a quality may have chosen for kept samples of a picture, by the names of options, and their planned number, but for
-    /// what is stated. A value that is no such setting is left out: a render compares all settings with those of the samples.
-    pub fn take_over(&mut self, kept: &NamedSettings, stated: Stated) {
+impl Stated {
+    /// Takes over into `settings` what a quality may have chosen for kept samples of a picture, by the names of options, and their planned
+    /// number, but for what is stated. A value that is no such setting is left out: a render compares all settings with those of the samples.
+    pub fn take_over(self, settings: &mut RenderSettings, kept: &NamedSettings) {
         let number = |name: &str| kept.get(name).and_then(Value::as_u64);
         let rays = |name: &str| number(name).and_then(|rays| u32::try_from(rays).ok());
-        let Self { photons, integrator, .. } = self;
-        if !stated.photons {
+        let RenderSettings { photons, integrator, .. } = settings;
+        if !self.photons {
             let kept = number("photons").and_then(|count| usize::try_from(count).ok());
             photons.count = kept.unwrap_or(photons.count);
         }
-        if !stated.gather_rays {
+        if !self.gather_rays {
             integrator.gather_rays = rays("gather-rays").unwrap_or(integrator.gather_rays);
         }
-        if !stated.shadow_rays {
+        if !self.shadow_rays {
             integrator.shadow_rays = rays("shadow-rays").unwrap_or(integrator.shadow_rays);
         }
         // The error is the quality's own; the scene decides only if irradiance is interpolated.
-        if !stated.cache && kept.get("ic-error").is_some_and(Value::is_null) {
+        if !self.cache && kept.get("ic-error").is_some_and(Value::is_null) {
             integrator.irradiance_error = None;
         }
         integrator.planned_samples = integrator.planned_samples.or(rays("planned-spp"));
@@ -53,7 +53,8 @@ mod tests {
             s.integrator.samples = 7;
             s.integrator.irradiance_error = Some(0.1);
         });
-        let taken = |stated| asked.clone().with(|settings| settings.take_over(&kept(&earlier), stated));
+        let taken =
+            |stated: Stated| asked.clone().with(|settings| stated.take_over(settings, &kept(&earlier)));
         let planned = Some(3);
         let all = earlier.clone().with(|s| {
             (s.integrator.samples, s.integrator.planned_samples) = (7, planned);
@@ -62,11 +63,11 @@ mod tests {
         let none = asked.clone().with(|s| s.integrator.planned_samples = planned);
         assert_eq!(taken(Stated::ALL), none);
         let of_other_quality = earlier.with(|s| s.integrator.irradiance_error = Some(0.2));
-        let taken = asked.clone().with(|s| s.take_over(&kept(&of_other_quality), Stated::default()));
+        let taken = asked.clone().with(|s| Stated::default().take_over(s, &kept(&of_other_quality)));
         assert_eq!(taken.integrator.irradiance_error, Some(0.1));
         let planned = asked.with(|s| s.integrator.planned_samples = Some(9));
         assert_eq!(
-            planned.with(|s| s.take_over(&kept(&all), Stated::ALL)).integrator.planned_samples,
+            planned.with(|s| Stated::ALL.take_over(s, &kept(&all))).integrator.planned_samples,
             Some(9)
         );
     }
@@ -77,7 +78,7 @@ mod tests {
             let names = ["gather-rays", "shadow-rays", "planned-spp", "ic-error"];
             let kept = names.map(|name| (name.to_owned(), value.clone())).into_iter().collect();
             let asked = RenderSettings::default();
-            assert_eq!(asked.clone().with(|s| s.take_over(&kept, Stated::default())), asked);
+            assert_eq!(asked.clone().with(|s| Stated::default().take_over(s, &kept)), asked);
         }
     }
 }
