@@ -145,7 +145,7 @@ function takeState(message) {
 function takeTile(buffer) {
     const tile = decoded(buffer);
     if (!tile || !picture.put(tile)) return;
-    // What answers a change is shown at once, and so is all that is whole.
+    // The first picture after a change is shown at once, and so is every whole one.
     if (picture.isFirst || picture.isWhole) drawing.soon();
     else drawing.later();
 }
@@ -260,7 +260,7 @@ on("camera", "change", ({ target }) => {
     view.move({ position: chosen.position, look_at: chosen.look_at, fov: chosen.fov }, false);
     target.value = place;
 });
-// What is typed and is not possible gives way to what the camera has.
+// A typed value that is not possible gives way to the camera's.
 on("fov", "change", ({ target }) => camera && (target.value = shortest(camera.fov)));
 on("fov", "input", ({ target }) => target.validity.valid && target.value !== "" && camera &&
     view.move({ ...camera, fov: Number(target.value) }, false));

@@ -1,4 +1,4 @@
-// What a tile took, over the picture: its card, or a map of heat with a legend.
+// Overlay of the work of each tile: its card, or a map of heat with a legend.
 
 import { setText } from "./status.js";
 import { OVERLAYS } from "./tone.js";

@@ -107,7 +107,7 @@ fn kept_samples_are_added_to_with_the_settings_that_were_chosen_for_them() {
     let first = chosen(&room, "a.exr", &["--spp", "3", "--keep-samples"]);
     assert_eq!(first.status, Some(0), "{}", first.stderr);
     let kept = room.read("a.exr.partial");
-    // What is stated and differs is refused, and alone it is named.
+    // A stated setting that differs is refused, and named alone.
     for (options, difference) in [
         (["--planned-spp", "5"], "planned-spp was 3 and is 5"),
         (["--shadow-rays", "15"], "shadow-rays was "),

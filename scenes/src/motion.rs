@@ -1,4 +1,4 @@
-//! What moves: animations, cameras and lights whose nodes move, skins, and morph targets.
+//! Motion: animations, cameras and lights whose nodes move, skins, and morph targets.
 
 use glam::{Mat4, Quat, Vec3};
 

@@ -59,7 +59,7 @@ impl PartHead {
         is_possible.then_some(PartPicture { size: [width, height], window, format, layers })
     }
 
-    /// What differs from another head of the picture, in words: each setting by its name.
+    /// Descriptions of the settings that differ from another head of the picture, by name.
     pub(super) fn differences(&self, other: &Self, [own, others]: [&str; 2]) -> Vec<String> {
         let say = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
         let names = self

@@ -59,7 +59,7 @@ impl FrameOptions {
         Moment { animations: self.animations.clone(), seconds: f64::from(frame) / self.fps() }
     }
 
-    /// What a frame's pixels depend on, besides the options of a picture.
+    /// Settings that a frame's pixels depend on, besides the options of a picture.
     pub(crate) fn provenance(&self, frame: u32) -> NamedSettings {
         let named =
             [("frame", json!(frame)), ("fps", json!(self.fps())), ("animation", json!(self.animations))];

@@ -93,7 +93,7 @@ impl RenderOptions {
         Ok(Unfitted { settings, stated: Stated { samples: stated.samples, ..Stated::ALL }, are_kept: true })
     }
 
-    /// What the quality finds for a scene, unless all that it would choose is stated or kept.
+    /// Settings that the quality finds for a scene; `None` if all that it would choose is stated or kept.
     ///
     /// # Errors
     /// As [`Quality::fit`].

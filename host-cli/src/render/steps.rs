@@ -30,7 +30,7 @@ pub(super) struct Finished {
     /// Inputs of the scene, by their names.
     pub(super) inputs: NamedSettings,
     pub(super) quality: Quality,
-    /// What the quality has found for the scene, if it was looked for.
+    /// Settings that the quality has found for the scene, if there was a pilot.
     pub(super) fit: Option<Fit>,
     /// Number of the frame, if it is one.
     pub(super) frame: Option<u32>,

@@ -204,7 +204,7 @@ fn two_pages_look_and_one_steers() {
     first.wait(&format!("{camera} !== '{}'", after.as_str().unwrap()), LIMIT);
 }
 
-/// What a page has moved goes back with everything else, and the next move begins there.
+/// A page's own camera goes back with everything else, and the next move begins there.
 #[test]
 fn undoing_all_changes_takes_the_camera_back() {
     let Some(mut browser) = Browser::start() else { return };
@@ -230,7 +230,7 @@ fn undoing_all_changes_takes_the_camera_back() {
     assert_eq!(tab.value(&own), start);
     assert_eq!(tab.value("photoncard.picture.data.some((value, part) => part % 4 < 3 && value > 0)"), true);
 
-    // What the command does not take leaves the page at what it has.
+    // A camera that the command refuses leaves the page at the one before.
     tab.value("photoncard.view.move({ position: [0, 0, 1e16], look_at: [0, 0, 0], fov: 40 }, false)");
     tab.wait(&format!("{own} === '{start}'"), LIMIT);
     let fov = "document.getElementById('fov').value";

@@ -89,7 +89,7 @@
     picture.resize([10, 3]);
     check(picture.data[4 * 29] === 9 && picture.data.length === 120, "another size stretches the picture");
 
-    // What can wait is drawn once, later, and what cannot in the next frame.
+    // A drawing that can wait comes once, later; any other in the next frame.
     const drawn = [];
     const pace = new Pace(() => drawn.push(performance.now()));
     const frames = count => count === 0 ? null : new Promise(requestAnimationFrame).then(() => frames(count - 1));

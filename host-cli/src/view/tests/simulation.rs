@@ -155,7 +155,7 @@ fn a_page_that_acknowledges_nothing_is_not_flooded() {
     world.check_pictures();
 }
 
-/// What a card on a link can hold is known when it refuses. Camera and edits stay.
+/// The budget of a card on a link is known when it refuses. Camera and edits stay.
 #[test]
 fn settings_that_a_card_refuses_give_way_to_those_of_the_last_settled_picture() {
     let mut world = World::new();
