@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # Worth of the noise that `photoncard render --noise` estimates: for five scenes the true root mean square error over the mean, as a share
-# of the noise that was asked for, of the default settings and of those without irradiance records. The references are two pictures of 2048
-# samples without records, 4,000,000 photons and other seeds, photons included; half of their squared difference is the squared noise of one,
+# of the noise that was asked for, of the default settings and of those without irradiance records. The references are two pictures of 1024
+# samples without records, 2,000,000 photons and other seeds, photons included; half of their squared difference is the squared noise of one,
 # which is subtracted.
 #
 # usage: tests/noise.sh PHOTONCARD [NOISE] [SIZE]
 #
-# With NOISE 0.01 and SIZE 32x32, the defaults, some ten minutes on two processors.
+# With NOISE 0.01 and SIZE 64x64, the defaults, some twenty minutes on two processors.
 set -euo pipefail
 photoncard=$(realpath "${1:?usage: tests/noise.sh PHOTONCARD [NOISE] [SIZE]}")
 noise=${2:-0.01}
-size=${3:-32x32}
+size=${3:-64x64}
 cd "$(dirname "$0")/.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -30,7 +30,7 @@ printf '%-20s %-12s %8s %11s %11s %8s\n' scene settings samples estimated error 
 for scene in cornell.gltf cornell-glossy.gltf room.glb atrium.glb roughness.glb; do
     plain=(--irradiance-cache off --gather-rays 8 --shadow-rays 1)
     for seed in 8 9; do
-        "$photoncard" render "scenes/$scene" --size "$size" "${plain[@]}" --photons 4000000 --seed $seed --spp 2048 --quiet -o "$work/$seed.exr"
+        "$photoncard" render "scenes/$scene" --size "$size" "${plain[@]}" --photons 2000000 --seed $seed --spp 1024 --quiet -o "$work/$seed.exr"
     done
     "$photoncard" diff "$work/8.exr" "$work/9.exr" >"$work/both.json"
     for settings in default "no records"; do

@@ -23,6 +23,8 @@ pub struct Fit {
     pub shadow_rays: u32,
     /// If irradiance is interpolated: false where hardly any could be.
     pub interpolates: bool,
+    /// Maximum error of interpolated irradiance; infinite where the quality's own is small enough.
+    pub max_irradiance_error: f32,
     /// Noise of the pilot, from which the settings follow.
     pub measured: Measured,
 }
@@ -83,6 +85,9 @@ const WEIGHT_OF_MAP: f64 = 6.0;
 const SHARE_OF_MAP: f64 = 0.25;
 /// Error of interpolated irradiance by the rays of its records, likewise.
 const SHARE_OF_RECORDS: f64 = 0.5;
+/// Allowed error of interpolated irradiance over the noise that a picture is rendered to: the picture then errs by about half of the noise where
+/// small objects are seen with few pixels.
+const IRRADIANCE_ERROR_OF_NOISE: f64 = 2.5;
 /// Maximum numbers of photons, and of rays of a record, for the noise that a picture is rendered to.
 const MAX_PHOTONS: usize = 8_000_000;
 const MAX_RAYS_OF_RECORD: u32 = 8_000;
@@ -98,6 +103,7 @@ impl Fit {
         Self {
             photons: self.photons.max(rounded(photons, &(0..=MAX_PHOTONS))),
             gather_rays: self.gather_rays.max(rays),
+            max_irradiance_error: (IRRADIANCE_ERROR_OF_NOISE * noise) as f32,
             ..self
         }
     }
@@ -116,8 +122,9 @@ impl Fit {
             let of_pixel = f64::from(self.shadow_rays) * f64::from(self.samples);
             integrator.shadow_rays = within(of_pixel / f64::from(integrator.samples.max(1)), &SHADOW_RAYS, 1);
         }
-        if !stated.cache && !self.interpolates {
-            integrator.irradiance_error = None;
+        if !stated.cache {
+            let of_fit = |error: f32| self.interpolates.then_some(error.min(self.max_irradiance_error));
+            integrator.irradiance_error = integrator.irradiance_error.and_then(of_fit);
         }
         if !stated.gather_rays {
             let of_sample = self.gather_rays.div_ceil(integrator.samples.max(1));
@@ -179,6 +186,7 @@ impl Level {
             gather_rays: within(gather_rays, &self.gather_rays, 8),
             shadow_rays: within(shadow_rays, &SHADOW_RAYS, 1),
             interpolates,
+            max_irradiance_error: f32::INFINITY,
             measured: Measured {
                 place: place.sqrt(),
                 shadow_ray: shadow_ray.sqrt(),
@@ -287,12 +295,18 @@ mod tests {
     #[test]
     fn little_noise_takes_the_photons_and_rays_of_records_that_keep_their_errors_below_it() {
         let fit = good(VARIANCES);
-        assert_eq!(fit.for_noise(1.0), fit);
+        assert_eq!(Fit { max_irradiance_error: f32::INFINITY, ..fit.for_noise(1.0) }, fit);
         for noise in [0.02, 0.01, 0.005] {
             let Fit { photons, gather_rays, interpolates, .. } = fit.for_noise(noise);
             assert!(interpolates);
             let of_map = VARIANCES.photon / photons as f64;
             let of_records = WEIGHT_OF_RECORDS * VARIANCES.gather_ray / f64::from(gather_rays);
+            let settings = Quality::Good
+                .settings()
+                .with(|settings| fit.for_noise(noise).apply(settings, Stated::default()));
+            assert!(
+                settings.integrator.irradiance_error.is_some_and(|error| f64::from(error) <= 2.501 * noise)
+            );
             assert!(of_map <= (0.25 * noise).powi(2), "{of_map}");
             assert!(of_records <= (0.5 * noise).powi(2) || gather_rays == MAX_RAYS_OF_RECORD, "{of_records}");
         }

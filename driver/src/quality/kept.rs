@@ -22,9 +22,14 @@ impl Stated {
         if !self.shadow_rays {
             integrator.shadow_rays = rays("shadow-rays").unwrap_or(integrator.shadow_rays);
         }
-        // The error is the quality's own; the scene decides only if irradiance is interpolated.
-        if !self.cache && kept.get("ic-error").is_some_and(Value::is_null) {
-            integrator.irradiance_error = None;
+        // The error is the quality's own, or less for little noise; the scene decides only if irradiance is interpolated.
+        if !self.cache
+            && let Some(kept) = kept.get("ic-error")
+        {
+            let error =
+                kept.as_f64().filter(|&error| error > 0.0).map_or(f32::INFINITY, |error| error as f32);
+            let smaller = |own: f32| (!kept.is_null()).then_some(own.min(error));
+            integrator.irradiance_error = integrator.irradiance_error.and_then(smaller);
         }
         integrator.planned_samples = integrator.planned_samples.or(rays("planned-spp"));
     }
@@ -65,6 +70,9 @@ mod tests {
         let of_other_quality = earlier.with(|s| s.integrator.irradiance_error = Some(0.2));
         let taken = asked.clone().with(|s| Stated::default().take_over(s, &kept(&of_other_quality)));
         assert_eq!(taken.integrator.irradiance_error, Some(0.1));
+        let of_little_noise = asked.clone().with(|s| s.integrator.irradiance_error = Some(0.025));
+        let taken = asked.clone().with(|s| Stated::default().take_over(s, &kept(&of_little_noise)));
+        assert_eq!(taken.integrator.irradiance_error, Some(0.025));
         let planned = asked.with(|s| s.integrator.planned_samples = Some(9));
         assert_eq!(
             planned.with(|s| Stated::ALL.take_over(s, &kept(&all))).integrator.planned_samples,

@@ -1,24 +1,23 @@
 //! Estimate of the noise of a picture from the differences of its passes.
 //!
 //! Let `A` and `B` be the means of the pixels over the first and the next `n` samples, `M` their mean, `e_n` and `e_2n` the errors of `A`
-//! and `M` (root mean squares), and `D_n = E[(A - B)^2]`. `B` has the error of `A`, so that `e_2n^2 = e_n^2 - D_n / 4`, and
-//! `e_2n^2 = (D_2n + D_4n + ...) / 4`: the sum of the differences of passes to come. These fall by a factor `r` at each doubling:
-//! `e_2n^2 = D_n / 4 * r / (1 - r)`. Independent samples have `r = 1/2`; a stratified sequence does better, down to `1/4` where light is smooth
-//! (Owen 1997), but not evenly: some numbers of samples are luckier than others. So `r` and `D_n` are geometric means over the last
-//! differences, and `r` is bounded.
+//! and `M` (root mean squares), and `D_n = E[(A - B)^2]`. `B` has the error of `A`, so that `e_2n^2 = e_n^2 - D_n / 4`. With
+//! `e_2n^2 = r e_n^2` this is `e_2n^2 = D_n / 4 * r / (1 - r)`. Independent samples have `r = 1/2`. A stratified sequence does better, down to
+//! `1/4` for edges and smooth light (Owen 1997), with few samples more than with many, and unevenly: the ratios of successive `D_n` are 0.24 to
+//! 0.43, and some numbers of samples are luckier than others. One ratio for all pictures is nearer to the truth than ratios that follow them.
 
 use crate::film::Film;
 
-/// Bounds of the ratio of consecutive differences.
-const RATIOS: [f64; 2] = [0.38, 0.5];
+/// Factor of the squared noise at a doubling of the samples.
+const RATIO: f64 = 0.45;
 
 /// Estimate of the noise of a picture from the differences of its passes, each of which doubles the samples.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NoiseEstimate {
     /// Samples after the last pass that has doubled them.
     samples: f64,
-    /// Mean squared differences of the last passes that have doubled the samples, relative to the mean pixel, the oldest first.
-    differences: [Option<f64>; 3],
+    /// Squared noise after that pass, relative to the mean pixel; `None` before there is one.
+    squared: Option<f64>,
     /// Samples after the last pass.
     all: f64,
     /// If the picture of the last pass that has doubled the samples is black.
@@ -46,8 +45,8 @@ impl NoiseEstimate {
             return;
         }
         // `A - B` is twice `A - M`.
-        let difference = 4.0 * squares / count / (sum / count).powi(2);
-        self.differences = [self.differences[1], self.differences[2], Some(difference)];
+        let quarter = squares / count / (sum / count).powi(2);
+        self.squared = Some(quarter * RATIO / (1.0 - RATIO));
         self.samples = all;
     }
 
@@ -56,33 +55,21 @@ impl NoiseEstimate {
         self.is_of_black
     }
 
-    /// Squared noise at the last doubling.
-    fn squared(&self) -> Option<f64> {
-        let [oldest, before, last] = self.differences;
-        let last = last?;
-        let bounded = |ratio: f64| ratio.clamp(RATIOS[0], RATIOS[1]);
-        let ratio = match (oldest, before) {
-            (Some(oldest), _) if oldest > 0.0 => bounded((last / oldest).sqrt()),
-            (None, Some(before)) if before > 0.0 => bounded(last / before),
-            _ => RATIOS[1],
-        };
-        let difference = before.map_or(last, |before| (last * before * ratio).sqrt());
-        Some(difference / 4.0 * ratio / (1.0 - ratio))
-    }
-
-    /// Noise of the last picture, relative to its mean; `None` before there is a pass that has doubled the samples. Samples beyond the last
-    /// doubling are taken for independent ones.
+    /// Noise of the last picture, relative to its mean; `None` before there is a pass that has doubled the samples.
     pub(super) fn noise(&self) -> Option<f64> {
-        Some((self.squared()? * self.samples / self.all).sqrt())
+        // Linear from one doubling to the next: the last samples of the sequence are not stratified against the first.
+        let doubled = (self.all / self.samples - 1.0).min(1.0);
+        Some((self.squared? * (1.0 - doubled * (1.0 - RATIO))).sqrt())
     }
 
-    /// Number of samples to be added so that the noise is at most `aim`; `None` before there is an estimate.
+    /// Number of samples to be added so that the noise is at most `aim`; `None` before there is an estimate, and where twice the samples of the
+    /// last doubling do not suffice.
     pub(super) fn samples_to(&self, aim: f64) -> Option<u32> {
         if self.noise()? <= aim {
             return Some(0);
         }
-        let samples = self.samples * self.squared()? / (aim * aim);
-        Some((samples - self.all).ceil().max(1.0) as u32)
+        let doubled = (1.0 - aim * aim / self.squared?) / (1.0 - RATIO);
+        (doubled <= 1.0).then(|| (self.samples * (1.0 + doubled) - self.all).ceil().max(1.0) as u32)
     }
 }
 
@@ -127,7 +114,7 @@ mod tests {
         let found = estimate.noise().unwrap();
         assert!(range.contains(&(found / truth)), "{found} {truth}");
         assert_eq!(estimate.samples_to(found), Some(0));
-        assert!(estimate.samples_to(found / 2.0).is_some_and(|more| (90..=97).contains(&more)));
+        assert_eq!(estimate.samples_to(found / 2.0), None);
         // A last pass that does not double the samples.
         let more = estimate.samples_to(0.8 * found).unwrap();
         estimate.add(&before, &film(32 + more, &value));
@@ -139,7 +126,7 @@ mod tests {
     #[test]
     fn noise_of_independent_samples_is_found() {
         let random = |pixel: u32, sample: u32| f64::from(hash(hash(pixel) ^ sample)) / f64::from(u32::MAX);
-        check(random, 0.9..=1.1);
+        check(random, 0.85..=1.0);
     }
 
     #[test]

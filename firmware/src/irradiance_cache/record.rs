@@ -6,7 +6,7 @@ use super::gradient::{Coefficients, Distances, rotation};
 use crate::fixed_point::ColourSum;
 use crate::importance::CELLS;
 use crate::scene::Surface;
-use crate::vector::{from_upper_half, max, tangents, upper_half};
+use crate::vector::{from_upper_half, max, min, tangents, upper_half};
 
 /// State of a record, with its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,6 +100,9 @@ const FARTHEST: f32 = 1e18;
 const NEAREST: f32 = 1.0 / FARTHEST;
 /// Maximum distance of an interpolated point from the record's tangent plane, over `radius sqrt(allowed error)`.
 const PLANE_SHARE: f32 = 0.1;
+/// Maximum distance of an interpolated point from the record's tangent plane, over the harmonic mean distance: farther points may lie
+/// behind the surroundings, as the lower side of a lamp does for the ceiling in the gap above it.
+const FREE_SHARE: f32 = 0.5;
 
 impl Record {
     /// Unsurveyed record of a surface, with a radius of at least `least` metres.
@@ -136,12 +139,12 @@ impl Record {
 
     /// Error of the record at a point: `|p - p_i|^2 / R^2 + 1 - n n_i`, with `radius` R. It is of second order in
     /// distance and angle, as gradients remove the first-order error of Ward, Rubinstein, Clear 1988. Infinite off the
-    /// record's tangent plane and for normals 90 degrees or more apart.
+    /// record's tangent plane, by less the nearer its surroundings are, and for normals 90 degrees or more apart.
     pub(super) fn error(&self, radius: f32, allowed: f32, position: Vec3, normal: Vec3) -> f32 {
         let way = position - self.position;
         let cosine = self.normal.dot(normal);
         let height = way.dot(self.normal + normal) * 0.5;
-        let height_allowed = PLANE_SHARE * libm::sqrtf(allowed) * radius;
+        let height_allowed = min(PLANE_SHARE * libm::sqrtf(allowed) * radius, FREE_SHARE * self.distance);
         if cosine <= 0.0 || height > height_allowed || height < -height_allowed {
             return f32::INFINITY;
         }

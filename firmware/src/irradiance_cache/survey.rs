@@ -18,9 +18,12 @@ use crate::memory::{MemoryPort, Stage};
 use crate::render::{Context, eye};
 use crate::sampler::{Dimension, Pattern, unit_interval};
 use crate::scene::{Ray, Surface, closest_hit};
+use crate::vector::min;
 
-/// Minimum reach of a record, pixels.
+/// Minimum reach of a record, pixels: it bounds the cost in corners.
 const MIN_REACH: f32 = 3.0;
+/// Allowed error below which the minimum reach falls in proportion, so that the picture converges to that without records.
+const ERROR_OF_MIN_REACH: f32 = 0.1;
 
 impl<R: Capacity> IrradianceCache<R> {
     /// Does the next piece of the survey: one lattice cell, or one ray of one record. Returns whether it was the last.
@@ -161,7 +164,8 @@ fn new_record<M: MemoryPort>(
     // A surface seen in a mirror or through glass is not where the lattice point is.
     let surface = seen.filter(|surface| surface.reflection.has_lambertian() && surface.specular.is_none());
     Ok(surface.map(|surface| {
-        let least = MIN_REACH * eye::pixel_side(context, &surface) / libm::sqrtf(allowed);
+        let reach = MIN_REACH * min(allowed / ERROR_OF_MIN_REACH, 1.0) * eye::pixel_side(context, &surface);
+        let least = reach / libm::sqrtf(allowed);
         Record::new(&surface, least)
     }))
 }

@@ -59,9 +59,15 @@ pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitte
         ("photons", is_fitted && !stated.photons),
         ("gather-rays", is_fitted && !stated.gather_rays),
         ("shadow-rays", is_fitted && !stated.shadow_rays),
+        (
+            "ic-error",
+            is_fitted && !stated.cache && options.samples.aim().is_some_and(|aim| aim.noise.is_some()),
+        ),
     ];
     let needed = are_needed.into_iter().filter(|(_, is_needed)| *is_needed);
-    let words = needed.filter_map(|(name, _)| Some(format!("--{name} {}", pixels.get(name)?)));
+    let valued =
+        needed.filter_map(|(name, _)| Some((name, pixels.get(name).filter(|value| !value.is_null())?)));
+    let words = valued.map(|(name, value)| format!("--{name} {value}"));
     words.collect::<Vec<_>>().join(" ")
 }
 

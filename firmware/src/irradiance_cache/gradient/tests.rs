@@ -100,3 +100,10 @@ fn the_error_of_a_record_grows_with_distance_and_turn_and_is_infinite_off_its_pl
     assert!(error(Vec3::X * 0.1, Vec3::new(0.1, 1.0, 0.0)) > 0.01);
     assert!(error(Vec3::Y * 0.03, Vec3::Y).is_infinite() && error(Vec3::ZERO, Vec3::NEG_Y).is_infinite());
 }
+
+#[test]
+fn a_record_in_a_gap_says_nothing_of_the_light_beyond_it() {
+    let in_gap = Record { distance: 0.015, ..Record::new(&white(Vec3::ZERO, Vec3::Y), 1.0) };
+    assert!(in_gap.error(1.0, 0.04, Vec3::Y * 0.01, Vec3::Y).is_infinite());
+    assert!(in_gap.error(1.0, 0.04, Vec3::X * 0.1, Vec3::Y).is_finite());
+}
