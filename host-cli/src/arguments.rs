@@ -112,6 +112,10 @@ pub(crate) enum Command {
     #[command(subcommand)]
     Farm(FarmCommand),
     /// Walk through a scene: a page of the browser shows it while it is rendered
+    #[command(mut_arg("size", |size| {
+        let help = "Width and height of the picture, pixels [default: those of the page's window]";
+        size.help(help).long_help(help)
+    }))]
     View(Box<ViewOptions>),
     /// Tone-map an EXR picture to a PNG, as a render does
     Tonemap(TonemapOptions),

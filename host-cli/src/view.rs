@@ -80,8 +80,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     let start = Start {
         options: options.scene.clone(),
         quality: options.quality,
-        stated: options.stated(),
-        wish: Wish::new(settings, options.scene.assignments.clone()),
+        wish: Wish::new(settings, options.stated(), options.scene.assignments.clone()),
         sketch: Sketch::new(&scene),
         facts: SceneFacts::new(input::name(&options.scene), &scene),
         is_size_stated: options.picture.states_size(),
@@ -172,7 +171,12 @@ fn token() -> Result<String, Failure> {
 fn announce(options: &ViewOptions, address: SocketAddr, gate: &Gate) -> Result<(), Failure> {
     if !address.ip().is_loopback() {
         say(format_args!(
-            "photoncard: warning: other machines can reach {address}, and who has the address of the page can steer the view"
+            "photoncard: warning: other machines can reach {address}, and who has the address of the page can steer the view{}",
+            if address.ip().is_unspecified() {
+                ": there it begins with an address of this machine"
+            } else {
+                ""
+            }
         ));
     }
     print(&[gate.url()])?;

@@ -1,6 +1,6 @@
 //! Options of `photoncard view`.
 
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -22,7 +22,7 @@ pub(crate) struct ViewOptions {
     #[command(flatten)]
     pub(crate) scene: SceneOptions,
     /// Address of the page, this machine's own alone by default; port 0 is any free one
-    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080", help_heading = "Page")]
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080", value_parser = listen, help_heading = "Page")]
     pub(crate) listen: SocketAddr,
     /// Open the page in the browser of this machine
     #[arg(long, help_heading = "Page")]
@@ -67,6 +67,31 @@ impl ViewOptions {
             schedule: self.schedule.settings(),
             cards: self.cards.settings(),
             ..RenderSettings::default()
+        }
+    }
+}
+
+/// Parses the address of a page. No other name than `localhost` is looked up, which could take long.
+fn listen(text: &str) -> Result<SocketAddr, String> {
+    let local = || Some((Ipv4Addr::LOCALHOST, text.strip_prefix("localhost:")?.parse().ok()?).into());
+    let address = text.parse().ok().or_else(local);
+    address.ok_or_else(|| {
+        "the address is an IP address of this machine, or localhost, and a port, such as 127.0.0.1:8080"
+            .into()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_listens_at_an_ip_address_or_at_localhost() {
+        for text in ["127.0.0.1:8080", "localhost:8080"] {
+            assert_eq!(listen(text), Ok(([127, 0, 0, 1], 8080).into()));
+        }
+        for text in ["localhost", "localhost:65536", "example.org:80", "8080", ""] {
+            assert!(listen(text).unwrap_err().contains("localhost"), "{text}");
         }
     }
 }

@@ -4,7 +4,7 @@
 //! leads here is refused (DNS rebinding); in `Origin` it states whose script asks for a connection; and only who has seen the printed
 //! address knows the token.
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use super::http::{Head, Refusal};
 use super::page_files::{PageFile, page_file};
@@ -35,10 +35,16 @@ impl Gate {
         Self { address, token }
     }
 
-    /// Address of the page, with the token.
+    /// Address of the page on this machine, with the token.
     pub(super) fn url(&self) -> String {
         let Self { address, token } = self;
-        format!("http://{address}{PAGE}?token={token}")
+        let ip = match address.ip() {
+            IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
+            IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
+            ip => ip,
+        };
+        let here = SocketAddr::new(ip, address.port());
+        format!("http://{here}{PAGE}?token={token}")
     }
 
     /// Conditions of a request.
@@ -130,6 +136,8 @@ mod tests {
     fn the_page_takes_its_host_and_the_token() {
         let gate = gate("127.0.0.1:8080");
         assert_eq!(gate.url(), format!("http://127.0.0.1:8080/?token={TOKEN}"));
+        assert_eq!(self::gate("0.0.0.0:8080").url(), gate.url());
+        assert_eq!(self::gate("[::]:8080").url(), format!("http://[::1]:8080/?token={TOKEN}"));
         let page = format!("/?token={TOKEN}");
         for (target, headers, expected) in [
             (&*page, "Host: 127.0.0.1:8080\r\n", 200),

@@ -115,9 +115,8 @@ impl View {
     pub(super) fn fit(&mut self, task: &Task, fit: Option<&Fit>, now: Duration) {
         let photons = self.wish.settings.photons.count;
         if let Some(fit) = fit {
-            let stated = self.start.stated;
-            self.wish.fit(fit, stated);
-            self.start.wish.fit(fit, stated);
+            self.wish.fit(fit);
+            self.start.wish.fit(fit);
         }
         let has_other_photons = self.wish.settings.photons.count != photons;
         if has_other_photons {

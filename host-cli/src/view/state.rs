@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use glam::Vec3;
-use photoncard_driver::quality::{Quality, Stated};
+use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
 use serde_json::{Value, json};
@@ -26,7 +26,6 @@ pub(super) type PageNumber = u64;
 pub(super) struct Start {
     pub(super) options: SceneOptions,
     pub(super) quality: Quality,
-    pub(super) stated: Stated,
     pub(super) wish: Wish,
     pub(super) sketch: Sketch,
     pub(super) facts: SceneFacts,
@@ -93,7 +92,7 @@ impl View {
     pub(super) fn new(start: Start) -> Result<Self, RenderError> {
         let wish = start.wish.clone();
         wish.check_cards()?;
-        let is_fitted = start.stated == Stated::ALL || start.quality == Quality::Paper;
+        let is_fitted = wish.states_all() || start.quality == Quality::Paper;
         Ok(Self {
             first: start.sketch.with(&wish)?,
             scene: start.sketch.with(&wish)?,

@@ -18,7 +18,7 @@ pub(super) struct Wish {
     /// Settings of the settled picture.
     pub(super) settings: RenderSettings,
     /// Settings that the quality leaves as they are.
-    stated: Vec<Setting>,
+    stated: Stated,
     /// Assignments of the command line.
     given: Vec<String>,
     /// Names of properties with their values: changes by pages.
@@ -26,8 +26,13 @@ pub(super) struct Wish {
 }
 
 impl Wish {
-    pub(super) fn new(settings: RenderSettings, given: Vec<String>) -> Self {
-        Self { settings, stated: Vec::new(), given, edits: Vec::new() }
+    pub(super) fn new(settings: RenderSettings, stated: Stated, given: Vec<String>) -> Self {
+        Self { settings, stated, given, edits: Vec::new() }
+    }
+
+    /// Returns whether the quality leaves all settings as they are.
+    pub(super) fn states_all(&self) -> bool {
+        self.stated == Stated::ALL
     }
 
     /// All assignments, in the order in which they are applied.
@@ -57,17 +62,18 @@ impl Wish {
 
     /// Changes a setting.
     pub(super) fn change(&mut self, setting: Setting) {
-        self.stated.push(setting);
         let RenderSettings { photons, integrator, schedule, .. } = &mut self.settings;
+        let stated = &mut self.stated;
         match setting {
-            Setting::Photons(count) => photons.count = count,
-            Setting::Samples(samples) => integrator.samples = samples,
-            Setting::GatherRays(rays) => integrator.gather_rays = rays,
+            Setting::Photons(count) => (photons.count, stated.photons) = (count, true),
+            Setting::Samples(samples) => (integrator.samples, stated.samples) = (samples, true),
+            Setting::GatherRays(rays) => (integrator.gather_rays, stated.gather_rays) = (rays, true),
             Setting::Order(order) => schedule.order = order,
             Setting::Tile(side) => schedule.tile = (side > 0).then_some(side),
-            Setting::Cache(false) => integrator.irradiance_error = None,
-            Setting::Cache(true) => {
-                integrator.irradiance_error.get_or_insert(IRRADIANCE_ERROR);
+            Setting::Cache(is_on) => {
+                stated.cache = true;
+                let error = integrator.irradiance_error.unwrap_or(IRRADIANCE_ERROR);
+                integrator.irradiance_error = is_on.then_some(error);
             }
             Setting::Sampling(sampling) => integrator.sampling = sampling,
         }
@@ -92,7 +98,7 @@ impl Wish {
     pub(super) fn by_settings_of(&self, other: &Self) -> Self {
         let picture = self.settings.picture.clone();
         let settings = RenderSettings { picture, ..other.settings.clone() };
-        Self { settings, stated: other.stated.clone(), ..self.clone() }
+        Self { settings, stated: other.stated, ..self.clone() }
     }
 
     /// Asks for all layers that chips can render. Returns whether they were not.
@@ -105,17 +111,8 @@ impl Wish {
     }
 
     /// Takes over what pilot renders have found, except what is stated on the command line or by a page.
-    pub(super) fn fit(&mut self, fit: &Fit, mut stated: Stated) {
-        for setting in &self.stated {
-            match setting {
-                Setting::Photons(_) => stated.photons = true,
-                Setting::Samples(_) => stated.samples = true,
-                Setting::GatherRays(_) => stated.gather_rays = true,
-                Setting::Cache(_) => stated.cache = true,
-                Setting::Order(_) | Setting::Tile(_) | Setting::Sampling(_) => {}
-            }
-        }
-        fit.apply(&mut self.settings, stated);
+    pub(super) fn fit(&mut self, fit: &Fit) {
+        fit.apply(&mut self.settings, self.stated);
     }
 
     /// Returns whether photons or scene are others than those of another wish.

@@ -96,7 +96,7 @@ fn options(random: &mut Random) -> Vec<String> {
 
 /// A wish after some messages of a page, at random.
 fn wish(options: &ViewOptions, random: &mut Random) -> Wish {
-    let mut wish = Wish::new(options.settings(), options.scene.assignments.clone());
+    let mut wish = Wish::new(options.settings(), options.stated(), options.scene.assignments.clone());
     for _ in 0..random.below(6) {
         let mut place = |reach| [(); 3].map(|()| random.number(reach));
         match place(1.0)[0] {
@@ -152,7 +152,7 @@ fn the_command_line_shown_parses_to_the_settings_of_the_view() {
 #[test]
 fn numbers_and_words_survive_a_shell() {
     let view = view_options(&["it's a scene.gltf".into()]);
-    let mut wish = Wish::new(view.settings(), Vec::new());
+    let mut wish = Wish::new(view.settings(), view.stated(), Vec::new());
     wish.look([0.1, -2.0, 1e-7], [f32::MIN_POSITIVE, 16_777_216.0, -0.0], 33.3);
     let line = quoted(&words(&view.scene, view.quality, &wish));
     assert!(line.starts_with(r"photoncard render 'it'\''s a scene.gltf' --quality good "), "{line}");

@@ -96,8 +96,7 @@ impl World {
         let scene = scene();
         let start = Start {
             quality: options.quality,
-            stated: options.stated(),
-            wish: Wish::new(options.settings(), Vec::new()),
+            wish: Wish::new(options.settings(), options.stated(), Vec::new()),
             sketch: Sketch::new(&scene),
             facts: SceneFacts::new("scene.gltf".into(), &scene),
             is_size_stated: true,
