@@ -35,19 +35,25 @@ command -v cc >/dev/null || {
 rustup component add rustfmt clippy llvm-tools
 rustup target add "${target_of[@]}"
 
+can_install() { [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; }
+# install NAME PACKAGE...: installs packages of the distribution, or says by which command.
+install() {
+    local name=$1
+    shift
+    if ! can_install; then
+        echo "ci: $name is missing; run: sudo apt-get install $*" >&2
+        return 1
+    fi
+    apt-get update -qq
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
 # The machines that boards are tested on. Without them all else is tested, and the end says what is not.
 has_qemu() { command -v qemu-system-arm >/dev/null && command -v qemu-system-riscv32 >/dev/null; }
 install_qemu() {
-    local packages=(qemu-system-arm qemu-system-misc)
-    if [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then
-        echo "ci: QEMU is missing; run: sudo apt-get install ${packages[*]}" >&2
-        return 1
-    fi
-    export DEBIAN_FRONTEND=noninteractive
-    apt-get update -qq
     # A newer qemu-utils, as from backports, stands in the way of the distribution's machines.
-    apt-get install -y -qq --no-install-recommends "${packages[@]}" >/dev/null ||
-        apt-get install -y -qq --no-install-recommends "${packages[@]}" qemu-utils- >/dev/null
+    install QEMU qemu-system-arm qemu-system-misc ||
+        { can_install && install QEMU qemu-system-arm qemu-system-misc qemu-utils-; }
 }
 unset PHOTONCARD_SKIP_QEMU
 if ! has_qemu && ! { install_qemu && has_qemu; }; then
@@ -63,31 +69,13 @@ has_browser() {
     done
     return 1
 }
-install_browser() {
-    if [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then
-        echo "ci: Chromium is missing; run: sudo apt-get install chromium" >&2
-        return 1
-    fi
-    export DEBIAN_FRONTEND=noninteractive
-    apt-get update -qq
-    apt-get install -y -qq --no-install-recommends chromium >/dev/null
-}
 unset PHOTONCARD_SKIP_BROWSER
-if ! has_browser && ! { install_browser && has_browser; }; then
+if ! has_browser && ! { install Chromium chromium && has_browser; }; then
     export PHOTONCARD_SKIP_BROWSER="Chromium is missing and could not be installed"
     echo "ci: SKIPPED: the page of the live view is not tested: $PHOTONCARD_SKIP_BROWSER" >&2
 fi
 
 # The engines of farms that jobs are tested with: GNU parallel, in whose place a loop can stand, and the runner of Open Job Description.
-install_parallel() {
-    if [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then
-        echo "ci: GNU parallel is missing; run: sudo apt-get install parallel" >&2
-        return 1
-    fi
-    export DEBIAN_FRONTEND=noninteractive
-    apt-get update -qq
-    apt-get install -y -qq --no-install-recommends parallel >/dev/null
-}
 install_openjd() {
     local folder=${CARGO_TARGET_DIR:-target}/openjd
     python3 -m venv "$folder" && "$folder/bin/pip" install --quiet openjd-cli==0.8.0 || return 1
@@ -95,7 +83,7 @@ install_openjd() {
     export PHOTONCARD_OPENJD
 }
 farms_untested=()
-command -v parallel >/dev/null || install_parallel || farms_untested+=("GNU parallel")
+command -v parallel >/dev/null || install "GNU parallel" parallel || farms_untested+=("GNU parallel")
 unset PHOTONCARD_OPENJD
 command -v openjd >/dev/null || install_openjd || farms_untested+=("Open Job Description (pip install openjd-cli)")
 for engine in "${farms_untested[@]}"; do
