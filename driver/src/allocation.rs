@@ -42,6 +42,15 @@ pub(crate) fn check(bytes: u64) -> Result<(), OutOfMemory> {
     Ok(())
 }
 
+/// Zeros. The system gives their memory when it is first written, so that a film of which a part is rendered takes that part's.
+///
+/// # Errors
+/// If the allocation fails.
+pub(crate) fn zeros(bytes: usize) -> Result<Vec<u8>, OutOfMemory> {
+    check(bytes as u64)?;
+    Ok(vec![0; bytes])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -20,6 +20,7 @@ use photoncard_shared::message::Tile;
 pub use photoncard_shared::message::{LayerSums, Pixel as PixelValue, PixelLayers, PixelSums, SumScale};
 use thiserror::Error;
 
+use crate::allocation;
 use crate::sink::{FinishedTile, TileSink, pixel_positions};
 pub use crate::sums::{FilmPixel, SumFormat};
 
@@ -146,12 +147,9 @@ impl Film {
         let count = Self::check(width, height, window)?;
         let too_large = FilmError::Memory { width: window.width(), height: window.height() };
         let bytes = count.checked_mul(format.record_bytes()).ok_or(too_large)?;
-        let mut records = Vec::new();
-        let mut written = Vec::new();
-        records.try_reserve_exact(bytes).map_err(|_| too_large)?;
-        written.try_reserve_exact(count).map_err(|_| too_large)?;
-        records.resize(bytes, 0);
-        written.resize(count, false);
+        let records = allocation::zeros(bytes).map_err(|_| too_large)?;
+        allocation::check(count as u64).map_err(|_| too_large)?;
+        let written = vec![false; count];
         Ok(Self { width, height, window, format, records, written, missing: count })
     }
 

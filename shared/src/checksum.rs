@@ -2,7 +2,7 @@
 //!
 //! [`Checksum`], of frames, is CRC-32C (Castagnoli) by slicing-by-16 (Kounavis, Berry 2005): sixteen bytes at a time,
 //! with a table for each of the sixteen byte positions. [`ImageChecksum`], of chunks and of the whole image, is
-//! CRC-64/XZ (ECMA-182), byte by byte.
+//! CRC-64/XZ (ECMA-182) by slicing-by-8.
 
 use crate::address::Line;
 
@@ -40,12 +40,12 @@ const fn tables() -> [[u32; 256]; 16] {
     tables
 }
 
-/// `IMAGE_TABLE[b]`: the CRC-64/XZ remainder of byte `b`.
-static IMAGE_TABLE: [u64; 256] = image_table();
+/// `IMAGE_TABLES[n][b]`: the CRC-64/XZ remainder of byte `b` followed by `n` zero bytes.
+static IMAGE_TABLES: [[u64; 256]; 8] = image_tables();
 
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
-const fn image_table() -> [u64; 256] {
-    let mut table = [0; 256];
+const fn image_tables() -> [[u64; 256]; 8] {
+    let mut tables = [[0; 256]; 8];
     let mut byte = 0;
     while byte < 256 {
         let (mut sum, mut bit) = (byte as u64, 0);
@@ -53,10 +53,20 @@ const fn image_table() -> [u64; 256] {
             sum = (sum >> 1) ^ (IMAGE_POLYNOMIAL & (sum & 1).wrapping_neg());
             bit += 1;
         }
-        table[byte] = sum;
+        tables[0][byte] = sum;
         byte += 1;
     }
-    table
+    let mut place = 1;
+    while place < 8 {
+        byte = 0;
+        while byte < 256 {
+            let sum = tables[place - 1][byte];
+            tables[place][byte] = (sum >> 8) ^ tables[0][(sum & 0xff) as usize];
+            byte += 1;
+        }
+        place += 1;
+    }
+    tables
 }
 
 /// The table entry of a byte.
@@ -128,9 +138,11 @@ impl Default for ImageChecksum {
 impl ImageChecksum {
     /// Appends lines.
     pub fn update(&mut self, lines: &[Line]) {
-        for &byte in lines.iter().flat_map(|line| &line.0) {
-            let [low, ..] = self.0.to_le_bytes();
-            self.0 = (self.0 >> 8) ^ look_up(&IMAGE_TABLE, low ^ byte);
+        // A line is a multiple of eight bytes.
+        for &eight in lines.iter().flat_map(|line| line.0.as_chunks::<8>().0) {
+            let head = (u64::from_le_bytes(eight) ^ self.0).to_le_bytes();
+            let tables = IMAGE_TABLES.iter().rev();
+            self.0 = head.into_iter().zip(tables).fold(0, |sum, (byte, table)| sum ^ look_up(table, byte));
         }
     }
 

@@ -24,6 +24,11 @@ impl SharedImage {
         // Cards that receive another image store it themselves.
         let _ = self.0.set(image);
     }
+
+    /// The image, if it is given and fits `bytes`.
+    pub(super) fn within(&self, bytes: u32) -> Option<Arc<CardImage>> {
+        self.0.get().filter(|image| image.bytes() <= u64::from(bytes)).cloned()
+    }
 }
 
 /// DRAM that takes host memory only for written lines, and none for lines that the shared image holds.
@@ -47,6 +52,13 @@ enum Stored {
 impl EmulatedDram {
     pub(super) fn new(bytes: u32, shared: SharedImage) -> Self {
         Self { lines: Stored::Own(Vec::new()), limit: bytes / LINE_BYTES as u32, shared }
+    }
+
+    /// DRAM that holds an image from the start, of which it stores no copy.
+    pub(super) fn holding(image: Arc<CardImage>, bytes: u32) -> Self {
+        let written = image.lines().len();
+        let lines = Stored::Shared { image, written, beyond: Vec::new() };
+        Self { lines, ..Self::new(bytes, SharedImage::default()) }
     }
 
     #[inline(always)]

@@ -33,6 +33,7 @@ use self::tile_lines::TileMeter;
 use self::trace::{TraceFile, Traced};
 use crate::choice::choices;
 use crate::link::{LoopbackPort, loopback};
+use crate::pack::CardImage;
 
 /// Kind of the chip on an emulated card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,11 +140,12 @@ pub struct EmulatedCard {
     port: Option<LoopbackPort>,
     trace_has_failed: Option<Arc<AtomicBool>>,
     tile_lines: TileLines,
+    held: Option<Arc<CardImage>>,
 }
 
 impl EmulatedCard {
-    /// Starts a card. Without a model its memory has no caches and no counters. A card that is loaded with the image in
-    /// `shared` keeps no copy of it.
+    /// Starts a card. Without a model its memory has no caches and no counters, and holds the image in `shared` from the start if there
+    /// is one. A card that is loaded with that image keeps no copy of it.
     ///
     /// # Errors
     /// If the card's thread cannot be started.
@@ -158,11 +160,21 @@ impl EmulatedCard {
         let trace_has_failed = trace.map(TraceFile::has_failed);
         let tile_lines = TileLines::default();
         let noted = tile_lines.clone();
+        let held = shared.within(kind.budget().dram_bytes).filter(|_| model.is_none());
+        let dram = match &held {
+            Some(image) => EmulatedDram::holding(image.clone(), kind.budget().dram_bytes),
+            None => EmulatedDram::new(kind.budget().dram_bytes, shared),
+        };
         let thread = std::thread::Builder::new()
             .name("chip".into())
             .stack_size(THREAD_STACK)
-            .spawn(move || run(kind, model.map(|model| (model, noted)), shared, &mut card))?;
-        Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines })
+            .spawn(move || run(kind, model.map(|model| (model, noted)), dram, &mut card))?;
+        Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines, held })
+    }
+
+    /// The image that the card's memory holds from the start; `None` from the second call on.
+    pub fn take_held(&mut self) -> Option<Arc<CardImage>> {
+        self.held.take()
     }
 
     /// The host's end of the link.
@@ -212,11 +224,12 @@ impl Drop for EmulatedCard {
 /// # Panics
 /// If the chip panicked.
 pub fn serve_card(kind: EmulatedKind, mut port: impl Port + Send) -> std::io::Result<()> {
+    let dram = EmulatedDram::new(kind.budget().dram_bytes, SharedImage::default());
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
             .name("chip".into())
             .stack_size(THREAD_STACK)
-            .spawn_scoped(scope, || run(kind, None, SharedImage::default(), &mut port))?;
+            .spawn_scoped(scope, || run(kind, None, dram, &mut port))?;
         thread.join().map(drop).or_else(|panic| std::panic::resume_unwind(panic))
     })
 }
@@ -224,10 +237,9 @@ pub fn serve_card(kind: EmulatedKind, mut port: impl Port + Send) -> std::io::Re
 fn run(
     kind: EmulatedKind,
     model: Option<(MemoryModel, TileLines)>,
-    shared: SharedImage,
+    dram: EmulatedDram,
     port: &mut impl Port,
 ) -> Option<MemoryRecord> {
-    let dram = EmulatedDram::new(kind.budget().dram_bytes, shared);
     match model {
         None => serve_on(kind, dram, port, |_| None),
         Some((MemoryModel { caches, trace }, tile_lines)) => {

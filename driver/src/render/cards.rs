@@ -45,14 +45,19 @@ pub(super) struct Cards {
 
 impl Cards {
     /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it, the first card's with
-    /// the trace. A card that does not answer counts as lost.
+    /// the trace. A card that does not answer counts as lost. Emulated cards share `image`, the one to be rendered if the host has it already.
     ///
     /// # Errors
     /// If the trace cannot be written, or fewer cards are left than needed.
-    pub(super) fn connect(settings: &RenderSettings, observer: &dyn Observer) -> Result<Self, RenderError> {
+    pub(super) fn connect(
+        settings: &RenderSettings,
+        image: Option<Arc<CardImage>>,
+        observer: &dyn Observer,
+    ) -> Result<Self, RenderError> {
         let mut trace = settings.cards.trace.as_ref().map(TraceFile::create).transpose()?;
         let start = Instant::now();
         let shared = SharedImage::default();
+        image.into_iter().for_each(|image| shared.give(image));
         let CardSet { addresses, faults, .. } = &settings.cards;
         let caches = settings.modelled_caches();
         let each_card = (addresses.iter())
@@ -209,6 +214,11 @@ impl Executor for Cards {
         let (scene_image, _) = image.view();
         let limits = PixelLimits::new(&scene_image.header, frame);
         let job = Job { upload: self.upload(image), frame: *frame, limits };
+        for (_, GreetedCard { card, session, .. }) in &mut self.cards {
+            if card.take_held().is_some_and(|held| Arc::ptr_eq(&held, image)) {
+                session.assume(job.upload.checksum());
+            }
+        }
         let scheduler = settings.scheduler(tiles, self.cards.len());
         let mut scheduler = scheduler.with_kept(&film.lock().unwrap_or_else(PoisonError::into_inner));
         if frame.keep_records && frame.first_sample > 0 {

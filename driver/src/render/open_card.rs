@@ -1,5 +1,6 @@
 //! Open connections to cards.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use photoncard_shared::link::{Port, PortError};
@@ -8,6 +9,7 @@ use super::CardError;
 use super::address::{CardAddress, RemoteAddress};
 use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage, TileLines};
 use crate::link::{FaultInjector, LineFaults, LinkError, connect_tcp, connect_unix, open_serial};
+use crate::pack::CardImage;
 
 /// Host's end of a link.
 pub(super) type BoxedPort = Box<dyn Port + Send>;
@@ -30,7 +32,7 @@ enum Connection {
 
 impl OpenCard {
     /// Starts or connects to the card at an address, the first if there are several. An emulated card may have a model of
-    /// its memory, and shares the host's image. `index` is the card's number, on which injected faults depend.
+    /// its memory, and shares the host's image; without a model it holds it from the start. `index` is the card's number, on which injected faults depend.
     pub(super) fn open(
         index: usize,
         address: &CardAddress,
@@ -64,6 +66,14 @@ impl OpenCard {
     pub(super) fn go_on_with(&mut self, opened: BoxedPort) {
         if let Connection::Remote { port, .. } = &mut self.connection {
             *port = Some(opened);
+        }
+    }
+
+    /// Image that an emulated card's memory holds from the start; `None` from the second call on.
+    pub(super) fn take_held(&mut self) -> Option<Arc<CardImage>> {
+        match &mut self.connection {
+            Connection::Emulated(card) => card.take_held(),
+            Connection::Remote { .. } => None,
         }
     }
 

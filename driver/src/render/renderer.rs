@@ -14,7 +14,7 @@ use super::times::Times;
 use super::whole_frame::WholeFrame;
 use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
 use crate::film::{Film, FilmError};
-use crate::pack::PackedScene;
+use crate::pack::{CardImage, PackedScene};
 use crate::partial::PartialRender;
 use crate::photon_map::{PhotonSettings, check_image};
 use crate::scene::{FixedScene, Scene};
@@ -158,12 +158,14 @@ impl Renderer {
         let camera = settings.camera(scene)?;
         settings.check()?;
         let Self { cards, kept } = self;
+        let held = kept.as_ref().filter(|kept| choose.is_none() && kept.is_of(scene, settings));
+        let held = held.map(|kept| kept.prepared.image.clone());
         let mut whole_frame;
         let executor: &mut dyn Executor = if settings.schedule.order.is_of_whole_frame() {
             whole_frame = WholeFrame::new(settings)?;
             &mut whole_frame
         } else {
-            connected(cards, settings, observer)?
+            connected(cards, settings, held, observer)?
         };
         let budgets = executor.budgets();
         settings.check_budgets(&budgets)?;
@@ -214,26 +216,36 @@ fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
     }
 }
 
-/// The open cards, if they are those of the settings, or newly connected ones.
+/// The open cards, if they are those of the settings, or newly connected ones, of which emulated ones share `image`.
 fn connected<'c>(
     cards: &'c mut Option<Cards>,
     settings: &RenderSettings,
+    image: Option<Arc<CardImage>>,
     observer: &dyn Observer,
 ) -> Result<&'c mut Cards, RenderError> {
     // Others are closed before: a card serves one host at a time.
     let open = cards.take().filter(|cards| cards.serve(settings));
     Ok(cards.insert(match open {
         Some(open) => open,
-        None => Cards::connect(settings, observer)?,
+        None => Cards::connect(settings, image, observer)?,
     }))
 }
 
 /// A card image, and what it was made of.
+#[derive(Clone)]
 pub(super) struct Kept {
     /// [`Scene::checksum_without_cameras`].
     pub(super) scene: String,
     pub(super) photons: PhotonSettings,
     pub(super) prepared: Prepared,
+}
+
+impl Kept {
+    /// Returns whether the image is that of a scene, with the photons of the settings.
+    fn is_of(&self, scene: &FixedScene, settings: &RenderSettings) -> bool {
+        self.scene == scene.checksum_without_cameras()
+            && self.photons == settings.photon_settings_if(scene.is_specular())
+    }
 }
 
 /// Origin of the card image.
@@ -253,11 +265,7 @@ impl Source {
         kept: &mut Option<Kept>,
         times: &mut Times,
     ) -> Result<(RenderSettings, Self), RenderError> {
-        let photons = settings.photon_settings_if(scene.is_specular());
-        let is_same = |kept: &mut Kept| {
-            choose.is_none() && kept.photons == photons && kept.scene == scene.checksum_without_cameras()
-        };
-        if let Some(kept) = kept.take_if(is_same) {
+        if let Some(kept) = kept.take_if(|kept| choose.is_none() && kept.is_of(scene, settings)) {
             return Ok((settings.clone(), Self::Kept(kept)));
         }
         let packing = Instant::now();
