@@ -7,7 +7,6 @@ for program in slurmctld slurmd sbatch munged; do
 done
 [ "$(id -u)" = 0 ] || { echo "slurm.sh: it needs root, as slurmd does" >&2; exit 1; }
 chmod 755 "$work"
-daemons=()
 clean() {
     [ ${#daemons[@]} = 0 ] || kill "${daemons[@]}" 2>/dev/null || true
     wait
