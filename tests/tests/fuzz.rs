@@ -10,22 +10,6 @@ use photoncard_tests::fuzz::{NAMES, Random, Settings, Target, fuzz, target};
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// Number of inputs of each target: some seconds each.
-const INPUTS: [(&str, u64); NAMES.len()] = [
-    ("frames", 100_000),
-    ("messages", 500_000),
-    ("session", 20_000),
-    ("image", 6000),
-    ("gltf", 8000),
-    ("meshopt", 8000),
-    ("draco", 8000),
-    ("textures", 6000),
-    ("environments", 20_000),
-    ("exr", 8000),
-    ("parts", 4000),
-    ("prepared", 4000),
-];
-
 /// Lock that runs one test at a time, so that no allocations of another are counted.
 static ALONE: Mutex<()> = Mutex::new(());
 
@@ -40,17 +24,45 @@ fn settings(inputs: u64, patience: Duration) -> Settings {
     }
 }
 
-#[test]
-fn no_input_panics_hangs_or_takes_much_memory() {
+fn check(name: &str, inputs: u64) {
     let _alone = ALONE.lock();
-    for (name, inputs) in INPUTS {
-        let settings = settings(inputs, Duration::from_secs(60));
-        let report = fuzz(&target(name).expect("a target"), &settings);
-        println!("{name}: {report:?}");
-        assert!(report.failures.is_empty(), "{name}: {:#?}", report.failures);
-        assert_eq!(report.inputs, inputs, "{name}");
-        // Inputs that are all rejected at once would test nothing.
-        assert!(report.sound * 20 > inputs && report.sound < inputs, "{name}: {report:?}");
+    let report = fuzz(&target(name).expect("a target"), &settings(inputs, Duration::from_secs(60)));
+    println!("{report:?}");
+    assert!(report.failures.is_empty(), "{:#?}", report.failures);
+    assert_eq!(report.inputs, inputs);
+    // Inputs that are all rejected at once would test nothing.
+    assert!(report.sound * 20 > inputs && report.sound < inputs, "{report:?}");
+}
+
+/// A test for each target, of so many inputs: some seconds each, so that a busy machine has time for any of them.
+macro_rules! tests_of_targets {
+    ($($name:ident: $inputs:literal,)*) => {
+        $(#[test]
+        fn $name() {
+            super::check(stringify!($name), $inputs);
+        })*
+
+        #[test]
+        fn all_targets_are_tested() {
+            assert_eq!(super::NAMES, [$(stringify!($name)),*]);
+        }
+    };
+}
+
+mod no_input_panics_hangs_or_takes_much_memory {
+    tests_of_targets! {
+        frames: 100_000,
+        messages: 500_000,
+        session: 20_000,
+        image: 6_000,
+        gltf: 8_000,
+        meshopt: 8_000,
+        draco: 8_000,
+        textures: 6_000,
+        environments: 20_000,
+        exr: 8_000,
+        parts: 4_000,
+        prepared: 4_000,
     }
 }
 
