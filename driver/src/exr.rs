@@ -13,8 +13,8 @@ use exr::meta::BlockDescription;
 use exr::meta::header::Header;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Compression, Encoding, FlatSamples, Image, ImageAttributes,
-    IntegerBounds, Layer, LayerAttributes, LineOrder, MetaData, ReadChannels, ReadLayers, SmallVec, Text,
-    Vec2, WritableImage, f16, read as reader,
+    IntegerBounds, Layer, LayerAttributes, LineOrder, MetaData, ReadChannels, ReadLayers, SampleType,
+    SmallVec, Text, Vec2, WritableImage, f16, read as reader,
 };
 use thiserror::Error;
 
@@ -241,6 +241,22 @@ pub fn read_with_provenance(path: &Path) -> Result<(RgbImage, Option<String>), E
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
     decode_walled(path, &bytes, MAX_READ_PIXELS)
+}
+
+/// Reads the provenance of a picture of this program and the type of its samples, without its pixels; `None` if the file is none.
+pub fn read_form(path: &Path) -> Option<(String, SampleFormat)> {
+    let meta = || MetaData::read_from_file(path, false).map_err(drop);
+    let meta = foreign::decode(meta, || ()).ok()?;
+    let [header] = &meta.headers[..] else { return None };
+    let format = match header.channels.find_index_of_channel(&Text::new_or_none("R")?) {
+        Some(red) => match header.channels.list.get(red)?.sample_type {
+            SampleType::F16 => SampleFormat::Half,
+            SampleType::F32 => SampleFormat::Float,
+            SampleType::U32 => return None,
+        },
+        None => return None,
+    };
+    Some((provenance(&header.own_attributes)?, format))
 }
 
 /// [`read_rgb`] from the bytes of a file, with at most `most_pixels` pixels.

@@ -5,12 +5,15 @@
 //! images*, equations 1 and 2). A [`ToneCurve`] then compresses it, and it is clipped to 1 and encoded with the sRGB
 //! transfer curve. Negative radiance is shown black, infinite radiance white.
 
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 use crate::choice::{Choice, choices};
 use crate::exr::{PROVENANCE, ascii};
+use crate::foreign;
 use crate::output::{self, OutputError};
 
 /// Tone curve that compresses scaled radiance to the range of a screen.
@@ -144,6 +147,15 @@ pub fn write_png(
     let encoded = encode_png([width, height], &pixels, texts);
     let bytes = encoded.map_err(|source| PngError::Encode { path: path.to_owned(), source })?;
     Ok(output::write(path, &bytes)?)
+}
+
+/// Reads the provenance of a PNG of this mapping, without its pixels; `None` if the file is none.
+pub fn read_form(path: &Path, mapping: ToneMapping) -> Option<String> {
+    let file = BufReader::new(File::open(path).ok()?);
+    let reader = foreign::decode(|| png::Decoder::new(file).read_info().map_err(drop), || ()).ok()?;
+    let texts = &reader.info().uncompressed_latin1_text;
+    let text = |keyword: &str| texts.iter().find(|chunk| chunk.keyword == keyword).map(|chunk| &chunk.text);
+    text(PROVENANCE).filter(|_| text(TONE_MAPPING) == Some(&mapping.to_json())).cloned()
 }
 
 /// Bytes of a PNG file with text chunks.

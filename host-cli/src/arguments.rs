@@ -44,6 +44,7 @@ use photoncard_shared::message::PROTOCOL_VERSION;
 use self::choice::choice;
 pub(crate) use self::farm::{FarmCommand, FarmOptions};
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
+pub(crate) use self::frames::{FrameOptions, last_numbered, numbered};
 pub(crate) use self::lights::LightOptions;
 pub(crate) use self::merge::MergeOptions;
 pub(crate) use self::outputs::OutputOptions;

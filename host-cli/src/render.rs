@@ -2,8 +2,10 @@
 
 mod end;
 pub(crate) mod files;
+mod finished;
 mod frames;
 mod messages;
+mod moments;
 pub(crate) mod part;
 pub(crate) mod prepare;
 mod prepared;

@@ -192,6 +192,44 @@ fn the_template_of_open_job_description_renders_the_picture() {
     check_pictures(&room);
 }
 
+/// Compiles the job type with a stand-in for Flamenco's manager, and runs the commands of the tasks in an order of their dependencies.
+#[test]
+fn the_job_type_of_flamenco_renders_the_picture() {
+    let (room, _) = room();
+    let script = job(&room, "flamenco");
+    if !is_there("node", "--version") {
+        eprintln!("SKIPPED: node is missing, and the job type is not run");
+        return;
+    }
+    let manager = r#"
+        const { execFileSync } = require("child_process");
+        const author = {
+            Task: (name, type) => ({ commands: [], before: [],
+                addCommand(command) { this.commands.push(command); },
+                addDependency(task) { this.before.push(task); } }),
+            Command: (name, settings) => ({ name, settings }),
+        };
+        const tasks = [];
+        compileJob({ settings: {}, addTask: (task) => tasks.push(task) });
+        const done = new Set();
+        const run = (task) => {
+            if (done.has(task)) return;
+            done.add(task);
+            task.before.forEach(run);
+            for (const { name, settings } of task.commands) {
+                if (name !== "exec") throw new Error(name);
+                execFileSync(settings.exe, settings.args);
+            }
+        };
+        if (tasks.length !== 5) throw new Error("tasks: " + tasks.length);
+        tasks.reverse().forEach(run);
+    "#;
+    room.write("job.js", script + manager);
+    let outcome = Outcome::of(&in_path("node").arg(room.path("job.js")).output().unwrap());
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    check_pictures(&room);
+}
+
 #[test]
 fn progress_and_failure_are_lines_of_open_job_description() {
     let (room, _) = room();
@@ -245,11 +283,20 @@ fn frames_are_tasks_of_their_own() {
     };
     step("tasks", "6");
     step("merge", "");
+    let prepare = script.replacen(
+        "set -eu\n",
+        "set -eu\ndiff() { false; }\nmv() { printf 'mv %s\\n' \"$*\" >>said; }\n",
+        1,
+    );
+    room.write("job.sh", &prepare);
+    step("prepare", "");
     let said = String::from_utf8(room.read("said")).unwrap();
     let lines: Vec<&str> = said.lines().collect();
-    assert!(lines[0].contains("a.gltf --seed 3 --frames 10 --resume --part 3/4 -o d/p."), "{said}");
+    assert!(lines[0].contains("/cards/######.card --frames 10 --resume --part 3/4 -o d/p."), "{said}");
     assert!(lines[1].contains("/000009.") && lines[1].ends_with("of4.part -o d/p##.09.exr"), "{said}");
-    assert_eq!(lines.len(), 4, "{said}");
+    assert!(lines[4].starts_with("prepare a.gltf --seed 3 --frames 9-11 -o d/p."), "{said}");
+    assert!(lines[4].ends_with("/new/######.card"), "{said}");
+    assert_eq!(lines.len(), 6, "{said}");
     assert!(script.contains("--array=0-11"), "{script}");
 }
 

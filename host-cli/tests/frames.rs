@@ -168,6 +168,85 @@ fn statistics_and_provenance_name_the_frame() {
     );
 }
 
+/// Frames that are finished stay as they are, down to their time; those of other settings, forms or damaged files are rendered again.
+#[test]
+fn a_sequence_that_is_resumed_renders_what_is_not_finished() {
+    let scene = shipped("cornell-moving.glb");
+    // All that a quality would choose is stated: there is no pilot.
+    let small =
+        ["--size", "8x8", "--photons", "200", "--shadow-rays", "1", "--spp", "1", "--gather-rays", "4"];
+    for animation in ["pan", "play"] {
+        let room = Room::new();
+        let of = |options: &[&str]| {
+            let own = ["render", &scene, "-o", "a.#.exr", "-o", "a.#.png", "--animation", animation];
+            let outcome = room.run(&[&own[..], &small, options].concat());
+            assert_eq!(outcome.status, Some(0), "{options:?}: {}", outcome.stderr);
+            (1..=3)
+                .map(|frame| outcome.stderr.contains(&format!("frame {frame} is finished")))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(of(&["--frames", "1-3", "--resume"]), [false; 3]);
+        let read = || ["exr", "png"].map(|end| [1, 2, 3].map(|frame| room.read(&format!("a.{frame}.{end}"))));
+        let whole = read();
+        let again = |options: &[&str]| of(&[&["--frames", "1-3", "--resume"], options].concat());
+        assert_eq!(again(&[]), [true; 3]);
+        // One file of each frame is not what it was.
+        room.write("a.1.exr", &whole[0][0][..100]);
+        std::fs::remove_file(room.path("a.2.png")).unwrap();
+        assert_eq!(again(&[]), [false, false, true]);
+        assert!(read() == whole, "{animation}");
+        std::fs::copy(room.path("a.2.exr"), room.path("a.1.exr")).unwrap();
+        assert_eq!(again(&[]), [false, true, true]);
+        assert!(read() == whole, "{animation}");
+        assert_eq!(of(&["--frames", "1-3"]), [false; 3]);
+    }
+    let room = Room::new();
+    room.write("a.1.exr", []);
+    for options in [
+        &["--fps", "24"][..],
+        &["--fps", "25"],
+        &["--seed", "1"],
+        &["--max-distance", "0.3"],
+        &["--sample-type", "half"],
+        &["--exposure", "1"],
+        &["--aov", "Z"],
+        &["--set", "white.diffuse=0.1,0.1,0.1"],
+        &["--camera-at", "0,1,3"],
+    ] {
+        let own = ["render", &scene, "-o", "a.#.exr", "-o", "a.#.png", "--frames", "1", "--resume"];
+        let is_finished = || {
+            let outcome = room.run(&[&own[..], &small, options].concat());
+            assert_eq!(outcome.status, Some(0), "{options:?}: {}", outcome.stderr);
+            outcome.stderr.contains("frame 1 is finished")
+        };
+        assert_eq!([is_finished(), is_finished()], [false, true], "{options:?}");
+    }
+}
+
+/// Kept samples of frames are gone on from with the settings that a pilot has chosen for them, whatever frames are finished.
+#[test]
+fn samples_of_frames_are_added_with_the_settings_of_the_kept_ones() {
+    let room = Room::new();
+    let of = |options: &[&str]| {
+        let own = ["--quality", "draft", "--size", "8x8", "--photons", "200", "--animation", "pan"];
+        let frames = ["--frames", "1-2", "-o", "a.#.exr", "--stats", "a.#.json", "--keep-samples"];
+        let scene = shipped("cornell-moving.glb");
+        let outcome = room.run(&[&["render", &scene], &own[..], &frames, options].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        outcome.stderr
+    };
+    let settings = |frame: u32| statistics(&room, &format!("a.{frame}.json"))["provenance"]["pixels"].clone();
+    of(&["--spp", "2"]);
+    let before = settings(2);
+    assert!(!of(&["--spp", "4", "--resume"]).contains("is finished"));
+    for frame in [1, 2] {
+        let after = settings(frame);
+        assert_eq!((&after["spp"], &after["gather-rays"]), (&json!(4), &before["gather-rays"]));
+    }
+    let said = of(&["--spp", "4", "--resume"]);
+    assert_eq!(said.matches("is finished").count(), 2, "{said}");
+}
+
 #[test]
 fn a_damaged_partial_picture_of_one_frame_stops_nothing_else() {
     let room = Room::new();

@@ -71,6 +71,57 @@ fn a_picture_of_a_prepared_scene_is_that_of_the_scene() {
     }
 }
 
+/// Options of small frames.
+const FRAMES: [&str; 8] = ["--quality", "paper", "--photons", "300", "--gather-rays", "4", "--fps", "12"];
+
+#[test]
+fn frames_of_a_prepared_scene_are_those_of_the_scene() {
+    let moving = shipped("cornell-moving.glb");
+    for (animation, frames, card, files) in [
+        // Cameras move: all frames are in one file, whether it has a number or not.
+        ("pan", "3-5,20", "one.card", &["one.card"][..]),
+        ("pan", "3-5,20", "s.##.card", &["s.03.card"]),
+        // Meshes and lights move until frame 24.
+        ("play", "22-26", "s.###.card", &["s.022.card", "s.023.card", "s.024.card"]),
+    ] {
+        let room = Room::new();
+        let of_frames = ["--frames", frames, "--animation", animation];
+        let own = ["render", &moving, "-o", "a.##.exr", "-o", "a.##.png", "--size", "9x8"];
+        done(&room.run(&[&own[..], &of_frames, &FRAMES].concat()));
+        let whole = room.names();
+        let own = ["prepare", &moving, "-o", card, "--size", "9x8"];
+        done(&room.run(&[&own[..], &of_frames, &FRAMES].concat()));
+        let cards: Vec<String> = room.names().into_iter().filter(|name| name.ends_with("card")).collect();
+        assert_eq!(cards, files);
+        let own = ["render", "--prepared", card, "--size", "9x8", "--card", "emulated:2", "--frames"];
+        for frames in [&frames[..2], frames] {
+            let frames = frames.trim_end_matches('-');
+            done(&room.run(&[&own[..], &[frames, "-o", "b.##.exr", "-o", "b.##.png"]].concat()));
+        }
+        for name in &whole {
+            assert!(room.read(name) == room.read(&name.replacen('a', "b", 1)), "{animation}: {name}");
+        }
+        let outcome = room.run(&[&own[..], &["1", "-o", "c.#.exr"]].concat());
+        refused(&outcome, &["has no frame 1", "photoncard prepare"]);
+        let last = files.last().unwrap();
+        let outcome = room.run(&["render", "--prepared", last, "--size", "9x8", "-o", "c.exr"]);
+        refused(&outcome, &["scene of frames", "--frames"]);
+        let outcome = room.run(&[&own[..], &["25", "-o", "c.#.exr", "--fps", "12"]].concat());
+        refused(&outcome, &["--fps", "state it to photoncard prepare"]);
+    }
+}
+
+#[test]
+fn frames_whose_meshes_move_have_files_of_their_own() {
+    let room = Room::new();
+    let own = ["prepare", &shipped("cornell-moving.glb"), "-o", "a.card", "--animation", "play"];
+    refused(&room.run(&[&own[..], &["--frames", "1-2"], &FRAMES].concat()), &["a.card is one file", "####"]);
+    done(&room.run(&[&own[..], &["--frames", "2"], &FRAMES].concat()));
+    assert_eq!(room.names(), ["a.card"]);
+    let own = ["prepare", &shipped("cornell.gltf"), "-o", "b.card", "--frames", "1"];
+    refused(&room.run(&own), &["no animations"]);
+}
+
 #[test]
 fn options_of_what_is_prepared_are_refused_with_a_remedy() {
     let room = Room::new();

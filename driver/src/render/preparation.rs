@@ -13,6 +13,7 @@ use crate::photon_map::{self, MappedImage, PhotonTimes, map_photons};
 use crate::scene::FixedScene;
 
 /// Card image with the parameters that a frame derives from it.
+#[derive(Clone)]
 pub(super) struct Prepared {
     pub(super) image: Arc<CardImage>,
     /// Maximum distance of a gather, metres.

@@ -11,6 +11,8 @@ pub(crate) enum FarmCommand {
     Openjd(Box<FarmOptions>),
     /// Print a script that submits the job to Slurm
     Slurm(Box<FarmOptions>),
+    /// Print a job type of Flamenco, of this one job
+    Flamenco(Box<FarmOptions>),
     /// Print a script that runs the job by GNU parallel
     Parallel(Box<FarmOptions>),
 }

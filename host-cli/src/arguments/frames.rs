@@ -15,17 +15,14 @@ const MAX_FPS: f64 = 100_000.0;
 /// Maximum number of a frame.
 const MAX_FRAME: u32 = 999_999;
 
-/// Options that frames do not have: they are of one render.
-const NOT_OF_FRAMES: [&str; 4] = ["time", "noise", "trace", "prepared"];
-
 #[derive(Args)]
 #[command(next_help_heading = "Frames")]
 pub(crate) struct FrameOptions {
-    /// Render frames of the scene's animations: 1-240, several ranges 1-10,20, or every tenth frame 1-240x10
+    /// Frames of the scene's animations: 1-240, several ranges 1-10,20, or every tenth frame 1-240x10
     ///
     /// Frame N is the scene N / --fps seconds after the begin of its animations. Names of outputs have a run of #, which the frame's number
     /// replaces: out.####.exr. The settings that --quality finds are those of the scene as it stands, for all frames.
-    #[arg(long, value_name = "RANGES", value_parser = frames, conflicts_with_all = NOT_OF_FRAMES)]
+    #[arg(long, value_name = "RANGES", value_parser = frames)]
     frames: Option<Frames>,
     /// Animation that plays, by its name; may be repeated [default: all of the file]
     #[arg(long = "animation", value_name = "NAME", requires = "frames", hide_short_help = true)]
@@ -50,6 +47,12 @@ impl FrameOptions {
         &self.animations
     }
 
+    /// Settings that all frames share, of those that [`Self::provenance`] holds.
+    pub(crate) fn shared_provenance(&self) -> NamedSettings {
+        let named = [("fps", json!(self.fps())), ("animation", json!(self.animations))];
+        named.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
+    }
+
     fn fps(&self) -> f64 {
         self.fps.unwrap_or(FPS)
     }
@@ -61,14 +64,30 @@ impl FrameOptions {
 
     /// Settings that a frame's pixels depend on, besides the options of a picture.
     pub(crate) fn provenance(&self, frame: u32) -> NamedSettings {
-        let named =
-            [("frame", json!(frame)), ("fps", json!(self.fps())), ("animation", json!(self.animations))];
-        named.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
+        let own = ("frame".to_owned(), json!(frame));
+        self.shared_provenance().into_iter().chain([own]).collect()
     }
 }
 
+/// Path of the file of the greatest number up to a frame's that a pattern with a run of `#` names; the pattern itself without one.
+pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
+    if numbered(pattern, frame).is_none() {
+        return Some(pattern.to_owned());
+    }
+    let folder = pattern.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let of_pattern = |name: &std::ffi::OsStr| {
+        let digits = |number: &str| number.parse().ok().filter(|&number: &u32| number <= frame);
+        let (begin, end) = pattern.file_name()?.to_str()?.rsplit_once('#')?;
+        let number = name.to_str()?.strip_prefix(begin.trim_end_matches('#'))?.strip_suffix(end)?;
+        digits(number).filter(|&number| numbered(pattern, number).is_some_and(|path| path.ends_with(name)))
+    };
+    let entries = std::fs::read_dir(folder).ok()?.flatten();
+    let last = entries.filter_map(|entry| of_pattern(&entry.file_name())).max()?;
+    numbered(pattern, last)
+}
+
 /// Path of a frame's output: the last run of `#` in the file's name becomes the number, with zeros before it. `None` without a `#`.
-pub(super) fn numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
+pub(crate) fn numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     let name = pattern.file_name()?.to_str()?;
     let end = name.rfind('#')? + 1;
     let begin = name[..end].trim_end_matches('#').len();
@@ -134,6 +153,29 @@ mod tests {
         ] {
             assert_eq!(numbered(Path::new(pattern), frame), expected.map(PathBuf::from), "{pattern}");
         }
+    }
+
+    #[test]
+    fn the_last_file_up_to_a_frame_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.0003.card", "a.0010.card", "a.12.card", "a.10000.card", "b.0004.card", "a.+005.card"]
+        {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let pattern = folder.path().join("a.####.card");
+        for (frame, expected) in [
+            (2, None),
+            (3, Some("a.0003.card")),
+            (9, Some("a.0003.card")),
+            (9_999, Some("a.0010.card")),
+            (10_001, Some("a.10000.card")),
+        ] {
+            let expected = expected.map(|name| folder.path().join(name));
+            assert_eq!(last_numbered(&pattern, frame), expected, "{frame}");
+        }
+        let one = Path::new("absent/one.card");
+        assert_eq!(last_numbered(one, 7).as_deref(), Some(one));
+        assert_eq!(last_numbered(Path::new("absent/#.card"), 7), None);
     }
 
     #[test]

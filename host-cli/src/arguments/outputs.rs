@@ -23,7 +23,8 @@ pub(crate) struct OutputOptions {
     pub(crate) pictures: Vec<PictureOutput>,
     /// Continue a render that was stopped or has failed
     ///
-    /// Finished tiles are kept beside the picture, in OUT.exr.partial, until the picture is written.
+    /// Finished tiles are kept beside the picture, in OUT.exr.partial, until the picture is written. Frames whose files are there and of these
+    /// settings are not rendered again.
     #[arg(long)]
     resume: bool,
     /// Type of the EXR's samples; Z and gathers are always float [default: float]
@@ -40,6 +41,11 @@ pub(crate) struct OutputOptions {
 }
 
 impl OutputOptions {
+    /// Returns whether a render goes on with what is there.
+    pub(crate) fn resumes(&self) -> bool {
+        self.resume
+    }
+
     /// File of finished tiles.
     pub(super) fn partial(&self) -> Option<PartialSettings> {
         Some(PartialSettings { path: self.partial_path(), resume: self.resume })

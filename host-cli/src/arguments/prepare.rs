@@ -10,6 +10,7 @@ use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
 
 use super::choice::choice;
 use super::files::file;
+use super::frames::FrameOptions;
 use super::integrator::IntegratorOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
@@ -22,11 +23,16 @@ pub(crate) struct PrepareOptions {
     #[command(flatten)]
     pub(crate) scene: SceneOptions,
     /// The file to write, for photoncard render --prepared
+    ///
+    /// Frames in which nothing but cameras moves share a file. Where meshes or lights move, a frame that differs from the one before has a file of its
+    /// own: the name has a run of #, which the frame's number replaces.
     #[arg(short, long, value_name = "OUT.card", value_parser = file())]
     pub(crate) output: PathBuf,
     /// Quality of the pictures, by which the options that are not stated are chosen
     #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
     pub(crate) quality: Quality,
+    #[command(flatten)]
+    pub(crate) frames: FrameOptions,
     #[command(flatten)]
     pub(crate) picture: PictureOptions,
     #[command(flatten)]

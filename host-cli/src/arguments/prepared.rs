@@ -4,7 +4,7 @@ use clap::Args;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
 /// Options of what is prepared.
-pub(crate) const OF_PREPARATION: [&str; 24] = [
+pub(crate) const OF_PREPARATION: [&str; 26] = [
     "assignments",
     "energy_compensation",
     "variant",
@@ -29,6 +29,8 @@ pub(crate) const OF_PREPARATION: [&str; 24] = [
     "time",
     "noise",
     "keep_samples",
+    "animations",
+    "fps",
 ];
 
 #[derive(Args)]
@@ -36,7 +38,7 @@ pub(crate) struct PreparedOption {
     /// SCENE is a file that photoncard prepare has written: no glTF file is read, and no photon is traced
     ///
     /// The scene, its photons, rays and samples are those that were stated to photoncard prepare. Options of the picture and of its camera are stated as
-    /// for a glTF file.
+    /// for a glTF file. Of frames that were prepared --frames states those to render, and SCENE has a run of # where there is a file for each.
     #[arg(long, help_heading = "Scene", conflicts_with_all = OF_PREPARATION)]
     pub(crate) prepared: bool,
 }
@@ -51,11 +53,7 @@ pub(super) fn with_remedy(mut error: Error) -> Error {
         })
     };
     if error.kind() == ErrorKind::ArgumentConflict && names("--prepared") {
-        let remedy = if names("--frames") {
-            "leave --prepared out, and give the glTF file: a prepared scene stands still"
-        } else {
-            "state it to photoncard prepare: the prepared scene depends on it"
-        };
+        let remedy = "state it to photoncard prepare: the prepared scene depends on it";
         let remedy = ContextValue::StyledStrs(vec![remedy.into()]);
         let _ = error.insert(ContextKind::Suggested, remedy);
     }

@@ -25,7 +25,7 @@ pub(crate) struct SampleOptions {
 }
 
 /// Options that a picture by passes does not have: their number of samples, memory or tiles are of one render.
-const NOT_BY_PASSES: [&str; 5] = ["spp", "resume", "cache", "trace", "verify"];
+const NOT_BY_PASSES: [&str; 6] = ["spp", "resume", "cache", "trace", "verify", "frames"];
 
 impl SampleOptions {
     /// Aim of the passes; `None` for a picture of a stated number of samples.

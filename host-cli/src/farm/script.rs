@@ -7,11 +7,10 @@ use crate::shell::quoted;
 /// has them begins in the job's home.
 pub(super) fn functions(job: &Job, extra: &str) -> String {
     let parts = job.parts;
-    let folder = word(&job.folder);
+    let (folder, prepare) = (word(&job.folder), prepare(job, extra));
     match job.frames {
         None => format!(
-            "folder={folder}\n\n{}\n{}\n{}\n{}",
-            prepare(job, extra),
+            "folder={folder}\n\n{prepare}\n{}\n{}\n{}",
             part(job, extra),
             format_args!(
                 "merge() {{ photoncard merge \"$folder\"/*of{parts}.part{}{extra}; }}\n",
@@ -20,8 +19,7 @@ pub(super) fn functions(job: &Job, extra: &str) -> String {
             "task() { part \"$(($1 + 1))\"; }\n",
         ),
         Some(Frames { first, last }) => format!(
-            "folder={folder}\n\n{}\n{}\n{}\n{}",
-            "prepare() { mkdir -p \"$folder\"; }\n",
+            "folder={folder}\n\n{prepare}\n{}\n{}\n{}",
             part_of_frames(job, extra),
             merge_frames(job, [first, last], extra),
             format_args!("task() {{ part \"$(($1 % {parts} + 1))\" \"$(({first} + $1 / {parts}))\"; }}\n"),
@@ -39,18 +37,28 @@ fn word(word: &str) -> String {
     quoted(word).replace('{', "{''").replace('}', "}''")
 }
 
+/// Name of the prepared scene, in the folder of cards.
+fn card(job: &Job) -> &'static str {
+    if job.frames.is_some() { "######.card" } else { "scene.card" }
+}
+
 /// The scene is prepared again by each job. Parts of another scene under its name are removed.
 fn prepare(job: &Job, extra: &str) -> String {
     let words = [&job.words.scene, &job.words.prepare, &job.words.both].map(|list| words(list)).concat();
+    let frames =
+        job.frames.map_or(String::new(), |Frames { first, last }| format!(" --frames {first}-{last}"));
+    let card = card(job);
     format!(
         "prepare() {{
-    mkdir -p \"$folder\"
-    photoncard prepare{words}{extra} -o \"$folder/new.card\"
-    if cmp -s \"$folder/new.card\" \"$folder/scene.card\"; then
-        rm -f \"$folder/new.card\"
+    rm -rf \"$folder/new\"
+    mkdir -p \"$folder/new\"
+    photoncard prepare{words}{frames}{extra} -o \"$folder/new/{card}\"
+    if diff -r \"$folder/new\" \"$folder/cards\" >/dev/null 2>&1; then
+        rm -rf \"$folder/new\"
     else
-        rm -f \"$folder\"/*.part \"$folder\"/*.part.partial \"$folder/joblog\"
-        mv \"$folder/new.card\" \"$folder/scene.card\"
+        find \"$folder\" -name '*.part*' -exec rm -f '{{}}' +
+        rm -rf \"$folder/joblog\" \"$folder/cards\"
+        mv \"$folder/new\" \"$folder/cards\"
     fi
 }}
 "
@@ -58,28 +66,35 @@ fn prepare(job: &Job, extra: &str) -> String {
 }
 
 fn part(job: &Job, extra: &str) -> String {
-    let words = [&job.words.both, &job.words.render].map(|list| words(list)).concat();
     let part = format!("\"$folder/$1of{}.part\"", job.parts);
     format!(
         "part() {{
     [ -e {part} ] ||
-        photoncard render --prepared \"$folder/scene.card\"{words}{extra} --resume --part \"$1/{}\" -o {part}
+        {} --resume --part \"$1/{}\" -o {part}
 }}
 ",
+        render(job, extra),
         job.parts
     )
 }
 
-/// Frames are rendered from the scene's file, which has its animations.
+/// A part of one frame, or of the frames A-B.
 fn part_of_frames(job: &Job, extra: &str) -> String {
-    let Job { words: all, parts, .. } = job;
-    let words = [&all.scene, &all.prepare, &all.both, &all.render].map(|list| words(list)).concat();
+    let parts = job.parts;
+    let render = render(job, extra);
     format!(
         "part() {{
-    photoncard render{words}{extra} --frames \"$2\" --resume --part \"$1/{parts}\" -o \"$folder/######.$1of{parts}.part\"
+    [ \"${{2%-*}}\" != \"${{2#*-}}\" ] || [ ! -e \"$folder/$(printf %06d \"${{2%-*}}\").$1of{parts}.part\" ] || return 0
+    {render} --frames \"$2\" --resume --part \"$1/{parts}\" -o \"$folder/######.$1of{parts}.part\"
 }}
 "
     )
+}
+
+/// Beginning of the command that renders a part.
+fn render(job: &Job, extra: &str) -> String {
+    let words = [&job.words.both, &job.words.render].map(|list| words(list)).concat();
+    format!("photoncard render --prepared \"$folder/cards/{}\"{words}{extra}", card(job))
 }
 
 fn merge_frames(job: &Job, [first, last]: [u32; 2], extra: &str) -> String {

@@ -8,13 +8,14 @@ use photoncard_driver::quality::Fit;
 use photoncard_driver::render::{
     Integrator, Phase, PhotonMaps, RenderError, RenderSettings, Renderer, Rendering,
 };
-use photoncard_driver::scene::{FixedScene, Scene};
+use photoncard_driver::scene::Scene;
 
-use super::steps::{Finished, assigned, chosen, dram_bytes, finish, on_threads, say_kept, view};
-use super::{files, messages};
+use super::moments::Moments;
+use super::steps::{Finished, chosen, dram_bytes, finish, on_threads, say_kept, view};
+use super::{files, finished, messages};
 use crate::arguments::{OutputOptions, RenderOptions};
 use crate::failure::Failure;
-use crate::input::{self, Input};
+use crate::input;
 use crate::progress::Progress;
 
 /// Renders the frames of these numbers, and writes their pictures and all other requested outputs.
@@ -25,6 +26,11 @@ pub(super) fn run(options: &RenderOptions, numbers: impl Iterator<Item = u32>) -
     let frames: Vec<_> = frames.collect::<Result<_, Failure>>()?;
     let mut sequence = Sequence::open(options, &mut settings)?;
     let count = frames.len();
+    if frames.iter().any(|(_, outputs)| finished::may_be(outputs)) {
+        // Settings of kept samples are those of the first frame, as without finished ones.
+        settings.outputs = frames.first().map(|(_, first)| options.tile_outputs(first)).unwrap_or_default();
+        sequence.settle(&mut settings)?;
+    }
     for (number, outputs) in frames {
         sequence.render(number, &outputs, &mut settings)?;
     }
@@ -36,7 +42,11 @@ pub(super) fn run(options: &RenderOptions, numbers: impl Iterator<Item = u32>) -
 }
 
 /// Outputs of a frame, which can be written.
-fn outputs_of(options: &RenderOptions, number: u32) -> Result<OutputOptions, Failure> {
+pub(super) fn outputs_of(options: &RenderOptions, number: u32) -> Result<OutputOptions, Failure> {
+    if options.cards.trace.is_some() {
+        let report = MietteDiagnostic::new("--trace is of one picture, and --frames are several");
+        return Err(Failure::Input(Report::new(report.with_help("trace a picture without --frames"))));
+    }
     let outputs = options.outputs.of_frame(number).map_err(|pattern| {
         let text = format!("the output {} has no place for the number of a frame", pattern.display());
         let report = MietteDiagnostic::new(text);
@@ -49,11 +59,7 @@ fn outputs_of(options: &RenderOptions, number: u32) -> Result<OutputOptions, Fai
 /// The frames of a scene, and what they share.
 struct Sequence<'a> {
     options: &'a RenderOptions,
-    input: Input,
-    /// The scene of the last frame; at first that at rest, if nothing but cameras moves.
-    scene: FixedScene<'static>,
-    /// True if a frame has the geometry and the lights of the others.
-    is_still: bool,
+    moments: Moments<'a>,
     /// The scene as it stands, by which the settings are chosen; `None` once they are.
     rest: Option<Scene>,
     renderer: Renderer,
@@ -65,20 +71,14 @@ struct Sequence<'a> {
 impl<'a> Sequence<'a> {
     fn open(options: &'a RenderOptions, settings: &mut RenderSettings) -> Result<Self, Failure> {
         let start = Instant::now();
-        let input = Input::open(&options.scene, dram_bytes(settings))?;
-        check_animations(&input)?;
-        let is_still = input.file.only_cameras_move(options.frames.animations()).map_err(Failure::input)?;
-        let rest = assigned(&options.scene, input.at_rest()?)?;
+        let (moments, rest) = Moments::open(&options.scene, &options.frames, dram_bytes(settings))?;
         view(options, settings, &rest)?;
-        let scene = if is_still { rest.clone() } else { Scene::default() };
         let progress = Progress::of_frames(options.quiet, settings.cards.count())
             .map_err(|error| Failure::work_error(&error))?
             .in_form(options.progress, Phase::Tiles);
         Ok(Self {
             options,
-            input,
-            scene: scene.into(),
-            is_still,
+            moments,
             rest: Some(rest),
             renderer: Renderer::default(),
             progress,
@@ -94,9 +94,17 @@ impl<'a> Sequence<'a> {
         settings: &mut RenderSettings,
     ) -> Result<(), Failure> {
         let start = Instant::now();
-        self.move_to(number)?;
+        self.moments.move_to(number)?;
         settings.outputs = self.options.tile_outputs(outputs);
         self.scene_seconds += start.elapsed().as_secs_f64();
+        let inputs = input::provenance(&self.options.scene);
+        let inputs = inputs.into_iter().chain(self.options.frames.provenance(number)).collect();
+        if finished::is_finished(self.options, outputs, settings, self.moments.scene(), &inputs) {
+            if !self.options.quiet {
+                messages::say_finished(outputs, number);
+            }
+            return Ok(());
+        }
         let result = on_threads(self.options.threads, || self.picture(settings))?;
         self.progress.finish();
         let result = result.inspect_err(|error| say_kept(error, &self.progress, outputs));
@@ -107,7 +115,7 @@ impl<'a> Sequence<'a> {
         let finished = Finished {
             rendering,
             scene_seconds: std::mem::take(&mut self.scene_seconds),
-            inputs: input::provenance(&self.options.scene),
+            inputs,
             quality: self.options.quality,
             fit,
             frame: Some(number),
@@ -115,24 +123,23 @@ impl<'a> Sequence<'a> {
         finish(self.options, outputs, finished)
     }
 
-    /// Places the scene as it is in a frame. Where nothing but cameras moves, all else of it stays.
-    fn move_to(&mut self, number: u32) -> Result<(), Failure> {
-        let moment = self.options.frames.moment(number);
-        if !self.is_still {
-            self.scene = assigned(&self.options.scene, self.input.at(&moment)?)?.into();
-            return Ok(());
-        }
-        let cameras = self.input.file.cameras_at(&moment).map_err(Failure::input)?;
-        // Without cameras in the file the scene is seen as at rest.
-        if !cameras.is_empty() {
-            self.scene.set_cameras(cameras);
-        }
+    /// Chooses the settings before any frame is rendered, as frames that are finished are known by them.
+    fn settle(&mut self, settings: &mut RenderSettings) -> Result<(), Failure> {
+        let Self { options, rest, progress, .. } = self;
+        let Some(rest) = rest.take() else { return Ok(()) };
+        let (photons, integrator) = on_threads(options.threads, || {
+            let unfitted = options.unfitted(settings)?;
+            let fit = options.fit(&rest, &PackedScene::new(&rest)?, &unfitted, progress)?;
+            Ok::<_, RenderError>(chosen(options, unfitted, fit.as_ref(), progress))
+        })??;
+        (settings.photons, settings.integrator) = (photons, integrator);
         Ok(())
     }
 
     /// The picture of the scene. Its settings are chosen with the first one, by the scene as it stands, whichever frame that is.
     fn picture(&mut self, settings: &mut RenderSettings) -> Result<(Rendering, Option<Fit>), RenderError> {
-        let Self { options, scene, is_still, rest, renderer, progress, .. } = self;
+        let Self { options, moments, rest, renderer, progress, .. } = self;
+        let scene = moments.scene();
         progress.begin_frame();
         let Some(rest) = rest.take() else {
             return Ok((renderer.render_fixed(scene, settings, progress)?, None));
@@ -140,7 +147,7 @@ impl<'a> Sequence<'a> {
         let found = std::cell::RefCell::new(None);
         let choose = |packed: &PackedScene| {
             let unfitted = options.unfitted(settings)?;
-            let fit = if *is_still {
+            let fit = if moments.is_still() {
                 options.fit(&rest, packed, &unfitted, progress)
             } else {
                 options.fit(&rest, &PackedScene::new(&rest)?, &unfitted, progress)
@@ -155,15 +162,4 @@ impl<'a> Sequence<'a> {
         (settings.photons, settings.integrator) = (photons, integrator);
         Ok((rendering, fit))
     }
-}
-
-/// Checks that the file has animations.
-fn check_animations(input: &Input) -> Result<(), Failure> {
-    if input.file.is_animated() {
-        return Ok(());
-    }
-    let report = MietteDiagnostic::new("the scene has no animations, and all of its frames are alike");
-    Err(Failure::Input(Report::new(
-        report.with_help("leave out --frames, or export the scene with its animations"),
-    )))
 }

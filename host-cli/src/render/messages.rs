@@ -36,13 +36,12 @@ pub(super) fn say_loaded(
 
 /// Prints what was prepared, and the view of it.
 pub(super) fn say_prepared(
-    options: &RenderOptions,
+    path: &Path,
     settings: &RenderSettings,
     inputs: &NamedSettings,
     camera: &Camera,
     misfit: Option<&String>,
 ) {
-    let path = &options.scene.path;
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let scene = inputs.get("scene").and_then(Value::as_str).unwrap_or_default();
     let RenderSettings { picture: Picture { width, height, .. }, photons, .. } = settings;
@@ -137,6 +136,12 @@ pub(super) fn say_done(outputs: &OutputOptions, rendering: &Rendering, frame: Op
 /// Prints the end of all frames.
 pub(super) fn say_frames(count: usize, seconds: f64) {
     say(format_args!("photoncard: {} in {}", counted(count, "frame"), duration(seconds)));
+}
+
+/// Prints that the files of a frame are there.
+pub(super) fn say_finished(outputs: &OutputOptions, number: u32) {
+    let path = outputs.pictures.first().map_or(Path::new(""), |picture| &picture.path);
+    say(format_args!("photoncard: {}: frame {number} is finished", path.display()));
 }
 
 /// Costs of a frame, and of what it does not share with the one before.

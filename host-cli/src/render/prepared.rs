@@ -1,51 +1,141 @@
-//! A render of a prepared scene.
+//! Renders of a prepared scene.
 
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::Quality;
-use photoncard_driver::render::{NamedSettings, Phase, PreparedScene};
-use serde_json::Value;
+use photoncard_driver::render::{NamedSettings, Phase, PreparedScene, RenderError, Renderer};
+use serde_json::{Value, json};
 
+use super::finished::is_finished;
+use super::frames::outputs_of;
 use super::steps::{Finished, finish, on_threads, say_kept};
 use super::{files, messages};
-use crate::arguments::RenderOptions;
+use crate::arguments::{OutputOptions, RenderOptions, last_numbered};
 use crate::failure::Failure;
 use crate::progress::Progress;
 
-/// Renders a prepared scene, and writes the picture and all other requested outputs.
+/// Renders a prepared scene, or frames of one, and writes the pictures and all other requested outputs.
 pub(super) fn run(options: &RenderOptions) -> Result<(), Failure> {
-    files::check(options, &options.outputs)?;
-    let start = Instant::now();
-    let prepared = PreparedScene::open(&options.scene.path).map_err(Failure::input)?;
-    let (quality, inputs) = notes(options, &prepared)?;
-    let mut settings = prepared.settings(options.settings_of(quality));
-    let camera = settings.camera(prepared.scene())?;
-    let misfit = options.picture.fit(&camera, &mut settings.picture);
-    if !options.quiet {
-        messages::say_prepared(options, &settings, &inputs, &camera, misfit.as_ref());
+    let outputs: Vec<(Option<u32>, OutputOptions)> = match options.frames.numbers() {
+        Some(numbers) => {
+            let outputs = numbers.map(|number| Ok((Some(number), outputs_of(options, number)?)));
+            outputs.collect::<Result<_, Failure>>()?
+        }
+        None => {
+            files::check(options, &options.outputs)?;
+            vec![(None, options.outputs.clone())]
+        }
+    };
+    let count = options.settings().cards.count();
+    let progress =
+        if outputs.len() > 1 { Progress::of_frames } else { Progress::start }(options.quiet, count)
+            .map_err(|error| Failure::work_error(&error))?
+            .in_form(options.progress, Phase::Tiles);
+    let (start, pictures) = (Instant::now(), outputs.len());
+    let mut last: Option<OpenScene> = None;
+    for (frame, outputs) in outputs {
+        let path = path_of(&options.scene.path, frame)?;
+        let scene = match last.take().filter(|scene| scene.path == path) {
+            Some(scene) => last.insert(scene),
+            None => last.insert(OpenScene::open(options, path, frame.is_none())?),
+        };
+        scene.render(options, frame, &outputs, &progress)?;
     }
-    let scene_seconds = start.elapsed().as_secs_f64();
-    let progress = Progress::start(options.quiet, settings.cards.count())
-        .map_err(|error| Failure::work_error(&error))?
-        .in_form(options.progress, Phase::Tiles);
-    let (mut renderer, scene) = prepared.into_renderer();
-    let result = on_threads(options.threads, || renderer.render_fixed(&scene, &settings, &progress))?;
-    progress.finish();
-    let rendering = result.inspect_err(|error| say_kept(error, &progress, &options.outputs))?;
-    let finished = Finished { rendering, scene_seconds, inputs, quality, fit: None, frame: None };
-    finish(options, &options.outputs, finished)
+    if pictures > 1 && !options.quiet {
+        messages::say_frames(pictures, start.elapsed().as_secs_f64());
+    }
+    Ok(())
 }
 
-/// Quality and inputs of a prepared scene.
-fn notes(options: &RenderOptions, prepared: &PreparedScene) -> Result<(Quality, NamedSettings), Failure> {
-    let quality = prepared.notes().get("quality").and_then(|name| Quality::of_name(name.as_str()?).ok());
-    let inputs = prepared.notes().get("inputs").and_then(Value::as_object);
-    quality.zip(inputs.cloned()).ok_or_else(|| {
-        let text = format!("{} was not prepared by this command", options.scene.path.display());
-        Failure::Input(Report::new(
-            MietteDiagnostic::new(text).with_help("prepare the scene by photoncard prepare"),
-        ))
-    })
+/// Path of the prepared scene that has a frame.
+fn path_of(pattern: &Path, frame: Option<u32>) -> Result<PathBuf, Failure> {
+    let Some(frame) = frame else { return Ok(pattern.to_owned()) };
+    last_numbered(pattern, frame).ok_or_else(|| without_frame(pattern, frame))
+}
+
+fn without_frame(path: &Path, frame: u32) -> Failure {
+    let text = format!("{} has no frame {frame}", path.display());
+    refusal(text, "prepare it: photoncard prepare SCENE --frames RANGES")
+}
+
+fn refusal(text: String, help: &str) -> Failure {
+    Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
+}
+
+/// A prepared scene, and its renderer.
+struct OpenScene {
+    path: PathBuf,
+    prepared: PreparedScene,
+    renderer: Renderer,
+    quality: Quality,
+    inputs: NamedSettings,
+    /// Time of opening that is not told of yet, seconds.
+    seconds: f64,
+}
+
+impl OpenScene {
+    /// Opens the prepared scene of a file, which `is_rest` if no frame of it is asked for.
+    fn open(options: &RenderOptions, path: PathBuf, is_rest: bool) -> Result<Self, Failure> {
+        let start = Instant::now();
+        let prepared = PreparedScene::open(&path).map_err(Failure::input)?;
+        if is_rest && prepared.frames().next().is_some() {
+            let text = format!("{} is a scene of frames", path.display());
+            return Err(refusal(text, "state those to render: --frames RANGES"));
+        }
+        let quality = prepared.notes().get("quality").and_then(|name| Quality::of_name(name.as_str()?).ok());
+        let inputs = prepared.notes().get("inputs").and_then(Value::as_object);
+        let (quality, inputs) = quality.zip(inputs.cloned()).ok_or_else(|| {
+            let text = format!("{} was not prepared by this command", options.scene.path.display());
+            refusal(text, "prepare the scene by photoncard prepare")
+        })?;
+        let (renderer, seconds) = (prepared.renderer(), start.elapsed().as_secs_f64());
+        Ok(Self { path, prepared, renderer, quality, inputs, seconds })
+    }
+
+    fn render(
+        &mut self,
+        options: &RenderOptions,
+        frame: Option<u32>,
+        outputs: &OutputOptions,
+        progress: &Progress,
+    ) -> Result<(), Failure> {
+        let Self { path, prepared, renderer, quality, inputs, seconds } = self;
+        let own;
+        let scene = match frame {
+            None => prepared.scene(),
+            Some(frame) => {
+                own = prepared.frame(frame).ok_or_else(|| without_frame(path, frame))?;
+                &own
+            }
+        };
+        let mut settings = prepared.settings(options.settings_of(*quality));
+        settings.outputs = options.tile_outputs(outputs);
+        let camera = settings.camera(scene)?;
+        let misfit = options.picture.fit(&camera, &mut settings.picture);
+        let mut inputs = inputs.clone();
+        if !options.quiet && *seconds > 0.0 {
+            messages::say_prepared(path, &settings, &inputs, &camera, misfit.as_ref());
+        }
+        inputs.extend(frame.map(|frame| ("frame".to_owned(), json!(frame))));
+        if let Some(frame) = frame.filter(|_| is_finished(options, outputs, &settings, scene, &inputs)) {
+            if !options.quiet {
+                messages::say_finished(outputs, frame);
+            }
+            return Ok(());
+        }
+        progress.begin_frame();
+        let result = on_threads(options.threads, || renderer.render_fixed(scene, &settings, progress))?;
+        progress.finish();
+        let result = result.inspect_err(|error| say_kept(error, progress, outputs));
+        let rendering = result.map_err(|error| match (frame, error) {
+            (Some(_), RenderError::Stopped) => Failure::Stopped("stopped; the frames before are written"),
+            (_, error) => error.into(),
+        })?;
+        let (scene_seconds, quality) = (std::mem::take(seconds), *quality);
+        let finished = Finished { rendering, scene_seconds, inputs, quality, fit: None, frame };
+        finish(options, outputs, finished)
+    }
 }

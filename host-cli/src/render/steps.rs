@@ -27,7 +27,7 @@ pub(super) struct Finished {
     pub(super) rendering: Rendering,
     /// Time of reading the scene, seconds.
     pub(super) scene_seconds: f64,
-    /// Inputs of the scene, by their names.
+    /// Inputs of the scene, by their names, and the frame's moment if it is one.
     pub(super) inputs: NamedSettings,
     pub(super) quality: Quality,
     /// Settings that the quality has found for the scene, if there was a pilot.
@@ -47,7 +47,6 @@ pub(super) fn finish(
     rendering.statistics.time_s.total += scene_seconds;
     let provenance = &mut rendering.statistics.provenance;
     provenance.pixels.extend(inputs);
-    provenance.pixels.extend(frame.map(|frame| options.frames.provenance(frame)).into_iter().flatten());
     provenance.work.insert("quality".to_owned(), json!(quality.name()));
     provenance.work.insert("threads".to_owned(), json!(options.threads));
     provenance.work.insert("pilot".to_owned(), json!(fit.map(|fit| fit.measured)));

@@ -1,5 +1,6 @@
 //! Head of a prepared scene's file: everything but the card image.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -9,7 +10,7 @@ use photoncard_shared::message::CausticGather;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::scene::{PreparedScene, is_camera};
+use super::scene::{PreparedScene, View, is_camera};
 use crate::pack::CardImage;
 use crate::render::preparation::Prepared;
 use crate::render::renderer::Kept;
@@ -35,12 +36,14 @@ pub(super) struct Head {
     max_distance: f32,
     caustics: Option<CausticGather>,
     paths: u64,
+    /// Views of frames, by their numbers.
+    frames: BTreeMap<u32, StoredView>,
     notes: Map<String, Value>,
 }
 
 impl Head {
     pub(super) fn new(scene: &PreparedScene) -> Self {
-        let PreparedScene { scene, photons, integrator, kept, notes } = scene;
+        let PreparedScene { scene, photons, integrator, kept, frames, notes } = scene;
         let Prepared { image, max_distance, caustics, paths } = &kept.prepared;
         Self {
             program: PROGRAM.to_owned(),
@@ -54,6 +57,7 @@ impl Head {
             max_distance: *max_distance,
             caustics: *caustics,
             paths: *paths,
+            frames: frames.iter().map(|(number, view)| (*number, StoredView::new(view))).collect(),
             notes: notes.clone(),
         }
     }
@@ -63,14 +67,17 @@ impl Head {
     /// # Errors
     /// If there is no such camera or distance.
     pub(super) fn into_scene(self, image: CardImage) -> Result<PreparedScene, &'static str> {
-        let Self { cameras, photons, integrator, max_distance, caustics, paths, notes, .. } = self;
+        let Self { cameras, photons, integrator, max_distance, caustics, paths, frames, notes, .. } = self;
         let is_distance = |distance: f32| distance.is_normal() && distance > 0.0;
         let distances = [Some(max_distance), caustics.map(|gather| gather.max_distance)];
         if !distances.into_iter().flatten().all(is_distance) {
             return Err("its distances of gathers are none");
         }
         let cameras: Vec<Camera> = cameras.into_iter().map(StoredCamera::camera).collect();
-        if cameras.is_empty() || !cameras.iter().all(is_camera) {
+        let frames: BTreeMap<u32, View> =
+            frames.into_iter().map(|(number, view)| (number, view.view())).collect();
+        let is_seen = |cameras: &[Camera]| !cameras.is_empty() && cameras.iter().all(is_camera);
+        if !is_seen(&cameras) || !frames.values().all(|view| is_seen(&view.cameras)) {
             return Err("its cameras are none");
         }
         let settings = RenderSettings { photons, integrator, ..RenderSettings::default() };
@@ -82,7 +89,7 @@ impl Head {
         };
         let RenderSettings { photons, integrator, .. } = settings;
         let scene = FixedScene::of_cameras(cameras, self.scene, self.is_specular);
-        Ok(PreparedScene { scene, photons, integrator, kept, notes })
+        Ok(PreparedScene { scene, photons, integrator, kept, frames, notes })
     }
 }
 
@@ -91,6 +98,26 @@ pub(super) fn checksum(lines: &[Line]) -> u32 {
     let mut sum = Checksum::default();
     lines.iter().for_each(|line| sum.update(&line.0));
     sum.value()
+}
+
+/// View of a frame in a file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredView {
+    checksum: String,
+    cameras: Vec<StoredCamera>,
+}
+
+impl StoredView {
+    fn new(view: &View) -> Self {
+        let View { cameras, checksum } = view;
+        Self { checksum: checksum.clone(), cameras: cameras.iter().map(StoredCamera::new).collect() }
+    }
+
+    fn view(self) -> View {
+        let Self { cameras, checksum } = self;
+        View { checksum, cameras: cameras.into_iter().map(StoredCamera::camera).collect() }
+    }
 }
 
 /// Camera in a file: numbers that parse back exactly.

@@ -1,5 +1,7 @@
 //! A scene with all that its pictures need.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 use photoncard_shared::budget::Budget;
 use serde_json::{Map, Value};
@@ -17,7 +19,15 @@ pub struct PreparedScene {
     pub(super) photons: PhotonMaps,
     pub(super) integrator: Integrator,
     pub(super) kept: Kept,
+    /// Views of frames, by their numbers.
+    pub(super) frames: BTreeMap<u32, View>,
     pub(super) notes: Map<String, Value>,
+}
+
+/// Cameras of a frame, and the checksum of the scene with them.
+pub(super) struct View {
+    pub(super) cameras: Vec<Camera>,
+    pub(super) checksum: String,
 }
 
 impl PreparedScene {
@@ -47,7 +57,30 @@ impl PreparedScene {
             [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned),
             scene.is_specular(),
         );
-        Ok(Self { scene, photons, integrator, kept, notes })
+        Ok(Self { scene, photons, integrator, kept, frames: BTreeMap::new(), notes })
+    }
+
+    /// Adds a frame, which is seen by the cameras of `scene`. Returns false, and adds none, if more than its cameras differs from the
+    /// prepared scene.
+    pub fn add_frame(&mut self, number: u32, scene: &FixedScene) -> bool {
+        let is_same = scene.checksum_without_cameras() == self.scene.checksum_without_cameras();
+        if is_same {
+            let view = View { cameras: scene.cameras.clone(), checksum: scene.checksum().to_owned() };
+            self.frames.insert(number, view);
+        }
+        is_same
+    }
+
+    /// Numbers of the frames, increasing; none if the scene was prepared as it stands.
+    pub fn frames(&self) -> impl Iterator<Item = u32> {
+        self.frames.keys().copied()
+    }
+
+    /// Cameras of a frame, as [`Self::scene`]; `None` without such a frame.
+    pub fn frame(&self, number: u32) -> Option<FixedScene<'static>> {
+        let View { cameras, checksum } = self.frames.get(&number)?;
+        let checksums = [checksum, self.scene.checksum_without_cameras()].map(str::to_owned);
+        Some(FixedScene::of_cameras(cameras.clone(), checksums, self.scene.is_specular()))
     }
 
     /// Cameras of the scene, without anything else of it.
@@ -72,9 +105,9 @@ impl PreparedScene {
         RenderSettings { photons, integrator, ..settings }
     }
 
-    /// Renderer of the prepared scene, and the scene that it renders with [`Renderer::render_fixed`] by [`Self::settings`], whose cameras stay.
-    pub fn into_renderer(self) -> (Renderer, FixedScene<'static>) {
-        (Renderer::with_image(self.kept), self.scene)
+    /// Renderer that has the card image: it renders [`Self::scene`] and [`Self::frame`] with [`Renderer::render_fixed`] by [`Self::settings`].
+    pub fn renderer(&self) -> Renderer {
+        Renderer::with_image(self.kept.clone())
     }
 }
 

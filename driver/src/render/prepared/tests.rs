@@ -51,17 +51,42 @@ fn pictures_of_a_prepared_scene_are_those_of_the_scene() {
     let unlike = RenderSettings { photons: PhotonMaps::default(), ..settings() };
     let own = prepared.settings(unlike);
     assert_eq!(own, settings());
-    let (mut renderer, cameras) = prepared.into_renderer();
+    let (mut renderer, cameras) = (prepared.renderer(), prepared.scene());
     for at in [None, Some([0.3, 0.4, 3.0])] {
         let settings = own.clone().with(|settings| settings.picture.camera_at = at);
         let expected = render(&scene(), &settings, &Unobserved).unwrap();
-        let found = renderer.render_fixed(&cameras, &settings, &Unobserved).unwrap();
+        let found = renderer.render_fixed(cameras, &settings, &Unobserved).unwrap();
         assert_eq!(sums(&found.film), sums(&expected.film));
         let [found, expected] = [found, expected].map(|rendering| rendering.statistics);
         assert_eq!(found.provenance.pixels, expected.provenance.pixels);
         assert_eq!(found.photon_paths, expected.photon_paths);
         assert_eq!((found.time_s.photons, found.time_s.pack), (0.0, 0.0));
     }
+}
+
+/// Frames are seen by cameras of their own. What is not of the prepared scene is no frame of it.
+#[test]
+fn frames_of_a_prepared_scene_are_those_of_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = prepared(folder.path());
+    let mut of_rest = PreparedScene::open(&path).unwrap();
+    let mut moved = scene();
+    moved.cameras[0].origin.x += 0.25;
+    let mut other = moved.clone();
+    other.triangles.pop();
+    assert!(of_rest.add_frame(7, &(&moved).into()) && !of_rest.add_frame(8, &(&other).into()));
+    of_rest.write(&path).unwrap();
+    let prepared = PreparedScene::open(&path).unwrap();
+    assert_eq!(prepared.frames().collect::<Vec<_>>(), [7]);
+    assert!(prepared.frame(8).is_none());
+    let (found, expected) = (prepared.frame(7).unwrap(), moved);
+    let found = prepared.renderer().render_fixed(&found, &settings(), &Unobserved).unwrap();
+    let expected = render(&expected, &settings(), &Unobserved).unwrap();
+    assert_eq!(sums(&found.film), sums(&expected.film));
+    assert_eq!(found.statistics.provenance.pixels, expected.statistics.provenance.pixels);
+    // Cards of this process have the image from their start.
+    assert!(found.statistics.link.image_bytes.iter().all(|&bytes| bytes == 0));
+    assert!(expected.statistics.link.image_bytes.iter().all(|&bytes| bytes > 0));
 }
 
 #[test]
@@ -93,8 +118,8 @@ fn a_damaged_prepared_scene_is_refused_and_named() {
     }
     refuses(&[&bytes[..], &[0; 128]].concat(), "one line more");
     refuses(b"{\"asset\": {\"version\": \"2.0\"}}", "a glTF file");
-    fs::write(&path, b"photoncard prepared scene 2\n{}\n").unwrap();
-    assert!(matches!(PreparedScene::open(&path), Err(PreparedError::Version { found: 2, .. })));
+    fs::write(&path, b"photoncard prepared scene 3\n{}\n").unwrap();
+    assert!(matches!(PreparedScene::open(&path), Err(PreparedError::Version { found: 3, .. })));
     assert!(matches!(PreparedScene::open(folder.path()), Err(PreparedError::Unreadable { .. })));
 }
 
@@ -121,6 +146,8 @@ fn a_hostile_prepared_scene_is_refused() {
         ("max_distance", json!(-1.0)),
         ("max_distance", json!(null)),
         ("cameras", json!([])),
+        ("frames", json!({"7": {"checksum": "0", "cameras": []}})),
+        ("frames", json!({"-1": {"checksum": "0", "cameras": head["cameras"]}})),
         ("scene", json!(["0"])),
         ("paths", json!(-1)),
         ("extra", json!(1)),

@@ -121,7 +121,7 @@ impl RenderSettings {
     }
 
     /// [`Self::identity`] for a scene that stays as it is.
-    pub(in crate::render) fn identity_of(&self, scene: &FixedScene) -> NamedSettings {
+    pub fn identity_of(&self, scene: &FixedScene) -> NamedSettings {
         self.resolved_if(scene.is_specular()).identity_with(scene.checksum())
     }
 

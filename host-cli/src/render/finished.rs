@@ -1,0 +1,68 @@
+//! Frames that are finished: their files say that a render would write them again as they are.
+
+use std::path::Path;
+
+use photoncard_driver::parts::Parts;
+use photoncard_driver::render::{NamedSettings, RenderSettings};
+use photoncard_driver::scene::FixedScene;
+use photoncard_driver::{exr, tone_mapping};
+use serde_json::Value;
+
+use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
+
+/// Settings in a picture that follow from the others: a render finds them when it traces photons and places the camera.
+const FOUND: [&str; 2] = ["max-distance", "view"];
+
+/// Returns whether all files of a frame are there, so that it may be finished.
+pub(super) fn may_be(outputs: &OutputOptions) -> bool {
+    let stats = outputs.stats.as_ref().and_then(TextOutput::path);
+    let mut files = outputs.pictures.iter().map(|picture| &*picture.path).chain(stats);
+    outputs.resumes() && files.all(Path::is_file)
+}
+
+/// Returns whether the pictures of a frame are those of these settings, and of `inputs`, which the library does not know.
+pub(super) fn is_finished(
+    options: &RenderOptions,
+    outputs: &OutputOptions,
+    settings: &RenderSettings,
+    scene: &FixedScene,
+    inputs: &NamedSettings,
+) -> bool {
+    if !may_be(outputs) {
+        return false;
+    }
+    let mut stated = settings.identity_of(scene);
+    stated.extend(inputs.clone());
+    let found: Vec<&str> =
+        FOUND.into_iter().filter(|name| stated.get(*name).is_none_or(Value::is_null)).collect();
+    let without_found = |mut settings: NamedSettings| {
+        found.iter().for_each(|name| drop(settings.remove(*name)));
+        // Numbers as they are in a file.
+        serde_json::to_string(&settings).ok()
+    };
+    let expected = without_found(stated);
+    let of_picture = |picture| without_found(provenance(options, outputs, picture)?);
+    expected.is_some() && outputs.pictures.iter().all(|picture| of_picture(picture) == expected)
+}
+
+/// Provenance of a picture that has the form of the outputs.
+fn provenance(
+    options: &RenderOptions,
+    outputs: &OutputOptions,
+    picture: &PictureOutput,
+) -> Option<NamedSettings> {
+    let PictureOutput { path, format } = picture;
+    let text = match format {
+        PictureFormat::Exr => {
+            let (text, samples) = exr::read_form(path)?;
+            (samples == outputs.sample_type()).then_some(text)?
+        }
+        PictureFormat::Png => tone_mapping::read_form(path, outputs.tone.mapping())?,
+        PictureFormat::Part => {
+            let parts = Parts::open(std::slice::from_ref(path)).ok()?;
+            let head = parts.any().filter(|head| Some(head.part) == options.parts.part)?;
+            return Some(head.settings.clone());
+        }
+    };
+    serde_json::from_str(&text).ok()
+}
