@@ -71,8 +71,19 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         leaves: SectionKind,
         stack: &'s mut Stack<ENTRIES>,
     ) -> Self {
-        // Always fits: the root, node 0, at distance 0.
-        let _ = stack.push(0);
+        Self::with_root(scene, [nodes, leaves], stack, 0)
+    }
+
+    /// [`Self::new`], with the bits of the root in place of its distance.
+    #[inline(always)]
+    pub(crate) fn with_root(
+        scene: &'s SceneImage,
+        [nodes, leaves]: [SectionKind; 2],
+        stack: &'s mut Stack<ENTRIES>,
+        bits: u32,
+    ) -> Self {
+        // Always fits: the root is node 0.
+        let _ = stack.push(u64::from(bits) << 32);
         // A tree visits each record once: more visits mean a cycle in an unsound image.
         let parts = [nodes, leaves].map(|kind| u64::from(scene.header.section(kind).records));
         Self { scene, nodes, leaves, stack, visits_left: parts.into_iter().sum() }
@@ -84,15 +95,25 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
     /// [`FaultCode::Depth`] if the image is not sound: the tree has a cycle.
     #[inline(always)]
     pub(crate) fn next(&mut self, limit: u32) -> Result<Option<Child>, Fault> {
-        while let Some(part) = self.stack.pop().map(Deferred) {
-            // Entries below were pushed earlier, and may be nearer: the loop goes on.
-            if part.distance() <= limit {
-                let depth = Fault { code: FaultCode::Depth, detail: part.0 as u32 };
-                self.visits_left = self.visits_left.checked_sub(1).ok_or(depth)?;
-                return Ok(Some(part.child()));
+        // Entries below were pushed earlier, and may be nearer: the loop goes on.
+        while let Some((distance, child)) = self.pop()? {
+            if distance <= limit {
+                return Ok(Some(child));
             }
         }
         Ok(None)
+    }
+
+    /// The next leaf or node, with the bits that it was pushed with; `None` at the end of the traversal.
+    ///
+    /// # Errors
+    /// As [`Self::next`].
+    #[inline(always)]
+    pub(crate) fn pop(&mut self) -> Result<Option<(u32, Child)>, Fault> {
+        let Some(part) = self.stack.pop().map(Deferred) else { return Ok(None) };
+        let depth = Fault { code: FaultCode::Depth, detail: part.0 as u32 };
+        self.visits_left = self.visits_left.checked_sub(1).ok_or(depth)?;
+        Ok(Some((part.distance(), part.child())))
     }
 
     /// Line of a leaf.
@@ -146,8 +167,9 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
     #[inline(always)]
     fn push(&mut self, isa: impl Isa, parts: &[u64; LANES], mask: u32) -> Option<()> {
         let bottom = self.stack.len();
-        self.stack.resize(bottom + LANES, 0).ok()?;
-        isa.pack_long(mask, parts, self.stack.get_mut(bottom..)?.first_chunk_mut()?);
+        let mut packed = [0; LANES];
+        isa.pack_long(mask, parts, &mut packed);
+        self.stack.extend_from_slice(&packed).ok()?;
         self.stack.truncate(bottom + mask.count_ones() as usize);
         Some(())
     }

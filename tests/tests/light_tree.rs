@@ -9,7 +9,7 @@ use photoncard_firmware::memory::{Lines, MemoryPort};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_firmware::scene::light::{
-    Fraction, Receiver, environment_density, sample_light, select_emitter, selection_probability,
+    Fraction, LightChoices, Receiver, environment_density, sample_light, select_emitter, selection_probability,
 };
 use photoncard_shared::address::{Line, LineAddress, Structure};
 use photoncard_shared::image::SectionKind;
@@ -85,10 +85,13 @@ fn sampling_and_its_probability_agree_to_the_bit() {
         let (image, mut memory) = packed.view();
         let mut found = 0;
         for index in 0..200 {
+            let receiver = receiver(index);
+            let mut choices = LightChoices::new(receiver);
             for sample in 0..20 {
                 let fraction = Fraction::new(random(sample, index), index ^ sample << 20);
-                let receiver = receiver(index);
-                let selected = select_emitter(&image, &mut memory, &receiver, fraction).unwrap();
+                let selected = select_emitter(&image, &mut memory, &mut choices, fraction).unwrap();
+                let anew = &mut LightChoices::new(receiver);
+                assert_eq!(select_emitter(&image, &mut memory, anew, fraction).unwrap(), selected);
                 let Some(selected) = selected else { continue };
                 let told = selection_probability(&image, &mut memory, &receiver, selected.emitter).unwrap();
                 assert_eq!(told.to_bits(), selected.probability.to_bits());
@@ -113,7 +116,7 @@ fn the_probabilities_of_all_emitters_sum_to_that_of_finding_one() {
         let finds = |sample: &u32| {
             let fraction =
                 Fraction::new((*sample as f32 + random(*sample, 7)) / samples as f32, hash(*sample));
-            select_emitter(&image, &mut packed.view().1, &receiver, fraction).unwrap().is_some()
+            select_emitter(&image, &mut packed.view().1, &mut LightChoices::new(receiver), fraction).unwrap().is_some()
         };
         let found = (0..samples).filter(finds).count() as f64 / f64::from(samples);
         // No light is found if all children of a node are behind the receiver, though the node as a whole is not.
@@ -125,7 +128,8 @@ fn the_probabilities_of_all_emitters_sum_to_that_of_finding_one() {
 /// Unshadowed light of one random number on a receiver, W/m^2.
 fn estimate(image: &SceneImage, memory: &mut impl MemoryPort, receiver: &Receiver, index: u32) -> f64 {
     let point = [random(index, 50), random(index, 51)];
-    let light = sample_light(image, memory, receiver, point, hash(index)).unwrap();
+    let mut choices = LightChoices::new(*receiver);
+    let light = sample_light(image, memory, &mut choices, point, hash(index)).unwrap();
     light.map_or(0.0, |light| f64::from(light.irradiance.x * light.direction.dot(receiver.normal).max(0.0)))
 }
 
@@ -200,7 +204,8 @@ fn the_environments_samples_have_the_density_that_it_tells() {
     let mut inverse = 0.0;
     for index in 0..20_000 {
         let point = [random(index, 50), random(index, 51)];
-        let Some(light) = sample_light(&image, &mut memory, &receiver(0), point, hash(index)).unwrap() else {
+        let mut choices = LightChoices::new(receiver(0));
+        let Some(light) = sample_light(&image, &mut memory, &mut choices, point, hash(index)).unwrap() else {
             continue;
         };
         if light.distance.is_finite() {
@@ -227,7 +232,12 @@ fn an_unsound_tree_is_a_fault_and_never_the_end() {
     let of_tree = nodes.first_line as usize..(nodes.first_line + nodes.records) as usize;
     let faults = |lines: &[Line]| {
         let receiver = receiver(3);
-        let selected = select_emitter(&image, &mut Lines(lines), &receiver, Fraction::new(0.4, 5));
+        let selected = select_emitter(
+            &image,
+            &mut Lines(lines),
+            &mut LightChoices::new(receiver),
+            Fraction::new(0.4, 5),
+        );
         let told = selection_probability(&image, &mut Lines(lines), &receiver, 70);
         [selected.map(drop).err(), told.map(drop).err()].map(|fault| fault.map(|fault| fault.code))
     };

@@ -89,7 +89,7 @@ fn light_sample<K: ChipKind, M: MemoryPort>(
     light.add(frame, Component::Direct, surface.emission * per_unit);
     let allowed = allowed_error_at(frame, view);
     let interpolated =
-        allowed.and_then(|allowed| cache.interpolate(&seen_sample(context, at, view), allowed));
+        allowed.and_then(|allowed| cache.interpolate(&seen_sample(at, view), allowed));
     *lambertian += u32::from(frame.gather_rays > 0 && surface.reflection.has_lambertian());
     if let Some(irradiance) = interpolated {
         *interpolated_samples += 1;
@@ -107,8 +107,7 @@ fn light_sample<K: ChipKind, M: MemoryPort>(
     context.memory.enter(Stage::Shadow);
     // The bits of a surface depend on the way it is read.
     if let Some(seen) = &view.seen {
-        let film = eye::film_position(context, at);
-        eye::surface(context, film, seen, &mut point.surface)?;
+        eye::surface(context, view.film, seen, &mut point.surface)?;
     }
     for (component, brought) in direct_light(context, at, &point, shared)? {
         light.add(frame, component, brought);

@@ -1,12 +1,13 @@
 //! The passes of a block's pixels with gather rays of their own, stripe by stripe and sample by sample: these rays, and direct light,
 //! which is weighted against them.
 
+use heapless::Vec;
 use photoncard_shared::message::{Fault, FrameParameters};
 
 use super::buffers::Shared;
 use super::flight::{Flight, allowed_error};
 use super::light::Component;
-use super::position::Pass;
+use super::position::{Pass, bundles};
 use super::stored_point::{StoredPoint, StoredRays, pattern};
 use crate::gather::{GatherTarget, PointIndex};
 use crate::irradiance_cache::{IrradianceCache, SeenSample};
@@ -47,8 +48,8 @@ pub(super) fn allowed_error_at(frame: &FrameParameters, view: &View) -> Option<f
 }
 
 /// The sample of a view, for the irradiance cache.
-pub(super) fn seen_sample<'a, M>(context: &Context<M>, at: PixelSample, view: &'a View) -> SeenSample<'a> {
-    SeenSample { pixel: [at.x, at.y], film: eye::film_position(context, at), surface: &view.surface }
+pub(super) fn seen_sample(at: PixelSample, view: &View) -> SeenSample<'_> {
+    SeenSample { pixel: [at.x, at.y], film: view.film, surface: &view.surface }
 }
 
 /// The gather point of a sample by geometry alone, its directions not yet chosen.
@@ -60,7 +61,7 @@ fn gather_point<M, R: Capacity>(
 ) -> GatherPoint {
     let allowed = allowed_error_at(context.frame, view);
     let is_interpolated =
-        allowed.is_some_and(|allowed| cache.covers(&seen_sample(context, at, view), allowed));
+        allowed.is_some_and(|allowed| cache.covers(&seen_sample(at, view), allowed));
     let purpose = if is_interpolated { Purpose::Lobe } else { Purpose::Sample };
     pixel_point(context.frame, at, view, purpose)
 }
@@ -178,25 +179,22 @@ impl<K: ChipKind> Flight<K> {
             if !of_bin.is_empty() && stored.read_surface(context, at, &mut point.surface)? {
                 let (rays, is_last) = self.position.next_rays(of_bin);
                 let target = GatherTarget::new(flight, PointIndex::Pixel(number));
-                for ray in rays {
-                    let Some(end) = final_gather::cast(context, &point, target, ray)? else {
-                        continue;
-                    };
-                    shared.sums.add(context.frame, (flight, number), Component::Direct, end.direct);
-                    match (end.request, outlet.as_deref_mut()) {
-                        (None, _) => {}
-                        (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),
-                        (Some(request), None) => match shared.gathers.submit(context, request)? {
-                            None => self.waiting += 1,
-                            Some(brought) => {
-                                shared.sums.add(
-                                    context.frame,
-                                    (flight, number),
-                                    Component::Indirect,
-                                    brought,
-                                );
-                            }
-                        },
+                let mut ends = Vec::new();
+                for bundle in bundles(rays) {
+                    final_gather::cast(context, &point, target, bundle, &mut ends)?;
+                    for end in &ends {
+                        let sum = (flight, number);
+                        shared.sums.add(context.frame, sum, Component::Direct, end.direct);
+                        match (end.request, outlet.as_deref_mut()) {
+                            (None, _) => {}
+                            (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),
+                            (Some(request), None) => match shared.gathers.submit(context, request)? {
+                                None => self.waiting += 1,
+                                Some(brought) => {
+                                    shared.sums.add(context.frame, sum, Component::Indirect, brought);
+                                }
+                            },
+                        }
                     }
                 }
                 if !is_last {

@@ -1,10 +1,11 @@
 //! The passes of a block's irradiance records.
 
+use heapless::Vec;
 use photoncard_shared::message::Fault;
 
 use super::buffers::Shared;
 use super::flight::{Flight, allowed_error};
-use super::position::{Pass, Position};
+use super::position::{Pass, Position, bundles};
 use super::stored_point::StoredPoint;
 use crate::gather::{GatherTarget, PointIndex};
 use crate::irradiance_cache::{Full, Recalled};
@@ -102,13 +103,16 @@ impl<K: ChipKind> Flight<K> {
             let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, bins);
             let (rays, is_last) = position.next_rays(of_bin);
             let target = GatherTarget::new(flight, PointIndex::Record(record));
-            for ray in rays {
-                let Some(end) = final_gather::cast(context, point, target, ray)? else { continue };
-                cache.add(record, end.cell, end.direct);
-                if let Some(request) = end.request {
-                    match gathers.submit(context, request)? {
-                        None => *waiting += 1,
-                        Some(brought) => cache.add(record, end.cell, brought),
+            let mut ends = Vec::new();
+            for bundle in bundles(rays) {
+                final_gather::cast(context, point, target, bundle, &mut ends)?;
+                for end in &ends {
+                    cache.add(record, end.cell, end.direct);
+                    if let Some(request) = end.request {
+                        match gathers.submit(context, request)? {
+                            None => *waiting += 1,
+                            Some(brought) => cache.add(record, end.cell, brought),
+                        }
                     }
                 }
             }

@@ -6,6 +6,7 @@
 //! level.
 
 use glam::Vec3;
+use heapless::Vec;
 use photoncard_shared::message::Fault;
 
 use super::lattice::{Cell, LEVELS};
@@ -17,7 +18,7 @@ use crate::kind::{Capacity, Map};
 use crate::memory::{MemoryPort, Stage};
 use crate::render::{Context, eye};
 use crate::sampler::{Dimension, Pattern, unit_interval};
-use crate::scene::{Ray, Surface, closest_hit};
+use crate::scene::{BUNDLE_RAYS, Ray, Surface, closest_hits};
 use crate::vector::min;
 
 /// Minimum reach of a record, pixels: it bounds the cost in corners.
@@ -26,7 +27,7 @@ const MIN_REACH: f32 = 3.0;
 const ERROR_OF_MIN_REACH: f32 = 0.1;
 
 impl<R: Capacity> IrradianceCache<R> {
-    /// Does the next piece of the survey: one lattice cell, or one ray of one record. Returns whether it was the last.
+    /// Does the next piece of the survey: one lattice cell, or one ray of each of some records. Returns whether it was the last.
     ///
     /// # Errors
     /// A [`Fault`] if the image is not sound; `Ok(Err(Full))` if the records do not fit into the cache.
@@ -95,21 +96,32 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(Ok(()))
     }
 
-    /// Casts the next new record's ray in the current cell of the hemisphere. The ray in the last cell ends the
-    /// record's survey.
+    /// Casts the rays of the next new records in the current cell of the hemisphere, a bundle. The rays in the last cell end the
+    /// records' survey.
     fn cast<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Survey { index, direction, first, .. } = self.survey;
         let is_last = direction as usize + 1 >= CELLS;
-        if let Some((point, Some(record))) = self.records.entry_mut(index) {
-            let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
-            let distance = distance_in(context, &record.surface(), pattern, direction)?;
-            record.set_distance(direction, distance);
+        let end = self.records.entries().min(index + BUNDLE_RAYS);
+        let mut rays = Vec::<Ray, BUNDLE_RAYS>::new();
+        for index in index..end {
+            if let Some((point, Some(record))) = self.records.entry(index) {
+                let _ = rays.push(survey_ray(context, point, &record.surface(), direction));
+            }
+        }
+        context.memory.enter(Stage::Survey);
+        context.counters.survey_rays += rays.len() as u64;
+        let hits = closest_hits(context.scene, context.memory, &rays)?;
+        let mut distances =
+            hits.iter().map(|hit| hit.as_ref().map_or(f32::INFINITY, |hit| hit.intersection.distance));
+        for index in index..end {
+            let Some((_, Some(record))) = self.records.entry_mut(index) else { continue };
+            record.set_distance(direction, distances.next().unwrap_or(f32::INFINITY));
             if is_last {
                 record.end_survey();
             }
         }
         let survey = &mut self.survey;
-        survey.index += 1;
+        survey.index = end;
         if survey.index >= self.records.entries() {
             survey.index = first;
             survey.direction += 1;
@@ -170,18 +182,9 @@ fn new_record<M: MemoryPort>(
     }))
 }
 
-/// Distance from a surface to the next one along a random ray in a cell of its hemisphere, metres; infinite if it hits
-/// nothing.
-fn distance_in<M: MemoryPort>(
-    context: &mut Context<M>,
-    surface: &Surface,
-    pattern: Pattern,
-    cell: u8,
-) -> Result<f32, Fault> {
-    context.memory.enter(Stage::Survey);
-    context.counters.survey_rays += 1;
+/// A random ray from the surface of a record in a cell of its hemisphere.
+fn survey_ray<M>(context: &Context<M>, point: &LatticePoint, surface: &Surface, cell: u8) -> Ray {
+    let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
     let square = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];
-    let ray = Ray::new(surface.offset_origin(), direction_in(surface.normal, cell, square));
-    let hit = closest_hit(context.scene, context.memory, &ray)?;
-    Ok(hit.map_or(f32::INFINITY, |hit| hit.intersection.distance))
+    Ray::new(surface.offset_origin(), direction_in(surface.normal, cell, square))
 }

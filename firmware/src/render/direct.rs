@@ -18,15 +18,16 @@
 use core::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
+use heapless::Vec;
 use photoncard_shared::message::Fault;
 
 use super::{Context, GatherPoint, PixelSample, Purpose, SHORTER};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::light::{
-    LightSample, Receiver, emitter_density, environment_density, environment_radiance, sample_light,
+    LightChoices, LightSample, Receiver, emitter_density, environment_density, environment_radiance, sample_light,
 };
-use crate::scene::{Ray, Surface, is_occluded};
+use crate::scene::{BUNDLE_RAYS, Ray, Surface, are_occluded};
 use crate::vector::max_component;
 
 /// Reflected direct light at a point by shadow rays, weighted, W/(sr m^2).
@@ -45,35 +46,72 @@ pub fn reflected<M: MemoryPort>(
     let frame = context.frame;
     let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, 0, Dimension::Emitter);
     let receiver = Receiver::new(&point.surface);
+    let mut choices = LightChoices::new(receiver);
     let mut sum = Vec3::ZERO;
+    let mut rays = ShadowRays::new();
     for index in 0..frame.shadow_rays {
         let index = pixel.sample.wrapping_mul(frame.shadow_rays).wrapping_add(index);
         let (place, dither) = (pattern.point(index), pattern.dither(index));
-        let light = sample_light(context.scene, context.memory, &receiver, place, dither)?;
-        if let Some(light) = light {
-            sum += from_light(context, point, receiver.origin, &light)?;
+        let light = sample_light(context.scene, context.memory, &mut choices, place, dither)?;
+        if let Some(light) = light
+            && point.surface.is_above(light.direction)
+            && max_component(light.irradiance) > 0.0
+        {
+            rays.push(receiver.origin, light);
+            if rays.is_full() {
+                sum = rays.cast(context, point, sum)?;
+            }
         }
     }
-    Ok(sum / frame.shadow_rays as f32)
+    Ok(rays.cast(context, point, sum)? / frame.shadow_rays as f32)
 }
 
-/// Reflected radiance of one light sample, W/(sr m^2).
-fn from_light<M: MemoryPort>(
-    context: &mut Context<M>,
-    point: &GatherPoint,
-    origin: Vec3,
-    light: &LightSample,
-) -> Result<Vec3, Fault> {
+/// Shadow rays of a point that are cast together, each to its light.
+struct ShadowRays {
+    rays: Vec<Ray, BUNDLE_RAYS>,
+    lights: Vec<LightSample, BUNDLE_RAYS>,
+}
+
+impl ShadowRays {
+    fn new() -> Self {
+        Self { rays: Vec::new(), lights: Vec::new() }
+    }
+
+    /// Adds a ray, for which there is room.
+    fn push(&mut self, origin: Vec3, light: LightSample) {
+        let LightSample { direction, distance, .. } = light;
+        let _ = self.rays.push(Ray { origin, direction, max_distance: distance * SHORTER });
+        let _ = self.lights.push(light);
+    }
+
+    fn is_full(&self) -> bool {
+        self.rays.is_full()
+    }
+
+    /// Casts the rays, and adds the radiance that the point reflects to a sum, W/(sr m^2).
+    fn cast<M: MemoryPort>(
+        &mut self,
+        context: &mut Context<M>,
+        point: &GatherPoint,
+        mut sum: Vec3,
+    ) -> Result<Vec3, Fault> {
+        context.counters.shadow_rays += self.rays.len() as u64;
+        let occluded = are_occluded(context.scene, context.memory, &self.rays)?;
+        for (light, is_occluded) in self.lights.iter().zip(occluded) {
+            if !is_occluded {
+                sum += from_light(context, point, light);
+            }
+        }
+        self.rays.clear();
+        self.lights.clear();
+        Ok(sum)
+    }
+}
+
+/// Reflected radiance of one light sample, W/(sr m^2), that is not occluded.
+fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample) -> Vec3 {
     let surface = &point.surface;
-    let LightSample { direction, distance, irradiance, density } = *light;
-    if !surface.is_above(direction) || max_component(irradiance) <= 0.0 {
-        return Ok(Vec3::ZERO);
-    }
-    context.counters.shadow_rays += 1;
-    let ray = Ray { origin, direction, max_distance: distance * SHORTER };
-    if is_occluded(context.scene, context.memory, &ray)? {
-        return Ok(Vec3::ZERO);
-    }
+    let LightSample { direction, irradiance, density, .. } = *light;
     let cosine = surface.normal.dot(direction);
     let reflector = point.reflector();
     // No gather ray meets a light without extent: weight 1.
@@ -89,7 +127,7 @@ fn from_light<M: MemoryPort>(
         });
         reflected += surface.reflector().lambertian() * weight;
     }
-    Ok(reflected * irradiance * cosine)
+    reflected * irradiance * cosine
 }
 
 /// Emission of the surface at the end of a gather ray, times its weight against shadow rays, W/(sr m^2). `gather_density` is the ray's

@@ -31,6 +31,8 @@ pub struct View {
     pub seen: Option<Seen>,
     /// `true` if the eye ray itself meets the surface.
     pub is_first: bool,
+    /// Position of the sample in the picture ([`film_position`]).
+    pub film: [f32; 2],
     /// Depth of the eye ray's hit along the view's axis, metres.
     pub depth: f32,
 }
@@ -62,7 +64,8 @@ impl Sight {
 pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Sight, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
-    let ray = eye_ray(context, film_position(context, pixel));
+    let film = film_position(context, pixel);
+    let ray = eye_ray(context, film);
     let PixelSample { x, y, sample } = pixel;
     let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Specular);
     // The first choices are stratified over all samples of a pixel.
@@ -96,6 +99,7 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
         surface: surface.dimmed(path.throughput),
         seen: is_stored.then(|| Seen::new(&hit)),
         is_first,
+        film,
     }))
 }
 

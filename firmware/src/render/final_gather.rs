@@ -2,7 +2,10 @@
 //!
 //! Emission at a ray's end is direct light, weighted against shadow rays ([`super::direct`]).
 
+use core::ops::Range;
+
 use glam::Vec3;
+use heapless::Vec;
 use photoncard_shared::message::{Fault, Radiance};
 
 use super::search::count_reflection;
@@ -13,7 +16,7 @@ use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
 use crate::scene::light::environment_radiance;
-use crate::scene::{PartialReflection, Ray, Reflector, Surface, closest_hit, read_surface};
+use crate::scene::{BUNDLE_RAYS, Hit, PartialReflection, Ray, Reflector, Surface, closest_hits, read_surface};
 
 /// Contribution of one final gather ray.
 #[derive(Clone, Copy, Debug)]
@@ -26,8 +29,8 @@ pub struct GatherRayEnd {
     pub request: Option<GatherRequest>,
 }
 
-/// Casts ray `index` of a gather point; `None` if it meets neither a surface nor the environment. The contribution is one term of
-/// the mean over the point's rays; the gather's result goes to the sum `target`.
+/// Casts rays of a gather point, at most [`BUNDLE_RAYS`], and puts their contributions into `ends`, without those that meet neither a
+/// surface nor the environment. A contribution is one term of the mean over the point's rays; the gather's result goes to the sum `target`.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -35,43 +38,66 @@ pub fn cast<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
     target: GatherTarget,
-    index: u32,
-) -> Result<Option<GatherRayEnd>, Fault> {
+    rays: Range<u32>,
+    ends: &mut Vec<GatherRayEnd, BUNDLE_RAYS>,
+) -> Result<(), Fault> {
+    ends.clear();
     context.memory.enter(Stage::GatherRay);
-    let sampled = point.directions.sample(&point.reflector(), point.pattern, index, point.rays);
-    let Some(sampled) = sampled.filter(|sampled| point.surface.is_above(sampled.direction)) else {
-        return Ok(None);
-    };
-    let ray = Ray::new(point.surface.offset_origin(), sampled.direction);
-    context.counters.gather_rays += 1;
-    let mut path = SpecularPath::new(ray, Carried::Radiance, Passes::NarrowLobes);
+    let mut aimed = Vec::<(u32, GatherDirection), BUNDLE_RAYS>::new();
+    let mut bundle = Vec::<Ray, BUNDLE_RAYS>::new();
+    for index in rays {
+        let sampled = point.directions.sample(&point.reflector(), point.pattern, index, point.rays);
+        if let Some(sampled) = sampled.filter(|sampled| point.surface.is_above(sampled.direction)) {
+            let _ = aimed.push((index, sampled));
+            let _ = bundle.push(Ray::new(point.surface.offset_origin(), sampled.direction));
+        }
+    }
+    context.counters.gather_rays += bundle.len() as u64;
+    let hits = closest_hits(context.scene, context.memory, &bundle)?;
+    for (((index, sampled), ray), hit) in aimed.iter().zip(&bundle).zip(hits) {
+        if let Some(end) = arrive(context, point, target.in_cell(sampled.cell), (*index, sampled), (ray, hit))? {
+            let _ = ends.push(end);
+        }
+    }
+    Ok(())
+}
+
+/// Contribution of ray `index` of a gather point, in its sampled direction, by the ray's hit.
+fn arrive<M: MemoryPort>(
+    context: &mut Context<M>,
+    point: &GatherPoint,
+    target: GatherTarget,
+    (index, sampled): (u32, &GatherDirection),
+    (ray, hit): (&Ray, Option<Hit>),
+) -> Result<Option<GatherRayEnd>, Fault> {
+    let mut path = SpecularPath::new(*ray, Carried::Radiance, Passes::NarrowLobes);
     // The division by the number of rays is done here: sums stay within the fixed-point range.
     let weight = sampled.weight * (1.0 / point.rays as f32);
-    let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
-        return escaped(context, point, &path, &sampled, weight);
+    let Some(mut hit) = hit else {
+        return escaped(context, point, &path, sampled, weight);
     };
     let random = |choice| point.pattern.choice(index, choice);
     let of_surface = |choice| random(surface_choice(0, choice));
     let mut met = Surface::NOWHERE;
-    read_surface(context.scene, context.memory, &ray, &hit, &of_surface, &mut met)?;
+    read_surface(context.scene, context.memory, ray, &hit, &of_surface, &mut met)?;
     if path.may_pass(&met) {
         match path.follow(context, &mut met, &mut hit, &random)? {
             PathEnd::Surface => {}
-            PathEnd::Escaped => return escaped(context, point, &path, &sampled, weight),
+            PathEnd::Escaped => return escaped(context, point, &path, sampled, weight),
             PathEnd::Lost => {
-                let direct = collected(context, point, &path, &sampled, weight);
+                let direct = collected(context, point, &path, sampled, weight);
                 return Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }));
             }
         }
     }
     met.normal = met.geometric_normal;
     let emitted = if path.bounces == 0 {
-        weight * direct::seen_by_gather_ray(context, point, &ray, &met, sampled.density)?
+        weight * direct::seen_by_gather_ray(context, point, ray, &met, sampled.density)?
     } else {
-        beyond_specular(context, point, &sampled, weight) * met.emission
+        beyond_specular(context, point, sampled, weight) * met.emission
     };
     let direct = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit)
-        + collected(context, point, &path, &sampled, weight);
+        + collected(context, point, &path, sampled, weight);
     let weight = weight * path.throughput;
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
@@ -81,7 +107,7 @@ pub fn cast<M: MemoryPort>(
             weight * (header.photon_power_unit / header.radiance_unit),
             point.pattern.dither(index),
         ),
-        target: target.in_cell(sampled.cell),
+        target,
     });
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request }))
 }

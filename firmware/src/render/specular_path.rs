@@ -13,7 +13,7 @@ use photoncard_shared::message::Fault;
 
 use super::{Context, SHORTER};
 use crate::memory::MemoryPort;
-use crate::scene::light::{LightSample, Receiver, sample_light};
+use crate::scene::light::{LightChoices, LightSample, Receiver, sample_light};
 use crate::scene::{Hit, Ray, Reflection, Reflector, Surface, closest_hit, is_occluded, read_surface};
 use crate::vector::{max, max_component};
 
@@ -244,7 +244,8 @@ fn punctual_light<M: MemoryPort>(
 ) -> Result<Vec3, Fault> {
     let [u, v] = [3, 4].map(|k| random(k * (SPECULAR_BOUNCES + 1) + bounce));
     let receiver = Receiver::new(surface);
-    let Some(light) = sample_light(context.scene, context.memory, &receiver, [u, v], u.to_bits())? else {
+    let mut choices = LightChoices::new(receiver);
+    let Some(light) = sample_light(context.scene, context.memory, &mut choices, [u, v], u.to_bits())? else {
         return Ok(Vec3::ZERO);
     };
     let LightSample { direction, distance, irradiance, density } = light;

@@ -10,6 +10,7 @@ use photoncard_shared::message::Fault;
 
 use super::coverage::is_met;
 use super::slabs::Slabs;
+use super::triangle::ShearedLeaf;
 use super::{Hit, Intersection, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
@@ -53,17 +54,8 @@ impl<M: MemoryPort> Kernel for ClosestHit<'_, M> {
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
         let Self { scene, memory, ray } = self;
-        let mut nearest: Option<Hit> = None;
-        descend(isa, scene, memory, ray, Order::NearestFirst, |intersection, index, triangle| {
-            let is_nearer = nearest.is_none_or(|hit| {
-                let distance = hit.intersection.distance;
-                intersection.distance < distance || intersection.distance == distance && index < hit.index
-            });
-            if is_nearer {
-                nearest = Some(Hit { intersection, triangle: triangle(), index });
-            }
-            ControlFlow::Continue(nearest.map_or(ray.max_distance, |hit| hit.intersection.distance))
-        })?;
+        let mut nearest = None;
+        descend(isa, scene, memory, ray, &mut nearest)?;
         Ok(nearest)
     }
 }
@@ -85,76 +77,116 @@ impl<M: MemoryPort> Kernel for AnyHit<'_, M> {
     fn run(self, isa: impl Isa) -> Self::Output {
         let Self { scene, memory, ray } = self;
         let mut occluded = false;
-        descend(isa, scene, memory, ray, Order::Any, |_, _, _| {
-            occluded = true;
-            ControlFlow::Break(())
-        })?;
+        descend(isa, scene, memory, ray, &mut occluded)?;
         Ok(occluded)
     }
 }
 
-/// Hits of triangles with cut-outs or partial coverage in one leaf, before their alpha is read.
-type CutOuts = heapless::Vec<Hit, LEAF_TRIANGLES>;
+/// What is searched along a ray: the closest hit, or any.
+pub(super) trait Search {
+    /// Order of the visits to a node's children.
+    const ORDER: Order;
 
-/// Calls `visit` with each intersection, the triangle's index, and a function that reads the triangle. The maximum distance is the one
-/// that `visit` returned last.
+    /// Takes a hit of the triangle of an index, in a slot of its leaf. The next hits may be up to the returned distance away; after
+    /// [`ControlFlow::Break`] none is needed.
+    fn meet(&mut self, hit: Intersection, index: u32, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
+}
+
+impl Search for Option<Hit> {
+    const ORDER: Order = Order::NearestFirst;
+
+    #[inline(always)]
+    fn meet(&mut self, found: Intersection, index: u32, (leaf, slot): (BvhLeaf, usize)) -> ControlFlow<(), f32> {
+        let nearest = match self {
+            Some(hit) => {
+                let distance = hit.intersection.distance;
+                if found.distance > distance || found.distance == distance && index > hit.index {
+                    return ControlFlow::Continue(distance);
+                }
+                found.distance
+            }
+            None => found.distance,
+        };
+        *self = Some(Hit { intersection: found, triangle: leaf.triangle(slot), index });
+        ControlFlow::Continue(nearest)
+    }
+}
+
+impl Search for bool {
+    const ORDER: Order = Order::Any;
+
+    #[inline(always)]
+    fn meet(&mut self, _: Intersection, _: u32, _: (BvhLeaf, usize)) -> ControlFlow<(), f32> {
+        *self = true;
+        ControlFlow::Break(())
+    }
+}
+
+/// Follows a ray through the hierarchy.
 #[inline(always)]
-fn descend(
+fn descend<S: Search>(
     isa: impl Isa,
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     ray: &Ray,
-    order: Order,
-    mut visit: impl FnMut(Intersection, u32, &dyn Fn() -> Triangle) -> ControlFlow<(), f32>,
+    search: &mut S,
 ) -> Result<(), Fault> {
     let frame = RayFrame::new(ray);
     let slabs = Slabs::new(ray);
     let mut until = ray.max_distance;
-    let mut stack = Stack::<{ BVH_STACK + LANES }>::new();
+    let mut stack = BvhStack::new();
     let mut descent = Descent::new(scene, SectionKind::Nodes, SectionKind::Triangles, &mut stack);
     while let Some(part) = descent.next(until.to_bits())? {
         match part {
-            Child::Node(node) => descent.enter(isa, memory, node, order, |line| {
+            Child::Node(node) => descent.enter(isa, memory, node, S::ORDER, |line| {
                 let children = WideNode(line).children() as usize;
                 slabs.enter(isa, BvhNode(line), children, until)
             })?,
             Child::Leaf(leaf) => {
-                let line = BvhLeaf(descent.leaf(memory, leaf)?);
-                let mut may_meet = frame.may_meet(isa, line);
-                let mut with_cut_outs = CutOuts::new();
-                while may_meet != 0 {
-                    let slot = may_meet.trailing_zeros() as usize;
-                    may_meet &= may_meet - 1;
-                    let Some(intersection) = frame.intersect_slot(line, slot, until) else {
-                        continue;
-                    };
-                    let index = leaf.wrapping_mul(LEAF_TRIANGLES as u32).wrapping_add(slot as u32);
-                    if line.is_cut_out(slot) {
-                        // Alpha is read after the leaf: a read of a texture ends the borrow of the leaf's line.
-                        let _ =
-                            with_cut_outs.push(Hit { intersection, triangle: line.triangle(slot), index });
-                        continue;
-                    }
-                    match visit(intersection, index, &|| line.triangle(slot)) {
-                        ControlFlow::Continue(distance) => until = distance,
-                        ControlFlow::Break(()) => return Ok(()),
-                    }
-                }
-                for Hit { intersection, triangle, index } in &with_cut_outs {
-                    let is_near = intersection.distance <= until;
-                    let weights = intersection.barycentric;
-                    if !is_near || !is_met(scene, memory, ray, (*index, triangle), weights)? {
-                        continue;
-                    }
-                    match visit(*intersection, *index, &|| *triangle) {
-                        ControlFlow::Continue(distance) => until = distance,
-                        ControlFlow::Break(()) => return Ok(()),
-                    }
+                let line = *descent.leaf(memory, leaf)?;
+                let line = BvhLeaf(&line);
+                let corners = line.all_corners();
+                let sheared = frame.leaf(isa, line, &corners);
+                let place = (ray, &frame, leaf);
+                match meet_leaf(scene, memory, place, (line, &sheared), until, search)? {
+                    ControlFlow::Continue(distance) => until = distance,
+                    ControlFlow::Break(()) => return Ok(()),
                 }
             }
         }
     }
     Ok(())
+}
+
+/// Stack of a traversal of the hierarchy.
+pub(super) type BvhStack = Stack<{ BVH_STACK + LANES }>;
+
+/// Finds the hits of a ray in a leaf up to a distance; returns the new one.
+#[inline(always)]
+pub(super) fn meet_leaf<S: Search>(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    (ray, frame, leaf): (&Ray, &RayFrame, u32),
+    (line, sheared): (BvhLeaf, &ShearedLeaf),
+    mut until: f32,
+    search: &mut S,
+) -> Result<ControlFlow<(), f32>, Fault> {
+    let mut may_meet = sheared.may_meet;
+    while may_meet != 0 {
+        let slot = may_meet.trailing_zeros() as usize;
+        may_meet &= may_meet - 1;
+        let Some(intersection) = frame.intersect_slot(sheared, slot, until) else { continue };
+        let index = leaf.wrapping_mul(LEAF_TRIANGLES as u32).wrapping_add(slot as u32);
+        let weights = intersection.barycentric;
+        if line.is_cut_out(slot) && !is_met(scene, memory, ray, (index, &line.triangle(slot)), weights)? {
+            continue;
+        }
+        match search.meet(intersection, index, (line, slot)) {
+            ControlFlow::Continue(distance) => until = distance,
+            ControlFlow::Break(()) => return Ok(ControlFlow::Break(())),
+        }
+    }
+    Ok(ControlFlow::Continue(until))
 }
 
 /// Triangle `index` of the image.

@@ -1,5 +1,6 @@
 //! The scene in card memory: views that read its records line by line.
 
+mod bundle;
 mod bvh;
 mod corners;
 mod coverage;
@@ -16,6 +17,7 @@ mod surface;
 mod texture;
 mod triangle;
 
+pub use bundle::{BUNDLE_RAYS, Bundle, are_occluded, closest_hits};
 pub use bvh::{AnyHit, ClosestHit, closest_hit, is_occluded};
 pub use cut_out::is_there;
 pub use reflection::{

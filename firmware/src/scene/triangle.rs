@@ -83,22 +83,26 @@ impl RayFrame {
         ([x - origin_x - shear_x * depth, y - origin_y - shear_y * depth], depth)
     }
 
-    /// Bit mask of the triangles of a leaf that the ray's line may meet: a superset of the hits of [`Self::intersect_slot`].
+    /// The triangles of a leaf, sheared, by its [`BvhLeaf::all_corners`].
     #[inline(always)]
-    pub(super) fn may_meet(&self, isa: impl Isa, leaf: BvhLeaf) -> u32 {
-        let [x, y, z] = self.axes.map(|axis| leaf.coordinates(axis));
-        let mut sheared = [[0.0; LANES]; 2];
-        let [across, up] = &mut sheared;
+    pub(super) fn leaf<'a>(&self, isa: impl Isa, leaf: BvhLeaf, corners: &'a Corners) -> ShearedLeaf<'a> {
+        let [x, y, z] = self.axes;
+        let [x, y, z] = [leaf.coordinates(x), leaf.coordinates(y), leaf.coordinates(z)];
+        let (mut across, mut up, mut depth) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for lane in 0..isa.lanes(leaf.vertices() as usize).min(VERTEX_LANES) {
             let at = |coordinates: &[f32; VERTEX_LANES]| coordinates.get(lane).copied().unwrap_or(0.0);
-            let ([u, v], _) = self.shear([at(&x), at(&y), at(&z)]);
-            if let (Some(across), Some(up)) = (across.get_mut(lane), up.get_mut(lane)) {
-                (*across, *up) = (u, v);
+            let ([u, v], w) = self.shear([at(&x), at(&y), at(&z)]);
+            if let (Some(across), Some(up), Some(depth)) =
+                (across.get_mut(lane), up.get_mut(lane), depth.get_mut(lane))
+            {
+                (*across, *up, *depth) = (u, v, w);
             }
         }
-        let [a, b, c] = [0, 1, 2].map(|corner| leaf.corners(corner));
-        let [a, b, c] = [permute(isa, &sheared, &a), permute(isa, &sheared, &b), permute(isa, &sheared, &c)];
+        let [a, b, c] = corners;
+        let [a, b, c] = [permute(isa, &across, &up, a), permute(isa, &across, &up, b), permute(isa, &across, &up, c)];
         let mut misses = [0; LANES];
+        let mut edge_lanes = [[0.0; LEAF_TRIANGLES]; 3];
+        let [us, vs, ws] = &mut edge_lanes;
         for lane in 0..isa.lanes(leaf.triangles() as usize).min(LEAF_TRIANGLES) {
             let at = |[x, y]: &[[f32; LEAF_TRIANGLES]; 2]| {
                 [x.get(lane).copied().unwrap_or(0.0), y.get(lane).copied().unwrap_or(0.0)]
@@ -106,11 +110,14 @@ impl RayFrame {
             let [u, v, w] = edges(at(&a), at(&b), at(&c));
             // A product of zero: some sign is undecided in `f32`.
             let is_missed = (min(min(u, v), w) < 0.0) & (max(max(u, v), w) > 0.0) & (u * v * w != 0.0);
-            if let Some(misses) = misses.get_mut(lane) {
-                *misses = u32::from(is_missed);
+            if let (Some(miss), Some(us), Some(vs), Some(ws)) =
+                (misses.get_mut(lane), us.get_mut(lane), vs.get_mut(lane), ws.get_mut(lane))
+            {
+                (*miss, *us, *vs, *ws) = (u32::from(is_missed), u, v, w);
             }
         }
-        isa.below(&misses, 1) & !(u32::MAX << leaf.triangles())
+        let may_meet = isa.below(&misses, 1) & !(u32::MAX << leaf.triangles());
+        ShearedLeaf { may_meet, across, up, depth, corners, edges: edge_lanes }
     }
 
     /// Intersection with either side of a triangle at a distance in (0, `max_distance`].
@@ -126,21 +133,32 @@ impl RayFrame {
     #[inline(always)]
     pub(super) fn intersect_slot(
         &self,
-        leaf: BvhLeaf,
+        leaf: &ShearedLeaf,
         slot: usize,
         max_distance: f32,
     ) -> Option<Intersection> {
-        let [x, y, z] = self.axes;
-        let [a, b, c] = leaf.vertices_of(slot);
-        let on_axes =
-            |vertex| [leaf.coordinate(vertex, x), leaf.coordinate(vertex, y), leaf.coordinate(vertex, z)];
-        self.intersect_on_axes([on_axes(a), on_axes(b), on_axes(c)], max_distance)
+        let lane = |lanes: &[f32; LEAF_TRIANGLES]| lanes.get(slot).copied().unwrap_or(0.0);
+        let [u, v, w] = &leaf.edges;
+        let [a, b, c] = leaf.corners;
+        let corners = [leaf.vertex(a, slot), leaf.vertex(b, slot), leaf.vertex(c, slot)];
+        self.intersect_sheared([lane(u), lane(v), lane(w)], corners, max_distance)
     }
 
     #[inline(always)]
     fn intersect_on_axes(&self, [a, b, c]: [[f32; 3]; 3], max_distance: f32) -> Option<Intersection> {
-        let [(a, a_depth), (b, b_depth), (c, c_depth)] = [self.shear(a), self.shear(b), self.shear(c)];
-        let mut edges = edges(a, b, c);
+        let corners = [self.shear(a), self.shear(b), self.shear(c)];
+        let [(a, _), (b, _), (c, _)] = corners;
+        self.intersect_sheared(edges(a, b, c), corners, max_distance)
+    }
+
+    /// Intersection by the edge functions and the sheared corners.
+    #[inline(always)]
+    fn intersect_sheared(
+        &self,
+        mut edges: [f32; 3],
+        [(a, a_depth), (b, b_depth), (c, c_depth)]: [([f32; 2], f32); 3],
+        max_distance: f32,
+    ) -> Option<Intersection> {
         if edges.contains(&0.0) {
             edges = [cross_exact(c, b), cross_exact(a, c), cross_exact(b, a)];
         }
@@ -159,14 +177,43 @@ impl RayFrame {
     }
 }
 
+/// Vertex indices of the first, second and third corners of a leaf's triangles.
+pub(super) type Corners = [[u32; LEAF_TRIANGLES]; 3];
+
+/// Triangles of a leaf in a ray's frame.
+pub(super) struct ShearedLeaf<'a> {
+    /// Bit mask of the triangles that the ray's line may meet: a superset of the hits of [`RayFrame::intersect_slot`].
+    pub(super) may_meet: u32,
+    /// Vertices across the ray.
+    across: [f32; LANES],
+    up: [f32; LANES],
+    /// Depths of the vertices, before scaling.
+    depth: [f32; LANES],
+    /// Vertex indices of the triangles' first, second and third corners.
+    corners: &'a Corners,
+    /// Edge functions of the triangles.
+    edges: [[f32; LEAF_TRIANGLES]; 3],
+}
+
+impl ShearedLeaf<'_> {
+    /// One corner of a triangle, and its depth.
+    #[inline(always)]
+    fn vertex(&self, corner: &[u32; LEAF_TRIANGLES], slot: usize) -> ([f32; 2], f32) {
+        let index = corner.get(slot).copied().unwrap_or(0) as usize % LANES;
+        let at = |lanes: &[f32; LANES]| lanes.get(index).copied().unwrap_or(0.0);
+        ([at(&self.across), at(&self.up)], at(&self.depth))
+    }
+}
+
 /// Coordinates of one corner of each triangle, gathered from the leaf's vertices.
 #[inline(always)]
 fn permute(
     isa: impl Isa,
-    [x, y]: &[[f32; LANES]; 2],
+    across: &[f32; LANES],
+    up: &[f32; LANES],
     vertices: &[u32; LEAF_TRIANGLES],
 ) -> [[f32; LEAF_TRIANGLES]; 2] {
-    [isa.permute(x, vertices), isa.permute(y, vertices)]
+    [isa.permute(across, vertices), isa.permute(up, vertices)]
 }
 
 /// Edge functions at the origin, each of the edge opposite to a corner.

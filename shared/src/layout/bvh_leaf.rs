@@ -76,12 +76,23 @@ impl BvhLeaf<'_> {
         bytes.map_or([0.0; VERTEX_LANES], |bytes| core::array::from_fn(|lane| read_f32(bytes, 4 * lane)))
     }
 
+    /// Vertex indices of the first, the second and the third corner of every triangle.
+    #[inline(always)]
+    pub fn all_corners(&self) -> [[u32; LEAF_TRIANGLES]; 3] {
+        [self.corners(0), self.corners(1), self.corners(2)]
+    }
+
     /// Vertex index of one corner of every triangle: below nine, even in an unsound image.
     #[inline(always)]
-    pub fn corners(&self, corner: usize) -> [u32; LEAF_TRIANGLES] {
+    fn corners(&self, corner: usize) -> [u32; LEAF_TRIANGLES] {
         let vertices = read_u32(self.0, CORNERS + 4 * corner);
-        // Above the maximum in unsound images only.
-        core::array::from_fn(|slot| (vertices >> (4 * slot) & 15).min(LEAF_VERTICES as u32 - 1))
+        let mut corners = [0; LEAF_TRIANGLES];
+        // A loop: compilers leave `from_fn` without the vector instructions of the caller.
+        for (slot, corner) in (0_u32..).zip(&mut corners) {
+            // Above the maximum in unsound images only.
+            *corner = (vertices >> (4 * slot) & 15).min(LEAF_VERTICES as u32 - 1);
+        }
+        corners
     }
 
     /// Vertex indices of triangle `slot`, below [`LEAF_TRIANGLES`].

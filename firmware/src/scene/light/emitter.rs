@@ -7,7 +7,7 @@ use photoncard_shared::message::Fault;
 
 use super::choice::Fraction;
 use super::sample::{LightSample, Receiver};
-use super::tree::{select_emitter, selection_probability};
+use super::tree::{LightChoices, select_emitter, selection_probability};
 use crate::memory::MemoryPort;
 use crate::scene::corners::Corners;
 use crate::scene::coverage::coverage;
@@ -115,11 +115,12 @@ pub fn emitter_density(
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    receiver: &Receiver,
+    choices: &mut LightChoices,
     share: f32,
     [across, down]: [Fraction; 2],
 ) -> Result<Option<LightSample>, Fault> {
-    let Some(selection) = select_emitter(scene, memory, receiver, across)? else { return Ok(None) };
+    let Some(selection) = select_emitter(scene, memory, choices, across)? else { return Ok(None) };
+    let receiver = &choices.receiver;
     let emitter = read_emitter(scene, memory, selection.emitter)?;
     let probability = share * selection.probability;
     let intensity = Vec3::from_array(emitter.emission);

@@ -21,7 +21,7 @@ pub use environment::{
     environment_coordinates, environment_density, environment_direction, environment_radiance,
 };
 pub use sample::{LightSample, Receiver};
-pub use tree::{Selection, select_emitter, selection_probability};
+pub use tree::{LightChoices, Selection, select_emitter, selection_probability};
 
 use photoncard_shared::image::Lights;
 use photoncard_shared::message::Fault;
@@ -29,14 +29,14 @@ use photoncard_shared::message::Fault;
 use super::SceneImage;
 use crate::memory::MemoryPort;
 
-/// Samples a light for a receiver by a point `(u, v)` of the unit square and 32 random bits; `None` for a sample without light.
+/// Samples a light for the receiver of `choices` by a point `(u, v)` of the unit square and 32 random bits; `None` for a sample without light.
 ///
 /// # Errors
 /// If the image is not sound.
 pub fn sample_light(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    receiver: &Receiver,
+    choices: &mut LightChoices,
     [u, v]: [f32; 2],
     dither: u32,
 ) -> Result<Option<LightSample>, Fault> {
@@ -44,7 +44,7 @@ pub fn sample_light(
     let across = Fraction::new(u, dither);
     if across.value() < emitters {
         let across = across.within(0.0, emitters);
-        return emitter::sample(scene, memory, receiver, emitters, [across, Fraction::new(v, !dither)]);
+        return emitter::sample(scene, memory, choices, emitters, [across, Fraction::new(v, !dither)]);
     }
     let beyond_emitters = emitters + environment;
     if across.value() < beyond_emitters {

@@ -47,13 +47,12 @@ pub struct Selection {
 pub fn select_emitter(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    receiver: &Receiver,
+    choices: &mut LightChoices,
     mut fraction: Fraction,
 ) -> Result<Option<Selection>, Fault> {
     let (mut node, mut probability) = (0, 1.0);
     for _ in 0..LIGHT_TREE_LEVELS {
-        let children = read_node(scene, memory, node)?;
-        let Some((child, lower)) = Choice::new(&children, receiver).choose(fraction) else {
+        let Some((child, lower)) = choices.at(scene, memory, node)?.choose(fraction) else {
             return Ok(None);
         };
         fraction = fraction.within(lower, child.probability);
@@ -108,7 +107,42 @@ fn read_node(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Re
     Ok(core::array::from_fn(|child| line.child(child)))
 }
 
+/// Number of no node: a tree has fewer.
+const NO_NODE: u32 = u32::MAX;
+/// Number of nodes whose choices are kept.
+const KEPT_CHOICES: usize = 4;
+
+/// A receiver, with its choices at the nodes that were read last: of the shadow rays of a point most pass the same few nodes.
+pub struct LightChoices {
+    pub(super) receiver: Receiver,
+    /// Nodes, each at its number modulo their count, and the choices there.
+    kept: [(u32, Choice); KEPT_CHOICES],
+}
+
+impl LightChoices {
+    /// A receiver without choices.
+    pub fn new(receiver: Receiver) -> Self {
+        Self { receiver, kept: [(NO_NODE, Choice::NONE); KEPT_CHOICES] }
+    }
+
+    /// The choice at a node, which is read if its choice is not kept.
+    fn at(&mut self, scene: &SceneImage, memory: &mut impl MemoryPort, node: u32) -> Result<&Choice, Fault> {
+        let [first, second, third, fourth] = &mut self.kept;
+        let kept = match node as usize % KEPT_CHOICES {
+            0 => first,
+            1 => second,
+            2 => third,
+            _ => fourth,
+        };
+        if kept.0 != node {
+            *kept = (node, Choice::new(&read_node(scene, memory, node)?, &self.receiver));
+        }
+        Ok(&kept.1)
+    }
+}
+
 /// Children of a node that may light a receiver, with their probabilities.
+#[derive(Clone, Copy)]
 struct Choice {
     options: [Option<Weighted>; LIGHT_CHILDREN],
 }
@@ -121,6 +155,8 @@ struct Weighted {
 }
 
 impl Choice {
+    const NONE: Self = Self { options: [None; LIGHT_CHILDREN] };
+
     fn new(children: &Children, receiver: &Receiver) -> Self {
         let bounds = children.map(|child| child.and_then(|child| Bound::new(&child, receiver)));
         // Relative to the nearest child: squared distances may overflow or underflow.
@@ -150,7 +186,7 @@ impl Choice {
     fn choose(&self, fraction: Fraction) -> Option<(Weighted, f32)> {
         let mut chosen = None;
         let mut lower = 0.0;
-        for option in self.options.into_iter().flatten() {
+        for &option in self.options.iter().flatten() {
             chosen = Some((option, lower));
             lower += option.probability;
             if fraction.value() < lower {

@@ -1,0 +1,174 @@
+//! Bundles of rays: up to sixteen go through the hierarchy together, so that a line is read, and its boxes or corners are decoded, once
+//! for all rays that meet it (compare Barringer, Akenine-Möller 2014, *Dynamic ray stream traversal*).
+//!
+//! Each ray is tested against each box and triangle by the operations of a ray alone ([`super::bvh`]): the hits are equal bit for bit,
+//! whatever the rays beside it.
+
+use core::ops::ControlFlow;
+
+use heapless::Vec;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, WideNode};
+use photoncard_shared::message::Fault;
+
+use super::bvh::{BvhStack, Search, closest_hit, is_occluded, meet_leaf};
+use super::slabs::{Boxes, Slabs};
+use super::{Hit, Ray, RayFrame, SceneImage};
+use crate::memory::MemoryPort;
+use crate::simd::{self, Isa, Kernel, LANES};
+use crate::wide_tree::{BEYOND, Descent, Order};
+
+/// Maximum number of rays of a bundle.
+pub const BUNDLE_RAYS: usize = LANES;
+
+/// A bit for each ray of a bundle: the lower half of the bits that are pushed with a child. The upper half is that of the least of
+/// the rays' distances, rounded down.
+const RAYS: u32 = (1 << BUNDLE_RAYS) - 1;
+
+/// [`closest_hit`] of each of up to [`BUNDLE_RAYS`] rays.
+///
+/// # Errors
+/// As [`closest_hit`].
+#[inline(never)]
+pub fn closest_hits(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    rays: &[Ray],
+) -> Result<[Option<Hit>; BUNDLE_RAYS], Fault> {
+    let mut searches = [None; BUNDLE_RAYS];
+    match (rays, &mut searches) {
+        ([], _) => {}
+        ([ray], [hit, ..]) => *hit = closest_hit(scene, memory, ray)?,
+        (_, searches) => simd::run(Bundle { scene, memory, rays, searches })?,
+    }
+    Ok(searches)
+}
+
+/// [`is_occluded`] of each of up to [`BUNDLE_RAYS`] rays.
+///
+/// # Errors
+/// As [`closest_hit`].
+#[inline(never)]
+pub fn are_occluded(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    rays: &[Ray],
+) -> Result<[bool; BUNDLE_RAYS], Fault> {
+    let mut searches = [false; BUNDLE_RAYS];
+    match (rays, &mut searches) {
+        ([], _) => {}
+        ([ray], [occluded, ..]) => *occluded = is_occluded(scene, memory, ray)?,
+        (_, searches) => simd::run(Bundle { scene, memory, rays, searches })?,
+    }
+    Ok(searches)
+}
+
+/// Kernel of [`closest_hits`] with searches of the type `Option<Hit>`, of [`are_occluded`] with `bool`.
+pub struct Bundle<'a, M, S> {
+    /// The scene.
+    pub scene: &'a SceneImage,
+    /// Card memory.
+    pub memory: &'a mut M,
+    /// The rays; those beyond [`BUNDLE_RAYS`] are ignored.
+    pub rays: &'a [Ray],
+    /// The result of each ray, nothing found.
+    pub searches: &'a mut [S; BUNDLE_RAYS],
+}
+
+/// A ray of a bundle.
+struct Way<'a> {
+    ray: &'a Ray,
+    frame: RayFrame,
+    slabs: Slabs,
+}
+
+impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
+    type Output = Result<(), Fault>;
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> Self::Output {
+        let Self { scene, memory, rays, searches } = self;
+        let mut ways = Vec::<Way, BUNDLE_RAYS>::new();
+        // Bits of the maximum distance of each ray.
+        let mut until = [0; BUNDLE_RAYS];
+        for (ray, until) in rays.iter().zip(&mut until) {
+            *until = ray.max_distance.to_bits();
+            let _ = ways.push(Way { ray, frame: RayFrame::new(ray), slabs: Slabs::new(ray) });
+        }
+        let mut waiting = RAYS & !(u32::MAX << ways.len());
+        let mut stack = BvhStack::new();
+        let sections = [SectionKind::Nodes, SectionKind::Triangles];
+        let mut descent = Descent::with_root(scene, sections, &mut stack, waiting);
+        while let Some((bits, child)) = descent.pop()? {
+            let mut here = bits & waiting;
+            if S::ORDER == Order::NearestFirst {
+                here &= !isa.below(&until, bits & !RAYS);
+            }
+            if here == 0 {
+                continue;
+            }
+            match child {
+                Child::Node(node) => descent.enter(isa, memory, node, S::ORDER, |line| {
+                    let children = WideNode(line).children() as usize;
+                    let boxes = Boxes::new(isa, BvhNode(line), children);
+                    enter(isa, &boxes, &ways, here, &until, S::ORDER)
+                })?,
+                Child::Leaf(leaf) => {
+                    let line = *descent.leaf(memory, leaf)?;
+                    let line = BvhLeaf(&line);
+                    let corners = line.all_corners();
+                    while here != 0 {
+                        let index = here.trailing_zeros() as usize;
+                        here &= here - 1;
+                        let (Some(way), Some(until), Some(search)) =
+                            (ways.get(index), until.get_mut(index), searches.get_mut(index))
+                        else {
+                            continue;
+                        };
+                        let sheared = way.frame.leaf(isa, line, &corners);
+                        if sheared.may_meet == 0 {
+                            continue;
+                        }
+                        let place = (way.ray, &way.frame, leaf);
+                        let limit = f32::from_bits(*until);
+                        match meet_leaf(scene, memory, place, (line, &sheared), limit, search)? {
+                            ControlFlow::Continue(distance) => *until = distance.to_bits(),
+                            ControlFlow::Break(()) => waiting &= !(1 << index),
+                        }
+                    }
+                    if waiting == 0 {
+                        break;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The bits to push with each child of a node: the rays of `here` that enter its box, and the least distance at which one does.
+#[inline(always)]
+fn enter(
+    isa: impl Isa,
+    boxes: &Boxes,
+    ways: &[Way],
+    mut here: u32,
+    until: &[u32; BUNDLE_RAYS],
+    order: Order,
+) -> [u32; LANES] {
+    let mut entered = [0; LANES];
+    let mut nearest = [f32::INFINITY; LANES];
+    while here != 0 {
+        let index = here.trailing_zeros() as usize;
+        let ray = here & here.wrapping_neg();
+        here &= here - 1;
+        let (Some(way), Some(&until)) = (ways.get(index), until.get(index)) else { continue };
+        way.slabs.enter_bundle(isa, boxes, f32::from_bits(until), (ray, &mut entered, &mut nearest));
+    }
+    let mut bits = [BEYOND; LANES];
+    for ((bits, rays), nearest) in bits.iter_mut().zip(entered).zip(nearest) {
+        let distance = if order == Order::NearestFirst { nearest.to_bits() & !RAYS } else { 0 };
+        *bits = if rays == 0 { BEYOND } else { distance | rays };
+    }
+    bits
+}
