@@ -9,7 +9,8 @@ use photoncard_firmware::memory::{Lines, MemoryPort};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_firmware::scene::light::{
-    Fraction, LightChoices, Receiver, environment_density, sample_light, select_emitter, selection_probability,
+    Fraction, LightChoices, Receiver, environment_density, sample_light, select_emitter,
+    selection_probability,
 };
 use photoncard_shared::address::{Line, LineAddress, Structure};
 use photoncard_shared::image::SectionKind;
@@ -116,7 +117,9 @@ fn the_probabilities_of_all_emitters_sum_to_that_of_finding_one() {
         let finds = |sample: &u32| {
             let fraction =
                 Fraction::new((*sample as f32 + random(*sample, 7)) / samples as f32, hash(*sample));
-            select_emitter(&image, &mut packed.view().1, &mut LightChoices::new(receiver), fraction).unwrap().is_some()
+            select_emitter(&image, &mut packed.view().1, &mut LightChoices::new(receiver), fraction)
+                .unwrap()
+                .is_some()
         };
         let found = (0..samples).filter(finds).count() as f64 / f64::from(samples);
         // No light is found if all children of a node are behind the receiver, though the node as a whole is not.

@@ -1,12 +1,13 @@
-//! The ray caster agrees with brute force, has equal bits on every processor, and loses no ray at an edge.
+//! The ray caster agrees with brute force, has equal bits on every processor and in bundles, and loses no ray at an edge.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::scene::{Triangle, gltf};
-use photoncard_firmware::memory::Lines;
+use photoncard_driver::scene::{Material, Scene, Triangle, gltf};
+use photoncard_firmware::memory::{Counted, Lines};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{
-    AnyHit, ClosestHit, Hit, Ray, RayFrame, SceneImage, closest_hit, is_occluded,
+    AnyHit, BUNDLE_RAYS, Bundle, ClosestHit, Hit, Ray, RayFrame, SceneImage, are_occluded, closest_hit,
+    closest_hits, is_occluded,
 };
 use photoncard_firmware::simd::Level;
 use photoncard_shared::address::LINE_BYTES;
@@ -170,6 +171,101 @@ fn no_ray_leaves_a_closed_surface() {
             let ray = Ray::new(origin, (target - origin).normalize());
             assert!(closest_hit(&image, &mut memory, &ray).unwrap().is_some(), "{ray:?} leaves");
             assert!(is_occluded(&image, &mut memory, &ray).unwrap(), "{ray:?} leaves");
+        }
+    }
+}
+
+/// Rays as a chip casts them together: those of neighbouring pixels, from one point to a light or all around, or without order.
+fn bundle(scene: &Scene, triangles: &[Triangle], index: u32) -> Vec<Ray> {
+    let count = 1 + index % BUNDLE_RAYS as u32;
+    let of = |ray: u32| index * BUNDLE_RAYS as u32 + ray;
+    let camera = scene.camera(None).expect("a scene has a camera");
+    let [from, to] = [1, 2].map(|salt| {
+        let [a, b, c] = triangles[hash(index + salt) as usize % triangles.len()].vertices;
+        a.lerp(b, random(index, salt)).lerp(c, 0.3)
+    });
+    let across = |ray: u32| random_point(of(ray), 40);
+    match index % 4 {
+        0 => (0..count)
+            .map(|ray| {
+                let place =
+                    [random(index, 5), random(index, 6) + 0.002 * ray as f32].map(|at| 2.0 * at - 1.0);
+                let direction = camera.forward + camera.right * place[0] + camera.up * place[1];
+                Ray::new(camera.origin, direction.normalize())
+            })
+            .collect(),
+        1 => (0..count)
+            .map(|ray| {
+                let way = to + across(ray) * 0.2 - from;
+                Ray { max_distance: way.length() * 0.999, ..Ray::new(from, way.normalize_or(Vec3::Y)) }
+            })
+            .collect(),
+        2 => (0..count).map(|ray| Ray::new(from, across(ray).normalize_or(Vec3::X))).collect(),
+        _ => rays(triangles, of(count)).split_off(of(0) as usize),
+    }
+}
+
+#[test]
+fn rays_of_a_bundle_hit_what_each_hits_alone_in_every_shipped_scene() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes");
+    let paths =
+        std::fs::read_dir(folder).expect("there are scenes").map(|entry| entry.expect("a file").path());
+    let is_scene = |path: &std::path::PathBuf| {
+        path.extension().is_some_and(|extension| extension == "gltf" || extension == "glb")
+    };
+    let mut scenes: Vec<Scene> =
+        paths.filter(is_scene).map(|path| gltf::load(&path).expect("a shipped scene loads")).collect();
+    assert!(scenes.len() > 8, "{}", scenes.len());
+    let sheet = Material { blends: true, alpha: 0.5, double_sided: true, ..lambertian("sheet", 0.5) };
+    scenes.push(scene(boards(), vec![sheet], camera(Vec3::splat(3.0), Vec3::NEG_ONE.normalize())));
+    for (number, scene) in scenes.iter().enumerate() {
+        let packed = PackedScene::new(scene).expect("packs");
+        let (image, mut memory) = packed.view();
+        let mut hits = 0;
+        for index in 0..200 {
+            let rays = bundle(scene, &scene.triangles, index);
+            let alone: Vec<_> =
+                rays.iter().map(|ray| closest_hit(&image, &mut memory, ray).expect("sound")).collect();
+            hits += alone.iter().flatten().count();
+            let together = closest_hits(&image, &mut memory, &rays).expect("sound");
+            let occluded = are_occluded(&image, &mut memory, &rays).expect("sound");
+            assert_eq!(together[..rays.len()], alone, "bundle {index} of scene {number}");
+            assert!(
+                alone.iter().zip(occluded).all(|(hit, any)| hit.is_some() == any),
+                "bundle {index} of {number}"
+            );
+            for level in Level::ALL {
+                let (mut closest, mut any) = ([None; BUNDLE_RAYS], [false; BUNDLE_RAYS]);
+                let (scene, memory, rays) = (&image, &mut memory, &rays[..]);
+                let found = level.run(Bundle { scene, memory, rays, searches: &mut closest });
+                assert!(found.is_none_or(|found| found.is_ok() && closest == together), "{level:?}");
+                let found = level.run(Bundle { scene, memory, rays, searches: &mut any });
+                assert!(found.is_none_or(|found| found.is_ok() && any == occluded), "{level:?}");
+            }
+        }
+        assert!(hits > 200, "{hits} of scene {number}");
+    }
+}
+
+#[test]
+fn coherent_rays_read_half_of_the_lines_in_bundles() {
+    let scene = gltf::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf").as_ref())
+        .expect("a shipped scene loads");
+    let packed = PackedScene::new(&scene).expect("packs");
+    let (image, memory) = packed.view();
+    let requests = |cast: &dyn Fn(&mut Counted<Lines>)| {
+        let mut counted = Counted::new(memory);
+        cast(&mut counted);
+        counted.traffic().sum(|_, _| true).requests
+    };
+    for index in 0..100 {
+        let rays = bundle(&scene, &scene.triangles, index);
+        let alone = requests(&|memory| {
+            rays.iter().for_each(|ray| drop(closest_hit(&image, memory, ray).expect("sound")));
+        });
+        let together = requests(&|memory| drop(closest_hits(&image, memory, &rays).expect("sound")));
+        if index % 4 < 2 && rays.len() >= 8 {
+            assert!(2 * together < alone, "{index}: {together} instead of {alone}");
         }
     }
 }

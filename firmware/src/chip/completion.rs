@@ -88,8 +88,7 @@ fn light_sample<K: ChipKind, M: MemoryPort>(
     let surface = &view.surface;
     light.add(frame, Component::Direct, surface.emission * per_unit);
     let allowed = allowed_error_at(frame, view);
-    let interpolated =
-        allowed.and_then(|allowed| cache.interpolate(&seen_sample(at, view), allowed));
+    let interpolated = allowed.and_then(|allowed| cache.interpolate(&seen_sample(at, view), allowed));
     *lambertian += u32::from(frame.gather_rays > 0 && surface.reflection.has_lambertian());
     if let Some(irradiance) = interpolated {
         *interpolated_samples += 1;

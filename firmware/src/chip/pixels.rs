@@ -60,8 +60,7 @@ fn gather_point<M, R: Capacity>(
     view: &View,
 ) -> GatherPoint {
     let allowed = allowed_error_at(context.frame, view);
-    let is_interpolated =
-        allowed.is_some_and(|allowed| cache.covers(&seen_sample(at, view), allowed));
+    let is_interpolated = allowed.is_some_and(|allowed| cache.covers(&seen_sample(at, view), allowed));
     let purpose = if is_interpolated { Purpose::Lobe } else { Purpose::Sample };
     pixel_point(context.frame, at, view, purpose)
 }

@@ -25,7 +25,8 @@ use super::{Context, GatherPoint, PixelSample, Purpose, SHORTER};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::light::{
-    LightChoices, LightSample, Receiver, emitter_density, environment_density, environment_radiance, sample_light,
+    LightChoices, LightSample, Receiver, emitter_density, environment_density, environment_radiance,
+    sample_light,
 };
 use crate::scene::{BUNDLE_RAYS, Ray, Surface, are_occluded};
 use crate::vector::max_component;

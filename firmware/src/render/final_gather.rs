@@ -16,7 +16,9 @@ use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
 use crate::scene::light::environment_radiance;
-use crate::scene::{BUNDLE_RAYS, Hit, PartialReflection, Ray, Reflector, Surface, closest_hits, read_surface};
+use crate::scene::{
+    BUNDLE_RAYS, Hit, PartialReflection, Ray, Reflector, Surface, closest_hits, read_surface,
+};
 
 /// Contribution of one final gather ray.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +57,9 @@ pub fn cast<M: MemoryPort>(
     context.counters.gather_rays += bundle.len() as u64;
     let hits = closest_hits(context.scene, context.memory, &bundle)?;
     for (((index, sampled), ray), hit) in aimed.iter().zip(&bundle).zip(hits) {
-        if let Some(end) = arrive(context, point, target.in_cell(sampled.cell), (*index, sampled), (ray, hit))? {
+        if let Some(end) =
+            arrive(context, point, target.in_cell(sampled.cell), (*index, sampled), (ray, hit))?
+        {
             let _ = ends.push(end);
         }
     }

@@ -96,7 +96,12 @@ impl Search for Option<Hit> {
     const ORDER: Order = Order::NearestFirst;
 
     #[inline(always)]
-    fn meet(&mut self, found: Intersection, index: u32, (leaf, slot): (BvhLeaf, usize)) -> ControlFlow<(), f32> {
+    fn meet(
+        &mut self,
+        found: Intersection,
+        index: u32,
+        (leaf, slot): (BvhLeaf, usize),
+    ) -> ControlFlow<(), f32> {
         let nearest = match self {
             Some(hit) => {
                 let distance = hit.intersection.distance;

@@ -100,7 +100,11 @@ impl Boxes {
     #[inline(always)]
     pub(super) fn new(isa: impl Isa, node: BvhNode, children: usize) -> Self {
         let [x, y, z] = node.axes();
-        let axes = [BoxAxis::new(isa, &x, children), BoxAxis::new(isa, &y, children), BoxAxis::new(isa, &z, children)];
+        let axes = [
+            BoxAxis::new(isa, &x, children),
+            BoxAxis::new(isa, &y, children),
+            BoxAxis::new(isa, &z, children),
+        ];
         Self { axes, children }
     }
 }

@@ -99,7 +99,8 @@ impl RayFrame {
             }
         }
         let [a, b, c] = corners;
-        let [a, b, c] = [permute(isa, &across, &up, a), permute(isa, &across, &up, b), permute(isa, &across, &up, c)];
+        let [a, b, c] =
+            [permute(isa, &across, &up, a), permute(isa, &across, &up, b), permute(isa, &across, &up, c)];
         let mut misses = [0; LANES];
         let mut edge_lanes = [[0.0; LEAF_TRIANGLES]; 3];
         let [us, vs, ws] = &mut edge_lanes;
