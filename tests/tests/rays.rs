@@ -227,7 +227,8 @@ fn rays_of_a_bundle_hit_what_each_hits_alone_in_every_shipped_scene() {
             let alone: Vec<_> =
                 rays.iter().map(|ray| closest_hit(&image, &mut memory, ray).expect("sound")).collect();
             hits += alone.iter().flatten().count();
-            let together = closest_hits(&image, &mut memory, &rays).expect("sound");
+            let mut together = [None; BUNDLE_RAYS];
+            closest_hits(&image, &mut memory, &rays, &mut together).expect("sound");
             let occluded = are_occluded(&image, &mut memory, &rays).expect("sound");
             assert_eq!(together[..rays.len()], alone, "bundle {index} of scene {number}");
             assert!(
@@ -263,7 +264,9 @@ fn coherent_rays_read_half_of_the_lines_in_bundles() {
         let alone = requests(&|memory| {
             rays.iter().for_each(|ray| drop(closest_hit(&image, memory, ray).expect("sound")));
         });
-        let together = requests(&|memory| drop(closest_hits(&image, memory, &rays).expect("sound")));
+        let together = requests(&|memory| {
+            closest_hits(&image, memory, &rays, &mut [None; BUNDLE_RAYS]).expect("sound");
+        });
         if index % 4 < 2 && rays.len() >= 8 {
             assert!(2 * together < alone, "{index}: {together} instead of {alone}");
         }

@@ -79,19 +79,18 @@ impl DirectionTable {
         if bins <= 1 {
             return 0..count;
         }
-        self.first_ray(pattern, count, bin, bins)..self.first_ray(pattern, count, bin + 1, bins)
-    }
-
-    /// Index of the first ray at or after the start of a bin.
-    fn first_ray(&self, pattern: Pattern, count: u32, bin: u32, bins: u32) -> u32 {
-        let [entry, part] = [bin * ENTRIES as u32 / bins, bin * ENTRIES as u32 % bins];
-        // In units of a share over `bins`: integers.
-        let beginning = (self.before(entry as usize) * bins + self.share(entry as usize) * part) as u64;
+        let place = |bin: u32| [bin * ENTRIES as u32 / bins, bin * ENTRIES as u32 % bins];
+        let [from, to] = [place(bin), place(bin + 1)];
         // At least 1 in every table, which the compiler cannot prove.
         let total = (self.total() * bins).max(1) as u64;
-        let ray = (beginning * count as u64 / total) as u32;
-        let is_before = ray < count && stratum_point(pattern, ray) * total < beginning * whole(count);
-        ray + u32::from(is_before)
+        let before = self.before(from[0] as usize);
+        let between: u32 = (from[0]..to[0]).map(|entry| self.share(entry as usize)).sum();
+        let first = |before: u32, [entry, part]: [u32; 2]| {
+            // In units of a share over `bins`: integers.
+            let beginning = (before * bins + self.share(entry as usize) * part) as u64;
+            first_ray(pattern, count, beginning, total)
+        };
+        first(before, from)..first(before + between, to)
     }
 
     /// Entry of ray `index` of `count`, and the ray's coordinates within the entry, along the walk and across it.
@@ -180,6 +179,14 @@ fn whole(count: u32) -> u64 {
 #[inline(always)]
 fn stratum_point(pattern: Pattern, index: u32) -> u64 {
     (index as u64) << JITTER_BITS | (pattern.jitter(index) >> (u32::BITS - JITTER_BITS)) as u64
+}
+
+/// Index of the first ray of `count` at or after a beginning, of `total`.
+#[inline(always)]
+fn first_ray(pattern: Pattern, count: u32, beginning: u64, total: u64) -> u32 {
+    let ray = (beginning * count as u64 / total) as u32;
+    let is_before = ray < count && stratum_point(pattern, ray) * total < beginning * whole(count);
+    ray + u32::from(is_before)
 }
 
 #[inline(always)]

@@ -110,7 +110,8 @@ impl<R: Capacity> IrradianceCache<R> {
         }
         context.memory.enter(Stage::Survey);
         context.counters.survey_rays += rays.len() as u64;
-        let hits = closest_hits(context.scene, context.memory, &rays)?;
+        let mut hits = [None; BUNDLE_RAYS];
+        closest_hits(context.scene, context.memory, &rays, &mut hits)?;
         let mut distances =
             hits.iter().map(|hit| hit.as_ref().map_or(f32::INFINITY, |hit| hit.intersection.distance));
         for index in index..end {

@@ -55,8 +55,9 @@ pub fn cast<M: MemoryPort>(
         }
     }
     context.counters.gather_rays += bundle.len() as u64;
-    let hits = closest_hits(context.scene, context.memory, &bundle)?;
-    for (((index, sampled), ray), hit) in aimed.iter().zip(&bundle).zip(hits) {
+    let mut hits = [None; BUNDLE_RAYS];
+    closest_hits(context.scene, context.memory, &bundle, &mut hits)?;
+    for (((index, sampled), ray), hit) in aimed.iter().zip(&bundle).zip(&mut hits) {
         if let Some(end) =
             arrive(context, point, target.in_cell(sampled.cell), (*index, sampled), (ray, hit))?
         {
@@ -72,20 +73,20 @@ fn arrive<M: MemoryPort>(
     point: &GatherPoint,
     target: GatherTarget,
     (index, sampled): (u32, &GatherDirection),
-    (ray, hit): (&Ray, Option<Hit>),
+    (ray, hit): (&Ray, &mut Option<Hit>),
 ) -> Result<Option<GatherRayEnd>, Fault> {
     let mut path = SpecularPath::new(*ray, Carried::Radiance, Passes::NarrowLobes);
     // The division by the number of rays is done here: sums stay within the fixed-point range.
     let weight = sampled.weight * (1.0 / point.rays as f32);
-    let Some(mut hit) = hit else {
+    let Some(hit) = hit else {
         return escaped(context, point, &path, sampled, weight);
     };
     let random = |choice| point.pattern.choice(index, choice);
     let of_surface = |choice| random(surface_choice(0, choice));
     let mut met = Surface::NOWHERE;
-    read_surface(context.scene, context.memory, ray, &hit, &of_surface, &mut met)?;
+    read_surface(context.scene, context.memory, ray, hit, &of_surface, &mut met)?;
     if path.may_pass(&met) {
-        match path.follow(context, &mut met, &mut hit, &random)? {
+        match path.follow(context, &mut met, hit, &random)? {
             PathEnd::Surface => {}
             PathEnd::Escaped => return escaped(context, point, &path, sampled, weight),
             PathEnd::Lost => {

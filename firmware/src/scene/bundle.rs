@@ -25,7 +25,7 @@ pub const BUNDLE_RAYS: usize = LANES;
 /// the rays' distances, rounded down.
 const RAYS: u32 = (1 << BUNDLE_RAYS) - 1;
 
-/// [`closest_hit`] of each of up to [`BUNDLE_RAYS`] rays.
+/// [`closest_hit`] of each of up to [`BUNDLE_RAYS`] rays, put into `hits`, which are `None`: in place, as they are a kilobyte.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -34,14 +34,16 @@ pub fn closest_hits(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     rays: &[Ray],
-) -> Result<[Option<Hit>; BUNDLE_RAYS], Fault> {
-    let mut searches = [None; BUNDLE_RAYS];
-    match (rays, &mut searches) {
-        ([], _) => {}
-        ([ray], [hit, ..]) => *hit = closest_hit(scene, memory, ray)?,
-        (_, searches) => simd::run(Bundle { scene, memory, rays, searches })?,
+    hits: &mut [Option<Hit>; BUNDLE_RAYS],
+) -> Result<(), Fault> {
+    match (rays, &mut *hits) {
+        ([], _) => Ok(()),
+        ([ray], [hit, ..]) => {
+            *hit = closest_hit(scene, memory, ray)?;
+            Ok(())
+        }
+        _ => simd::run(Bundle { scene, memory, rays, searches: hits }),
     }
-    Ok(searches)
 }
 
 /// [`is_occluded`] of each of up to [`BUNDLE_RAYS`] rays.
