@@ -13,7 +13,7 @@ use photoncard_firmware::gather::{GatherTarget, PointIndex};
 use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::photon::CandidateBuffer;
 use photoncard_firmware::render::eye::see;
-use photoncard_firmware::render::final_gather::{cast, gathered};
+use photoncard_firmware::render::final_gather::{GatherRayEnds, bundles, cast, gathered};
 use photoncard_firmware::render::{Context, GatherPoint};
 use photoncard_firmware::sampler::{Dimension, Pattern};
 use photoncard_firmware::scene::Surface;
@@ -128,10 +128,11 @@ impl<'a> IndirectLight<'a> {
             point.choose_directions(&mut context, candidates.view()).expect("sound");
             let mut sum = Vec3::ZERO;
             let target = GatherTarget::new(0, PointIndex::Pixel(0));
-            for ray in 0..rays {
-                let end = cast(&mut context, &point, target, ray).expect("sound");
-                if let Some(request) = end.and_then(|end| end.request) {
-                    sum += gathered(&mut context, &request, candidates.view()).expect("sound");
+            let mut ends = GatherRayEnds::new();
+            for bundle in bundles(0..rays) {
+                cast(&mut context, &point, target, bundle, &mut ends).expect("sound");
+                for request in ends.iter().filter_map(|end| end.request.as_ref()) {
+                    sum += gathered(&mut context, request, candidates.view()).expect("sound");
                 }
             }
             sum * scene.header.radiance_unit

@@ -262,7 +262,9 @@ fn coherent_rays_read_half_of_the_lines_in_bundles() {
     for index in 0..100 {
         let rays = bundle(&scene, &scene.triangles, index);
         let alone = requests(&|memory| {
-            rays.iter().for_each(|ray| drop(closest_hit(&image, memory, ray).expect("sound")));
+            for ray in &rays {
+                closest_hit(&image, memory, ray).expect("sound");
+            }
         });
         let together = requests(&|memory| {
             closest_hits(&image, memory, &rays, &mut [None; BUNDLE_RAYS]).expect("sound");

@@ -1,13 +1,12 @@
 //! The passes of a block's pixels with gather rays of their own, stripe by stripe and sample by sample: these rays, and direct light,
 //! which is weighted against them.
 
-use heapless::Vec;
 use photoncard_shared::message::{Fault, FrameParameters};
 
 use super::buffers::Shared;
 use super::flight::{Flight, allowed_error};
 use super::light::Component;
-use super::position::{Pass, bundles};
+use super::position::Pass;
 use super::stored_point::{StoredPoint, StoredRays, pattern};
 use crate::gather::{GatherTarget, PointIndex};
 use crate::irradiance_cache::{IrradianceCache, SeenSample};
@@ -178,8 +177,8 @@ impl<K: ChipKind> Flight<K> {
             if !of_bin.is_empty() && stored.read_surface(context, at, &mut point.surface)? {
                 let (rays, is_last) = self.position.next_rays(of_bin);
                 let target = GatherTarget::new(flight, PointIndex::Pixel(number));
-                let mut ends = Vec::new();
-                for bundle in bundles(rays) {
+                let mut ends = final_gather::GatherRayEnds::new();
+                for bundle in final_gather::bundles(rays) {
                     final_gather::cast(context, &point, target, bundle, &mut ends)?;
                     for end in &ends {
                         let sum = (flight, number);

@@ -2,8 +2,6 @@
 
 use core::ops::Range;
 
-use crate::scene::BUNDLE_RAYS;
-
 /// A rectangle of a tile's pixels, in coordinates from the tile's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {
@@ -132,12 +130,6 @@ impl Position {
     pub(super) fn next_sample(&mut self, count: u32) -> bool {
         next(&mut self.sample, count)
     }
-}
-
-/// Parts of a range of rays that are cast together.
-pub(super) fn bundles(rays: Range<u32>) -> impl Iterator<Item = Range<u32>> {
-    let Range { start, end } = rays;
-    (start..end).step_by(BUNDLE_RAYS).map(move |first| first..end.min(first + BUNDLE_RAYS as u32))
 }
 
 fn next(number: &mut u32, count: u32) -> bool {

@@ -1,11 +1,10 @@
 //! The passes of a block's irradiance records.
 
-use heapless::Vec;
 use photoncard_shared::message::Fault;
 
 use super::buffers::Shared;
 use super::flight::{Flight, allowed_error};
-use super::position::{Pass, Position, bundles};
+use super::position::{Pass, Position};
 use super::stored_point::StoredPoint;
 use crate::gather::{GatherTarget, PointIndex};
 use crate::irradiance_cache::{Full, Recalled};
@@ -103,8 +102,8 @@ impl<K: ChipKind> Flight<K> {
             let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, bins);
             let (rays, is_last) = position.next_rays(of_bin);
             let target = GatherTarget::new(flight, PointIndex::Record(record));
-            let mut ends = Vec::new();
-            for bundle in bundles(rays) {
+            let mut ends = final_gather::GatherRayEnds::new();
+            for bundle in final_gather::bundles(rays) {
                 final_gather::cast(context, point, target, bundle, &mut ends)?;
                 for end in &ends {
                     cache.add(record, end.cell, end.direct);

@@ -31,6 +31,15 @@ pub struct GatherRayEnd {
     pub request: Option<GatherRequest>,
 }
 
+/// Contributions of the rays of a bundle.
+pub type GatherRayEnds = Vec<GatherRayEnd, BUNDLE_RAYS>;
+
+/// Parts of a range of rays, each for one [`cast`].
+pub fn bundles(rays: Range<u32>) -> impl Iterator<Item = Range<u32>> {
+    let Range { start, end } = rays;
+    (start..end).step_by(BUNDLE_RAYS).map(move |first| first..end.min(first + BUNDLE_RAYS as u32))
+}
+
 /// Casts rays of a gather point, at most [`BUNDLE_RAYS`], and puts their contributions into `ends`, without those that meet neither a
 /// surface nor the environment. A contribution is one term of the mean over the point's rays; the gather's result goes to the sum `target`.
 ///
@@ -41,7 +50,7 @@ pub fn cast<M: MemoryPort>(
     point: &GatherPoint,
     target: GatherTarget,
     rays: Range<u32>,
-    ends: &mut Vec<GatherRayEnd, BUNDLE_RAYS>,
+    ends: &mut GatherRayEnds,
 ) -> Result<(), Fault> {
     ends.clear();
     context.memory.enter(Stage::GatherRay);
