@@ -20,7 +20,7 @@ use crate::wide_tree::{Descent, Order, Stack};
 ///
 /// # Errors
 /// If the image is not sound: a record out of range, or a hierarchy deeper than the stack.
-#[inline(always)]
+#[inline(never)]
 pub fn closest_hit(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -33,7 +33,7 @@ pub fn closest_hit(
 ///
 /// # Errors
 /// As [`closest_hit`].
-#[inline(always)]
+#[inline(never)]
 pub fn is_occluded(scene: &SceneImage, memory: &mut impl MemoryPort, ray: &Ray) -> Result<bool, Fault> {
     simd::run(AnyHit { scene, memory, ray })
 }
