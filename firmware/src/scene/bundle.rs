@@ -29,7 +29,6 @@ const RAYS: u32 = (1 << BUNDLE_RAYS) - 1;
 ///
 /// # Errors
 /// As [`closest_hit`].
-#[inline(never)]
 pub fn closest_hits(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -42,7 +41,7 @@ pub fn closest_hits(
             *hit = closest_hit(scene, memory, ray)?;
             Ok(())
         }
-        _ => simd::run(Bundle { scene, memory, rays, searches: hits }),
+        _ => cast(Bundle { scene, memory, rays, searches: hits }),
     }
 }
 
@@ -50,7 +49,6 @@ pub fn closest_hits(
 ///
 /// # Errors
 /// As [`closest_hit`].
-#[inline(never)]
 pub fn are_occluded(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -60,7 +58,7 @@ pub fn are_occluded(
     match (rays, &mut searches) {
         ([], _) => {}
         ([ray], [occluded, ..]) => *occluded = is_occluded(scene, memory, ray)?,
-        (_, searches) => simd::run(Bundle { scene, memory, rays, searches })?,
+        (_, searches) => cast(Bundle { scene, memory, rays, searches })?,
     }
     Ok(searches)
 }
@@ -75,6 +73,12 @@ pub struct Bundle<'a, M, S> {
     pub rays: &'a [Ray],
     /// The result of each ray, nothing found.
     pub searches: &'a mut [S; BUNDLE_RAYS],
+}
+
+/// Runs a kernel, in a frame of its own: a ray alone needs no room on the stack for a bundle.
+#[inline(never)]
+fn cast<M: MemoryPort, S: Search>(bundle: Bundle<M, S>) -> Result<(), Fault> {
+    simd::run(bundle)
 }
 
 /// A ray of a bundle.
