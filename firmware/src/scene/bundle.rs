@@ -1,5 +1,6 @@
-//! Bundles of rays: up to sixteen go through the hierarchy together, so that a line is read, and its boxes or corners are decoded, once
-//! for all rays that meet it (compare Barringer, Akenine-Möller 2014, *Dynamic ray stream traversal*).
+//! Bundles of rays: up to sixteen go through the hierarchy together, so that a line comes once for all rays that meet it (compare
+//! Barringer, Akenine-Möller 2014, *Dynamic ray stream traversal*). Each of them requests it, so that requests are those of work, as of rays alone;
+//! all but the first find it in any cache.
 //!
 //! Each ray is tested against each box and triangle by the operations of a ray alone ([`super::bvh`]): the hits are equal bit for bit,
 //! whatever the rays beside it.
@@ -7,12 +8,13 @@
 use core::ops::ControlFlow;
 
 use heapless::Vec;
+use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, WideNode};
 use photoncard_shared::message::Fault;
 
 use super::bvh::{BvhStack, Search, closest_hit, is_occluded, meet_leaf};
-use super::slabs::{Boxes, Slabs};
+use super::slabs::Slabs;
 use super::{Hit, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
@@ -114,12 +116,18 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
                 continue;
             }
             match child {
-                Child::Node(node) => descent.enter(isa, memory, node, S::ORDER, |line| {
-                    let children = WideNode(line).children() as usize;
-                    let boxes = Boxes::new(isa, BvhNode(line), children);
-                    enter(isa, &boxes, &ways, here, &until, S::ORDER)
-                })?,
+                Child::Node(node) => {
+                    for _ in 1..here.count_ones() {
+                        scene.line(memory, SectionKind::Nodes, node, 0..LINE_BYTES as u32)?;
+                    }
+                    descent.enter(isa, memory, node, S::ORDER, |line| {
+                        enter(isa, BvhNode(line), &ways, here, &until, S::ORDER)
+                    })?;
+                }
                 Child::Leaf(leaf) => {
+                    for _ in 1..here.count_ones() {
+                        descent.leaf(memory, leaf)?;
+                    }
                     let line = *descent.leaf(memory, leaf)?;
                     let line = BvhLeaf(&line);
                     let corners = line.all_corners();
@@ -156,24 +164,29 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
 #[inline(always)]
 fn enter(
     isa: impl Isa,
-    boxes: &Boxes,
+    node: BvhNode,
     ways: &[Way],
     mut here: u32,
     until: &[u32; BUNDLE_RAYS],
     order: Order,
 ) -> [u32; LANES] {
+    let children = WideNode(node.0).children() as usize;
     let mut entered = [0; LANES];
-    let mut nearest = [f32::INFINITY; LANES];
+    let mut nearest = [BEYOND; LANES];
     while here != 0 {
         let index = here.trailing_zeros() as usize;
         let ray = here & here.wrapping_neg();
         here &= here - 1;
         let (Some(way), Some(&until)) = (ways.get(index), until.get(index)) else { continue };
-        way.slabs.enter_bundle(isa, boxes, f32::from_bits(until), (ray, &mut entered, &mut nearest));
+        let distances = way.slabs.enter(isa, node, children, f32::from_bits(until));
+        for ((entered, nearest), distance) in entered.iter_mut().zip(&mut nearest).zip(distances) {
+            *entered |= if distance == BEYOND { 0 } else { ray };
+            *nearest = distance.min(*nearest);
+        }
     }
     let mut bits = [BEYOND; LANES];
     for ((bits, rays), nearest) in bits.iter_mut().zip(entered).zip(nearest) {
-        let distance = if order == Order::NearestFirst { nearest.to_bits() & !RAYS } else { 0 };
+        let distance = if order == Order::NearestFirst { nearest & !RAYS } else { 0 };
         *bits = if rays == 0 { BEYOND } else { distance | rays };
     }
     bits

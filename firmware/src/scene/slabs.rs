@@ -57,69 +57,6 @@ impl Slabs {
         }
         distances
     }
-
-    /// [`Self::enter`] of one ray of a bundle: adds the ray's bit to each child that it enters, and keeps the least distance of each.
-    #[inline(always)]
-    pub(super) fn enter_bundle(
-        &self,
-        isa: impl Isa,
-        boxes: &Boxes,
-        until: f32,
-        (ray, entered, nearest): (u32, &mut [u32; LANES], &mut [f32; LANES]),
-    ) {
-        let [x, y, z] = &boxes.axes;
-        let [a, b, c] = &self.axes;
-        let [x, y, z] = [a.decoded(x), b.decoded(y), c.decoded(z)];
-        for lane in 0..isa.lanes(boxes.children) {
-            let near = max(x.near(lane), max(y.near(lane), max(z.near(lane), 0.0)));
-            let far = min(x.far(lane), min(y.far(lane), min(z.far(lane), until)));
-            if let (Some(entered), Some(nearest)) = (entered.get_mut(lane), nearest.get_mut(lane)) {
-                let enters = near <= far;
-                *entered |= if enters { ray } else { 0 };
-                *nearest = if enters { min(near, *nearest) } else { *nearest };
-            }
-        }
-    }
-}
-
-/// Sides of all boxes of a node, in the node's units.
-pub(super) struct Boxes {
-    axes: [BoxAxis; 3],
-    children: usize,
-}
-
-/// One axis of [`Boxes`].
-struct BoxAxis {
-    corner: f32,
-    unit: f32,
-    lower: [f32; LANES],
-    upper: [f32; LANES],
-}
-
-impl Boxes {
-    #[inline(always)]
-    pub(super) fn new(isa: impl Isa, node: BvhNode, children: usize) -> Self {
-        let [x, y, z] = node.axes();
-        let axes = [
-            BoxAxis::new(isa, &x, children),
-            BoxAxis::new(isa, &y, children),
-            BoxAxis::new(isa, &z, children),
-        ];
-        Self { axes, children }
-    }
-}
-
-impl BoxAxis {
-    #[inline(always)]
-    fn new(isa: impl Isa, axis: &BvhAxis, children: usize) -> Self {
-        let (mut lower, mut upper) = ([0.0; LANES], [0.0; LANES]);
-        for lane in 0..isa.lanes(children) {
-            if let (Some(lower), Some(upper)) = (lower.get_mut(lane), upper.get_mut(lane)) {
-                (*lower, *upper) = (side(axis.lower, lane), side(axis.upper, lane));
-            }
-        }
-        Self { corner: axis.corner, unit: axis.unit, lower, upper }
-    }
 }
 
 impl SlabAxis {
@@ -131,36 +68,26 @@ impl SlabAxis {
 
     /// Planes of a node's boxes on this axis.
     #[inline(always)]
-    fn planes<'a>(&self, axis: &BvhAxis<'a>) -> Planes<&'a [u8; NODE_CHILDREN]> {
-        self.between(axis.corner, axis.unit, [axis.lower, axis.upper])
-    }
-
-    /// [`Self::planes`] of decoded boxes.
-    #[inline(always)]
-    fn decoded<'a>(&self, axis: &'a BoxAxis) -> Planes<&'a [f32; LANES]> {
-        self.between(axis.corner, axis.unit, [&axis.lower, &axis.upper])
-    }
-
-    #[inline(always)]
-    fn between<S>(&self, corner: f32, unit: f32, [lower, upper]: [S; 2]) -> Planes<S> {
-        let corner = (corner - self.origin) * self.inverse;
+    fn planes<'a>(&self, axis: &BvhAxis<'a>) -> Planes<'a> {
+        let corner = (axis.corner - self.origin) * self.inverse;
         let margin = corner.abs() * MARGIN;
-        let (near, far) = if self.inverse < 0.0 { (upper, lower) } else { (lower, upper) };
-        Planes { near, far, first: corner - margin, last: corner + margin, unit: unit * self.inverse }
+        let (near, far) =
+            if self.inverse < 0.0 { (axis.upper, axis.lower) } else { (axis.lower, axis.upper) };
+        Planes { near, far, first: corner - margin, last: corner + margin, unit: axis.unit * self.inverse }
     }
 }
 
 /// Planes of a node's boxes on one axis: distance along the ray is `first + side * unit` or `last + side * unit`.
-struct Planes<S> {
-    near: S,
-    far: S,
+struct Planes<'a> {
+    near: &'a [u8; NODE_CHILDREN],
+    far: &'a [u8; NODE_CHILDREN],
     /// Lower bound of the distance to the node's corner; `last` is the upper bound.
     first: f32,
     last: f32,
     unit: f32,
 }
 
-impl<S: Copy + Into<f32>> Planes<&[S; LANES]> {
+impl Planes<'_> {
     #[inline(always)]
     fn near(&self, child: usize) -> f32 {
         side(self.near, child) * self.unit + self.first
@@ -173,6 +100,6 @@ impl<S: Copy + Into<f32>> Planes<&[S; LANES]> {
 }
 
 #[inline(always)]
-fn side<S: Copy + Into<f32>>(sides: &[S; LANES], child: usize) -> f32 {
-    sides.get(child).map_or(0.0, |&side| side.into())
+fn side(sides: &[u8; NODE_CHILDREN], child: usize) -> f32 {
+    f32::from(sides.get(child).copied().unwrap_or(0))
 }
