@@ -210,8 +210,10 @@ fn other_cards_and_modelled_memory_are_connected_anew() {
     let frame = Frame { camera: 0, seed: 0, photons: 300, lamp: 1, wall: 1 };
     let scene = frame.scene(&base);
     let mut renderer = Renderer::default();
-    for (addresses, is_modelled) in
+    for (index, (addresses, is_modelled)) in
         [("emulated:2", false), ("emulated:1", false), ("emulated:1", true), ("emulated:1", true)]
+            .into_iter()
+            .enumerate()
     {
         let settings = frame.settings().with(|settings| {
             settings.cards.addresses = vec![addresses.parse().unwrap()];
@@ -223,6 +225,9 @@ fn other_cards_and_modelled_memory_are_connected_anew() {
         assert_eq!(found.statistics.memory, fresh.statistics.memory);
         // Of two cards one may have rendered all tiles before the other is loaded.
         let bytes = |statistics: &Statistics| statistics.link.image_bytes.iter().max().copied();
-        assert_eq!(bytes(&found.statistics), bytes(&fresh.statistics), "{addresses}");
+        // A card without a model shares the image that the host has kept.
+        let is_sent = index == 0 || is_modelled;
+        let expected = if is_sent { bytes(&fresh.statistics) } else { Some(0) };
+        assert_eq!(bytes(&found.statistics), expected, "{addresses}");
     }
 }
