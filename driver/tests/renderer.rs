@@ -205,6 +205,26 @@ fn an_observer_receives_every_tile_with_its_card() {
 }
 
 #[test]
+fn one_chip_of_the_process_is_loaded_and_the_others_share_its_image() {
+    let base = base();
+    let frame = Frame { camera: 0, seed: 0, photons: 300, lamp: 1, wall: 1 };
+    let on = |addresses: &str, change: fn(&mut RenderSettings)| {
+        let settings = frame.settings().with(|settings| {
+            settings.cards.addresses = vec![addresses.parse().unwrap()];
+            change(settings);
+        });
+        render(&frame.scene(&base), &settings, &Unobserved).unwrap()
+    };
+    let (alone, shared) = (on("emulated:1", |_| {}), on("emulated:3", |_| {}));
+    assert!(shared.film.sums().eq(alone.film.sums()));
+    // The others may have rendered all tiles before the first is loaded.
+    assert_eq!(shared.statistics.link.image_bytes[1..], [0, 0]);
+    // Counters of modelled memories count loads as well.
+    let modelled = on("emulated:3", |settings| settings.cards.caches = Some(CacheSettings::default()));
+    assert!(modelled.statistics.link.image_bytes.iter().all(|&bytes| bytes > 0));
+}
+
+#[test]
 fn other_cards_and_modelled_memory_are_connected_anew() {
     let base = base();
     let frame = Frame { camera: 0, seed: 0, photons: 300, lamp: 1, wall: 1 };

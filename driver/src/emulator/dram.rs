@@ -24,11 +24,6 @@ impl SharedImage {
         // Cards that receive another image store it themselves.
         let _ = self.0.set(image);
     }
-
-    /// The image, if it is given and fits `bytes`.
-    pub(super) fn within(&self, bytes: u32) -> Option<Arc<CardImage>> {
-        self.0.get().filter(|image| image.bytes() <= u64::from(bytes)).cloned()
-    }
 }
 
 /// DRAM that takes host memory only for written lines, and none for lines that the shared image holds.
@@ -36,6 +31,8 @@ pub(super) struct EmulatedDram {
     lines: Stored,
     limit: u32,
     shared: SharedImage,
+    /// Image that a memory without written lines holds, once it is given.
+    held: SharedImage,
 }
 
 /// Lines from the first to the last written one.
@@ -50,15 +47,22 @@ enum Stored {
 }
 
 impl EmulatedDram {
-    pub(super) fn new(bytes: u32, shared: SharedImage) -> Self {
-        Self { lines: Stored::Own(Vec::new()), limit: bytes / LINE_BYTES as u32, shared }
+    pub(super) fn new(bytes: u32, shared: SharedImage, held: SharedImage) -> Self {
+        Self { lines: Stored::Own(Vec::new()), limit: bytes / LINE_BYTES as u32, shared, held }
     }
 
-    /// DRAM that holds an image from the start, of which it stores no copy.
-    pub(super) fn holding(image: Arc<CardImage>, bytes: u32) -> Self {
-        let written = image.lines().len();
-        let lines = Stored::Shared { image, written, beyond: Vec::new() };
-        Self { lines, ..Self::new(bytes, SharedImage::default()) }
+    /// The image of a memory that holds one, and without a line that was written.
+    fn held(&self) -> Option<&Arc<CardImage>> {
+        self.held.0.get().filter(|_| matches!(&self.lines, Stored::Own(own) if own.is_empty()))
+    }
+
+    /// Stores the lines of an image that the memory holds, by reference.
+    #[cold]
+    fn adopt(&mut self) {
+        if let Some(image) = self.held().cloned() {
+            let written = image.lines().len();
+            self.lines = Stored::Shared { image, written, beyond: Vec::new() };
+        }
     }
 
     #[inline(always)]
@@ -74,6 +78,9 @@ impl EmulatedDram {
 
     /// All lines, without those beyond a shared image.
     fn all(&self) -> &[Line] {
+        if let Some(image) = self.held() {
+            return image.lines();
+        }
         match &self.lines {
             Stored::Own(lines) => lines,
             Stored::Shared { image, written, .. } => &image.lines()[..*written],
@@ -120,12 +127,16 @@ impl EmulatedDram {
 impl MemoryPort for EmulatedDram {
     #[inline(always)]
     fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
+        if matches!(&self.lines, Stored::Own(own) if own.is_empty()) {
+            self.adopt();
+        }
         self.get(address).ok_or(Fault { code: FaultCode::LineRange, detail: address.0 })
     }
 
     fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         let first = first.0 as usize;
         first.checked_add(lines.len()).filter(|&end| end <= self.limit as usize)?;
+        self.adopt();
         if !self.share(first, lines) {
             let (own, first) = self.own_from(first);
             let end = first + lines.len();
@@ -215,7 +226,8 @@ mod tests {
             &[(1, &bytes[1..2], false), (0, &other, false)],
         ];
         for run in runs {
-            let new = |shared: &SharedImage| EmulatedDram::new(1 << 20, shared.clone());
+            let new =
+                |shared: &SharedImage| EmulatedDram::new(1 << 20, shared.clone(), SharedImage::default());
             let mut drams = [new(&shared), new(&SharedImage::default())];
             for &(first, lines, is_shared_then) in run {
                 write(&mut drams, first, lines);
@@ -225,8 +237,26 @@ mod tests {
     }
 
     #[test]
+    fn a_memory_holds_an_image_by_reference_until_it_is_written() {
+        let image = image();
+        let held = SharedImage::default();
+        let mut dram = EmulatedDram::new(1 << 20, SharedImage::default(), held.clone());
+        assert!(dram.read(Structure::Header, LineAddress(0), 0..1).is_err());
+        held.give(image.clone());
+        assert!(dram.stored(LineAddress(0), 2).is_some_and(|lines| lines == &image.lines()[..2]));
+        let last = image.lines().len() as u32 - 1;
+        assert_eq!(dram.read(Structure::Header, LineAddress(last), 0..1), Ok(&image.lines()[last as usize]));
+        assert!(is_shared(&dram));
+        assert_eq!(dram.write(LineAddress(1), &[[7; LINE_BYTES]]), Some(()));
+        let mut expected = image.lines().to_vec();
+        expected[1].0 = [7; LINE_BYTES];
+        assert!(dram.all() == expected && !is_shared(&dram));
+    }
+
+    #[test]
     fn lines_outside_are_refused() {
-        let mut dram = EmulatedDram::new(2 * LINE_BYTES as u32, SharedImage::default());
+        let mut dram =
+            EmulatedDram::new(2 * LINE_BYTES as u32, SharedImage::default(), SharedImage::default());
         assert_eq!(dram.write(LineAddress(1), &[[1; LINE_BYTES]; 2]), None);
         assert!(dram.stored(LineAddress(0), 1).is_none());
     }

@@ -33,7 +33,6 @@ use self::tile_lines::TileMeter;
 use self::trace::{TraceFile, Traced};
 use crate::choice::choices;
 use crate::link::{LoopbackPort, loopback};
-use crate::pack::CardImage;
 
 /// Kind of the chip on an emulated card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,12 +139,13 @@ pub struct EmulatedCard {
     port: Option<LoopbackPort>,
     trace_has_failed: Option<Arc<AtomicBool>>,
     tile_lines: TileLines,
-    held: Option<Arc<CardImage>>,
+    /// Image that the memory holds, as long as nothing was loaded.
+    held: Option<SharedImage>,
 }
 
 impl EmulatedCard {
-    /// Starts a card. Without a model its memory has no caches and no counters, and holds the image in `shared` from the start if there
-    /// is one. A card that is loaded with that image keeps no copy of it.
+    /// Starts a card. Without a model its memory has no caches and no counters. A card that is loaded with the image in `shared` keeps no copy
+    /// of it.
     ///
     /// # Errors
     /// If the card's thread cannot be started.
@@ -160,11 +160,9 @@ impl EmulatedCard {
         let trace_has_failed = trace.map(TraceFile::has_failed);
         let tile_lines = TileLines::default();
         let noted = tile_lines.clone();
-        let held = shared.within(kind.budget().dram_bytes).filter(|_| model.is_none());
-        let dram = match &held {
-            Some(image) => EmulatedDram::holding(image.clone(), kind.budget().dram_bytes),
-            None => EmulatedDram::new(kind.budget().dram_bytes, shared),
-        };
+        let held = SharedImage::default();
+        let dram = EmulatedDram::new(kind.budget().dram_bytes, shared, held.clone());
+        let held = model.is_none().then_some(held);
         let thread = std::thread::Builder::new()
             .name("chip".into())
             .stack_size(THREAD_STACK)
@@ -172,8 +170,9 @@ impl EmulatedCard {
         Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines, held })
     }
 
-    /// The image that the card's memory holds from the start; `None` from the second call on.
-    pub fn take_held(&mut self) -> Option<Arc<CardImage>> {
+    /// Takes the empty memory of a card to which nothing was loaded; `None` from the second call on, and of a modelled memory. An image that is
+    /// given to it is held by reference.
+    pub fn take_empty_memory(&mut self) -> Option<SharedImage> {
         self.held.take()
     }
 
@@ -224,7 +223,7 @@ impl Drop for EmulatedCard {
 /// # Panics
 /// If the chip panicked.
 pub fn serve_card(kind: EmulatedKind, mut port: impl Port + Send) -> std::io::Result<()> {
-    let dram = EmulatedDram::new(kind.budget().dram_bytes, SharedImage::default());
+    let dram = EmulatedDram::new(kind.budget().dram_bytes, SharedImage::default(), SharedImage::default());
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
             .name("chip".into())

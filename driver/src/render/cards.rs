@@ -45,19 +45,14 @@ pub(super) struct Cards {
 
 impl Cards {
     /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it, the first card's with
-    /// the trace. A card that does not answer counts as lost. Emulated cards share `image`, the one to be rendered if the host has it already.
+    /// the trace. A card that does not answer counts as lost.
     ///
     /// # Errors
     /// If the trace cannot be written, or fewer cards are left than needed.
-    pub(super) fn connect(
-        settings: &RenderSettings,
-        image: Option<Arc<CardImage>>,
-        observer: &dyn Observer,
-    ) -> Result<Self, RenderError> {
+    pub(super) fn connect(settings: &RenderSettings, observer: &dyn Observer) -> Result<Self, RenderError> {
         let mut trace = settings.cards.trace.as_ref().map(TraceFile::create).transpose()?;
         let start = Instant::now();
         let shared = SharedImage::default();
-        image.into_iter().for_each(|image| shared.give(image));
         let CardSet { addresses, faults, .. } = &settings.cards;
         let caches = settings.modelled_caches();
         let each_card = (addresses.iter())
@@ -111,6 +106,21 @@ impl Cards {
         let last = errors.pop_if(|_| self.cards.len() < needed);
         errors.iter().for_each(|(card, error)| observer.lost(card, error));
         last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
+    }
+
+    /// Has emulated cards to which nothing was loaded hold the image by reference: all of them, or all but the first, whose load is the one
+    /// that is counted. Cards on faulty links are loaded.
+    fn share(&mut self, image: &Arc<CardImage>, checksum: u64, is_image_kept: bool) {
+        let is_faulty = self.set.faults.is_some();
+        for (index, (_, GreetedCard { card, session, .. })) in self.cards.iter_mut().enumerate() {
+            if let Some(memory) = card.take_empty_memory()
+                && (is_image_kept || index > 0)
+                && !is_faulty
+            {
+                memory.give(image.clone());
+                session.assume(checksum);
+            }
+        }
     }
 
     /// The image as the cards receive it: those that hold the last one receive only its differences.
@@ -208,17 +218,13 @@ impl Executor for Cards {
     }
 
     fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
-        let Work { settings, image, frame, tiles, film, sinks, outputs } = work;
+        let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
         // Emulated cards that receive the shared image store no copy of it.
         self.shared.give(image.clone());
         let (scene_image, _) = image.view();
         let limits = PixelLimits::new(&scene_image.header, frame);
         let job = Job { upload: self.upload(image), frame: *frame, limits };
-        for (_, GreetedCard { card, session, .. }) in &mut self.cards {
-            if card.take_held().is_some_and(|held| Arc::ptr_eq(&held, image)) {
-                session.assume(job.upload.checksum());
-            }
-        }
+        self.share(image, job.upload.checksum(), is_image_kept);
         let scheduler = settings.scheduler(tiles, self.cards.len());
         let mut scheduler = scheduler.with_kept(&film.lock().unwrap_or_else(PoisonError::into_inner));
         if frame.keep_records && frame.first_sample > 0 {

@@ -36,6 +36,8 @@ pub(super) struct Work<'a> {
     pub(super) settings: &'a RenderSettings,
     /// The card image.
     pub(super) image: &'a Arc<CardImage>,
+    /// If the image is that of an earlier picture, or of a prepared scene.
+    pub(super) is_image_kept: bool,
     /// The frame's parameters.
     pub(super) frame: &'a FrameParameters,
     /// All tiles of the picture.

@@ -1,6 +1,5 @@
 //! Open connections to cards.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use photoncard_shared::link::{Port, PortError};
@@ -9,7 +8,6 @@ use super::CardError;
 use super::address::{CardAddress, RemoteAddress};
 use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage, TileLines};
 use crate::link::{FaultInjector, LineFaults, LinkError, connect_tcp, connect_unix, open_serial};
-use crate::pack::CardImage;
 
 /// Host's end of a link.
 pub(super) type BoxedPort = Box<dyn Port + Send>;
@@ -32,7 +30,7 @@ enum Connection {
 
 impl OpenCard {
     /// Starts or connects to the card at an address, the first if there are several. An emulated card may have a model of
-    /// its memory, and shares the host's image; without a model it holds it from the start. `index` is the card's number, on which injected faults depend.
+    /// its memory, and shares the host's image. `index` is the card's number, on which injected faults depend.
     pub(super) fn open(
         index: usize,
         address: &CardAddress,
@@ -69,10 +67,10 @@ impl OpenCard {
         }
     }
 
-    /// Image that an emulated card's memory holds from the start; `None` from the second call on.
-    pub(super) fn take_held(&mut self) -> Option<Arc<CardImage>> {
+    /// Empty memory of an emulated card ([`EmulatedCard::take_empty_memory`]).
+    pub(super) fn take_empty_memory(&mut self) -> Option<SharedImage> {
         match &mut self.connection {
-            Connection::Emulated(card) => card.take_held(),
+            Connection::Emulated(card) => card.take_empty_memory(),
             Connection::Remote { .. } => None,
         }
     }

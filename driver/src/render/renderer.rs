@@ -14,7 +14,7 @@ use super::times::Times;
 use super::whole_frame::WholeFrame;
 use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
 use crate::film::{Film, FilmError};
-use crate::pack::{CardImage, PackedScene};
+use crate::pack::PackedScene;
 use crate::partial::PartialRender;
 use crate::photon_map::{PhotonSettings, check_image};
 use crate::scene::{FixedScene, Scene};
@@ -158,14 +158,12 @@ impl Renderer {
         let camera = settings.camera(scene)?;
         settings.check()?;
         let Self { cards, kept } = self;
-        let held = kept.as_ref().filter(|kept| choose.is_none() && kept.is_of(scene, settings));
-        let held = held.map(|kept| kept.prepared.image.clone());
         let mut whole_frame;
         let executor: &mut dyn Executor = if settings.schedule.order.is_of_whole_frame() {
             whole_frame = WholeFrame::new(settings)?;
             &mut whole_frame
         } else {
-            connected(cards, settings, held, observer)?
+            connected(cards, settings, observer)?
         };
         let budgets = executor.budgets();
         settings.check_budgets(&budgets)?;
@@ -181,6 +179,7 @@ impl Renderer {
         base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
         let tiles = settings.tiles(tile);
         let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
+        let is_image_kept = matches!(source, Source::Kept(_));
         let made = source.prepare(scene, settings, &budgets, &mut times, observer)?;
         let prepared = &kept.insert(made).prepared;
         let frame = FrameParameters {
@@ -191,7 +190,16 @@ impl Renderer {
         let film = Mutex::new(film);
         let sinks = outputs.sinks(&film, executor.finishes_tiles_early());
         let image = &prepared.image;
-        let work = Work { settings, image, frame: &frame, tiles, film: &film, sinks, outputs: &outputs };
+        let work = Work {
+            settings,
+            image,
+            is_image_kept,
+            frame: &frame,
+            tiles,
+            film: &film,
+            sinks,
+            outputs: &outputs,
+        };
         let outcome = executor.run(work).inspect_err(|_| outputs.report_kept())?;
         times.load = outcome.load_seconds;
         times.render = outcome.render_seconds;
@@ -216,18 +224,17 @@ fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
     }
 }
 
-/// The open cards, if they are those of the settings, or newly connected ones, of which emulated ones share `image`.
+/// The open cards, if they are those of the settings, or newly connected ones.
 fn connected<'c>(
     cards: &'c mut Option<Cards>,
     settings: &RenderSettings,
-    image: Option<Arc<CardImage>>,
     observer: &dyn Observer,
 ) -> Result<&'c mut Cards, RenderError> {
     // Others are closed before: a card serves one host at a time.
     let open = cards.take().filter(|cards| cards.serve(settings));
     Ok(cards.insert(match open {
         Some(open) => open,
-        None => Cards::connect(settings, image, observer)?,
+        None => Cards::connect(settings, observer)?,
     }))
 }
 
