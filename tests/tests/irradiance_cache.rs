@@ -112,7 +112,7 @@ fn a_furnace_is_even_with_records_of_any_sampling() {
         };
         let rendering = render_or_panic(&furnace(albedo), &settings);
         let Statistics { interpolated_share, .. } = rendering.statistics;
-        assert!(interpolated_share > 0.9, "only {interpolated_share} interpolated");
+        assert!(interpolated_share > 0.85, "only {interpolated_share} interpolated");
         let found = mean(&radiances(&rendering.film)) * (1.0 - albedo as f64);
         assert!((found - 1.0).abs() < 0.01, "{sampling:?}, albedo {albedo}: {found} of what it must be");
     }

@@ -24,6 +24,8 @@ struct SlabAxis {
     origin: f32,
     /// Reciprocal of the direction's component.
     inverse: f32,
+    /// If that is negative: the upper side of a box is the near one.
+    is_downwards: bool,
 }
 
 /// Relative margin for rounding errors.
@@ -63,7 +65,7 @@ impl SlabAxis {
     #[inline(always)]
     fn new(origin: f32, direction: f32) -> Self {
         let inverse = 1.0 / if direction.abs() < MIN_COMPONENT { MIN_COMPONENT } else { direction };
-        Self { origin, inverse }
+        Self { origin, inverse, is_downwards: inverse < 0.0 }
     }
 
     /// Planes of a node's boxes on this axis.
@@ -71,8 +73,7 @@ impl SlabAxis {
     fn planes<'a>(&self, axis: &BvhAxis<'a>) -> Planes<'a> {
         let corner = (axis.corner - self.origin) * self.inverse;
         let margin = corner.abs() * MARGIN;
-        let (near, far) =
-            if self.inverse < 0.0 { (axis.upper, axis.lower) } else { (axis.lower, axis.upper) };
+        let (near, far) = if self.is_downwards { (axis.upper, axis.lower) } else { (axis.lower, axis.upper) };
         Planes { near, far, first: corner - margin, last: corner + margin, unit: axis.unit * self.inverse }
     }
 }

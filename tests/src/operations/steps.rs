@@ -62,7 +62,7 @@ pub(super) fn step_of(place: &Place) -> Step {
 
 /// Steps of the ray caster.
 fn ray_caster(place: &Place) -> Option<Step> {
-    Some(if place.is_of("scene/triangle.rs", "may_meet") {
+    Some(if place.is_of("scene/triangle.rs", "leaf") {
         if place.is_of("scene/triangle.rs", "shear") { Step::Vertex } else { Step::Triangle }
     } else if place.is_of("scene/triangle.rs", "intersect_slot") {
         Step::Leaf

@@ -8,9 +8,9 @@ use crate::choice::Choice;
 #[rustfmt::skip] // One step a line.
 pub const OPERATIONS: [Operations; Step::ALL.len()] = [
     // Preparation of a ray
-    Operations { add: 0.0, multiply: 0.0, divide: 6.0, square_root: 0.0, compare: 6.0, convert: 0.0 },
+    Operations { add: 0.0, multiply: 0.0, divide: 6.0, square_root: 0.0, compare: 9.0, convert: 0.0 },
     // A node of the hierarchy
-    Operations { add: 9.0, multiply: 9.0, divide: 0.0, square_root: 0.0, compare: 3.0, convert: 0.0 },
+    Operations { add: 9.0, multiply: 9.0, divide: 0.0, square_root: 0.0, compare: 0.0, convert: 0.0 },
     // A box of a node
     Operations { add: 6.0, multiply: 6.0, divide: 0.0, square_root: 0.0, compare: 7.0, convert: 6.0 },
     // A vertex of a leaf
@@ -18,7 +18,7 @@ pub const OPERATIONS: [Operations; Step::ALL.len()] = [
     // A triangle of a leaf
     Operations { add: 3.0, multiply: 8.0, divide: 0.0, square_root: 0.0, compare: 7.0, convert: 0.0 },
     // Triangles of a leaf that may be met
-    Operations { add: 20.00, multiply: 16.72, divide: 0.9091, square_root: 0.0, compare: 8.738, convert: 0.0 },
+    Operations { add: 3.506, multiply: 5.504, divide: 0.8765, square_root: 0.0, compare: 8.451, convert: 0.0 },
     // A box of photons
     Operations { add: 8.0, multiply: 9.0, divide: 0.0, square_root: 0.0, compare: 7.0, convert: 6.0 },
     // A photon of a leaf
@@ -26,37 +26,37 @@ pub const OPERATIONS: [Operations; Step::ALL.len()] = [
     // A photon of the kd-tree
     Operations { add: 5.0, multiply: 4.0, divide: 0.0, square_root: 0.0, compare: 3.425, convert: 0.0 },
     // A candidate that a selection reads
-    Operations { add: 0.01598, multiply: 0.02168, divide: 0.02130, square_root: 0.0, compare: 0.01296, convert: 0.01387 },
+    Operations { add: 0.01616, multiply: 0.02243, divide: 0.02199, square_root: 0.0, compare: 0.01388, convert: 0.01457 },
     // A comparison of two distances
     Operations { add: 0.0, multiply: 0.0, divide: 0.0, square_root: 0.0, compare: 1.0, convert: 0.0 },
     // A gather at the end of a ray
-    Operations { add: 40.00, multiply: 78.33, divide: 8.781, square_root: 0.7699, compare: 8.347, convert: 40.81 },
+    Operations { add: 44.01, multiply: 78.15, divide: 9.842, square_root: 0.8030, compare: 8.495, convert: 36.93 },
     // The normal of a photon
-    Operations { add: 8.039, multiply: 9.043, divide: 3.014, square_root: 1.005, compare: 2.010, convert: 2.010 },
+    Operations { add: 8.053, multiply: 9.059, divide: 3.020, square_root: 1.007, compare: 2.013, convert: 2.013 },
     // A photon that a lobe reflects
-    Operations { add: 6.614, multiply: 12.05, divide: 2.130, square_root: 0.7101, compare: 0.7106, convert: 5.681 },
+    Operations { add: 7.497, multiply: 13.71, divide: 2.467, square_root: 0.8216, compare: 0.8241, convert: 6.579 },
     // The value of a Phong lobe for a photon
-    Operations { add: 43.41, multiply: 29.58, divide: 1.636, square_root: 0.0, compare: 0.9007, convert: 0.8236 },
+    Operations { add: 42.87, multiply: 29.23, divide: 1.614, square_root: 0.0, compare: 0.9062, convert: 0.8138 },
     // The value of a microfacet lobe for a photon
-    Operations { add: 7.804, multiply: 13.05, divide: 1.919, square_root: 1.450, compare: 2.473, convert: 0.0 },
+    Operations { add: 11.59, multiply: 19.43, divide: 2.863, square_root: 2.158, compare: 3.658, convert: 0.0 },
     // A surface that is read
-    Operations { add: 38.13, multiply: 51.22, divide: 1.813, square_root: 1.379, compare: 19.78, convert: 3.632 },
+    Operations { add: 30.87, multiply: 42.54, divide: 1.519, square_root: 1.326, compare: 18.74, convert: 2.601 },
     // A record of a light
-    Operations { add: 35.73, multiply: 47.49, divide: 6.707, square_root: 8.500, compare: 24.08, convert: 4.032 },
+    Operations { add: 23.66, multiply: 29.34, divide: 4.609, square_root: 4.825, compare: 15.65, convert: 3.046 },
     // A shadow ray
-    Operations { add: 67.66, multiply: 77.30, divide: 17.41, square_root: 4.905, compare: 27.21, convert: 12.40 },
+    Operations { add: 73.35, multiply: 88.83, divide: 15.18, square_root: 4.248, compare: 27.83, convert: 5.931 },
     // A gather ray
-    Operations { add: 39.14, multiply: 84.55, divide: 8.177, square_root: 2.266, compare: 20.65, convert: 12.17 },
+    Operations { add: 51.54, multiply: 102.2, divide: 8.026, square_root: 2.918, compare: 23.47, convert: 10.90 },
     // A table of directions
-    Operations { add: 413.7, multiply: 393.5, divide: 9.645, square_root: 3.627, compare: 270.7, convert: 219.4 },
+    Operations { add: 495.2, multiply: 538.0, divide: 22.07, square_root: 22.79, compare: 167.3, convert: 90.68 },
     // A photon of a table of directions
-    Operations { add: 6.009, multiply: 8.794, divide: 1.283, square_root: 0.4242, compare: 2.580, convert: 2.292 },
+    Operations { add: 5.335, multiply: 7.714, divide: 1.186, square_root: 0.3921, compare: 2.237, convert: 1.996 },
     // A survey ray
-    Operations { add: 23.11, multiply: 39.25, divide: 2.062, square_root: 2.062, compare: 3.387, convert: 8.142 },
+    Operations { add: 23.21, multiply: 39.39, divide: 2.144, square_root: 2.082, compare: 3.645, convert: 6.343 },
     // A gather ray of an irradiance record
-    Operations { add: 28.73, multiply: 85.74, divide: 3.116, square_root: 2.476, compare: 0.5600, convert: 36.66 },
+    Operations { add: 29.37, multiply: 87.77, divide: 3.265, square_root: 2.518, compare: 0.5600, convert: 37.54 },
     // A sample that is interpolated
-    Operations { add: 316.4, multiply: 296.2, divide: 15.50, square_root: 23.46, compare: 57.62, convert: 6.542 },
+    Operations { add: 424.0, multiply: 375.4, divide: 18.60, square_root: 36.06, compare: 86.07, convert: 6.825 },
     // An eye ray
-    Operations { add: 53.21, multiply: 46.64, divide: 18.44, square_root: 5.240, compare: 13.36, convert: 40.58 },
+    Operations { add: 103.7, multiply: 155.1, divide: 20.81, square_root: 6.264, compare: 21.36, convert: 90.68 },
 ];
