@@ -82,7 +82,7 @@ impl<M: MemoryPort> Kernel for AnyHit<'_, M> {
     }
 }
 
-/// What is searched along a ray: the closest hit, or any.
+/// Search along a ray: for the closest hit, or for any.
 pub(super) trait Search {
     /// Order of the visits to a node's children.
     const ORDER: Order;

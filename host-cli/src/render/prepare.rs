@@ -81,7 +81,7 @@ fn one_file(output: &Path) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// What the files of a preparation share.
+/// Common part of the files of a preparation.
 struct Preparation<'a> {
     options: &'a PrepareOptions,
     settings: RenderSettings,
