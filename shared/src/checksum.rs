@@ -12,23 +12,26 @@ const POLYNOMIAL: u32 = 0x82f6_3b78;
 const IMAGE_POLYNOMIAL: u64 = 0xc96c_5795_d787_0f42;
 
 /// `TABLES[n][b]`: the CRC-32C remainder of byte `b` followed by `n` zero bytes.
-static TABLES: [[u32; 256]; 16] = tables();
+static TABLES: [[u32; 256]; 16] = narrowed(tables(POLYNOMIAL as u64));
+/// `IMAGE_TABLES[n][b]`: the CRC-64/XZ remainder of byte `b` followed by `n` zero bytes.
+static IMAGE_TABLES: [[u64; 256]; 8] = tables(IMAGE_POLYNOMIAL);
 
+/// Remainders by a bit-reversed polynomial of up to 64 bits: `[n][b]` is that of byte `b` followed by `n` zero bytes.
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
-const fn tables() -> [[u32; 256]; 16] {
-    let mut tables = [[0; 256]; 16];
+const fn tables<const PLACES: usize>(polynomial: u64) -> [[u64; 256]; PLACES] {
+    let mut tables = [[0; 256]; PLACES];
     let mut byte = 0;
     while byte < 256 {
-        let (mut sum, mut bit) = (byte as u32, 0);
+        let (mut sum, mut bit) = (byte as u64, 0);
         while bit < 8 {
-            sum = (sum >> 1) ^ (POLYNOMIAL & (sum & 1).wrapping_neg());
+            sum = (sum >> 1) ^ (polynomial & (sum & 1).wrapping_neg());
             bit += 1;
         }
         tables[0][byte] = sum;
         byte += 1;
     }
     let mut place = 1;
-    while place < 16 {
+    while place < PLACES {
         byte = 0;
         while byte < 256 {
             let sum = tables[place - 1][byte];
@@ -40,31 +43,14 @@ const fn tables() -> [[u32; 256]; 16] {
     tables
 }
 
-/// `IMAGE_TABLES[n][b]`: the CRC-64/XZ remainder of byte `b` followed by `n` zero bytes.
-static IMAGE_TABLES: [[u64; 256]; 8] = image_tables();
-
+/// Remainders of a polynomial of 32 bits, in as many.
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
-const fn image_tables() -> [[u64; 256]; 8] {
-    let mut tables = [[0; 256]; 8];
-    let mut byte = 0;
-    while byte < 256 {
-        let (mut sum, mut bit) = (byte as u64, 0);
-        while bit < 8 {
-            sum = (sum >> 1) ^ (IMAGE_POLYNOMIAL & (sum & 1).wrapping_neg());
-            bit += 1;
-        }
-        tables[0][byte] = sum;
-        byte += 1;
-    }
-    let mut place = 1;
-    while place < 8 {
-        byte = 0;
-        while byte < 256 {
-            let sum = tables[place - 1][byte];
-            tables[place][byte] = (sum >> 8) ^ tables[0][(sum & 0xff) as usize];
-            byte += 1;
-        }
-        place += 1;
+const fn narrowed<const PLACES: usize>(wide: [[u64; 256]; PLACES]) -> [[u32; 256]; PLACES] {
+    let mut tables = [[0; 256]; PLACES];
+    let mut entry = 0;
+    while entry < PLACES * 256 {
+        tables[entry / 256][entry % 256] = wide[entry / 256][entry % 256] as u32;
+        entry += 1;
     }
     tables
 }

@@ -1,9 +1,10 @@
 //! DRAM of an emulated card, stored copy-on-write over the host's card image.
 //!
-//! A host and its emulated cards live in one process, and each card's DRAM holds the same image. A card still receives it
-//! line by line over its link. As long as the received lines equal the lines of the host's image at the same addresses, the
-//! card stores no copy and reads the host's; lines beyond the image are its own. At the first line of the image that differs it switches
-//! to lines of its own, so that a card always reads what was written.
+//! A host and its emulated cards live in one process, and each card's DRAM holds the same image. A card may be given the image by
+//! reference before its first line, and checks it like a received one; or it receives the image line by line over its link. As long as
+//! the received lines equal the lines of the host's image at the same addresses, the card stores no copy and reads the host's; lines
+//! beyond the image are its own. At the first line of the image that differs it switches to lines of its own, so that a card always
+//! reads what was written.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};

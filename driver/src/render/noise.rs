@@ -4,7 +4,7 @@
 //! and `M` (root mean squares), and `D_n = E[(A - B)^2]`. `B` has the error of `A`, so that `e_2n^2 = e_n^2 - D_n / 4`. With
 //! `e_2n^2 = r e_n^2` this is `e_2n^2 = D_n / 4 * r / (1 - r)`. Independent samples have `r = 1/2`. A stratified sequence does better, down to
 //! `1/4` for edges and smooth light (Owen 1997), with few samples more than with many, and unevenly: the ratios of successive `D_n` are 0.24 to
-//! 0.43, and some numbers of samples are luckier than others. One ratio for all pictures is nearer to the truth than ratios that follow them.
+//! 0.69, and some numbers of samples are luckier than others. One ratio for all pictures is nearer to the truth than ratios that follow them.
 
 use crate::film::Film;
 

@@ -255,7 +255,7 @@ impl<K: ChipKind> Engine<K> {
         }
         self.image = ImageState::None;
         if let Some(scene) = result? {
-            // A memory may hold the image since before the card began.
+            // A memory may hold lines that were never sent to the card.
             self.written = self.written.max(scene.header.lines);
             self.image = ImageState::Ready(scene);
             send(transport, &Reply::ImageAccepted);
