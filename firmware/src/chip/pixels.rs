@@ -170,16 +170,19 @@ impl<K: ChipKind> Flight<K> {
         {
             let at = self.sample(job.frame, pixel.into(), self.position.sample);
             let index_in_tile = self.index_in_tile(pixel.into());
-            let of_bin = stored.rays_of_bin(job.frame, at, self.position.bin);
+            let of_bin = stored.rays_of_bin(pattern(job.frame, at), self.position.bin, job.frame.bins);
             let (context, outlet) = &mut job.context_and_outlet(&mut self.counters);
             context.memory.enter(Stage::GatherRay);
-            let mut point = stored.point(context.frame, at);
-            if !of_bin.is_empty() && stored.read_surface(context, at, &mut point.surface)? {
+            // Most points have no ray in a bin: none of those is copied.
+            let mut point = (!of_bin.is_empty()).then(|| stored.point(context.frame, at));
+            if let Some(point) = &mut point
+                && stored.read_surface(context, at, &mut point.surface)?
+            {
                 let (rays, is_last) = self.position.next_rays(of_bin);
                 let target = GatherTarget::new(flight, PointIndex::Pixel(number));
                 let mut ends = final_gather::GatherRayEnds::new();
                 for bundle in final_gather::bundles(rays) {
-                    final_gather::cast(context, &point, target, bundle, &mut ends)?;
+                    final_gather::cast(context, point, target, bundle, &mut ends)?;
                     for end in &ends {
                         let sum = (flight, number);
                         shared.sums.add(context.frame, sum, Component::Direct, end.direct);

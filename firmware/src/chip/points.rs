@@ -31,8 +31,8 @@ impl<C: Capacity> Points<C> {
 
     /// The point of an index, with its owner.
     #[inline(always)]
-    pub(super) fn get(&self, index: u32) -> Option<(u16, StoredPoint)> {
+    pub(super) fn get(&self, index: u32) -> Option<(u16, &StoredPoint)> {
         let index = index as usize;
-        Some((*self.owners.view().get(index)?, *self.points.view().get(index)?))
+        Some((*self.owners.view().get(index)?, self.points.view().get(index)?))
     }
 }

@@ -95,11 +95,14 @@ impl<K: ChipKind> Flight<K> {
         let Self { cache, counters, position, waiting, .. } = self;
         let bins = job.frame.bins;
         if let Some((record, stored)) = points.get(position.index)
+            && let Some(pattern) = cache.pattern(job.frame, record.into())
+            // Known before the record's surface is copied, as many a bin has no ray of it.
+            && let of_bin = stored.rays_of_bin(pattern, position.bin, bins)
+            && !of_bin.is_empty()
             && let Some(point) = cache.point(job.frame, record.into())
         {
             let context = &mut job.context(counters);
             let point = &GatherPoint { directions: stored.directions, ..point };
-            let of_bin = point.directions.rays(point.pattern, point.rays, position.bin, bins);
             let (rays, is_last) = position.next_rays(of_bin);
             let target = GatherTarget::new(flight, PointIndex::Record(record));
             let mut ends = final_gather::GatherRayEnds::new();

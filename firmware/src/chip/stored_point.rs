@@ -56,8 +56,8 @@ impl StoredPoint {
 
     /// The rays of a direction bin: known before the surface is read again.
     #[inline(always)]
-    pub(super) fn rays_of_bin(&self, frame: &FrameParameters, at: PixelSample, bin: u32) -> Range<u32> {
-        self.directions.rays(pattern(frame, at), self.rays.number(), bin, frame.bins)
+    pub(super) fn rays_of_bin(&self, pattern: Pattern, bin: u32, bins: u32) -> Range<u32> {
+        self.directions.rays(pattern, self.rays.number(), bin, bins)
     }
 
     /// The gather point of a sample of a pixel, but for its surface.

@@ -49,7 +49,7 @@ impl DirectionTable {
 
     #[inline(always)]
     fn total(&self) -> u32 {
-        self.cells.iter().map(|&share| share as u32).sum::<u32>() + self.lobe as u32
+        sum(&self.cells) + self.lobe as u32
     }
 
     /// Share of all rays in a cell's entry, without the lobe's rays through the cell.
@@ -65,8 +65,8 @@ impl DirectionTable {
     /// Sum of the shares before an entry.
     #[inline(always)]
     fn before(&self, entry: usize) -> u32 {
-        let cells: u32 = self.cells.iter().take(entry).map(|&share| share as u32).sum();
-        cells + if entry > LOBE { self.lobe as u32 } else { 0 }
+        let cells = self.cells.get(..entry.min(CELLS)).unwrap_or_default();
+        sum(cells) + if entry > LOBE { self.lobe as u32 } else { 0 }
     }
 
     /// Range of the rays, of `count` in all, in direction bin `bin` of `bins`. Bins divide the walk through the
@@ -82,12 +82,12 @@ impl DirectionTable {
         let place = |bin: u32| [bin * ENTRIES as u32 / bins, bin * ENTRIES as u32 % bins];
         let [from, to] = [place(bin), place(bin + 1)];
         // At least 1 in every table, which the compiler cannot prove.
-        let total = (self.total() * bins).max(1) as u64;
+        let total = (self.total() * bins).max(1);
         let before = self.before(from[0] as usize);
         let between: u32 = (from[0]..to[0]).map(|entry| self.share(entry as usize)).sum();
         let first = |before: u32, [entry, part]: [u32; 2]| {
             // In units of a share over `bins`: integers.
-            let beginning = (before * bins + self.share(entry as usize) * part) as u64;
+            let beginning = before * bins + self.share(entry as usize) * part;
             first_ray(pattern, count, beginning, total)
         };
         first(before, from)..first(before + between, to)
@@ -97,16 +97,18 @@ impl DirectionTable {
     #[inline(always)]
     fn entry(&self, pattern: Pattern, index: u32, count: u32) -> (usize, [f32; 2]) {
         let target = stratum_point(pattern, index) * self.total() as u64;
-        let mut before = 0_u64;
-        for (entry, &share) in self.cells.iter().enumerate() {
-            let end = before + share as u64 * whole(count);
-            if target < end {
-                return (entry, [part(target - before, end - before), pattern.radical_inverse(index)]);
+        // Below the sum of the shares: an entry's end is a whole number of shares, so that the fraction of one decides nothing.
+        let shares = (target >> JITTER_BITS) as u32 / count.max(1);
+        let (mut entry, mut before) = (LOBE, 0_u32);
+        for (cell, &share) in self.cells.iter().enumerate() {
+            if shares < before + share as u32 {
+                entry = cell;
+                break;
             }
-            before = end;
+            before += share as u32;
         }
-        let size = self.lobe as u64 * whole(count);
-        (LOBE, [part(target - before, size), pattern.radical_inverse(index)])
+        let [before, size] = [before, self.share(entry)].map(|shares| shares as u64 * whole(count));
+        (entry, [part(target - before, size), pattern.radical_inverse(index)])
     }
 
     /// Number of rays, of `count`, in each cell, without the lobe's.
@@ -178,15 +180,53 @@ fn whole(count: u32) -> u64 {
 /// Point of a ray along all strata, each `2^JITTER_BITS` long.
 #[inline(always)]
 fn stratum_point(pattern: Pattern, index: u32) -> u64 {
-    (index as u64) << JITTER_BITS | (pattern.jitter(index) >> (u32::BITS - JITTER_BITS)) as u64
+    (index as u64) << JITTER_BITS | jitter(pattern, index) as u64
 }
 
-/// Index of the first ray of `count` at or after a beginning, of `total`.
+/// Offset of a ray's point in its stratum.
 #[inline(always)]
-fn first_ray(pattern: Pattern, count: u32, beginning: u64, total: u64) -> u32 {
-    let ray = (beginning * count as u64 / total) as u32;
-    let is_before = ray < count && stratum_point(pattern, ray) * total < beginning * whole(count);
+fn jitter(pattern: Pattern, index: u32) -> u32 {
+    pattern.jitter(index) >> (u32::BITS - JITTER_BITS)
+}
+
+/// Index of the first ray of `count` at or after a beginning, of `total`; both at most 2^25.
+#[inline(always)]
+fn first_ray(pattern: Pattern, count: u32, beginning: u32, total: u32) -> u32 {
+    let (ray, remainder) = divide([beginning, count], total);
+    // Begins the stratum: no ray of it is before.
+    if remainder == 0 {
+        return ray;
+    }
+    let is_before = jitter(pattern, ray) as u64 * (total as u64) < (remainder as u64) << JITTER_BITS;
     ray + u32::from(is_before)
+}
+
+/// Quotient, below 2^20, and remainder of a product by a divisor of at most 2^25. Processors of 32 bits divide 64 by hundreds of
+/// instructions; the quotient is estimated in `f32`, to within 1, and corrected.
+#[inline(always)]
+fn divide([a, b]: [u32; 2], divisor: u32) -> (u32, u32) {
+    let estimate = (a as f32 * b as f32 / divisor as f32) as u32;
+    // In the interval [-divisor, 2 divisor).
+    let remainder = (a as u64 * b as u64).wrapping_sub(estimate as u64 * divisor as u64) as i32;
+    if remainder < 0 {
+        (estimate - 1, remainder.wrapping_add(divisor as i32) as u32)
+    } else if remainder as u32 >= divisor {
+        (estimate + 1, remainder as u32 - divisor)
+    } else {
+        (estimate, remainder as u32)
+    }
+}
+
+/// Sum of shares, four at a time.
+#[inline(always)]
+fn sum(shares: &[u8]) -> u32 {
+    let (words, rest) = shares.as_chunks::<4>();
+    let pairs = words.iter().fold(0, |pairs, &word| {
+        let word = u32::from_le_bytes(word);
+        // At most eight words: a half does not overflow.
+        pairs + (word & 0x00ff_00ff) + (word >> 8 & 0x00ff_00ff)
+    });
+    (pairs & 0xffff) + (pairs >> 16) + rest.iter().map(|&share| share as u32).sum::<u32>()
 }
 
 #[inline(always)]
@@ -197,6 +237,8 @@ fn part(of: u64, size: u64) -> f32 {
 #[cfg(test)]
 mod tests {
     use core::f32::consts::PI;
+
+    use photoncard_shared::budget::MAX_GATHER_RAYS;
 
     use super::*;
     use crate::sampler::Dimension;
@@ -237,6 +279,25 @@ mod tests {
                     }
                 }
                 assert_eq!(next, count);
+            }
+        }
+    }
+
+    #[test]
+    fn a_quotient_is_that_of_integers() {
+        for seed in 0..100_000 {
+            let divisor = crate::sampler::hash(seed) % (1 << 25) + 1;
+            let beginning = crate::sampler::hash(seed + 1_000_000) % (divisor + 1);
+            let count = crate::sampler::hash(seed + 2_000_000) % (MAX_GATHER_RAYS + 1);
+            // Multiples of the divisor, and their neighbours, too.
+            let multiple = divisor * (beginning % 64);
+            for factors in
+                [[beginning, count], [multiple, 1], [multiple + 1, 1], [multiple.saturating_sub(1), 1]]
+            {
+                let [a, b] = factors.map(u64::from);
+                let expected = (a * b / divisor as u64, a * b % divisor as u64);
+                let (quotient, remainder) = divide(factors, divisor);
+                assert_eq!((quotient as u64, remainder as u64), expected, "{factors:?} / {divisor}");
             }
         }
     }

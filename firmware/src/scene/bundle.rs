@@ -179,13 +179,15 @@ fn enter(
         here &= here - 1;
         let (Some(way), Some(&until)) = (ways.get(index), until.get(index)) else { continue };
         let distances = way.slabs.enter(isa, node, children, f32::from_bits(until));
-        for ((entered, nearest), distance) in entered.iter_mut().zip(&mut nearest).zip(distances) {
+        let lanes = entered.iter_mut().zip(&mut nearest).zip(distances);
+        for ((entered, nearest), distance) in lanes.take(isa.lanes(children)) {
             *entered |= if distance == BEYOND { 0 } else { ray };
             *nearest = distance.min(*nearest);
         }
     }
     let mut bits = [BEYOND; LANES];
-    for ((bits, rays), nearest) in bits.iter_mut().zip(entered).zip(nearest) {
+    let lanes = bits.iter_mut().zip(entered).zip(nearest);
+    for ((bits, rays), nearest) in lanes.take(isa.lanes(children)) {
         let distance = if order == Order::NearestFirst { nearest & !RAYS } else { 0 };
         *bits = if rays == 0 { BEYOND } else { distance | rays };
     }
