@@ -10,9 +10,9 @@ pub const OPERATIONS: [Operations; Step::ALL.len()] = [
     // Preparation of a ray
     Operations { add: 0.0, multiply: 0.0, divide: 6.0, square_root: 0.0, compare: 9.0, convert: 0.0 },
     // A node of the hierarchy
-    Operations { add: 9.0, multiply: 9.0, divide: 0.0, square_root: 0.0, compare: 0.0, convert: 0.0 },
+    Operations { add: 8.851, multiply: 8.926, divide: 0.0, square_root: 0.0, compare: 0.0, convert: 0.0 },
     // A box of a node
-    Operations { add: 6.0, multiply: 6.0, divide: 0.0, square_root: 0.0, compare: 7.0, convert: 6.0 },
+    Operations { add: 6.010, multiply: 6.005, divide: 0.0, square_root: 0.0, compare: 7.0, convert: 6.0 },
     // A vertex of a leaf
     Operations { add: 5.0, multiply: 2.0, divide: 0.0, square_root: 0.0, compare: 0.0, convert: 0.0 },
     // A triangle of a leaf
@@ -46,7 +46,7 @@ pub const OPERATIONS: [Operations; Step::ALL.len()] = [
     // A shadow ray
     Operations { add: 73.35, multiply: 88.83, divide: 15.18, square_root: 4.248, compare: 27.83, convert: 5.931 },
     // A gather ray
-    Operations { add: 51.54, multiply: 102.2, divide: 8.026, square_root: 2.918, compare: 23.47, convert: 10.90 },
+    Operations { add: 51.54, multiply: 103.6, divide: 9.376, square_root: 2.918, compare: 23.47, convert: 17.49 },
     // A table of directions
     Operations { add: 495.2, multiply: 538.0, divide: 22.07, square_root: 22.79, compare: 167.3, convert: 90.68 },
     // A photon of a table of directions
