@@ -123,7 +123,8 @@ impl<K: ChipKind> Flight<K> {
                     directions: point.directions,
                     rays: StoredRays::new(&point),
                 };
-                shared.points.push(pixel as u16, stored);
+                let bin = stored.first_bin(point.pattern, frame.bins);
+                shared.points.push(pixel as u16, stored, bin);
             }
         }
         Ok(())
@@ -143,7 +144,7 @@ impl<K: ChipKind> Flight<K> {
             let at = self.sample(job.frame, pixel.into(), self.position.sample);
             let context = &mut job.context(&mut self.counters);
             context.memory.enter(Stage::Shadow);
-            let mut point = stored.point(context.frame, at);
+            let mut point = stored.point(pattern(context.frame, at));
             if stored.read_surface(context, at, &mut point.surface)? {
                 let light = direct_light(context, at, &point, shared)?;
                 for (component, light) in light {
@@ -157,54 +158,50 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Casts gather rays of the present bin, of the present gather point.
+    /// Casts gather rays of the present bin, of the next gather point with any.
     pub(super) fn cast_for_pixel<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
         shared: &mut Shared<K>,
         flight: usize,
     ) -> Result<(), Fault> {
-        let present = shared.points.get(self.position.index);
-        if let Some((pixel, stored)) = present
-            && let Some(number) = self.sum(pixel.into())
-        {
-            let at = self.sample(job.frame, pixel.into(), self.position.sample);
-            let index_in_tile = self.index_in_tile(pixel.into());
-            let of_bin = stored.rays_of_bin(pattern(job.frame, at), self.position.bin, job.frame.bins);
-            let (context, outlet) = &mut job.context_and_outlet(&mut self.counters);
-            context.memory.enter(Stage::GatherRay);
-            // Most points have no ray in a bin: none of those is copied.
-            let mut point = (!of_bin.is_empty()).then(|| stored.point(context.frame, at));
-            if let Some(point) = &mut point
-                && stored.read_surface(context, at, &mut point.surface)?
-            {
-                let (rays, is_last) = self.position.next_rays(of_bin);
-                let target = GatherTarget::new(flight, PointIndex::Pixel(number));
-                let mut ends = final_gather::GatherRayEnds::new();
-                for bundle in final_gather::bundles(rays) {
-                    final_gather::cast(context, point, target, bundle, &mut ends)?;
-                    for end in &ends {
-                        let sum = (flight, number);
-                        shared.sums.add(context.frame, sum, Component::Direct, end.direct);
-                        match (end.request, outlet.as_deref_mut()) {
-                            (None, _) => {}
-                            (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),
-                            (Some(request), None) => match shared.gathers.submit(context, request)? {
-                                None => self.waiting += 1,
-                                Some(brought) => {
-                                    shared.sums.add(context.frame, sum, Component::Indirect, brought);
-                                }
-                            },
+        let Some((index, pixel)) = shared.points.next(&self.position) else {
+            if self.position.end_bin(job.frame.bins) {
+                self.end_sample(job.frame);
+            }
+            return Ok(());
+        };
+        let at = self.sample(job.frame, pixel.into(), self.position.sample);
+        let pattern = pattern(job.frame, at);
+        let rays = shared.points.take_rays(&mut self.position, index, pattern, job.frame.bins);
+        let (Some((_, stored)), Some(number)) = (shared.points.get(index), self.sum(pixel.into())) else {
+            return Ok(());
+        };
+        let index_in_tile = self.index_in_tile(pixel.into());
+        let (context, outlet) = &mut job.context_and_outlet(&mut self.counters);
+        context.memory.enter(Stage::GatherRay);
+        let mut point = stored.point(pattern);
+        if !stored.read_surface(context, at, &mut point.surface)? {
+            return Ok(());
+        }
+        let target = GatherTarget::new(flight, PointIndex::Pixel(number));
+        let mut ends = final_gather::GatherRayEnds::new();
+        for bundle in final_gather::bundles(rays) {
+            final_gather::cast(context, &point, target, bundle, &mut ends)?;
+            for end in &ends {
+                let sum = (flight, number);
+                shared.sums.add(context.frame, sum, Component::Direct, end.direct);
+                match (end.request, outlet.as_deref_mut()) {
+                    (None, _) => {}
+                    (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),
+                    (Some(request), None) => match shared.gathers.submit(context, request)? {
+                        None => self.waiting += 1,
+                        Some(brought) => {
+                            shared.sums.add(context.frame, sum, Component::Indirect, brought);
                         }
-                    }
-                }
-                if !is_last {
-                    return Ok(());
+                    },
                 }
             }
-        }
-        if self.position.next_index(shared.points.len()) && self.position.next_bin(job.frame.bins) {
-            self.end_sample(job.frame);
         }
         Ok(())
     }

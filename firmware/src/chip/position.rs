@@ -1,7 +1,5 @@
 //! Progress of a tile: its blocks, and the passes of a block.
 
-use core::ops::Range;
-
 /// A rectangle of a tile's pixels, in coordinates from the tile's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {
@@ -95,9 +93,6 @@ pub(super) struct Position {
     rays: u32,
 }
 
-/// Maximum number of gather rays of one piece of work.
-const RAYS_PER_STEP: u32 = 64;
-
 impl Position {
     pub(super) const VACANT: Self = Self::at(Pass::Vacant);
 
@@ -106,24 +101,25 @@ impl Position {
         Self { pass, sample: 0, bin: 0, first: 0, index: 0, rays: 0 }
     }
 
-    /// The next rays to cast, at most [`RAYS_PER_STEP`], of the current bin's rays `of_bin`, and whether they are the
-    /// last.
-    pub(super) fn next_rays(&mut self, of_bin: Range<u32>) -> (Range<u32>, bool) {
-        let first = of_bin.start + self.rays;
-        let end = of_bin.end.min(first + RAYS_PER_STEP);
-        let is_last = end >= of_bin.end;
-        self.rays = if is_last { 0 } else { self.rays + RAYS_PER_STEP };
-        (first..end, is_last)
+    /// Number of rays of the present bin already cast, of the present gather point.
+    pub(super) fn rays_cast(&self) -> u32 {
+        self.rays
+    }
+
+    /// Advances by some rays of the present bin and of the gather point `index`: to its other rays, or to the next point.
+    pub(super) fn pass_rays(&mut self, index: u32, rays: u32, are_last: bool) {
+        [self.index, self.rays] = if are_last { [index + 1, 0] } else { [index, self.rays + rays] };
+    }
+
+    /// Advances to the first gather point and the next of `count` bins, cyclically. Returns whether the bin was the last.
+    pub(super) fn end_bin(&mut self, count: u32) -> bool {
+        self.index = 0;
+        next(&mut self.bin, count)
     }
 
     /// Advances to the next of `count` indices, cyclically. Returns whether the index was the last.
     pub(super) fn next_index(&mut self, count: u32) -> bool {
         next(&mut self.index, count)
-    }
-
-    /// Advances to the next of `count` bins, cyclically. Returns whether the bin was the last.
-    pub(super) fn next_bin(&mut self, count: u32) -> bool {
-        next(&mut self.bin, count)
     }
 
     /// Advances to the next of `count` samples, cyclically. Returns whether the sample was the last.
@@ -147,23 +143,6 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-
-    #[test]
-    fn steps_cast_all_rays_of_a_bin_and_none_twice() {
-        for of_bin in [5..5, 0..1, 7..71, 3..500, 0..64, 0..16_384] {
-            let mut position = Position::at(Pass::Rays);
-            let mut cast = Vec::new();
-            loop {
-                let (rays, is_last) = position.next_rays(of_bin.clone());
-                assert!(rays.len() <= RAYS_PER_STEP as usize);
-                cast.extend(rays);
-                if is_last {
-                    break;
-                }
-            }
-            assert!(cast.into_iter().eq(of_bin));
-        }
-    }
 
     #[test]
     fn halves_make_up_the_whole_down_to_one_pixel() {

@@ -10,7 +10,7 @@ use crate::gather::{GatherTarget, PointIndex};
 use crate::irradiance_cache::{Full, Recalled};
 use crate::kind::ChipKind;
 use crate::memory::MemoryPort;
-use crate::render::{GatherPoint, RenderJob, final_gather};
+use crate::render::{RenderJob, final_gather};
 
 impl<K: ChipKind> Flight<K> {
     /// Reads back the block's records, if an earlier frame has kept them.
@@ -76,7 +76,8 @@ impl<K: ChipKind> Flight<K> {
             point.choose_directions(&mut job.context(&mut self.counters), shared.gathers.candidates())?;
             self.cache.begin_gather(index, &point);
             // An index fits 15 bits, by the check of the kind's capacities.
-            shared.points.push(index as u16, StoredPoint::of_record(&point));
+            let stored = StoredPoint::of_record(&point);
+            shared.points.push(index as u16, stored, stored.first_bin(point.pattern, job.frame.bins));
         }
         if self.position.next_index(self.cache.lattice_points()) {
             self.position = Position::at(Pass::RecordRays);
@@ -84,7 +85,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Casts gather rays of the current direction bin for one record.
+    /// Casts gather rays of the present bin, of the next record with any.
     pub(super) fn cast_for_record<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -94,36 +95,33 @@ impl<K: ChipKind> Flight<K> {
         let Shared { points, gathers, .. } = shared;
         let Self { cache, counters, position, waiting, .. } = self;
         let bins = job.frame.bins;
-        if let Some((record, stored)) = points.get(position.index)
-            && let Some(pattern) = cache.pattern(job.frame, record.into())
-            // Known before the record's surface is copied, as many a bin has no ray of it.
-            && let of_bin = stored.rays_of_bin(pattern, position.bin, bins)
-            && !of_bin.is_empty()
-            && let Some(point) = cache.point(job.frame, record.into())
-        {
-            let context = &mut job.context(counters);
-            let point = &GatherPoint { directions: stored.directions, ..point };
-            let (rays, is_last) = position.next_rays(of_bin);
-            let target = GatherTarget::new(flight, PointIndex::Record(record));
-            let mut ends = final_gather::GatherRayEnds::new();
-            for bundle in final_gather::bundles(rays) {
-                final_gather::cast(context, point, target, bundle, &mut ends)?;
-                for end in &ends {
-                    cache.add(record, end.cell, end.direct);
-                    if let Some(request) = end.request {
-                        match gathers.submit(context, request)? {
-                            None => *waiting += 1,
-                            Some(brought) => cache.add(record, end.cell, brought),
-                        }
+        let Some((index, record)) = points.next(position) else {
+            if position.end_bin(bins) {
+                self.position = Position::at(Pass::WaitForRecords);
+            }
+            return Ok(());
+        };
+        let Some(mut point) = cache.point(job.frame, record.into()) else {
+            // Never reached: every owner is a record.
+            position.pass_rays(index, 0, true);
+            return Ok(());
+        };
+        let rays = points.take_rays(position, index, point.pattern, bins);
+        point.directions = points.get(index).map_or(point.directions, |(_, stored)| stored.directions);
+        let context = &mut job.context(counters);
+        let target = GatherTarget::new(flight, PointIndex::Record(record));
+        let mut ends = final_gather::GatherRayEnds::new();
+        for bundle in final_gather::bundles(rays) {
+            final_gather::cast(context, &point, target, bundle, &mut ends)?;
+            for end in &ends {
+                cache.add(record, end.cell, end.direct);
+                if let Some(request) = end.request {
+                    match gathers.submit(context, request)? {
+                        None => *waiting += 1,
+                        Some(brought) => cache.add(record, end.cell, brought),
                     }
                 }
             }
-            if !is_last {
-                return Ok(());
-            }
-        }
-        if position.next_index(points.len()) && position.next_bin(bins) {
-            self.position = Position::at(Pass::WaitForRecords);
         }
         Ok(())
     }

@@ -11,6 +11,9 @@ use crate::render::{Context, GatherPoint, PixelSample, Purpose, eye};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Seen, Surface};
 
+/// Maximum number of gather rays of one piece of work.
+const RAYS_PER_STEP: u32 = 64;
+
 /// State of a gather point from one direction bin to the next, 48 bytes: the rest is read again.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredPoint {
@@ -54,18 +57,38 @@ impl StoredPoint {
         Self { seen: Seen::NOWHERE, directions: point.directions, rays: StoredRays::new(point) }
     }
 
-    /// The rays of a direction bin: known before the surface is read again.
+    /// Direction bin, of `bins`, of the first ray.
+    pub(super) fn first_bin(&self, pattern: Pattern, bins: u32) -> u32 {
+        self.directions.bin(pattern, 0, self.rays.number(), bins)
+    }
+
+    /// The next rays of a direction bin, at most [`RAYS_PER_STEP`], of which `done` are cast; and the bin of the ray after them. There is one at least.
     #[inline(always)]
-    pub(super) fn rays_of_bin(&self, pattern: Pattern, bin: u32, bins: u32) -> Range<u32> {
-        self.directions.rays(pattern, self.rays.number(), bin, bins)
+    pub(super) fn next_rays(
+        &self,
+        pattern: Pattern,
+        done: u32,
+        [bin, bins]: [u32; 2],
+    ) -> (Range<u32>, Option<u32>) {
+        let number = self.rays.number();
+        let first = self.directions.first_ray(pattern, number, bin, bins) + done;
+        let mut end = first + 1;
+        while end < number {
+            let next = self.directions.bin(pattern, end, number, bins);
+            if next != bin || end - first == RAYS_PER_STEP {
+                return (first..end, Some(next));
+            }
+            end += 1;
+        }
+        (first..number, None)
     }
 
     /// The gather point of a sample of a pixel, but for its surface.
     #[inline(always)]
-    pub(super) fn point(&self, frame: &FrameParameters, at: PixelSample) -> GatherPoint {
+    pub(super) fn point(&self, pattern: Pattern) -> GatherPoint {
         GatherPoint {
             surface: Surface::NOWHERE,
-            pattern: pattern(frame, at),
+            pattern,
             rays: self.rays.number(),
             directions: self.directions,
             purpose: self.rays.purpose(),
@@ -96,4 +119,31 @@ impl StoredPoint {
 #[inline(always)]
 pub(super) fn pattern(frame: &FrameParameters, at: PixelSample) -> Pattern {
     Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+
+    #[test]
+    fn all_rays_are_cast_bin_by_bin_and_none_twice() {
+        for (rays, bins) in [(1, 99), (5, 1), (64, 1), (65, 2), (300, 99), (16_384, 256)] {
+            let pattern = Pattern::new(7, rays, bins, 0, Dimension::Gather);
+            let directions = DirectionTable::COSINE;
+            let stored = StoredPoint { seen: Seen::NOWHERE, directions, rays: StoredRays(rays as u16) };
+            let mut cast = Vec::new();
+            let (mut bin, mut done) = (Some(stored.first_bin(pattern, bins)), 0);
+            while let Some(present) = bin {
+                let (rays, next) = stored.next_rays(pattern, done, [present, bins]);
+                assert!((1..=RAYS_PER_STEP as usize).contains(&rays.len()));
+                done = if next == bin { done + rays.len() as u32 } else { 0 };
+                assert!(next.is_none_or(|next| present <= next && next < bins));
+                cast.extend(rays);
+                bin = next;
+            }
+            assert!(cast.into_iter().eq(0..rays));
+        }
+    }
 }

@@ -59,7 +59,8 @@ pub(crate) fn direction_in(normal: Vec3, cell: u8, [along, across]: [f32; 2]) ->
     let sine_squared = (row as f32 + across) * (1.0 / ROWS as f32);
     let sine = libm::sqrtf(sine_squared);
     let cosine = libm::sqrtf(max(1.0 - sine_squared, 0.0));
-    from_frame(normal, sine * libm::cosf(azimuth), sine * libm::sinf(azimuth), cosine)
+    let (sine_of_azimuth, cosine_of_azimuth) = libm::sincosf(azimuth);
+    from_frame(normal, sine * cosine_of_azimuth, sine * sine_of_azimuth, cosine)
 }
 
 /// Centre of a cell: azimuth, radians, and `sin^2` of the polar angle.

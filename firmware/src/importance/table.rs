@@ -1,7 +1,6 @@
 //! The direction table of a gather point: shares of its gather rays by direction.
 
 use core::f32::consts::FRAC_1_PI;
-use core::ops::Range;
 
 use glam::Vec3;
 
@@ -69,46 +68,79 @@ impl DirectionTable {
         sum(cells) + if entry > LOBE { self.lobe as u32 } else { 0 }
     }
 
-    /// Range of the rays, of `count` in all, in direction bin `bin` of `bins`. Bins divide the walk through the
-    /// entries into equal parts; their ranges follow each other.
+    /// Index of the first ray, of `count` in all, in direction bin `bin` of `bins` or in a later one. Bins divide the walk through the
+    /// entries into equal parts; their rays follow each other.
     ///
     /// `count` is at most [`MAX_GATHER_RAYS`](photoncard_shared::budget::MAX_GATHER_RAYS), `bins` at most
     /// [`MAX_BINS`](photoncard_shared::budget::MAX_BINS).
-    #[inline]
-    pub fn rays(&self, pattern: Pattern, count: u32, bin: u32, bins: u32) -> Range<u32> {
-        if bins <= 1 {
-            return 0..count;
+    #[inline(always)]
+    pub fn first_ray(&self, pattern: Pattern, count: u32, bin: u32, bins: u32) -> u32 {
+        if bin == 0 || bins == 0 {
+            return 0;
         }
-        let place = |bin: u32| [bin * ENTRIES as u32 / bins, bin * ENTRIES as u32 % bins];
-        let [from, to] = [place(bin), place(bin + 1)];
+        let place = bin * ENTRIES as u32;
+        let (entry, part) = ((place / bins) as usize, place % bins);
         // At least 1 in every table, which the compiler cannot prove.
         let total = (self.total() * bins).max(1);
-        let before = self.before(from[0] as usize);
-        let between: u32 = (from[0]..to[0]).map(|entry| self.share(entry as usize)).sum();
-        let first = |before: u32, [entry, part]: [u32; 2]| {
-            // In units of a share over `bins`: integers.
-            let beginning = before * bins + self.share(entry as usize) * part;
-            first_ray(pattern, count, beginning, total)
-        };
-        first(before, from)..first(before + between, to)
+        // In units of a share over `bins`: integers.
+        let beginning = self.before(entry) * bins + self.share(entry) * part;
+        first_ray(pattern, count, beginning, total)
+    }
+
+    /// Direction bin, of `bins`, of ray `index` of `count`.
+    #[inline(always)]
+    pub fn bin(&self, pattern: Pattern, index: u32, count: u32, bins: u32) -> u32 {
+        if bins <= 1 {
+            return 0;
+        }
+        let Place { entry, offset, size } = self.place(pattern, index, count);
+        // Of `bins` parts of the entry the ray's, estimated to within 1 and corrected: a division of integers takes long.
+        let mut part = (self::part(offset, size) * bins as f32) as u32;
+        let begins = |part: u32| part as u64 * size <= offset * bins as u64;
+        if !begins(part) {
+            part = part.saturating_sub(1);
+        } else if begins(part + 1) {
+            part += 1;
+        }
+        (entry as u32 * bins + part) / ENTRIES as u32
+    }
+
+    /// Place of ray `index` of `count` along the walk.
+    #[inline(always)]
+    fn place(&self, pattern: Pattern, index: u32, count: u32) -> Place {
+        let target = stratum_point(pattern, index) * self.total() as u64;
+        // Below the sum of the shares: an entry's end is a whole number of shares, so that the fraction of one decides nothing.
+        let shares = (target >> JITTER_BITS) as u32 / count.max(1);
+        let (entry, before) = self.entry_at(shares);
+        let [before, size] = [before, self.share(entry)].map(|shares| shares as u64 * whole(count));
+        Place { entry, offset: target - before, size }
+    }
+
+    /// The entry with a share, by the number of shares before it, and the sum of those before the entry.
+    #[inline(always)]
+    fn entry_at(&self, shares: u32) -> (usize, u32) {
+        let (mut first, mut before) = (0, 0);
+        for word in self.cells.as_chunks::<4>().0 {
+            let with_word = before + sum(word);
+            if shares < with_word {
+                break;
+            }
+            (first, before) = (first + word.len(), with_word);
+        }
+        for (cell, &share) in self.cells.iter().enumerate().skip(first) {
+            if shares < before + share as u32 {
+                return (cell, before);
+            }
+            before += share as u32;
+        }
+        (LOBE, before)
     }
 
     /// Entry of ray `index` of `count`, and the ray's coordinates within the entry, along the walk and across it.
     #[inline(always)]
     fn entry(&self, pattern: Pattern, index: u32, count: u32) -> (usize, [f32; 2]) {
-        let target = stratum_point(pattern, index) * self.total() as u64;
-        // Below the sum of the shares: an entry's end is a whole number of shares, so that the fraction of one decides nothing.
-        let shares = (target >> JITTER_BITS) as u32 / count.max(1);
-        let (mut entry, mut before) = (LOBE, 0_u32);
-        for (cell, &share) in self.cells.iter().enumerate() {
-            if shares < before + share as u32 {
-                entry = cell;
-                break;
-            }
-            before += share as u32;
-        }
-        let [before, size] = [before, self.share(entry)].map(|shares| shares as u64 * whole(count));
-        (entry, [part(target - before, size), pattern.radical_inverse(index)])
+        let Place { entry, offset, size } = self.place(pattern, index, count);
+        (entry, [part(offset, size), pattern.radical_inverse(index)])
     }
 
     /// Number of rays, of `count`, in each cell, without the lobe's.
@@ -166,6 +198,13 @@ impl DirectionTable {
         let lobe_share = self.lobe as f32 * per_share;
         cell_share * CELLS as f32 * FRAC_1_PI * cosine + lobe_share * lobe_density
     }
+}
+
+/// Place of a ray along the walk: its entry, and the offset in it, both lengths in units of a share over the length of all strata.
+struct Place {
+    entry: usize,
+    offset: u64,
+    size: u64,
 }
 
 /// Bits of a point's offset in its stratum.
@@ -263,22 +302,26 @@ mod tests {
     }
 
     #[test]
-    fn bins_hold_every_ray_once_and_only_rays_of_their_entries() {
+    fn bins_follow_the_rays_and_hold_only_rays_of_their_entries() {
         for seed in 0..20 {
             let table = uneven(seed, 2000.0 * (seed % 3) as f32);
             for (count, bins) in [(100, 33), (7, 33), (200, 66), (1, 256), (256, 11), (5000, 100)] {
-                let mut next = 0;
-                for bin in 0..bins {
-                    let rays = table.rays(pattern(seed), count, bin, bins);
-                    assert_eq!(rays.start, next);
-                    next = rays.end;
-                    for ray in rays {
-                        let (entry, [along, _]) = table.entry(pattern(seed), ray, count);
-                        let place = (entry as f32 + along) * bins as f32 / ENTRIES as f32;
-                        assert!(place > bin as f32 - 1e-3 && place < bin as f32 + 1.001, "{place} {bin}");
+                let mut last = 0;
+                for ray in 0..count {
+                    let bin = table.bin(pattern(seed), ray, count, bins);
+                    for begun in last + 1..=bin {
+                        assert_eq!(table.first_ray(pattern(seed), count, begun, bins), ray);
                     }
+                    assert!(last <= bin && bin < bins);
+                    last = bin;
+                    let (entry, [along, _]) = table.entry(pattern(seed), ray, count);
+                    let place = (entry as f32 + along) * bins as f32 / ENTRIES as f32;
+                    assert!(place > bin as f32 - 1e-3 && place < bin as f32 + 1.001, "{place} {bin}");
                 }
-                assert_eq!(next, count);
+                assert_eq!(table.first_ray(pattern(seed), count, 0, bins), 0);
+                for empty in last + 1..bins {
+                    assert_eq!(table.first_ray(pattern(seed), count, empty, bins), count);
+                }
             }
         }
     }

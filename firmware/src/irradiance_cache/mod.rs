@@ -117,15 +117,9 @@ impl<R: Capacity> IrradianceCache<R> {
     /// Gather point of the record at the lattice point `index`, without directions; `None` without a record.
     #[inline(always)]
     pub fn point(&self, frame: &FrameParameters, index: u32) -> Option<GatherPoint> {
-        let (_, record) = self.records.entry(index as usize)?;
-        let pattern = self.pattern(frame, index)?;
+        let (&LatticePoint { x, y }, record) = self.records.entry(index as usize)?;
+        let pattern = Pattern::new(frame.seed, x, y, 0, Dimension::Irradiance);
         Some(GatherPoint::record(record.as_ref()?.surface(), pattern, frame.gather_rays))
-    }
-
-    /// The random numbers of the gather rays at a lattice point; `None` beyond the last.
-    pub fn pattern(&self, frame: &FrameParameters, index: u32) -> Option<Pattern> {
-        let (&LatticePoint { x, y }, _) = self.records.entry(index as usize)?;
-        Some(Pattern::new(frame.seed, x, y, 0, Dimension::Irradiance))
     }
 
     /// Begins the gather of a record, by the directions of its gather point, which determine its gradient's coefficients.

@@ -90,69 +90,54 @@ struct Way<'a> {
     slabs: Slabs,
 }
 
+/// State of a bundle's search.
+struct Rays<'a, S> {
+    ways: Vec<Way<'a>, BUNDLE_RAYS>,
+    /// Bits of the maximum distance of each ray.
+    until: [u32; BUNDLE_RAYS],
+    searches: &'a mut [S; BUNDLE_RAYS],
+}
+
+/// Takes the lowest of some rays' bits: its index. `None` without one.
+#[inline(always)]
+fn take(rays: &mut u32) -> Option<usize> {
+    let index = rays.trailing_zeros();
+    *rays &= rays.wrapping_sub(1);
+    (index < u32::BITS).then_some(index as usize)
+}
+
 impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
     type Output = Result<(), Fault>;
 
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
         let Self { scene, memory, rays, searches } = self;
-        let mut ways = Vec::<Way, BUNDLE_RAYS>::new();
-        // Bits of the maximum distance of each ray.
-        let mut until = [0; BUNDLE_RAYS];
-        for (ray, until) in rays.iter().zip(&mut until) {
-            *until = ray.max_distance.to_bits();
-            let _ = ways.push(Way { ray, frame: RayFrame::new(ray), slabs: Slabs::new(ray) });
-        }
-        let mut waiting = RAYS & !(u32::MAX << ways.len());
+        let mut rays = Rays::new(rays, searches);
+        let mut waiting = RAYS & !(u32::MAX << rays.ways.len());
         let mut stack = BvhStack::new();
         let sections = [SectionKind::Nodes, SectionKind::Triangles];
         let mut descent = Descent::with_root(scene, sections, &mut stack, waiting);
-        while let Some((bits, child)) = descent.pop()? {
-            let mut here = bits & waiting;
-            if S::ORDER == Order::NearestFirst {
-                here &= !isa.below(&until, bits & !RAYS);
-            }
-            if here == 0 {
-                continue;
-            }
+        while waiting != 0
+            && let Some((bits, child)) = descent.pop()?
+        {
+            let here = rays.within(isa, bits) & waiting;
+            // Each ray requests the line: the first by reading it.
+            let others = 1..here.count_ones();
             match child {
+                _ if here == 0 => {}
                 Child::Node(node) => {
-                    for _ in 1..here.count_ones() {
+                    for _ in others {
                         scene.line(memory, SectionKind::Nodes, node, 0..LINE_BYTES as u32)?;
                     }
-                    descent.enter(isa, memory, node, S::ORDER, |line| {
-                        enter(isa, BvhNode(line), &ways, here, &until, S::ORDER)
-                    })?;
+                    descent
+                        .enter(isa, memory, node, S::ORDER, |line| rays.enter(isa, BvhNode(line), here))?;
                 }
                 Child::Leaf(leaf) => {
-                    for _ in 1..here.count_ones() {
+                    for _ in others {
                         descent.leaf(memory, leaf)?;
                     }
                     let line = *descent.leaf(memory, leaf)?;
-                    let line = BvhLeaf(&line);
-                    let corners = line.all_corners();
-                    while here != 0 {
-                        let index = here.trailing_zeros() as usize;
-                        here &= here - 1;
-                        let (Some(way), Some(until), Some(search)) =
-                            (ways.get(index), until.get_mut(index), searches.get_mut(index))
-                        else {
-                            continue;
-                        };
-                        let sheared = way.frame.leaf(isa, line, &corners);
-                        if sheared.may_meet == 0 {
-                            continue;
-                        }
-                        let place = (way.ray, &way.frame, leaf);
-                        let limit = f32::from_bits(*until);
-                        match meet_leaf(scene, memory, place, (line, &sheared), limit, search)? {
-                            ControlFlow::Continue(distance) => *until = distance.to_bits(),
-                            ControlFlow::Break(()) => waiting &= !(1 << index),
-                        }
-                    }
-                    if waiting == 0 {
-                        break;
-                    }
+                    waiting &= !rays.meet(isa, (scene, memory), (leaf, BvhLeaf(&line)), here)?;
                 }
             }
         }
@@ -160,36 +145,80 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
     }
 }
 
-/// The bits to push with each child of a node: the rays of `here` that enter its box, and the least distance at which one does.
-#[inline(always)]
-fn enter(
-    isa: impl Isa,
-    node: BvhNode,
-    ways: &[Way],
-    mut here: u32,
-    until: &[u32; BUNDLE_RAYS],
-    order: Order,
-) -> [u32; LANES] {
-    let children = WideNode(node.0).children() as usize;
-    let mut entered = [0; LANES];
-    let mut nearest = [BEYOND; LANES];
-    while here != 0 {
-        let index = here.trailing_zeros() as usize;
-        let ray = here & here.wrapping_neg();
-        here &= here - 1;
-        let (Some(way), Some(&until)) = (ways.get(index), until.get(index)) else { continue };
-        let distances = way.slabs.enter(isa, node, children, f32::from_bits(until));
-        let lanes = entered.iter_mut().zip(&mut nearest).zip(distances);
-        for ((entered, nearest), distance) in lanes.take(isa.lanes(children)) {
-            *entered |= if distance == BEYOND { 0 } else { ray };
-            *nearest = distance.min(*nearest);
+impl<'a, S: Search> Rays<'a, S> {
+    #[inline(always)]
+    fn new(rays: &'a [Ray], searches: &'a mut [S; BUNDLE_RAYS]) -> Self {
+        let mut ways = Vec::new();
+        let mut until = [0; BUNDLE_RAYS];
+        for (ray, until) in rays.iter().zip(&mut until) {
+            *until = ray.max_distance.to_bits();
+            let _ = ways.push(Way { ray, frame: RayFrame::new(ray), slabs: Slabs::new(ray) });
+        }
+        Self { ways, until, searches }
+    }
+
+    /// The rays of a child's bits whose maximum distance is not below that of the bits.
+    #[inline(always)]
+    fn within(&self, isa: impl Isa, bits: u32) -> u32 {
+        match S::ORDER {
+            Order::NearestFirst => bits & RAYS & !isa.below(&self.until, bits & !RAYS),
+            Order::Any => bits & RAYS,
         }
     }
-    let mut bits = [BEYOND; LANES];
-    let lanes = bits.iter_mut().zip(entered).zip(nearest);
-    for ((bits, rays), nearest) in lanes.take(isa.lanes(children)) {
-        let distance = if order == Order::NearestFirst { nearest & !RAYS } else { 0 };
-        *bits = if rays == 0 { BEYOND } else { distance | rays };
+
+    /// The bits to push with each child of a node: the rays of `here` that enter its box, and the least distance at which one does.
+    #[inline(always)]
+    fn enter(&self, isa: impl Isa, node: BvhNode, mut here: u32) -> [u32; LANES] {
+        let children = WideNode(node.0).children() as usize;
+        let mut entered = [0; LANES];
+        let mut nearest = [BEYOND; LANES];
+        while let Some(index) = take(&mut here) {
+            let (Some(way), Some(&until)) = (self.ways.get(index), self.until.get(index)) else { continue };
+            let distances = way.slabs.enter(isa, node, children, f32::from_bits(until));
+            let lanes = entered.iter_mut().zip(&mut nearest).zip(distances);
+            for ((entered, nearest), distance) in lanes.take(isa.lanes(children)) {
+                *entered |= if distance == BEYOND { 0 } else { 1 << index };
+                *nearest = distance.min(*nearest);
+            }
+        }
+        let mut bits = [BEYOND; LANES];
+        let lanes = bits.iter_mut().zip(entered).zip(nearest);
+        for ((bits, rays), nearest) in lanes.take(isa.lanes(children)) {
+            let distance = if S::ORDER == Order::NearestFirst { nearest & !RAYS } else { 0 };
+            *bits = if rays == 0 { BEYOND } else { distance | rays };
+        }
+        bits
     }
-    bits
+
+    /// Finds the hits of the rays of `here` in a leaf. Returns the rays that need no other.
+    #[inline(always)]
+    fn meet<M: MemoryPort>(
+        &mut self,
+        isa: impl Isa,
+        (scene, memory): (&SceneImage, &mut M),
+        (leaf, line): (u32, BvhLeaf),
+        mut here: u32,
+    ) -> Result<u32, Fault> {
+        let corners = line.all_corners();
+        let mut done = 0;
+        while let Some(index) = take(&mut here) {
+            let Self { ways, until, searches } = self;
+            let (Some(way), Some(until), Some(search)) =
+                (ways.get(index), until.get_mut(index), searches.get_mut(index))
+            else {
+                continue;
+            };
+            let sheared = way.frame.leaf(isa, line, &corners);
+            if sheared.may_meet == 0 {
+                continue;
+            }
+            let place = (way.ray, &way.frame, leaf);
+            let limit = f32::from_bits(*until);
+            match meet_leaf(scene, memory, place, (line, &sheared), limit, search)? {
+                ControlFlow::Continue(distance) => *until = distance.to_bits(),
+                ControlFlow::Break(()) => done |= 1 << index,
+            }
+        }
+        Ok(done)
+    }
 }

@@ -148,12 +148,16 @@ fn descend<S: Search>(
                 slabs.enter(isa, BvhNode(line), children, until)
             })?,
             Child::Leaf(leaf) => {
-                let line = *descent.leaf(memory, leaf)?;
-                let line = BvhLeaf(&line);
-                let corners = line.all_corners();
-                let sheared = frame.leaf(isa, line, &corners);
+                let line = descent.leaf(memory, leaf)?;
+                let corners = BvhLeaf(line).all_corners();
+                let sheared = frame.leaf(isa, BvhLeaf(line), &corners);
+                if sheared.may_meet == 0 {
+                    continue;
+                }
+                // A copy: textures of cut-outs are read beside it.
+                let line = *line;
                 let place = (ray, &frame, leaf);
-                match meet_leaf(scene, memory, place, (line, &sheared), until, search)? {
+                match meet_leaf(scene, memory, place, (BvhLeaf(&line), &sheared), until, search)? {
                     ControlFlow::Continue(distance) => until = distance,
                     ControlFlow::Break(()) => return Ok(()),
                 }

@@ -10,9 +10,9 @@ pub const OPERATIONS: [Operations; Step::ALL.len()] = [
     // Preparation of a ray
     Operations { add: 0.0, multiply: 0.0, divide: 6.0, square_root: 0.0, compare: 9.0, convert: 0.0 },
     // A node of the hierarchy
-    Operations { add: 8.851, multiply: 8.926, divide: 0.0, square_root: 0.0, compare: 0.0, convert: 0.0 },
+    Operations { add: 8.330, multiply: 8.330, divide: 0.0, square_root: 0.0, compare: 0.0, convert: 0.0 },
     // A box of a node
-    Operations { add: 6.010, multiply: 6.005, divide: 0.0, square_root: 0.0, compare: 7.0, convert: 6.0 },
+    Operations { add: 6.0, multiply: 6.0, divide: 0.0, square_root: 0.0, compare: 7.0, convert: 6.0 },
     // A vertex of a leaf
     Operations { add: 5.0, multiply: 2.0, divide: 0.0, square_root: 0.0, compare: 0.0, convert: 0.0 },
     // A triangle of a leaf
@@ -40,13 +40,13 @@ pub const OPERATIONS: [Operations; Step::ALL.len()] = [
     // The value of a microfacet lobe for a photon
     Operations { add: 11.59, multiply: 19.43, divide: 2.863, square_root: 2.158, compare: 3.658, convert: 0.0 },
     // A surface that is read
-    Operations { add: 30.87, multiply: 42.54, divide: 1.519, square_root: 1.326, compare: 18.74, convert: 2.601 },
+    Operations { add: 34.29, multiply: 45.96, divide: 1.519, square_root: 1.326, compare: 18.74, convert: 2.601 },
     // A record of a light
     Operations { add: 23.66, multiply: 29.34, divide: 4.609, square_root: 4.825, compare: 15.65, convert: 3.046 },
     // A shadow ray
     Operations { add: 73.35, multiply: 88.83, divide: 15.18, square_root: 4.248, compare: 27.83, convert: 5.931 },
     // A gather ray
-    Operations { add: 51.54, multiply: 103.6, divide: 9.376, square_root: 2.918, compare: 23.47, convert: 17.49 },
+    Operations { add: 51.54, multiply: 103.2, divide: 9.031, square_root: 2.918, compare: 23.47, convert: 14.48 },
     // A table of directions
     Operations { add: 495.2, multiply: 538.0, divide: 22.07, square_root: 22.79, compare: 167.3, convert: 90.68 },
     // A photon of a table of directions
@@ -58,5 +58,5 @@ pub const OPERATIONS: [Operations; Step::ALL.len()] = [
     // A sample that is interpolated
     Operations { add: 424.0, multiply: 375.4, divide: 18.60, square_root: 36.06, compare: 86.07, convert: 6.825 },
     // An eye ray
-    Operations { add: 103.7, multiply: 155.1, divide: 20.81, square_root: 6.264, compare: 21.36, convert: 90.68 },
+    Operations { add: 103.7, multiply: 155.1, divide: 20.81, square_root: 6.264, compare: 21.36, convert: 100.9 },
 ];

@@ -28,3 +28,9 @@ counted! {
     powf(x, y) = counted_powf;
     atan2f(y, x) = counted_atan2f;
 }
+
+/// Sine and cosine, counted as two functions.
+#[inline(always)]
+pub fn sincosf(x: f32) -> (f32, f32) {
+    (sinf(x), cosf(x))
+}
