@@ -6,8 +6,10 @@ use photoncard_firmware::scene::SceneImage;
 use photoncard_firmware::simd::{Isa, Kernel, LANES, run};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{BvhAxis, BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, VERTEX_LANES, WideNode};
+use photoncard_shared::layout::{BvhAxis, BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, WideNode};
 use photoncard_shared::message::{Fault, FaultCode};
+
+use super::lanes::{cross, dot, greatest, least, minus};
 
 /// Ball around photons, metres.
 #[derive(Clone, Copy)]
@@ -16,43 +18,101 @@ pub(super) struct Ball {
     pub(super) radius: f32,
 }
 
-impl Ball {
-    /// Vertices of a leaf in the ball's coordinates: relative to its centre, in units of its radius.
+/// Triangles of a leaf in a ball's coordinates: relative to its centre, in units of its radius.
+pub(super) struct LeafNearBall {
+    /// By corner, axis and slot.
+    corners: [[[f32; LEAF_TRIANGLES]; 3]; 3],
+    /// Bit mask of the triangles that have an area, and whose bounding boxes and planes are within distance 1 of the origin.
+    near: u32,
+    /// Bit mask of the triangles with a coordinate beyond [`MAX_EXTENT`].
+    large: u32,
+}
+
+/// Maximum coordinate of corners, in radii: beyond it rounding would be too coarse near the ball.
+const MAX_EXTENT: f32 = 1e4;
+
+/// A triangle that may intersect a ball, in the ball's coordinates.
+pub(super) struct NearTriangle {
+    /// Index in the image.
+    pub(super) index: u32,
+    pub(super) corners: [Vec3; 3],
+    /// True if a corner is so far away that rounding would be too coarse near the ball.
+    pub(super) is_large: bool,
+}
+
+impl LeafNearBall {
     #[inline(always)]
-    fn vertices(&self, leaf: &BvhLeaf) -> [Vec3; VERTEX_LANES] {
-        let scale = self.radius.recip();
-        let centre = self.centre.to_array();
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| {
-            let mut coordinates = leaf.coordinates(axis);
-            for coordinate in &mut coordinates {
-                *coordinate = (*coordinate - centre[axis]) * scale;
-            }
-            coordinates
-        });
-        std::array::from_fn(|vertex| Vec3::new(x[vertex], y[vertex], z[vertex]))
+    fn triangle(&self, leaf: u32, slot: usize) -> NearTriangle {
+        let [a, b, c] = &self.corners;
+        let corner = |[x, y, z]: &[[f32; LEAF_TRIANGLES]; 3]| Vec3::new(x[slot], y[slot], z[slot]);
+        NearTriangle {
+            index: leaf.saturating_mul(LEAF_TRIANGLES as u32) + slot as u32,
+            corners: [corner(a), corner(b), corner(c)],
+            is_large: self.large >> slot & 1 != 0,
+        }
     }
 }
 
-/// True if the triangle has an area, and its bounding box and its plane are within distance 1 of the origin.
-#[inline(always)]
-fn is_near(corners: &[Vec3; 3]) -> bool {
-    let [a, b, c] = *corners;
-    let (lower, upper) = (a.min(b).min(c), a.max(b).max(c));
-    let outside = lower.max(-upper).max(Vec3::ZERO);
-    let normal = (b - a).cross(c - a);
-    let (size, distance) = (normal.length_squared(), normal.dot(a));
-    outside.length_squared() <= 1.0 && size > 0.0 && distance * distance <= size
+/// Kernel that finds the triangles of a leaf that may intersect a ball.
+struct NearTriangles<'a> {
+    leaf: BvhLeaf<'a>,
+    ball: Ball,
 }
 
-/// Calls `visit(index, corners)` for all triangles that may intersect a ball, until one call returns false. `index` is the
-/// triangle's index in the image; corners are in the ball's coordinates. Returns whether all calls returned true.
+impl Kernel for NearTriangles<'_> {
+    type Output = LeafNearBall;
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> LeafNearBall {
+        let Self { leaf, ball } = self;
+        let (scale, centre) = (ball.radius.recip(), ball.centre.to_array());
+        let slots = leaf.all_corners();
+        let mut corners = [[[0.0; LEAF_TRIANGLES]; 3]; 3];
+        for axis in 0..3 {
+            let mut vertices = [0.0; LANES];
+            for (target, coordinate) in vertices.iter_mut().zip(leaf.coordinates(axis)) {
+                *target = (coordinate - centre[axis]) * scale;
+            }
+            for corner in 0..3 {
+                corners[corner][axis] = isa.permute(&vertices, &slots[corner]);
+            }
+        }
+        let (mut apart, mut small) = ([1; LANES], [1; LANES]);
+        for slot in 0..LEAF_TRIANGLES {
+            let (is_near, is_large) = place(&corners, slot);
+            apart[slot] = if is_near { 0 } else { 1 };
+            small[slot] = if is_large { 0 } else { 1 };
+        }
+        let near = isa.below(&apart, 1) & !(u32::MAX << leaf.triangles());
+        LeafNearBall { corners, near, large: isa.below(&small, 1) }
+    }
+}
+
+/// True if a triangle has an area, and its bounding box and its plane are within distance 1 of the origin; and true if it is large.
+#[inline(always)]
+fn place([a, b, c]: &[[[f32; LEAF_TRIANGLES]; 3]; 3], slot: usize) -> (bool, bool) {
+    let (mut outside, mut extent) = ([0.0; 3], 0.0);
+    for axis in 0..3 {
+        let [p, q, r] = [a[axis][slot], b[axis][slot], c[axis][slot]];
+        let (lower, upper) = (least(least(p, q), r), greatest(greatest(p, q), r));
+        outside[axis] = greatest(greatest(lower, -upper), 0.0);
+        extent = greatest(extent, greatest(upper, -lower));
+    }
+    let corner = |corner: &[[f32; LEAF_TRIANGLES]; 3]| [corner[0][slot], corner[1][slot], corner[2][slot]];
+    let a = corner(a);
+    let normal = cross(minus(corner(b), a), minus(corner(c), a));
+    let (size, distance) = (dot(normal, normal), dot(normal, a));
+    ((dot(outside, outside) <= 1.0) & (size > 0.0) & (distance * distance <= size), extent > MAX_EXTENT)
+}
+
+/// Calls `visit` for all triangles that may intersect a ball, until one call returns false. Returns whether all calls returned true.
 #[inline(always)]
 pub(super) fn for_each_near(
     scene: &SceneImage,
     memory: Lines,
     ball: Ball,
     stack: &mut Vec<Child>,
-    visit: &mut impl FnMut(u32, &[Vec3; 3]) -> bool,
+    visit: &mut impl FnMut(&NearTriangle) -> bool,
 ) -> Result<bool, Fault> {
     let Ball { centre, radius } = ball;
     stack.clear();
@@ -75,11 +135,12 @@ pub(super) fn for_each_near(
             }
             Child::Leaf(leaf) => {
                 let line = BvhLeaf(line(scene, memory, SectionKind::Triangles, leaf)?);
-                let vertices = ball.vertices(&line);
-                for slot in 0..line.triangles() {
-                    let corners = line.vertices_of(slot as usize).map(|vertex| vertices[vertex]);
-                    let index = leaf.saturating_mul(LEAF_TRIANGLES as u32) + slot;
-                    if is_near(&corners) && !visit(index, &corners) {
+                let triangles = run(NearTriangles { leaf: line, ball });
+                let mut near = triangles.near;
+                while near != 0 {
+                    let slot = near.trailing_zeros() as usize % LEAF_TRIANGLES;
+                    near &= near - 1;
+                    if !visit(&triangles.triangle(leaf, slot)) {
                         return Ok(false);
                     }
                 }

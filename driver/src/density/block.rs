@@ -4,12 +4,15 @@ use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
 
 use super::lanes::{LaneVector, at, cross, dot, greatest, least, minus};
+use super::sides::Sides;
 
 /// Sixteen triangles. Unused lanes have coinciding corners, which no ray or chord meets.
+#[derive(Default)]
 pub(super) struct Block {
     pub(super) corners: [LaneVector; 3],
     /// Indices in the image.
     pub(super) indices: [u32; LANES],
+    pub(super) sides: [Sides; LANES],
     /// Bit mask of the triangles whose back faces the inside of a solid.
     pub(super) are_solid: u32,
 }
@@ -17,9 +20,9 @@ pub(super) struct Block {
 impl Block {
     /// True if the block has a triangle with these corners.
     pub(super) fn holds(&self, corners: &[Vec3; 3]) -> bool {
-        (0..LANES).any(|lane| {
-            self.corners.iter().zip(corners).all(|(lanes, corner)| at(lanes, lane) == corner.to_array())
-        })
+        let [a, b, c] = &self.corners;
+        let [p, q, r] = corners.map(|corner| corner.to_array());
+        (0..LANES).any(|lane| a[0][lane] == p[0] && at(a, lane) == p && at(b, lane) == q && at(c, lane) == r)
     }
 }
 
@@ -46,7 +49,7 @@ impl Kernel for FirstOnWay<'_> {
     type Output = Option<(f32, [Vec3; 3])>;
 
     #[inline(always)]
-    fn run(self, _: impl Isa) -> Self::Output {
+    fn run(self, isa: impl Isa) -> Self::Output {
         let (origin, direction) = (self.origin.to_array(), self.direction.to_array());
         let mut first = (f32::INFINITY, [Vec3::ZERO; 3]);
         for block in self.blocks {
@@ -60,9 +63,18 @@ impl Kernel for FirstOnWay<'_> {
                 *target =
                     if is_met & (determinant != 0.0) & (distance > 0.0) { distance } else { f32::INFINITY };
             }
-            for (lane, &distance) in distances.iter().enumerate() {
-                if distance < first.0 {
-                    first = (distance, block.corners.each_ref().map(|corner| Vec3::from(at(corner, lane))));
+            // The bits of positive floats ascend with the value.
+            let mut bits = [0; LANES];
+            for (bits, distance) in bits.iter_mut().zip(&distances) {
+                *bits = distance.to_bits();
+            }
+            let mut nearer = isa.below(&bits, first.0.to_bits());
+            while nearer != 0 {
+                let lane = nearer.trailing_zeros() as usize % LANES;
+                nearer &= nearer - 1;
+                if distances[lane] < first.0 {
+                    let corners = block.corners.each_ref().map(|corner| Vec3::from(at(corner, lane)));
+                    first = (distances[lane], corners);
                 }
             }
         }

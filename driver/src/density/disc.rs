@@ -14,17 +14,19 @@ use glam::Vec3;
 use photoncard_firmware::photon::MIN_NORMAL_COSINE;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{Ray, is_there, magnitude, offset_origin};
-use photoncard_firmware::simd::run;
+use photoncard_firmware::simd::{LANES, run};
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{FULL_DISC, LEAF_PHOTONS, Photon, PhotonLeaf, decode_normal, encode_disc};
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
 use super::ball::Ball;
-use super::chords::{CHORDS, ChordFrame, Chords, Crossing, Crossings, FractionWithin, OpenSurfaces};
+use super::chords::{CHORDS, ChordFrame, Chords};
+use super::crossings::{Crossings, Layer};
 use super::rays::{Met, all_on_way, first_triangle};
 use super::search::Searcher;
 use super::sides::SideTable;
+use super::surfaces::{FractionWithin, OpenSurfaces, SameSurfaces};
 use super::surroundings::{PlainWall, Surroundings};
 use crate::pack::CardImage;
 use crate::photon::PhotonError;
@@ -56,10 +58,11 @@ pub(crate) fn measure_discs(
 ) -> Result<(), PhotonError> {
     let leaves = image.section(SectionKind::PhotonLeaves).len();
     let sides = SideTable::new(image)?;
+    let same = SameSurfaces::new();
     let measured: Result<Vec<Vec<(usize, Codes)>>, PhotonError> = (0..leaves.div_ceil(LEAVES_PER_TASK))
         .into_par_iter()
         .map_init(
-            || Meter::new(image, &sides, neighbors, max_distance),
+            || Meter::new(image, (&sides, &same), neighbors, max_distance),
             |meter, task| {
                 if !go_on() {
                     return Err(PhotonError::Stopped);
@@ -83,6 +86,7 @@ pub(crate) fn measure_discs(
 struct Meter<'a> {
     image: &'a CardImage,
     sides: &'a SideTable,
+    same: &'a SameSurfaces,
     searcher: Searcher<'a>,
     surroundings: Surroundings,
     /// True if [`Self::surroundings`] holds all triangles of the ball.
@@ -118,11 +122,17 @@ struct Cluster {
 }
 
 impl<'a> Meter<'a> {
-    fn new(image: &'a CardImage, sides: &'a SideTable, neighbors: u32, max_distance: f32) -> Self {
+    fn new(
+        image: &'a CardImage,
+        (sides, same): (&'a SideTable, &'a SameSurfaces),
+        neighbors: u32,
+        max_distance: f32,
+    ) -> Self {
         let searcher = Searcher::new(image, neighbors, max_distance);
         Self {
             image,
             sides,
+            same,
             searcher,
             surroundings: Surroundings::default(),
             is_complete: false,
@@ -235,13 +245,12 @@ impl<'a> Meter<'a> {
         if self.sides.has_cut_outs {
             self.leave_out_cut_outs(frame, &chords, ball)?;
         }
-        let sides = self.sides;
-        self.crossings.open_surfaces(&chords, |triangle| sides.of(triangle), &mut self.surfaces);
+        self.crossings.open_surfaces(&chords, &mut self.surfaces);
         let lift = self.lift(radius) / ball.radius;
         let mut chosen = None;
         for photon in group {
             if chosen.replace(photon.normal) != Some(photon.normal) {
-                self.surfaces.choose(photon.normal);
+                self.surfaces.choose(photon.normal, self.same);
             }
             let centre = frame.along((photon.position - ball.centre) / ball.radius);
             let radius = radius / ball.radius;
@@ -256,18 +265,20 @@ impl<'a> Meter<'a> {
         let Self { sides, searcher: Searcher { scene, memory, .. }, crossings, .. } = self;
         let [tangent, bitangent, normal] = frame.axes;
         let mut fault = None;
-        crossings.list.retain(|crossing| {
-            if !sides.of(crossing.triangle).has_cut_outs {
-                return true;
+        for (batch, layers) in crossings.layers.iter_mut().enumerate() {
+            for layer in layers.iter_mut().filter(|layer| sides.of(layer.triangle).has_cut_outs) {
+                let triangle = layer.triangle;
+                layer.retain(|lane, height| {
+                    let [x, y] = chords.point(batch * LANES + lane);
+                    let along = tangent * x + bitangent * y + normal * height;
+                    let found = is_there(scene, memory, triangle, ball.centre + along * ball.radius);
+                    found.unwrap_or_else(|error| {
+                        fault = Some(error);
+                        true
+                    })
+                });
             }
-            let [x, y] = chords.point(crossing.chord());
-            let along = tangent * x + bitangent * y + normal * crossing.height;
-            let found = is_there(scene, memory, crossing.triangle, ball.centre + along * ball.radius);
-            found.unwrap_or_else(|error| {
-                fault = Some(error);
-                true
-            })
-        });
+        }
         fault.map_or(Ok(()), Err)
     }
 
@@ -333,8 +344,11 @@ impl<'a> Meter<'a> {
             for met in all_on_way(scene, *memory, [place(x, y, half), place(x, y, -half)], step)? {
                 let height = half - met.distance / ball.radius;
                 let cosine = met.normal.dot(normal);
-                let crossing = Crossing::new(chord, height, cosine > 0.0, met.triangle, cosine.abs().recip());
-                self.crossings.list.push(crossing);
+                let face = (met.triangle, self.sides.of(met.triangle), cosine > 0.0);
+                let mut misses = [1; LANES];
+                misses[chord % LANES] = 0;
+                let layer = Layer::new((&[height; LANES], &misses), face, cosine.abs().recip());
+                self.crossings.layers[chord / LANES].push(layer);
             }
             let way = place(x, y, frame.open.z) - open;
             let mut depth = 0;

@@ -7,12 +7,14 @@
 mod ball;
 mod block;
 mod chords;
+mod crossings;
 mod disc;
 mod lanes;
 mod rays;
 mod search;
 mod shadows;
 mod sides;
+mod surfaces;
 mod surroundings;
 
 pub(crate) use self::disc::measure_discs;

@@ -5,8 +5,9 @@ use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
 
 use super::block::Block;
-use super::chords::{BATCHES, Batch, ChordFrame, Chords, Crossing, Crossings};
-use super::lanes::{Lane, LaneVector, at, cross, greatest, least, minus};
+use super::chords::{BATCHES, Batch, ChordFrame, Chords};
+use super::crossings::{Crossings, Layer};
+use super::lanes::{Lane, LaneVector, at, greatest, least};
 
 /// Kernel that adds the crossings of chords with the triangles of some blocks.
 pub(super) struct CrossAll<'a> {
@@ -25,12 +26,17 @@ impl Kernel for CrossAll<'_> {
         let mut shadows = Shadows::NONE;
         for block in blocks {
             shadows.cast(block, frame);
-            for (number, batch) in chords.batches.iter().enumerate() {
+            for (batch, layers) in chords.batches.iter().zip(&mut crossings.layers) {
                 let mut near = shadows.near(isa, batch);
                 while near != 0 {
-                    let triangle = near.trailing_zeros() as usize;
+                    let triangle = near.trailing_zeros() as usize % LANES;
                     near &= near - 1;
-                    shadows.cross(isa, triangle, block.indices[triangle], (number, batch), crossings);
+                    let (heights, misses) = shadows.cross(triangle, batch);
+                    if isa.below(&misses, 1) != 0 {
+                        let is_front = shadows.is_front[triangle] != 0.0;
+                        let face = (block.indices[triangle], block.sides[triangle], is_front);
+                        layers.push(Layer::new((&heights, &misses), face, shadows.slopes[triangle]));
+                    }
                 }
             }
             let mut cut = shadows.cut(isa, frame.open.z) & block.are_solid;
@@ -51,6 +57,8 @@ struct Shadows {
     corners: [LaneVector; 3],
     /// Line of each edge, `x a + y b + c`, positive inside.
     edges: [LaneVector; 3],
+    /// Value of each edge's line that points inside exceed: those exactly on a shared edge belong to one of its two triangles.
+    bounds: [Lane; 3],
     /// Height of the plane, `x a + y b + c`.
     heights: LaneVector,
     slopes: Lane,
@@ -69,6 +77,7 @@ impl Shadows {
     const NONE: Self = Self {
         corners: [[[0.0; LANES]; 3]; 3],
         edges: [[[0.0; LANES]; 3]; 3],
+        bounds: [[0.0; LANES]; 3],
         heights: [[0.0; LANES]; 3],
         slopes: [0.0; LANES],
         is_front: [0.0; LANES],
@@ -81,13 +90,8 @@ impl Shadows {
     #[inline(always)]
     fn cast(&mut self, block: &Block, frame: &ChordFrame) {
         for corner in 0..3 {
-            let [x, y, z] = &block.corners[corner];
-            for (axis, direction) in frame.axes.iter().enumerate() {
-                let [a, b, c] = direction.to_array();
-                let target = &mut self.corners[corner][axis];
-                for lane in 0..LANES {
-                    target[lane] = a * x[lane] + b * y[lane] + c * z[lane];
-                }
+            for axis in 0..3 {
+                self.corners[corner][axis] = along(frame.axes[axis].to_array(), &block.corners[corner]);
             }
         }
         self.cast_planes();
@@ -101,6 +105,11 @@ impl Shadows {
                 a[lane] = (y[lane] - q[lane]) * sign;
                 b[lane] = (p[lane] - x[lane]) * sign;
                 c[lane] = (x[lane] * q[lane] - y[lane] * p[lane]) * sign;
+            }
+            let bounds = &mut self.bounds[edge];
+            for lane in 0..LANES {
+                let has_points = (a[lane] > 0.0) | ((a[lane] == 0.0) & (b[lane] > 0.0));
+                bounds[lane] = if has_points { -f32::MIN_POSITIVE } else { 0.0 };
             }
         }
         for axis in 0..2 {
@@ -117,14 +126,21 @@ impl Shadows {
     #[inline(always)]
     fn cast_planes(&mut self) {
         let [a, b, c] = &self.corners;
+        let mut normals = [[0.0; LANES]; 3];
+        for (axis, normal) in normals.iter_mut().enumerate() {
+            let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+            for (lane, normal) in normal.iter_mut().enumerate() {
+                let (p, q) = (b[i][lane] - a[i][lane], b[j][lane] - a[j][lane]);
+                let (r, s) = (c[i][lane] - a[i][lane], c[j][lane] - a[j][lane]);
+                *normal = p * s - q * r;
+            }
+        }
         let [x, y, z] = &mut self.heights;
         for lane in 0..LANES {
-            let a = at(a, lane);
-            let (u, v) = (minus(at(b, lane), a), minus(at(c, lane), a));
-            let [p, q, r] = cross(u, v);
+            let (p, q, r) = (normals[0][lane], normals[1][lane], normals[2][lane]);
             let size = p * p + q * q + r * r;
             (x[lane], y[lane]) = (-p / r, -q / r);
-            z[lane] = a[2] + (a[0] * p + a[1] * q) / r;
+            z[lane] = a[2][lane] + (a[0][lane] * p + a[1][lane] * q) / r;
             self.slopes[lane] = size.sqrt() / r.abs();
             self.is_front[lane] = if r > 0.0 { 1.0 } else { 0.0 };
             let is_steep = r * r <= MIN_COSINE * MIN_COSINE * size;
@@ -156,22 +172,12 @@ impl Shadows {
         isa.below(&apart, 1)
     }
 
-    /// Adds the crossings of a batch of chords with a triangle within the ball.
+    /// Heights at which a batch of chords meets a triangle's plane, and 1 for the chords that do not meet the triangle within the
+    /// ball, else 0.
     #[inline(always)]
-    fn cross(
-        &self,
-        isa: impl Isa,
-        triangle: usize,
-        index: u32,
-        (number, batch): (usize, &Batch),
-        crossings: &mut Crossings,
-    ) {
+    fn cross(&self, triangle: usize, batch: &Batch) -> (Lane, [u32; LANES]) {
         let edges = [0, 1, 2].map(|edge: usize| at(&self.edges[edge], triangle));
-        // Points exactly on a shared edge belong to one of its two triangles.
-        let bounds = edges.map(|[a, b, _]| {
-            let has_points = (a > 0.0) | ((a == 0.0) & (b > 0.0));
-            if has_points { -f32::MIN_POSITIVE } else { 0.0 }
-        });
+        let bounds = at(&self.bounds, triangle);
         let [a, b, c] = at(&self.heights, triangle);
         let mut heights = [0.0; LANES];
         let mut misses = [0; LANES];
@@ -181,17 +187,27 @@ impl Shadows {
                 |edge: usize| x * edges[edge][0] + y * edges[edge][1] + edges[edge][2] > bounds[edge];
             let height = x * a + y * b + c;
             heights[lane] = height;
-            let is_near = x * x + y * y + height * height <= 1.0;
+            let is_near = batch.squares[lane] + height * height <= 1.0;
             misses[lane] = if beyond(0) & beyond(1) & beyond(2) & is_near { 0 } else { 1 };
         }
-        let mut met = isa.below(&misses, 1);
-        while met != 0 {
-            let lane = met.trailing_zeros() as usize;
-            met &= met - 1;
-            let (is_front, slope) = (self.is_front[triangle] != 0.0, self.slopes[triangle]);
-            crossings.list.push(Crossing::new(number * LANES + lane, heights[lane], is_front, index, slope));
-        }
+        (heights, misses)
     }
+}
+
+/// Components of sixteen vectors along a direction. A loop for each product: compilers vectorise each.
+#[inline(always)]
+fn along([a, b, c]: [f32; 3], [x, y, z]: &LaneVector) -> Lane {
+    let mut sum = [0.0; LANES];
+    for lane in 0..LANES {
+        sum[lane] = a * x[lane];
+    }
+    for lane in 0..LANES {
+        sum[lane] += b * y[lane];
+    }
+    for lane in 0..LANES {
+        sum[lane] += c * z[lane];
+    }
+    sum
 }
 
 /// Cut of a triangle by the horizontal plane through the reference point: a segment from `start` to `end`, relative to that

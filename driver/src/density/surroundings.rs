@@ -11,9 +11,10 @@ use photoncard_firmware::simd::{LANES, run};
 use photoncard_shared::layout::Child;
 use photoncard_shared::message::Fault;
 
-use super::ball::{Ball, for_each_near};
+use super::ball::{Ball, NearTriangle, for_each_near};
 use super::block::{Block, FirstOnWay};
-use super::chords::{ChordFrame, Chords, Crossings};
+use super::chords::{ChordFrame, Chords};
+use super::crossings::Crossings;
 use super::lanes::set;
 use super::shadows::CrossAll;
 use super::sides::SideTable;
@@ -22,8 +23,6 @@ use super::sides::SideTable;
 const MAX_TRIANGLES: usize = 4096;
 /// Number of triangles beyond which repeated triangles are left out: thousands of coinciding ones act as one.
 const MAX_WITH_TWINS: usize = 512;
-/// Maximum coordinate of corners, in radii: beyond it rounding would be too coarse near the ball.
-const MAX_EXTENT: f32 = 1e4;
 /// Maximum number of triangles of a plain wall within a ball.
 const MAX_PLAIN: usize = 24;
 /// Minimum cosine between normals of one plane: a deviation of a thousandth of the radius at the ball's border.
@@ -56,9 +55,7 @@ impl Surroundings {
         self.triangles = 0;
         (self.centre, self.radius) = (ball.centre, ball.radius);
         let mut stack = std::mem::take(&mut self.stack);
-        let all = for_each_near(scene, memory, ball, &mut stack, &mut |index, corners| {
-            self.add(index, corners, sides)
-        });
+        let all = for_each_near(scene, memory, ball, &mut stack, &mut |triangle| self.add(triangle, sides));
         self.stack = stack;
         all
     }
@@ -80,14 +77,15 @@ impl Surroundings {
         let mut triangles = heapless::Vec::<[Vec3; 3], MAX_PLAIN>::new();
         let mut plane: Option<Vec3> = None;
         let mut stack = std::mem::take(&mut self.stack);
-        let is_plane = for_each_near(scene, memory, ball, &mut stack, &mut |index, corners| {
-            let [a, b, c] = *corners;
+        let is_plane = for_each_near(scene, memory, ball, &mut stack, &mut |triangle| {
+            let &NearTriangle { index, corners, .. } = triangle;
+            let [a, b, c] = corners;
             let normal = (b - a).cross(c - a).normalize_or_zero();
             let is_along = normal.dot(*plane.get_or_insert(normal)) >= MIN_PLAIN_COSINE;
             let is_at = normal.dot(a).abs() <= lift;
             let is_side = sides.of(index).normal(true) == Some(wall.normal);
             let is_whole = !sides.of(index).has_cut_outs;
-            is_along && is_at && is_side && is_whole && triangles.push(*corners).is_ok()
+            is_along && is_at && is_side && is_whole && triangles.push(corners).is_ok()
         });
         self.stack = stack;
         let Some(normal) = plane.filter(|_| is_plane == Ok(true)) else { return is_plane.map(|_| false) };
@@ -96,9 +94,9 @@ impl Surroundings {
 
     /// Adds a triangle. Returns false if the list is full or the triangle too large.
     #[inline(always)]
-    fn add(&mut self, index: u32, corners: &[Vec3; 3], sides: &SideTable) -> bool {
-        let extent = corners.iter().map(|corner| corner.abs().max_element()).fold(0.0, f32::max);
-        if self.triangles == MAX_TRIANGLES || extent > MAX_EXTENT {
+    fn add(&mut self, triangle: &NearTriangle, sides: &SideTable) -> bool {
+        let &NearTriangle { index, ref corners, is_large } = triangle;
+        if self.triangles == MAX_TRIANGLES || is_large {
             return false;
         }
         let lane = self.triangles % LANES;
@@ -106,15 +104,15 @@ impl Surroundings {
             return true;
         }
         if lane == 0 {
-            self.blocks.push(Block { corners: Default::default(), indices: [0; LANES], are_solid: 0 });
+            self.blocks.push(Block::default());
         }
         self.triangles += 1;
         if let Some(block) = self.blocks.last_mut() {
             for (lanes, corner) in block.corners.iter_mut().zip(corners) {
                 set(lanes, lane, *corner);
             }
-            block.indices[lane] = index;
-            block.are_solid |= u32::from(sides.of(index).is_solid) << lane;
+            (block.indices[lane], block.sides[lane]) = (index, sides.of(index));
+            block.are_solid |= u32::from(block.sides[lane].is_solid) << lane;
         }
         true
     }

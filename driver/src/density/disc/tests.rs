@@ -16,7 +16,8 @@ fn the_triangles_around_a_photon_are_what_rays_meet() {
         let photons = trace(&packed, 1, photons, &|_| true).expect("it is lit").photons;
         let image = store_photons(packed, photons, 20).expect("packs");
         let sides = SideTable::new(&image).expect("sound");
-        let mut meter = Meter::new(&image, &sides, 20, f32::MAX.sqrt() * 0.5);
+        let same = SameSurfaces::new();
+        let mut meter = Meter::new(&image, (&sides, &same), 20, f32::MAX.sqrt() * 0.5);
         let grid = meter.searcher.scene.header.photon_grid;
         let (mut discs, mut cut, mut far, mut sums) = (0, 0, 0, [0.0; 2]);
         for line in image.section(SectionKind::PhotonLeaves) {

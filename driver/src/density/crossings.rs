@@ -1,0 +1,271 @@
+//! Crossings of chords and triangles, and which of them lie outside all solids.
+//!
+//! All crossings of a chord count, not only the first, except those inside a solid. The *depth* of a point is the number of
+//! solids that contain it. It follows from the front and back faces that are crossed on a path from a reference point
+//! outside all solids, a little above the photon.
+
+use std::cmp::Reverse;
+
+use photoncard_firmware::simd::{Isa, Kernel, LANES, run};
+
+use super::chords::{BATCHES, Batch, Chords};
+use super::lanes::Lane;
+use super::sides::Sides;
+use super::surfaces::OpenSurfaces;
+
+/// Number of layers above which the crossings of each chord are sorted by themselves.
+const MAX_LAYERS: usize = 64;
+
+/// Crossings of sixteen chords with one triangle.
+#[derive(Clone)]
+pub(super) struct Layer {
+    /// Sort keys by [`key`]; 0 for a chord that does not meet the triangle.
+    keys: [u32; LANES],
+    /// Area of surface per area of the disc, `1 / cos`.
+    slope: f32,
+    face: u32,
+    /// Index of the triangle in the image.
+    pub(super) triangle: u32,
+}
+
+/// Sort key of a crossing: greater for higher ones, and at one height for fronts. It is not 0, as heights are within 1.
+#[inline(always)]
+fn key(height: f32, is_front: bool) -> u32 {
+    let bits = height.to_bits();
+    // As integers, the bits of positive floats ascend with the value, those of negative floats descend.
+    let ascending = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
+    ascending.wrapping_sub(LOWEST) << 1 | u32::from(is_front)
+}
+
+/// Integer below those of all heights above -2.
+const LOWEST: u32 = 1 << 30;
+
+/// Height of a crossing with a key.
+#[inline(always)]
+fn height(key: u32) -> f32 {
+    let ascending = (key >> 1).wrapping_add(LOWEST);
+    f32::from_bits(if ascending >> 31 == 0 { !ascending } else { ascending & !(1 << 31) })
+}
+
+/// The side of a triangle that a chord meets on its way down: bits 0 to 7 are the code of its normal, bit 8 is set if no photons
+/// are stored there, and bits 9 and 10 are one more than the change of depth.
+#[inline(always)]
+fn face(sides: Sides, is_front: bool) -> u32 {
+    let normal = sides.normal(is_front).map_or(1 << 8, u32::from);
+    let change = match sides.is_solid {
+        true if is_front => 2,
+        true => 0,
+        false => 1,
+    };
+    normal | change << 9
+}
+
+#[inline(always)]
+fn change_of_depth(face: u32) -> i32 {
+    (face >> 9) as i32 - 1
+}
+
+#[inline(always)]
+fn stores_photons(face: u32) -> bool {
+    face >> 8 & 1 == 0
+}
+
+impl Layer {
+    /// Crossings at some heights of the chords for which `misses` is 0.
+    #[inline(always)]
+    pub(super) fn new(
+        (heights, misses): (&Lane, &[u32; LANES]),
+        (triangle, sides, is_front): (u32, Sides, bool),
+        slope: f32,
+    ) -> Self {
+        let mut keys = [0; LANES];
+        for (lane, target) in keys.iter_mut().enumerate() {
+            let key = key(heights[lane], is_front);
+            *target = if misses[lane] == 0 { key } else { 0 };
+        }
+        Self { keys, slope, face: face(sides, is_front), triangle }
+    }
+
+    /// Removes the crossings for which `keeps(lane, height)` returns false.
+    pub(super) fn retain(&mut self, mut keeps: impl FnMut(usize, f32) -> bool) {
+        for (lane, key) in self.keys.iter_mut().enumerate() {
+            if *key != 0 && !keeps(lane, height(*key)) {
+                *key = 0;
+            }
+        }
+    }
+}
+
+/// Crossings of all chords.
+pub(super) struct Crossings {
+    /// Layers of each batch.
+    pub(super) layers: [Vec<Layer>; BATCHES],
+    /// Depth of each chord at [`Self::height`], minus the depth of the reference point.
+    pub(super) depths: [[i32; LANES]; BATCHES],
+    /// Height of the reference point.
+    height: f32,
+    /// Buffer of [`OpenAll`].
+    levels: Vec<Level>,
+}
+
+impl Crossings {
+    pub(super) fn new() -> Self {
+        let layers = [const { Vec::new() }; BATCHES];
+        Self { layers, depths: [[0; LANES]; BATCHES], height: 0.0, levels: Vec::new() }
+    }
+
+    pub(super) fn clear(&mut self, height: f32) {
+        self.layers.iter_mut().for_each(Vec::clear);
+        self.depths = [[0; LANES]; BATCHES];
+        self.height = height;
+    }
+
+    /// Sets the depth of a chord at the height of the reference point, relative to that point.
+    pub(super) fn set_depth(&mut self, chord: usize, depth: i32) {
+        self.depths[chord / LANES][chord % LANES] = depth;
+    }
+
+    /// Collects the crossings outside all solids, by chords and from the top down.
+    pub(super) fn open_surfaces(&mut self, chords: &Chords, surfaces: &mut OpenSurfaces) {
+        surfaces.clear();
+        run(OpenAll { crossings: self, chords, surfaces });
+    }
+}
+
+/// One crossing of each of sixteen chords: those with equally many crossings above.
+#[derive(Clone, Copy)]
+struct Level {
+    /// Sort keys; 0 for a chord without such a crossing.
+    keys: [u32; LANES],
+    /// Bits of the slopes.
+    slopes: [u32; LANES],
+    faces: [u32; LANES],
+    /// Bit mask of the crossings outside all solids.
+    open: u32,
+}
+
+impl Level {
+    const NONE: Self = Self { keys: [0; LANES], slopes: [0; LANES], faces: [0; LANES], open: 0 };
+
+    #[inline(always)]
+    fn of(layer: &Layer) -> Self {
+        let Layer { keys, slope, face, .. } = *layer;
+        Self { keys, slopes: [slope.to_bits(); LANES], faces: [face; LANES], open: 0 }
+    }
+
+    /// Exchanges the crossings of the chords where that of `self` is not above that of `other`.
+    #[inline(always)]
+    fn sort(&mut self, other: &mut Self) {
+        for lane in 0..LANES {
+            let [a, b] = [self.keys[lane], other.keys[lane]];
+            // By their difference: lanes that are chosen in memory would be written one by one, and read back slowly.
+            let exchange = if b >= a { u32::MAX } else { 0 };
+            let slopes = (self.slopes[lane] ^ other.slopes[lane]) & exchange;
+            let faces = (self.faces[lane] ^ other.faces[lane]) & exchange;
+            (self.keys[lane], other.keys[lane]) = (a.max(b), a.min(b));
+            self.slopes[lane] ^= slopes;
+            other.slopes[lane] ^= slopes;
+            self.faces[lane] ^= faces;
+            other.faces[lane] ^= faces;
+        }
+    }
+}
+
+/// Sorts layers into levels. Crossings with equal keys keep their order.
+#[inline(always)]
+fn sort(isa: impl Isa, layers: &[Layer], levels: &mut Vec<Level>) {
+    levels.clear();
+    if layers.len() > MAX_LAYERS {
+        return sort_each(layers, levels);
+    }
+    // From the last: what is inserted comes before its equals.
+    for layer in layers.iter().rev() {
+        let mut inserted = Level::of(layer);
+        for level in levels.iter_mut() {
+            level.sort(&mut inserted);
+        }
+        if isa.below(&inserted.keys, 1).count_ones() < LANES as u32 {
+            levels.push(inserted);
+        }
+    }
+}
+
+/// [`sort`] for many layers: chord by chord.
+fn sort_each(layers: &[Layer], levels: &mut Vec<Level>) {
+    let mut order = Vec::new();
+    for lane in 0..LANES {
+        order.clear();
+        order.extend(layers.iter().map(|layer| Reverse(layer.keys[lane])).zip(0..));
+        order.retain(|(Reverse(key), _)| *key != 0);
+        order.sort_unstable();
+        levels.resize(levels.len().max(order.len()), Level::NONE);
+        for (level, &(Reverse(key), layer)) in levels.iter_mut().zip(&order) {
+            let layer: &Layer = &layers[layer];
+            level.keys[lane] = key;
+            (level.slopes[lane], level.faces[lane]) = (layer.slope.to_bits(), layer.face);
+        }
+    }
+}
+
+/// Kernel that collects the crossings outside all solids.
+struct OpenAll<'a> {
+    crossings: &'a mut Crossings,
+    chords: &'a Chords,
+    surfaces: &'a mut OpenSurfaces,
+}
+
+impl Kernel for OpenAll<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) {
+        let Crossings { layers, depths, height, levels } = self.crossings;
+        // The sum is never -0.0.
+        let reference = key(*height + 0.0, false) >> 1;
+        for (batch, (layers, depths)) in self.chords.batches.iter().zip(layers.iter().zip(depths)) {
+            sort(isa, layers, levels);
+            open(isa, levels, depths, reference);
+            collect(batch, levels, self.surfaces);
+        }
+    }
+}
+
+/// Finds the crossings outside all solids. `depths` are those of the chords at the reference point, of which `reference` is the
+/// height as an integer.
+#[inline(always)]
+fn open(isa: impl Isa, levels: &mut [Level], depths: &mut [i32; LANES], reference: u32) {
+    for level in levels.iter() {
+        for (lane, depth) in depths.iter_mut().enumerate() {
+            let is_above = i32::from(level.keys[lane] >> 1 > reference);
+            *depth -= change_of_depth(level.faces[lane]) * is_above;
+        }
+    }
+    for level in levels {
+        let mut closed = [0; LANES];
+        for (lane, depth) in depths.iter_mut().enumerate() {
+            let face = level.faces[lane];
+            // Negative depth: the chord crossed the back of an open (non-manifold) surface.
+            let is_open = (level.keys[lane] != 0) & stores_photons(face) & (*depth <= 0);
+            closed[lane] = if is_open { 0 } else { 1 };
+            *depth += change_of_depth(face);
+        }
+        level.open = isa.below(&closed, 1);
+    }
+}
+
+/// Appends the crossings outside all solids to the surfaces.
+#[inline(always)]
+fn collect(batch: &Batch, levels: &[Level], surfaces: &mut OpenSurfaces) {
+    let mut left = levels.iter().fold(0, |open, level| open | level.open);
+    while left != 0 {
+        let lane = left.trailing_zeros() as usize % LANES;
+        left &= left - 1;
+        for level in levels.iter().filter(|level| level.open >> lane & 1 != 0) {
+            let place = [batch.x[lane], batch.y[lane], height(level.keys[lane])];
+            surfaces.push(place, f32::from_bits(level.slopes[lane]), level.faces[lane] as u8);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
