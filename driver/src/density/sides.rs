@@ -1,7 +1,5 @@
 //! Front and back of every triangle: the normals that photons are stored with, and the boundaries of solids.
 
-use std::collections::HashMap;
-
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::scene::{SceneImage, keeps_photons};
@@ -129,17 +127,19 @@ impl SideTable {
                 }
             }
         }
-        let mut edges: HashMap<[[u32; 3]; 2], Vec<usize>> = HashMap::new();
-        for (sheet, (_, vertices)) in sheets.iter().enumerate() {
-            for edge in edges_of(*vertices) {
-                edges.entry(edge).or_default().push(sheet);
-            }
-        }
+        let directed =
+            sheets.par_iter().zip(0_u32..sheets.len() as u32).flat_map_iter(|((_, vertices), sheet)| {
+                edges_of(*vertices).map(|[from, to]| ([from.min(to), from.max(to)], from < to, sheet))
+            });
+        let mut edges: Vec<_> = directed.collect();
+        edges.par_sort_unstable();
         let mut meshes = Components::new(sheets.len());
-        for ([from, to], along) in &edges {
-            match (along.as_slice(), edges.get(&[*to, *from]).map(Vec::as_slice)) {
-                ([one], Some([other])) => meshes.join(*one, *other),
-                _ => along.iter().for_each(|sheet| is_open[*sheet] = true),
+        for along in edges.chunk_by(|(one, ..), (other, ..)| one == other) {
+            match *along {
+                [(_, false, one), (_, true, other)] => meshes.join(one as usize, other as usize),
+                // Of a triangle with two corners in one place: it is its own opposite.
+                [([from, to], ..)] if from == to => {}
+                _ => along.iter().for_each(|(.., sheet)| is_open[*sheet as usize] = true),
             }
         }
         let mut is_mesh_open = vec![false; sheets.len()];
