@@ -1,16 +1,18 @@
 //! Bounding volume hierarchy: built by obvhs as a binary tree, folded into wide nodes for the chip by the surface area
 //! heuristic.
 
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::BVH_STACK;
 use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, MAX_MATERIALS, NodeBox};
+use rayon::prelude::*;
 
 use crate::fold::{Folded, Tree};
 use crate::scene::Triangle;
+
+mod reinsertion;
 
 /// A bounding volume hierarchy in the chip's records.
 #[derive(Debug)]
@@ -69,10 +71,18 @@ const MAX_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 /// Cost of a visit of a leaf, relative to a visit of a node.
 const LEAF_COST: f32 = 1.0;
 
+/// Number of a depth's nodes that one thread converts at once.
+const SEQUENTIAL: usize = 256;
+
 /// Maximum number of concentric boxes that the builder receives one by one.
 const MAX_CONCENTRIC: usize = 64;
 
-/// Builds the hierarchy of `triangles`, at least one. The result does not depend on the machine: obvhs runs on one thread.
+/// Shares of the nodes that the two optimizations of the binary tree reinsert.
+const REINSERTED: [f32; 2] = [0.2, 0.4];
+/// Depth of the binary tree above which its builder searches for partners next to each part alone.
+const SEARCH_DEPTH: usize = 2;
+
+/// Builds the hierarchy of `triangles`, at least one. The result does not depend on the machine or on threads.
 /// `cut_out[m]` is true if triangles of material `m` may have cut-outs; materials beyond its end have none.
 ///
 /// # Errors
@@ -92,11 +102,9 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
     if !is_finite || !all.half_area().is_finite() {
         return Err(HierarchyError::NotFinite);
     }
-    // Leaves are made when the tree is folded.
-    let parameters = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::slow_build() };
     let parts = Parts::new(&boxes);
     let around_parts: Vec<Aabb> = parts.iter().map(|part| around(part, &boxes)).collect();
-    let binary = build_bvh2(&around_parts, parameters, &mut std::time::Duration::default());
+    let binary = binary(&around_parts);
     let mesh = &Mesh { triangles, cut_out };
     let mut folded = Folded::new(tree(&binary, &parts, &boxes, mesh));
     if folded.stack > BVH_STACK {
@@ -108,12 +116,22 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
     if stack > BVH_STACK {
         return Err(HierarchyError::TooDeep { entries: stack });
     }
-    let nodes = nodes.iter().map(|node| BvhNode::encode(&node.children, node.links));
+    let nodes = nodes.par_iter().map(|node| BvhNode::encode(&node.children, node.links));
     let nodes = nodes.collect::<Option<_>>().ok_or(HierarchyError::NotFinite)?;
-    let lines = leaves.iter().map(|indices| {
+    let lines = leaves.par_iter().map(|indices| {
         mesh.encode(indices).unwrap_or_else(|| unreachable!("a leaf of {} triangles", indices.len()))
     });
     Ok(Hierarchy { nodes, leaves: lines.collect(), leaf_triangles: leaves })
+}
+
+/// The builder's tree of boxes, each in a leaf of its own: leaves are made when the tree is folded.
+fn binary(boxes: &[Aabb]) -> Bvh2 {
+    let (distance, precision) = (PlocSearchDistance::High, SortPrecision::U128);
+    let indices = (0..boxes.len() as u32).collect();
+    let mut tree =
+        PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, SEARCH_DEPTH);
+    REINSERTED.iter().for_each(|&share| reinsertion::optimize(&mut tree, share));
+    tree
 }
 
 /// Input of the builder: one box for many triangles whose boxes have a common centre, one for each other triangle.
@@ -179,33 +197,40 @@ impl Mesh<'_> {
 
 /// Converts the builder's tree for folding. Every subtree whose triangles fit in one leaf may become one.
 fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
-    // Parents before children.
-    let mut order = vec![0];
-    let mut next = 0;
-    while let Some(&node) = order.get(next) {
-        let node = &binary.nodes[node as usize];
-        if !node.is_leaf() {
-            order.extend([node.first_index, node.first_index + 1]);
-        }
-        next += 1;
+    // Nodes by depth; the children of a depth's inner nodes follow each other in the next.
+    let mut depths = vec![vec![0]];
+    while let Some(nodes) = depths.last().filter(|nodes| !nodes.is_empty()) {
+        let inner =
+            nodes.iter().map(|&node: &u32| &binary.nodes[node as usize]).filter(|node| !node.is_leaf());
+        depths.push(inner.flat_map(|node| [node.first_index, node.first_index + 1]).collect());
     }
-    let mut trees: Vec<Option<Tree<LeafTriangles, NodeBox>>> = binary.nodes.iter().map(|_| None).collect();
     let missing = || unreachable!("a part is made before its parent");
-    for &index in order.iter().rev() {
-        let node = &binary.nodes[index as usize];
-        let first = node.first_index as usize;
-        let bounds = NodeBox { lower: node.aabb().min.to_array(), upper: node.aabb().max.to_array() };
-        let area = node.aabb().half_area();
-        trees[index as usize] = Some(if node.is_leaf() {
-            // `max_prims_per_leaf` is 1: the leaf holds one part.
-            halves(&mut parts.triangles(binary.primitive_indices[first]).to_vec(), boxes, mesh)
-        } else {
-            let parts = [first, first + 1].map(|part| trees[part].take().unwrap_or_else(missing));
-            let leaf = both(&parts, mesh).map(|leaf| (leaf, LEAF_COST * area));
-            Tree::node(parts, bounds, area, leaf)
+    let mut below: Vec<Option<Tree<LeafTriangles, NodeBox>>> = Vec::new();
+    for nodes in depths.iter().rev() {
+        let (leaves, inner): (Vec<_>, Vec<_>) =
+            (0..nodes.len()).partition(|&at| binary.nodes[nodes[at] as usize].is_leaf());
+        let node = |at: usize| &binary.nodes[nodes[at] as usize];
+        let mut trees: Vec<_> = nodes.iter().map(|_| None).collect();
+        let whole = leaves.par_iter().with_min_len(SEQUENTIAL).map(|&at| {
+            // The leaf holds one part.
+            let part = binary.primitive_indices[node(at).first_index as usize];
+            halves(&mut parts.triangles(part).to_vec(), boxes, mesh)
         });
+        let joined =
+            inner.par_iter().zip(below.par_chunks_mut(2)).with_min_len(SEQUENTIAL).map(|(&at, pair)| {
+                let bounds = node(at).aabb();
+                let (lower, upper) = (bounds.min.to_array(), bounds.max.to_array());
+                let mut parts = pair.iter_mut().map(|part| part.take().unwrap_or_else(missing));
+                let parts = [(); 2].map(|()| parts.next().unwrap_or_else(missing));
+                let leaf = both(&parts, mesh).map(|leaf| (leaf, LEAF_COST * bounds.half_area()));
+                Tree::node(parts, NodeBox { lower, upper }, bounds.half_area(), leaf)
+            });
+        let (whole, joined): (Vec<_>, Vec<_>) = rayon::join(|| whole.collect(), || joined.collect());
+        leaves.into_iter().zip(whole).for_each(|(at, tree)| trees[at] = Some(tree));
+        inner.into_iter().zip(joined).for_each(|(at, tree)| trees[at] = Some(tree));
+        below = trees;
     }
-    trees[0].take().unwrap_or_else(missing)
+    below.pop().flatten().unwrap_or_else(missing)
 }
 
 /// A tree of median splits along the longest axis.

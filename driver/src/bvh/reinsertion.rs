@@ -1,0 +1,69 @@
+//! Optimization of a binary tree: parts are taken out and inserted where the tree's surface area is least (Meister, Bittner 2017,
+//! *Parallel reinsertion for bounding volume hierarchy optimization*).
+//!
+//! Rounds, order and results are those of obvhs, whose search for the best place is called here for many parts at once. The tree
+//! does not depend on the number of threads.
+
+use obvhs::bvh2::reinsertion::{Reinsertion, find_reinsertion, reinsert_node};
+use obvhs::bvh2::{Bvh2, node::Bvh2Node};
+use rayon::prelude::*;
+use rdst::{RadixKey, RadixSort};
+
+/// Number of rounds, of which the n-th, from 0 on, tries `1 / (2 n + 1)` of the parts of the first.
+const ROUNDS: usize = 16;
+
+/// Part of a tree that may be reinserted.
+#[derive(Clone, Copy)]
+struct Candidate {
+    area: f32,
+    node: u32,
+}
+
+/// Descending area.
+impl RadixKey for Candidate {
+    const LEVELS: usize = 4;
+
+    #[inline]
+    fn get_level(&self, level: usize) -> u8 {
+        (-self.area).get_level(level)
+    }
+}
+
+/// Optimizes a tree, in rounds. `share`: of all nodes, those that the first round tries.
+pub(super) fn optimize(tree: &mut Bvh2, share: f32) {
+    if tree.nodes.first().is_none_or(Bvh2Node::is_leaf) {
+        return;
+    }
+    tree.init_parents_if_uninit();
+    tree.children_are_ordered_after_parents = false;
+    let mut touched = vec![false; tree.nodes.len()];
+    for round in 0..ROUNDS {
+        let part = 1.0 / (2 * round + 1) as f32;
+        let count = ((tree.nodes.len() as f32 * share * part) as usize).max(1);
+        let found = reinsertions(tree, count.min(tree.nodes.len() - 1));
+        touched.fill(false);
+        for Reinsertion { from, to, .. } in found {
+            let [from, to] = [from, to].map(|node| node as usize);
+            let parents = [to, from].map(|node| tree.parents[node] as usize);
+            let moved = [to, from, Bvh2Node::get_sibling_id(from), parents[0], parents[1]];
+            // A part beside one that has moved in this round may have another best place now.
+            if moved.iter().all(|&node| !touched[node]) {
+                moved.iter().for_each(|&node| touched[node] = true);
+                reinsert_node(tree, from, to);
+            }
+        }
+    }
+}
+
+/// Best places of the `count` largest of the tree's first nodes, those first that save the most area.
+fn reinsertions(tree: &Bvh2, count: usize) -> Vec<Reinsertion> {
+    let first = tree.nodes.iter().zip(0..).take(2 * (count + 1)).skip(1);
+    let mut candidates: Vec<Candidate> =
+        first.map(|(node, index)| Candidate { area: node.aabb().half_area(), node: index }).collect();
+    candidates.radix_sort_unstable();
+    candidates.truncate(count);
+    let places = candidates.par_iter().map(|candidate| find_reinsertion(tree, candidate.node as usize));
+    let mut found: Vec<Reinsertion> = places.filter(|place| place.area_diff > 0.0).collect();
+    found.sort_unstable_by(|a, b| b.area_diff.total_cmp(&a.area_diff));
+    found
+}
