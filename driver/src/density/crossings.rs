@@ -236,8 +236,8 @@ impl Kernel for OpenAll<'_> {
 fn open(isa: impl Isa, levels: &mut [Level], depths: &mut [i32; LANES], reference: u32) {
     for level in levels.iter() {
         for (lane, depth) in depths.iter_mut().enumerate() {
-            let is_above = i32::from(level.keys[lane] >> 1 > reference);
-            *depth -= change_of_depth(level.faces[lane]) * is_above;
+            let above = if level.keys[lane] >> 1 > reference { -1 } else { 0 };
+            *depth -= change_of_depth(level.faces[lane]) & above;
         }
     }
     for level in levels {
