@@ -2,7 +2,7 @@
 //! heuristic.
 
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::BVH_STACK;
@@ -197,40 +197,39 @@ impl Mesh<'_> {
 
 /// Converts the builder's tree for folding. Every subtree whose triangles fit in one leaf may become one.
 fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
-    // Nodes by depth; the children of a depth's inner nodes follow each other in the next.
-    let mut depths = vec![vec![0]];
-    while let Some(nodes) = depths.last().filter(|nodes| !nodes.is_empty()) {
-        let inner =
-            nodes.iter().map(|&node: &u32| &binary.nodes[node as usize]).filter(|node| !node.is_leaf());
-        depths.push(inner.flat_map(|node| [node.first_index, node.first_index + 1]).collect());
-    }
     let missing = || unreachable!("a part is made before its parent");
-    let mut below: Vec<Option<Tree<LeafTriangles, NodeBox>>> = Vec::new();
-    for nodes in depths.iter().rev() {
-        let (leaves, inner): (Vec<_>, Vec<_>) =
-            (0..nodes.len()).partition(|&at| binary.nodes[nodes[at] as usize].is_leaf());
-        let node = |at: usize| &binary.nodes[nodes[at] as usize];
-        let mut trees: Vec<_> = nodes.iter().map(|_| None).collect();
-        let whole = leaves.par_iter().with_min_len(SEQUENTIAL).map(|&at| {
-            // The leaf holds one part.
-            let part = binary.primitive_indices[node(at).first_index as usize];
-            halves(&mut parts.triangles(part).to_vec(), boxes, mesh)
+    let mut below = Vec::new();
+    for nodes in depths(binary).iter().rev() {
+        let mut below_nodes = below.into_iter();
+        let mut part = || below_nodes.next().unwrap_or_else(missing);
+        let with_parts = nodes.iter().map(|&node| (node, (!node.is_leaf()).then(|| [part(), part()])));
+        let with_parts: Vec<_> = with_parts.collect();
+        let trees = with_parts.into_par_iter().with_min_len(SEQUENTIAL).map(|(node, parts_below)| {
+            let Some(parts_below) = parts_below else {
+                // The leaf holds one part.
+                let part = binary.primitive_indices[node.first_index as usize];
+                return halves(&mut parts.triangles(part).to_vec(), boxes, mesh);
+            };
+            let bounds = node.aabb();
+            let (lower, upper) = (bounds.min.to_array(), bounds.max.to_array());
+            let leaf = both(&parts_below, mesh).map(|leaf| (leaf, LEAF_COST * bounds.half_area()));
+            Tree::node(parts_below, NodeBox { lower, upper }, bounds.half_area(), leaf)
         });
-        let joined =
-            inner.par_iter().zip(below.par_chunks_mut(2)).with_min_len(SEQUENTIAL).map(|(&at, pair)| {
-                let bounds = node(at).aabb();
-                let (lower, upper) = (bounds.min.to_array(), bounds.max.to_array());
-                let mut parts = pair.iter_mut().map(|part| part.take().unwrap_or_else(missing));
-                let parts = [(); 2].map(|()| parts.next().unwrap_or_else(missing));
-                let leaf = both(&parts, mesh).map(|leaf| (leaf, LEAF_COST * bounds.half_area()));
-                Tree::node(parts, NodeBox { lower, upper }, bounds.half_area(), leaf)
-            });
-        let (whole, joined): (Vec<_>, Vec<_>) = rayon::join(|| whole.collect(), || joined.collect());
-        leaves.into_iter().zip(whole).for_each(|(at, tree)| trees[at] = Some(tree));
-        inner.into_iter().zip(joined).for_each(|(at, tree)| trees[at] = Some(tree));
-        below = trees;
+        below = trees.collect();
     }
-    below.pop().flatten().unwrap_or_else(missing)
+    below.pop().unwrap_or_else(missing)
+}
+
+/// Nodes by depth, the root first. The children of a depth's nodes follow each other in the next.
+fn depths(binary: &Bvh2) -> Vec<Vec<&Bvh2Node>> {
+    let mut depths = Vec::new();
+    let mut nodes = vec![&binary.nodes[0]];
+    while !nodes.is_empty() {
+        let inner = nodes.iter().filter(|node| !node.is_leaf()).map(|node| node.first_index as usize);
+        let below = inner.flat_map(|first| [first, first + 1].map(|child| &binary.nodes[child])).collect();
+        depths.push(std::mem::replace(&mut nodes, below));
+    }
+    depths
 }
 
 /// A tree of median splits along the longest axis.
