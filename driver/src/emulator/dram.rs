@@ -17,13 +17,19 @@ use crate::pack::CardImage;
 
 /// The host's card image; empty until [`Self::give`].
 #[derive(Clone, Default)]
-pub struct SharedImage(Arc<OnceLock<Arc<CardImage>>>);
+pub struct SharedImage(Arc<OnceLock<Given>>);
+
+/// An image, and its checksum if that is computed already.
+struct Given {
+    image: Arc<CardImage>,
+    checksum: Option<u64>,
+}
 
 impl SharedImage {
-    /// Shares the image with the cards; later calls have no effect.
-    pub fn give(&self, image: Arc<CardImage>) {
+    /// Shares the image with the cards; later calls have no effect. Cards that hold it need not compute a known checksum again.
+    pub fn give(&self, image: Arc<CardImage>, checksum: Option<u64>) {
         // Cards that receive another image store it themselves.
-        let _ = self.0.set(image);
+        let _ = self.0.set(Given { image, checksum });
     }
 }
 
@@ -53,14 +59,15 @@ impl EmulatedDram {
     }
 
     /// The image of a memory that holds one, and without a line that was written.
-    fn held(&self) -> Option<&Arc<CardImage>> {
+    fn held(&self) -> Option<&Given> {
         self.held.0.get().filter(|_| matches!(&self.lines, Stored::Own(own) if own.is_empty()))
     }
 
     /// Stores the lines of an image that the memory holds, by reference.
     #[cold]
     fn adopt(&mut self) {
-        if let Some(image) = self.held().cloned() {
+        if let Some(Given { image, .. }) = self.held() {
+            let image = image.clone();
             let written = image.lines().len();
             self.lines = Stored::Shared { image, written, beyond: Vec::new() };
         }
@@ -79,7 +86,7 @@ impl EmulatedDram {
 
     /// All lines, without those beyond a shared image.
     fn all(&self) -> &[Line] {
-        if let Some(image) = self.held() {
+        if let Some(Given { image, .. }) = self.held() {
             return image.lines();
         }
         match &self.lines {
@@ -92,7 +99,7 @@ impl EmulatedDram {
     /// do.
     fn share(&mut self, first: usize, lines: &[[u8; LINE_BYTES]]) -> bool {
         if matches!(&self.lines, Stored::Own(own) if own.is_empty())
-            && let Some(image) = self.shared.0.get()
+            && let Some(Given { image, .. }) = self.shared.0.get()
         {
             self.lines = Stored::Shared { image: image.clone(), written: 0, beyond: Vec::new() };
         }
@@ -159,6 +166,10 @@ impl CardMemory for EmulatedDram {
         let end = first.0.checked_add(count)?;
         self.all().get(first.0 as usize..end as usize)
     }
+
+    fn known_checksum(&self, lines: u32) -> Option<u64> {
+        self.held().filter(|given| given.image.lines().len() == lines as usize)?.checksum
+    }
 }
 
 #[cfg(test)]
@@ -205,7 +216,7 @@ mod tests {
         let image = image();
         let bytes: Vec<[u8; LINE_BYTES]> = image.lines().iter().map(|line| line.0).collect();
         let shared = SharedImage::default();
-        shared.give(image);
+        shared.give(image, None);
         let mut other = bytes.clone();
         other[3][7] ^= 1;
         // First line, lines, and whether the DRAM shares the image afterwards.
@@ -243,15 +254,21 @@ mod tests {
         let held = SharedImage::default();
         let mut dram = EmulatedDram::new(1 << 20, SharedImage::default(), held.clone());
         assert!(dram.read(Structure::Header, LineAddress(0), 0..1).is_err());
-        held.give(image.clone());
+        held.give(image.clone(), Some(7));
+        let lines = image.lines().len() as u32;
+        assert_eq!(
+            [lines - 1, lines, lines + 1].map(|lines| dram.known_checksum(lines)),
+            [None, Some(7), None]
+        );
         assert!(dram.stored(LineAddress(0), 2).is_some_and(|lines| lines == &image.lines()[..2]));
-        let last = image.lines().len() as u32 - 1;
+        let last = lines - 1;
         assert_eq!(dram.read(Structure::Header, LineAddress(last), 0..1), Ok(&image.lines()[last as usize]));
         assert!(is_shared(&dram));
         assert_eq!(dram.write(LineAddress(1), &[[7; LINE_BYTES]]), Some(()));
         let mut expected = image.lines().to_vec();
         expected[1].0 = [7; LINE_BYTES];
         assert!(dram.all() == expected && !is_shared(&dram));
+        assert_eq!(dram.known_checksum(lines), None);
     }
 
     #[test]

@@ -243,6 +243,10 @@ impl<M: CardMemory> CardMemory for Traced<M> {
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
     }
+
+    fn known_checksum(&self, lines: u32) -> Option<u64> {
+        self.memory.known_checksum(lines)
+    }
 }
 
 #[cfg(test)]

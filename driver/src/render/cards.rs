@@ -117,7 +117,7 @@ impl Cards {
                 && (is_image_kept || index > 0)
                 && !is_faulty
             {
-                memory.give(image.clone());
+                memory.give(image.clone(), Some(checksum));
                 session.assume(checksum);
             }
         }
@@ -220,7 +220,7 @@ impl Executor for Cards {
     fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
         let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
         // Emulated cards that receive the shared image store no copy of it.
-        self.shared.give(image.clone());
+        self.shared.give(image.clone(), None);
         let (scene_image, _) = image.view();
         let limits = PixelLimits::new(&scene_image.header, frame);
         let job = Job { upload: self.upload(image), frame: *frame, limits };

@@ -320,4 +320,8 @@ where
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
     }
+
+    fn known_checksum(&self, lines: u32) -> Option<u64> {
+        self.memory.known_checksum(lines)
+    }
 }

@@ -62,6 +62,12 @@ pub trait CardMemory: MemoryPort {
     /// `count` lines from line `first`, bypassing caches and counters; `None` if they are not all in the memory.
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]>;
 
+    /// [`image_checksum`](photoncard_shared::checksum::image_checksum) of the first `lines` lines, if it is known without reading
+    /// them: the memory of an emulated card is an image whose checksum its host has computed.
+    fn known_checksum(&self, _lines: u32) -> Option<u64> {
+        None
+    }
+
     /// Writes one byte of a written line; `None`, and nothing is written, if it is not in the memory. A memory that the processor
     /// addresses directly stores the byte alone.
     fn write_byte(&mut self, address: LineAddress, place: usize, byte: u8) -> Option<()> {
