@@ -9,8 +9,8 @@
 //! | [`material`] | reflection, transmission and emission, as glTF states them |
 //! | [`document`], [`builder`] | glTF's JSON, and its assembly from meshes, materials, nodes and cameras |
 //! | `motion` | animations, and what they move: cameras, lights, joints and morph targets |
-//! | `cornell`, `furnace`, `atrium`, `room`, `roughness` | one module for each scene and its variants |
-//! | `sky` | environment map for `atrium-open.glb` |
+//! | `cornell`, `furnace`, `atrium`, `room`, `roughness`, `house` | one module for each scene and its variants |
+//! | `sky` | environment map for `atrium-open.glb` and `house.glb` |
 //!
 //! To add a scene, write a module with a function that returns the file's bytes, and add it to [`scenes`].
 #![forbid(unsafe_code)]
@@ -20,6 +20,7 @@ pub mod builder;
 mod cornell;
 pub mod document;
 mod furnace;
+mod house;
 pub mod material;
 pub mod mesh;
 mod motion;
@@ -37,7 +38,7 @@ pub struct SceneFile {
     pub bytes: Vec<u8>,
 }
 
-/// Files of all scenes, and of the sky that lights `atrium-open.glb`.
+/// Files of all scenes, and of the sky that lights `atrium-open.glb` and `house.glb`.
 pub fn scenes() -> Vec<SceneFile> {
     vec![
         SceneFile { name: "cornell.gltf", bytes: cornell::lambertian() },
@@ -51,6 +52,7 @@ pub fn scenes() -> Vec<SceneFile> {
         SceneFile { name: "atrium-open.glb", bytes: atrium::open() },
         SceneFile { name: "room.glb", bytes: room::room() },
         SceneFile { name: "roughness.glb", bytes: roughness::roughness() },
+        SceneFile { name: "house.glb", bytes: house::house() },
         SceneFile { name: "sky.exr", bytes: sky::sky() },
     ]
 }

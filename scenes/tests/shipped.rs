@@ -10,7 +10,7 @@ use gltf::mesh::Mode;
 use gltf::{Gltf, Node, Primitive};
 
 /// Name of each scene, its range of triangles, and its cameras.
-const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 11] = [
+const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 12] = [
     ("cornell.gltf", 36..=36, &["camera"]),
     ("cornell-glossy.gltf", 36..=36, &["camera", "floor"]),
     ("cornell-uplight.gltf", 46..=46, &["camera"]),
@@ -22,6 +22,7 @@ const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 11] = [
     ("atrium-open.glb", 60_000..=150_000, &["court", "gallery"]),
     ("room.glb", 1_500..=3_000, &["camera"]),
     ("roughness.glb", 51_206..=51_206, &["camera"]),
+    ("house.glb", 158..=158, &["camera"]),
 ];
 
 fn shipped(name: &str) -> Vec<u8> {
