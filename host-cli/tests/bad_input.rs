@@ -236,6 +236,14 @@ fn settings_that_no_card_can_take_are_refused_before_one_is_reached() {
 }
 
 #[test]
+fn photons_of_several_frames_for_one_camera() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let words = ["--photons-for", "--frames"];
+    refused(&room, "scene.gltf", &["--photons-for", "camera", "--frames", "1-2"], &words);
+}
+
+#[test]
 fn nothing_to_listen_on() {
     let room = Room::new();
     for (options, words) in [

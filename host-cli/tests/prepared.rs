@@ -139,6 +139,9 @@ fn options_of_what_is_prepared_are_refused_with_a_remedy() {
             room.run(&[&["render", "--prepared", "scene.card", "-o", "a.exr"], &option[..]].concat());
         refused(&outcome, &["--prepared", option[0], "state it to photoncard prepare"]);
     }
+    let outcome = room.run(&["render", "--prepared", "scene.card", "-o", "a.exr", "--photons-for", "camera"]);
+    refused(&outcome, &["--prepared", "--photons-for"]);
+    assert!(!outcome.stderr.contains("photoncard prepare"), "{}", outcome.stderr);
     let absent = room.run(&["render", "--prepared", "scene.card", "-o", "a.exr", "--camera", "other"]);
     refused(&absent, &["other"]);
     assert_eq!(room.names(), ["scene.card"]);

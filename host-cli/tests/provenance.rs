@@ -25,6 +25,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--environment", "1,2,3"], "environment", json!("1,2,3")),
         (&["--seed", "5"], "seed", json!(5)),
         (&["--photons", "300"], "photons", json!(300)),
+        (&["--photons-for", "camera"], "photons-for", json!("camera")),
         (&["--neighbors", "6"], "neighbors", json!(6)),
         (&["--caustic-photons", "90"], "caustic-photons", json!(90)),
         (&["--caustic-neighbors", "9"], "caustic-neighbors", json!(9)),

@@ -57,6 +57,7 @@ fn prepare(name: &str, layout: PhotonLayout) -> Prepared {
 fn map(scene: &Scene, photons: usize, layout: PhotonLayout) -> MappedImage {
     let packed = PackedScene::new(scene).expect("packs");
     let settings = PhotonSettings {
+        camera: None,
         caustic_photons: 0,
         caustic_neighbors: 50,
         seed: 0,

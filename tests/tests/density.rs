@@ -24,6 +24,7 @@ impl Map {
     fn new(scene: &Scene, photons: usize) -> Self {
         let packed = PackedScene::new(scene).unwrap();
         let settings = PhotonSettings {
+            camera: None,
             caustic_photons: 0,
             caustic_neighbors: 50,
             seed: 1,

@@ -8,7 +8,7 @@ use photoncard_driver::film::{Film, Window};
 use photoncard_driver::layer::Layers;
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::parts::Part;
-use photoncard_driver::photon_map::PhotonLayout;
+use photoncard_driver::photon_map::{PhotonLayout, PhotonsFor};
 use photoncard_driver::render::{
     CardAddress, CardSet, Filter, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling,
     Schedule, TileOutputs,
@@ -82,6 +82,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
         }
         photons: PhotonMaps {
             count: Image = 2001,
+            photons_for: Image = PhotonsFor::Camera,
             layout: Layout = PhotonLayout::Jensen,
             neighbors: Image = 19,
             max_distance: Image = Some(0.2),

@@ -6,11 +6,12 @@ use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::{NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::PhotonLeaf;
+use photoncard_shared::layout::{Photon, PhotonLeaf};
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
 use crate::pack::CardImage;
+use crate::photon::{ImportonGrid, Importons};
 
 /// Number of leaves that the automatic maximum distance is estimated from, one photon of each.
 const SAMPLED_LEAVES: usize = 2048;
@@ -59,25 +60,40 @@ impl<'a> Searcher<'a> {
 }
 
 /// Automatic maximum distance of gathers, metres: the 95th percentile of the distance of the k-th neighbour,
-/// `k = neighbors`.
+/// `k = neighbors`; with importons, among photons where there are any.
 ///
 /// # Errors
 /// If the image is malformed.
-pub(crate) fn automatic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
-    distance_within(image, PhotonMap::Indirect, neighbors, COVERED_SHARE)
+pub(crate) fn automatic_max_distance(
+    image: &CardImage,
+    neighbors: u32,
+    importons: Option<&Importons>,
+) -> Result<f32, Fault> {
+    let importons = importons.map(|importons| &importons.indirect);
+    distance_within(image, (PhotonMap::Indirect, importons), neighbors, COVERED_SHARE)
 }
 
 /// Maximum distance of gathers of caustics, metres: the 80th percentile of the distance of the k-th neighbour among caustic
-/// photons, `k = neighbors`. Photons beyond it are spread too far to form a caustic.
+/// photons, `k = neighbors`; with importons, among photons where there are any. Photons beyond it are spread too far to form a caustic.
 ///
 /// # Errors
 /// If the image is malformed.
-pub(crate) fn caustic_max_distance(image: &CardImage, neighbors: u32) -> Result<f32, Fault> {
-    distance_within(image, PhotonMap::Caustics, neighbors, FOCUSED_SHARE)
+pub(crate) fn caustic_max_distance(
+    image: &CardImage,
+    neighbors: u32,
+    importons: Option<&Importons>,
+) -> Result<f32, Fault> {
+    let importons = importons.map(|importons| &importons.caustic);
+    distance_within(image, (PhotonMap::Caustics, importons), neighbors, FOCUSED_SHARE)
 }
 
-/// Distance within which the share `share` of a map's photons have `neighbors` neighbours.
-fn distance_within(image: &CardImage, map: PhotonMap, neighbors: u32, share: f64) -> Result<f32, Fault> {
+/// Distance within which the share `share` of a map's photons, of those at importons, have `neighbors` neighbours.
+fn distance_within(
+    image: &CardImage,
+    (map, importons): (PhotonMap, Option<&ImportonGrid>),
+    neighbors: u32,
+    share: f64,
+) -> Result<f32, Fault> {
     let leaves = match map {
         PhotonMap::Indirect => image.section(SectionKind::PhotonLeaves),
         PhotonMap::Caustics => image.section(SectionKind::CausticLeaves),
@@ -92,13 +108,17 @@ fn distance_within(image: &CardImage, map: PhotonMap, neighbors: u32, share: f64
             || Searcher::new(image, neighbors, unlimited).of(map),
             |searcher, (sample, line)| {
                 let leaf = PhotonLeaf::read(&line.0);
-                let photon = leaf.point(sample as u32 % leaf.photons().max(1));
-                searcher.radius(grid.position(photon).into())
+                let photon = sample as u32 % leaf.photons().max(1);
+                let position = grid.position(leaf.point(photon)).into();
+                let [.., low, high] = leaf.content(photon);
+                let normal = Photon::normal_of_flags(u16::from_le_bytes([low, high]));
+                let is_used = importons.is_none_or(|importons| importons.is_used(position, normal));
+                if is_used { searcher.radius(position) } else { Ok(unlimited) }
             },
         )
         .collect();
     let mut distances = distances?;
-    // A map of fewer photons than neighbours has no such distances.
+    // A map of fewer photons than neighbours has no such distances, nor has a photon without importons.
     distances.retain(|&distance| distance < unlimited);
     distances.sort_by(f32::total_cmp);
     let place = (distances.len() as f64 * share) as usize;

@@ -85,6 +85,12 @@ impl Sources {
         (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
     }
 
+    /// These sources with photons aimed at other targets as well as in all directions.
+    pub(crate) fn aimed_at(&self, targets: Targets) -> Self {
+        let strongest = self.strongest / (1.0 - targets.share);
+        Self { targets, strongest, power: 0.0, ..self.clone() }
+    }
+
     fn towards(scene: &Scene, lights: &Lights, targets: Targets) -> Self {
         let bounds = enlarged(scene.bounds());
         let size = (bounds[1] - bounds[0]).as_dvec3();

@@ -37,6 +37,8 @@ pub(crate) struct Aim {
 
 /// Share of the aimed photons where photons may be needed elsewhere as well.
 const AIMED_SHARE: f32 = 0.9;
+/// Share of the photons that are aimed at boxes.
+const BOX_SHARE: f32 = 0.5;
 /// Minimum emission of a lamp over the greatest emission.
 const LAMP_SHARE: f32 = 0.01;
 /// Maximum number of spheres.
@@ -65,7 +67,16 @@ impl Targets {
     /// Surfaces of the chosen materials.
     fn around(scene: &Scene, is_chosen: &[bool], share: f32) -> Self {
         let triangles = scene.triangles.iter().filter(|triangle| is_chosen[triangle.material as usize]);
-        let all: Vec<[Vec3; 3]> = triangles.map(|triangle| triangle.vertices).collect();
+        Self::holding(triangles.map(|triangle| triangle.vertices).collect(), share)
+    }
+
+    /// Boxes, by their lower and upper corners; half of the photons are aimed at them.
+    pub(crate) fn boxes(boxes: impl IntoIterator<Item = [Vec3; 2]>) -> Self {
+        Self::holding(boxes.into_iter().map(|[lower, upper]| [lower, upper, lower]).collect(), BOX_SHARE)
+    }
+
+    /// Spheres that hold all of the triangles.
+    fn holding(all: Vec<[Vec3; 3]>, share: f32) -> Self {
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
         while parts.len() < MAX_SPHERES {
             // The largest splittable part.

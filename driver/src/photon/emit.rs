@@ -16,6 +16,7 @@ use photoncard_firmware::scene::{Ray, SceneImage, Surface};
 use photoncard_shared::layout::{Emitter, EmitterKind};
 use photoncard_shared::message::Fault;
 
+use super::guide::{Guide, Point, Warped};
 use crate::light::{Aim, SolidCone, Source, Sources, Targets};
 
 /// Emitted photon: the first ray of a path, and its power.
@@ -46,7 +47,7 @@ impl PathRandom {
     }
 
     /// Low-discrepancy point of the emission, in units of 2^-64.
-    fn emission(self) -> [u64; 4] {
+    fn emission(self) -> Point {
         std::array::from_fn(|dimension| {
             let shift = (hash(self.seed ^ hash(dimension as u32 + 1)) as u64) << 32;
             RECURRENCE[dimension].wrapping_mul(self.path + 1).wrapping_add(shift)
@@ -105,15 +106,22 @@ fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 / 16_777_216.0
 }
 
+/// Point that a path's emission is sampled from, with its weight.
+pub(super) fn emission_point(guide: Option<&Guide>, random: PathRandom) -> Warped {
+    let point = random.emission();
+    guide.map_or(Warped { point, weight: 1.0 }, |guide| guide.warp(point))
+}
+
 /// Emission of a path: samples a source by its power, a position and a direction. `None` if Russian roulette ends the path,
-/// the direction carries no light, or there are no sources.
+/// the direction carries no light, or there are no sources. A guide warps the distribution of all of these.
 pub(super) fn emit(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    sources: &Sources,
+    (sources, guide): (&Sources, Option<&Guide>),
     random: PathRandom,
 ) -> Result<Option<Emission>, Fault> {
-    let [first, b, c, d] = random.emission();
+    let Warped { point, weight } = emission_point(guide, random);
+    let [first, b, c, d] = point;
     let [b, c, d] = [b, c, d].map(unit_of_bits);
     let Some(chosen) = sources.choose(first) else { return Ok(None) };
     let (is_aimed, c) = sources.targets.is_aimed(c);
@@ -143,7 +151,10 @@ pub(super) fn emit(
     });
     let emission = emission.filter(|emission| emission.power.max_element() > 0.0);
     // Bounces are fewer than `u32::MAX`: this random number is used once.
-    Ok(emission.and_then(|emission| roulette(emission, sources.power, random.bounce(u32::MAX).survival())))
+    let survival = random.bounce(u32::MAX).survival();
+    // The roulette equalises the power of the sources, not that of guided photons.
+    let emission = emission.and_then(|emission| roulette(emission, sources.power, survival));
+    Ok(emission.map(|emission| Emission { power: emission.power * weight, ..emission }))
 }
 
 /// Russian roulette where an emitter is darker than its mean, as in dark parts of an emissive texture: photons of equal

@@ -1,13 +1,21 @@
 //! The photon pass: paths are traced from the lights, and photons stored where they meet surfaces.
 //!
-//! Photons depend on the scene, the seed and their number alone, never on threads, camera, tile or chip.
+//! Photons depend on the scene, the seed and their number alone, never on threads, tile or chip; and on the camera if, and only if,
+//! they are guided towards what it uses.
 
 mod emit;
 mod error;
+mod guide;
+mod importons;
+mod pilot;
 mod stored;
 mod trace;
+mod tracer;
 
 pub use error::PhotonError;
+pub(crate) use importons::{ImportonGrid, Importons};
+pub use pilot::Guiding;
 pub use stored::Photons;
 pub(crate) use stored::StoredPhoton;
 pub use trace::{PhotonPass, trace, trace_caustics};
+pub(crate) use trace::{trace_caustics_for, trace_for};

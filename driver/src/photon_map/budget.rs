@@ -124,6 +124,7 @@ mod tests {
     fn remedy(scene: &PackedScene, photons: usize, dram_bytes: u32) -> String {
         let budget = Budget { dram_bytes, ..REFERENCE };
         let settings = PhotonSettings {
+            camera: None,
             seed: 0,
             photons,
             neighbors: 100,
@@ -157,6 +158,7 @@ mod tests {
             [(500, 3000, "lower --caustic-photons"), (3000, 500, "lower --photons")]
         {
             let settings = PhotonSettings {
+                camera: None,
                 seed: 0,
                 photons,
                 neighbors: 100,

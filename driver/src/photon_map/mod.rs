@@ -11,6 +11,8 @@ mod radius;
 mod settings;
 mod size;
 mod store;
+#[cfg(test)]
+mod tests;
 
 use std::time::{Duration, Instant};
 
@@ -19,13 +21,16 @@ use photoncard_shared::message::{CausticGather, Radiance};
 pub use self::budget::{check_image, check_packed};
 pub use self::irradiance::precompute_irradiance;
 pub use self::kd_tree::to_kd_tree;
-pub use self::settings::{PhotonLayout, PhotonSettings};
+pub use self::settings::{PhotonLayout, PhotonSettings, PhotonsFor};
 pub use self::size::PhotonMapSize;
 use self::store::store_caustics;
 pub use self::store::store_photons;
 use crate::density::{automatic_max_distance, caustic_max_distance, measure_discs};
 use crate::pack::{CardImage, PackedScene};
-use crate::photon::{PhotonError, PhotonPass, Photons, trace, trace_caustics};
+pub use crate::photon::Guiding;
+use crate::photon::{
+    ImportonGrid, Importons, PhotonError, PhotonPass, Photons, trace_caustics_for, trace_for,
+};
 
 /// Lower bound of the maximum distance of a gather, in cells of the photon grid, so that the grid does not show.
 const MIN_CELLS: f32 = 8.0;
@@ -40,6 +45,8 @@ pub struct MappedImage {
     pub caustics: Option<CausticGather>,
     /// Number of paths traced from the lights.
     pub paths: u64,
+    /// Guiding of the paths; `None` for photons of any camera.
+    pub guiding: Option<Guiding>,
     /// Time of each step.
     pub times: PhotonTimes,
 }
@@ -80,8 +87,12 @@ pub(crate) struct TracedPhotons {
     pub(crate) photons: Photons,
     /// Number of paths traced from the lights.
     pub(crate) paths: u64,
+    /// Guiding of the paths; `None` for photons of any camera.
+    pub(crate) guiding: Option<Guiding>,
     /// Caustic photons, if requested and if any are found.
     pub(crate) caustic: Option<Photons>,
+    /// Importons of the camera that the photons are for; `None` for photons of any camera.
+    pub(crate) importons: Option<Importons>,
 }
 
 impl TracedPhotons {
@@ -94,8 +105,15 @@ impl TracedPhotons {
         settings: &PhotonSettings,
         progress: &(dyn Fn(usize) -> bool + Sync),
     ) -> Result<Self, PhotonError> {
-        let PhotonPass { photons, paths, .. } = trace(packed, settings.seed, settings.photons, progress)?;
-        Ok(Self { photons, paths, caustic: caustics(packed, settings, progress)? })
+        let importons = importons(packed, settings)?;
+        let [of_map, of_caustics] = [
+            importons.as_ref().map(|importons| &importons.indirect),
+            importons.as_ref().map(|importons| &importons.caustic),
+        ];
+        let PhotonPass { photons, paths, guiding, .. } =
+            trace_for(packed, of_map, settings.seed, settings.photons, progress)?;
+        let caustic = caustics(packed, of_caustics, settings, progress)?;
+        Ok(Self { photons, paths, guiding, caustic, importons })
     }
 }
 
@@ -106,7 +124,7 @@ pub(crate) fn map_traced(
     settings: &PhotonSettings,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<MappedImage, PhotonError> {
-    let TracedPhotons { photons, paths, caustic } = traced;
+    let TracedPhotons { photons, paths, guiding, caustic, importons } = traced;
     let mut times = PhotonTimes::default();
     let start = Instant::now();
     let cell = photons.grid().cell;
@@ -116,7 +134,7 @@ pub(crate) fn map_traced(
     let max_distance = match settings.max_distance {
         // A distance beyond the scene's diagonal has no further effect.
         Some(distance) => distance.min(image.diagonal()),
-        None => automatic_max_distance(&image, settings.neighbors)?,
+        None => automatic_max_distance(&image, settings.neighbors, importons.as_ref())?,
     };
     if max_distance < MIN_CELLS * cell {
         return Err(PhotonError::TooWide { cell, max_distance });
@@ -132,7 +150,7 @@ pub(crate) fn map_traced(
     if let Some(photons) = caustic {
         let start = Instant::now();
         image = store_caustics(image, photons, settings.caustic_neighbors)?;
-        let max_distance = caustic_max_distance(&image, settings.caustic_neighbors)?;
+        let max_distance = caustic_max_distance(&image, settings.caustic_neighbors, importons.as_ref())?;
         caustics = Some(CausticGather { neighbors: settings.caustic_neighbors, max_distance });
         times.building += start.elapsed();
     }
@@ -142,12 +160,25 @@ pub(crate) fn map_traced(
         image = precompute_irradiance(image, settings.neighbors, max_distance, &go_on)?;
         times.estimating = start.elapsed();
     }
-    Ok(MappedImage { image, max_distance, caustics, paths, times })
+    Ok(MappedImage { image, max_distance, caustics, paths, guiding, times })
+}
+
+/// Importons of the camera that photons are traced for, if it is one.
+fn importons(packed: &PackedScene, settings: &PhotonSettings) -> Result<Option<Importons>, PhotonError> {
+    // Disc of a gather over the surface, if photons are everywhere as dense.
+    let share = |neighbors: u32, photons: usize| neighbors as f32 / photons.max(1) as f32;
+    let shares = [
+        share(settings.neighbors, settings.photons),
+        share(settings.caustic_neighbors, settings.caustic_photons),
+    ];
+    let importons = settings.camera.map(|camera| Importons::new(packed, &camera, shares));
+    importons.transpose().map_err(PhotonError::Unsound)
 }
 
 /// Caustic photons, if requested and if any are found. Without a caustic map gather rays carry the light of caustics.
 fn caustics(
     packed: &PackedScene,
+    importons: Option<&ImportonGrid>,
     settings: &PhotonSettings,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<Option<Photons>, PhotonError> {
@@ -155,36 +186,6 @@ fn caustics(
         return Ok(None);
     }
     let go_on = || progress(settings.photons);
-    let photons = trace_caustics(packed, settings.seed, settings.caustic_photons, &go_on)?;
+    let photons = trace_caustics_for(packed, importons, settings.seed, settings.caustic_photons, &go_on)?;
     Ok((!photons.is_empty()).then_some(photons))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::gltf;
-
-    #[test]
-    fn an_image_is_the_same_on_any_number_of_threads() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf");
-        let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
-        for layout in [PhotonLayout::Lines, PhotonLayout::Jensen] {
-            let settings = PhotonSettings {
-                caustic_photons: 0,
-                caustic_neighbors: 50,
-                seed: 3,
-                photons: 60_000,
-                neighbors: 50,
-                max_distance: None,
-                layout,
-                radiance: Radiance::Precomputed,
-            };
-            let images = [1, 2, 5].map(|threads| {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-                let packed = PackedScene::new(&scene).expect("packs");
-                pool.install(|| map_photons(packed, &settings, &|_| true)).expect("maps").image
-            });
-            assert!(images.iter().all(|image| image.lines() == images[0].lines()), "{layout:?}");
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! Parameters of a photon map.
 
-use photoncard_shared::message::Radiance;
+use photoncard_shared::message::{Camera, Radiance};
 use serde::{Deserialize, Serialize};
 
 use crate::choice::choices;
@@ -10,6 +10,8 @@ use crate::choice::choices;
 pub struct PhotonSettings {
     /// Seed of the photon paths.
     pub seed: u32,
+    /// Camera whose picture alone uses the photons, which are then guided towards what it uses; `None` for any camera.
+    pub camera: Option<Camera>,
     /// Number of photons to store.
     pub photons: usize,
     /// Number of photons of a density estimate.
@@ -25,6 +27,21 @@ pub struct PhotonSettings {
     /// Estimate of reflected radiance: [`Radiance::Precomputed`] adds irradiance points to the image.
     pub radiance: Radiance,
 }
+
+/// Cameras that photons are traced for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PhotonsFor {
+    /// Any camera: photons depend on the scene alone.
+    #[default]
+    Scene,
+    /// The camera of the picture: photons are guided towards what it uses, without bias.
+    Camera,
+}
+
+choices!(PhotonsFor {
+    Scene = "scene": "Any camera",
+    Camera = "camera": "The camera of the picture: fewer where it does not use them",
+});
 
 /// Layout of the photon map in card memory. A gather finds the same photons in each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use photoncard_shared::message::CausticGather;
 use super::times::Times;
 use super::{Observer, Phase, RenderError, RenderSettings};
 use crate::pack::{CardImage, PackedScene};
-use crate::photon_map::{self, MappedImage, PhotonTimes, map_photons};
+use crate::photon_map::{self, Guiding, MappedImage, PhotonTimes, map_photons};
 use crate::scene::FixedScene;
 
 /// Card image with the parameters that a frame derives from it.
@@ -22,6 +22,8 @@ pub(super) struct Prepared {
     pub(super) caustics: Option<CausticGather>,
     /// Number of paths that were traced for the photons.
     pub(super) paths: u64,
+    /// Guiding of these paths; `None` for photons of any camera.
+    pub(super) guiding: Option<Guiding>,
 }
 
 /// Maps the photons of a packed scene.
@@ -37,7 +39,7 @@ pub(super) fn prepare(
     observer: &dyn Observer,
 ) -> Result<Prepared, RenderError> {
     let start = Instant::now();
-    let photon_settings = settings.photon_settings_if(scene.is_specular());
+    let photon_settings = settings.photon_settings_of(scene);
     for budget in budgets {
         photon_map::check_packed(&packed, &photon_settings, budget)?;
     }
@@ -59,6 +61,6 @@ pub(super) fn prepare(
     times.photon_map = building.as_secs_f64();
     times.discs = measuring.as_secs_f64();
     times.irradiance = estimating.as_secs_f64();
-    let MappedImage { image, max_distance, caustics, paths, .. } = mapped;
-    Ok(Prepared { image: Arc::new(image), max_distance, caustics, paths })
+    let MappedImage { image, max_distance, caustics, paths, guiding, .. } = mapped;
+    Ok(Prepared { image: Arc::new(image), max_distance, caustics, paths, guiding })
 }

@@ -250,8 +250,7 @@ pub(super) struct Kept {
 impl Kept {
     /// Returns whether the image is that of a scene, with the photons of the settings.
     fn is_of(&self, scene: &FixedScene, settings: &RenderSettings) -> bool {
-        self.scene == scene.checksum_without_cameras()
-            && self.photons == settings.photon_settings_if(scene.is_specular())
+        self.scene == scene.checksum_without_cameras() && self.photons == settings.photon_settings_of(scene)
     }
 }
 
@@ -317,7 +316,7 @@ impl Source {
         };
         Ok(Kept {
             scene: scene.checksum_without_cameras().to_owned(),
-            photons: settings.photon_settings_if(scene.is_specular()),
+            photons: settings.photon_settings_of(scene),
             prepared: prepare(scene, packed, settings, budgets, times, observer)?,
         })
     }

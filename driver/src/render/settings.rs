@@ -15,8 +15,8 @@ pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
 use crate::emulator::memory_model::CacheSettings;
 use crate::film::{Film, FilmError, Window};
-use crate::photon_map::PhotonSettings;
-use crate::scene::{Camera, Scene};
+use crate::photon_map::{PhotonSettings, PhotonsFor};
+use crate::scene::{Camera, FixedScene, Scene};
 use crate::scheduler::tiles;
 use crate::sums::SumFormat;
 
@@ -133,12 +133,22 @@ impl RenderSettings {
 
     /// Parameters of the photon maps of a scene.
     pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
-        self.photon_settings_if(scene.is_specular())
+        self.photon_settings_of(&scene.into())
     }
 
-    /// [`Self::photon_settings`] for a scene that is specular or not.
+    /// [`Self::photon_settings`] of a scene that stays as it is. A camera that the scene does not have is any.
+    pub(super) fn photon_settings_of(&self, scene: &FixedScene) -> PhotonSettings {
+        let camera = match self.photons.photons_for {
+            PhotonsFor::Scene => None,
+            PhotonsFor::Camera => self.camera(scene).ok().map(|camera| self.pinhole(&camera)),
+        };
+        PhotonSettings { camera, ..self.photon_settings_if(scene.is_specular()) }
+    }
+
+    /// [`Self::photon_settings`] for any camera of a scene that is specular or not.
     pub(super) fn photon_settings_if(&self, is_specular: bool) -> PhotonSettings {
         PhotonSettings {
+            camera: None,
             caustic_photons: self.caustic_photons(is_specular),
             caustic_neighbors: self.photons.caustic_neighbors,
             seed: self.integrator.seed,
@@ -233,5 +243,24 @@ mod tests {
         assert_eq!(settings.tile_side(&[REFERENCE]), 32);
         assert_eq!(settings.tile_side(&[MICRO]), 8);
         assert_eq!(settings.with(|s| s.schedule.tile = Some(5)).tile_side(&[REFERENCE; 3]), 5);
+    }
+
+    #[test]
+    fn photons_for_the_scene_depend_on_no_camera() {
+        let [right, up, forward] = [Vec3::X, Vec3::Y, Vec3::NEG_Z];
+        let seen_from = |origin: Vec3| {
+            let name = "camera".to_owned();
+            let camera = Camera { name, origin, right, up, forward, vertical_fov: 1.0, aspect: None };
+            Scene { cameras: vec![camera], ..Scene::default() }
+        };
+        for (photons_for, is_of_camera) in [(PhotonsFor::Scene, false), (PhotonsFor::Camera, true)] {
+            let settings = RenderSettings::default().with(|s| s.photons.photons_for = photons_for);
+            let [of_first, of_second] =
+                [Vec3::ZERO, Vec3::X].map(|origin| settings.photon_settings(&seen_from(origin)));
+            assert_eq!(of_first != of_second, is_of_camera);
+            // A crop is a part of the same picture.
+            let cropped = settings.with(|s| s.picture.crop = Some(Window { x0: 1, x1: 2, y0: 3, y1: 4 }));
+            assert_eq!(cropped.photon_settings(&seen_from(Vec3::ZERO)), of_first);
+        }
     }
 }

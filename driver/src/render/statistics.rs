@@ -8,6 +8,7 @@ use super::preparation::Prepared;
 use super::times::Times;
 use super::{MemoryStatistics, Provenance, RenderSettings};
 use crate::cost_model::Flops;
+use crate::photon_map::Guiding;
 use crate::session::LinkBytes;
 
 /// Contents of the statistics file. The keys are stable.
@@ -25,6 +26,9 @@ pub struct Statistics {
     pub photons: u64,
     /// Number of paths traced from the lights for the photons.
     pub photon_paths: u64,
+    /// Guiding of these paths; absent for photons of any camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub photon_guiding: Option<Guiding>,
     /// Maximum distance of a gather, metres.
     pub max_distance: f32,
     /// Number of cards, one chip each.
@@ -105,6 +109,7 @@ impl Statistics {
             samples: settings.integrator.samples,
             photons: settings.photons.count as u64,
             photon_paths: prepared.paths,
+            photon_guiding: prepared.guiding,
             max_distance: frame.max_distance,
             cards: outcome.cards,
             cards_given_up: outcome.cards_given_up,

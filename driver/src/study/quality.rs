@@ -228,10 +228,10 @@ type TilePixels = Vec<Vec<[f64; 3]>>;
 
 /// Indirect light in `count` tiles: the scene's photons with its lights out.
 fn indirect(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<TilePixels, RenderError> {
-    let MappedImage { image, max_distance, caustics, paths, times } = bench.mapped;
+    let MappedImage { image, max_distance, caustics, paths, guiding, times } = bench.mapped;
     let (max_distance, caustics) = (*max_distance, *caustics);
     let image = image.without_emission();
-    let dark = MappedImage { image, max_distance, caustics, paths: *paths, times: *times };
+    let dark = MappedImage { image, max_distance, caustics, paths: *paths, guiding: *guiding, times: *times };
     let bench = Bench { mapped: &dark, ..*bench };
     pixels(&bench, settings, true, count, |pixel| pixel.layers.indirect)
 }

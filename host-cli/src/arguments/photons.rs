@@ -52,6 +52,7 @@ impl PhotonOptions {
     pub(super) fn settings(&self, base: &PhotonMaps) -> PhotonMaps {
         PhotonMaps {
             count: self.photons.unwrap_or(base.count),
+            photons_for: base.photons_for,
             layout: self.photon_map,
             neighbors: self.neighbors.unwrap_or(base.neighbors),
             max_distance: match self.max_distance {

@@ -52,7 +52,8 @@ pub(super) fn with_remedy(mut error: Error) -> Error {
             _ => false,
         })
     };
-    if error.kind() == ErrorKind::ArgumentConflict && names("--prepared") {
+    // Prepared photons are for all cameras.
+    if error.kind() == ErrorKind::ArgumentConflict && names("--prepared") && !names("--photons-for") {
         let remedy = "state it to photoncard prepare: the prepared scene depends on it";
         let remedy = ContextValue::StyledStrs(vec![remedy.into()]);
         let _ = error.insert(ContextKind::Suggested, remedy);

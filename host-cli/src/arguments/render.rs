@@ -4,8 +4,9 @@ use clap::Args;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::partial::{PartialError, PartialSettings};
+use photoncard_driver::photon_map::PhotonsFor;
 use photoncard_driver::quality::{Fit, Quality, Stated};
-use photoncard_driver::render::{Observer, RenderError, RenderSettings, Schedule, TileOutputs};
+use photoncard_driver::render::{Observer, PhotonMaps, RenderError, RenderSettings, Schedule, TileOutputs};
 use photoncard_driver::scene::Scene;
 
 use super::cards::CardOptions;
@@ -37,6 +38,12 @@ pub(crate) struct RenderOptions {
     pub(crate) picture: PictureOptions,
     #[command(flatten)]
     pub(super) photons: PhotonOptions,
+    /// Cameras that the photons are for
+    ///
+    /// For the picture's camera more photons are where it uses them: light through a window wastes fewer on the outside of a house. The
+    /// picture's expected value stays. Pictures of several cameras, such as frames and prepared scenes, share photons for the scene.
+    #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::default().name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]
+    photons_for: PhotonsFor,
     #[command(flatten)]
     pub(super) integrator: IntegratorOptions,
     #[command(flatten)]
@@ -123,7 +130,7 @@ impl RenderOptions {
         let base = quality.settings();
         RenderSettings {
             picture: self.picture.settings(&base.picture),
-            photons: self.photons.settings(&base.photons),
+            photons: PhotonMaps { photons_for: self.photons_for, ..self.photons.settings(&base.photons) },
             integrator: self.integrator.settings(&base.integrator),
             schedule: Schedule { part: self.parts.part, ..self.schedule.settings() },
             cards,

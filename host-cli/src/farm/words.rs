@@ -12,8 +12,18 @@ const OF_MERGE: [&str; 4] = ["pictures", "sample_type", "exposure", "curve"];
 /// Options of the job itself.
 const OF_JOB: [&str; 2] = ["parts", "frames"];
 /// Options that a job states itself, or that are of one render alone.
-const OF_NO_JOB: [&str; 9] =
-    ["part", "prepared", "resume", "stats", "time", "noise", "keep_samples", "trace", "progress"];
+const OF_NO_JOB: [&str; 10] = [
+    "photons_for",
+    "part",
+    "prepared",
+    "resume",
+    "stats",
+    "time",
+    "noise",
+    "keep_samples",
+    "trace",
+    "progress",
+];
 
 /// Words of a command line.
 #[derive(Debug, Default, PartialEq)]

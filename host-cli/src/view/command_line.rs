@@ -84,8 +84,16 @@ fn of_picture(picture: &Picture, words: &mut Words) {
 }
 
 fn of_photons(photons: &PhotonMaps, words: &mut Words) {
-    let PhotonMaps { count, layout, neighbors, max_distance, caustic_photons, caustic_neighbors, radiance } =
-        photons;
+    let PhotonMaps {
+        count,
+        photons_for: _,
+        layout,
+        neighbors,
+        max_distance,
+        caustic_photons,
+        caustic_neighbors,
+        radiance,
+    } = photons;
     words.add("--photons", count);
     words.add("--photon-map", layout.name());
     words.add("--neighbors", neighbors);

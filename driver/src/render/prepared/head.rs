@@ -12,6 +12,7 @@ use serde_json::{Map, Value};
 
 use super::scene::{PreparedScene, View, is_camera};
 use crate::pack::CardImage;
+use crate::photon_map::PhotonsFor;
 use crate::render::preparation::Prepared;
 use crate::render::renderer::Kept;
 use crate::render::{Integrator, PROGRAM, PhotonMaps, RenderSettings};
@@ -44,7 +45,7 @@ pub(super) struct Head {
 impl Head {
     pub(super) fn new(scene: &PreparedScene) -> Self {
         let PreparedScene { scene, photons, integrator, kept, frames, notes } = scene;
-        let Prepared { image, max_distance, caustics, paths } = &kept.prepared;
+        let Prepared { image, max_distance, caustics, paths, guiding: _ } = &kept.prepared;
         Self {
             program: PROGRAM.to_owned(),
             lines: image.lines().len() as u32,
@@ -65,13 +66,16 @@ impl Head {
     /// The prepared scene of an image.
     ///
     /// # Errors
-    /// If there is no such camera or distance.
+    /// If there is no such camera or distance, or the photons are for one camera.
     pub(super) fn into_scene(self, image: CardImage) -> Result<PreparedScene, &'static str> {
         let Self { cameras, photons, integrator, max_distance, caustics, paths, frames, notes, .. } = self;
         let is_distance = |distance: f32| distance.is_normal() && distance > 0.0;
         let distances = [Some(max_distance), caustics.map(|gather| gather.max_distance)];
         if !distances.into_iter().flatten().all(is_distance) {
             return Err("its distances of gathers are none");
+        }
+        if photons.photons_for != PhotonsFor::Scene {
+            return Err("its photons are not for all cameras");
         }
         let cameras: Vec<Camera> = cameras.into_iter().map(StoredCamera::camera).collect();
         let frames: BTreeMap<u32, View> =
@@ -81,7 +85,7 @@ impl Head {
             return Err("its cameras are none");
         }
         let settings = RenderSettings { photons, integrator, ..RenderSettings::default() };
-        let prepared = Prepared { image: Arc::new(image), max_distance, caustics, paths };
+        let prepared = Prepared { image: Arc::new(image), max_distance, caustics, paths, guiding: None };
         let kept = Kept {
             scene: self.scene[1].clone(),
             photons: settings.photon_settings_if(self.is_specular),

@@ -6,7 +6,9 @@ use glam::Vec3;
 use photoncard_shared::budget::Budget;
 use serde_json::{Map, Value};
 
+use crate::choice::Choice;
 use crate::pack::PackedScene;
+use crate::photon_map::PhotonsFor;
 use crate::render::renderer::{Chosen, Kept, Renderer, Source};
 use crate::render::times::Times;
 use crate::render::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
@@ -46,6 +48,7 @@ impl PreparedScene {
     ) -> Result<Self, RenderError> {
         settings.camera(scene)?;
         settings.check()?;
+        check_cameras(settings.photons.photons_for)?;
         let mut times = Times::default();
         let (settings, source) = Source::new(scene, settings, Some(choose), &mut None, &mut times)?;
         settings.check()?;
@@ -108,6 +111,19 @@ impl PreparedScene {
     /// Renderer that has the card image: it renders [`Self::scene`] and [`Self::frame`] with [`Renderer::render_fixed`] by [`Self::settings`].
     pub fn renderer(&self) -> Renderer {
         Renderer::with_image(self.kept.clone())
+    }
+}
+
+/// Checks that photons are for all cameras of a scene.
+fn check_cameras(photons_for: PhotonsFor) -> Result<(), RenderError> {
+    match photons_for {
+        PhotonsFor::Scene => Ok(()),
+        PhotonsFor::Camera => Err(RenderError::Setting {
+            option: "--photons-for",
+            value: photons_for.name().into(),
+            reason: "a prepared scene has photons for all its cameras".into(),
+            remedy: "leave it out".into(),
+        }),
     }
 }
 

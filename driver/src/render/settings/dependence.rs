@@ -33,6 +33,7 @@ impl RenderSettings {
         let Picture { width, height, crop: _, camera, camera_at, look_at, fov, layers, filter } = picture;
         let PhotonMaps {
             count,
+            photons_for,
             layout: _,
             neighbors,
             max_distance,
@@ -60,6 +61,7 @@ impl RenderSettings {
             ("filter", json!(filter.name())),
             ("aov", json!(layers.of_chip().to_string())),
             ("photons", json!(count)),
+            ("photons-for", json!(photons_for.name())),
             ("neighbors", json!(neighbors)),
             ("max-distance", json!(max_distance)),
             ("caustic-photons", json!(caustic_photons)),
@@ -85,6 +87,7 @@ impl RenderSettings {
         let Self { picture: _, photons, integrator: _, schedule, cards: _, outputs: _ } = self;
         let PhotonMaps {
             count: _,
+            photons_for: _,
             layout,
             neighbors: _,
             max_distance: _,

@@ -12,7 +12,7 @@ use crate::layer::Layers;
 use crate::link::LineFaults;
 use crate::partial::PartialSettings;
 use crate::parts::Part;
-use crate::photon_map::PhotonLayout;
+use crate::photon_map::{PhotonLayout, PhotonsFor};
 use crate::render::address::CardAddress;
 use crate::scheduler::GatherOrder;
 
@@ -61,6 +61,8 @@ impl Default for Picture {
 pub struct PhotonMaps {
     /// Number of photons in the map.
     pub count: usize,
+    /// Cameras that the photons are for.
+    pub photons_for: PhotonsFor,
     /// Layout of the photon map in card memory; no pixel depends on it.
     pub layout: PhotonLayout,
     /// Number of photons that a gather searches for.
@@ -80,6 +82,7 @@ impl Default for PhotonMaps {
     fn default() -> Self {
         Self {
             count: 500_000,
+            photons_for: PhotonsFor::default(),
             layout: PhotonLayout::default(),
             neighbors: 100,
             max_distance: None,

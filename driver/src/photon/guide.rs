@@ -1,0 +1,302 @@
+//! Guiding of emission: a warp of the unit hypercube that emission is sampled from, towards the points whose paths are useful.
+//!
+//! The hypercube is halved again and again, each box along the dimension that separates useful from useless paths best. A point
+//! descends by hierarchical sample warping (Clarberg et al. 2005, *Wavelet importance sampling*): within a box its coordinate along the
+//! divided dimension is compared with the probability of the lower half, and rescaled. Points that are stratified in each dimension so
+//! remain stratified.
+
+/// Number of dimensions of the hypercube.
+pub(super) const DIMENSIONS: usize = 4;
+/// Point of the hypercube, in units of 2^-64.
+pub(super) type Point = [u64; DIMENSIONS];
+
+/// Share of the points that are uniform: an upper bound of the weights is its inverse.
+pub(super) const UNIFORM_SHARE: f64 = 0.25;
+/// Minimum number of useful samples of a half on average.
+const MIN_USEFUL: usize = 8;
+/// Samples of the enclosing box that a box counts in addition to its own.
+const PRIOR_SAMPLES: f64 = 4.0;
+/// Maximum number of halvings along a dimension.
+const MAX_HALVINGS: u32 = 20;
+/// 2^64.
+const ALL: f64 = 18_446_744_073_709_551_616.0;
+/// Upper bound of coordinates below 1.
+const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
+
+/// Point of the hypercube, and the use of the path that begins with it, as if it were not guided.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    pub(super) point: Point,
+    /// Sum of the uses of its photons.
+    pub(super) use_of_path: f64,
+    /// Sum of the squares of the uses of its photons, which are in different places: the variance that they bring.
+    pub(super) squares: f64,
+    /// Weight of the point.
+    pub(super) weight: f32,
+}
+
+/// Warped point, with its weight: the density of uniform points over that of warped ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Warped {
+    pub(super) point: Point,
+    pub(super) weight: f32,
+}
+
+/// Division of the hypercube into boxes with probabilities.
+#[derive(Clone, Debug)]
+pub(super) struct Guide {
+    /// The whole first, and of each two halves the lower one right after the box they divide.
+    boxes: Vec<Region>,
+    spread: f64,
+    gain: f64,
+}
+
+/// Region of the hypercube.
+#[derive(Clone, Copy, Debug)]
+struct Region {
+    /// Probability of the box.
+    share: f64,
+    halves: Option<Halves>,
+}
+
+/// Halves of a box.
+#[derive(Clone, Copy, Debug)]
+struct Halves {
+    dimension: usize,
+    /// Index of the upper half.
+    upper: usize,
+}
+
+/// Sums over the samples of a box.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    /// Number of samples of some use.
+    useful: usize,
+    /// Sum of the weights.
+    weight: f64,
+    /// Weighted sum of the uses.
+    uses: f64,
+    /// Weighted sum of the squares.
+    squares: f64,
+}
+
+impl Sums {
+    fn add(&mut self, sample: &Sample) {
+        let Sample { use_of_path, squares, weight, .. } = *sample;
+        let weight = f64::from(weight);
+        self.useful += usize::from(squares > 0.0);
+        self.weight += weight;
+        self.uses += weight * use_of_path;
+        self.squares += weight * squares;
+    }
+
+    fn of(samples: &[Sample]) -> Self {
+        let mut sums = Self::default();
+        samples.iter().for_each(|sample| sums.add(sample));
+        sums
+    }
+}
+
+impl Guide {
+    /// Guide by samples; `None` if none of them is of use.
+    pub(super) fn new(mut samples: Vec<Sample>) -> Option<Self> {
+        let all = Sums::of(&samples);
+        if !(all.squares > 0.0 && all.squares.is_finite()) {
+            return None;
+        }
+        let mut builder = Builder { boxes: Vec::new(), uses: Vec::new() };
+        let mean_square = all.squares / all.weight;
+        let total = builder.divide(&mut samples, [0; DIMENSIONS], 1.0, mean_square);
+        let Builder { mut boxes, uses } = builder;
+        let mut guided_use = 0.0;
+        for (part, (volume, mean)) in boxes.iter_mut().zip(&uses) {
+            part.share = UNIFORM_SHARE * volume + (1.0 - UNIFORM_SHARE) * part.share / total;
+            if part.halves.is_none() {
+                guided_use += part.share * mean;
+            }
+        }
+        Some(Self { boxes, spread: total, gain: guided_use / (all.uses / all.weight) })
+    }
+
+    /// Expected use of a guided path over that of a path that is not guided, by the samples.
+    pub(super) fn gain(&self) -> f64 {
+        self.gain
+    }
+
+    /// Root mean square of the use of a guided path times its weight.
+    pub(super) fn spread(&self) -> f64 {
+        self.spread
+    }
+
+    /// Number of boxes that are not divided.
+    pub(super) fn cells(&self) -> usize {
+        self.boxes.iter().filter(|part| part.halves.is_none()).count()
+    }
+
+    /// The warped point of a uniform one.
+    pub(super) fn warp(&self, point: Point) -> Warped {
+        // Within the box, from 0 to 1.
+        let mut inner = point.map(|coordinate| (coordinate as f64 / ALL).min(BELOW_ONE));
+        let mut lower = [0.0; DIMENSIONS];
+        let mut sides = [1.0; DIMENSIONS];
+        let mut index = 0;
+        while let Region { share, halves: Some(Halves { dimension, upper }) } = self.boxes[index] {
+            let of_lower = self.boxes[index + 1].share / share;
+            let at = inner[dimension];
+            sides[dimension] *= 0.5;
+            (inner[dimension], index) = if at < of_lower {
+                (at / of_lower, index + 1)
+            } else {
+                lower[dimension] += sides[dimension];
+                ((at - of_lower) / (1.0 - of_lower), upper)
+            };
+            inner[dimension] = inner[dimension].min(BELOW_ONE);
+        }
+        let volume: f64 = sides.iter().product();
+        let point = std::array::from_fn(|dimension| {
+            ((lower[dimension] + sides[dimension] * inner[dimension]) * ALL) as u64
+        });
+        Warped { point, weight: (volume / self.boxes[index].share) as f32 }
+    }
+}
+
+/// Boxes as they are divided.
+struct Builder {
+    /// `share` is the root mean square of the use of the box's paths times its volume: the optimal density.
+    boxes: Vec<Region>,
+    /// Volume and mean use of each box.
+    uses: Vec<(f64, f64)>,
+}
+
+impl Builder {
+    /// Adds a box with its division. `halvings` counts those along each dimension; `mean_square` is that of the enclosing box. Returns the
+    /// box's share.
+    fn divide(
+        &mut self,
+        samples: &mut [Sample],
+        halvings: [u32; DIMENSIONS],
+        volume: f64,
+        mean_square: f64,
+    ) -> f64 {
+        let sums = Sums::of(samples);
+        let mean_square = (sums.squares + PRIOR_SAMPLES * mean_square) / (sums.weight + PRIOR_SAMPLES);
+        let index = self.boxes.len();
+        self.boxes.push(Region { share: volume * mean_square.sqrt(), halves: None });
+        self.uses.push((volume, if sums.weight > 0.0 { sums.uses / sums.weight } else { 0.0 }));
+        let Some(dimension) = best_dimension(samples, halvings) else { return self.boxes[index].share };
+        let is_lower = |sample: &Sample| !is_upper(sample, dimension, halvings[dimension]);
+        let (lower, upper) = partitioned(samples, is_lower);
+        let mut finer = halvings;
+        finer[dimension] += 1;
+        let of_lower = self.divide(lower, finer, 0.5 * volume, mean_square);
+        let halves = Some(Halves { dimension, upper: self.boxes.len() });
+        let share = of_lower + self.divide(upper, finer, 0.5 * volume, mean_square);
+        self.boxes[index] = Region { share, halves };
+        share
+    }
+}
+
+/// Returns whether a sample of a box is in its upper half along a dimension that was halved `halvings` times.
+fn is_upper(sample: &Sample, dimension: usize, halvings: u32) -> bool {
+    sample.point[dimension] >> (63 - halvings) & 1 == 1
+}
+
+/// Dimension along which the halves of a box differ most: the sum of their optimal shares is least. `None` for a box that is not divided,
+/// for too few of its samples are of use.
+fn best_dimension(samples: &[Sample], halvings: [u32; DIMENSIONS]) -> Option<usize> {
+    if Sums::of(samples).useful < 2 * MIN_USEFUL {
+        return None;
+    }
+    let cost = |dimension: usize| {
+        let mut halves = [Sums::default(); 2];
+        for sample in samples {
+            halves[usize::from(is_upper(sample, dimension, halvings[dimension]))].add(sample);
+        }
+        halves.map(|half| (half.weight * half.squares).sqrt()).iter().sum::<f64>()
+    };
+    let open = (0..DIMENSIONS).filter(|&dimension| halvings[dimension] < MAX_HALVINGS);
+    open.map(|dimension| (dimension, cost(dimension)))
+        .min_by(|(_, a), (_, b)| a.total_cmp(b))
+        .map(|(dimension, _)| dimension)
+}
+
+/// The samples that fulfil a condition, and the others.
+fn partitioned(samples: &mut [Sample], is_first: impl Fn(&Sample) -> bool) -> (&mut [Sample], &mut [Sample]) {
+    let mut count = 0;
+    for index in 0..samples.len() {
+        if is_first(&samples[index]) {
+            samples.swap(index, count);
+            count += 1;
+        }
+    }
+    samples.split_at_mut(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_firmware::sampler::hash;
+
+    use super::*;
+
+    /// Uniform points, a lattice of rank 1.
+    fn points(count: u32) -> impl Iterator<Item = Point> {
+        let bits = |index: u32, dimension: u32| (hash(hash(index).wrapping_add(dimension)) as u64) << 32;
+        (0..count).map(move |index| [0, 1, 2, 3].map(|dimension| bits(index, dimension)))
+    }
+
+    fn coordinates(point: Point) -> [f64; DIMENSIONS] {
+        point.map(|coordinate| coordinate as f64 / ALL)
+    }
+
+    /// Use that lies in a corner of three of the dimensions.
+    fn use_of(point: Point) -> f64 {
+        let [a, b, _, d] = coordinates(point);
+        if a < 0.3 && b > 0.6 && d < 0.5 { 1.0 + a } else { 0.0 }
+    }
+
+    fn guide() -> Guide {
+        let sample =
+            |point| Sample { point, use_of_path: use_of(point), squares: use_of(point).powi(2), weight: 1.0 };
+        Guide::new(points(20_000).map(sample).collect()).expect("some are of use")
+    }
+
+    #[test]
+    fn weighted_means_over_warped_points_are_those_over_uniform_ones() {
+        let guide = guide();
+        let count = 100_000;
+        let functions: [fn(Point) -> f64; 3] =
+            [|_| 1.0, use_of, |point| coordinates(point).iter().product::<f64>()];
+        for function in functions {
+            let mean = |warp: &dyn Fn(Point) -> Warped| {
+                let values = points(count).map(|point| {
+                    let Warped { point, weight } = warp(point);
+                    f64::from(weight) * function(point)
+                });
+                values.sum::<f64>() / f64::from(count)
+            };
+            let uniform = mean(&|point| Warped { point, weight: 1.0 });
+            let guided = mean(&|point| guide.warp(point));
+            assert!((guided / uniform - 1.0).abs() < 0.02, "{guided} instead of {uniform}");
+        }
+    }
+
+    #[test]
+    fn warped_points_are_of_more_use_and_no_weight_is_great() {
+        let guide = guide();
+        let mean = |warped: &dyn Fn(Point) -> Point| {
+            points(50_000).map(|point| use_of(warped(point))).sum::<f64>() / 50_000.0
+        };
+        let gain = mean(&|point| guide.warp(point).point) / mean(&|point| point);
+        assert!(gain > 8.0, "{gain}");
+        assert!((gain / guide.gain() - 1.0).abs() < 0.1, "{gain}, {} by its own account", guide.gain());
+        for point in points(10_000) {
+            assert!(f64::from(guide.warp(point).weight) <= 1.001 / UNIFORM_SHARE);
+        }
+    }
+
+    #[test]
+    fn without_use_there_is_no_guide() {
+        let sample = |point| Sample { point, use_of_path: 0.0, squares: 0.0, weight: 1.0 };
+        assert!(Guide::new(points(1000).map(sample).collect()).is_none());
+    }
+}

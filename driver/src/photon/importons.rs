@@ -1,0 +1,228 @@
+//! Importons: places at which the picture of a camera uses photons, found by a pilot of eye paths.
+//!
+//! Photons are used where gather rays end and, for caustics, where eye paths end.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+use photoncard_firmware::memory::MemoryPort;
+use photoncard_firmware::render::specular_path::{Arrival, Carried, Passes, SpecularPath};
+use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit, read_surface};
+use photoncard_shared::layout::{Photon, decode_normal, encode_normal};
+use photoncard_shared::message::{Camera, Fault};
+use rayon::prelude::*;
+
+use super::emit::PathRandom;
+use crate::light::Targets;
+use crate::pack::PackedScene;
+
+/// Eye paths along each axis of the picture.
+const EYE_PATHS: u32 = 128;
+/// Gather rays of an eye path.
+const GATHER_RAYS: u32 = 4;
+/// Random numbers of eye paths are those of photon paths of another seed.
+const SEED: u32 = 0x1b56_c4e9;
+
+/// Importon: a place with the weight of its light in the picture.
+#[derive(Clone, Copy, Debug)]
+struct Importon {
+    position: Vec3,
+    /// Code of the surface's normal.
+    normal: u8,
+    weight: f32,
+}
+
+/// Importons of the photon map and of the caustic map.
+pub(crate) struct Importons {
+    /// At the ends of gather rays, and of eye paths as many as of a gather ray.
+    pub(crate) indirect: ImportonGrid,
+    /// At the ends of eye paths.
+    pub(crate) caustic: ImportonGrid,
+}
+
+impl Importons {
+    /// Importons of a camera. Photons are gathered within areas of `indirect` and `caustic` of the surface that the picture uses.
+    ///
+    /// # Errors
+    /// If the image is not sound.
+    pub(crate) fn new(
+        packed: &PackedScene,
+        camera: &Camera,
+        [indirect, caustic]: [f32; 2],
+    ) -> Result<Self, Fault> {
+        let rows: Result<Vec<_>, Fault> = (0..EYE_PATHS)
+            .into_par_iter()
+            .map(|row| {
+                let (scene, mut memory) = packed.view();
+                let mut seen = Vec::new();
+                let mut used = Vec::new();
+                for column in 0..EYE_PATHS {
+                    let mut walk = Walk {
+                        scene: &scene,
+                        memory: &mut memory,
+                        random: PathRandom::new(SEED, u64::from(row * EYE_PATHS + column)),
+                        bounce: 0,
+                    };
+                    walk.look(camera, [column, row], &mut seen, &mut used)?;
+                }
+                Ok((seen, used))
+            })
+            .collect();
+        let (seen, used): (Vec<_>, Vec<_>) = rows?.into_iter().unzip();
+        let seen = seen.concat();
+        let mut used = used.concat();
+        used.extend(&seen);
+        Ok(Self { indirect: ImportonGrid::new(&used, indirect), caustic: ImportonGrid::new(&seen, caustic) })
+    }
+}
+
+/// Eye path of the pilot.
+struct Walk<'a, M> {
+    scene: &'a SceneImage,
+    memory: &'a mut M,
+    random: PathRandom,
+    /// Number of the next random numbers.
+    bounce: u32,
+}
+
+impl<M: MemoryPort> Walk<'_, M> {
+    /// Adds the importons of an eye path and of its gather rays.
+    fn look(
+        &mut self,
+        camera: &Camera,
+        pixel: [u32; 2],
+        seen: &mut Vec<Importon>,
+        used: &mut Vec<Importon>,
+    ) -> Result<(), Fault> {
+        let [u, v] = self.random.bounce(u32::MAX).point();
+        let across = (pixel[0] as f32 + u) / EYE_PATHS as f32;
+        let down = (pixel[1] as f32 + v) / EYE_PATHS as f32;
+        let [forward, right, up] = [camera.forward, camera.right, camera.up].map(Vec3::from_array);
+        let direction = forward + right * (2.0 * across - 1.0) + up * (1.0 - 2.0 * down);
+        let ray = Ray::new(camera.origin.into(), direction.normalize());
+        let Some((eye, throughput)) = self.follow(ray, Passes::Specular)? else { return Ok(()) };
+        seen.extend(importon(&eye, throughput));
+        for _ in 0..GATHER_RAYS {
+            let point = self.random.bounce(self.bounce).point();
+            self.bounce += 1;
+            let Some(sampled) = eye.reflector().sample(point) else { continue };
+            if !eye.is_above(sampled.direction) {
+                continue;
+            }
+            let ray = Ray::new(eye.offset_origin(), sampled.direction);
+            let Some((end, passed)) = self.follow(ray, Passes::NarrowLobes)? else { continue };
+            used.extend(importon(&end, throughput * sampled.weight * passed));
+        }
+        Ok(())
+    }
+
+    /// Surface at which a path ends, and the path's throughput; `None` if it leaves the scene or is lost.
+    fn follow(&mut self, ray: Ray, passes: Passes) -> Result<Option<(Surface, Vec3)>, Fault> {
+        let mut path = SpecularPath::new(ray, Carried::Radiance, passes);
+        let mut surface = Surface::NOWHERE;
+        loop {
+            let random = self.random.bounce(self.bounce);
+            self.bounce += 1;
+            let Some(hit) = closest_hit(self.scene, self.memory, &path.ray)? else { return Ok(None) };
+            let layer = |choice| random.layer(choice);
+            read_surface(self.scene, self.memory, &path.ray, &hit, &layer, &mut surface)?;
+            let [u, v] = random.point();
+            match path.arrive(&mut surface, [random.choice(), u, v]) {
+                Arrival::Ends => return Ok(Some((surface, path.throughput))),
+                Arrival::Lost | Arrival::Absorbed => return Ok(None),
+                Arrival::GoesOn => {}
+            }
+        }
+    }
+}
+
+/// Importon at the end of a path; `None` if nothing is reflected there.
+fn importon(surface: &Surface, throughput: Vec3) -> Option<Importon> {
+    let surface = surface.flat();
+    let weight = (throughput * surface.reflector().albedo()).element_sum() / 3.0;
+    (weight > 0.0 && weight.is_finite()).then(|| Importon {
+        position: surface.position,
+        normal: encode_normal(surface.normal.to_array()),
+        weight,
+    })
+}
+
+/// Cell of a grid: its coordinates, and the side of the axis that a surface's normal is nearest to.
+type Cell = ([i32; 3], u8);
+
+/// Weights of importons in cells of space and of directions of normals: photons on the other side of a wall are of no use.
+pub(crate) struct ImportonGrid {
+    /// Side of a cell, metres.
+    side: f32,
+    cells: HashMap<Cell, f64>,
+}
+
+/// Importons that a cell of the surface has on average at the least.
+const MIN_IMPORTONS: f32 = 8.0;
+/// Share of the weight of the cells that photons are aimed at.
+const AIMED_WEIGHT: f64 = 0.95;
+/// Share of the importons beyond each face of the box that the area of the surface is estimated by.
+const OUTLIERS: f32 = 0.02;
+
+impl ImportonGrid {
+    /// Grid of importons, whose cells are as wide as the areas that photons are gathered from: `share` of the surface.
+    fn new(importons: &[Importon], share: f32) -> Self {
+        let share = share.max(MIN_IMPORTONS / importons.len().max(1) as f32);
+        let side = (area(importons) * share).sqrt().max(f32::MIN_POSITIVE);
+        let mut grid = Self { side, cells: HashMap::new() };
+        for importon in importons {
+            let cell = grid.cell(importon.position, importon.normal);
+            *grid.cells.entry(cell).or_default() += f64::from(importon.weight);
+        }
+        grid
+    }
+
+    /// Use of a photon of power 1. The variance that a photon brings to the picture's pixels is the square of its power times the density of
+    /// importons around it, and the use is the square root.
+    pub(super) fn use_of(&self, photon: &Photon) -> f64 {
+        let cell = self.cell(photon.position.into(), photon.normal);
+        self.cells.get(&cell).copied().unwrap_or(0.0).sqrt()
+    }
+
+    /// Targets of photons: the cells with the greatest weights, which have most of the weight.
+    pub(super) fn targets(&self) -> Targets {
+        let mut cells: Vec<(&Cell, f64)> = self.cells.iter().map(|(cell, &weight)| (cell, weight)).collect();
+        cells.sort_by(|(a, first), (b, second)| second.total_cmp(first).then(a.cmp(b)));
+        let all: f64 = cells.iter().map(|(_, weight)| weight).sum();
+        let mut sum = 0.0;
+        let greatest = cells.into_iter().take_while(|(_, weight)| {
+            sum += weight;
+            sum - weight < AIMED_WEIGHT * all
+        });
+        Targets::boxes(greatest.map(|((place, _), _)| {
+            let lower = Vec3::from_array(place.map(|coordinate| coordinate as f32)) * self.side;
+            [lower, lower + self.side]
+        }))
+    }
+
+    /// Returns whether there are importons around a place on a surface, by the code of its normal.
+    pub(crate) fn is_used(&self, position: Vec3, normal: u8) -> bool {
+        self.cells.contains_key(&self.cell(position, normal))
+    }
+
+    fn cell(&self, position: Vec3, normal: u8) -> Cell {
+        let normal = Vec3::from(decode_normal(normal));
+        let axis = normal.abs().max_position();
+        let side = 2 * axis as u8 + u8::from(normal[axis] < 0.0);
+        // Beyond the range of integers cells are the outermost ones.
+        ((position / self.side).floor().to_array().map(|coordinate| coordinate as i32), side)
+    }
+}
+
+/// Area of the faces of the box that holds most importons, m^2.
+fn area(importons: &[Importon]) -> f32 {
+    let [x, y, z] = [0, 1, 2].map(|axis: usize| {
+        let mut places: Vec<f32> = importons.iter().map(|importon| importon.position[axis]).collect();
+        places.sort_by(f32::total_cmp);
+        let last = places.len().saturating_sub(1);
+        let outlying = (last as f32 * OUTLIERS) as usize;
+        let at = |index: usize| places.get(index).copied().unwrap_or(0.0);
+        at(last - outlying) - at(outlying)
+    });
+    2.0 * (x * y + y * z + z * x)
+}
