@@ -4,7 +4,7 @@
 //! order, as sums are in fixed point. In an order with spatial coherence, photons of one gather are still in the cache for the next
 //! (Steinhurst, Coombe, Lastra 2005, *Reordering for cache conscious photon mapping*):
 //!
-//! - *generative* reordering casts the rays of one bin of directions ([`crate::importance::DirectionTable::rays`]) for
+//! - *generative* reordering casts the rays of one bin of directions ([`crate::importance::DirectionTable::bin`]) for
 //!   all pixels of a tile before those of the next;
 //! - *deferred* reordering ([`GatherQueue`]) queues requests, and executes them by a hash of their position or along a
 //!   Hilbert curve.

@@ -12,7 +12,7 @@
 //! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | that flux, reflected | the part of the lobe that is narrower than a cell |
 //! | mixture | the mean of reflection and photon | half the lobe's albedo |
 //!
-//! Table entries are the direction bins of generative reordering as well: see [`DirectionTable::rays`].
+//! Table entries are the direction bins of generative reordering as well: see [`DirectionTable::bin`].
 
 mod hemisphere;
 mod incident;
