@@ -39,6 +39,13 @@ pub(crate) fn from_frame(normal: Vec3, x: f32, y: f32, z: f32) -> Vec3 {
     tangent * x + bitangent * y + normal * z
 }
 
+/// The vector `radius` away from an axis, at an azimuth in radians, and `height` along it, in the frame of [`tangents`].
+#[inline(always)]
+pub(crate) fn about(axis: Vec3, azimuth: f32, radius: f32, height: f32) -> Vec3 {
+    let (y, x) = libm::sincosf(azimuth);
+    from_frame(axis, radius * x, radius * y, height)
+}
+
 /// `vector / |vector|`, or zero for a zero vector.
 #[inline(always)]
 pub(crate) fn unit(vector: Vec3) -> Vec3 {

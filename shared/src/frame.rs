@@ -8,6 +8,7 @@
 //! finds the next frame after any damage. [`crate::transport`] gives the header's numbers their meaning.
 
 use heapless::Vec;
+use memchr::memchr;
 
 use crate::checksum::{Checksum, checksum};
 use crate::stuffing::{max_stuffed_bytes, stuff, unstuff};
@@ -99,8 +100,7 @@ pub fn write_frame<const N: usize>(header: &FrameHeader, payload: &[u8], wire: &
     sum.update(&header);
     sum.update(payload);
     let sum = sum.value().to_le_bytes();
-    let plain = [&header[..], payload, &sum].into_iter().flatten().copied();
-    if !stuff(plain, wire) || wire.push(0).is_err() {
+    if !stuff(&[&header, payload, &sum], wire) || wire.push(0).is_err() {
         wire.truncate(begin);
     }
 }
@@ -142,7 +142,7 @@ impl FrameReader {
             self.wire.clear();
             self.overrun = false;
         }
-        let end = bytes.iter().position(|&byte| byte == 0);
+        let end = memchr(0, bytes);
         let body = bytes.get(..end.unwrap_or(bytes.len())).unwrap_or(&[]);
         if self.wire.extend_from_slice(body).is_err() {
             self.overrun = true;

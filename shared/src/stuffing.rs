@@ -4,8 +4,6 @@
 //! follows a code byte, its length plus one. A code below 255 stands for a zero byte after its piece, but for the last
 //! piece.
 
-use core::cell::Cell;
-
 use heapless::Vec;
 
 /// Code of a piece of 254 bytes, the longest: no zero byte follows it.
@@ -16,54 +14,53 @@ pub const fn max_stuffed_bytes(plain: usize) -> usize {
     plain + plain.div_ceil(FULL as usize - 1) + (plain == 0) as usize
 }
 
-/// Appends the stuffed bytes of `plain` to `wire`. Returns whether there was room; if not, `wire` holds a part of them.
-pub fn stuff<const N: usize>(plain: impl IntoIterator<Item = u8>, wire: &mut Vec<u8, N>) -> bool {
-    let mut piece = Vec::<u8, { FULL as usize - 1 }>::new();
-    let mut is_open = true;
-    for byte in plain {
-        if !is_open {
-            is_open = true;
-            piece.clear();
-        }
-        if byte == 0 {
-            if !write_piece(&piece, wire) {
-                return false;
-            }
-            piece.clear();
-        } else if piece.push(byte).is_ok() && piece.is_full() {
-            // A full piece that ends the message has no piece after it: the next plain byte opens one.
-            is_open = false;
-            if !write_piece(&piece, wire) {
-                return false;
-            }
-        }
-    }
-    !is_open || write_piece(&piece, wire)
+/// Appends the stuffed bytes of `parts`, one after the other, to `wire`, or nothing if there is no room. Returns whether there was.
+pub fn stuff<const N: usize>(parts: &[&[u8]], wire: &mut Vec<u8, N>) -> bool {
+    let begin = wire.len();
+    let plain = parts.iter().map(|part| part.len()).sum();
+    // Always fits: at most the capacity.
+    let _ = wire.resize_default(N.min(begin + max_stuffed_bytes(plain)));
+    let written = wire.get_mut(begin..).and_then(|room| write_pieces(parts, room));
+    wire.truncate(begin + written.unwrap_or(0));
+    written.is_some()
 }
 
-fn write_piece<const N: usize>(piece: &[u8], wire: &mut Vec<u8, N>) -> bool {
-    wire.push(piece.len() as u8 + 1).is_ok() && wire.extend_from_slice(piece).is_ok()
+/// Writes the stuffed bytes to the front of `room`: their number, or `None` if there are too many.
+fn write_pieces(parts: &[&[u8]], room: &mut [u8]) -> Option<usize> {
+    let (mut code, mut place) = (0, 1);
+    for &part in parts {
+        for &byte in part {
+            // A full piece that ends the message has no piece after it: the next plain byte opens one.
+            if place - code == usize::from(FULL) {
+                code = place;
+                place += 1;
+            }
+            // Zero bytes come as they please: no branch depends on them. One is in the place of the next code.
+            *room.get_mut(place)? = byte;
+            *room.get_mut(code)? = (place - code) as u8 + u8::from(byte != 0);
+            code = if byte == 0 { place } else { code };
+            place += 1;
+        }
+    }
+    *room.get_mut(code)? = (place - code) as u8;
+    Some(place)
 }
 
 /// Decodes stuffed bytes, without the terminating zero, in place; `None` if they are not a COBS encoding.
 pub fn unstuff(wire: &mut [u8]) -> Option<&mut [u8]> {
-    let cells = Cell::from_mut(&mut *wire).as_slice_of_cells();
-    // In place: the write position stays behind the read position, as every piece is preceded by a code byte.
-    let (mut rest, mut targets) = (cells, cells.iter());
-    let (mut length, mut ends_with_zero) = (0, false);
-    while let Some((code, behind)) = rest.split_first() {
-        let code = code.get();
-        if ends_with_zero {
-            targets.next()?.set(0);
-            length += 1;
+    // Plain bytes are where they were stuffed, and a zero byte is in the place of its code. Only the code behind a full piece, for
+    // which no zero byte stands, is taken out: those before it move up.
+    let mut begin = 1;
+    let mut place = 0;
+    let mut is_zero = false;
+    while place < wire.len() {
+        let code = core::mem::take(wire.get_mut(place)?);
+        if place > 0 && !is_zero {
+            wire.get_mut(begin..=place)?.rotate_right(1);
+            begin += 1;
         }
-        let (piece, behind) = behind.split_at_checked(usize::from(code.checked_sub(1)?))?;
-        for (byte, target) in piece.iter().zip(&mut targets) {
-            target.set(byte.get());
-        }
-        length += piece.len();
-        ends_with_zero = code != FULL;
-        rest = behind;
+        is_zero = code != FULL;
+        place += usize::from(code.checked_sub(1)?) + 1;
     }
-    wire.get_mut(..length)
+    if place == wire.len() { wire.get_mut(begin.min(place)..) } else { None }
 }

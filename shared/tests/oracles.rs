@@ -5,6 +5,7 @@ use photoncard_shared::checksum::{Checksum, ImageChecksum, checksum, image_check
 use photoncard_shared::stuffing::{max_stuffed_bytes, stuff, unstuff};
 use proptest::collection::vec;
 use proptest::prelude::*;
+use proptest::sample::Index;
 
 /// Bytes with runs on both sides of a piece's 254.
 fn plain() -> impl Strategy<Value = Vec<u8>> {
@@ -13,19 +14,24 @@ fn plain() -> impl Strategy<Value = Vec<u8>> {
     prop_oneof![runs, vec(any::<u8>(), 0..600), vec(0_u8..2, 0..600)]
 }
 
-fn stuffed(plain: &[u8]) -> Vec<u8> {
+/// Bytes in two parts.
+fn cut(bytes: &[u8], at: Index) -> [&[u8]; 2] {
+    bytes.split_at(at.index(bytes.len() + 1)).into()
+}
+
+fn stuffed(parts: [&[u8]; 2]) -> Vec<u8> {
     let mut wire = heapless::Vec::<u8, 4096>::new();
-    assert!(stuff(plain.iter().copied(), &mut wire));
+    assert!(stuff(&parts, &mut wire));
     wire.to_vec()
 }
 
 proptest! {
     #[test]
-    fn stuffing_is_that_of_cobs(plain in plain()) {
+    fn stuffing_is_that_of_cobs(plain in plain(), at: Index) {
         let mut expected = vec![0; cobs::max_encoding_length(plain.len())];
         let length = cobs::encode(&plain, &mut expected);
         expected.truncate(length);
-        let mut wire = stuffed(&plain);
+        let mut wire = stuffed(cut(&plain, at));
         prop_assert_eq!(&wire, &expected);
         prop_assert!(wire.len() <= max_stuffed_bytes(plain.len()) && !wire.contains(&0));
         prop_assert_eq!(unstuff(&mut wire), Some(&mut plain.clone()[..]));
@@ -41,10 +47,10 @@ proptest! {
     }
 
     #[test]
-    fn no_room_is_told(plain in plain()) {
+    fn no_room_is_told(plain in plain(), at: Index) {
         let mut wire = heapless::Vec::<u8, 300>::new();
-        let fits = stuffed(&plain).len() <= 300;
-        prop_assert_eq!(stuff(plain.iter().copied(), &mut wire), fits);
+        let fits = stuffed(cut(&plain, at)).len() <= 300;
+        prop_assert_eq!(stuff(&cut(&plain, at), &mut wire), fits);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use core::f32::consts::PI;
 
 use glam::Vec3;
 
-use crate::vector::{from_frame, max, tangents};
+use crate::vector::{about, max, tangents};
 
 /// Rows, from the normal to the horizon.
 pub const ROWS: usize = 4;
@@ -59,8 +59,7 @@ pub(crate) fn direction_in(normal: Vec3, cell: u8, [along, across]: [f32; 2]) ->
     let sine_squared = (row as f32 + across) * (1.0 / ROWS as f32);
     let sine = libm::sqrtf(sine_squared);
     let cosine = libm::sqrtf(max(1.0 - sine_squared, 0.0));
-    let (sine_of_azimuth, cosine_of_azimuth) = libm::sincosf(azimuth);
-    from_frame(normal, sine * cosine_of_azimuth, sine * sine_of_azimuth, cosine)
+    about(normal, azimuth, sine, cosine)
 }
 
 /// Centre of a cell: azimuth, radians, and `sin^2` of the polar angle.

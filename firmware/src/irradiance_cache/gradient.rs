@@ -60,7 +60,8 @@ pub(super) fn coefficients(point: &GatherPoint, distances: &Distances) -> Coeffi
         }
         let nearer = crate::vector::min(distances.get(less), distances.get(more));
         let speed = length / nearer;
-        let way = [speed * libm::cosf(azimuth), speed * libm::sinf(azimuth)];
+        let (sine, cosine) = libm::sincosf(azimuth);
+        let way = [speed * cosine, speed * sine];
         for (cell, sign) in [(less, -1.0), (more, 1.0)] {
             if let Some(sum) = coefficients.get_mut(cell) {
                 sum[0] += sign * way[0];
@@ -101,7 +102,8 @@ pub(super) fn rotation(cell: u8) -> [f32; 2] {
     let [azimuth, sine_squared] = cell_centre(cell);
     let tangent = libm::sqrtf(sine_squared / (1.0 - sine_squared));
     // The axis about which the normal turns towards the cell is perpendicular to the cell's azimuth.
-    [-tangent * libm::sinf(azimuth), tangent * libm::cosf(azimuth)]
+    let (sine, cosine) = libm::sincosf(azimuth);
+    [-tangent * sine, tangent * cosine]
 }
 
 #[cfg(test)]

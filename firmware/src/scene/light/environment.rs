@@ -24,7 +24,8 @@ pub fn environment_coordinates(direction: Vec3) -> [f32; 2] {
 pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
     let angle = 2.0 * PI * (across - 0.5);
     let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
-    Vec3::new(sine * libm::sinf(angle), cosine, -sine * libm::cosf(angle))
+    let (x, z) = libm::sincosf(angle);
+    Vec3::new(sine * x, cosine, -sine * z)
 }
 
 /// Radiance from a direction, W/(sr m^2); zero without an environment.

@@ -17,7 +17,7 @@ use core::f32::consts::PI;
 use glam::Vec3;
 
 use super::ggx_albedo::albedo_shares;
-use crate::vector::{from_frame, max, max_component, min, mirror, unit};
+use crate::vector::{about, max, max_component, min, mirror, unit};
 
 /// Minimum of `a`: a lobe of 0.06 degrees, in which `f32` resolves the half vector.
 pub(super) const MIN_ALPHA: f32 = 1e-3;
@@ -207,8 +207,7 @@ fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) ->
     let top = normal.dot(stretched);
     let z = (1.0 - v) * (1.0 + top) - top;
     let sine = libm::sqrtf(max(1.0 - z * z, 0.0));
-    let angle = 2.0 * PI * u;
-    let cap = from_frame(normal, sine * libm::cosf(angle), sine * libm::sinf(angle), z) + stretched;
+    let cap = about(normal, 2.0 * PI * u, sine, z) + stretched;
     let cap_height = normal.dot(cap);
     unit((cap - normal * cap_height) * alpha + normal * max(cap_height, 0.0))
 }

@@ -10,7 +10,7 @@ use core::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 
-use crate::vector::{from_frame, max, max_component};
+use crate::vector::{about, max, max_component};
 
 /// A lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,8 +79,7 @@ impl PhongLobe {
     pub(super) fn direction(&self, mirror: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let cosine = libm::powf(1.0 - v, 1.0 / (self.exponent + 1.0));
         let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
-        let angle = 2.0 * PI * u;
-        from_frame(mirror, sine * libm::cosf(angle), sine * libm::sinf(angle), cosine)
+        about(mirror, 2.0 * PI * u, sine, cosine)
     }
 }
 

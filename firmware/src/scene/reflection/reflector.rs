@@ -213,7 +213,8 @@ fn cosine_direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     }
     let (radius, angle) =
         if a * a > b * b { (a, (PI / 4.0) * (b / a)) } else { (b, (PI / 2.0) - (PI / 4.0) * (a / b)) };
-    let (x, y) = (radius * libm::cosf(angle), radius * libm::sinf(angle));
+    let (sine, cosine) = libm::sincosf(angle);
+    let (x, y) = (radius * cosine, radius * sine);
     from_frame(normal, x, y, libm::sqrtf(max(1.0 - x * x - y * y, 0.0)))
 }
 

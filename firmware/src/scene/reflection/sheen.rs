@@ -12,7 +12,7 @@ use core::f32::consts::PI;
 use glam::Vec3;
 
 use super::ggx_albedo::{SIDE, interpolated};
-use crate::vector::{from_frame, max, max_component, unit};
+use crate::vector::{about, max, max_component, unit};
 
 /// Minimum roughness: a narrower lobe would reflect more light at grazing angles than arrives.
 const MIN_ROUGHNESS: f32 = 0.25;
@@ -81,8 +81,7 @@ impl SheenLobe {
     /// A direction above the surface at a point of the unit square.
     pub(super) fn direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let sine = libm::sqrtf(max(1.0 - v * v, 0.0));
-        let angle = 2.0 * PI * u;
-        from_frame(normal, sine * libm::cosf(angle), sine * libm::sinf(angle), v)
+        about(normal, 2.0 * PI * u, sine, v)
     }
 }
 
