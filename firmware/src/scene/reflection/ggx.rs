@@ -187,6 +187,7 @@ impl GgxLobe {
     }
 
     /// A direction of density `p` at a point of the unit square; it may lie below the surface.
+    #[inline(always)]
     pub(super) fn direction(&self, normal: Vec3, outgoing: Vec3, point: [f32; 2]) -> Vec3 {
         mirror(outgoing, visible_normal(normal, outgoing, self.alpha, point))
     }
@@ -199,6 +200,7 @@ impl GgxLobe {
 }
 
 /// A microfacet's normal, by the density of visible normals, at a point of the unit square.
+#[inline(always)]
 fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) -> Vec3 {
     let height = normal.dot(outgoing);
     // The ellipsoid of normals, scaled to a sphere.
