@@ -1,9 +1,10 @@
-//! Measures the ray caster in isolation: incoherent rays from surfaces that a camera sees, cosine-weighted.
+//! Measures the ray caster in isolation: rays from surfaces that a camera sees, cosine-weighted.
 //!
-//! `cargo run --release -p photoncard-tests --example rays -- SCENE [--write FOLDER] [--rays N] [--repeat N]`
+//! `cargo run --release -p photoncard-tests --example rays -- SCENE [--bundle 16] [--write FOLDER] [--rays N] [--repeat N]`
 //!
 //! Prints rays per second of one thread, to the first triangle and to any, the number of rays that meet one, the sum of the
-//! distances, and the lines that a ray reads. `--write` stores triangles and rays as little-endian `f32`, so that other
+//! distances, and the lines that a ray reads. Each ray has a place of its own, or as many as `--bundle` says, in one of 32 cells of the
+//! hemisphere; these are cast alone and in bundles. `--write` stores triangles and rays as little-endian `f32`, so that other
 //! libraries can cast the same rays: `tests/peers/rays.sh`.
 
 use std::error::Error;
@@ -13,7 +14,9 @@ use photoncard_driver::pack::PackedScene;
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_firmware::memory::{Counted, Lines, MemoryPort};
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit, is_occluded, read_surface};
+use photoncard_firmware::scene::{
+    BUNDLE_RAYS, Ray, SceneImage, Surface, are_occluded, closest_hit, closest_hits, is_occluded, read_surface,
+};
 use photoncard_shared::address::Structure;
 use photoncard_shared::image::SectionKind;
 use rustix::time::{ClockId, clock_gettime};
@@ -28,8 +31,11 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Rays from the surfaces that the camera sees, in sampled directions of reflection.
-fn bounces(scene: &Scene, packed: &PackedScene, count: u32) -> Vec<Ray> {
+/// Sides of the cells of the unit square that the directions of a place are of one of.
+const CELLS: [f32; 2] = [8.0, 4.0];
+
+/// Rays from the surfaces that the camera sees, in sampled directions of reflection: `bundle` from each place, in one cell.
+fn bounces(scene: &Scene, packed: &PackedScene, count: u32, bundle: u32) -> Vec<Ray> {
     let (image, mut memory) = packed.view();
     let camera = scene.camera(None).expect("a scene has a camera");
     let mut bounce = |i: u32| {
@@ -39,31 +45,56 @@ fn bounces(scene: &Scene, packed: &PackedScene, count: u32) -> Vec<Ray> {
         let hit = closest_hit(&image, &mut memory, &eye).expect("sound")?;
         let mut surface = Surface::NOWHERE;
         read_surface(&image, &mut memory, &eye, &hit, &|_| 0.0, &mut surface).expect("sound");
-        let sampled = surface.reflector().sample([random(i, 3), random(i, 4)])?;
-        Some(Ray::new(surface.offset_origin(), sampled.direction))
+        let cell = [0, 1].map(|axis| (random(i, 3 + axis as u32) * CELLS[axis]).floor());
+        let ray = |ray: u32| {
+            let within = [0, 1].map(|axis| (cell[axis] + random(i, 5 + 2 * ray + axis as u32)) / CELLS[axis]);
+            let sampled = surface.reflector().sample(within)?;
+            Some(Ray::new(surface.offset_origin(), sampled.direction))
+        };
+        (0..bundle).map(ray).collect::<Option<Vec<Ray>>>()
     };
     // Of the rays in shipped scenes four of five bounce; none do if the camera sees nothing.
-    (0..count * 10).filter_map(&mut bounce).take(count as usize).collect()
+    (0..count * 10).filter_map(&mut bounce).flatten().take(count as usize).collect()
 }
 
 /// Number of rays that meet a triangle, and the sum of their distances.
-fn cast_all(image: &SceneImage, memory: &mut impl MemoryPort, rays: &[Ray], is_any: bool) -> (usize, f64) {
+fn cast_all(
+    image: &SceneImage,
+    memory: &mut impl MemoryPort,
+    rays: &[Ray],
+    (is_any, is_bundled): (bool, bool),
+) -> (usize, f64) {
     let (mut hits, mut sum) = (0, 0.0);
-    for ray in rays {
-        if is_any {
-            hits += usize::from(is_occluded(image, memory, ray).expect("sound"));
-        } else if let Some(hit) = closest_hit(image, memory, ray).expect("sound") {
-            hits += 1;
-            sum += f64::from(hit.intersection.distance);
+    let mut add = |distance: f32| {
+        hits += 1;
+        sum += f64::from(distance);
+    };
+    for bundle in rays.chunks(if is_bundled { BUNDLE_RAYS } else { 1 }) {
+        match (is_any, bundle) {
+            (true, [ray]) if is_occluded(image, memory, ray).expect("sound") => add(0.0),
+            (true, [_]) => {}
+            (true, rays) => {
+                let occluded = are_occluded(image, memory, rays).expect("sound");
+                occluded.iter().filter(|&&is_occluded| is_occluded).for_each(|_| add(0.0));
+            }
+            (false, [ray]) => {
+                let hit = closest_hit(image, memory, ray).expect("sound");
+                hit.iter().for_each(|hit| add(hit.intersection.distance));
+            }
+            (false, rays) => {
+                let mut found = [None; BUNDLE_RAYS];
+                closest_hits(image, memory, rays, &mut found).expect("sound");
+                found.iter().flatten().for_each(|hit| add(hit.intersection.distance));
+            }
         }
     }
     (hits, sum)
 }
 
 /// Mean numbers of nodes and leaves that a ray reads.
-fn lines_of_a_ray(image: &SceneImage, memory: Lines, rays: &[Ray], is_any: bool) -> [f64; 2] {
+fn lines_of_a_ray(image: &SceneImage, memory: Lines, rays: &[Ray], way: (bool, bool)) -> [f64; 2] {
     let mut counted = Counted::new(memory);
-    cast_all(image, &mut counted, rays, is_any);
+    cast_all(image, &mut counted, rays, way);
     [Structure::Nodes, Structure::Triangles].map(|structure| {
         counted.traffic().sum(|_, of| of == structure).requests as f64 / rays.len().max(1) as f64
     })
@@ -81,20 +112,23 @@ fn write(folder: &Path, scene: &Scene, rays: &[Ray]) -> std::io::Result<()> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let path = arguments.next().ok_or("usage: rays SCENE [--write FOLDER] [--rays N] [--repeat N]")?;
-    let (mut folder, mut count, mut repeat): (Option<PathBuf>, u32, usize) = (None, 200_000, 5);
+    let path =
+        arguments.next().ok_or("usage: rays SCENE [--bundle N] [--write FOLDER] [--rays N] [--repeat N]")?;
+    let (mut folder, mut count, mut bundle, mut repeat): (Option<PathBuf>, u32, u32, usize) =
+        (None, 200_000, 1, 5);
     while let Some(argument) = arguments.next() {
         let value = arguments.next().ok_or_else(|| format!("{argument} needs a value"))?;
         match argument.as_str() {
             "--write" => folder = Some(value.into()),
             "--rays" => count = value.parse()?,
+            "--bundle" => bundle = value.parse()?,
             "--repeat" => repeat = value.parse()?,
             other => return Err(format!("{other} is not known").into()),
         }
     }
     let scene = gltf::load(path.as_ref())?;
     let packed = PackedScene::new(&scene)?;
-    let rays = bounces(&scene, &packed, count);
+    let rays = bounces(&scene, &packed, count, bundle);
     if let Some(folder) = folder {
         write(&folder, &scene, &rays)?;
     }
@@ -105,18 +139,22 @@ fn main() -> Result<(), Box<dyn Error>> {
         image.header.section(SectionKind::Triangles).records,
         image.header.section(SectionKind::Nodes).records
     );
-    for (name, is_any) in [("closest", false), ("any", true)] {
+    let bundled = [("closest", (false, true)), ("any", (true, true))];
+    let alone = [("closest", (false, false)), ("any", (true, false))];
+    for (name, way) in alone.into_iter().chain(bundled.into_iter().filter(|_| bundle > 1)) {
+        let (_, is_bundled) = way;
+        let program = if is_bundled { "photoncard-bundles" } else { "photoncard" };
         let mut seconds = Vec::new();
         let mut met = (0, 0.0);
         for _ in 0..repeat {
             let start = cpu_seconds();
-            met = cast_all(&image, &mut memory, &rays, is_any);
+            met = cast_all(&image, &mut memory, &rays, way);
             seconds.push(cpu_seconds() - start);
         }
         seconds.sort_by(f64::total_cmp);
-        let [nodes, leaves] = lines_of_a_ray(&image, memory, &rays, is_any);
+        let [nodes, leaves] = lines_of_a_ray(&image, memory, &rays, way);
         println!(
-            "photoncard {name}: {:.0} rays a second; {} of {} meet a triangle, sum {:.3}; {nodes:.2} nodes, {leaves:.2} leaves",
+            "{program} {name}: {:.0} rays a second; {} of {} meet a triangle, sum {:.3}; {nodes:.2} nodes, {leaves:.2} leaves",
             rays.len() as f64 / seconds.get(repeat / 2).ok_or("nothing to repeat")?,
             met.0,
             rays.len(),

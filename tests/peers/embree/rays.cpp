@@ -1,6 +1,6 @@
-// The rays of photoncard's example `rays`, cast by Embree 3 one at a time on one thread.
+// The rays of photoncard's example `rays`, cast by Embree 3 one at a time or in packets of 16 on one thread.
 //
-// rays FOLDER REPEAT fast|watertight: reads triangles and rays as the example leaves them, and prints what it prints.
+// rays FOLDER REPEAT fast|watertight 1|16: reads triangles and rays as the example leaves them, and prints what it prints.
 #include <embree3/rtcore.h>
 
 #include <algorithm>
@@ -22,9 +22,72 @@ static std::vector<float> read(const std::string &path) {
     return numbers;
 }
 
+// What rays meet.
+struct Met {
+    size_t hits = 0;
+    double sum = 0;
+};
+
+static Met cast_alone(RTCScene scene, RTCIntersectContext *context, const std::vector<float> &rays, bool is_any) {
+    Met met;
+    for (size_t i = 0; i < rays.size() / 6; ++i) {
+        const float *ray = &rays[6 * i];
+        RTCRayHit query{};
+        query.ray.org_x = ray[0], query.ray.org_y = ray[1], query.ray.org_z = ray[2];
+        query.ray.dir_x = ray[3], query.ray.dir_y = ray[4], query.ray.dir_z = ray[5];
+        query.ray.tnear = 0;
+        query.ray.tfar = INFINITY;
+        query.ray.mask = ~0u;
+        query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        if (is_any) {
+            rtcOccluded1(scene, context, &query.ray);
+            met.hits += query.ray.tfar < 0;
+        } else {
+            rtcIntersect1(scene, context, &query);
+            if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
+                met.hits += 1;
+                met.sum += query.ray.tfar;
+            }
+        }
+    }
+    return met;
+}
+
+static Met cast_packets(RTCScene scene, RTCIntersectContext *context, const std::vector<float> &rays, bool is_any) {
+    Met met;
+    for (size_t first = 0; first < rays.size() / 6; first += 16) {
+        const size_t number = std::min<size_t>(16, rays.size() / 6 - first);
+        int valid[16];
+        RTCRayHit16 query{};
+        for (size_t lane = 0; lane < 16; ++lane) {
+            valid[lane] = lane < number ? -1 : 0;
+            const float *ray = &rays[6 * (first + std::min(lane, number - 1))];
+            query.ray.org_x[lane] = ray[0], query.ray.org_y[lane] = ray[1], query.ray.org_z[lane] = ray[2];
+            query.ray.dir_x[lane] = ray[3], query.ray.dir_y[lane] = ray[4], query.ray.dir_z[lane] = ray[5];
+            query.ray.tfar[lane] = INFINITY;
+            query.ray.mask[lane] = ~0u;
+            query.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+        }
+        if (is_any) {
+            rtcOccluded16(valid, scene, context, &query.ray);
+        } else {
+            rtcIntersect16(valid, scene, context, &query);
+        }
+        for (size_t lane = 0; lane < number; ++lane) {
+            if (is_any) {
+                met.hits += query.ray.tfar[lane] < 0;
+            } else if (query.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID) {
+                met.hits += 1;
+                met.sum += query.ray.tfar[lane];
+            }
+        }
+    }
+    return met;
+}
+
 int main(int count, char **arguments) {
-    if (count != 4) {
-        std::fprintf(stderr, "usage: rays FOLDER REPEAT fast|watertight\n");
+    if (count != 5) {
+        std::fprintf(stderr, "usage: rays FOLDER REPEAT fast|watertight 1|16\n");
         return 1;
     }
     const std::string folder = arguments[1];
@@ -56,42 +119,24 @@ int main(int count, char **arguments) {
     rtcSetSceneFlags(scene, mode == "fast" ? RTC_SCENE_FLAG_NONE : RTC_SCENE_FLAG_ROBUST);
     rtcCommitScene(scene);
 
+    const bool is_packet = std::string(arguments[4]) == "16";
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    // As packets of rays of a place and a cell are.
+    context.flags = is_packet ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     const size_t number = rays.size() / 6;
     for (const bool is_any : {false, true}) {
         std::vector<double> seconds;
-        size_t hits = 0;
-        double sum = 0;
+        Met met;
         for (int round = 0; round < repeat; ++round) {
-            hits = 0;
-            sum = 0;
             const std::clock_t start = std::clock();
-            for (size_t i = 0; i < number; ++i) {
-                const float *ray = &rays[6 * i];
-                RTCRayHit query{};
-                query.ray.org_x = ray[0], query.ray.org_y = ray[1], query.ray.org_z = ray[2];
-                query.ray.dir_x = ray[3], query.ray.dir_y = ray[4], query.ray.dir_z = ray[5];
-                query.ray.tnear = 0;
-                query.ray.tfar = INFINITY;
-                query.ray.mask = ~0u;
-                query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-                if (is_any) {
-                    rtcOccluded1(scene, &context, &query.ray);
-                    hits += query.ray.tfar < 0;
-                } else {
-                    rtcIntersect1(scene, &context, &query);
-                    if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
-                        hits += 1;
-                        sum += query.ray.tfar;
-                    }
-                }
-            }
+            met = is_packet ? cast_packets(scene, &context, rays, is_any) : cast_alone(scene, &context, rays, is_any);
             seconds.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
         }
         std::sort(seconds.begin(), seconds.end());
-        std::printf("embree-%s %s: %.0f rays a second; %zu of %zu meet a triangle, sum %.3f\n", mode.c_str(),
-                    is_any ? "any" : "closest", number / seconds[seconds.size() / 2], hits, number, sum);
+        std::printf("embree-%s%s %s: %.0f rays a second; %zu of %zu meet a triangle, sum %.3f\n", mode.c_str(),
+                    is_packet ? "-packets" : "", is_any ? "any" : "closest", number / seconds[seconds.size() / 2], met.hits,
+                    number, met.sum);
     }
     rtcReleaseScene(scene);
     rtcReleaseDevice(device);
