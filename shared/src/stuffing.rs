@@ -35,7 +35,7 @@ fn write_pieces(parts: &[&[u8]], room: &mut [u8]) -> Option<usize> {
                 code = place;
                 place += 1;
             }
-            // Zero bytes come as they please: no branch depends on them. One is in the place of the next code.
+            // Zero bytes are unpredictable: no branch depends on them. One is in the place of the next code.
             *room.get_mut(place)? = byte;
             *room.get_mut(code)? = (place - code) as u8 + u8::from(byte != 0);
             code = if byte == 0 { place } else { code };
@@ -46,7 +46,7 @@ fn write_pieces(parts: &[&[u8]], room: &mut [u8]) -> Option<usize> {
     Some(place)
 }
 
-/// Decodes stuffed bytes, without the terminating zero, in place; `None` if they are not a COBS encoding.
+/// Decodes stuffed bytes, without the terminating zero, in place; `None` if they are not a COBS encoding. They must hold no zero byte.
 pub fn unstuff(wire: &mut [u8]) -> Option<&mut [u8]> {
     // Plain bytes are where they were stuffed, and a zero byte is in the place of its code. Only the code behind a full piece, for
     // which no zero byte stands, is taken out: those before it move up.
@@ -56,7 +56,10 @@ pub fn unstuff(wire: &mut [u8]) -> Option<&mut [u8]> {
     while place < wire.len() {
         let code = core::mem::take(wire.get_mut(place)?);
         if place > 0 && !is_zero {
-            wire.get_mut(begin..=place)?.rotate_right(1);
+            // Never empty, which the compiler cannot see: it would panic.
+            if let Some(moved @ [_, ..]) = wire.get_mut(begin..=place) {
+                moved.rotate_right(1);
+            }
             begin += 1;
         }
         is_zero = code != FULL;

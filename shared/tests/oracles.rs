@@ -49,8 +49,11 @@ proptest! {
     #[test]
     fn no_room_is_told(plain in plain(), at: Index) {
         let mut wire = heapless::Vec::<u8, 300>::new();
-        let fits = stuffed(cut(&plain, at)).len() <= 300;
+        let fits = 6 + stuffed(cut(&plain, at)).len() <= 300;
+        let before = b"before";
+        prop_assert!(wire.extend_from_slice(before).is_ok());
         prop_assert_eq!(stuff(&cut(&plain, at), &mut wire), fits);
+        prop_assert!(fits || wire == before[..]);
     }
 
     #[test]
