@@ -3,8 +3,8 @@
 //! `cargo run --release -p photoncard-tests --example rays -- SCENE [--bundle 16] [--write FOLDER] [--rays N] [--repeat N]`
 //!
 //! Prints rays per second of one thread, to the first triangle and to any, the number of rays that meet one, the sum of the
-//! distances, and the lines that a ray reads. Each ray has a place of its own, or as many as `--bundle` says, in one of 32 cells of the
-//! hemisphere; these are cast alone and in bundles. `--write` stores triangles and rays as little-endian `f32`, so that other
+//! distances, and the lines that a ray reads. By default each ray has a place of its own. With `--bundle 16` sixteen rays have a place and one
+//! of 32 cells of the hemisphere in common, and are cast alone and in bundles. `--write` stores triangles and rays as little-endian `f32`, so that other
 //! libraries can cast the same rays: `tests/peers/rays.sh`.
 
 use std::error::Error;
@@ -31,7 +31,7 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Sides of the cells of the unit square that the directions of a place are of one of.
+/// Numbers of cells along the axes of the unit square; the directions of a place are in one cell.
 const CELLS: [f32; 2] = [8.0, 4.0];
 
 /// Rays from the surfaces that the camera sees, in sampled directions of reflection: `bundle` from each place, in one cell.
@@ -125,6 +125,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--repeat" => repeat = value.parse()?,
             other => return Err(format!("{other} is not known").into()),
         }
+    }
+    if bundle != 1 && bundle as usize != BUNDLE_RAYS {
+        return Err(format!("--bundle is 1 or {BUNDLE_RAYS}").into());
     }
     let scene = gltf::load(path.as_ref())?;
     let packed = PackedScene::new(&scene)?;
