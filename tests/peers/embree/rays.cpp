@@ -122,7 +122,7 @@ int main(int count, char **arguments) {
     const bool is_packet = std::string(arguments[4]) == "16";
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    // As packets of rays of a place and a cell are.
+    // Packets are of rays of a place and a cell.
     context.flags = is_packet ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     const size_t number = rays.size() / 6;
     for (const bool is_any : {false, true}) {
