@@ -1,10 +1,12 @@
 //! The light tree: selection of the emitter of a shadow ray (Conty Estevez, Kulla 2018, *Importance sampling of many lights with adaptive
 //! tree splitting*; the bounds are those of Pharr, Jakob, Humphreys 2023, *Physically Based Rendering*, section 12.6.3).
 //!
-//! At each node one of up to four children is chosen by a bound of its light: power, times the greatest cosines at receiver and
-//! emitter that the child's bounding sphere and cone of normals allow, over the squared distance, which is at least the sphere's
-//! radius. A fraction [`EVEN`] of the choices is uniform, so that emitters with a low bound are not starved; a child that cannot light
-//! the receiver is excluded.
+//! At each node one of up to four children is chosen by an estimate of its light: power, times cosines at receiver and emitter, over
+//! the squared distance to the centre of the child's bounding sphere, which is at least the squared radius. Each cosine is a weighted
+//! mean of that at the centre and the greatest one that the sphere and the cone of normals allow. The greatest alone, as in the
+//! papers, is that of a few points of a large lamp or of a sky, and draws rays from emitters that are worth more. A fraction
+//! [`EVEN`] of the choices is uniform, so that emitters with a low estimate are not starved; a child whose greatest cosine is
+//! negative cannot light the receiver and is excluded.
 
 use glam::Vec3;
 use photoncard_shared::address::LINE_BYTES;
@@ -26,6 +28,10 @@ const _: () = assert!(1 << TRAIL_BITS == LIGHT_CHILDREN && TRAIL_BITS * LIGHT_TR
 
 /// Fraction of the choices at a node that is uniform.
 const EVEN: f32 = 1.0 / 64.0;
+/// Weight of the greatest cosine in that of an emitter, whose light comes from all of it: least noise in the atrium and the room.
+const EMITTER_BOUND: f32 = 1.0 / 8.0;
+/// Weight of the greatest cosine in that of a node, whose nearest emitters may be anywhere in it: least noise of 10,000 emitters.
+const NODE_BOUND: f32 = 1.0 / 2.0;
 /// Upper bound of a cosine below which a child is excluded: below 0 by more than the rounding error of cones' axes.
 const BELOW_HORIZON: f32 = -1e-3;
 
@@ -158,18 +164,18 @@ impl Choice {
     const NONE: Self = Self { options: [None; LIGHT_CHILDREN] };
 
     fn new(children: &Children, receiver: &Receiver) -> Self {
-        let bounds = children.map(|child| child.and_then(|child| Bound::new(&child, receiver)));
+        let estimates = children.map(|child| child.and_then(|child| Estimate::new(&child, receiver)));
         // Relative to the nearest child: squared distances may overflow or underflow.
-        let nearest = bounds.iter().flatten().map(|bound| bound.distance_squared);
+        let nearest = estimates.iter().flatten().map(|estimate| estimate.distance_squared);
         let nearest = nearest.fold(f32::INFINITY, crate::vector::min);
-        let weights = bounds.map(|bound| bound.map_or(0.0, |bound| bound.weight(nearest)));
+        let weights = estimates.map(|estimate| estimate.map_or(0.0, |estimate| estimate.weight(nearest)));
         let total: f32 = weights.iter().sum();
-        let count = bounds.iter().flatten().count() as f32;
+        let count = estimates.iter().flatten().count() as f32;
         let mut options = [None; LIGHT_CHILDREN];
-        for ((option, child), (bound, weight)) in
-            options.iter_mut().zip(children).zip(bounds.iter().zip(weights))
+        for ((option, child), (estimate, weight)) in
+            options.iter_mut().zip(children).zip(estimates.iter().zip(weights))
         {
-            let (Some(child), Some(_)) = (child, bound) else { continue };
+            let (Some(child), Some(_)) = (child, estimate) else { continue };
             let even = 1.0 / count;
             // Not `<= 0`: in an unsound image the sum may be NaN.
             let probability = if total > 0.0 { weight / total * (1.0 - EVEN) + even * EVEN } else { even };
@@ -197,45 +203,56 @@ impl Choice {
     }
 }
 
-/// Upper bound of a child's light at a receiver.
+/// Estimate of a child's light at a receiver.
 #[derive(Clone, Copy)]
-struct Bound {
-    /// Power times the greatest cosines at receiver and emitter.
+struct Estimate {
+    /// Power times the cosines at receiver and emitter.
     strength: f32,
     /// Squared distance to the sphere's centre, at least the squared radius, m^2.
     distance_squared: f32,
 }
 
-impl Bound {
-    /// The bound; `None` for a child that cannot light the receiver.
+impl Estimate {
+    /// The estimate; `None` for a child that cannot light the receiver.
     fn new(child: &LightChild, receiver: &Receiver) -> Option<Self> {
         let way = Vec3::from_array(child.centre) - receiver.position;
-        let distance_squared = way.length_squared();
-        let radius_squared = child.radius * child.radius;
-        let share = max(child.share, 0.0);
-        if distance_squared <= radius_squared {
-            return Some(Self { strength: share, distance_squared: radius_squared });
-        }
         let towards = unit(way);
-        let sphere = Angle::of_sine_squared(radius_squared / distance_squared);
-        let received = Angle::of_cosine(receiver.normal.dot(towards)).less(sphere).cosine;
-        let emitted = if child.cosine <= -1.0 {
-            1.0
-        } else {
-            let axis = unit(child.axis.into());
-            let cone = Angle::of_cosine(child.cosine);
-            Angle::of_cosine(-axis.dot(towards)).less(cone).less(sphere).cosine
-        };
-        if received < BELOW_HORIZON || emitted < BELOW_HORIZON {
+        let received = receiver.normal.dot(towards);
+        let shines_everywhere = child.cosine <= -1.0;
+        let emitted = if shines_everywhere { 1.0 } else { -unit(child.axis.into()).dot(towards) };
+        let (squared, radius_squared) = (way.length_squared(), child.radius * child.radius);
+        let (mut greatest_received, mut greatest_emitted) = (1.0, 1.0);
+        // From within the sphere, a point of it may be in any direction.
+        if squared > radius_squared {
+            let sphere = Angle::of_sine_squared(radius_squared / squared);
+            greatest_received = Angle::of_cosine(received).less(sphere).cosine;
+            if !shines_everywhere {
+                let cone = Angle::of_cosine(child.cosine);
+                greatest_emitted = Angle::of_cosine(emitted).less(cone).less(sphere).cosine;
+            }
+        }
+        if greatest_received < BELOW_HORIZON || greatest_emitted < BELOW_HORIZON {
             return None;
         }
-        Some(Self { strength: share * max(received, 0.0) * max(emitted, 0.0), distance_squared })
+        let bound = match child.link {
+            LightLink::Node(_) => NODE_BOUND,
+            LightLink::Emitter(_) => EMITTER_BOUND,
+        };
+        let cosines =
+            mean_cosine(received, greatest_received, bound) * mean_cosine(emitted, greatest_emitted, bound);
+        let strength = max(child.share, 0.0) * cosines;
+        Some(Self { strength, distance_squared: max(squared, radius_squared) })
     }
 
     fn weight(&self, nearest: f32) -> f32 {
         let nearness = if self.distance_squared > nearest { nearest / self.distance_squared } else { 1.0 };
         self.strength * nearness
     }
+}
+
+/// Mean of the cosine at a child's centre and the greatest one, which has the weight `bound`.
+fn mean_cosine(centre: f32, greatest: f32, bound: f32) -> f32 {
+    (1.0 - bound) * max(centre, 0.0) + bound * max(greatest, 0.0)
 }
 
 /// An angle, 0 to pi.
@@ -299,16 +316,16 @@ mod tests {
 
     #[test]
     fn what_cannot_light_a_place_is_left_out_and_nothing_else() {
-        let is_bounded = |child: LightChild| Bound::new(&child, &FLOOR).is_some();
+        let may_light = |child: LightChild| Estimate::new(&child, &FLOOR).is_some();
         let down = Vec3::NEG_Y;
-        assert!(is_bounded(child(2.0 * Vec3::Y, 0.1, down, 1.0)));
-        assert!(!is_bounded(child(2.0 * Vec3::Y, 0.1, Vec3::Y, 1.0)), "it shines away");
-        assert!(is_bounded(child(2.0 * Vec3::Y, 0.1, Vec3::Y, -1.0)), "it shines to all sides");
-        assert!(!is_bounded(child(-2.0 * Vec3::Y, 0.1, Vec3::Y, 1.0)), "it is below the horizon");
-        assert!(is_bounded(child(-2.0 * Vec3::Y, 2.1, Vec3::Y, 1.0)), "part of it may be above");
+        assert!(may_light(child(2.0 * Vec3::Y, 0.1, down, 1.0)));
+        assert!(!may_light(child(2.0 * Vec3::Y, 0.1, Vec3::Y, 1.0)), "it shines away");
+        assert!(may_light(child(2.0 * Vec3::Y, 0.1, Vec3::Y, -1.0)), "it shines to all sides");
+        assert!(!may_light(child(-2.0 * Vec3::Y, 0.1, Vec3::Y, 1.0)), "it is below the horizon");
+        assert!(may_light(child(-2.0 * Vec3::Y, 2.1, Vec3::Y, 1.0)), "part of it may be above");
         let level = Vec3::new(2.0, -0.05, 0.0);
-        assert!(is_bounded(child(level, 0.1, down, -1.0)), "its upper part is above the horizon");
-        assert!(!is_bounded(child(level, 0.01, down, -1.0)));
+        assert!(may_light(child(level, 0.1, down, -1.0)), "its upper part is above the horizon");
+        assert!(!may_light(child(level, 0.01, down, -1.0)));
     }
 
     #[test]
